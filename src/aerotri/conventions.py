@@ -1,0 +1,74 @@
+"""Frames, axes, angles and units, stated once and used everywhere; and the error that names its remedy.
+
+Object frame
+    Right-handed, metres. Inside the adjustment coordinates are reduced to a local origin.
+Camera frame
+    x right, y up, z backwards (towards the viewer). A point in front of the camera has a negative z.
+    ``X = X0 + λ·R·(x − x0, y − y0, −c)ᵀ``; the columns of R are the camera axes in the object frame.
+Rotation
+    ``omega-phi-kappa``: R = Rx(ω)·Ry(φ)·Rz(κ); ``phi-omega-kappa``: R = Ry(φ)·Rx(ω)·Rz(κ). Radians in records.
+Image coordinates
+    Millimetres from the image centre, x right, y up, in every record. Files may hold pixels: column to the right,
+    row down, (0, 0) the upper left CORNER of the upper left pixel, whose centre is therefore (0.5, 0.5).
+Systematic image error
+    ``measured = ideal + d``, d evaluated at the measured position; ``corrected = measured − d``.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+ROTATION_ORDERS = ("omega-phi-kappa", "phi-omega-kappa")
+RADIANS_PER = {"deg": np.pi / 180.0, "gon": np.pi / 200.0, "rad": 1.0}
+MGON_PER_RADIAN = 200.0e3 / np.pi
+IMAGE_UNITS = ("mm", "um", "px")
+FLIGHT_AXES = ("+x", "-x", "+y", "-y")
+
+
+class InputError(Exception):
+    """Bad input: says which file, which line, what is wrong and what to do about it.
+
+    Parameters
+    ----------
+    message : what is wrong, naming the offending value.
+    remedy : what the user can do.
+    file, line : where, when known. Lines count from 1.
+    """
+
+    def __init__(self, message: str, remedy: str = "", file: str | os.PathLike | None = None, line: int | None = None):
+        self.message, self.remedy, self.file, self.line = message, remedy, file, line
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        place = "" if self.file is None else Path(self.file).name
+        if place and self.line is not None:
+            place += f":{self.line}"
+        text = f"{place}: {self.message}" if place else self.message
+        return f"{text} — {self.remedy}" if self.remedy else text
+
+
+def mm_from_px(column_row: np.ndarray, size_px: tuple[int, int], pixel_mm: float) -> np.ndarray:
+    """Image coordinates in mm from the image centre, y up, of pixel positions (0.5 = centre of the first pixel).
+
+    Parameters
+    ----------
+    column_row : (n, 2) px.
+    size_px : columns, rows of the format.
+    pixel_mm : size of a pixel.
+
+    Returns
+    -------
+    (n, 2) mm.
+    """
+    column_row = np.asarray(column_row, dtype=float)
+    half = np.array(size_px, dtype=float) / 2.0
+    return (column_row - half) * np.array([pixel_mm, -pixel_mm])
+
+
+def px_from_mm(xy_mm: np.ndarray, size_px: tuple[int, int], pixel_mm: float) -> np.ndarray:
+    """Pixel positions (column, row) of image coordinates in mm; the inverse of `mm_from_px`."""
+    half = np.array(size_px, dtype=float) / 2.0
+    return np.asarray(xy_mm, dtype=float) / np.array([pixel_mm, -pixel_mm]) + half

@@ -1,0 +1,43 @@
+"""Brown's lens parameters in Fraser's form, a function of the measured position.
+
+[L] Δx = x̄(K1r² + K2r⁴ + K3r⁶) + P1(r² + 2x̄²) + 2P2x̄ȳ + b1x̄ + b2ȳ, Δy = ȳ(K1r² + …) + P2(r² + 2ȳ²) + 2P1x̄ȳ is a
+correction, corrected = measured + Δ, so the image error is d = −Δ. x̄, ȳ count from the principal point, which is an
+unknown of the interior orientation; the family is therefore evaluated inside the collinearity equations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerotri.observations.block import BROWN_NAMES
+
+FAMILY = "brown"
+ITEMS = BROWN_NAMES
+MARK = "L"
+CAMERA_MODEL = None
+REFERENCE = "Fraser, Digital camera self-calibration, ISPRS Journal 52 (1997); sign as in DBAT"
+
+
+def image_error(x_bar: np.ndarray, y_bar: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+    """d = −Δ at positions counted from the principal point.
+
+    Parameters
+    ----------
+    x_bar, y_bar : (n,) mm.
+    parameters : (7,) in the order of `ITEMS`.
+
+    Returns
+    -------
+    (n, 2) mm.
+    """
+    return basis(x_bar, y_bar) @ np.asarray(parameters, dtype=float)
+
+
+def basis(x_bar: np.ndarray, y_bar: np.ndarray) -> np.ndarray:
+    """(n, 2, 7) image error per unit of each parameter (K in mm⁻², mm⁻⁴, mm⁻⁶; P in mm⁻¹; b without unit)."""
+    x, y = np.asarray(x_bar, dtype=float), np.asarray(y_bar, dtype=float)
+    r2 = x * x + y * y
+    zero = np.zeros_like(x)
+    dx = [x * r2, x * r2**2, x * r2**3, r2 + 2 * x * x, 2 * x * y, x, y]
+    dy = [y * r2, y * r2**2, y * r2**3, 2 * x * y, r2 + 2 * y * y, zero, zero]
+    return -np.stack([np.stack(dx, axis=-1), np.stack(dy, axis=-1)], axis=1)

@@ -1,0 +1,92 @@
+"""The special additional parameters 42–73 of BLUH for the UltraCamD: its CCD tiles.
+
+[P] the list (Spreckels et al., Table 1); [L/D] the tile layout; [C] the numbering. Nine CCDs in 3 × 3 make the image;
+the eight around the centre may each be scaled (42–49), shifted (50–57 in x, 58–65 in y) and turned (66–73) about their
+own centres. Scale and rotation are per unit (a rotation in radians, counter-clockwise), shifts in millimetres.
+The tiles live in the sensor's native frame, x across the flight; `flight_axis` turns it into the image.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerotri.functional_model.additional_parameters.terms import Terms
+from aerotri.observations import Camera
+
+FAMILY = "ultracam_d"
+ITEMS = tuple(str(i) for i in range(42, 74))
+MARK = "P"
+CAMERA_MODEL = "ultracam_d"
+REFERENCE = "Spreckels, Schlienkamp, Jacobsen, Table 1 (42–73); tile numbering of this project, row by row"
+
+SENSOR_SIZE_PX = (11500, 7500)
+TILE_CENTRE_COLUMNS = np.array([2004.0, 5750.0, 9496.0])
+TILE_CENTRE_ROWS = np.array([1336.0, 3750.0, 6164.0])
+SEAM_COLUMNS = np.array([3877.0, 7623.0])
+SEAM_ROWS = np.array([2543.0, 4957.0])
+CENTRE_TILE = 4
+OUTER_TILES = tuple(tile for tile in range(9) if tile != CENTRE_TILE)
+
+# rows: image axes of the native axes (across, along) for each flight axis
+NATIVE_FROM_IMAGE = {
+    "+y": np.array([[1.0, 0.0], [0.0, 1.0]]),
+    "-y": np.array([[-1.0, 0.0], [0.0, -1.0]]),
+    "+x": np.array([[0.0, -1.0], [1.0, 0.0]]),
+    "-x": np.array([[0.0, 1.0], [-1.0, 0.0]]),
+}
+
+
+def native_from_image(camera: Camera) -> np.ndarray:
+    """(2, 2) rotation from image axes into the sensor's native axes (x across, y along the flight)."""
+    return NATIVE_FROM_IMAGE[camera.flight_axis or "+y"]
+
+
+def native_pixel_mm(camera: Camera) -> float:
+    """Size of a sensor pixel from the longer side of the format, so that reduced copies of an image keep the tiles."""
+    return max(camera.size_px) * camera.pixel_mm / SENSOR_SIZE_PX[0]
+
+
+def tile_centres_mm(camera: Camera) -> np.ndarray:
+    """(9, 2) centres of the tiles in native millimetres, row by row from the upper left."""
+    pixel = native_pixel_mm(camera)
+    across = (TILE_CENTRE_COLUMNS - SENSOR_SIZE_PX[0] / 2) * pixel
+    along = (SENSOR_SIZE_PX[1] / 2 - TILE_CENTRE_ROWS) * pixel
+    return np.array([(x, y) for y in along for x in across])
+
+
+def tile_of(camera: Camera, x_native: np.ndarray, y_native: np.ndarray) -> np.ndarray:
+    """(n,) number 0–8 of the tile that holds each native position, row by row from the upper left."""
+    pixel = native_pixel_mm(camera)
+    column = np.searchsorted((SEAM_COLUMNS - SENSOR_SIZE_PX[0] / 2) * pixel, x_native, side="right")
+    row = np.searchsorted((SEAM_ROWS - SENSOR_SIZE_PX[1] / 2) * pixel, -np.asarray(y_native), side="right")
+    return 3 * row + column
+
+
+def terms(camera: Camera, x: np.ndarray, y: np.ndarray) -> Terms:
+    """The four patterns of the tile each point lies in: scale, shift x, shift y, rotation.
+
+    Parameters
+    ----------
+    x, y : (n,) mm from the image centre, the measured position.
+
+    Returns
+    -------
+    Terms with 4 columns; all zero within the centre tile, which is held.
+    """
+    turn = native_from_image(camera)
+    native = np.stack([x, y], axis=-1) @ turn.T
+    tile = tile_of(camera, native[:, 0], native[:, 1])
+    acts = (tile != CENTRE_TILE).astype(float)
+    offset = (native - tile_centres_mm(camera)[tile]) * acts[:, None]
+    value = np.zeros((len(tile), 2, 4))
+    value[:, :, 0] = offset
+    value[:, 0, 1] = value[:, 1, 2] = acts
+    value[:, 0, 3], value[:, 1, 3] = -offset[:, 1], offset[:, 0]
+    partial = np.zeros((len(tile), 2, 4, 2))
+    partial[:, 0, 0, 0] = partial[:, 1, 0, 1] = acts
+    partial[:, 0, 3, 1], partial[:, 1, 3, 0] = -acts, acts
+    number = np.where(tile > CENTRE_TILE, tile - 1, np.minimum(tile, CENTRE_TILE - 1))
+    index = number[:, None] + 8 * np.arange(4)
+    value = np.einsum("ia,nak->nik", turn.T, value)
+    partial = np.einsum("ia,nakb,bj->nikj", turn.T, partial, turn)
+    return Terms(index, value, partial)

@@ -1,0 +1,258 @@
+"""A block: what was measured, as frozen records of arrays, never an object per point.
+
+Units inside the records: image coordinates mm from the image centre (x right, y up), object coordinates metres, angles
+radians. Names are arrays of str; everything else refers to them by index.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+INTERIOR_ELEMENTS = ("focal_length_mm", "x0_mm", "y0_mm")
+BROWN_NAMES = ("K1", "K2", "K3", "P1", "P2", "b1", "b2")
+LENS_NAMES = ("k1", "k2", "p1", "p2", "k3")
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of an unknown beforehand: its value, and whether it is held, observed with σ, or free."""
+
+    value: float = 0.0
+    sigma: float | None = None
+    fixed: bool = False
+
+    @property
+    def kind(self) -> str:
+        """'fixed', 'weighted' or 'free'."""
+        if self.fixed:
+            return "fixed"
+        return "free" if self.sigma is None else "weighted"
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera: format, interior orientation and lens.
+
+    Parameters
+    ----------
+    model : 'frame', 'ultracam_d' or 'dmc'.
+    size_px : columns, rows.
+    pixel_um : size of a pixel, µm.
+    interior : a `Prior` for each of focal_length_mm, x0_mm, y0_mm (principal distance and principal point, mm).
+    brown : `Prior` of Brown's parameters by name (`BROWN_NAMES`, units mm^-k); a function of the measured position.
+    lens : `Prior` of the forward lens parameters by name (`LENS_NAMES`, dimensionless); a function of the ideal
+        direction, as OpenCV, COLMAP and Bundler have it.
+    flight_axis : image axis along the flight ('+x', '-x', '+y', '-y') or None when not stated.
+    """
+
+    name: str
+    model: str
+    size_px: tuple[int, int]
+    pixel_um: float
+    interior: Mapping[str, Prior]
+    brown: Mapping[str, Prior] = field(default_factory=dict)
+    lens: Mapping[str, Prior] = field(default_factory=dict)
+    flight_axis: str | None = None
+
+    @property
+    def pixel_mm(self) -> float:
+        return self.pixel_um * 1e-3
+
+    @property
+    def focal_length_mm(self) -> float:
+        return self.interior["focal_length_mm"].value
+
+    @property
+    def principal_point_mm(self) -> tuple[float, float]:
+        return self.interior["x0_mm"].value, self.interior["y0_mm"].value
+
+    @property
+    def half_format_mm(self) -> tuple[float, float]:
+        """Half width and half height of the format, mm."""
+        return self.size_px[0] * self.pixel_mm / 2.0, self.size_px[1] * self.pixel_mm / 2.0
+
+    @property
+    def r_max_mm(self) -> float:
+        """Distance of the corners from the image centre, mm."""
+        return float(np.hypot(*self.half_format_mm))
+
+
+@dataclass(frozen=True, eq=False)
+class Images:
+    """The photographs, n of them.
+
+    Parameters
+    ----------
+    names : (n,) str.
+    camera : (n,) index into the block's cameras.
+    strip : (n,) str, '' where not named.
+    centre : (n, 3) m, start values of the projection centres, NaN where to be computed.
+    angles : (n, 3) rad, start values of ω, φ, κ, NaN where to be computed.
+    columns : grouping columns by name, each (n,) str.
+    """
+
+    names: np.ndarray
+    camera: np.ndarray
+    strip: np.ndarray
+    centre: np.ndarray
+    angles: np.ndarray
+    columns: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+@dataclass(frozen=True, eq=False)
+class ImagePoints:
+    """The rays, m of them, in the order of the input.
+
+    Parameters
+    ----------
+    image, point : (m,) index into images and into the block's point names.
+    xy : (m, 2) mm.
+    sigma : (m, 2) mm, a-priori standard deviations.
+    """
+
+    image: np.ndarray
+    point: np.ndarray
+    xy: np.ndarray
+    sigma: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.image)
+
+
+@dataclass(frozen=True, eq=False)
+class Control:
+    """Control and check points, k of them.
+
+    Parameters
+    ----------
+    point : (k,) index into the block's point names.
+    xyz : (k, 3) m, NaN where a coordinate is unknown (height-only, plan-only).
+    sigma : (k, 3) m, NaN where the coordinate is.
+    is_check : (k,) bool: a check point is never in the equations.
+    """
+
+    point: np.ndarray
+    xyz: np.ndarray
+    sigma: np.ndarray
+    is_check: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.point)
+
+    @classmethod
+    def empty(cls) -> Control:
+        return cls(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, bool))
+
+
+@dataclass(frozen=True, eq=False)
+class GnssIns:
+    """Observed antenna positions and attitudes, g of them.
+
+    Parameters
+    ----------
+    image : (g,) index.
+    xyz, sigma : (g, 3) m; NaN where not observed.
+    angles, angles_sigma : (g, 3) rad; NaN where not observed.
+    time : (g,) s; NaN where not given.
+    """
+
+    image: np.ndarray
+    xyz: np.ndarray
+    sigma: np.ndarray
+    angles: np.ndarray
+    angles_sigma: np.ndarray
+    time: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.image)
+
+
+@dataclass(frozen=True)
+class AdjustmentSettings:
+    """What `[adjustment]` of block.toml says; the meaning of every key is in the README.
+
+    Parameters
+    ----------
+    additional_parameters : (family, items) pairs, for example (('bluh', ('1', '2')), ('ultracam_d', ('42',))).
+    parameter_groups : 'camera', 'block' or a grouping column of the images.
+    datum_points : names of the points that carry an inner datum; empty = all.
+    datum_fixed : orientation elements held when datum = 'fixed': (image name, element) pairs, element one of
+        X0 Y0 Z0 omega phi kappa.
+    """
+
+    additional_parameters: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    parameter_groups: str = "camera"
+    parameter_selection: str = "off"
+    t_limit: float = 1.0
+    correlation_limit: float = 0.85
+    robust: str = "off"
+    datum: str = "control"
+    datum_points: tuple[str, ...] = ()
+    datum_fixed: tuple[tuple[str, str], ...] = ()
+    variance_components: str = "off"
+    alpha: float = 0.001
+    power: float = 0.80
+    max_iterations: int = 30
+
+
+@dataclass(frozen=True)
+class GnssSettings:
+    """What `[gnss]` says. `lever_arm_m` runs from the projection centre to the antenna, in the camera frame."""
+
+    shift: str = "strip"
+    drift: str = "off"
+    lever_arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    lever_arm_sigma_m: tuple[float, float, float] | None = None
+    time_offset: str = "off"
+
+
+@dataclass(frozen=True)
+class InsSettings:
+    """What `[ins]` says."""
+
+    boresight: str = "camera"
+    drift: str = "off"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All settings of a block that are not measurements."""
+
+    adjustment: AdjustmentSettings = AdjustmentSettings()
+    gnss: GnssSettings = GnssSettings()
+    ins: InsSettings = InsSettings()
+    image_sigma_um: float = 1.0
+    refraction: str = "off"
+    earth_curvature: str = "off"
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Everything that was measured of one block, with the settings of its adjustment.
+
+    Parameters
+    ----------
+    name : the block's name.
+    crs : 'local' or 'EPSG:…'.
+    rotation : order of the angles, see `conventions`.
+    cameras : the cameras; images refer to them by index.
+    points : (N,) str, the names of all points measured or given.
+    gnss_ins : None when nothing was observed.
+    """
+
+    name: str
+    cameras: tuple[Camera, ...]
+    images: Images
+    points: np.ndarray
+    image_points: ImagePoints
+    control: Control = field(default_factory=Control.empty)
+    gnss_ins: GnssIns | None = None
+    settings: Settings = Settings()
+    crs: str = "local"
+    rotation: str = "omega-phi-kappa"

@@ -1,0 +1,219 @@
+"""The result of an adjustment: everything a later stage, a table or a plot needs, as one frozen record of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aerotri.observations import Block
+
+RAY_STATUS = ("used", "one ray", "off", "no start value", "not finite")
+"""Status of a ray: adjusted, or why it was left out. The records hold the index into this tuple."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """How the adjustment ended.
+
+    Parameters
+    ----------
+    status : 'converged', 'not converged' or 'rank deficient'.
+    message : the status in words, naming the culprit; '' when converged.
+    sigma0 : σ̂0, dimensionless; sigma0_um : the same times the a-priori σ of an image coordinate, µm.
+    vtpv : vᵀPv with the final weights.
+    observations, unknowns, conditions, redundancy : redundancy = observations − unknowns + conditions.
+    warnings : sentences the user should read.
+    timings_s : seconds by stage.
+    """
+
+    status: str
+    message: str
+    iterations: int
+    sigma0: float
+    sigma0_um: float
+    vtpv: float
+    observations: int
+    unknowns: int
+    conditions: int
+    redundancy: int
+    warnings: tuple[str, ...] = ()
+    timings_s: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class ImageResults:
+    """Exterior orientation of the n photographs, in the block's object frame.
+
+    Parameters
+    ----------
+    centre : (n, 3) m.
+    angles : (n, 3) rad, ω, φ, κ in the block's order.
+    covariance : (n, 6, 6) of (X0, Y0, Z0, ω, φ, κ), m and rad, σ̂0² included; NaN where not available.
+    rays : (n,) rays used.
+    """
+
+    centre: np.ndarray
+    angles: np.ndarray
+    covariance: np.ndarray
+    rays: np.ndarray
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """(n, 6) m and rad."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+
+@dataclass(frozen=True, eq=False)
+class PointResults:
+    """The N object points of the block, NaN where a point could not be adjusted.
+
+    Parameters
+    ----------
+    xyz : (N, 3) m.
+    covariance : (N, 3, 3) m², σ̂0² included.
+    rays : (N,) rays used.
+    max_abs_w : (N,) largest |w| of the point's image coordinates.
+    """
+
+    xyz: np.ndarray
+    covariance: np.ndarray
+    rays: np.ndarray
+    max_abs_w: np.ndarray
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """(N, 3) m."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+
+@dataclass(frozen=True, eq=False)
+class RayResults:
+    """Residuals of the m rays in the order of `block.image_points`, NaN where a ray was not used.
+
+    Parameters
+    ----------
+    v : (m, 2) mm, adjusted minus measured, in the plane corrected for the systematic image errors.
+    r : (m, 2) redundancy numbers.
+    w : (m, 2) normalised residuals −v/(σ√r), σ a priori.
+    weight : (m,) robust factor, 1 when off.
+    status : (m,) index into `RAY_STATUS`.
+    """
+
+    v: np.ndarray
+    r: np.ndarray
+    w: np.ndarray
+    weight: np.ndarray
+    status: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class SharedParameters:
+    """Unknowns shared by many rays: interior orientation, additional parameters, GNSS shifts; s of them.
+
+    Parameters
+    ----------
+    names : (s,) str such as 'focal_length_mm', 'bluh.1', 'brown.K1', 'gnss.shift_X'.
+    groups : (s,) str, the camera, day or strip the parameter belongs to.
+    kinds : (s,) str, 'interior', 'additional' or 'gnss'.
+    marks : (s,) str, P L D C of the family, '' otherwise.
+    value : (s,); covariance : (s, s), σ̂0² included. Units: mm for interior elements, as the family states otherwise.
+    max_correlation : (s,) the largest |r| with another shared parameter, signed; max_correlation_with : (s,) its name.
+    total_correlation : (s,) B = 1 − 1/(N_ii·Q_ii) with N reduced to the shared parameters.
+    status : (s,) str, 'estimated', 'weighted', 'fixed' or 'removed'; reason : (s,) str.
+    """
+
+    names: np.ndarray
+    groups: np.ndarray
+    kinds: np.ndarray
+    marks: np.ndarray
+    value: np.ndarray
+    covariance: np.ndarray
+    max_correlation: np.ndarray
+    max_correlation_with: np.ndarray
+    total_correlation: np.ndarray
+    status: np.ndarray
+    reason: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """(s,)."""
+        return np.sqrt(np.diagonal(self.covariance))
+
+    @property
+    def t(self) -> np.ndarray:
+        """(s,) |value|/σ."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.abs(self.value) / self.sigma
+
+
+@dataclass(frozen=True, eq=False)
+class GroundPointResults:
+    """Control or check points, k of them; NaN in a coordinate that was not given.
+
+    Parameters
+    ----------
+    point : (k,) index into the block's point names.
+    difference : (k, 3) m, adjusted − given.
+    sigma : (k, 3) m of the adjusted coordinate, σ̂0 included.
+    r : (k, 3) redundancy numbers of the given coordinate (NaN for check points).
+    w : (k, 3) normalised: control −v/(σ√r); check points d/√(σ_adjusted² + σ_given²).
+    rays : (k,).
+    """
+
+    point: np.ndarray
+    difference: np.ndarray
+    sigma: np.ndarray
+    r: np.ndarray
+    w: np.ndarray
+    rays: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.point)
+
+
+@dataclass(frozen=True)
+class ObservationGroup:
+    """One group of observations: its share of the redundancy and how its residuals fit their σ.
+
+    `sigma_apriori` and `rms` in the unit of the group (µm for image points, m otherwise); `sigma_aposteriori` is
+    sigma_apriori·√(vᵀPv of the group / its redundancy).
+    """
+
+    name: str
+    count: int
+    sigma_apriori: float
+    rms: float
+    redundancy: float
+    sigma_aposteriori: float
+
+
+@dataclass(frozen=True)
+class Blunder:
+    """A suspected gross error in one image coordinate pair."""
+
+    image: str
+    point: str
+    w: float
+    estimated_mm: float
+    action: str
+
+
+@dataclass(frozen=True, eq=False)
+class AdjustedBlock:
+    """A block after its adjustment; what the later stages start from."""
+
+    block: Block
+    outcome: Outcome
+    images: ImageResults
+    points: PointResults
+    rays: RayResults
+    parameters: SharedParameters
+    control: GroundPointResults
+    check: GroundPointResults
+    groups: tuple[ObservationGroup, ...]
+    blunders: tuple[Blunder, ...] = ()
