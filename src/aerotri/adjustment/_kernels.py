@@ -1,0 +1,299 @@
+"""Kernels over object points: normal equations with the points eliminated, back substitution, covariances.
+
+All take a range of points, so that a fixed number of chunks runs in parallel threads and sums repeat bit for bit.
+Rays lie in point order and, within a point, by photograph. `rays`, `pattern`, `table` and `state` are tuples:
+
+rays    : start (P+1), image (m), lens_row (m), xy (m, 2), inv_sigma (m, 2), ap_index (m, ka), ap_value (m, 2, ka)
+pattern : pair_start (P+1), pair_block (·) block of every pair of rays of a point, first ray's photograph < second's
+table   : lens_columns (L, 15) shared parameter or −1, eo_free (n, 6) 1 or 0, turn (n, 3, 3) basis of small rotations,
+          prior_xyz, prior_weight, point_free (P, 3)
+state   : rotation (n, 3, 3), centre (n, 3), points (P, 3), interior (L, 15), shared (s)
+work    : scratch of one thread, see `scratch`
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from aerotri.functional_model._kernels import linearise_ray, predict_ray
+
+E = 6
+MIN_PIVOT = 1e-14
+NONE, HUBER = 0, 1
+
+
+@njit(cache=True, nogil=True)
+def scratch(max_rays, max_columns, n_shared):
+    """Arrays one thread needs for a point: whitened partials of its rays, their columns, and the point's own 3 × ·."""
+    return (
+        np.empty((max_rays, 2, E)),
+        np.empty((max_rays, 2, 3)),
+        np.empty((max_rays, 2, max_columns)),
+        np.empty((max_rays, 2)),
+        np.empty((max_rays, max_columns), np.int64),
+        np.empty(max_rays, np.int64),
+        np.empty(n_shared, np.int64),
+        np.full(n_shared, -1, np.int64),
+        np.empty((max_rays, 3, E)),
+        np.empty((3, n_shared)),
+        np.empty((2, 15)),
+        np.empty(2),
+    )
+
+
+@njit(cache=True, nogil=True)
+def robust_factor(error, estimator, limit):
+    """Weight factor and cost of a ray with normalised length `error`; a Huber ray costs 2·limit·e − limit² outside."""
+    if estimator == HUBER and error > limit:
+        return limit / error, 2.0 * limit * error - limit * limit
+    return 1.0, error * error
+
+
+@njit(cache=True, nogil=True)
+def linearise_point(p, rays, table, state, estimator, limit, weight, residual, work):
+    """Whitened partials and misclosures of the rays of point p into `work`; its residuals (mm) and weights out.
+
+    Returns the cost of its rays and the number of shared parameters that act on them.
+    """
+    start, image, lens_row, xy, inv_sigma, ap_index, ap_value = rays
+    lens_columns, eo_free, turn, _, _, point_free = table
+    rotation, centre, points, interior, shared = state
+    by_eo, by_pt, by_sh, whitened, columns, n_columns, union, place, _, _, by_interior, prediction = work
+    cost, n_union = 0.0, 0
+    for q in range(start[p + 1] - start[p]):
+        ray = start[p] + q
+        i, lens = image[ray], lens_row[ray]
+        linearise_ray(
+            rotation[i], centre[i], points[p], interior[lens], xy[ray, 0], xy[ray, 1], prediction, by_eo[q], by_pt[q],
+            by_interior,
+        )  # fmt: skip
+        n = 0
+        for t in range(15):
+            if lens_columns[lens, t] >= 0:
+                columns[q, n] = lens_columns[lens, t]
+                by_sh[q, 0, n], by_sh[q, 1, n] = by_interior[0, t], by_interior[1, t]
+                n += 1
+        for t in range(ap_index.shape[1]):
+            if ap_value[ray, 0, t] != 0.0 or ap_value[ray, 1, t] != 0.0:
+                columns[q, n] = ap_index[ray, t]
+                by_sh[q, 0, n], by_sh[q, 1, n] = ap_value[ray, 0, t], ap_value[ray, 1, t]
+                prediction[0] += ap_value[ray, 0, t] * shared[ap_index[ray, t]]
+                prediction[1] += ap_value[ray, 1, t] * shared[ap_index[ray, t]]
+                n += 1
+        n_columns[q] = n
+        residual[ray, 0], residual[ray, 1] = xy[ray, 0] - prediction[0], xy[ray, 1] - prediction[1]
+        ex, ey = residual[ray, 0] * inv_sigma[ray, 0], residual[ray, 1] * inv_sigma[ray, 1]
+        factor, ray_cost = robust_factor(np.sqrt(ex * ex + ey * ey), estimator, limit)
+        weight[ray] = factor
+        cost += ray_cost
+        for row in range(2):
+            f = inv_sigma[ray, row] * np.sqrt(factor)
+            whitened[q, row] = residual[ray, row] * f
+            for t in range(3):
+                by_eo[q, row, t] *= f * eo_free[i, t]
+                by_pt[q, row, t] *= f * point_free[p, t]
+            d0, d1, d2 = by_eo[q, row, 3], by_eo[q, row, 4], by_eo[q, row, 5]
+            for t in range(3):
+                turned = d0 * turn[i, 0, t] + d1 * turn[i, 1, t] + d2 * turn[i, 2, t]
+                by_eo[q, row, 3 + t] = turned * f * eo_free[i, 3 + t]
+            for t in range(n):
+                by_sh[q, row, t] *= f
+        for t in range(n):
+            column = columns[q, t]
+            if place[column] < 0:
+                place[column] = n_union
+                union[n_union] = column
+                n_union += 1
+            columns[q, t] = place[column]
+    for t in range(n_union):
+        place[union[t]] = -1
+    return cost, n_union
+
+
+@njit(cache=True, nogil=True)
+def reduce_point(p, n_rays, n_union, table, points, damping, work, lower, misclosure):
+    """Eliminate point p: `lower` = Cholesky factor L of its 3 × 3 normals, `misclosure` = L⁻¹·(right side).
+
+    The couplings L⁻¹·N_pe and L⁻¹·N_ps go into `work`. Returns the cost of the coordinates observed, and False where
+    the rays do not determine the point.
+    """
+    _, _, _, prior_xyz, prior_weight, point_free = table
+    by_eo, by_pt, by_sh, whitened, columns, n_columns, _, _, couple, couple_shared, _, _ = work
+    n = np.zeros((3, 3))
+    cost = 0.0
+    for t in range(3):
+        misclosure[t] = 0.0
+        if prior_weight[p, t] > 0.0:
+            gap = prior_xyz[p, t] - points[p, t]
+            cost += prior_weight[p, t] * gap * gap
+            n[t, t] += prior_weight[p, t] * point_free[p, t]
+            misclosure[t] += prior_weight[p, t] * gap * point_free[p, t]
+    for q in range(n_rays):
+        for row in range(2):
+            for a in range(3):
+                misclosure[a] += by_pt[q, row, a] * whitened[q, row]
+                for b in range(a + 1):
+                    n[a, b] += by_pt[q, row, a] * by_pt[q, row, b]
+    ok = True
+    for a in range(3):
+        if point_free[p, a] == 0.0:
+            n[a, a] = 1.0
+    for a in range(3):
+        n[a, a] *= 1.0 + damping
+        diagonal = n[a, a]
+        for b in range(a + 1):
+            value = n[a, b]
+            for c in range(b):
+                value -= lower[a, c] * lower[b, c]
+            if b < a:
+                lower[a, b] = value / lower[b, b]
+            else:
+                if not value > MIN_PIVOT * diagonal:
+                    ok = False
+                    value = 1.0
+                lower[a, a] = np.sqrt(value)
+    for a in range(3):
+        for c in range(a):
+            misclosure[a] -= lower[a, c] * misclosure[c]
+        misclosure[a] /= lower[a, a]
+    for t in range(n_union):
+        for a in range(3):
+            couple_shared[a, t] = 0.0
+    for q in range(n_rays):
+        for a in range(3):
+            for t in range(E):
+                couple[q, a, t] = by_pt[q, 0, a] * by_eo[q, 0, t] + by_pt[q, 1, a] * by_eo[q, 1, t]
+            for t in range(n_columns[q]):
+                couple_shared[a, columns[q, t]] += by_pt[q, 0, a] * by_sh[q, 0, t] + by_pt[q, 1, a] * by_sh[q, 1, t]
+        for t in range(E):
+            for a in range(3):
+                for c in range(a):
+                    couple[q, a, t] -= lower[a, c] * couple[q, c, t]
+                couple[q, a, t] /= lower[a, a]
+    for t in range(n_union):
+        for a in range(3):
+            for c in range(a):
+                couple_shared[a, t] -= lower[a, c] * couple_shared[c, t]
+            couple_shared[a, t] /= lower[a, a]
+    return cost, ok
+
+
+@njit(cache=True, nogil=True)
+def assemble(first, last, rays, pattern, table, state, damping, estimator, limit, sums, residual, weight, work):
+    """Reduced normal equations of points first..last, added to `sums`.
+
+    sums : blocks (nb, 6, 6), border (n, 6, s), corner (s, s), right (n, 6), right_shared (s).
+
+    Returns the cost, the part of the Newton decrement that belongs to the points, and the number of a point that its
+    rays do not determine (−1 when all are).
+    """
+    start, image = rays[0], rays[1]
+    pair_start, pair_block = pattern
+    blocks, border, corner, right, right_shared = sums
+    by_eo, by_pt, by_sh, whitened, columns, n_columns, union, _, couple, couple_shared, _, _ = work
+    lower, misclosure = np.zeros((3, 3)), np.zeros(3)
+    cost, decrement, undetermined = 0.0, 0.0, -1
+    for p in range(first, last):
+        n_rays = start[p + 1] - start[p]
+        ray_cost, n_union = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
+        prior_cost, ok = reduce_point(p, n_rays, n_union, table, state[2], damping, work, lower, misclosure)
+        if not ok:
+            undetermined = p
+        cost += ray_cost + prior_cost
+        for a in range(3):
+            decrement += misclosure[a] * misclosure[a]
+        pair = pair_start[p]
+        for q in range(n_rays):
+            i = image[start[p] + q]
+            for a in range(E):
+                value = by_eo[q, 0, a] * whitened[q, 0] + by_eo[q, 1, a] * whitened[q, 1]
+                for c in range(3):
+                    value -= couple[q, c, a] * misclosure[c]
+                right[i, a] += value
+                for b in range(E):
+                    blocks[i, a, b] += (
+                        by_eo[q, 0, a] * by_eo[q, 0, b] + by_eo[q, 1, a] * by_eo[q, 1, b]
+                        - couple[q, 0, a] * couple[q, 0, b] - couple[q, 1, a] * couple[q, 1, b]
+                        - couple[q, 2, a] * couple[q, 2, b]
+                    )  # fmt: skip
+                for t in range(n_columns[q]):
+                    border[i, a, union[columns[q, t]]] += (
+                        by_eo[q, 0, a] * by_sh[q, 0, t] + by_eo[q, 1, a] * by_sh[q, 1, t]
+                    )
+                for t in range(n_union):
+                    border[i, a, union[t]] -= (
+                        couple[q, 0, a] * couple_shared[0, t] + couple[q, 1, a] * couple_shared[1, t]
+                        + couple[q, 2, a] * couple_shared[2, t]
+                    )  # fmt: skip
+            for other in range(q + 1, n_rays):
+                block = blocks[pair_block[pair]]
+                pair += 1
+                for a in range(E):
+                    for b in range(E):
+                        block[a, b] -= (
+                            couple[q, 0, a] * couple[other, 0, b] + couple[q, 1, a] * couple[other, 1, b]
+                            + couple[q, 2, a] * couple[other, 2, b]
+                        )  # fmt: skip
+            for t in range(n_columns[q]):
+                column = union[columns[q, t]]
+                right_shared[column] += by_sh[q, 0, t] * whitened[q, 0] + by_sh[q, 1, t] * whitened[q, 1]
+                for c in range(n_columns[q]):
+                    corner[column, union[columns[q, c]]] += (
+                        by_sh[q, 0, t] * by_sh[q, 0, c] + by_sh[q, 1, t] * by_sh[q, 1, c]
+                    )
+        for t in range(n_union):
+            column = union[t]
+            for a in range(3):
+                right_shared[column] -= couple_shared[a, t] * misclosure[a]
+            for c in range(n_union):
+                corner[column, union[c]] -= (
+                    couple_shared[0, t] * couple_shared[0, c] + couple_shared[1, t] * couple_shared[1, c]
+                    + couple_shared[2, t] * couple_shared[2, c]
+                )  # fmt: skip
+    return cost, decrement, undetermined
+
+
+@njit(cache=True, nogil=True)
+def back_substitute(
+    first, last, rays, table, state, damping, estimator, limit, step, step_shared, step_points, residual, weight, work
+):
+    """Steps of the points first..last (P, 3) from those of the photographs (n, 6) and shared parameters (s)."""
+    start, image = rays[0], rays[1]
+    columns, n_columns, union, couple, couple_shared = work[4], work[5], work[6], work[8], work[9]
+    lower, d = np.zeros((3, 3)), np.zeros(3)
+    for p in range(first, last):
+        n_rays = start[p + 1] - start[p]
+        _, n_union = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
+        reduce_point(p, n_rays, n_union, table, state[2], damping, work, lower, d)
+        for q in range(n_rays):
+            i = image[start[p] + q]
+            for a in range(3):
+                for t in range(E):
+                    d[a] -= couple[q, a, t] * step[i, t]
+        for t in range(n_union):
+            for a in range(3):
+                d[a] -= couple_shared[a, t] * step_shared[union[t]]
+        for a in range(2, -1, -1):
+            for c in range(a + 1, 3):
+                d[a] -= lower[c, a] * d[c]
+            d[a] /= lower[a, a]
+            step_points[p, a] = d[a]
+
+
+@njit(cache=True, nogil=True)
+def residuals(first, last, rays, state, residual):
+    """Measured minus predicted (mm) of the rays of points first..last."""
+    start, image, lens_row, xy, _, ap_index, ap_value = rays
+    rotation, centre, points, interior, shared = state
+    prediction = np.empty(2)
+    for p in range(first, last):
+        for ray in range(start[p], start[p + 1]):
+            i = image[ray]
+            predict_ray(
+                rotation[i], centre[i], points[p], interior[lens_row[ray]], xy[ray, 0], xy[ray, 1], prediction
+            )
+            for t in range(ap_index.shape[1]):
+                prediction[0] += ap_value[ray, 0, t] * shared[ap_index[ray, t]]
+                prediction[1] += ap_value[ray, 1, t] * shared[ap_index[ray, t]]
+            residual[ray, 0], residual[ray, 1] = xy[ray, 0] - prediction[0], xy[ray, 1] - prediction[1]

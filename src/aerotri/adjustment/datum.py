@@ -1,0 +1,97 @@
+"""The datum: what fixes the frame, which directions stay free, and the inner (free network) datum.
+
+A free block may be moved, turned and scaled without changing a residual; self-calibration adds no further freedom.
+Minimal datum: the best-spread coordinates of three points are held. Inner datum: the same solution, moved by a
+similarity so that GᵀdX = 0 over the datum points, dX counted from the start values; covariances follow by the
+S-transformation [L: Baarda 1973; Teunissen 1985].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerotri.adjustment.unknowns import State, Unknowns
+from aerotri.functional_model.rotation import cross_matrix, exponential
+
+FREEDOMS = ("X", "Y", "Z", "ω", "φ", "κ", "scale")
+
+
+def spread_points(points: np.ndarray, rays: np.ndarray) -> tuple[int, int, int]:
+    """Three well-measured points far apart: the ends of the longest distance, and the one farthest off their line.
+
+    Parameters
+    ----------
+    points : (P, 3) m; rays : (P,) rays of each.
+    """
+    good = np.flatnonzero(rays >= min(3, rays.max()))
+    xyz = points[good]
+    inside = np.linalg.norm(xyz - np.median(xyz, axis=0), axis=1)
+    good, xyz = good[inside <= 4.0 * np.median(inside) + 1e-9], xyz[inside <= 4.0 * np.median(inside) + 1e-9]
+    first = int(np.argmax(np.linalg.norm(xyz - xyz.mean(axis=0), axis=1)))
+    second = int(np.argmax(np.linalg.norm(xyz - xyz[first], axis=1)))
+    line = (xyz[second] - xyz[first]) / np.linalg.norm(xyz[second] - xyz[first])
+    off = np.linalg.norm(np.cross(xyz - xyz[first], line), axis=1)
+    return int(good[first]), int(good[second]), int(good[int(np.argmax(off))])
+
+
+def minimal_coordinates(unknowns: Unknowns, state: State) -> list[tuple[int, int]]:
+    """Seven coordinates that fix the datum: (row of the point, axis) pairs.
+
+    Both ends of the longest distance, but of the second one the coordinate held last is chosen with the third point so
+    that the seven are independent: X, Y, Z of the first, X, Y, Z of the second, and of the third the axis nearest to
+    the normal of the plane of the three.
+    """
+    a, b, c = spread_points(state.points, np.diff(unknowns.rays.start))
+    normal = np.cross(state.points[b] - state.points[a], state.points[c] - state.points[a])
+    axis = int(np.argmax(np.abs(normal)))
+    return [(a, 0), (a, 1), (a, 2), (b, 0), (b, 1), (b, 2), (c, axis)]
+
+
+def motions_of_points(points: np.ndarray) -> np.ndarray:
+    """G of object points (P, 3, 7): translations, rotations about the axes of the origin, scale."""
+    g = np.zeros((len(points), 3, 7))
+    g[:, :, :3] = np.eye(3)
+    g[:, :, 3:6] = -cross_matrix(points)
+    g[:, :, 6] = points
+    return g
+
+
+def motions_of_images(centre: np.ndarray) -> np.ndarray:
+    """G of the photographs (n, 6, 7): the centre moves like a point, the attitude turns with the rotation."""
+    g = np.zeros((len(centre), 6, 7))
+    g[:, :3] = motions_of_points(centre)
+    g[:, 3:, 3:6] = np.eye(3)
+    return g
+
+
+def datum_rows(unknowns: Unknowns) -> np.ndarray:
+    """Rows of the points that carry an inner datum."""
+    wanted = unknowns.block.settings.adjustment.datum_points
+    if not wanted:
+        return np.arange(len(unknowns.points))
+    names = unknowns.block.points[unknowns.points]
+    return np.flatnonzero(np.isin(names.astype(str), np.array(wanted, dtype=str)))
+
+
+def move_to_inner(unknowns: Unknowns, state: State, reference: np.ndarray) -> State:
+    """The state moved by a similarity so that Gᵀ(X − reference) = 0 over the datum points.
+
+    Parameters
+    ----------
+    reference : (P, 3) m, local start values.
+    """
+    rows = datum_rows(unknowns)
+    for _ in range(20):
+        g = motions_of_points(state.points[rows]).reshape(-1, 7)
+        gap = (reference[rows] - state.points[rows]).ravel()
+        motion = np.linalg.lstsq(g, gap, rcond=None)[0]
+        turn, scale = exponential(motion[3:6]), 1.0 + motion[6]
+        state = State(
+            centre=scale * state.centre @ turn.T + motion[:3],
+            rotation=turn @ state.rotation,
+            points=scale * state.points @ turn.T + motion[:3],
+            shared=state.shared,
+        )
+        if np.abs(g @ motion).max() < 1e-9:
+            break
+    return state

@@ -1,0 +1,251 @@
+"""Normal equations with the object points eliminated: assembled chunk by chunk, never stored as a design matrix."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.adjustment import _covariance_kernels, _kernels
+from aerotri.adjustment.parallel import chunk_bounds, run_chunks
+from aerotri.adjustment.robust import Estimator
+from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, InverseOnPattern, Symbolic
+from aerotri.adjustment.unknowns import State, Step, Unknowns
+from aerotri.functional_model.observed_unknowns import CentreObservations, antenna_partials, predict_antennas
+
+
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """The reduced normal equations at a state.
+
+    Parameters
+    ----------
+    matrix : of photographs and shared parameters.
+    right : (6·n + s,) right side.
+    cost : Σρ of all observations (vᵀPv when not robust).
+    point_decrement : the points' part of the Newton decrement.
+    residual : (m, 2) mm, measured − predicted, in ray order; weight : (m,) robust factors.
+    undetermined : row of a point that its rays do not determine, −1 if there is none.
+    """
+
+    matrix: BorderedMatrix
+    right: np.ndarray
+    cost: float
+    point_decrement: float
+    residual: np.ndarray
+    weight: np.ndarray
+    undetermined: int
+
+
+class NormalSystem:
+    """Assembles and back-substitutes for one set of unknowns; owns the buffers and the symbolic factor.
+
+    Parameters
+    ----------
+    unknowns : what is to be found.
+    centres : observed projection centres, or None.
+    position : (n, 2) plan positions of the photographs, for the ordering.
+    """
+
+    def __init__(self, unknowns: Unknowns, centres: CentreObservations | None, position: np.ndarray):
+        self.unknowns, self.centres = unknowns, centres
+        counts = np.diff(unknowns.rays.start).astype(float)
+        self._bounds = chunk_bounds(counts * (counts + 4.0))
+        self._max_rays = int(counts.max(initial=1))
+        n, s = len(unknowns.images), len(unknowns.shared)
+        self.symbolic = Symbolic(n, unknowns.block_row, unknowns.block_col, position, s)
+        self._sums = [
+            (
+                np.empty((len(unknowns.block_row), 6, 6)),
+                np.empty((n, 6, s)),
+                np.empty((s, s)),
+                np.empty((n, 6)),
+                np.empty(s),
+            )
+            for _ in self._bounds
+        ]
+        sigma = np.array(unknowns.shared.sigma).reshape(-1)
+        self._prior_weight = np.where(np.isfinite(sigma), 1.0 / sigma**2, 0.0)
+        self._prior_value = np.array(unknowns.shared.start).reshape(-1)
+
+    @property
+    def n_shared_priors(self) -> int:
+        return int((self._prior_weight > 0.0).sum())
+
+    def _work(self):
+        u = self.unknowns
+        most = int((u.lens.columns >= 0).sum(axis=1).max(initial=0)) + u.rays.ap_index.shape[1]
+        return _kernels.scratch(self._max_rays, max(most, 1), len(u.shared))
+
+    def _table(self, state: State):
+        u = self.unknowns
+        return (
+            u.lens.columns,
+            u.eo_free.astype(float),
+            u.turn(state),
+            u.prior_xyz,
+            u.prior_weight,
+            u.point_free.astype(float),
+        )
+
+    def _state(self, state: State):
+        return (
+            np.ascontiguousarray(state.rotation),
+            state.centre,
+            state.points,
+            self.unknowns.interior(state),
+            state.shared,
+        )
+
+    def assemble(self, state: State, damping: float, estimator: Estimator) -> NormalEquations:
+        """Normal equations at `state`; `damping` λ multiplies every diagonal element by 1 + λ."""
+        u = self.unknowns
+        m = len(u.rays.image)
+        residual, weight = np.empty((m, 2)), np.empty(m)
+        rays, table, kernel_state = u.rays.as_tuple(), self._table(state), self._state(state)
+        pattern = (u.pair_start, u.pair_block)
+
+        def chunk(k: int):
+            sums = self._sums[k]
+            for array in sums:
+                array.fill(0.0)
+            first, last = self._bounds[k]
+            return _kernels.assemble(
+                first, last, rays, pattern, table, kernel_state, damping, estimator.code, estimator.limit, sums,
+                residual, weight, self._work(),
+            )  # fmt: skip
+
+        outcomes = run_chunks(chunk, len(self._bounds))
+        blocks, border, corner, right, right_shared = (
+            sum((sums[part] for sums in self._sums[1:]), self._sums[0][part].copy()) for part in range(5)
+        )
+        cost = sum(o[0] for o in outcomes)
+        cost += self._add_centres(state, blocks, border, corner, right, right_shared)
+        cost += self._add_priors(state, corner, right_shared)
+        held_image, held_column = np.nonzero(~u.eo_free)
+        blocks[held_image, held_column, held_column] = 1.0
+        diagonal = np.arange(6)
+        blocks[: len(u.images), diagonal, diagonal] *= 1.0 + damping
+        corner[np.diag_indices_from(corner)] *= 1.0 + damping
+        return NormalEquations(
+            matrix=BorderedMatrix(blocks, border, corner),
+            right=np.concatenate([right.ravel(), right_shared]),
+            cost=float(cost),
+            point_decrement=float(sum(o[1] for o in outcomes)),
+            residual=residual,
+            weight=weight,
+            undetermined=max(o[2] for o in outcomes),
+        )
+
+    def _add_priors(self, state: State, corner: np.ndarray, right_shared: np.ndarray) -> float:
+        gap = self._prior_value - state.shared
+        corner[np.diag_indices_from(corner)] += self._prior_weight
+        right_shared += self._prior_weight * gap
+        return float(np.sum(self._prior_weight * gap**2))
+
+    def _add_centres(self, state: State, blocks, border, corner, right, right_shared) -> float:
+        observed = self.centres
+        if observed is None:
+            return 0.0
+        by_image, by_shared = self.whitened_centre_partials(state)
+        gap = (observed.xyz - predict_antennas(observed, state.centre, state.rotation, state.shared)) * observed.inv_sigma
+        gap = np.where(observed.inv_sigma > 0.0, gap, 0.0)
+        np.add.at(blocks, observed.image, np.einsum("gka,gkb->gab", by_image, by_image))
+        np.add.at(right, observed.image, np.einsum("gka,gk->ga", by_image, gap))
+        np.add.at(border, observed.image, np.einsum("gka,gks->gas", by_image, by_shared))
+        corner += np.einsum("gks,gkt->st", by_shared, by_shared)
+        right_shared += np.einsum("gks,gk->s", by_shared, gap)
+        return float(np.sum(gap**2))
+
+    def whitened_centre_partials(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """(g, 3, 6) and (g, 3, s), the rows of the observed centres divided by σ."""
+        u, observed = self.unknowns, self.centres
+        if observed is None:
+            return np.zeros((0, 3, 6)), np.zeros((0, 3, len(u.shared)))
+        by_image = antenna_partials(observed, state.rotation)
+        by_image[:, :, 3:] = by_image[:, :, 3:] @ self._table(state)[2][observed.image]
+        by_image *= u.eo_free[observed.image][:, None, :] * observed.inv_sigma[:, :, None]
+        by_shared = np.zeros((len(observed), 3, len(u.shared)))
+        for columns, factor in ((observed.shift, 1.0), (observed.drift, observed.time[:, None])):
+            g, axis = np.nonzero(columns >= 0)
+            by_shared[g, axis, columns[g, axis]] += (observed.inv_sigma * factor)[g, axis]
+        return by_image, by_shared
+
+    def back_substitute(self, state: State, x: np.ndarray, damping: float, equations: NormalEquations, estimator):
+        """The full step from the solution x (6·n + s,) of the reduced equations."""
+        u = self.unknowns
+        n = 6 * len(u.images)
+        images, shared = np.ascontiguousarray(x[:n].reshape(-1, 6)), np.ascontiguousarray(x[n:])
+        points = np.empty((len(u.points), 3))
+        rays, table, kernel_state = u.rays.as_tuple(), self._table(state), self._state(state)
+
+        def chunk(k: int):
+            first, last = self._bounds[k]
+            _kernels.back_substitute(
+                first, last, rays, table, kernel_state, damping, estimator.code, estimator.limit, images, shared,
+                points, equations.residual, equations.weight, self._work(),
+            )  # fmt: skip
+
+        run_chunks(chunk, len(self._bounds))
+        return Step(images, shared, points)
+
+    def point_cofactors(self, state: State, inverse: InverseOnPattern, estimator: Estimator):
+        """Cofactors of the points (P, 3, 3) and redundancy numbers of the rays (m, 2), in the order of `unknowns`."""
+        u = self.unknowns
+        m = len(u.rays.image)
+        cofactor, redundancy = np.empty((len(u.points), 3, 3)), np.empty((m, 2))
+        residual, weight = np.empty((m, 2)), np.empty(m)
+        rays, table, kernel_state = u.rays.as_tuple(), self._table(state), self._state(state)
+        parts = (inverse.blocks, inverse.border, inverse.corner)
+
+        def chunk(k: int):
+            first, last = self._bounds[k]
+            _covariance_kernels.point_cofactors(
+                first, last, rays, (u.pair_start, u.pair_block), table, kernel_state, estimator.code, estimator.limit,
+                parts, cofactor, redundancy, residual, weight, self._work(),
+            )  # fmt: skip
+
+        run_chunks(chunk, len(self._bounds))
+        held = ~u.point_free
+        cofactor[held] = 0.0
+        np.swapaxes(cofactor, 1, 2)[held] = 0.0
+        return cofactor, redundancy
+
+    def factorise(self, equations: NormalEquations) -> Factor:
+        """Factor of the reduced matrix; valid until the next one."""
+        return self.symbolic.factorise(equations.matrix)
+
+    def solve_sides(self, state: State, factor: Factor, sides: np.ndarray, estimator: Estimator):
+        """Columns Q·b for right sides b that act on the points.
+
+        Parameters
+        ----------
+        sides : (P, 3, k).
+
+        Returns
+        -------
+        Solutions of photographs (n, 6, k), shared parameters (s, k) and points (P, 3, k).
+        """
+        u = self.unknowns
+        n, s, k = len(u.images), len(u.shared), sides.shape[2]
+        free = np.ascontiguousarray(sides * u.point_free[:, :, None])
+        residual, weight = np.empty((len(u.rays.image), 2)), np.empty(len(u.rays.image))
+        common = (u.rays.as_tuple(), self._table(state), self._state(state), estimator.code, estimator.limit, free)
+        rights = [(np.zeros((n, 6, k)), np.zeros((s, k))) for _ in self._bounds]
+
+        def reduce(c: int):
+            _covariance_kernels.reduce_point_sides(*self._bounds[c], *common, *rights[c], residual, weight, self._work())
+
+        run_chunks(reduce, len(self._bounds))
+        right = np.concatenate([sum(r[0] for r in rights).reshape(6 * n, k), sum(r[1] for r in rights)])
+        x = factor.solve(right)
+        images, shared = np.ascontiguousarray(x[: 6 * n].reshape(n, 6, k)), np.ascontiguousarray(x[6 * n :])
+        points = np.empty((len(u.points), 3, k))
+
+        def expand(c: int):
+            _covariance_kernels.expand_point_sides(
+                *self._bounds[c], *common, images, shared, points, residual, weight, self._work()
+            )
+
+        run_chunks(expand, len(self._bounds))
+        return images, shared, points * u.point_free[:, :, None]

@@ -1,0 +1,42 @@
+"""Threads, set in one place: kernels run over a fixed number of chunks, whatever the machine, so that sums repeat."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+CHUNKS = 4
+"""Pieces of every parallel sum. A constant of the program, never the number of threads: it decides the rounding."""
+
+
+def thread_count() -> int:
+    """Threads for kernels: AEROTRI_THREADS, or the processors this process may use."""
+    asked = os.environ.get("AEROTRI_THREADS", "")
+    if asked.isdigit() and int(asked) > 0:
+        return int(asked)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def chunk_bounds(work: np.ndarray, chunks: int = CHUNKS) -> list[tuple[int, int]]:
+    """Ranges of items with about equal work.
+
+    Parameters
+    ----------
+    work : (P,) cost of each item.
+    """
+    total = np.concatenate([[0.0], np.cumsum(work)])
+    cuts = np.searchsorted(total, np.linspace(0.0, total[-1], chunks + 1)[1:-1])
+    edges = [0, *(int(c) for c in cuts), len(work)]
+    return [(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]
+
+
+def run_chunks(function: Callable[[int], object], count: int) -> list:
+    """function(0), …, function(count − 1) in threads; results in order."""
+    threads = min(thread_count(), count)
+    if threads <= 1:
+        return [function(k) for k in range(count)]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(function, range(count)))

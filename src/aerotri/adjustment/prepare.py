@@ -1,0 +1,210 @@
+"""From a block to equations: which rays take part, the datum, the observed centres; what cannot be adjusted is named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.adjustment.datum import minimal_coordinates
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.start_values import start_values
+from aerotri.adjustment.unknowns import (
+    ORIENTATION_ELEMENTS,
+    StartValues,
+    State,
+    Unknowns,
+    build_unknowns,
+    hold_orientation,
+    hold_points,
+)
+from aerotri.conventions import InputError
+from aerotri.functional_model.observed_unknowns import CentreObservations
+from aerotri.observations import Block
+
+USED, ONE_RAY, OFF, NO_START, NOT_FINITE = range(5)
+"""Status of a ray; the words stand in `statistics.adjusted_block.RAY_STATUS`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A block ready to be adjusted: the system, the start state, the status of every ray, what to tell the user."""
+
+    system: NormalSystem
+    state: State
+    ray_status: np.ndarray
+    warnings: tuple[str, ...]
+
+
+def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
+    """Set up the adjustment of a block.
+
+    Parameters
+    ----------
+    given_points : (N, 3) m, start values of points where known.
+
+    Raises
+    ------
+    InputError
+        For settings this version cannot honour, and when no photograph has start values.
+    """
+    check_settings(block)
+    start = start_values(block, given_points)
+    if not np.isfinite(start.centre).all(axis=1).any():
+        raise InputError(
+            "no photograph has start values, and none sees four known points",
+            "give X0, Y0, Z0, omega, phi, kappa of some photographs in images.csv, or coordinates of more control points",
+            file="images.csv",
+        )
+    status, warnings = ray_status(block, start)
+    unknowns, state = build_unknowns(block, start, status == USED)
+    unknowns = _with_datum(unknowns, state)
+    shared_before = len(unknowns.shared)
+    centres = _centre_observations(block, unknowns)
+    if len(unknowns.shared) > shared_before:
+        state = State(state.centre, state.rotation, state.points, np.array(unknowns.shared.start))
+    system = NormalSystem(unknowns, centres, state.centre[:, :2])
+    return Prepared(system, state, status, tuple(warnings))
+
+
+def check_settings(block: Block) -> None:
+    """Refuse what is not built, rather than pass over it.
+
+    Raises
+    ------
+    InputError
+    """
+    s = block.settings
+    refused = [
+        (s.adjustment.robust not in ("off", "huber"), f'robust = "{s.adjustment.robust}"', 'use "off" or "huber"'),
+        (s.adjustment.parameter_selection != "off", "parameter_selection", 'set it to "off"'),
+        (s.adjustment.variance_components != "off", "variance_components", 'set it to "off"'),
+        (s.refraction != "off", "refraction", 'set it to "off"'),
+        (s.earth_curvature != "off", "earth_curvature", 'set it to "off"'),
+        (s.gnss.lever_arm_sigma_m is not None, "lever_arm_sigma_m", "leave it out: the lever arm is then held"),
+        (s.gnss.time_offset != "off", "time_offset", 'set it to "off"'),
+    ]
+    for wrong, what, remedy in refused:
+        if wrong:
+            raise InputError(f"{what} is not built into this version", remedy, file="block.toml")
+    if s.adjustment.datum in ("minimal", "inner") and block.gnss_ins is not None:
+        raise InputError(
+            f'datum = "{s.adjustment.datum}" together with observed projection centres is not built into this version',
+            'use datum = "control", which takes the datum from both, or remove gnss_ins.csv',
+            file="block.toml",
+        )
+    if s.adjustment.datum == "fixed" and not s.adjustment.datum_fixed:
+        raise InputError(
+            'datum = "fixed" needs the elements to hold', 'give datum_fixed = ["photo:X0", …]', file="block.toml"
+        )
+    names = set(block.images.names.tolist())
+    for image, element in s.adjustment.datum_fixed:
+        if image not in names or element not in ORIENTATION_ELEMENTS:
+            raise InputError(
+                f"datum_fixed names '{image}:{element}'",
+                f"name a photograph and one of {', '.join(ORIENTATION_ELEMENTS)}",
+                file="block.toml",
+            )
+    unknown = set(s.adjustment.datum_points) - set(block.points.tolist())
+    if unknown:
+        raise InputError(
+            f"datum_points names '{min(unknown)}', which is no point of the block", "correct the list", file="block.toml"
+        )
+
+
+def ray_status(block: Block, start: StartValues) -> tuple[np.ndarray, list[str]]:
+    """Status of every ray, and sentences about those left out.
+
+    A point needs two rays, or one ray and enough known coordinates; a photograph needs start values.
+    """
+    rays = block.image_points
+    status = np.full(len(rays), USED, dtype=np.int8)
+    status[~np.isfinite(start.centre[rays.image, 0])] = NO_START
+    known = np.zeros(len(block.points), dtype=np.int64)
+    if block.settings.adjustment.datum == "control":
+        control = ~block.control.is_check
+        known[block.control.point[control]] = np.isfinite(block.control.xyz[control]).sum(axis=1)
+    usable = status == USED
+    count = np.bincount(rays.point[usable], minlength=len(block.points))
+    weak = (2 * count + known < 4) | ((count == 1) & (known < 3))
+    status[usable & weak[rays.point]] = ONE_RAY
+    status[(status == USED) & ~np.isfinite(start.points[rays.point, 0])] = NO_START
+    warnings = []
+    photos = np.setdiff1d(np.unique(rays.image), np.unique(rays.image[status == USED]))
+    photos = np.union1d(photos, np.flatnonzero(~np.isfinite(start.centre[:, 0])))
+    no_rays = np.setdiff1d(np.arange(len(block.images)), np.unique(rays.image))
+    if len(no_rays):
+        warnings.append(f"{_some(block.images.names[no_rays], 'photograph')} without image points, left out")
+    photos = np.setdiff1d(photos, no_rays)
+    if len(photos):
+        warnings.append(f"{_some(block.images.names[photos], 'photograph')} without start values or usable points, left out")
+    for code, words in ((ONE_RAY, "measured in one photograph only"), (NO_START, "whose rays do not intersect")):
+        points = np.unique(rays.point[(status == code) & np.isfinite(start.centre[rays.image, 0])])
+        if len(points):
+            warnings.append(f"{_some(block.points[points], 'point')} {words}, left out")
+    return status, warnings
+
+
+def _some(names: np.ndarray, noun: str) -> str:
+    shown = ", ".join(str(name) for name in names[:5])
+    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
+    return f"{len(names)} {noun}{'s' if len(names) > 1 else ''} ({shown}{more})"
+
+
+def _with_datum(unknowns: Unknowns, state: State) -> Unknowns:
+    settings = unknowns.block.settings.adjustment
+    if settings.datum == "fixed":
+        return hold_orientation(unknowns, settings.datum_fixed)
+    if settings.datum in ("minimal", "inner"):
+        return hold_points(unknowns, minimal_coordinates(unknowns, state))
+    return unknowns
+
+
+def _centre_observations(block: Block, unknowns: Unknowns) -> CentreObservations | None:
+    """Observed projection centres of the photographs that take part; shifts and drifts join the shared parameters."""
+    observed = block.gnss_ins
+    if observed is None:
+        return None
+    row = np.full(len(block.images), -1)
+    row[unknowns.images] = np.arange(len(unknowns.images))
+    used = np.flatnonzero((row[observed.image] >= 0) & np.isfinite(observed.xyz).any(axis=1))
+    if not len(used):
+        return None
+    image, settings = observed.image[used], block.settings.gnss
+    known = np.isfinite(observed.xyz[used])
+    strips = np.asarray(block.images.strip, dtype=object)[image]
+    time = observed.time[used]
+    if settings.drift != "off" and not np.isfinite(time).all():
+        raise InputError(
+            "a GNSS drift needs the time of every photograph", "add the column time, or set drift = \"off\"",
+            file="gnss_ins.csv",
+        )  # fmt: skip
+    return CentreObservations(
+        image=row[image],
+        xyz=np.where(known, observed.xyz[used] - unknowns.origin, 0.0),
+        inv_sigma=np.where(known, 1.0 / observed.sigma[used], 0.0),
+        shift=_gnss_columns(unknowns, "shift", settings.shift, strips, known),
+        drift=_gnss_columns(unknowns, "drift", settings.drift, strips, known),
+        time=_since_mean(time, strips),
+        lever_arm=np.array(settings.lever_arm_m),
+    )
+
+
+def _gnss_columns(unknowns: Unknowns, what: str, per: str, strips: np.ndarray, known: np.ndarray) -> np.ndarray:
+    columns = np.full((len(strips), 3), -1, dtype=np.int64)
+    if per == "off":
+        return columns
+    groups = strips if per == "strip" else np.full(len(strips), "block", dtype=object)
+    for group in dict.fromkeys(groups.tolist()):
+        own = groups == group
+        for axis, letter in enumerate("XYZ"):
+            if known[own, axis].any():
+                columns[own, axis] = unknowns.shared.add(f"gnss.{what}_{letter}", str(group), "gnss")
+    return columns
+
+
+def _since_mean(time: np.ndarray, strips: np.ndarray) -> np.ndarray:
+    since = np.nan_to_num(time)
+    for strip in set(strips.tolist()):
+        since[strips == strip] -= since[strips == strip].mean()
+    return since

@@ -1,0 +1,176 @@
+"""Which unknowns are shared by many rays: interior orientation, additional parameters, GNSS shifts and drifts.
+
+The list made here is the border of the normal equations; `Unknowns` is the only map between it and the vector x.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.functional_model.additional_parameters import FAMILIES, ParameterSet, parameter_set
+from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
+from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, interior_row
+from aerotri.observations import Block, Camera, Prior
+from aerotri.observations.block import INTERIOR_ELEMENTS
+
+
+@dataclass
+class SharedList:
+    """The shared parameters while they are being listed, one entry each."""
+
+    names: list[str] = field(default_factory=list)
+    groups: list[str] = field(default_factory=list)
+    kinds: list[str] = field(default_factory=list)
+    marks: list[str] = field(default_factory=list)
+    start: list[float] = field(default_factory=list)
+    sigma: list[float] = field(default_factory=list)
+
+    def add(self, name: str, group: str, kind: str, mark: str = "", prior: Prior = Prior()) -> int:
+        """Append one parameter; its column."""
+        self.names.append(name)
+        self.groups.append(group)
+        self.kinds.append(kind)
+        self.marks.append(mark)
+        self.start.append(prior.value)
+        self.sigma.append(np.inf if prior.sigma is None else prior.sigma)
+        return len(self.names) - 1
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+@dataclass(frozen=True, eq=False)
+class LensTable:
+    """Interior orientation and lens of every (camera, parameter group) pair: one row each.
+
+    Parameters
+    ----------
+    base : (L, 15) start values, columns of `INTERIOR_COLUMNS`.
+    columns : (L, 15) shared parameter of each element, −1 where it is held.
+    of_image : (n,) row of every photograph.
+    """
+
+    base: np.ndarray
+    columns: np.ndarray
+    of_image: np.ndarray
+
+
+def group_of_images(block: Block) -> np.ndarray:
+    """(n,) str, the parameter group every photograph belongs to."""
+    how = block.settings.adjustment.parameter_groups
+    if how == "camera":
+        return np.array([block.cameras[c].name for c in block.images.camera], dtype=object)
+    if how == "block":
+        return np.full(len(block.images), "block", dtype=object)
+    if how == "strip":
+        return np.asarray(block.images.strip, dtype=object)
+    if how not in block.images.columns:
+        raise InputError(
+            f"parameter_groups names '{how}', images.csv has no such column",
+            "use camera, block, strip or a column of images.csv",
+            file="block.toml",
+        )
+    return np.asarray(block.images.columns[how], dtype=object)
+
+
+def lens_table(block: Block, images: np.ndarray, shared: SharedList) -> LensTable:
+    """Interior and lens unknowns of the photographs `images`, appended to `shared`.
+
+    Interior elements belong to a camera whatever the parameter groups are; brown and lens parameters to a group.
+    """
+    chosen = dict(block.settings.adjustment.additional_parameters)
+    groups = group_of_images(block)[images]
+    keys = list(zip(block.images.camera[images].tolist(), groups.tolist(), strict=True))
+    rows = {key: row for row, key in enumerate(dict.fromkeys(keys))}
+    columns = np.full((len(rows), len(INTERIOR_COLUMNS)), -1, dtype=np.int64)
+    made: dict[tuple[str, str], int] = {}
+    for (camera_index, group), row in rows.items():
+        camera = block.cameras[camera_index]
+        for column, name in enumerate(INTERIOR_COLUMNS):
+            prior = _interior_prior(camera, name, chosen)
+            if prior is None or prior.fixed:
+                continue
+            owner = camera.name if name in INTERIOR_ELEMENTS else group
+            if (name, owner) not in made:
+                family = name.partition(".")[0]
+                kind, mark = ("interior", "") if name in INTERIOR_ELEMENTS else ("additional", FAMILIES[family].MARK)
+                made[name, owner] = shared.add(name, owner, kind, mark, prior)
+            columns[row, column] = made[name, owner]
+    base = np.array([interior_row(block.cameras[camera]) for camera, _ in rows]).reshape(-1, len(INTERIOR_COLUMNS))
+    return LensTable(base, columns, np.array([rows[key] for key in keys], dtype=np.int64))
+
+
+def _interior_prior(camera: Camera, name: str, chosen: dict[str, tuple[str, ...]]) -> Prior | None:
+    """What is known of one interior column; None where it is not an unknown."""
+    if name in INTERIOR_ELEMENTS:
+        return camera.interior[name]
+    family, item = name.split(".")
+    if item not in chosen.get(family, ()):
+        return None
+    return (camera.brown if family == "brown" else camera.lens).get(item, Prior())
+
+
+@dataclass(frozen=True, eq=False)
+class LinearColumns:
+    """Columns of the linear additional parameters at every ray: index (m, k) into the shared list, value (m, 2, k)."""
+
+    index: np.ndarray
+    value: np.ndarray
+
+
+def linear_columns(
+    block: Block, images: np.ndarray, ray_image: np.ndarray, xy: np.ndarray, shared: SharedList
+) -> LinearColumns:
+    """Linear additional parameters, appended to `shared`, and their columns at the rays.
+
+    Parameters
+    ----------
+    images : (n,) photographs used; ray_image : (m,) index into `images`; xy : (m, 2) mm.
+    """
+    groups = group_of_images(block)[images]
+    cameras = block.images.camera[images]
+    parts = []
+    for family, items in block.settings.adjustment.additional_parameters:
+        if family not in LINEAR_FAMILIES:
+            continue
+        sets = _sets_by_camera(block, family, items)
+        first: dict[str, int] = {}
+        for camera, group in zip(cameras.tolist(), groups.tolist(), strict=True):
+            if camera in sets and group not in first:
+                added = [
+                    shared.add(name, group, "additional", LINEAR_FAMILIES[family].MARK) for name in sets[camera].names
+                ]
+                first[group] = added[0]
+        offset = np.array(
+            [first[g] if c in sets else 0 for c, g in zip(cameras.tolist(), groups.tolist(), strict=True)]
+        )
+        parts.append(_family_columns(sets, cameras[ray_image], offset[ray_image], xy))
+    if not parts:
+        return LinearColumns(np.zeros((len(xy), 0), np.int64), np.zeros((len(xy), 2, 0)))
+    return LinearColumns(
+        np.ascontiguousarray(np.concatenate([p.index for p in parts], axis=1)),
+        np.ascontiguousarray(np.concatenate([p.value for p in parts], axis=2)),
+    )
+
+
+def _sets_by_camera(block: Block, family: str, items: tuple[str, ...]) -> dict[int, ParameterSet]:
+    wanted = LINEAR_FAMILIES[family].CAMERA_MODEL
+    used = sorted(set(block.images.camera.tolist()))
+    fitting = [c for c in used if wanted in (None, block.cameras[c].model)]
+    # without a fitting camera let parameter_set say what is wrong
+    return {c: parameter_set(family, items, block.cameras[c]) for c in fitting or used}
+
+
+def _family_columns(sets: dict[int, ParameterSet], camera: np.ndarray, offset: np.ndarray, xy: np.ndarray):
+    pieces = {c: parameter_set_.terms(*xy[camera == c].T) for c, parameter_set_ in sets.items()}
+    width = max(piece.index.shape[1] for piece in pieces.values())
+    index, value = np.zeros((len(xy), width), np.int64), np.zeros((len(xy), 2, width))
+    for c, piece in pieces.items():
+        rays = np.flatnonzero(camera == c)
+        k = piece.index.shape[1]
+        index[rays[:, None], np.arange(k)] = piece.index + offset[rays, None]
+        value[rays[:, None, None], np.arange(2)[:, None], np.arange(k)] = piece.value
+    return LinearColumns(index, value)

@@ -1,0 +1,146 @@
+"""The adjustment: Gauss-Newton on whitened observations, damped only when a step fails.
+
+`minimise` reads as the algorithm; it knows normal equations and steps, not photographs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.robust import LEAST_SQUARES, Estimator, huber, scale_of
+from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
+from aerotri.adjustment.unknowns import State
+
+COST_TOLERANCE = 1e-9
+STEP_TOLERANCE = 1e-3
+FIRST_DAMPING, LAST_DAMPING = 1e-5, 1e12
+SCALE_TOLERANCE = 0.01
+MAX_SCALE_CHANGES = 20
+
+
+@dataclass(frozen=True)
+class SolveOptions:
+    """When to stop: after `max_iterations`, or when the next step changes no unknown by more than 0.001 of its σ.
+
+    report : called after every iteration with (iteration, cost, damping), for progress.
+    """
+
+    max_iterations: int = 30
+    robust: str = "off"
+    report: Callable[[int, float, float], None] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where `minimise` ended: values, equations and estimator there, and how it went.
+
+    status : 'converged', 'not converged' or 'rank deficient'.
+    costs : Σρ at the start and after every iteration.
+    """
+
+    status: str
+    state: State
+    equations: NormalEquations
+    estimator: Estimator
+    iterations: int
+    costs: tuple[float, ...] = field(default_factory=tuple)
+
+
+def minimise(system: NormalSystem, state: State, redundancy: int, options: SolveOptions) -> Solution:
+    """Minimise Σρ over all unknowns.
+
+    Parameters
+    ----------
+    system : assembles and solves. state : start values.
+    redundancy : of the adjustment, for σ̂0 in the stopping rule.
+
+    Returns
+    -------
+    Solution
+        Its equations are assembled, undamped, at its state.
+    """
+    estimator = LEAST_SQUARES
+    equations = system.assemble(state, 0.0, estimator)
+    if options.robust != "off":
+        estimator, equations = _rescale(system, state, equations, estimator, redundancy)
+    costs = [equations.cost]
+    damping, scale_changes = 0.0, 0
+    for iteration in range(1, options.max_iterations + 1):
+        step = _step(system, state, equations, estimator, damping)
+        while step is None or not step.improves(equations):
+            damping = max(FIRST_DAMPING, 10.0 * damping)
+            if damping > LAST_DAMPING:
+                status = "rank deficient" if step is None else "not converged"
+                return Solution(status, state, equations, estimator, iteration, tuple(costs))
+            step = _step(system, state, equations, estimator, damping)
+        settled = damping == 0.0 and _settled(equations, step, redundancy)
+        state, equations = step.state, step.equations
+        damping = 0.0 if damping <= FIRST_DAMPING else damping / 10.0
+        costs.append(equations.cost)
+        if options.report:
+            options.report(iteration, equations.cost, damping)
+        if estimator.is_robust and scale_changes < MAX_SCALE_CHANGES:
+            fresh, rescaled = _rescale(system, state, equations, estimator, redundancy)
+            if abs(fresh.limit / estimator.limit - 1.0) > SCALE_TOLERANCE:
+                estimator, equations, settled = fresh, rescaled, False
+                scale_changes += 1
+        if settled:
+            return Solution("converged", state, equations, estimator, iteration, tuple(costs))
+    return Solution("not converged", state, equations, estimator, options.max_iterations, tuple(costs))
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A step that was tried: the state it leads to, the equations there, and the decrement it promised."""
+
+    state: State
+    equations: NormalEquations
+    decrement: float
+
+    def improves(self, before: NormalEquations) -> bool:
+        # at the minimum the cost stands still within rounding
+        return np.isfinite(self.equations.cost) and self.equations.cost <= before.cost * (1.0 + COST_TOLERANCE)
+
+
+def _step(system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, damping: float):
+    """Solve for a step and go there; None where the equations are singular."""
+    damped = equations if damping == 0.0 else system.assemble(state, damping, estimator)
+    try:
+        factor = system.factorise(damped)
+    except NotPositiveDefiniteError:
+        return None
+    x = factor.solve(damped.right)
+    decrement = float(x @ damped.right) + damped.point_decrement
+    step = system.back_substitute(state, x, damping, damped, estimator)
+    if not all(np.isfinite(part).all() for part in (step.images, step.shared, step.points)):
+        return None
+    there = system.unknowns.advance(state, step)
+    return _Trial(there, system.assemble(there, 0.0, estimator), decrement)
+
+
+def _settled(equations: NormalEquations, step: _Trial, redundancy: int) -> bool:
+    """Every unknown moved by less than STEP_TOLERANCE of its σ: |dx_i|/σ_i ≤ √(dxᵀN dx)/σ̂0 for all i."""
+    variance = max(step.equations.cost, 1e-30) / max(redundancy, 1)
+    return abs(step.decrement) <= STEP_TOLERANCE**2 * variance or step.decrement <= 1e-13 * equations.cost
+
+
+def _rescale(system, state, equations, estimator, redundancy):
+    """Robust estimator for the residuals at `state`, and the equations with its weights."""
+    rays = system.unknowns.rays
+    share = redundancy / max(redundancy + system.unknowns.count, 1)
+    fresh = huber(scale_of(equations.residual, rays.inv_sigma, share))
+    if estimator.is_robust and abs(fresh.limit / estimator.limit - 1.0) <= SCALE_TOLERANCE:
+        return estimator, equations
+    return fresh, system.assemble(state, 0.0, fresh)
+
+
+def final_factor(system: NormalSystem, solution: Solution) -> Factor | None:
+    """The undamped factor at the solution, for steps and covariances; None where the matrix is singular."""
+    try:
+        return system.factorise(solution.equations)
+    except NotPositiveDefiniteError:
+        return None

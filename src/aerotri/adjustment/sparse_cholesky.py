@@ -1,0 +1,375 @@
+"""Block sparse Cholesky of the bordered reduced normal matrix, and its inverse on the same pattern.
+
+Multifrontal [L: Duff & Reid 1983; Takahashi 1973 for the inverse]: every supernode of the dissection tree is a dense
+front on BLAS. The border of shared parameters is the last supernode, so that step, covariance and correlations of all
+unknowns come from one factor. Panels and work stacks are allocated once per block and reused by every factorisation;
+a `Factor` is therefore valid until the next one of the same `Symbolic`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg.blas import dgemm, dsyrk, dtrsm
+from scipy.linalg.lapack import dpotrf, dpotri
+
+from aerotri.adjustment import _factor_kernels as _kernels
+from aerotri.adjustment.dissection import Tree, dissect
+
+B = 6
+"""Unknowns of a photograph."""
+
+PIVOT_LIMIT = 1e-13
+"""Smallest pivot, relative to a unit diagonal, that is taken for a number and not for rounding."""
+
+
+class NotPositiveDefiniteError(Exception):
+    """The matrix is singular within rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class BorderedMatrix:
+    """Symmetric matrix [[S, B], [Bᵀ, C]] of n photographs and s shared parameters.
+
+    Parameters
+    ----------
+    blocks : (nb, 6, 6) blocks of S listed in the pattern of `Symbolic` (row photograph ≤ column photograph).
+    border : (n, 6, s); corner : (s, s).
+    """
+
+    blocks: np.ndarray
+    border: np.ndarray
+    corner: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class _Front:
+    """Symbolic part of a supernode: own columns, rows below them, and where blocks and updates go.
+
+    columns, rows : scalar indices into the elimination-ordered vector.
+    n_own, n_rows : number of photographs in either.
+    block, local_row, local_col, flipped : the matrix blocks that begin here, with their places in the front.
+    place : position of each row photograph in the parent's front.
+    """
+
+    first: int
+    n_own: int
+    rows: np.ndarray
+    scalar_rows: np.ndarray
+    block: np.ndarray
+    local_row: np.ndarray
+    local_col: np.ndarray
+    flipped: np.ndarray
+    place: np.ndarray
+    parent: int
+    depth: int
+
+
+class Symbolic:
+    """Everything about the factor that depends only on which photographs share points.
+
+    Parameters
+    ----------
+    n : number of photographs.
+    block_row, block_col : (nb,) photographs of each stored block, row ≤ column; the n diagonal blocks come first.
+    position : (n, 2) plan coordinates of the projection centres.
+    n_border : number of shared parameters s.
+    """
+
+    def __init__(self, n: int, block_row: np.ndarray, block_col: np.ndarray, position: np.ndarray, n_border: int):
+        self.n, self.n_border = n, n_border
+        self.block_row, self.block_col = block_row, block_col
+        off = block_row != block_col
+        self.tree = dissect(n, np.column_stack([block_row[off], block_col[off]]), position)
+        self.rank = np.empty(n, dtype=np.int64)
+        self.rank[self.tree.order] = np.arange(n)
+        self.fronts = self._fronts(self.tree)
+        self._allocate()
+
+    @property
+    def size(self) -> int:
+        return B * self.n + self.n_border
+
+    @property
+    def factor_entries(self) -> int:
+        """Numbers stored in the factor."""
+        return len(self._panels)
+
+    @property
+    def flops(self) -> float:
+        """Multiplications of one factorisation."""
+        total = 0.0
+        for front in self.fronts:
+            c, r = B * front.n_own, len(front.scalar_rows)
+            total += c**3 / 3 + c * c * r + c * r * r
+        return total
+
+    def _fronts(self, tree: Tree) -> list[_Front]:
+        low = np.minimum(self.rank[self.block_row], self.rank[self.block_col])
+        high = np.maximum(self.rank[self.block_row], self.rank[self.block_col])
+        flipped = self.rank[self.block_row] < self.rank[self.block_col]
+        by_low = np.argsort(low, kind="stable")
+        bounds = np.searchsorted(low[by_low], tree.start)
+        border = B * self.n + np.arange(self.n_border)
+        children: list[list[int]] = [[] for _ in tree.parent]
+        below: list[np.ndarray] = []
+        fronts = []
+        for k in range(len(tree.parent)):
+            first, end = tree.start[k], tree.start[k + 1]
+            block = by_low[bounds[k] : bounds[k + 1]]
+            parts = [high[block]] + [below[child] for child in children[k]]
+            rows = np.unique(np.concatenate(parts))
+            rows = rows[rows >= end]
+            below.append(rows)
+            if tree.parent[k] >= 0:
+                children[tree.parent[k]].append(k)
+            scalar = np.concatenate([(B * rows[:, None] + np.arange(B)).ravel(), border])
+            local = np.concatenate([np.arange(first, end), rows])
+            fronts.append(
+                _Front(
+                    first=int(first),
+                    n_own=int(end - first),
+                    rows=rows,
+                    scalar_rows=scalar,
+                    block=block,
+                    local_row=np.searchsorted(local, high[block]),
+                    local_col=low[block] - first,
+                    flipped=flipped[block],
+                    place=np.zeros(0, np.int64),
+                    parent=int(tree.parent[k]),
+                    depth=int(tree.depth[k]),
+                )
+            )
+        return [self._with_place(front, fronts) for front in fronts]
+
+    @staticmethod
+    def _with_place(front: _Front, fronts: list[_Front]) -> _Front:
+        if front.parent < 0:
+            return front
+        above = fronts[front.parent]
+        local = np.concatenate([above.first + np.arange(above.n_own), above.rows])
+        return _Front(**{**front.__dict__, "place": np.searchsorted(local, front.rows)})
+
+    def _allocate(self) -> None:
+        """Panels of the factor, and one stack of update matrices for even and one for odd depths."""
+        offset, spans = 0, []
+        tops = [0, 0]
+        peaks = [0, 0]
+        live: dict[int, int] = {}
+        updates = []
+        for k, front in enumerate(self.fronts):
+            c, r = B * front.n_own, len(front.scalar_rows)
+            spans.append((offset, offset + c * c, offset + c * c + r * c))
+            offset += c * c + r * c
+            side = front.depth % 2
+            for child in [j for j in live if self.fronts[j].parent == k]:
+                tops[1 - side] -= live.pop(child)
+            updates.append(tops[side])
+            live[k] = r * r
+            tops[side] += r * r
+            peaks[side] = max(peaks[side], tops[side])
+        self._spans, self._updates = spans, updates
+        self._panels = np.empty(offset)
+        self._stacks = [np.empty(peaks[0]), np.empty(peaks[1])]
+        self._corner = np.empty((self.n_border, self.n_border), order="F")
+
+    def panel(self, k: int) -> tuple[np.ndarray, np.ndarray]:
+        """L of supernode k: its own triangle and the rows below, Fortran order."""
+        a, b, c = self._spans[k]
+        own = B * self.fronts[k].n_own
+        return (
+            self._panels[a:b].reshape(own, own, order="F"),
+            self._panels[b:c].reshape(len(self.fronts[k].scalar_rows), own, order="F"),
+        )
+
+    def update(self, k: int) -> np.ndarray:
+        """Update matrix of supernode k on its stack, Fortran order."""
+        r = len(self.fronts[k].scalar_rows)
+        begin = self._updates[k]
+        return self._stacks[self.fronts[k].depth % 2][begin : begin + r * r].reshape(r, r, order="F")
+
+    def factorise(self, matrix: BorderedMatrix) -> Factor:
+        """Cholesky factor of the matrix, scaled to a unit diagonal first.
+
+        Raises
+        ------
+        NotPositiveDefiniteError
+            When a pivot is not positive or drowns in rounding.
+        """
+        scale = self._scale(matrix)
+        by_image = np.ascontiguousarray(scale[: B * self.n].reshape(self.n, B)[self.rank])
+        by_border = scale[B * self.n :]
+        corner = self._corner
+        corner[:] = matrix.corner * by_border[:, None] * by_border[None, :]
+        children: list[list[int]] = [[] for _ in self.fronts]
+        smallest = 1.0
+        for k, front in enumerate(self.fronts):
+            top, low = self.panel(k)
+            rest = self.update(k)
+            top[:] = 0.0
+            low[:] = 0.0
+            rest[:] = 0.0
+            _kernels.scatter_blocks(
+                front.block, front.local_row, front.local_col, front.flipped, matrix.blocks, self.block_row,
+                self.block_col, by_image, top, low,
+            )  # fmt: skip
+            own = self.tree.order[front.first : front.first + front.n_own]
+            _kernels.scatter_border(own, matrix.border, by_image, by_border, B * len(front.rows), low)
+            for child in children[k]:
+                lower = self.fronts[child]
+                _kernels.extend_add(self.update(child), lower.place, front.n_own, self.n_border, top, low, rest)
+            if front.n_own:
+                smallest = min(smallest, _eliminate(top, low, rest))
+            if front.parent >= 0:
+                children[front.parent].append(k)
+            elif self.n_border:
+                corner += rest
+        if self.n_border:
+            smallest = min(smallest, _factor_triangle(corner))
+        return Factor(self, scale, smallest)
+
+    def _scale(self, matrix: BorderedMatrix) -> np.ndarray:
+        diagonal = np.concatenate(
+            [
+                np.diagonal(matrix.blocks[: self.n], axis1=1, axis2=2)[self.tree.order].ravel(),
+                np.diagonal(matrix.corner),
+            ]
+        )
+        if not np.isfinite(diagonal).all() or (diagonal <= 0.0).any():
+            raise NotPositiveDefiniteError
+        return 1.0 / np.sqrt(diagonal)
+
+
+def _factor_triangle(a: np.ndarray) -> float:
+    """Lower Cholesky in place; the smallest pivot."""
+    _, info = dpotrf(a, lower=1, clean=0, overwrite_a=1)
+    pivots = np.diagonal(a)
+    if info != 0 or not np.isfinite(pivots).all() or (pivots * pivots).min() < PIVOT_LIMIT:
+        raise NotPositiveDefiniteError
+    return float((pivots * pivots).min())
+
+
+def _eliminate(top: np.ndarray, low: np.ndarray, rest: np.ndarray) -> float:
+    """One front: L11 = chol(top), L21 = low·L11⁻ᵀ, rest −= L21·L21ᵀ, all in place."""
+    smallest = _factor_triangle(top)
+    if low.shape[0]:
+        dtrsm(1.0, top, low, side=1, lower=1, trans_a=1, overwrite_b=1)
+        dsyrk(-1.0, low, beta=1.0, c=rest, lower=1, overwrite_c=1)
+    return smallest
+
+
+@dataclass(frozen=True, eq=False)
+class InverseOnPattern:
+    """The inverse where the matrix has blocks: blocks (nb, 6, 6), border (n, 6, s), corner (s, s)."""
+
+    blocks: np.ndarray
+    border: np.ndarray
+    corner: np.ndarray
+
+
+class Factor:
+    """A factor of a `BorderedMatrix`: solves, inverts on the pattern, gives columns of the inverse.
+
+    `smallest_pivot` is relative to a unit diagonal: 1 / smallest_pivot is a lower bound of the scaled condition number.
+    """
+
+    def __init__(self, symbolic: Symbolic, scale: np.ndarray, smallest_pivot: float):
+        self._symbolic, self._scale, self.smallest_pivot = symbolic, scale, smallest_pivot
+
+    def _permutation(self) -> np.ndarray:
+        s = self._symbolic
+        images = (B * s.tree.order[:, None] + np.arange(B)).ravel()
+        return np.concatenate([images, B * s.n + np.arange(s.n_border)])
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """x with matrix·x = rhs; rhs (size,) or (size, k), the photographs' unknowns first, then the border's."""
+        s = self._symbolic
+        permutation = self._permutation()
+        flat = rhs.reshape(len(permutation), -1)
+        x = np.asfortranarray(flat[permutation] * self._scale[:, None])
+        corner = slice(B * s.n, None)
+        for k, front in enumerate(s.fronts):
+            top, low = s.panel(k)
+            if not front.n_own:
+                continue
+            own = slice(B * front.first, B * (front.first + front.n_own))
+            x[own] = dtrsm(1.0, top, x[own], lower=1)
+            if len(front.scalar_rows):
+                x[front.scalar_rows] -= low @ x[own]
+        if s.n_border:
+            x[corner] = dtrsm(1.0, s._corner, x[corner], lower=1)
+            x[corner] = dtrsm(1.0, s._corner, x[corner], lower=1, trans_a=1)
+        for k in range(len(s.fronts) - 1, -1, -1):
+            front = s.fronts[k]
+            if not front.n_own:
+                continue
+            top, low = s.panel(k)
+            own = slice(B * front.first, B * (front.first + front.n_own))
+            right = x[own] - low.T @ x[front.scalar_rows] if len(front.scalar_rows) else x[own]
+            x[own] = dtrsm(1.0, top, right, lower=1, trans_a=1)
+        out = np.empty_like(x)
+        out[permutation] = x * self._scale[:, None]
+        return out.reshape(rhs.shape)
+
+    def columns(self, indices: np.ndarray) -> np.ndarray:
+        """(size, k) columns of the inverse."""
+        unit = np.zeros((self._symbolic.size, len(indices)))
+        unit[indices, np.arange(len(indices))] = 1.0
+        return self.solve(unit)
+
+    def inverse_on_pattern(self) -> InverseOnPattern:
+        """The inverse on the pattern of the matrix, by the Takahashi recursion from the root down."""
+        s = self._symbolic
+        out = InverseOnPattern(
+            np.zeros((len(s.block_row), B, B)), np.zeros((s.n, B, s.n_border)), np.zeros((s.n_border, s.n_border))
+        )
+        if s.n_border:
+            out.corner[:] = _symmetric_from_lower(dpotri(s._corner, lower=1)[0])
+        by_image = np.ascontiguousarray(self._scale[: B * s.n].reshape(s.n, B)[s.rank])
+        by_border = self._scale[B * s.n :]
+        work: dict[int, np.ndarray] = {}
+        for k in range(len(s.fronts) - 1, -1, -1):
+            front = s.fronts[k]
+            z = self._inverse_front(k, work, out.corner)
+            work[front.depth] = z
+            own = s.tree.order[front.first : front.first + front.n_own]
+            _kernels.gather_blocks(
+                front.block, front.local_row, front.local_col, front.flipped, z, s.block_row, s.block_col, by_image,
+                out.blocks,
+            )  # fmt: skip
+            _kernels.gather_border(own, z, by_image, by_border, out.border)
+        out.corner[:] *= by_border[:, None] * by_border[None, :]
+        return out
+
+    def _inverse_front(self, k: int, work: dict[int, np.ndarray], corner: np.ndarray) -> np.ndarray:
+        """Inverse over the front's own columns and rows (full symmetric, Fortran order)."""
+        s = self._symbolic
+        front = s.fronts[k]
+        top, low = s.panel(k)
+        c, r = top.shape[0], low.shape[0]
+        z = np.empty((c + r, c + r), order="F")
+        if front.parent >= 0:
+            above = work[front.depth - 1]
+            zrr = np.empty((r, r), order="F")
+            _kernels.extract_symmetric(above, front.place, s.n_border, zrr)
+        else:
+            zrr = np.asfortranarray(corner)
+        if c == 0:
+            return zrr
+        inverse, _ = dpotri(top, lower=1)
+        zcc = _symmetric_from_lower(inverse)
+        if r:
+            y = dtrsm(1.0, top, low, side=1, lower=1)
+            zrc = dgemm(-1.0, zrr, y)
+            zcc = zcc - dgemm(1.0, y, zrc, trans_a=1)
+            z[c:, :c] = zrc
+            z[:c, c:] = zrc.T
+            z[c:, c:] = zrr
+        z[:c, :c] = 0.5 * (zcc + zcc.T)
+        return z
+
+
+def _symmetric_from_lower(a: np.ndarray) -> np.ndarray:
+    lower = np.tril(a)
+    return lower + np.tril(a, -1).T

@@ -1,0 +1,218 @@
+"""Start values: orientations that are given, spatial resection from known points, robust forward intersection.
+
+Beginning with the photographs whose orientation is given or can be resected from control points, points are intersected
+and further photographs resected from them, until nothing is added.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.adjustment.unknowns import StartValues
+from aerotri.functional_model.additional_parameters import brown, lens
+from aerotri.functional_model.collinearity import interior_row
+from aerotri.functional_model.rotation import rotation_from_angles
+from aerotri.observations import Block
+
+MIN_RESECTION_POINTS = 4
+RESECTION_TOLERANCES = (8.0, 40.0)
+"""Reprojection errors (in a-priori σ and pixels, the larger) a ray may have in a resection; the second as last resort."""
+MIN_INTERSECTION = 1e-6
+"""Smallest eigenvalue of the intersection's normal matrix per ray: sin² of half the angle, about 0.1°."""
+OPENCV_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Directions:
+    """Every ray as a direction: tangents (m, 2) in the camera, freed of known lens errors; tolerance (m,) of the same."""
+
+    tangent: np.ndarray
+    tolerance: np.ndarray
+
+
+def local_origin(block: Block) -> np.ndarray:
+    """(3,) m, whole metres near the middle of what is known in the object frame."""
+    for xyz in (block.control.xyz, None if block.gnss_ins is None else block.gnss_ins.xyz, block.images.centre):
+        if xyz is not None and np.isfinite(xyz).any():
+            known = [column[np.isfinite(column)] for column in xyz.T]
+            return np.array([np.round(column.mean()) if len(column) else 0.0 for column in known])
+    return np.zeros(3)
+
+
+def start_values(block: Block, given_points: np.ndarray | None = None) -> StartValues:
+    """Start values of photographs and points; NaN where none could be found.
+
+    Parameters
+    ----------
+    given_points : (N, 3) m, start values of points where known from elsewhere.
+    """
+    origin = local_origin(block)
+    directions = _directions(block)
+    centre = block.images.centre - origin
+    oriented = np.isfinite(centre).all(axis=1) & np.isfinite(block.images.angles).all(axis=1)
+    rotation = np.full((len(block.images), 3, 3), np.nan)
+    rotation[oriented] = rotation_from_angles(block.images.angles[oriented], block.rotation)
+    centre[~oriented] = np.nan
+    known = _full_control(block, origin)
+    points = known.copy()
+    for tolerance in RESECTION_TOLERANCES:
+        while True:
+            _intersect_into(points, block, directions, rotation, centre)
+            if not _resect_into(rotation, centre, points, block, directions, tolerance):
+                break
+            points = known.copy()
+    if given_points is not None:
+        there = np.isfinite(given_points).all(axis=1)
+        points[there] = given_points[there] - origin
+    return StartValues(origin, rotation, centre, points)
+
+
+def _full_control(block: Block, origin: np.ndarray) -> np.ndarray:
+    points = np.full((len(block.points), 3), np.nan)
+    control = block.control
+    usable = ~control.is_check & np.isfinite(control.xyz).all(axis=1)
+    if block.settings.adjustment.datum in ("control", "inner", "minimal"):
+        points[control.point[usable]] = control.xyz[usable] - origin
+    return points
+
+
+def _directions(block: Block) -> _Directions:
+    rays = block.image_points
+    tangent, tolerance = np.empty((len(rays), 2)), np.empty(len(rays))
+    camera_of_ray = block.images.camera[rays.image]
+    for index, camera in enumerate(block.cameras):
+        of_camera = camera_of_ray == index
+        row = interior_row(camera)
+        bar = rays.xy[of_camera] - row[1:3]
+        ideal = (bar - brown.image_error(bar[:, 0], bar[:, 1], row[3:10])) / row[0]
+        distorted = ideal.copy()
+        if row[10:].any():
+            for _ in range(20):
+                ideal = ideal - (lens.distort(ideal[:, 0], ideal[:, 1], row[10:]) - distorted)
+        tangent[of_camera] = ideal
+        tolerance[of_camera] = np.maximum(rays.sigma[of_camera].max(axis=1), camera.pixel_mm) / row[0]
+    return _Directions(tangent, tolerance)
+
+
+def _intersect_into(points, block: Block, directions: _Directions, rotation, centre) -> None:
+    """Intersect every point from the oriented photographs; points that cannot be keep what they have."""
+    rays = block.image_points
+    use = np.isfinite(centre[rays.image, 0])
+    image, point = rays.image[use], rays.point[use]
+    tangent = directions.tangent[use]
+    ray = np.einsum("mij,mj->mi", rotation[image], np.column_stack([tangent, -np.ones(len(tangent))]))
+    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    found = intersect(len(points), point, centre[image], ray, directions.tolerance[use])
+    there = np.isfinite(found).all(axis=1)
+    points[there] = found[there]
+
+
+def intersect(n_points: int, point: np.ndarray, centre: np.ndarray, ray: np.ndarray, tolerance: np.ndarray):
+    """Robust forward intersection: the point nearest to its rays, with re-weighting by their angular distance.
+
+    Parameters
+    ----------
+    point : (m,) which point each ray belongs to. centre : (m, 3) m. ray : (m, 3) unit vectors.
+    tolerance : (m,) rad, distance below which a ray has full weight.
+
+    Returns
+    -------
+    (n_points, 3) m, NaN where fewer than two rays meet or they meet under too small an angle or behind the camera.
+    """
+    across = np.eye(3) - ray[:, :, None] * ray[:, None, :]
+    weight = np.ones(len(point))
+    xyz = np.full((n_points, 3), np.nan)
+    if not len(point):
+        return xyz
+    count = np.bincount(point, minlength=n_points)
+    for iteration in range(6):
+        normal = _sum_by_point(weight[:, None, None] * across, point, n_points)
+        right = _sum_by_point(weight[:, None] * np.einsum("mij,mj->mi", across, centre), point, n_points)
+        total = np.bincount(point, weights=weight, minlength=n_points)
+        solvable = count >= 2
+        smallest = np.zeros(n_points)
+        smallest[solvable] = np.linalg.eigvalsh(normal[solvable])[:, 0] / total[solvable]
+        solvable &= smallest > MIN_INTERSECTION
+        xyz[:] = np.nan
+        xyz[solvable] = np.linalg.solve(normal[solvable], right[solvable][:, :, None])[:, :, 0]
+        reach = xyz[point] - centre
+        distance = np.linalg.norm(reach, axis=1)
+        with np.errstate(invalid="ignore"):
+            angle = np.linalg.norm(np.einsum("mij,mj->mi", across, reach), axis=1) / distance
+            scale = np.maximum(tolerance * 3.0, np.nanmedian(angle)) if np.isfinite(angle).any() else tolerance * 3.0
+            weight = np.where(np.isfinite(angle), 1.0 / (1.0 + (angle / scale) ** 2), 1.0) if iteration < 5 else weight
+            # rays to near points count more in metres than in angle: weigh by distance as well
+            weight = weight / np.where(np.isfinite(distance), distance, 1.0) ** 2 * np.nanmean(distance) ** 2
+    behind = np.bincount(point, weights=np.nan_to_num(np.einsum("mi,mi->m", reach, ray)) < 0.0, minlength=n_points)
+    xyz[behind > 0.5 * count] = np.nan
+    return xyz
+
+
+def _sum_by_point(values: np.ndarray, point: np.ndarray, n_points: int) -> np.ndarray:
+    flat = values.reshape(len(values), -1)
+    columns = [np.bincount(point, weights=flat[:, k], minlength=n_points) for k in range(flat.shape[1])]
+    return np.stack(columns, axis=-1).reshape(n_points, *values.shape[1:])
+
+
+def _resect_into(rotation, centre, points, block: Block, directions: _Directions, tolerance: float) -> bool:
+    """Resect photographs that see enough known points, those that see most of them first; whether any was added."""
+    rays = block.image_points
+    usable = np.isfinite(points[rays.point, 0]) & ~np.isfinite(centre[rays.image, 0])
+    rows = np.flatnonzero(usable)
+    if not len(rows):
+        return False
+    rows = rows[np.argsort(rays.image[rows], kind="stable")]
+    images, first, counts = np.unique(rays.image[rows], return_index=True, return_counts=True)
+    enough = max(MIN_RESECTION_POINTS, int(0.5 * counts.max())) if counts.max() > 12 else MIN_RESECTION_POINTS
+    added = False
+    for image, begin, count in zip(images, first, counts, strict=True):
+        if count < enough:
+            continue
+        own = rows[begin : begin + count]
+        pose = resect(points[rays.point[own]], directions.tangent[own], tolerance * float(np.median(directions.tolerance[own])))
+        if pose is not None:
+            rotation[image], centre[image] = pose
+            added = True
+    return added
+
+
+def resect(points: np.ndarray, tangent: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray] | None:
+    """Spatial resection of one photograph, robust by random sampling of minimal sets (OpenCV).
+
+    Parameters
+    ----------
+    points : (k, 3) m. tangent : (k, 2) direction tangents in the camera frame.
+    tolerance : largest reprojection error of a ray that counts as good, as a tangent.
+
+    Returns
+    -------
+    Rotation (3, 3) camera → object and centre (3,), or None where too few rays agree.
+    """
+    import cv2
+
+    shift = points.mean(axis=0)
+    scale = np.abs(points - shift).max() or 1.0
+    reduced = np.ascontiguousarray((points - shift) / scale)
+    # OpenCV's frame: y down, z forward; tolerances below 1e-4 suffer from its single-precision parts, so scale to 1000
+    focal = 1000.0
+    image = np.ascontiguousarray(tangent * [focal, -focal])
+    matrix = np.diag([focal, focal, 1.0])
+    cv2.setRNGSeed(1)
+    found, rotation_vector, translation, inliers = cv2.solvePnPRansac(
+        reduced, image, matrix, None, iterationsCount=300, reprojectionError=tolerance * focal, confidence=0.9999,
+        flags=cv2.SOLVEPNP_AP3P,
+    )  # fmt: skip
+    if not found or inliers is None or len(inliers) < max(MIN_RESECTION_POINTS, 0.4 * len(points)):
+        return None
+    good = inliers.ravel()
+    if len(good) >= 6:
+        rotation_vector, translation = cv2.solvePnPRefineLM(
+            reduced[good], image[good], matrix, None, rotation_vector, translation
+        )
+    turned, _ = cv2.Rodrigues(rotation_vector)
+    rotation = turned.T @ OPENCV_FROM_CAMERA
+    centre = -turned.T @ translation.ravel() * scale + shift
+    in_front = ((points - centre) @ rotation)[:, 2] < 0.0
+    return (rotation, centre) if in_front.mean() > 0.5 and np.isfinite(rotation).all() else None

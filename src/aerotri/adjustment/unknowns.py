@@ -1,0 +1,265 @@
+"""The unknowns of an adjustment: which there are, in which order, and how a step changes them.
+
+This is the only map between parameters and the vector x: six values a photograph (centre, small rotation about the
+object axes), then the shared parameters, then three values an object point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aerotri.adjustment import _pairs
+from aerotri.adjustment.shared_parameters import LensTable, SharedList, lens_table, linear_columns
+from aerotri.functional_model.rotation import angles_from_rotation, exponential, small_rotation_per_angle
+from aerotri.observations import Block
+
+ORIENTATION_ELEMENTS = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Values of all unknowns; coordinates count from the local origin.
+
+    Parameters
+    ----------
+    centre : (n, 3) m; rotation : (n, 3, 3); points : (P, 3) m; shared : (s,).
+    """
+
+    centre: np.ndarray
+    rotation: np.ndarray
+    points: np.ndarray
+    shared: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A change of all unknowns: images (n, 6), shared (s,), points (P, 3)."""
+
+    images: np.ndarray
+    shared: np.ndarray
+    points: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """Rays in point order and, within a point, by photograph; see `_kernels`. `source` is their row in the block."""
+
+    start: np.ndarray
+    image: np.ndarray
+    lens_row: np.ndarray
+    xy: np.ndarray
+    inv_sigma: np.ndarray
+    ap_index: np.ndarray
+    ap_value: np.ndarray
+    source: np.ndarray
+
+    def as_tuple(self):
+        return (
+            self.start, self.image, self.lens_row, self.xy, self.inv_sigma, self.ap_index, self.ap_value,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """The unknowns of one adjustment.
+
+    Parameters
+    ----------
+    block : the block.
+    images : (n,), points : (P,) rows of the block that take part.
+    origin : (3,) m, the local origin.
+    rays : the rays that take part.
+    lens : interior orientation rows.
+    shared : the shared parameters.
+    eo_free : (n, 6) bool, point_free : (P, 3) bool: False where a value is held.
+    by_angles : (n,) bool: small rotations run along ω, φ, κ, so that single angles can be held.
+    prior_xyz, prior_weight : (P, 3) observed coordinates (local, m) and 1/σ², 0 where not observed.
+    pair_start, pair_block, block_row, block_col : pattern of the reduced normal matrix.
+    """
+
+    block: Block
+    images: np.ndarray
+    points: np.ndarray
+    origin: np.ndarray
+    rays: Rays
+    lens: LensTable
+    shared: SharedList
+    eo_free: np.ndarray
+    by_angles: np.ndarray
+    point_free: np.ndarray
+    prior_xyz: np.ndarray
+    prior_weight: np.ndarray
+    pair_start: np.ndarray
+    pair_block: np.ndarray
+    block_row: np.ndarray
+    block_col: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """Number of unknowns."""
+        return int(self.eo_free.sum() + self.point_free.sum() + len(self.shared))
+
+    def interior(self, state: State) -> np.ndarray:
+        """(L, 15) interior elements and lens parameters at `state`."""
+        table = self.lens.base.copy()
+        free = self.lens.columns >= 0
+        table[free] = state.shared[self.lens.columns[free]]
+        return table
+
+    def turn(self, state: State) -> np.ndarray:
+        """(n, 3, 3) δ = turn·q for the three rotation unknowns q: the identity, or ω, φ, κ where angles are held."""
+        turn = np.broadcast_to(np.eye(3), (len(self.images), 3, 3)).copy()
+        if self.by_angles.any():
+            angles = angles_from_rotation(state.rotation[self.by_angles], self.block.rotation)
+            turn[self.by_angles] = small_rotation_per_angle(angles, self.block.rotation)
+        return turn
+
+    def advance(self, state: State, step: Step) -> State:
+        """The state after a step."""
+        small = np.einsum("nij,nj->ni", self.turn(state), step.images[:, 3:])
+        return State(
+            centre=state.centre + step.images[:, :3],
+            rotation=exponential(small) @ state.rotation,
+            points=state.points + step.points,
+            shared=state.shared + step.shared,
+        )
+
+    def name_of(self, column: int) -> str:
+        """Name of an unknown of the reduced system, for messages: 'X0 of photo 1' or 'bluh.1 (ucd8)'."""
+        n = 6 * len(self.images)
+        if column < n:
+            image = self.block.images.names[self.images[column // 6]]
+            return f"{ORIENTATION_ELEMENTS[column % 6]} of {image}"
+        return f"{self.shared.names[column - n]} ({self.shared.groups[column - n]})"
+
+
+@dataclass(frozen=True, eq=False)
+class StartValues:
+    """Where the adjustment begins, in local coordinates; NaN where there is no value.
+
+    Parameters
+    ----------
+    origin : (3,) m. rotation : (n, 3, 3), centre : (n, 3), points : (N, 3), rows as in the block.
+    """
+
+    origin: np.ndarray
+    rotation: np.ndarray
+    centre: np.ndarray
+    points: np.ndarray
+
+
+def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tuple[Unknowns, State]:
+    """Unknowns and start state of the rays that take part.
+
+    Parameters
+    ----------
+    active : (m,) bool, rays of the block to adjust; their photographs and points have start values.
+    """
+    source, images, points, ray_image, row_start = _sort_rays(block, active)
+    shared = SharedList()
+    lens = lens_table(block, images, shared)
+    xy = np.ascontiguousarray(block.image_points.xy[source])
+    linear = linear_columns(block, images, ray_image, xy, shared)
+    pair_start, pair_block, block_row, block_col = _pattern(len(images), row_start, ray_image)
+    prior_xyz, prior_weight = _control_priors(block, points, start.origin)
+    unknowns = Unknowns(
+        block=block,
+        images=images,
+        points=points,
+        origin=start.origin,
+        rays=Rays(
+            start=row_start,
+            image=ray_image,
+            lens_row=lens.of_image[ray_image],
+            xy=xy,
+            inv_sigma=1.0 / block.image_points.sigma[source],
+            ap_index=linear.index,
+            ap_value=linear.value,
+            source=source,
+        ),
+        lens=lens,
+        shared=shared,
+        eo_free=np.ones((len(images), 6), dtype=bool),
+        by_angles=np.zeros(len(images), dtype=bool),
+        point_free=np.ones((len(points), 3), dtype=bool),
+        prior_xyz=prior_xyz,
+        prior_weight=prior_weight,
+        pair_start=pair_start,
+        pair_block=pair_block,
+        block_row=block_row,
+        block_col=block_col,
+    )
+    state = State(
+        start.centre[images].copy(), start.rotation[images].copy(), start.points[points].copy(), np.array(shared.start)
+    )
+    return unknowns, state
+
+
+def _sort_rays(block: Block, active: np.ndarray):
+    """Active rays by point, points by their first photograph, so that neighbours in memory are neighbours in the air."""
+    rows = np.flatnonzero(active)
+    images, ray_image = np.unique(block.image_points.image[rows], return_inverse=True)
+    points, ray_point = np.unique(block.image_points.point[rows], return_inverse=True)
+    first_image = np.full(len(points), len(images))
+    np.minimum.at(first_image, ray_point, ray_image)
+    order_of_points = np.lexsort((np.arange(len(points)), first_image))
+    rank = np.empty(len(points), dtype=np.int64)
+    rank[order_of_points] = np.arange(len(points))
+    order = np.lexsort((ray_image, rank[ray_point]))
+    counts = np.bincount(rank[ray_point], minlength=len(points))
+    row_start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    return rows[order], images, points[order_of_points], ray_image[order].astype(np.int64), row_start
+
+
+def _pattern(n: int, row_start: np.ndarray, ray_image: np.ndarray):
+    """Pairs of photographs that share a point, as blocks of the reduced matrix: diagonal first, then row < column."""
+    counts = np.diff(row_start)
+    pair_start = np.concatenate([[0], np.cumsum(counts * (counts - 1) // 2)]).astype(np.int64)
+    codes = np.empty(pair_start[-1], dtype=np.int64)
+    _pairs.enumerate_pairs(row_start, ray_image, n, codes)
+    unique, pair_block = np.unique(codes, return_inverse=True)
+    block_row = np.concatenate([np.arange(n), unique // n])
+    block_col = np.concatenate([np.arange(n), unique % n])
+    return pair_start, (pair_block + n).astype(np.int64), block_row, block_col
+
+
+def _control_priors(block: Block, points: np.ndarray, origin: np.ndarray):
+    xyz, weight = np.zeros((len(points), 3)), np.zeros((len(points), 3))
+    if block.settings.adjustment.datum != "control":
+        return xyz, weight
+    row_of_point = np.full(len(block.points), -1)
+    row_of_point[points] = np.arange(len(points))
+    control = block.control
+    used = np.flatnonzero(~control.is_check & (row_of_point[control.point] >= 0))
+    rows = row_of_point[control.point[used]]
+    known = np.isfinite(control.xyz[used])
+    xyz[rows] = np.where(known, control.xyz[used] - origin, 0.0)
+    weight[rows] = np.where(known, 1.0 / control.sigma[used] ** 2, 0.0)
+    return xyz, weight
+
+
+def hold_orientation(unknowns: Unknowns, held: tuple[tuple[str, str], ...]) -> Unknowns:
+    """The unknowns with single orientation elements held at their start values.
+
+    Parameters
+    ----------
+    held : (image name, element) pairs, elements of `ORIENTATION_ELEMENTS`.
+    """
+    eo_free, by_angles = unknowns.eo_free.copy(), unknowns.by_angles.copy()
+    row = {str(name): k for k, name in enumerate(unknowns.block.images.names[unknowns.images])}
+    for image, element in held:
+        if image in row:
+            column = ORIENTATION_ELEMENTS.index(element)
+            eo_free[row[image], column] = False
+            by_angles[row[image]] |= column >= 3
+    return replace(unknowns, eo_free=eo_free, by_angles=by_angles)
+
+
+def hold_points(unknowns: Unknowns, held: list[tuple[int, int]]) -> Unknowns:
+    """The unknowns with single point coordinates held: (row of `unknowns.points`, axis) pairs."""
+    point_free = unknowns.point_free.copy()
+    for row, axis in held:
+        point_free[row, axis] = False
+    return replace(unknowns, point_free=point_free)

@@ -1,0 +1,74 @@
+"""The collinearity equations over many rays: x + vx = −c·u1/u3 + x0 + d(x, y), u = Rᵀ(X − X0) [L].
+
+`interior` rows hold c, x0, y0, K1, K2, K3, P1, P2, b1, b2, k1, k2, p1, p2, k3 (see `INTERIOR_COLUMNS`); the linear
+additional parameters are added by the caller, since their columns do not change between iterations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.functional_model import _kernels
+from aerotri.observations import Camera
+from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
+
+INTERIOR_COLUMNS = INTERIOR_ELEMENTS + tuple(f"brown.{n}" for n in BROWN_NAMES) + tuple(f"lens.{n}" for n in LENS_NAMES)
+
+
+@dataclass(frozen=True, eq=False)
+class RayPartials:
+    """Prediction (m, 2) mm and its partials by orientation (m, 2, 6), point (m, 2, 3) and interior (m, 2, 15)."""
+
+    prediction: np.ndarray
+    by_orientation: np.ndarray
+    by_point: np.ndarray
+    by_interior: np.ndarray
+
+
+def interior_row(camera: Camera) -> np.ndarray:
+    """(15,) start values of a camera's interior elements and lens parameters."""
+    row = [camera.interior[name].value for name in INTERIOR_ELEMENTS]
+    row += [camera.brown[name].value if name in camera.brown else 0.0 for name in BROWN_NAMES]
+    row += [camera.lens[name].value if name in camera.lens else 0.0 for name in LENS_NAMES]
+    return np.array(row)
+
+
+def predict(rotation, centre, points, interior, image, point, lens_row, xy) -> np.ndarray:
+    """Predicted image coordinates without linear additional parameters.
+
+    Parameters
+    ----------
+    rotation : (n, 3, 3); centre : (n, 3) m; points : (N, 3) m; interior : (L, 15).
+    image, point, lens_row : (m,) rows of these tables for every ray.
+    xy : (m, 2) mm, measured positions.
+
+    Returns
+    -------
+    (m, 2) mm.
+    """
+    prediction = np.empty((len(image), 2))
+    _kernels.predict_rays(rotation, centre, points, interior, image, point, lens_row, xy, prediction)
+    return prediction
+
+
+def linearise(rotation, centre, points, interior, image, point, lens_row, xy) -> RayPartials:
+    """Prediction and analytic partials; arguments as in `predict`."""
+    m = len(image)
+    out = RayPartials(np.empty((m, 2)), np.empty((m, 2, 6)), np.empty((m, 2, 3)), np.empty((m, 2, 15)))
+    _kernels.linearise_rays(
+        rotation,
+        centre,
+        points,
+        interior,
+        image,
+        point,
+        lens_row,
+        xy,
+        out.prediction,
+        out.by_orientation,
+        out.by_point,
+        out.by_interior,
+    )
+    return out

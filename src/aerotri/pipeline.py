@@ -1,0 +1,143 @@
+"""The chain of stages: block → start values → unknowns → adjustment → statistics."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aerotri.adjustment.datum import move_to_inner
+from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
+from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.prepare import prepare
+from aerotri.adjustment.robust import LEAST_SQUARES
+from aerotri.adjustment.solve import Solution, SolveOptions, minimise
+from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
+from aerotri.adjustment.unknowns import State
+from aerotri.observations import Block
+from aerotri.statistics.adjusted_block import AdjustedBlock, Outcome
+from aerotri.statistics.summarise import count_observations, summarise
+
+
+class AdjustmentFailedError(Exception):
+    """The adjustment has no result; `outcome` says why."""
+
+    def __init__(self, outcome: Outcome):
+        self.outcome = outcome
+        super().__init__(f"{outcome.status}: {outcome.message}")
+
+
+@dataclass(frozen=True, eq=False)
+class Adjustment:
+    """A result together with the system and solution it came from, for stages that need covariances beyond σ."""
+
+    result: AdjustedBlock
+    system: NormalSystem
+    solution: Solution
+
+
+def adjust(
+    block: Block,
+    report: Callable[[int, float, float], None] | None = None,
+    given_points: np.ndarray | None = None,
+) -> AdjustedBlock:
+    """Adjust a block.
+
+    Parameters
+    ----------
+    report : called after every iteration with (iteration, vᵀPv, damping).
+    given_points : (N, 3) m, start values of object points; intersected where not given.
+
+    Returns
+    -------
+    AdjustedBlock
+
+    Raises
+    ------
+    InputError
+        When a setting or an observation makes no sense.
+    AdjustmentFailedError
+        When the observations do not determine the unknowns; the outcome names which.
+    """
+    return adjust_keeping_system(block, report, given_points).result
+
+
+def adjust_keeping_system(
+    block: Block,
+    report: Callable[[int, float, float], None] | None = None,
+    given_points: np.ndarray | None = None,
+) -> Adjustment:
+    """As `adjust`, with the equations and the solution beside the result."""
+    begun = time.perf_counter()
+    prepared = prepare(block, given_points)
+    system, state = prepared.system, prepared.state
+    started = time.perf_counter()
+    counts = count_observations(system)
+    _refuse_defects(system, state, system.assemble(state, 0.0, LEAST_SQUARES))
+    settings = block.settings.adjustment
+    options = SolveOptions(settings.max_iterations, settings.robust, report)
+    solution = minimise(system, state, counts.redundancy, options)
+    if settings.datum == "inner":
+        moved = move_to_inner(system.unknowns, solution.state, state.points)
+        solution = replace(
+            solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator)
+        )
+    factor = _refuse_defects(system, solution.state, solution.equations)
+    solved = time.perf_counter()
+    warnings = prepared.warnings + _doubts(block, counts.redundancy)
+    result = summarise(system, solution, factor, prepared.ray_status, warnings)
+    timings = {
+        "start_values": started - begun, "solve": solved - started, "statistics": time.perf_counter() - solved,
+    }  # fmt: skip
+    return Adjustment(replace(result, outcome=replace(result.outcome, timings_s=timings)), system, solution)
+
+
+def _doubts(block: Block, redundancy: int) -> tuple[str, ...]:
+    doubts = []
+    if redundancy <= 0:
+        doubts.append(f"redundancy {redundancy}: nothing controls the observations, σ is not known")
+    if block.gnss_ins is not None and np.isfinite(block.gnss_ins.angles).any():
+        doubts.append("observed attitudes are not used as observations in this version")
+    return tuple(doubts)
+
+
+def _refuse_defects(system: NormalSystem, state: State, equations: NormalEquations) -> Factor:
+    """The factor of the undamped equations; a defect ends the adjustment with the unknowns named.
+
+    Raises
+    ------
+    AdjustmentFailedError
+    """
+    try:
+        factor = system.factorise(equations)
+        if factor.smallest_pivot > SUSPECT_PIVOT:
+            return factor
+    except NotPositiveDefiniteError:
+        factor = None
+    defects = find_defects(system, state, equations)
+    if not defects:
+        defects = [] if factor is not None else ["the normal equations are singular"]
+    if defects:
+        raise AdjustmentFailedError(_failure(system, "rank deficient", _in_words(system, defects)))
+    return system.factorise(equations)
+
+
+def _in_words(system: NormalSystem, defects: list[str]) -> str:
+    u = system.unknowns
+    text = "; ".join(defects)
+    if u.block.settings.adjustment.datum != "control" or "datum" not in text:
+        return text
+    if not (u.prior_weight > 0.0).any() and system.centres is None:
+        return f'no control: {text}. Give control points, or set datum = "minimal" or "inner"'
+    return f"too little control: {text}"
+
+
+def _failure(system: NormalSystem, status: str, message: str) -> Outcome:
+    counts = count_observations(system)
+    return Outcome(
+        status=status, message=message, iterations=0, sigma0=np.nan, sigma0_um=np.nan, vtpv=np.nan,
+        observations=counts.observations, unknowns=counts.unknowns, conditions=counts.conditions,
+        redundancy=counts.redundancy,
+    )  # fmt: skip

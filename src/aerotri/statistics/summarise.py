@@ -1,0 +1,273 @@
+"""From a solution to the result record: σ, redundancy numbers, tests, groups, control and check points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.solve import Solution
+from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.functional_model.observed_unknowns import predict_antennas
+from aerotri.functional_model.rotation import angles_from_rotation
+from aerotri.observations import Block
+from aerotri.statistics.adjusted_block import (
+    RAY_STATUS,
+    AdjustedBlock,
+    GroundPointResults,
+    ImageResults,
+    ObservationGroup,
+    Outcome,
+    PointResults,
+    RayResults,
+    SharedParameters,
+)
+from aerotri.statistics.covariance import Cofactors, cofactors, correlations, orientation_cofactors, total_correlations
+from aerotri.statistics.reliability import normalised_residuals
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Observations, unknowns and conditions of an adjustment."""
+
+    observations: int
+    unknowns: int
+    conditions: int
+
+    @property
+    def redundancy(self) -> int:
+        return self.observations - self.unknowns + self.conditions
+
+
+def count_observations(system: NormalSystem) -> Counts:
+    """Counts of the adjustment that `system` stands for; an inner datum has seven conditions."""
+    u = system.unknowns
+    held_observed = int(((u.prior_weight > 0.0) & u.point_free).sum())
+    centres = 0 if system.centres is None else system.centres.count
+    observations = 2 * len(u.rays.image) + held_observed + centres + system.n_shared_priors
+    inner = u.block.settings.adjustment.datum == "inner"
+    return Counts(observations, u.count + (7 if inner else 0), 7 if inner else 0)
+
+
+def summarise(
+    system: NormalSystem, solution: Solution, factor: Factor, ray_status: np.ndarray, warnings: tuple[str, ...]
+) -> AdjustedBlock:
+    """The result record of a solution.
+
+    Parameters
+    ----------
+    factor : undamped, at the solution.
+    ray_status : (m,) index into `RAY_STATUS` of every ray of the block.
+    """
+    block, counts = system.unknowns.block, count_observations(system)
+    q = cofactors(system, solution.state, factor, solution.estimator)
+    sigma0 = float(np.sqrt(solution.equations.cost / counts.redundancy)) if counts.redundancy > 0 else np.nan
+    vtpv = solution.equations.cost
+    if solution.estimator.is_robust:
+        vtpv = _weighted_sum(system, solution)
+        sigma0 = float(np.sqrt(vtpv / counts.redundancy)) if counts.redundancy > 0 else np.nan
+    outcome = Outcome(
+        status=solution.status,
+        message="" if solution.status == "converged" else _message(solution),
+        iterations=solution.iterations,
+        sigma0=sigma0,
+        sigma0_um=sigma0 * block.settings.image_sigma_um,
+        vtpv=vtpv,
+        observations=counts.observations,
+        unknowns=counts.unknowns,
+        conditions=counts.conditions,
+        redundancy=counts.redundancy,
+        warnings=warnings,
+    )
+    rays = _rays(system, solution, q, ray_status)
+    points = _points(system, solution, q, rays, sigma0)
+    control, check = _ground_points(system, solution, q, points, sigma0)
+    return AdjustedBlock(
+        block=block,
+        outcome=outcome,
+        images=_images(system, solution, q, sigma0),
+        points=points,
+        rays=rays,
+        parameters=_parameters(system, solution, q, sigma0),
+        control=control,
+        check=check,
+        groups=_groups(system, solution, q, rays, control),
+    )
+
+
+def _message(solution: Solution) -> str:
+    return f"no convergence within {solution.iterations} iterations, Σvᵀpv {solution.equations.cost:.6g}"
+
+
+def _weighted_sum(system: NormalSystem, solution: Solution) -> float:
+    """vᵀPv with the final weights: what Huber's cost is not."""
+    rays, equations = system.unknowns.rays, solution.equations
+    squares = np.sum((equations.residual * rays.inv_sigma) ** 2, axis=1)
+    length, limit = np.sqrt(squares), solution.estimator.limit
+    robust_cost = np.where(length > limit, 2.0 * limit * length - limit**2, squares)
+    return float(equations.cost - robust_cost.sum() + np.sum(equations.weight * squares))
+
+
+def _images(system: NormalSystem, solution: Solution, q: Cofactors, sigma0: float) -> ImageResults:
+    u, state, n = system.unknowns, solution.state, len(system.unknowns.block.images)
+    centre, angles, covariance = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full((n, 6, 6), np.nan)
+    centre[u.images] = state.centre + u.origin
+    angles[u.images] = angles_from_rotation(state.rotation, u.block.rotation)
+    covariance[u.images] = sigma0**2 * orientation_cofactors(u, state, q.images)
+    rays = np.zeros(n, dtype=np.int64)
+    rays[u.images] = np.bincount(u.rays.image, minlength=len(u.images))
+    return ImageResults(centre, angles, covariance, rays)
+
+
+def _points(system: NormalSystem, solution: Solution, q: Cofactors, rays: RayResults, sigma0: float) -> PointResults:
+    u = system.unknowns
+    count = len(u.block.points)
+    xyz, covariance = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
+    xyz[u.points] = solution.state.points + u.origin
+    covariance[u.points] = sigma0**2 * q.points
+    n_rays = np.zeros(count, dtype=np.int64)
+    n_rays[u.points] = np.diff(u.rays.start)
+    w = np.zeros(len(u.block.image_points))
+    w[u.rays.source] = np.nan_to_num(np.abs(rays.w[u.rays.source])).max(axis=1)
+    largest = np.zeros(count)
+    np.maximum.at(largest, u.block.image_points.point, w)
+    return PointResults(xyz, covariance, n_rays, np.where(n_rays > 0, largest, np.nan))
+
+
+def _rays(system: NormalSystem, solution: Solution, q: Cofactors, status: np.ndarray) -> RayResults:
+    u, equations = system.unknowns, solution.equations
+    m = len(u.block.image_points)
+    v, r, w = np.full((m, 2), np.nan), np.full((m, 2), np.nan), np.full((m, 2), np.nan)
+    weight = np.full(m, np.nan)
+    source = u.rays.source
+    v[source] = -equations.residual
+    r[source] = q.ray_redundancy
+    w[source] = normalised_residuals(v[source], u.block.image_points.sigma[source], r[source])
+    weight[source] = equations.weight
+    return RayResults(v, r, w, weight, status)
+
+
+def _parameters(system: NormalSystem, solution: Solution, q: Cofactors, sigma0: float) -> SharedParameters:
+    u = system.unknowns
+    s = len(u.shared)
+    r = correlations(q.shared)
+    off = np.abs(r - np.diag(np.diagonal(r))) if s else np.zeros((0, 0))
+    partner = off.argmax(axis=1) if s > 1 else np.zeros(s, dtype=int)
+    names = np.array(u.shared.names, dtype=object)
+    groups = np.array(u.shared.groups, dtype=object)
+    lens = np.array([kind in ("interior", "additional") for kind in u.shared.kinds], dtype=bool)
+    total = np.full(s, np.nan)
+    total[lens] = total_correlations(q.shared[np.ix_(lens, lens)])
+    weighted = np.isfinite(np.array(u.shared.sigma).reshape(-1))
+    one_group = len(set(groups.tolist())) <= 1
+    labels = np.array([n if one_group else f"{n} ({g})" for n, g in zip(names, groups, strict=True)], dtype=object)
+    return SharedParameters(
+        names=names,
+        groups=groups,
+        kinds=np.array(u.shared.kinds, dtype=object),
+        marks=np.array(u.shared.marks, dtype=object),
+        value=solution.state.shared.copy(),
+        covariance=sigma0**2 * q.shared,
+        max_correlation=r[np.arange(s), partner] if s > 1 else np.full(s, np.nan),
+        max_correlation_with=labels[partner] if s > 1 else np.full(s, "", dtype=object),
+        total_correlation=total,
+        status=np.where(weighted, "weighted", "estimated").astype(object),
+        reason=np.full(s, "", dtype=object),
+    )
+
+
+def _ground_points(system: NormalSystem, solution: Solution, q: Cofactors, points: PointResults, sigma0: float):
+    """Control and check points that were adjusted."""
+    block, u = system.unknowns.block, system.unknowns
+    row = np.full(len(block.points), -1)
+    row[u.points] = np.arange(len(u.points))
+    out = []
+    for is_check in (False, True):
+        k = np.flatnonzero((block.control.is_check == is_check) & (row[block.control.point] >= 0))
+        point = block.control.point[k]
+        difference = points.xyz[point] - block.control.xyz[k]
+        known = np.isfinite(block.control.xyz[k])
+        sigma_given = block.control.sigma[k]
+        adjusted = np.where(known, points.sigma[point], np.nan)
+        if is_check:
+            r = np.full((len(k), 3), np.nan)
+            w = difference / np.sqrt(adjusted**2 + sigma_given**2)
+        else:
+            weight = np.where(known, u.prior_weight[row[point]], np.nan)
+            r = 1.0 - weight * np.diagonal(q.points[row[point]], axis1=1, axis2=2)
+            w = normalised_residuals(difference, sigma_given, r)
+        out.append(GroundPointResults(point, difference, adjusted, r, w, points.rays[point]))
+    return out
+
+
+def _groups(system: NormalSystem, solution: Solution, q: Cofactors, rays: RayResults, control: GroundPointResults):
+    """Image points by camera, control in plan and height, projection centres: redundancy and fit of each."""
+    u, block = system.unknowns, system.unknowns.block
+    groups = []
+    source = u.rays.source
+    camera = block.images.camera[block.image_points.image[source]]
+    sigma = block.image_points.sigma[source]
+    for index, cam in enumerate(block.cameras):
+        own = camera == index
+        if own.any():
+            name = "image points" if len(block.cameras) == 1 else f"image points {cam.name}"
+            v, weight = rays.v[source[own]], rays.weight[source[own]]
+            pvv = float(np.sum(weight[:, None] * (v / sigma[own]) ** 2))
+            apriori = 1e3 * float(np.median(sigma[own]))
+            rms = 1e3 * float(np.sqrt(np.mean(v**2)))
+            groups.append(_group(name, 2 * int(own.sum()), apriori, rms, float(q.ray_redundancy[own].sum()), pvv))
+    if block.settings.adjustment.datum == "control" and len(control):
+        given = {int(p): k for k, p in enumerate(block.control.point)}
+        sigma_control = block.control.sigma[[given[int(p)] for p in control.point]]
+        for name, axes in (("control plan", [0, 1]), ("control height", [2])):
+            d, s, r = control.difference[:, axes], sigma_control[:, axes], control.r[:, axes]
+            known = np.isfinite(d)
+            if known.any():
+                pvv = float(np.sum((d[known] / s[known]) ** 2))
+                rms = float(np.sqrt(np.mean(d[known] ** 2)))
+                apriori = float(np.median(s[known]))
+                groups.append(_group(name, int(known.sum()), apriori, rms, float(r[known].sum()), pvv))
+    groups += _centre_group(system, solution, q)
+    groups += _prior_group(system, solution, q)
+    return tuple(groups)
+
+
+def _group(name: str, count: int, apriori: float, rms: float, redundancy: float, pvv: float) -> ObservationGroup:
+    posteriori = apriori * float(np.sqrt(pvv / redundancy)) if redundancy > 1e-9 else np.nan
+    return ObservationGroup(name, count, apriori, rms, redundancy, posteriori)
+
+
+def _centre_group(system: NormalSystem, solution: Solution, q: Cofactors) -> list[ObservationGroup]:
+    observed, state = system.centres, solution.state
+    if observed is None:
+        return []
+    by_image, by_shared = system.whitened_centre_partials(state)
+    cofactor = np.einsum("gka,gab,gkb->gk", by_image, q.images[observed.image], by_image)
+    cofactor += 2.0 * np.einsum("gka,gas,gks->gk", by_image, q.image_shared[observed.image], by_shared)
+    cofactor += np.einsum("gks,st,gkt->gk", by_shared, q.shared, by_shared)
+    known = observed.inv_sigma > 0.0
+    gap = (observed.xyz - predict_antennas(observed, state.centre, state.rotation, state.shared))[known]
+    inv_sigma = observed.inv_sigma[known]
+    return [
+        _group(
+            "projection centres", int(known.sum()), float(np.median(1.0 / inv_sigma)), float(np.sqrt(np.mean(gap**2))),
+            float((1.0 - cofactor[known]).sum()), float(np.sum((gap * inv_sigma) ** 2)),
+        )
+    ]  # fmt: skip
+
+
+def _prior_group(system: NormalSystem, solution: Solution, q: Cofactors) -> list[ObservationGroup]:
+    """Weighted interior elements and additional parameters; residuals in units of σ, for want of a common unit."""
+    shared = system.unknowns.shared
+    sigma = np.array(shared.sigma).reshape(-1)
+    known = np.isfinite(sigma)
+    if not known.any():
+        return []
+    normed = ((solution.state.shared - np.array(shared.start)) / sigma)[known]
+    redundancy = float((1.0 - np.diagonal(q.shared)[known] / sigma[known] ** 2).sum())
+    pvv = float(np.sum(normed**2))
+    return [_group("weighted parameters", int(known.sum()), 1.0, float(np.sqrt(pvv / known.sum())), redundancy, pvv)]
+
+
+USED = RAY_STATUS.index("used")
