@@ -81,9 +81,7 @@ def adjust_keeping_system(
     solution = minimise(system, state, counts.redundancy, options)
     if settings.datum == "inner":
         moved = move_to_inner(system.unknowns, solution.state, state.points)
-        solution = replace(
-            solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator)
-        )
+        solution = replace(solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator))
     factor = _refuse_defects(system, solution.state, solution.equations)
     solved = time.perf_counter()
     warnings = prepared.warnings + _doubts(block, counts.redundancy)

@@ -37,7 +37,9 @@ def test_solve_and_inverse_against_dense(n, n_border):
     scale = np.sqrt(np.diagonal(inverse))
     factor = symbolic.factorise(matrix)
     rhs = np.random.default_rng(3).normal(size=(len(dense), 2)) / scale[:, None]
-    np.testing.assert_allclose(factor.solve(rhs) / scale[:, None], inverse @ rhs / scale[:, None], rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(
+        factor.solve(rhs) / scale[:, None], inverse @ rhs / scale[:, None], rtol=1e-9, atol=1e-10
+    )
     pattern = factor.inverse_on_pattern()
     normed = inverse / scale[:, None] / scale[None, :]
     for b, (i, j) in enumerate(zip(symbolic.block_row, symbolic.block_col, strict=True)):
@@ -46,7 +48,9 @@ def test_solve_and_inverse_against_dense(n, n_border):
         np.testing.assert_allclose(got, normed[6 * i : 6 * i + 6, 6 * j : 6 * j + 6], atol=1e-10)
     flat = pattern.border.reshape(6 * n, n_border) / scale[: 6 * n, None] / scale[None, 6 * n :]
     np.testing.assert_allclose(flat, normed[: 6 * n, 6 * n :], atol=1e-10)
-    np.testing.assert_allclose(pattern.corner / np.outer(scale[6 * n :], scale[6 * n :]), normed[6 * n :, 6 * n :], atol=1e-10)
+    np.testing.assert_allclose(
+        pattern.corner / np.outer(scale[6 * n :], scale[6 * n :]), normed[6 * n :, 6 * n :], atol=1e-10
+    )
     columns = factor.columns(np.array([0, len(dense) - 1]))
     np.testing.assert_allclose(columns / scale[:, None], inverse[:, [0, -1]] / scale[:, None], rtol=1e-8, atol=1e-10)
 

@@ -72,7 +72,9 @@ def test_partials_by_interior(rays, column):
         return {"interior": interior}
 
     numeric = _difference(rays, changed, step)
-    np.testing.assert_allclose(partials.by_interior[:, :, column], numeric, rtol=1e-5, atol=1e-5 * np.abs(numeric).max())
+    np.testing.assert_allclose(
+        partials.by_interior[:, :, column], numeric, rtol=1e-5, atol=1e-5 * np.abs(numeric).max()
+    )
 
 
 def test_prediction_shared_by_both(rays):
@@ -113,7 +115,9 @@ def test_angles_round_trip_and_partials(order):
     angles = rng.uniform(-1.4, 1.4, (50, 3))
     rotation = rotation_from_angles(angles, order)
     np.testing.assert_allclose(angles_from_rotation(rotation, order), angles, atol=1e-14)
-    np.testing.assert_allclose(rotation @ np.swapaxes(rotation, 1, 2), np.broadcast_to(np.eye(3), (50, 3, 3)), atol=1e-14)
+    np.testing.assert_allclose(
+        rotation @ np.swapaxes(rotation, 1, 2), np.broadcast_to(np.eye(3), (50, 3, 3)), atol=1e-14
+    )
     e = small_rotation_per_angle(angles, order)
     for axis in range(3):
         step = 1e-6 * np.eye(3)[axis]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from aerotri.adjustment._kernels import E, linearise_point, reduce_point
+from aerotri.compiled import kernel
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def solve_lower_transposed(lower, rhs):
     """L⁻ᵀ·rhs in place, rhs (3, k)."""
     for t in range(rhs.shape[1]):
@@ -18,7 +18,7 @@ def solve_lower_transposed(lower, rhs):
             rhs[a, t] /= lower[a, a]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def point_cofactors(
     first, last, rays, pattern, table, state, estimator, limit, inverse, cofactor, redundancy, residual, weight, work
 ):
@@ -88,7 +88,7 @@ def point_cofactors(
                 redundancy[start[p] + q, row] = 1.0 - explained
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _solve_lower(lower, rhs):
     """L⁻¹·rhs in place, rhs (3, k)."""
     for t in range(rhs.shape[1]):
@@ -98,7 +98,7 @@ def _solve_lower(lower, rhs):
             rhs[a, t] /= lower[a, a]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _coupled_cofactors(
     first_ray, n_rays, n_union, image, pair, pair_block, blocks, border, corner, g, g_shared, union, h, h_shared
 ):
@@ -136,7 +136,7 @@ def _coupled_cofactors(
                     h[other, a, b] += mirrored
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def reduce_point_sides(
     first, last, rays, table, state, estimator, limit, sides, right, right_shared, residual, weight, work
 ):
@@ -164,7 +164,7 @@ def reduce_point_sides(
                     right_shared[union[t], k] -= couple_shared[a, t] * side[a, k]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def expand_point_sides(
     first, last, rays, table, state, estimator, limit, sides, x, x_shared, x_points, residual, weight, work
 ):

@@ -1,23 +1,24 @@
 """Kernels of the factor: blocks in and out of dense fronts.
 
 A front lists its own photographs, then the photographs of its rows, then the border; `top` holds own × own, `low` the
-rows and the border × own, `rest` rows and border × the same. Only lower triangles are used. `scale` is (n, 6).
+rows and the border × own, `rest` rows and border × the same. Only lower triangles are used. Fronts come as flat arrays
+in Fortran order (element (r, c) at r + c·rows), so that each kernel is compiled once. `scale` is (n, 6).
 """
 
 from __future__ import annotations
 
-from numba import njit
+from aerotri.compiled import kernel
 
 B = 6
 
 
-@njit(cache=True)
-def scatter_blocks(block, local_row, local_col, flipped, blocks, block_row, block_col, scale, top, low):
+@kernel
+def scatter_blocks(block, local_row, local_col, flipped, blocks, block_row, block_col, scale, own, rows, top, low):
     """Scaled matrix blocks into a front, the photograph eliminated later giving the row.
 
     `flipped` says that the stored block has the earlier photograph as its row, so that it goes in transposed.
+    own, rows : scalar sizes of the front.
     """
-    own = top.shape[0]
     for k in range(len(block)):
         b = block[k]
         i, j = block_row[b], block_col[b]
@@ -29,95 +30,106 @@ def scatter_blocks(block, local_row, local_col, flipped, blocks, block_row, bloc
                 else:
                     value = blocks[b, r, c] * scale[i, r] * scale[j, c]
                 if r0 < own:
-                    top[r0 + r, c0 + c] = value
+                    top[r0 + r + (c0 + c) * own] = value
                 else:
-                    low[r0 - own + r, c0 + c] = value
+                    low[r0 - own + r + (c0 + c) * rows] = value
 
 
-@njit(cache=True)
-def scatter_border(own, border, scale, border_scale, offset, low):
-    """Scaled border of the front's own photographs into the last rows of `low`, which begin at `offset`."""
-    for k in range(len(own)):
-        i = own[k]
+@kernel
+def scatter_border(images, border, scale, border_scale, rows, low):
+    """Scaled border of the front's own photographs into the last rows of `low`."""
+    n_border = border.shape[2]
+    for k in range(len(images)):
+        i = images[k]
         for c in range(B):
-            for t in range(border.shape[2]):
-                low[offset + t, B * k + c] = border[i, c, t] * scale[i, c] * border_scale[t]
+            target = (B * k + c) * rows + rows - n_border
+            for t in range(n_border):
+                low[target + t] = border[i, c, t] * scale[i, c] * border_scale[t]
 
 
-@njit(cache=True)
-def extend_add(update, place, n_own, n_border, top, low, rest):
-    """A child's update matrix added to its parent's front; `place` are the parent's positions of the child's rows."""
-    child_border = B * len(place)
-    parent_border = low.shape[0] - n_border
+@kernel
+def extend_add(update, place, n_own, n_border, n_rows, top, low, rest):
+    """A child's update matrix added to its parent's front.
+
+    place : the parent's positions of the child's row photographs. n_own, n_rows : photographs of the parent.
+    """
+    own, rows = B * n_own, B * n_rows + n_border
+    child = B * len(place) + n_border
     for bj in range(len(place)):
         pj = place[bj]
         for c in range(B):
-            source = B * bj + c
+            source = (B * bj + c) * child
             if pj < n_own:
-                target = B * pj + c
+                in_top, in_low = (B * pj + c) * own, (B * pj + c) * rows
                 for bi in range(bj, len(place)):
                     pi = place[bi]
-                    for r in range(B):
-                        if pi < n_own:
-                            top[B * pi + r, target] += update[B * bi + r, source]
-                        else:
-                            low[B * (pi - n_own) + r, target] += update[B * bi + r, source]
+                    if pi < n_own:
+                        for r in range(B):
+                            top[in_top + B * pi + r] += update[source + B * bi + r]
+                    else:
+                        for r in range(B):
+                            low[in_low + B * (pi - n_own) + r] += update[source + B * bi + r]
                 for t in range(n_border):
-                    low[parent_border + t, target] += update[child_border + t, source]
+                    low[in_low + rows - n_border + t] += update[source + child - n_border + t]
             else:
-                target = B * (pj - n_own) + c
+                in_rest = (B * (pj - n_own) + c) * rows
                 for bi in range(bj, len(place)):
                     pi = B * (place[bi] - n_own)
                     for r in range(B):
-                        rest[pi + r, target] += update[B * bi + r, source]
+                        rest[in_rest + pi + r] += update[source + B * bi + r]
                 for t in range(n_border):
-                    rest[parent_border + t, target] += update[child_border + t, source]
+                    rest[in_rest + rows - n_border + t] += update[source + child - n_border + t]
     for c in range(n_border):
+        source = (child - n_border + c) * child + child - n_border
+        target = (rows - n_border + c) * rows + rows - n_border
         for t in range(n_border):
-            rest[parent_border + t, parent_border + c] += update[child_border + t, child_border + c]
+            rest[target + t] += update[source + t]
 
 
-@njit(cache=True)
-def extract_symmetric(above, place, n_border, out):
+@kernel
+def extract_symmetric(above, above_size, place, n_border, out):
     """The rows of a child out of its parent's full symmetric front."""
-    child_border = B * len(place)
-    parent_border = above.shape[0] - n_border
+    size = B * len(place) + n_border
     for bj in range(len(place)):
         for c in range(B):
-            source, target = B * place[bj] + c, B * bj + c
+            source, target = (B * place[bj] + c) * above_size, (B * bj + c) * size
             for bi in range(len(place)):
                 for r in range(B):
-                    out[B * bi + r, target] = above[B * place[bi] + r, source]
+                    out[target + B * bi + r] = above[source + B * place[bi] + r]
             for t in range(n_border):
-                value = above[parent_border + t, source]
-                out[child_border + t, target] = value
-                out[target, child_border + t] = value
+                value = above[source + above_size - n_border + t]
+                out[target + size - n_border + t] = value
+                out[B * bj + c + (size - n_border + t) * size] = value
     for c in range(n_border):
+        source = (above_size - n_border + c) * above_size + above_size - n_border
+        target = (size - n_border + c) * size + size - n_border
         for t in range(n_border):
-            out[child_border + t, child_border + c] = above[parent_border + t, parent_border + c]
+            out[target + t] = above[source + t]
 
 
-@njit(cache=True)
-def gather_blocks(block, local_row, local_col, flipped, front, block_row, block_col, scale, blocks):
-    """The inverse's blocks out of a front, scaled back; the reverse of `scatter_blocks`."""
+@kernel
+def gather_blocks(block, local_row, local_col, flipped, front, size, block_row, block_col, scale, blocks):
+    """The inverse's blocks out of a full symmetric front, scaled back; the reverse of `scatter_blocks`."""
     for k in range(len(block)):
         b = block[k]
         i, j = block_row[b], block_col[b]
         r0, c0 = B * local_row[k], B * local_col[k]
         for c in range(B):
             for r in range(B):
+                value = front[r0 + r + (c0 + c) * size]
                 if flipped[k]:
-                    blocks[b, c, r] = front[r0 + r, c0 + c] * scale[i, c] * scale[j, r]
+                    blocks[b, c, r] = value * scale[i, c] * scale[j, r]
                 else:
-                    blocks[b, r, c] = front[r0 + r, c0 + c] * scale[i, r] * scale[j, c]
+                    blocks[b, r, c] = value * scale[i, r] * scale[j, c]
 
 
-@njit(cache=True)
-def gather_border(own, front, scale, border_scale, border):
+@kernel
+def gather_border(images, front, size, scale, border_scale, border):
     """The inverse's border of the front's own photographs, scaled back."""
-    offset = front.shape[0] - border.shape[2]
-    for k in range(len(own)):
-        i = own[k]
+    n_border = border.shape[2]
+    for k in range(len(images)):
+        i = images[k]
         for c in range(B):
-            for t in range(border.shape[2]):
-                border[i, c, t] = front[offset + t, B * k + c] * scale[i, c] * border_scale[t]
+            source = (B * k + c) * size + size - n_border
+            for t in range(n_border):
+                border[i, c, t] = front[source + t] * scale[i, c] * border_scale[t]

@@ -14,8 +14,8 @@ work    : scratch of one thread, see `scratch`
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from aerotri.compiled import kernel
 from aerotri.functional_model._kernels import linearise_ray, predict_ray
 
 E = 6
@@ -23,7 +23,7 @@ MIN_PIVOT = 1e-14
 NONE, HUBER = 0, 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def scratch(max_rays, max_columns, n_shared):
     """Arrays one thread needs for a point: whitened partials of its rays, their columns, and the point's own 3 × ·."""
     return (
@@ -42,7 +42,7 @@ def scratch(max_rays, max_columns, n_shared):
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def robust_factor(error, estimator, limit):
     """Weight factor and cost of a ray with normalised length `error`; a Huber ray costs 2·limit·e − limit² outside."""
     if estimator == HUBER and error > limit:
@@ -50,7 +50,7 @@ def robust_factor(error, estimator, limit):
     return 1.0, error * error
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def linearise_point(p, rays, table, state, estimator, limit, weight, residual, work):
     """Whitened partials and misclosures of the rays of point p into `work`; its residuals (mm) and weights out.
 
@@ -111,7 +111,7 @@ def linearise_point(p, rays, table, state, estimator, limit, weight, residual, w
     return cost, n_union
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def reduce_point(p, n_rays, n_union, table, points, damping, work, lower, misclosure):
     """Eliminate point p: `lower` = Cholesky factor L of its 3 × 3 normals, `misclosure` = L⁻¹·(right side).
 
@@ -179,7 +179,7 @@ def reduce_point(p, n_rays, n_union, table, points, damping, work, lower, misclo
     return cost, ok
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def assemble(first, last, rays, pattern, table, state, damping, estimator, limit, sums, residual, weight, work):
     """Reduced normal equations of points first..last, added to `sums`.
 
@@ -191,7 +191,7 @@ def assemble(first, last, rays, pattern, table, state, damping, estimator, limit
     start, image = rays[0], rays[1]
     pair_start, pair_block = pattern
     blocks, border, corner, right, right_shared = sums
-    by_eo, by_pt, by_sh, whitened, columns, n_columns, union, _, couple, couple_shared, _, _ = work
+    by_eo, _, by_sh, whitened, columns, n_columns, union, _, couple, couple_shared, _, _ = work
     lower, misclosure = np.zeros((3, 3)), np.zeros(3)
     cost, decrement, undetermined = 0.0, 0.0, -1
     for p in range(first, last):
@@ -254,13 +254,13 @@ def assemble(first, last, rays, pattern, table, state, damping, estimator, limit
     return cost, decrement, undetermined
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def back_substitute(
     first, last, rays, table, state, damping, estimator, limit, step, step_shared, step_points, residual, weight, work
 ):
     """Steps of the points first..last (P, 3) from those of the photographs (n, 6) and shared parameters (s)."""
     start, image = rays[0], rays[1]
-    columns, n_columns, union, couple, couple_shared = work[4], work[5], work[6], work[8], work[9]
+    union, couple, couple_shared = work[6], work[8], work[9]
     lower, d = np.zeros((3, 3)), np.zeros(3)
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
@@ -281,7 +281,7 @@ def back_substitute(
             step_points[p, a] = d[a]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def residuals(first, last, rays, state, residual):
     """Measured minus predicted (mm) of the rays of points first..last."""
     start, image, lens_row, xy, _, ap_index, ap_value = rays
@@ -290,9 +290,7 @@ def residuals(first, last, rays, state, residual):
     for p in range(first, last):
         for ray in range(start[p], start[p + 1]):
             i = image[ray]
-            predict_ray(
-                rotation[i], centre[i], points[p], interior[lens_row[ray]], xy[ray, 0], xy[ray, 1], prediction
-            )
+            predict_ray(rotation[i], centre[i], points[p], interior[lens_row[ray]], xy[ray, 0], xy[ray, 1], prediction)
             for t in range(ap_index.shape[1]):
                 prediction[0] += ap_value[ray, 0, t] * shared[ap_index[ray, t]]
                 prediction[1] += ap_value[ray, 1, t] * shared[ap_index[ray, t]]

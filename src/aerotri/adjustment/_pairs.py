@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from numba import njit
+from aerotri.compiled import kernel
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def enumerate_pairs(start, image, n, codes):
     """image·n + other image for every pair of rays of every point, in the order the assembly meets them."""
     k = 0

@@ -148,7 +148,9 @@ class NormalSystem:
         if observed is None:
             return 0.0
         by_image, by_shared = self.whitened_centre_partials(state)
-        gap = (observed.xyz - predict_antennas(observed, state.centre, state.rotation, state.shared)) * observed.inv_sigma
+        gap = (
+            observed.xyz - predict_antennas(observed, state.centre, state.rotation, state.shared)
+        ) * observed.inv_sigma
         gap = np.where(observed.inv_sigma > 0.0, gap, 0.0)
         np.add.at(blocks, observed.image, np.einsum("gka,gkb->gab", by_image, by_image))
         np.add.at(right, observed.image, np.einsum("gka,gk->ga", by_image, gap))
@@ -234,10 +236,14 @@ class NormalSystem:
         rights = [(np.zeros((n, 6, k)), np.zeros((s, k))) for _ in self._bounds]
 
         def reduce(c: int):
-            _covariance_kernels.reduce_point_sides(*self._bounds[c], *common, *rights[c], residual, weight, self._work())
+            _covariance_kernels.reduce_point_sides(
+                *self._bounds[c], *common, *rights[c], residual, weight, self._work()
+            )
 
         run_chunks(reduce, len(self._bounds))
-        right = np.concatenate([sum(r[0] for r in rights).reshape(6 * n, k), sum(r[1] for r in rights)])
+        right = np.concatenate(
+            [np.sum([r[0] for r in rights], axis=0).reshape(6 * n, k), np.sum([r[1] for r in rights], axis=0)]
+        )
         x = factor.solve(right)
         images, shared = np.ascontiguousarray(x[: 6 * n].reshape(n, 6, k)), np.ascontiguousarray(x[6 * n :])
         points = np.empty((len(u.points), 3, k))

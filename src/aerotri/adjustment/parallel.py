@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 
@@ -30,7 +31,7 @@ def chunk_bounds(work: np.ndarray, chunks: int = CHUNKS) -> list[tuple[int, int]
     total = np.concatenate([[0.0], np.cumsum(work)])
     cuts = np.searchsorted(total, np.linspace(0.0, total[-1], chunks + 1)[1:-1])
     edges = [0, *(int(c) for c in cuts), len(work)]
-    return [(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]
+    return [(a, b) for a, b in pairwise(edges) if b > a]
 
 
 def run_chunks(function: Callable[[int], object], count: int) -> list:

@@ -1,4 +1,4 @@
-"""From a block to equations: which rays take part, the datum, the observed centres; what cannot be adjusted is named."""
+"""From a block to equations: which rays take part, datum, observed centres; what cannot be adjusted is named."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
     if not np.isfinite(start.centre).all(axis=1).any():
         raise InputError(
             "no photograph has start values, and none sees four known points",
-            "give X0, Y0, Z0, omega, phi, kappa of some photographs in images.csv, or coordinates of more control points",
+            "give X0, Y0, Z0, omega, phi, kappa of some photographs in images.csv, or more control points",
             file="images.csv",
         )
     status, warnings = ray_status(block, start)
@@ -108,7 +108,9 @@ def check_settings(block: Block) -> None:
     unknown = set(s.adjustment.datum_points) - set(block.points.tolist())
     if unknown:
         raise InputError(
-            f"datum_points names '{min(unknown)}', which is no point of the block", "correct the list", file="block.toml"
+            f"datum_points names '{min(unknown)}', which is no point of the block",
+            "correct the list",
+            file="block.toml",
         )
 
 
@@ -137,7 +139,9 @@ def ray_status(block: Block, start: StartValues) -> tuple[np.ndarray, list[str]]
         warnings.append(f"{_some(block.images.names[no_rays], 'photograph')} without image points, left out")
     photos = np.setdiff1d(photos, no_rays)
     if len(photos):
-        warnings.append(f"{_some(block.images.names[photos], 'photograph')} without start values or usable points, left out")
+        warnings.append(
+            f"{_some(block.images.names[photos], 'photograph')} without start values or usable points, left out"
+        )
     for code, words in ((ONE_RAY, "measured in one photograph only"), (NO_START, "whose rays do not intersect")):
         points = np.unique(rays.point[(status == code) & np.isfinite(start.centre[rays.image, 0])])
         if len(points):

@@ -16,6 +16,8 @@ from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, interior_row
 from aerotri.observations import Block, Camera, Prior
 from aerotri.observations.block import INTERIOR_ELEMENTS
 
+FREE = Prior()
+
 
 @dataclass
 class SharedList:
@@ -28,7 +30,7 @@ class SharedList:
     start: list[float] = field(default_factory=list)
     sigma: list[float] = field(default_factory=list)
 
-    def add(self, name: str, group: str, kind: str, mark: str = "", prior: Prior = Prior()) -> int:
+    def add(self, name: str, group: str, kind: str, mark: str = "", prior: Prior = FREE) -> int:
         """Append one parameter; its column."""
         self.names.append(name)
         self.groups.append(group)
@@ -110,7 +112,7 @@ def _interior_prior(camera: Camera, name: str, chosen: dict[str, tuple[str, ...]
     family, item = name.split(".")
     if item not in chosen.get(family, ()):
         return None
-    return (camera.brown if family == "brown" else camera.lens).get(item, Prior())
+    return (camera.brown if family == "brown" else camera.lens).get(item, FREE)
 
 
 @dataclass(frozen=True, eq=False)

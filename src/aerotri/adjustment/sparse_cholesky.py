@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.blas import dgemm, dsyrk, dtrsm
-from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.linalg.blas import dgemm, dsyrk, dtrsm  # pyright: ignore[reportAttributeAccessIssue]
+from scipy.linalg.lapack import dpotrf, dpotri  # pyright: ignore[reportAttributeAccessIssue]
 
 from aerotri.adjustment import _factor_kernels as _kernels
 from aerotri.adjustment.dissection import Tree, dissect
@@ -205,20 +205,21 @@ class Symbolic:
         children: list[list[int]] = [[] for _ in self.fronts]
         smallest = 1.0
         for k, front in enumerate(self.fronts):
-            top, low = self.panel(k)
-            rest = self.update(k)
-            top[:] = 0.0
-            low[:] = 0.0
-            rest[:] = 0.0
+            top, low, rest = self.panel(k)[0], self.panel(k)[1], self.update(k)
+            flat_top, flat_low, flat_rest = _flat(top), _flat(low), _flat(rest)
+            for part in (flat_top, flat_low, flat_rest):
+                part.fill(0.0)
             _kernels.scatter_blocks(
                 front.block, front.local_row, front.local_col, front.flipped, matrix.blocks, self.block_row,
-                self.block_col, by_image, top, low,
+                self.block_col, by_image, len(top), len(low), flat_top, flat_low,
             )  # fmt: skip
             own = self.tree.order[front.first : front.first + front.n_own]
-            _kernels.scatter_border(own, matrix.border, by_image, by_border, B * len(front.rows), low)
+            _kernels.scatter_border(own, matrix.border, by_image, by_border, len(low), flat_low)
             for child in children[k]:
-                lower = self.fronts[child]
-                _kernels.extend_add(self.update(child), lower.place, front.n_own, self.n_border, top, low, rest)
+                _kernels.extend_add(
+                    _flat(self.update(child)), self.fronts[child].place, front.n_own, self.n_border, len(front.rows),
+                    flat_top, flat_low, flat_rest,
+                )  # fmt: skip
             if front.n_own:
                 smallest = min(smallest, _eliminate(top, low, rest))
             if front.parent >= 0:
@@ -334,11 +335,12 @@ class Factor:
             z = self._inverse_front(k, work, out.corner)
             work[front.depth] = z
             own = s.tree.order[front.first : front.first + front.n_own]
+            flat = _flat(z)
             _kernels.gather_blocks(
-                front.block, front.local_row, front.local_col, front.flipped, z, s.block_row, s.block_col, by_image,
-                out.blocks,
+                front.block, front.local_row, front.local_col, front.flipped, flat, len(z), s.block_row, s.block_col,
+                by_image, out.blocks,
             )  # fmt: skip
-            _kernels.gather_border(own, z, by_image, by_border, out.border)
+            _kernels.gather_border(own, flat, len(z), by_image, by_border, out.border)
         out.corner[:] *= by_border[:, None] * by_border[None, :]
         return out
 
@@ -352,7 +354,7 @@ class Factor:
         if front.parent >= 0:
             above = work[front.depth - 1]
             zrr = np.empty((r, r), order="F")
-            _kernels.extract_symmetric(above, front.place, s.n_border, zrr)
+            _kernels.extract_symmetric(_flat(above), len(above), front.place, s.n_border, _flat(zrr))
         else:
             zrr = np.asfortranarray(corner)
         if c == 0:
@@ -368,6 +370,11 @@ class Factor:
             z[c:, c:] = zrr
         z[:c, :c] = 0.5 * (zcc + zcc.T)
         return z
+
+
+def _flat(a: np.ndarray) -> np.ndarray:
+    """A Fortran-ordered matrix as its elements in memory order."""
+    return a.reshape(-1, order="F")
 
 
 def _symmetric_from_lower(a: np.ndarray) -> np.ndarray:

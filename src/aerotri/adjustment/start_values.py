@@ -18,7 +18,7 @@ from aerotri.observations import Block
 
 MIN_RESECTION_POINTS = 4
 RESECTION_TOLERANCES = (8.0, 40.0)
-"""Reprojection errors (in a-priori σ and pixels, the larger) a ray may have in a resection; the second as last resort."""
+"""Reprojection errors a ray may have in a resection, in a-priori σ or pixels; the second as last resort."""
 MIN_INTERSECTION = 1e-6
 """Smallest eigenvalue of the intersection's normal matrix per ray: sin² of half the angle, about 0.1°."""
 OPENCV_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
@@ -26,7 +26,7 @@ OPENCV_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
 
 @dataclass(frozen=True, eq=False)
 class _Directions:
-    """Every ray as a direction: tangents (m, 2) in the camera, freed of known lens errors; tolerance (m,) of the same."""
+    """Rays as directions: tangents (m, 2) in the camera, freed of known lens errors, and their tolerance (m,)."""
 
     tangent: np.ndarray
     tolerance: np.ndarray
@@ -171,7 +171,9 @@ def _resect_into(rotation, centre, points, block: Block, directions: _Directions
         if count < enough:
             continue
         own = rows[begin : begin + count]
-        pose = resect(points[rays.point[own]], directions.tangent[own], tolerance * float(np.median(directions.tolerance[own])))
+        pose = resect(
+            points[rays.point[own]], directions.tangent[own], tolerance * float(np.median(directions.tolerance[own]))
+        )
         if pose is not None:
             rotation[image], centre[image] = pose
             added = True
@@ -206,7 +208,7 @@ def resect(points: np.ndarray, tangent: np.ndarray, tolerance: float) -> tuple[n
     )  # fmt: skip
     if not found or inliers is None or len(inliers) < max(MIN_RESECTION_POINTS, 0.4 * len(points)):
         return None
-    good = inliers.ravel()
+    good = np.asarray(inliers, dtype=np.int64).ravel()
     if len(good) >= 6:
         rotation_vector, translation = cv2.solvePnPRefineLM(
             reduced[good], image[good], matrix, None, rotation_vector, translation

@@ -198,7 +198,7 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
 
 
 def _sort_rays(block: Block, active: np.ndarray):
-    """Active rays by point, points by their first photograph, so that neighbours in memory are neighbours in the air."""
+    """Active rays by point, points by their first photograph: neighbours in memory are neighbours in the air."""
     rows = np.flatnonzero(active)
     images, ray_image = np.unique(block.image_points.image[rows], return_inverse=True)
     points, ray_point = np.unique(block.image_points.point[rows], return_inverse=True)

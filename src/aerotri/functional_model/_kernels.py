@@ -1,16 +1,16 @@
 """The collinearity equations of one ray with their partials: scalar kernels without checks or objects.
 
-Columns of `interior`, and of every table of interior elements: c, x0, y0, K1, K2, K3, P1, P2, b1, b2, k1, k2, p1, p2, k3.
+Columns of every table of interior elements: c, x0, y0, K1, K2, K3, P1, P2, b1, b2, k1, k2, p1, p2, k3.
 """
 
 from __future__ import annotations
 
-from numba import njit
+from aerotri.compiled import kernel
 
 N_INTERIOR = 15
 
 
-@njit(cache=True)
+@kernel
 def predict_ray(rotation, centre, point, interior, x, y, prediction):
     """Ideal image coordinates plus the lens errors of `interior`.
 
@@ -41,7 +41,7 @@ def predict_ray(rotation, centre, point, interior, x, y, prediction):
     prediction[1] = interior[0] * b_lens + interior[2] - correction_y
 
 
-@njit(cache=True)
+@kernel
 def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orientation, by_point, by_interior):
     """As `predict_ray`, with the partials; they share their intermediates.
 
@@ -116,7 +116,7 @@ def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orient
     by_interior[0, 14], by_interior[1, 14] = c * a * rho2**3, c * b * rho2**3
 
 
-@njit(cache=True)
+@kernel
 def predict_rays(rotation, centre, points, interior, image, point, lens_row, xy, prediction):
     """`predict_ray` over m rays.
 
@@ -128,12 +128,10 @@ def predict_rays(rotation, centre, points, interior, image, point, lens_row, xy,
     """
     for k in range(len(image)):
         i = image[k]
-        predict_ray(
-            rotation[i], centre[i], points[point[k]], interior[lens_row[k]], xy[k, 0], xy[k, 1], prediction[k]
-        )
+        predict_ray(rotation[i], centre[i], points[point[k]], interior[lens_row[k]], xy[k, 0], xy[k, 1], prediction[k])
 
 
-@njit(cache=True)
+@kernel
 def linearise_rays(rotation, centre, points, interior, image, point, lens_row, xy, prediction, by_eo, by_pt, by_in):
     """`linearise_ray` over m rays; outputs (m, 2), (m, 2, 6), (m, 2, 3), (m, 2, 15)."""
     for k in range(len(image)):

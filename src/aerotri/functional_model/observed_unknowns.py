@@ -48,7 +48,9 @@ def predict_antennas(observed: CentreObservations, centre: np.ndarray, rotation:
     predicted = centre[observed.image] + rotation[observed.image] @ observed.lever_arm
     for columns, factor in ((observed.shift, 1.0), (observed.drift, observed.time[:, None])):
         there = columns >= 0
-        predicted = predicted + np.where(there, shared[np.where(there, columns, 0)] if len(shared) else 0.0, 0.0) * factor
+        predicted = (
+            predicted + np.where(there, shared[np.where(there, columns, 0)] if len(shared) else 0.0, 0.0) * factor
+        )
     return predicted
 
 

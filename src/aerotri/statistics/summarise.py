@@ -11,7 +11,6 @@ from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.functional_model.observed_unknowns import predict_antennas
 from aerotri.functional_model.rotation import angles_from_rotation
-from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import (
     RAY_STATUS,
     AdjustedBlock,

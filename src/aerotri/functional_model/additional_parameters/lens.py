@@ -1,7 +1,7 @@
 """A forward lens: distortion as a function of the ideal direction, as OpenCV, COLMAP, Bundler and BAL have it.
 
-[L] With a, b = −u1/u3, −u2/u3: a' = a(1 + k1ρ² + k2ρ⁴ + k3ρ⁶) + 2p1ab + p2(ρ² + 2a²), b' alike; x = c·a' + x0. It stands
-beside Brown's parameters because the two models are inverse to each other only approximately: a block from those
+[L] With a, b = −u1/u3, −u2/u3: a' = a(1 + k1ρ² + k2ρ⁴ + k3ρ⁶) + 2p1ab + p2(ρ² + 2a²), b' alike; x = c·a' + x0. It
+stands beside Brown's parameters because the two models are inverse to each other only approximately: a block from those
 programs is adjusted in its own model, without a fit in between.
 """
 

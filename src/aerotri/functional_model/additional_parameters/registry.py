@@ -86,7 +86,7 @@ def parameter_set(family: str, items: Iterable[str], camera: Camera) -> Paramete
         raise InputError(
             f"parameters '{family}' belong to camera model '{module.CAMERA_MODEL}', camera '{camera.name}' is "
             f"'{camera.model}'",
-            f"set model = \"{module.CAMERA_MODEL}\" or leave the family out",
+            f'set model = "{module.CAMERA_MODEL}" or leave the family out',
         )
     wanted = set(items)
     return ParameterSet(family, tuple(item for item in module.ITEMS if item in wanted), camera)

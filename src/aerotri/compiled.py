@@ -1,0 +1,38 @@
+"""How kernels are compiled: cached on disk where that is possible, releasing the interpreter lock, always serial.
+
+Kernels run in threads over chunks (see `adjustment.parallel`); numba's own parallel loops are not used, which keeps
+compilation short and sums reproducible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numba import njit
+
+_state: dict[str, Any] = {"cached": True, "example": None}
+
+
+def kernel(function: Callable) -> Any:
+    """Compile a function on first use. Without a writable place for the cache it is compiled anew in every run."""
+    try:
+        compiled = njit(cache=True, nogil=True)(function)
+    except RuntimeError:  # numba found no writable place
+        _state["cached"] = False
+        return njit(nogil=True)(function)
+    _state["example"] = compiled
+    return compiled
+
+
+def compilation_notice() -> str:
+    """A sentence for the user when kernels have to be compiled in this run; '' when they come from the cache."""
+    if not _state["cached"]:
+        return (
+            "compiling kernels; there is no writable place to keep them (set NUMBA_CACHE_DIR), so every run does this"
+        )
+    example = _state["example"]
+    if example is None or any(Path(example.stats.cache_path).glob("*.nbi")):
+        return ""
+    return "compiling kernels, in this first run only (about 15 s)"
