@@ -11,11 +11,12 @@ import numpy as np
 from aerotri.adjustment.datum import move_to_inner
 from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
-from aerotri.adjustment.prepare import prepare
-from aerotri.adjustment.robust import LEAST_SQUARES
+from aerotri.adjustment.prepare import build_system, prepare
+from aerotri.adjustment.robust import LEAST_SQUARES, Estimator
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
-from aerotri.adjustment.unknowns import State
+from aerotri.adjustment.unknowns import StartValues, State
+from aerotri.formats.solution import SavedSolution
 from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import AdjustedBlock, Outcome
 from aerotri.statistics.summarise import count_observations, summarise
@@ -90,6 +91,24 @@ def adjust_keeping_system(
         "start_values": started - begun, "solve": solved - started, "statistics": time.perf_counter() - solved,
     }  # fmt: skip
     return Adjustment(replace(result, outcome=replace(result.outcome, timings_s=timings)), system, solution)
+
+
+def reopen(block: Block, saved: SavedSolution) -> Adjustment:
+    """An adjustment from its saved solution: linearised and factorised once, never adjusted again.
+
+    Parameters
+    ----------
+    block : as it was adjusted (the result's block/). saved : its solution.npz.
+    """
+    start = StartValues(saved.origin, saved.rotation, saved.centre, saved.points)
+    held = [(int(point), int(axis)) for point, axis in saved.held]
+    system, state = build_system(block, start, saved.ray_status, held)
+    state = replace(state, shared=saved.shared)
+    estimator = Estimator(saved.estimator_code, saved.estimator_limit)
+    equations = system.assemble(state, 0.0, estimator)
+    solution = Solution(saved.status, state, equations, estimator, saved.iterations)
+    result = summarise(system, solution, _refuse_defects(system, state, equations), saved.ray_status, saved.warnings)
+    return Adjustment(result, system, solution)
 
 
 def _doubts(block: Block, redundancy: int) -> tuple[str, ...]:

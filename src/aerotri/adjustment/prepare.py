@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,14 +57,24 @@ def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
             file="images.csv",
         )
     status, warnings = ray_status(block, start)
+    return Prepared(*build_system(block, start, status), status, tuple(warnings))
+
+
+def build_system(
+    block: Block, start: StartValues, status: np.ndarray, held: list[tuple[int, int]] | None = None
+) -> tuple[NormalSystem, State]:
+    """The normal system of the rays that take part, and its start state.
+
+    Parameters
+    ----------
+    status : (m,) of the rays. held : (row of the block's points, axis) of coordinates held for a minimal or inner
+        datum; chosen anew where None.
+    """
     unknowns, state = build_unknowns(block, start, status == USED)
-    unknowns = _with_datum(unknowns, state)
-    shared_before = len(unknowns.shared)
+    unknowns = _with_datum(unknowns, state, held)
     centres = _centre_observations(block, unknowns)
-    if len(unknowns.shared) > shared_before:
-        state = State(state.centre, state.rotation, state.points, np.array(unknowns.shared.start))
-    system = NormalSystem(unknowns, centres, state.centre[:, :2])
-    return Prepared(system, state, status, tuple(warnings))
+    state = replace(state, shared=np.array(unknowns.shared.start, dtype=float))
+    return NormalSystem(unknowns, centres, state.centre[:, :2]), state
 
 
 def check_settings(block: Block) -> None:
@@ -155,12 +165,15 @@ def _some(names: np.ndarray, noun: str) -> str:
     return f"{len(names)} {noun}{'s' if len(names) > 1 else ''} ({shown}{more})"
 
 
-def _with_datum(unknowns: Unknowns, state: State) -> Unknowns:
+def _with_datum(unknowns: Unknowns, state: State, held: list[tuple[int, int]] | None) -> Unknowns:
     settings = unknowns.block.settings.adjustment
     if settings.datum == "fixed":
         return hold_orientation(unknowns, settings.datum_fixed)
     if settings.datum in ("minimal", "inner"):
-        return hold_points(unknowns, minimal_coordinates(unknowns, state))
+        if held is None:
+            return hold_points(unknowns, minimal_coordinates(unknowns, state))
+        row = {int(point): k for k, point in enumerate(unknowns.points)}
+        return hold_points(unknowns, [(row[point], axis) for point, axis in held])
     return unknowns
 
 

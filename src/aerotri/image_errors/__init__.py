@@ -1,0 +1,19 @@
+"""What the camera does wrong: systematic image errors from the parameters, and what the residuals still show."""
+
+from aerotri.image_errors.averaged_residuals import AveragedResiduals, averaged_residuals
+from aerotri.image_errors.field import ErrorField, field_difference, field_on_grid, largest_effects, systematic_errors
+from aerotri.image_errors.groups import ImageGroup, image_group, image_groups, interior_elements
+
+__all__ = [
+    "AveragedResiduals",
+    "ErrorField",
+    "ImageGroup",
+    "averaged_residuals",
+    "field_difference",
+    "field_on_grid",
+    "image_group",
+    "image_groups",
+    "interior_elements",
+    "largest_effects",
+    "systematic_errors",
+]

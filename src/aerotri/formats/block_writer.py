@@ -1,0 +1,170 @@
+"""A `Block` written as a block folder, in full precision."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+
+from aerotri.conventions import RADIANS_PER, InputError
+from aerotri.formats.atomic import atomic_folder
+from aerotri.formats.table_writer import check_names, write_table
+from aerotri.formats.toml_text import Inline, toml_of
+from aerotri.observations import Block, Camera, Prior
+from aerotri.observations.block import INTERIOR_ELEMENTS
+
+ANGLE_UNIT = "deg"
+TABLE_NAMES = ("images", "image_points", "control", "gnss_ins", "fiducials", "edits", "constraints")
+OWN_ENTRIES = ("block.toml", *(f"{name}.{ending}" for name in TABLE_NAMES for ending in ("csv", "parquet")))
+IMAGE_FIELDS = ("image", "camera", "strip", "X0", "Y0", "Z0", "omega", "phi", "kappa")
+
+
+def write_block(block: Block, folder: str | os.PathLike, tables: Literal["csv", "parquet"] = "csv") -> None:
+    """Write a block; the folder appears when it is whole.
+
+    Tables of an older block of that name are replaced, whatever else the folder holds is kept. Units are mm and
+    degrees; floating point numbers are written so that they are read back the same.
+
+    Parameters
+    ----------
+    block : the block.
+    folder : its place.
+    tables : 'csv' or 'parquet'.
+
+    Raises
+    ------
+    InputError
+        When a name cannot stand in a table, or the place cannot be written to.
+    """
+    if tables not in ("csv", "parquet"):
+        raise InputError(f"tables = '{tables}'", "tables are written as csv or parquet")
+    with atomic_folder(folder, own=OWN_ENTRIES) as place:
+        _check_columns(block)
+        (place / "block.toml").write_text(toml_of(_settings(block)), encoding="utf-8")
+        for name, columns in _tables(block).items():
+            write_table(columns, place / f"{name}.{tables}")
+
+
+def _check_columns(block: Block) -> None:
+    check_names(np.array([camera.name for camera in block.cameras], dtype=str), "camera")
+    check_names(np.array(list(block.images.columns), dtype=str), "grouping column")
+    for name in block.images.columns:
+        if not name or name in IMAGE_FIELDS or name.startswith("x_"):
+            raise InputError(f"a grouping column cannot be named '{name}'", "give it another name")
+
+
+def _tables(block: Block) -> dict[str, dict[str, np.ndarray]]:
+    images, rays, control = block.images, block.image_points, block.control
+    per_radian = 1.0 / RADIANS_PER[ANGLE_UNIT]
+    camera_names = np.array([camera.name for camera in block.cameras], dtype=str)
+    tables = {
+        "images": {"image": images.names, "camera": camera_names[images.camera], "strip": images.strip}
+        | dict(images.columns)
+        | _columns(("X0", "Y0", "Z0"), images.centre)
+        | _columns(("omega", "phi", "kappa"), images.angles * per_radian),
+        "image_points": {"image": images.names[rays.image], "point": block.points[rays.point]}
+        | _columns(("x", "y"), rays.xy)
+        | _columns(("sx", "sy"), _sigma_unless_common(block)),
+    }
+    if len(control):
+        role = np.where(control.is_check, "check", "control")
+        tables["control"] = (
+            {"point": block.points[control.point]}
+            | _columns(("X", "Y", "Z"), control.xyz)
+            | _columns(("sX", "sY", "sZ"), control.sigma)
+            | {"role": role}
+        )
+    if block.gnss_ins is not None and len(block.gnss_ins):
+        observed = block.gnss_ins
+        tables["gnss_ins"] = (
+            {"image": images.names[observed.image]}
+            | _columns(("X", "Y", "Z"), observed.xyz, always=True)
+            | _columns(("sX", "sY", "sZ"), observed.sigma, always=True)
+            | _columns(("omega", "phi", "kappa"), observed.angles * per_radian)
+            | _columns(("s_omega", "s_phi", "s_kappa"), observed.angles_sigma * per_radian)
+            | _columns(("time",), observed.time[:, None])
+        )
+    return tables
+
+
+def _columns(names: tuple[str, ...], values: np.ndarray, always: bool = False) -> dict[str, np.ndarray]:
+    """Columns of an array, left out when all of it is unknown."""
+    if not always and np.isnan(values).all() and len(values):
+        return {}
+    return {name: values[:, k] for k, name in enumerate(names)}
+
+
+def _sigma_unless_common(block: Block) -> np.ndarray:
+    """The σ of the image points, unknown (so not written) when they are all the block's own."""
+    sigma = block.image_points.sigma
+    common = (sigma == block.settings.image_sigma_um * 1e-3).all()
+    return np.full_like(sigma, np.nan) if common else sigma
+
+
+def _settings(block: Block) -> dict[str, Any]:
+    settings, adjustment = block.settings, block.settings.adjustment
+    content: dict[str, Any] = {
+        "name": block.name,
+        "crs": block.crs,
+        "angle_unit": ANGLE_UNIT,
+        "rotation": block.rotation,
+        "image_unit": "mm",
+        "camera": {camera.name: _camera(camera) for camera in block.cameras},
+        "stochastic": {"image_sigma_um": settings.image_sigma_um},
+        "adjustment": {
+            "additional_parameters": [
+                f"{family}:{'+'.join(items)}" for family, items in adjustment.additional_parameters
+            ],
+            "parameter_groups": adjustment.parameter_groups,
+            "parameter_selection": adjustment.parameter_selection,
+            "t_limit": adjustment.t_limit,
+            "correlation_limit": adjustment.correlation_limit,
+            "robust": adjustment.robust,
+            "datum": adjustment.datum,
+            "datum_points": list(adjustment.datum_points),
+            "datum_fixed": [f"{image}:{element}" for image, element in adjustment.datum_fixed],
+            "variance_components": adjustment.variance_components,
+            "alpha": adjustment.alpha,
+            "power": adjustment.power,
+            "max_iterations": adjustment.max_iterations,
+        },
+        "corrections": {"refraction": settings.refraction, "earth_curvature": settings.earth_curvature},
+        "gnss": {
+            "shift": settings.gnss.shift,
+            "drift": settings.gnss.drift,
+            "lever_arm_m": list(settings.gnss.lever_arm_m),
+            "time_offset": settings.gnss.time_offset,
+        },
+        "ins": {"boresight": settings.ins.boresight, "drift": settings.ins.drift},
+    }
+    if settings.gnss.lever_arm_sigma_m is not None:
+        content["gnss"]["lever_arm_sigma_m"] = list(settings.gnss.lever_arm_sigma_m)
+    return content
+
+
+def _camera(camera: Camera) -> dict[str, Any]:
+    content: dict[str, Any] = {
+        "model": camera.model,
+        "size_px": list(camera.size_px),
+        "pixel_um": camera.pixel_um,
+        "focal_length_mm": camera.focal_length_mm,
+        "principal_point_mm": list(camera.principal_point_mm),
+    }
+    if camera.flight_axis is not None:
+        content["flight_axis"] = camera.flight_axis
+    interior = {name: prior for name, prior in camera.interior.items() if name in INTERIOR_ELEMENTS and not prior.fixed}
+    for section, priors in (("interior", interior), ("brown", camera.brown), ("lens", camera.lens)):
+        if priors:
+            content[section] = {name: _prior(prior) for name, prior in priors.items()}
+    return content
+
+
+def _prior(prior: Prior) -> Mapping[str, Any]:
+    content: dict[str, Any] = {"value": prior.value}
+    if prior.sigma is not None:
+        content["sigma"] = prior.sigma
+    if prior.fixed:
+        content["fixed"] = True
+    return Inline(content)

@@ -1,0 +1,105 @@
+"""solution.npz: the final unknowns, from which any covariance can be had again without adjusting.
+
+Coordinates are kept as the adjustment had them, reduced to the local origin, so that nothing is lost in between.
+"""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.solve import Solution
+from aerotri.conventions import InputError
+from aerotri.statistics.adjusted_block import AdjustedBlock
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True, eq=False)
+class SavedSolution:
+    """What solution.npz holds; rows of photographs, points and rays as in the result's block.
+
+    Parameters
+    ----------
+    origin : (3,) m. rotation : (n, 3, 3). centre : (n, 3) m, points : (N, 3) m, from the origin; NaN if not adjusted.
+    shared : (s,) values, shared_names, shared_groups : (s,) str, shared_cofactor : (s, s), without σ̂0².
+    held : (k, 2) point and axis of coordinates held for the datum.
+    ray_status, weight : (m,).
+    """
+
+    origin: np.ndarray
+    rotation: np.ndarray
+    centre: np.ndarray
+    points: np.ndarray
+    shared: np.ndarray
+    shared_names: np.ndarray
+    shared_groups: np.ndarray
+    shared_cofactor: np.ndarray
+    held: np.ndarray
+    ray_status: np.ndarray
+    weight: np.ndarray
+    estimator_code: int
+    estimator_limit: float
+    sigma0: float
+    status: str
+    iterations: int
+    warnings: tuple[str, ...]
+
+
+def write_solution(path: str | os.PathLike, system: NormalSystem, solution: Solution, result: AdjustedBlock) -> None:
+    """Write solution.npz."""
+    u, state = system.unknowns, solution.state
+    n, count = len(u.block.images), len(u.block.points)
+    centre, rotation, points = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((count, 3), np.nan)
+    centre[u.images], rotation[u.images], points[u.points] = state.centre, state.rotation, state.points
+    row, axis = np.nonzero(~u.point_free)
+    np.savez_compressed(
+        path,
+        schema=SCHEMA,
+        origin=u.origin,
+        rotation=rotation,
+        centre=centre,
+        points=points,
+        shared=state.shared,
+        shared_names=np.array(u.shared.names, dtype=str),
+        shared_groups=np.array(u.shared.groups, dtype=str),
+        shared_cofactor=result.parameters.covariance / result.outcome.sigma0**2,
+        held=np.column_stack([u.points[row], axis]),
+        ray_status=result.rays.status,
+        weight=result.rays.weight,
+        estimator_code=solution.estimator.code,
+        estimator_limit=solution.estimator.limit,
+        sigma0=result.outcome.sigma0,
+        status=np.array(solution.status),
+        iterations=solution.iterations,
+        warnings=np.array(result.outcome.warnings, dtype=str),
+    )
+
+
+def read_solution(path: str | os.PathLike) -> SavedSolution:
+    """Read solution.npz.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, damaged or of another schema.
+    """
+    path = Path(path)
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        if int(arrays.pop("schema")) != SCHEMA:
+            raise InputError("was written by another version", "adjust the block again", path)
+        scalars = {"estimator_code": int, "estimator_limit": float, "sigma0": float, "iterations": int, "status": str}
+        values = {name: scalars[name](array) if name in scalars else array for name, array in arrays.items()}
+        values["warnings"] = tuple(str(w) for w in arrays["warnings"])
+        return SavedSolution(**values)
+    except FileNotFoundError:
+        raise InputError("is missing", "give the folder that `aerotri adjust` wrote", path) from None
+    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+        raise InputError(f"cannot be read: {error}", "adjust the block again", path) from error

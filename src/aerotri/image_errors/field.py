@@ -1,0 +1,224 @@
+"""Systematic image errors d(x, y) of a group of photographs, with their covariance: d = B·p, Q_dd = B·Q_pp·Bᵀ.
+
+measured = ideal + d, evaluated at the measured position. σ̂0² is in Q_pp, so every σ here is final.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.functional_model.additional_parameters import ParameterSet, brown, lens
+from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
+from aerotri.image_errors.groups import (
+    ImageGroup,
+    image_group,
+    image_groups,
+    interior_elements,
+    parameters_of_group,
+)
+from aerotri.observations import Camera
+from aerotri.statistics.adjusted_block import AdjustedBlock
+
+CHI2_LIMIT = -2.0 * np.log(1.0 - 0.95)
+"""95 % quantile of χ² with two degrees of freedom; the distribution function is 1 − exp(−χ²/2)."""
+LENS_ITERATIONS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorField:
+    """Systematic image errors on a grid over the format; the nodes are the centres of nx × ny equal cells.
+
+    Parameters
+    ----------
+    camera, group : of the photographs.
+    x, y : (ny, nx) mm from the image centre; y grows with the row index.
+    d : (ny, nx, 2) mm, measured − ideal.
+    sigma : (ny, nx, 2) mm.
+    significant : (ny, nx) bool, dᵀQ⁻¹d above the 95 % quantile of χ² with two degrees of freedom.
+    """
+
+    camera: Camera
+    group: str
+    x: np.ndarray
+    y: np.ndarray
+    d: np.ndarray
+    sigma: np.ndarray
+    significant: np.ndarray
+
+    @property
+    def rms(self) -> float:
+        """mm, root mean square length of the vectors."""
+        return float(np.sqrt(np.mean(np.sum(self.d**2, axis=-1))))
+
+    @property
+    def max(self) -> float:
+        """mm, the longest vector."""
+        return float(np.max(np.hypot(self.d[..., 0], self.d[..., 1])))
+
+
+def systematic_errors(
+    adjusted: AdjustedBlock, group: str, x: np.ndarray, y: np.ndarray, camera: str | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Systematic image errors of a group at image positions, and their covariance.
+
+    Linear families count exactly. Brown's family is evaluated about the adjusted principal point. The forward lens is a
+    function of the ideal direction, which is found from the measured one by fixed point; its covariance leaves out how
+    the ideal direction itself depends on the parameters (a relative effect of |∂d/∂x|). Lens values that were given and
+    not adjusted belong to d and carry no variance.
+
+    Parameters
+    ----------
+    group : name of the parameter group.
+    x, y : (n,) mm from the image centre, measured positions.
+    camera : name; needed only where several cameras share the group.
+
+    Returns
+    -------
+    d : (n, 2) mm, measured − ideal.
+    covariance : (n, 2, 2) mm².
+    """
+    d, jacobian, rows = _errors_with_jacobian(adjusted, image_group(adjusted.block, group, camera), x, y)
+    return d, _propagated(jacobian, _covariance_of(adjusted, rows))
+
+
+def field_on_grid(adjusted: AdjustedBlock, group: str, nx: int | None = None, camera: str | None = None) -> ErrorField:
+    """The systematic image errors of a group on a grid.
+
+    Parameters
+    ----------
+    nx : nodes along x; default 25 on the longer side of the format. The cells are as square as the format allows.
+    """
+    images = image_group(adjusted.block, group, camera)
+    x, y = grid_nodes(images.camera, nx)
+    d, covariance = systematic_errors(adjusted, group, x.ravel(), y.ravel(), images.camera.name)
+    return _field(images.camera, group, x, y, d, covariance)
+
+
+def field_difference(
+    adjusted: AdjustedBlock, first: str, second: str, nx: int | None = None, camera: str | None = None
+) -> ErrorField:
+    """First group minus second group, with the covariance of the difference: correlations between the two count."""
+    one, two = (image_group(adjusted.block, name, camera) for name in (first, second))
+    x, y = grid_nodes(one.camera, nx)
+    d_one, jacobian_one, rows_one = _errors_with_jacobian(adjusted, one, x.ravel(), y.ravel())
+    d_two, jacobian_two, rows_two = _errors_with_jacobian(adjusted, two, x.ravel(), y.ravel())
+    jacobian, rows = np.concatenate([jacobian_one, -jacobian_two], axis=2), np.concatenate([rows_one, rows_two])
+    covariance = _propagated(jacobian, _covariance_of(adjusted, rows))
+    return _field(one.camera, f"{first} − {second}", x, y, d_one - d_two, covariance)
+
+
+def largest_effects(adjusted: AdjustedBlock) -> np.ndarray:
+    """(s,) mm, the longest displacement that each additional parameter causes on the grid; NaN for other parameters.
+
+    Makes parameters of different families and units comparable.
+    """
+    effects = np.full(len(adjusted.parameters), np.nan)
+    for group in image_groups(adjusted.block):
+        x, y = grid_nodes(group.camera)
+        _, jacobian, rows = _errors_with_jacobian(adjusted, group, x.ravel(), y.ravel())
+        longest = np.linalg.norm(jacobian, axis=1).max(axis=0, initial=0.0) * np.abs(adjusted.parameters.value[rows])
+        effects[rows] = np.fmax(effects[rows], longest)
+    return effects
+
+
+def grid_nodes(camera: Camera, nx: int | None = None, longer: int = 25) -> tuple[np.ndarray, np.ndarray]:
+    """Centres of the cells that divide the format, (ny, nx) mm each; `longer` cells on the longer side unless nx."""
+    half_x, half_y = camera.half_format_mm
+    if nx is None:
+        nx = longer if half_x >= half_y else max(1, round(longer * half_x / half_y))
+    ny = max(1, round(nx * half_y / half_x))
+    x = (2.0 * (np.arange(nx) + 0.5) / nx - 1.0) * half_x
+    y = (2.0 * (np.arange(ny) + 0.5) / ny - 1.0) * half_y
+    grid_x, grid_y = np.meshgrid(x, y)
+    return grid_x, grid_y
+
+
+def _field(camera: Camera, group: str, x, y, d: np.ndarray, covariance: np.ndarray) -> ErrorField:
+    sigma = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
+    grid = (*x.shape, 2)
+    mask = significant(d, covariance).reshape(x.shape)
+    return ErrorField(camera, group, x, y, d.reshape(grid), sigma.reshape(grid), mask)
+
+
+def significant(d: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """(n,) bool: dᵀQ⁻¹d above `CHI2_LIMIT`.
+
+    Where Q is singular (a pattern that moves points along a line only) its pseudo-inverse is used; where Q is zero, a
+    vector other than zero was given as known and counts as significant.
+    """
+    finite = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
+    safe = np.where(finite[:, None, None], covariance, 0.0)
+    statistic = np.einsum("ni,nij,nj->n", d, np.linalg.pinv(safe, rcond=1e-10, hermitian=True), d)
+    known = np.trace(safe, axis1=1, axis2=2) == 0.0
+    return np.where(known, np.any(d != 0.0, axis=1), statistic > CHI2_LIMIT) & finite
+
+
+def _propagated(jacobian: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """(n, 2, 2) J·Q·Jᵀ of (n, 2, k) and (k, k)."""
+    return jacobian @ covariance @ jacobian.transpose(0, 2, 1)
+
+
+def _covariance_of(adjusted: AdjustedBlock, rows: np.ndarray) -> np.ndarray:
+    """(k, k) of some shared parameters; what was held has no variance, whatever the record keeps for it."""
+    p = adjusted.parameters
+    varies = np.isin(p.status[rows], ("estimated", "weighted"))
+    return np.where(varies[:, None] & varies[None, :], p.covariance[np.ix_(rows, rows)], 0.0)
+
+
+def _errors_with_jacobian(
+    adjusted: AdjustedBlock, group: ImageGroup, x, y
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """d (n, 2) mm, its partials (n, 2, k) by the k parameters in force, and their rows (k,) in the record."""
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    rows = np.flatnonzero(parameters_of_group(adjusted, group))
+    column_of = {str(name): column for column, name in enumerate(adjusted.parameters.names[rows])}
+    d, jacobian = np.zeros((len(x), 2)), np.zeros((len(x), 2, len(rows)))
+    for names, d_of_family, basis in _families(adjusted, group, rows, x, y):
+        d += d_of_family
+        for i, name in enumerate(names):
+            if name in column_of:
+                jacobian[:, :, column_of[name]] += basis[:, :, i]
+    return d, jacobian, rows
+
+
+def _families(adjusted: AdjustedBlock, group: ImageGroup, rows: np.ndarray, x: np.ndarray, y: np.ndarray):
+    """Names, image errors (n, 2) and patterns (n, 2, p) of every family that acts in a group."""
+    camera, values = group.camera, _values_in_force(adjusted, group, rows)
+    for family, module in LINEAR_FAMILIES.items():
+        items = tuple(item for item in module.ITEMS if f"{family}.{item}" in values)
+        if items and module.CAMERA_MODEL in (None, camera.model):
+            chosen = ParameterSet(family, items, camera)
+            basis = chosen.basis(x, y)
+            yield chosen.names, basis @ np.array([values[name] for name in chosen.names]), basis
+    (c, x0, y0), _ = interior_elements(adjusted, camera)
+    for module in (brown, lens):
+        names = tuple(f"{module.FAMILY}.{item}" for item in module.ITEMS)
+        if any(name in values for name in names):
+            p = np.array([values.get(name, 0.0) for name in names])
+            yield names, *(_brown(x - x0, y - y0, p) if module is brown else _lens((x - x0) / c, (y - y0) / c, c, p))
+
+
+def _values_in_force(adjusted: AdjustedBlock, group: ImageGroup, rows: np.ndarray) -> dict[str, float]:
+    """Values by name: adjusted where they were, as the camera gives them otherwise, without what was removed."""
+    p = adjusted.parameters
+    given = {f"brown.{item}": prior.value for item, prior in group.camera.brown.items()}
+    given |= {f"lens.{item}": prior.value for item, prior in group.camera.lens.items()}
+    for name in p.names[p.status == "removed"]:
+        given.pop(str(name), None)
+    return given | {str(name): float(value) for name, value in zip(p.names[rows], p.value[rows], strict=True)}
+
+
+def _brown(x_bar: np.ndarray, y_bar: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return brown.image_error(x_bar, y_bar, p), brown.basis(x_bar, y_bar)
+
+
+def _lens(a: np.ndarray, b: np.ndarray, c: float, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Image error and patterns of the forward lens at measured directions a, b."""
+    measured = np.stack([a, b], axis=-1)
+    ideal = measured
+    for _ in range(LENS_ITERATIONS):
+        ideal = measured - (lens.distort(ideal[:, 0], ideal[:, 1], p) - ideal)
+    patterns = [lens.distort(ideal[:, 0], ideal[:, 1], unit) - ideal for unit in np.eye(len(lens.ITEMS))]
+    return c * (measured - ideal), c * np.stack(patterns, axis=-1)

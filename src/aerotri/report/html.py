@@ -1,0 +1,117 @@
+"""One self-contained page about an adjustment: no network, no scripts, every name escaped."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from aerotri.report import quality, tables
+from aerotri.report.rendering import RenderedPlot, render_plots
+from aerotri.statistics.adjusted_block import AdjustedBlock
+
+LARGEST_SVG = 450_000
+"""Bytes above which a plot is embedded as PNG: thousands of photographs as vectors weigh more than they say."""
+
+CAPTIONS = {
+    "block_plan": "Projection centres, strips, footprints on the mean height of the ground, control and check points.",
+    "ground_points": "Differences adjusted − given: horizontal vectors, and heights as arrows up (too high) or down.",
+    "systematic_errors": (
+        "Systematic image errors d of the additional parameters: measured = ideal + d. Dark arrows differ from zero at "
+        "95 % (χ² with two degrees of freedom and the covariance of the parameters)."
+    ),
+    "averaged_residuals": (
+        "All photographs laid over one another: mean of measured − adjusted by cells, what a remaining systematic "
+        "image error looks like. Dark arrows exceed what noise leaves at 95 %."
+    ),
+    "correlations": "Correlations of the shared parameters; darkness is size, a dash marks negative ones.",
+    "residual_histogram": "Residuals of the image coordinates against the normal curve they should follow.",
+    "rays_per_point": "In how many photographs the points were measured.",
+}
+
+
+def report_html(adjusted: AdjustedBlock, plots: Mapping[str, Figure | RenderedPlot]) -> str:
+    """The page as text.
+
+    Parameters
+    ----------
+    plots : by the names of `all_plots`, drawn or already rendered (what `save_plots` returned need not be rendered
+        twice); those missing are left out.
+    """
+    environment = Environment(
+        loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    return environment.get_template("report.html.j2").render(_content(adjusted, render_plots(plots)))
+
+
+def write_report(adjusted: AdjustedBlock, plots: Mapping[str, Figure | RenderedPlot], path: str | Path) -> None:
+    """Write the page; arguments as in `report_html`."""
+    Path(path).write_text(report_html(adjusted, plots), encoding="utf-8")
+
+
+def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot]) -> dict[str, Any]:
+    return {
+        "name": quality.printable(adjusted.block.name),
+        "outcome": adjusted.outcome,
+        "version": _version(),
+        "cards": _cards(adjusted),
+        "findings": quality.findings(adjusted),
+        "warnings": [quality.printable(text, 1000) for text in adjusted.outcome.warnings],
+        "asprs": quality.asprs_warning(adjusted),
+        "plots": {name: _embedded(name, plot) for name, plot in plots.items()},
+        "tables": _tables(adjusted),
+    }
+
+
+def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
+    control, check = adjusted.control, adjusted.check
+    return {
+        "summary": tables.summary(adjusted),
+        "groups": tables.observation_groups(adjusted),
+        "control_accuracy": tables.ground_accuracy(adjusted, control, f"Control points ({len(control)})"),
+        "check_accuracy": tables.ground_accuracy(adjusted, check, f"Check points ({len(check)})"),
+        "control": tables.ground_points(adjusted, control, "Control points, one by one"),
+        "check": tables.ground_points(adjusted, check, "Check points, one by one"),
+        "cameras": tables.cameras(adjusted),
+        "parameters": tables.parameters(adjusted),
+        "largest": tables.largest_residuals(adjusted),
+        "blunders": tables.blunders(adjusted),
+        "weak_points": tables.weak_points(adjusted),
+        "weak_images": tables.weak_images(adjusted),
+        "images": tables.images(adjusted),
+    }
+
+
+def _cards(adjusted: AdjustedBlock) -> list[tuple[str, str, str]]:
+    """Heading, number and small print of the boxes at the top."""
+    o = adjusted.outcome
+    cards = [("σ₀", f"{o.sigma0:.3f}", f"{o.sigma0_um:.2f} µm{quality.pixel_text(o.sigma0_um, adjusted)}")]
+    for heading, results in (("Check points", adjusted.check), ("Control points", adjusted.control)):
+        if len(results):
+            s, d = quality.ground_statistics(adjusted, results), quality.metre_digits(results.sigma)
+            cards.append(
+                (f"{heading} ({len(results)})", f"{s.rmse_h:.{d}f} / {s.rmse_v:.{d}f} m", "RMSE horizontal / vertical")
+            )
+    cards.append(("Redundancy", f"{o.redundancy}", f"of {o.observations} observations"))
+    return cards
+
+
+def _embedded(name: str, plot: RenderedPlot) -> dict[str, str]:
+    """Source and description of an image; as a data address it can neither load nor run anything."""
+    small = len(plot.svg) <= LARGEST_SVG
+    kind, content = ("svg+xml", plot.svg) if small else ("png", plot.png)
+    caption = next(text for start, text in CAPTIONS.items() if name.startswith(start))
+    return {"source": f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}", "caption": caption}
+
+
+def _version() -> str:
+    try:
+        return version("aerotri")
+    except PackageNotFoundError:
+        return "unknown"

@@ -1,0 +1,118 @@
+"""What a simulated block really is, and its files."""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.formats.atomic import atomic_folder
+from aerotri.observations import Block
+
+
+@dataclass(frozen=True, eq=False)
+class ImageErrorSample:
+    """The image error of a camera on a grid: xy and d, (g, 2) mm each; day '' when it is the same on all days."""
+
+    camera: str
+    day: str
+    xy: np.ndarray
+    d: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The true values behind a simulated block.
+
+    Parameters
+    ----------
+    centre, angles : (n, 3) m and rad of the images, in the block's order and rotation order.
+    points : (N, 3) m in the order of the block's points.
+    parameter_names, parameter_groups, parameter_values : (p,) additional parameters in force, the group a camera name.
+    interior : (c, 3) mm, focal length, x0, y0 of the cameras in the block's order.
+    image_errors : sampled fields.
+    gross_errors : (k,) index into the block's image points; gross_error_mm : (k, 2).
+    control_blunders : (b,) index into the block's control; control_blunder_m : (b, 3).
+    """
+
+    centre: np.ndarray
+    angles: np.ndarray
+    points: np.ndarray
+    parameter_names: tuple[str, ...]
+    parameter_groups: tuple[str, ...]
+    parameter_values: np.ndarray
+    interior: np.ndarray
+    image_errors: tuple[ImageErrorSample, ...]
+    gross_errors: np.ndarray
+    gross_error_mm: np.ndarray
+    control_blunders: np.ndarray
+    control_blunder_m: np.ndarray
+
+
+def write_simulated(folder: str | os.PathLike, block: Block, truth: Truth) -> None:
+    """Write the block's folder and, under `truth/`, what is behind it; other files of the folder stay."""
+    # imported here: those who only simulate need no file formats
+    from aerotri.formats.block_folder import write_block
+
+    # a block must never stand beside the truth of another one, not even when the program is killed here
+    if (Path(folder) / "truth").exists():
+        shutil.rmtree(Path(folder) / "truth")
+    write_block(block, Path(folder))
+    write_truth(folder, block, truth)
+
+
+def write_truth(folder: str | os.PathLike, block: Block, truth: Truth) -> None:
+    """Write `truth/` of a block's folder: images, points, additional_parameters, cameras, image_errors, gross_errors,
+    control_blunders (.csv). Metres, millimetres in the image, degrees.
+    """
+    with atomic_folder(Path(folder) / "truth") as place:
+        _write_tables(place, block, truth)
+
+
+def _write_tables(place: Path, block: Block, truth: Truth) -> None:
+    names = block.images.names
+    orientation = np.hstack([truth.centre, np.degrees(truth.angles)])
+    _write(place / "images.csv", ["image", "X0", "Y0", "Z0", "omega", "phi", "kappa"], _rows((names,), orientation))
+    _write(place / "points.csv", ["point", "X", "Y", "Z"], _rows((block.points,), truth.points))
+    parameters = (truth.parameter_names, truth.parameter_groups)
+    _write(
+        place / "additional_parameters.csv",
+        ["name", "group", "value"],
+        _rows(parameters, truth.parameter_values[:, None]),
+    )
+    cameras = [camera.name for camera in block.cameras]
+    _write(place / "cameras.csv", ["name", "focal_length_mm", "x0_mm", "y0_mm"], _rows((cameras,), truth.interior))
+    _write_image_errors(place / "image_errors.csv", truth.image_errors)
+    rays = block.image_points
+    wrong = (names[rays.image[truth.gross_errors]], block.points[rays.point[truth.gross_errors]])
+    _write(place / "gross_errors.csv", ["image", "point", "dx", "dy"], _rows(wrong, truth.gross_error_mm))
+    blundered = (block.points[block.control.point[truth.control_blunders]],)
+    _write(place / "control_blunders.csv", ["point", "dX", "dY", "dZ"], _rows(blundered, truth.control_blunder_m))
+
+
+def _write_image_errors(path: Path, samples: Sequence[ImageErrorSample]) -> None:
+    rows = []
+    for sample in samples:
+        count = len(sample.xy)
+        rows += _rows(([sample.camera] * count, [sample.day] * count), np.hstack([sample.xy, sample.d]))
+    _write(path, ["camera", "day", "x", "y", "dx", "dy"], rows)
+
+
+def _rows(texts: tuple[Iterable, ...], numbers: np.ndarray) -> list[list]:
+    """Rows of text columns and numbers; repr keeps every bit of a number."""
+    return [
+        [*(str(t) for t in text), *(repr(v) for v in values)]
+        for text, values in zip(zip(*texts, strict=True), numbers.tolist(), strict=True)
+    ]
+
+
+def _write(path: Path, header: list[str], rows: Iterable[list]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
