@@ -12,7 +12,12 @@ import numpy as np
 
 from aerotri.adjustment import _pairs
 from aerotri.adjustment.shared_parameters import LensTable, SharedList, lens_table, linear_columns
-from aerotri.functional_model.rotation import angles_from_rotation, exponential, small_rotation_per_angle
+from aerotri.functional_model.rotation import (
+    angles_from_rotation,
+    exponential,
+    rotation_from_angles,
+    small_rotation_per_angle,
+)
 from aerotri.observations import Block
 
 ORIENTATION_ELEMENTS = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
@@ -118,10 +123,16 @@ class Unknowns:
 
     def advance(self, state: State, step: Step) -> State:
         """The state after a step."""
-        small = np.einsum("nij,nj->ni", self.turn(state), step.images[:, 3:])
+        rotation = exponential(step.images[:, 3:]) @ state.rotation
+        if self.by_angles.any():
+            # adding to the angles themselves keeps a held angle exactly, where turning would do so to first order
+            angles = angles_from_rotation(state.rotation[self.by_angles], self.block.rotation)
+            rotation[self.by_angles] = rotation_from_angles(
+                angles + step.images[self.by_angles, 3:], self.block.rotation
+            )
         return State(
             centre=state.centre + step.images[:, :3],
-            rotation=exponential(small) @ state.rotation,
+            rotation=rotation,
             points=state.points + step.points,
             shared=state.shared + step.shared,
         )

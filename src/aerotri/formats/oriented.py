@@ -45,13 +45,13 @@ class OrientedBlock:
     def oriented(self) -> np.ndarray:
         """(n,) bool."""
         pose = np.concatenate([self.centre[:, :, None], self.rotation], axis=2).reshape(len(self.centre), 12)
-        return np.isfinite(pose).all(axis=1)
+        return np.asarray(np.isfinite(pose).all(axis=1))
 
     @property
     def complete(self) -> np.ndarray:
         """(m,) bool, the used rays of oriented images to known points."""
         rays = self.block.image_points
-        known = np.isfinite(self.points).all(axis=1)
+        known = np.asarray(np.isfinite(self.points).all(axis=1))
         return self.used & self.oriented[rays.image] & known[rays.point]
 
     def corrected_xy(self) -> np.ndarray:

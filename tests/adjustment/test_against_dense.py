@@ -1,0 +1,215 @@
+"""Solution, covariances and redundancy numbers of the sparse adjustment against dense algebra on small blocks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aerotri.adjustment.datum import datum_rows, motions_of_images, motions_of_points
+from aerotri.functional_model.collinearity import linearise
+from aerotri.functional_model.observed_unknowns import antenna_partials
+from aerotri.functional_model.rotation import small_rotation_per_angle
+from aerotri.observations import Prior
+from aerotri.pipeline import adjust_keeping_system
+from small_blocks import small_block, with_adjustment
+
+
+def dense_design(adjustment):
+    """Whitened design matrix over (photographs, shared parameters, points), written out from the linearised rays."""
+    system, state = adjustment.system, adjustment.solution.state
+    u = system.unknowns
+    rays, n, s, count = u.rays, len(u.images), len(u.shared), len(u.points)
+    ray_point = np.repeat(np.arange(count), np.diff(rays.start))
+    partials = linearise(
+        state.rotation, state.centre, state.points, u.interior(state), rays.image, ray_point, rays.lens_row, rays.xy
+    )
+    rows = []
+    for k in range(len(rays.image)):
+        block = np.zeros((2, 6 * n + s + 3 * count))
+        by_eo = partials.by_orientation[k].copy()
+        by_eo[:, 3:] = by_eo[:, 3:] @ u.turn(state)[rays.image[k]]
+        block[:, 6 * rays.image[k] : 6 * rays.image[k] + 6] = by_eo * u.eo_free[rays.image[k]]
+        for t, column in enumerate(u.lens.columns[rays.lens_row[k]]):
+            if column >= 0:
+                block[:, 6 * n + column] += partials.by_interior[k, :, t]
+        for t in range(rays.ap_index.shape[1]):
+            block[:, 6 * n + rays.ap_index[k, t]] += rays.ap_value[k, :, t]
+        at = 6 * n + s + 3 * ray_point[k]
+        block[:, at : at + 3] = partials.by_point[k] * u.point_free[ray_point[k]]
+        rows.append(block * (rays.inv_sigma[k] * np.sqrt(adjustment.solution.equations.weight[k]))[:, None])
+    design = np.concatenate(rows)
+    extra = []
+    for point, axis in zip(*np.nonzero(u.prior_weight), strict=True):
+        row = np.zeros(design.shape[1])
+        row[6 * n + s + 3 * point + axis] = np.sqrt(u.prior_weight[point, axis])
+        extra.append(row)
+    for column, sigma in enumerate(u.shared.sigma):
+        if np.isfinite(sigma):
+            row = np.zeros(design.shape[1])
+            row[6 * n + column] = 1.0 / sigma
+            extra.append(row)
+    if system.centres is not None:
+        observed = system.centres
+        by_eo = antenna_partials(observed, state.rotation)
+        for g in range(len(observed)):
+            for axis in range(3):
+                row = np.zeros(design.shape[1])
+                row[6 * observed.image[g] : 6 * observed.image[g] + 6] = by_eo[g, axis]
+                for columns, factor in ((observed.shift, 1.0), (observed.drift, observed.time[g])):
+                    if columns[g, axis] >= 0:
+                        row[6 * n + columns[g, axis]] = factor
+                extra.append(row * observed.inv_sigma[g, axis])
+    return np.concatenate([design, np.array(extra)]) if extra else design
+
+
+def dense_cofactors(adjustment, inner=False):
+    """Pseudo-inverse of the scaled normal matrix; with `inner`, bordered by the datum conditions."""
+    design = dense_design(adjustment)
+    u, state = adjustment.system.unknowns, adjustment.solution.state
+    norm = np.linalg.norm(design, axis=0)
+    live = norm > 0
+    scaled = design[:, live] / norm[live]
+    q = np.zeros((design.shape[1], design.shape[1]))
+    if not inner:
+        q[np.ix_(live, live)] = np.linalg.inv(scaled.T @ scaled) / np.outer(norm[live], norm[live])
+        return design, q
+    g = np.zeros((design.shape[1], 7))
+    first = 6 * len(u.images) + len(u.shared)
+    rows = datum_rows(u)
+    g[first:].reshape(-1, 3, 7)[rows] = motions_of_points(state.points)[rows]
+    conditions = g[live] / norm[live][:, None]
+    conditions /= np.linalg.norm(conditions, axis=0)
+    size = live.sum()
+    bordered = np.block([[scaled.T @ scaled, conditions], [conditions.T, np.zeros((7, 7))]])
+    q[np.ix_(live, live)] = np.linalg.inv(bordered)[:size, :size] / np.outer(norm[live], norm[live])
+    return design, q
+
+
+def assert_same(got, expected, scale, tolerance):
+    """Compare cofactors as fractions of the σ of their unknowns."""
+    np.testing.assert_allclose(got / scale, expected / scale, atol=tolerance)
+
+
+def check(adjustment, q, design, tolerance=1e-9):
+    result, u = adjustment.result, adjustment.system.unknowns
+    s0 = result.outcome.sigma0
+    n, s = len(u.images), len(u.shared)
+    first = 6 * n + s
+    sigma = np.sqrt(np.maximum(np.diagonal(q), 0))
+    points = result.points.covariance[u.points] / s0**2
+    for p in range(len(u.points)):
+        at = slice(first + 3 * p, first + 3 * p + 3)
+        assert_same(points[p], q[at, at], np.outer(sigma[at], sigma[at]) + 1e-30, tolerance)
+    angles = result.images.angles[u.images]
+    e = small_rotation_per_angle(angles, u.block.rotation)
+    for i in range(n):
+        at = slice(6 * i, 6 * i + 6)
+        jacobian = np.eye(6)
+        jacobian[3:, 3:] = np.linalg.solve(e[i], u.turn(adjustment.solution.state)[i])
+        expected = jacobian @ q[at, at] @ jacobian.T
+        got = result.images.covariance[u.images[i]] / s0**2
+        scale = np.sqrt(np.outer(np.diagonal(expected), np.diagonal(expected))) + 1e-30
+        assert_same(got, expected, scale, tolerance)
+    shared = slice(6 * n, first)
+    assert_same(
+        result.parameters.covariance / s0**2, q[shared, shared], np.outer(sigma[shared], sigma[shared]), tolerance
+    )
+    redundancy = 1.0 - np.einsum("ij,jk,ik->i", design, q, design)
+    m = len(u.rays.image)
+    np.testing.assert_allclose(result.rays.r[u.rays.source].ravel(), redundancy[: 2 * m], atol=tolerance)
+    assert abs(redundancy.sum() - result.outcome.redundancy) < 1e-6 * result.outcome.redundancy
+    assert abs(sum(g.redundancy for g in result.groups) - result.outcome.redundancy) < 1e-6 * result.outcome.redundancy
+
+
+TINY = {
+    "flight": {
+        "gsd_m": 0.1, "strips": 2, "images_per_strip": 4, "end_lap": 0.6, "side_lap": 0.3, "heading_deg": 20.0,
+        "attitude_sigma_deg": [1.0, 1.0, 2.0], "position_sigma_m": [5.0, 5.0, 3.0],
+    },
+    "tie_points": {"per_image": 25, "probability": 1.0, "sigma_um": 2.0},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("parameters", ["none", "bluh:1-4+9", "brown:K1+P1+P2"])
+def test_control_datum(parameters):
+    adjustment = adjust_keeping_system(small_block(3, parameters, **TINY)[0])
+    design, q = dense_cofactors(adjustment)
+    check(adjustment, q, design)
+    control = adjustment.result.control
+    u = adjustment.system.unknowns
+    row = {int(p): k for k, p in enumerate(u.points)}
+    first = 6 * len(u.images) + len(u.shared)
+    at = first + 3 * row[int(control.point[0])]
+    given = adjustment.result.block.control
+    weight = 1.0 / given.sigma[list(given.point).index(control.point[0])] ** 2
+    np.testing.assert_allclose(control.r[0], 1.0 - weight * np.diagonal(q)[at : at + 3], atol=1e-9)
+
+
+def test_interior_orientation_weighted_and_gnss():
+    """Principal distance and point observed, GNSS with a shift per strip: every kind of border column at once."""
+    block, _ = small_block(
+        4,
+        "bluh:1-2",
+        **TINY,
+        gnss={"sigma_m": [0.05, 0.05, 0.08], "shift_sigma_m": [0.2, 0.2, 0.2], "lever_arm_m": [0.2, -0.3, 1.1]},
+    )
+    camera = block.cameras[0]
+    priors = {name: Prior(prior.value, 0.02) for name, prior in camera.interior.items()}
+    adjustment = adjust_keeping_system(replace(block, cameras=(replace(camera, interior=priors),)))
+    assert {"focal_length_mm", "gnss.shift_X", "bluh.1"} <= set(adjustment.result.parameters.names)
+    design, q = dense_cofactors(adjustment)
+    check(adjustment, q, design)
+
+
+def test_minimal_datum():
+    block = with_adjustment(small_block(5, "bluh:1-2", **TINY)[0], datum="minimal")
+    adjustment = adjust_keeping_system(block)
+    assert (~adjustment.system.unknowns.point_free).sum() == 7
+    design, q = dense_cofactors(adjustment)
+    check(adjustment, q, design)
+
+
+@pytest.mark.parametrize("chosen", [False, True])
+def test_inner_datum(chosen):
+    block = small_block(6, "bluh:1-2", **TINY)[0]
+    names = tuple(block.points[:12].tolist()) if chosen else ()
+    adjustment = adjust_keeping_system(with_adjustment(block, datum="inner", datum_points=names))
+    u = adjustment.system.unknowns
+    free = replace(u, point_free=np.ones_like(u.point_free))
+    adjustment.system.unknowns = free
+    design, q = dense_cofactors(adjustment, inner=True)
+    check(adjustment, q, design, tolerance=2e-9)
+    assert adjustment.result.outcome.conditions == 7
+
+
+def test_fixed_datum_with_single_angles():
+    block = small_block(7, **TINY)[0]
+    first, second = block.images.names[0], block.images.names[3]
+    held = tuple((first, e) for e in ("X0", "Y0", "Z0", "omega", "phi", "kappa")) + ((second, "X0"), (second, "phi"))
+    adjustment = adjust_keeping_system(with_adjustment(block, datum="fixed", datum_fixed=held))
+    design, q = dense_cofactors(adjustment)
+    check(adjustment, q, design)
+    result = adjustment.result
+    np.testing.assert_array_equal(result.images.sigma[0], 0.0)
+    np.testing.assert_allclose(result.images.angles[3, 1], block.images.angles[3, 1], atol=1e-12)
+    assert result.images.sigma[3, 4] < 1e-12
+    assert result.images.sigma[3, 3] > 1e-7
+
+
+def test_datums_agree_in_what_does_not_depend_on_them():
+    block = small_block(8, "bluh:1-2", **TINY)[0]
+    results = [adjust_keeping_system(with_adjustment(block, datum=datum)).result for datum in ("minimal", "inner")]
+    np.testing.assert_allclose(results[0].outcome.sigma0, results[1].outcome.sigma0, rtol=1e-9)
+    np.testing.assert_allclose(results[0].rays.r, results[1].rays.r, atol=1e-8)
+    np.testing.assert_allclose(results[0].parameters.sigma, results[1].parameters.sigma, rtol=1e-7)
+    assert np.trace(np.nansum(results[1].points.covariance, axis=0)) < np.trace(
+        np.nansum(results[0].points.covariance, axis=0)
+    )
+
+
+def test_same_result_bit_for_bit():
+    block = small_block(9, "bluh:1-12", **TINY)[0]
+    first, second = (adjust_keeping_system(block).result for _ in range(2))
+    np.testing.assert_array_equal(first.points.xyz, second.points.xyz)
+    np.testing.assert_array_equal(first.rays.w, second.rays.w)
+    np.testing.assert_array_equal(first.parameters.covariance, second.parameters.covariance)

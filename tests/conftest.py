@@ -1,0 +1,20 @@
+"""Common to all tests: real data where it is, and small simulated blocks."""
+
+from pathlib import Path
+
+import pytest
+
+SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+@pytest.fixture
+def shared_data():
+    """A folder of real data by name; the test is skipped where it is missing."""
+
+    def folder(name: str) -> Path:
+        path = SHARED_DATA / name
+        if not path.exists():
+            pytest.skip(f"real data '{name}' is not beside the project (../shared/data)")
+        return path
+
+    return folder

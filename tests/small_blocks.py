@@ -1,0 +1,45 @@
+"""Small simulated blocks for the tests of adjustment and statistics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from aerotri.functional_model.additional_parameters import parse_parameters
+from aerotri.observations import Block
+from aerotri.simulation import Truth, parse_spec, simulate
+
+
+def small_spec(**changes) -> dict:
+    """An UltraCamD block of 3 × 6 photographs at 60/40 % with a cross strip; `changes` replace whole tables."""
+    spec = {
+        "name": "small",
+        "camera": {"ucd": {"preset": "ultracam_d"}},
+        "flight": {
+            "gsd_m": 0.1,
+            "strips": 3,
+            "images_per_strip": 6,
+            "end_lap": 0.6,
+            "side_lap": 0.4,
+            "heading_deg": 30.0,
+            "cross_strips": [{"position": 0.5, "images": 5}],
+            "attitude_sigma_deg": [1.0, 1.0, 2.0],
+            "position_sigma_m": [5.0, 5.0, 3.0],
+        },
+        "terrain": {"kind": "undulating", "height_m": 100.0, "relief_rms_m": 30.0, "wavelength_m": 900.0},
+        "tie_points": {"per_image": 60, "rays_per_point": 4.0, "sigma_um": 2.0},
+        "control": {"distance_bases": 3.0, "sigma_m": [0.03, 0.03, 0.05], "check_points": 8},
+        "start_values": {"kind": "perturbed", "position_sigma_m": 1.0, "angle_sigma_deg": 0.05},
+    }
+    return spec | changes
+
+
+def small_block(seed: int = 1, parameters: str = "none", **changes) -> tuple[Block, Truth]:
+    """A simulated block with settings for the additional parameters to be estimated."""
+    block, truth = simulate(parse_spec(small_spec(**changes)), seed)
+    return with_adjustment(block, additional_parameters=parse_parameters(parameters)), truth
+
+
+def with_adjustment(block: Block, **settings) -> Block:
+    """The block with other settings of its adjustment."""
+    adjustment = replace(block.settings.adjustment, **settings)
+    return replace(block, settings=replace(block.settings, adjustment=adjustment))
