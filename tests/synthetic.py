@@ -40,7 +40,9 @@ def _images(camera: Camera, strips: int, per_strip: int, rng) -> tuple[Images, n
     along = np.where(back, per_strip - 1 - number, number) * base
     centre = np.stack([612000 + along, 6562000 + strip * spacing, np.full(len(strip), height + 120.0)], axis=-1)
     centre += rng.normal(0, 12.0, centre.shape)
-    angles = np.radians(rng.normal(0, 0.6, centre.shape) + np.stack([0 * strip, 0 * strip, np.where(back, 90, -90)], -1))
+    angles = np.radians(
+        rng.normal(0, 0.6, centre.shape) + np.stack([0 * strip, 0 * strip, np.where(back, 90, -90)], -1)
+    )
     names = np.array([f"{s + 1:02d}_{n + 1:03d}" for s, n in zip(strip, number, strict=True)])
     day = np.where(strip < (strips + 1) // 2, "day 1", "day 2")
     images = Images(
@@ -153,8 +155,8 @@ def make_adjusted_block(
     names = np.array([f"{i + 1001}" for i in range(n_points)])
     known = rng.permutation(np.flatnonzero(rays >= 4))[: n_control + n_check]
     given = xyz[known].copy()
-    given[1 : n_control : 5, :2] = np.nan
-    given[2 : n_control : 5, 2] = np.nan
+    given[1:n_control:5, :2] = np.nan
+    given[2:n_control:5, 2] = np.nan
     is_check = np.arange(len(known)) >= n_control
     control = Control(known, given, np.where(np.isfinite(given), CONTROL_SIGMA, np.nan), is_check)
     settings = Settings(
@@ -171,11 +173,15 @@ def make_adjusted_block(
     group_names = {"camera": [camera.name], "block": ["block"], "day": ["day 1", "day 2"]}[groups]
     n = len(images)
     n_used = int(used.sum())
+    unknowns = 3 * n_points + 6 * n + 45
+    outcome = Outcome(
+        "converged", "", 4, SIGMA0, SIGMA0 * SIGMA_MM * 1e3, 1.0 * n_used, 2 * n_used, unknowns, 0,
+        2 * n_used - unknowns, ("Point 1007 was measured in one photograph and left out.",),
+        {"read": 0.1, "start_values": 0.2, "solve": 0.8, "statistics": 0.4},
+    )  # fmt: skip
     return AdjustedBlock(
         block,
-        Outcome("converged", "", 4, SIGMA0, SIGMA0 * SIGMA_MM * 1e3, 1.0 * n_used, 2 * n_used, 3 * n_points + 6 * n + 45, 0,
-                2 * n_used - 3 * n_points - 6 * n - 45, ("Point 1007 was measured in one photograph and left out.",),
-                {"read": 0.1, "start_values": 0.2, "solve": 0.8, "statistics": 0.4}),
+        outcome,
         ImageResults(centre, images.angles, np.tile(np.diag(sigma_image**2), (n, 1, 1)),
                      np.bincount(image[used], minlength=n)),
         PointResults(np.where(rays[:, None] >= 2, xyz, np.nan), sigma_point[:, :, None] ** 2 * np.eye(3), rays, max_w),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,7 +12,7 @@ from aerotri import __version__
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
-    from aerotri.observations import Block
+    pass
 
 app = typer.Typer(
     name="aerotri",

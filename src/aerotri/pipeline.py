@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.adjustment.datum import move_to_inner
+from aerotri.adjustment.datum import restore_datum
 from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.prepare import build_system, prepare
@@ -80,8 +80,8 @@ def adjust_keeping_system(
     settings = block.settings.adjustment
     options = SolveOptions(settings.max_iterations, settings.robust, report)
     solution = minimise(system, state, counts.redundancy, options)
-    if settings.datum == "inner":
-        moved = move_to_inner(system.unknowns, solution.state, state.points)
+    if settings.datum in ("minimal", "inner"):
+        moved = restore_datum(system.unknowns, solution.state, state.points)
         solution = replace(solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator))
     factor = _refuse_defects(system, solution.state, solution.equations)
     solved = time.perf_counter()

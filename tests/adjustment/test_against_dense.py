@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aerotri.adjustment.datum import datum_rows, motions_of_images, motions_of_points
+from aerotri.adjustment.datum import datum_rows, motions_of_points
 from aerotri.functional_model.collinearity import linearise
 from aerotri.functional_model.observed_unknowns import antenna_partials
 from aerotri.functional_model.rotation import small_rotation_per_angle

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.adjustment.unknowns import State, Unknowns
+from aerotri.adjustment.unknowns import State, Step, Unknowns
 from aerotri.functional_model.rotation import cross_matrix, exponential
 
 FREEDOMS = ("X", "Y", "Z", "ω", "φ", "κ", "scale")
@@ -24,9 +24,9 @@ def spread_points(points: np.ndarray, rays: np.ndarray) -> tuple[int, int, int]:
     points : (P, 3) m; rays : (P,) rays of each.
     """
     good = np.flatnonzero(rays >= min(3, rays.max()))
+    off_centre = np.linalg.norm(points[good] - np.median(points[good], axis=0), axis=1)
+    good = good[off_centre <= 3.0 * np.median(off_centre) + 1e-9]
     xyz = points[good]
-    inside = np.linalg.norm(xyz - np.median(xyz, axis=0), axis=1)
-    good, xyz = good[inside <= 4.0 * np.median(inside) + 1e-9], xyz[inside <= 4.0 * np.median(inside) + 1e-9]
     first = int(np.argmax(np.linalg.norm(xyz - xyz.mean(axis=0), axis=1)))
     second = int(np.argmax(np.linalg.norm(xyz - xyz[first], axis=1)))
     line = (xyz[second] - xyz[first]) / np.linalg.norm(xyz[second] - xyz[first])
@@ -37,9 +37,7 @@ def spread_points(points: np.ndarray, rays: np.ndarray) -> tuple[int, int, int]:
 def minimal_coordinates(unknowns: Unknowns, state: State) -> list[tuple[int, int]]:
     """Seven coordinates that fix the datum: (row of the point, axis) pairs.
 
-    Both ends of the longest distance, but of the second one the coordinate held last is chosen with the third point so
-    that the seven are independent: X, Y, Z of the first, X, Y, Z of the second, and of the third the axis nearest to
-    the normal of the plane of the three.
+    X, Y, Z of both ends of the longest distance, and of the third point the axis nearest to the normal of their plane.
     """
     a, b, c = spread_points(state.points, np.diff(unknowns.rays.start))
     normal = np.cross(state.points[b] - state.points[a], state.points[c] - state.points[a])
@@ -73,18 +71,38 @@ def datum_rows(unknowns: Unknowns) -> np.ndarray:
     return np.flatnonzero(np.isin(names.astype(str), np.array(wanted, dtype=str)))
 
 
-def move_to_inner(unknowns: Unknowns, state: State, reference: np.ndarray) -> State:
-    """The state moved by a similarity so that Gᵀ(X − reference) = 0 over the datum points.
+def without_motion(state: State, step: Step) -> Step:
+    """A free block's step, freed of the motion of the whole: each iteration then turns and scales as little as it can.
+
+    Which coordinates are held decides how far a linear step is from the truth; far points would swing the block about.
+    They count less the farther they lie.
+    """
+    distance = np.linalg.norm(state.points - np.median(state.points, axis=0), axis=1)
+    weight = 1.0 / np.maximum(1.0, distance / max(np.median(distance), 1e-12)) ** 2
+    g = motions_of_points(state.points)
+    weighted = (g * weight[:, None, None]).reshape(-1, 7)
+    motion = np.linalg.solve(weighted.T @ g.reshape(-1, 7), weighted.T @ step.points.ravel())
+    return Step(step.images - motions_of_images(state.centre) @ motion, step.shared, step.points - g @ motion)
+
+
+def restore_datum(unknowns: Unknowns, state: State, reference: np.ndarray) -> State:
+    """The state of a free block moved by a similarity into its datum.
+
+    Minimal: the held coordinates get their values of `reference` again. Inner: Gᵀ(X − reference) = 0 over the datum
+    points.
 
     Parameters
     ----------
     reference : (P, 3) m, local start values.
     """
-    rows = datum_rows(unknowns)
+    datum = np.zeros(state.points.shape, dtype=bool)
+    if unknowns.block.settings.adjustment.datum == "inner":
+        datum[datum_rows(unknowns)] = True
+    else:
+        datum = ~unknowns.point_free
     for _ in range(20):
-        g = motions_of_points(state.points[rows]).reshape(-1, 7)
-        gap = (reference[rows] - state.points[rows]).ravel()
-        motion = np.linalg.lstsq(g, gap, rcond=None)[0]
+        g = motions_of_points(state.points)[datum]
+        motion = np.linalg.lstsq(g, (reference - state.points)[datum], rcond=None)[0]
         turn, scale = exponential(motion[3:6]), 1.0 + motion[6]
         state = State(
             centre=scale * state.centre @ turn.T + motion[:3],

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from aerotri.adjustment.datum import without_motion
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.robust import LEAST_SQUARES, Estimator, huber, scale_of
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
@@ -17,7 +18,7 @@ from aerotri.adjustment.unknowns import State
 
 COST_TOLERANCE = 1e-9
 STEP_TOLERANCE = 1e-3
-FIRST_DAMPING, LAST_DAMPING = 1e-5, 1e12
+FIRST_DAMPING, LAST_DAMPING, NO_DAMPING = 1e-5, 1e12, 1e-11
 SCALE_TOLERANCE = 0.01
 MAX_SCALE_CHANGES = 20
 
@@ -68,21 +69,20 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
     if options.robust != "off":
         estimator, equations = _rescale(system, state, equations, estimator, redundancy)
     costs = [equations.cost]
-    damping, scale_changes = 0.0, 0
+    damping, scale_changes = Damping(), 0
     for iteration in range(1, options.max_iterations + 1):
-        step = _step(system, state, equations, estimator, damping)
+        step = _step(system, state, equations, estimator, damping.value)
         while step is None or not step.improves(equations):
-            damping = max(FIRST_DAMPING, 10.0 * damping)
-            if damping > LAST_DAMPING:
-                status = "rank deficient" if step is None else "not converged"
-                return Solution(status, state, equations, estimator, iteration, tuple(costs))
-            step = _step(system, state, equations, estimator, damping)
-        settled = damping == 0.0 and _settled(equations, step, redundancy)
+            damping = damping.raised()
+            if damping.value > LAST_DAMPING:
+                return Solution("not converged", state, equations, estimator, iteration, tuple(costs))
+            step = _step(system, state, equations, estimator, damping.value)
+        settled = damping.value == 0.0 and _settled(equations, step, redundancy)
+        damping = damping.lowered(step.gain_ratio(equations))
         state, equations = step.state, step.equations
-        damping = 0.0 if damping <= FIRST_DAMPING else damping / 10.0
         costs.append(equations.cost)
         if options.report:
-            options.report(iteration, equations.cost, damping)
+            options.report(iteration, equations.cost, damping.value)
         if estimator.is_robust and scale_changes < MAX_SCALE_CHANGES:
             fresh, rescaled = _rescale(system, state, equations, estimator, redundancy)
             if abs(fresh.limit / estimator.limit - 1.0) > SCALE_TOLERANCE:
@@ -91,6 +91,26 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
         if settled:
             return Solution("converged", state, equations, estimator, iteration, tuple(costs))
     return Solution("not converged", state, equations, estimator, options.max_iterations, tuple(costs))
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Levenberg's λ: none until a step fails, then led by how well the steps keep their promise.
+
+    [L: Nielsen, Damping parameter in Marquardt's method, 1999]
+    """
+
+    value: float = 0.0
+    growth: float = 10.0
+
+    def raised(self) -> Damping:
+        """After a step that failed."""
+        return Damping(max(FIRST_DAMPING, self.value * self.growth), 2.0 * self.growth if self.value else 10.0)
+
+    def lowered(self, gain_ratio: float) -> Damping:
+        """After a step that improved; gain_ratio is the gain over the gain promised."""
+        value = self.value * max(0.1, 1.0 - (2.0 * gain_ratio - 1.0) ** 3)
+        return Damping(value if value > NO_DAMPING else 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +123,10 @@ class _Trial:
 
     def improves(self, before: NormalEquations) -> bool:
         # at the minimum the cost stands still within rounding
-        return np.isfinite(self.equations.cost) and self.equations.cost <= before.cost * (1.0 + COST_TOLERANCE)
+        return bool(np.isfinite(self.equations.cost)) and self.equations.cost <= before.cost * (1.0 + COST_TOLERANCE)
+
+    def gain_ratio(self, before: NormalEquations) -> float:
+        return min((before.cost - self.equations.cost) / max(self.decrement, 1e-300), 1.0)
 
 
 def _step(system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, damping: float):
@@ -116,6 +139,8 @@ def _step(system: NormalSystem, state: State, equations: NormalEquations, estima
     x = factor.solve(damped.right)
     decrement = float(x @ damped.right) + damped.point_decrement
     step = system.back_substitute(state, x, damping, damped, estimator)
+    if not system.unknowns.point_free.all():
+        step = without_motion(state, step)
     if not all(np.isfinite(part).all() for part in (step.images, step.shared, step.points)):
         return None
     there = system.unknowns.advance(state, step)

@@ -41,18 +41,29 @@ def write_block(block: Block, folder: str | os.PathLike, tables: Literal["csv", 
     if tables not in ("csv", "parquet"):
         raise InputError(f"tables = '{tables}'", "tables are written as csv or parquet")
     with atomic_folder(folder, own=OWN_ENTRIES) as place:
-        _check_columns(block)
-        (place / "block.toml").write_text(toml_of(_settings(block)), encoding="utf-8")
+        _check_all_names(block)
+        (place / "block.toml").write_bytes(_utf8(toml_of(_settings(block))))
         for name, columns in _tables(block).items():
             write_table(columns, place / f"{name}.{tables}")
 
 
-def _check_columns(block: Block) -> None:
+def _utf8(text: str) -> bytes:
+    try:
+        return text.encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise InputError("a name in the settings is no text in UTF-8", "rename it") from error
+
+
+def _check_all_names(block: Block) -> None:
     check_names(np.array([camera.name for camera in block.cameras], dtype=str), "camera")
+    check_names(block.images.names, "image")
+    check_names(block.points, "point")
+    check_names(block.images.strip, "strip", may_be_empty=True)
     check_names(np.array(list(block.images.columns), dtype=str), "grouping column")
-    for name in block.images.columns:
-        if not name or name in IMAGE_FIELDS or name.startswith("x_"):
+    for name, values in block.images.columns.items():
+        if name in IMAGE_FIELDS or name.startswith("x_"):
             raise InputError(f"a grouping column cannot be named '{name}'", "give it another name")
+        check_names(np.asarray(values, dtype=str), name, may_be_empty=True)
 
 
 def _tables(block: Block) -> dict[str, dict[str, np.ndarray]]:

@@ -70,7 +70,8 @@ def adjustment_json(adjusted: AdjustedBlock) -> dict[str, Any]:
 def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
     """As `adjustment_json` for an adjustment without a result: the same keys, lists empty."""
     o = outcome
-    nothing = GroundPointResults(np.zeros(0, np.int64), *(np.zeros((0, 3)) for _ in range(4)), np.zeros(0, np.int64))
+    index, coordinates = np.zeros(0, np.int64), np.zeros((0, 3))
+    nothing = GroundPointResults(index, coordinates, coordinates, coordinates, coordinates, index)
     return {
         "aerotri": _version(),
         "block": str(block.name),

@@ -29,7 +29,7 @@ def write_table(columns: Mapping[str, np.ndarray], path: Path) -> None:
     Raises
     ------
     InputError
-        For a name that would not be read back the same.
+        For a name that would not be read back the same; see also `check_names`.
     """
     import pyarrow as pa
 
@@ -43,14 +43,17 @@ def write_table(columns: Mapping[str, np.ndarray], path: Path) -> None:
         _write_csv(table, path)
 
 
-def check_names(names: np.ndarray, what: str) -> None:
-    """Refuse names that a table would not give back: surrounding blanks, control characters, over-long ones.
+def check_names(names: np.ndarray, what: str, may_be_empty: bool = False) -> None:
+    """Refuse names that a table would not give back: empty, surrounding blanks, control characters, over-long.
 
     Raises
     ------
     InputError
     """
-    _checked(_as_text(names, what), what)
+    if not may_be_empty and (names == "").any():
+        raise InputError(f"a {what} has no name", "give it one")
+    # from a list: an array of fixed width ends at a NUL on its way into pyarrow
+    _checked(_as_text(names.tolist(), what), what)
 
 
 def _array(values: np.ndarray, name: str) -> pa.Array:
@@ -61,12 +64,12 @@ def _array(values: np.ndarray, name: str) -> pa.Array:
     return pa.array(values, pa.float64(), from_pandas=True)
 
 
-def _as_text(values: np.ndarray, what: str) -> pa.Array:
+def _as_text(values: np.ndarray | list[str], what: str) -> pa.Array:
     import pyarrow as pa
 
     try:
         return pa.array(values, pa.string())
-    except (pa.ArrowException, UnicodeEncodeError, TypeError) as error:
+    except (pa.ArrowException, UnicodeError, TypeError) as error:
         raise InputError(f"a name in column '{what}' is no text in UTF-8", "rename it") from error
 
 

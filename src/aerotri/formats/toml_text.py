@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.csv_text import read_bytes
@@ -66,6 +69,11 @@ def toml_of(content: Mapping[str, Any]) -> str:
     """TOML text of nested tables, strings, numbers, booleans and lists of these.
 
     A table of the type `Inline` stands on one line, every other gets a header.
+
+    Raises
+    ------
+    InputError
+        For a number that is not finite.
     """
     lines: list[str] = []
     _emit(content, (), lines)
@@ -96,7 +104,7 @@ def _key(part: str) -> str:
 
 
 def _value(value: Any) -> str:
-    if isinstance(value, bool):
+    if isinstance(value, (bool, np.bool_)):
         return "true" if value else "false"
     if isinstance(value, str):
         return _string(value)
@@ -105,7 +113,11 @@ def _value(value: Any) -> str:
         return f"{{ {inner} }}" if inner else "{}"
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(_value(entry) for entry in value)}]"
-    return repr(int(value)) if isinstance(value, int) else repr(float(value))
+    if isinstance(value, (int, np.integer)):
+        return repr(int(value))
+    if not math.isfinite(value):
+        raise InputError(f"a setting is {value}, no finite number", "repair it")
+    return repr(float(value))
 
 
 def _string(text: str) -> str:
