@@ -79,7 +79,7 @@ def simulate(
 def convert(
     source: Annotated[Path, typer.Argument(help="A DBAT script or its folder, a BAL file, a COLMAP model, a block.")],
     target: Annotated[Path, typer.Argument(help="Block folder, BAL file (.txt) or COLMAP folder to write.")],
-    to: Annotated[str, typer.Option(help="block, bal, colmap-text or colmap-binary.")] = "block",
+    to: Annotated[str, typer.Option(help="block, bal, colmap (binary) or colmap-text.")] = "block",
     positions: Annotated[
         Path | None, typer.Option(help="Observed projection centres to add (DBAT: label, X, Y, Z, σ).")
     ] = None,

@@ -75,7 +75,7 @@ TABLES = {
     "comments only": Case(P, "# nothing\n\n", None, "is empty"),
     "missing": Case(P, None, None, "is missing"),
     "missing column": Case(P, "# c\nimage,point,x\n", 2, "column 'y' is missing"),
-    "unknown column": Case(P, "image,point,x,y,sz\n", 1, "did you mean 'sx'"),
+    "unknown column": Case(P, "image,point,x,y,s_x\n", 1, "did you mean 'sx'"),
     "column twice": Case(P, "image,point,x,y,x\n", 1, "column 'x' is there twice"),
     "column without name": Case(P, "image,point,x,y,\n", 1, "a column has no name"),
     "not utf-8": Case(P, points("a,p1,1,2").encode() + b"a,p\xff,1,2\n", 3, "is not UTF-8"),

@@ -82,16 +82,11 @@ def test_nothing_overlaps(name, shape):
     renderer = figure.canvas.get_renderer()
     parts = [*figure.texts, *figure.legends]
     for axes in figure.axes:
-        parts += [
-            axes.xaxis.label,
-            axes.yaxis.label,
-            axes.title,
-            axes.titles_left if hasattr(axes, "titles_left") else None,
-        ]
-        parts += [a.text for a in axes.get_children() if isinstance(a, matplotlib.quiver.QuiverKey)]
-    boxes = [
-        (p, p.get_window_extent(renderer)) for p in parts if p is not None and getattr(p, "get_text", lambda: "x")()
-    ]
+        parts += [axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels(), *axes.get_yticklabels()]
+        parts += [artist for artist in axes.get_children() if isinstance(artist, matplotlib.text.Text)]
+        parts += [artist.text for artist in axes.get_children() if isinstance(artist, matplotlib.quiver.QuiverKey)]
+    boxes = [(part, part.get_window_extent(renderer)) for part in parts if getattr(part, "get_text", lambda: "-")()]
+    assert len(boxes) > 5
     width, height = figure.canvas.get_width_height()
     for i, (first, a) in enumerate(boxes):
         assert a.x0 >= -1, first
@@ -219,7 +214,7 @@ def test_seams_turn_with_the_flight(axis):
 
 def test_footprint_of_a_vertical_photograph():
     """A level photograph at height h shows format·h/c, turned by κ."""
-    adjusted = make_adjusted_block(1, 1, 30)
+    adjusted = make_adjusted_block(1, 1, 30, parameters="none")
     centre = np.array([[1000.0, 2000.0, 1134.0]])
     xyz = adjusted.points.xyz.copy()
     xyz[:, 2] = 120.0
@@ -235,7 +230,7 @@ def test_footprint_of_a_vertical_photograph():
 
 
 def test_oblique_photographs_hide_their_footprint():
-    adjusted = make_adjusted_block(1, 2, 30)
+    adjusted = make_adjusted_block(1, 2, 30, parameters="none")
     angles = np.array([[0.0, 0.0, 0.0], [np.radians(85.0), 0.0, 0.0]])
     corners = plan.footprints(replace(adjusted, images=replace(adjusted.images, angles=angles)))
     assert np.isfinite(corners[0]).all()

@@ -202,7 +202,7 @@ class BlockToml:
         """
         for name in self.model.camera:
             if not name or name != name.strip() or any(ord(c) < 32 or ord(c) == 127 for c in name):
-                raise self.error(("camera", name), f"'{name}' is no name for a camera", "name it by a short text")
+                raise self.error(("camera", name), f"{name[:60]!r} is no name for a camera", "name it by a short text")
         return tuple(camera.camera(name) for name, camera in self.model.camera.items())
 
     def settings(self, image_sigma_um: float) -> Settings:
@@ -244,7 +244,7 @@ class BlockToml:
         if not image or element not in ORIENTATION_ELEMENTS:
             raise self.error(
                 ("adjustment", "datum_fixed"),
-                f"datum_fixed = '{text}' names no orientation element",
+                f"datum_fixed = {text!r} names no orientation element",
                 f"write IMAGE:ELEMENT, the element one of {' '.join(ORIENTATION_ELEMENTS)}",
             )
         return image, element
@@ -291,7 +291,7 @@ def _as_input_error(error: ValidationError | OverflowError, path: Path, text: st
 
 
 def _shown(value: Any) -> str:
-    text = f"'{value}'" if isinstance(value, str) else "{…}" if isinstance(value, dict) else str(value)
+    text = "{…}" if isinstance(value, dict) else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
 

@@ -165,11 +165,14 @@ def as_str_array(names: pa.StringArray) -> np.ndarray:
 
 
 def _check_header(header: tuple[str, ...], columns: Columns, path: Path, line: int | None) -> None:
+    if "" in header:
+        raise InputError("a column has no name", "name every column in the first row", path, line)
+    odd = [name for name in header if len(name) > LONGEST_NAME or not name.isprintable()]
+    if odd:
+        raise InputError(f"{_shortened(repr(odd[0]))} is no name for a column", "name it by a short text", path, line)
     twice = [name for i, name in enumerate(header) if name in header[:i]]
     if twice:
         raise InputError(f"column '{twice[0]}' is there twice", "keep one of them", path, line)
-    if "" in header:
-        raise InputError("a column has no name", "name every column in the first row", path, line)
     missing = [name for name in columns.required if name not in header]
     if missing:
         near = _hint_of_separator(header)
@@ -250,7 +253,7 @@ def _numbers_from_text(column: pa.ChunkedArray, name: str, source: CsvText) -> p
     row = compute.index(good, False).as_py()
     if row >= 0:
         raise InputError(
-            f"{name} = '{_shortened(column[row].as_py())}' is not a number",
+            f"{name} = {_shortened(repr(column[row].as_py()))} is not a number",
             "write numbers with a point as decimal sign; leave a cell empty where nothing is known",
             source.path,
             source.line_of_row(row),
