@@ -191,5 +191,5 @@ def make_adjusted_block(
         _ground_results(known[is_check], sigma_point, rays, True, given[is_check], rng),
         (ObservationGroup("image points", 2 * n_used, 2.5, 2.1, 0.66 * 2 * n_used, 2.6),
          ObservationGroup("control", 3 * n_control, 0.05, 0.045, 0.7 * 3 * n_control, 0.052)),
-        (Blunder(str(images.names[3]), names[5], 7.4, 0.0213, "reported"),),
+        (Blunder(str(images.names[-1]), names[5], 7.4, 0.0213, "reported"),),
     )  # fmt: skip

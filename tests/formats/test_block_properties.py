@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from aerotri.conventions import InputError
 from aerotri.formats.block_folder import read_block, write_block
+from aerotri.formats.block_writer import IMAGE_FIELDS
 from aerotri.observations import (
     AdjustmentSettings,
     Block,
@@ -86,7 +87,7 @@ def blocks(draw) -> Block:
     xyz[:, 2] = np.where(np.isnan(xyz).all(axis=1), 17.0, xyz[:, 2])
     start = np.where(rng.random((n, 1)) < 0.5, np.nan, rng.uniform(-1e7, 1e7, (n, 3)))
     angles = np.where(rng.random((n, 1)) < 0.5, np.nan, rng.uniform(-3, 3, (n, 3)))
-    column = draw(names.filter(lambda name: name not in ("image", "camera", "strip") and not name.startswith("x_")))
+    column = draw(names.filter(lambda name: name not in IMAGE_FIELDS and not name.startswith("x_")))
     return Block(
         name=draw(st.text(letters)),
         crs=draw(st.sampled_from(["local", "EPSG:25832", "EPSG:25832+7837"])),

@@ -17,6 +17,8 @@ from aerotri.conventions import InputError
 
 UTF8_REMEDY = "save the table as UTF-8"
 QUOTE = b'"'
+BLANKS = " \t\n\r\v\f"
+"""What is taken off both ends of a name."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ def cells(line: bytes) -> list[str]:
 
 def _header_cells(text: bytes, path: Path, line: int) -> tuple[str, ...]:
     try:
-        return tuple(cell.strip() for cell in cells(text))
+        return tuple(cell.strip(BLANKS) for cell in cells(text))
     except UnicodeDecodeError as error:
         raise InputError("is not UTF-8", UTF8_REMEDY, path, line) from error
     except csv.Error as error:

@@ -10,7 +10,8 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.arrow_compute import arrow_compute
-from aerotri.formats.tables import BLANKS, CONTROL_CHARACTERS, LONGEST_NAME
+from aerotri.formats.csv_text import BLANKS
+from aerotri.formats.tables import CONTROL_CHARACTERS, LONGEST_NAME
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -7,6 +7,7 @@ line each row stands on; nothing here loops over rows unless there is an error t
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,13 +18,12 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.formats import csv_text
 from aerotri.formats.arrow_compute import arrow_compute
-from aerotri.formats.csv_text import CsvText
+from aerotri.formats.csv_text import BLANKS, CsvText
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 IGNORED_PREFIX = "x_"
-BLANKS = " \t\n\r\v\f"
 LONGEST_NAME = 1000
 NUMBER = r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$"
 CONTROL_CHARACTERS = r"[\x00-\x1f\x7f]"
@@ -167,7 +167,7 @@ def as_str_array(names: pa.StringArray) -> np.ndarray:
 def _check_header(header: tuple[str, ...], columns: Columns, path: Path, line: int | None) -> None:
     if "" in header:
         raise InputError("a column has no name", "name every column in the first row", path, line)
-    odd = [name for name in header if len(name) > LONGEST_NAME or not name.isprintable()]
+    odd = [name for name in header if len(name) > LONGEST_NAME or re.search(CONTROL_CHARACTERS, name)]
     if odd:
         raise InputError(f"{_shortened(repr(odd[0]))} is no name for a column", "name it by a short text", path, line)
     twice = [name for i, name in enumerate(header) if name in header[:i]]

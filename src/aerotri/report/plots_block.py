@@ -49,7 +49,7 @@ def plot_block_plan(adjusted: AdjustedBlock) -> Figure:
     block = adjusted.block
     strips = len(np.unique(block.images.strip[block.images.strip != ""]))
     subtitle = (
-        f"{len(block.images)} photographs in {strips} strips, {len(adjusted.control)} control and "
+        f"{len(block.images)} photographs in {strips} strip{'s' * (strips != 1)}, {len(adjusted.control)} control and "
         f"{len(adjusted.check)} check points; outlines on the mean height of the ground"
     )
     below = 0.65 if beside else 1.15
@@ -101,6 +101,7 @@ def plot_ground_points(adjusted: AdjustedBlock) -> Figure:
     extent = extent.widened(0.03 * max(extent.width, extent.height), 0.05 * max(extent.width, extent.height))
     stacked = extent.width > 1.25 * extent.height
     width, height = plan.plan_size(extent, WIDTH - 1.2 if stacked else 3.55, 3.9 if stacked else 5.6)
+    width = max(width, 3.0)
     panels_high = 2 * height + 0.85 if stacked else height
     title = f"Control and check points – {plain(adjusted.block.name)}"
     figure = new_figure(panels_high + 1.9, title, "adjusted − given: " + _differences_text(adjusted))

@@ -155,6 +155,7 @@ def parameters(adjusted: AdjustedBlock) -> Table:
     """Additional and GNSS parameters with their tests; interior elements stand in their own table."""
     p = adjusted.parameters
     rows = p.kinds != "interior"
+    reason = [(Column("reason"), p.reason[rows])] if np.any(p.reason[rows] != "") else []
     return table(
         "Additional and GNSS parameters" if "gnss" in p.kinds else "Additional parameters",
         (Column("parameter"), p.names[rows]),
@@ -163,13 +164,13 @@ def parameters(adjusted: AdjustedBlock) -> Table:
         (Column("value", "", ".4e"), p.value[rows]),
         (Column("σ", "", ".1e"), p.sigma[rows]),
         (Column("unit"), [unit_of(name) for name in p.names[rows]]),
-        (Column("largest effect", "µm", ".2f"), 1e3 * largest_effects(adjusted)[rows]),
+        (Column("effect", "µm", ".2f"), 1e3 * largest_effects(adjusted)[rows]),
         (Column("t", "", ".1f"), p.t[rows]),
         (Column("largest r", "", "+.2f"), p.max_correlation[rows]),
         (Column("with"), p.max_correlation_with[rows]),
         (Column("B", "", ".2f"), p.total_correlation[rows]),
         (Column("status"), p.status[rows]),
-        (Column("reason"), p.reason[rows]),
+        *reason,
     )
 
 
