@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from aerotri.conventions import InputError
+from aerotri.formats.csv_text import BLANKS
+from aerotri.formats.tables import CONTROL_CHARACTERS
 from aerotri.formats.toml_text import line_of_key, read_toml
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.observations import AdjustmentSettings, Camera, GnssSettings, InsSettings, Prior, Settings
@@ -201,7 +204,7 @@ class BlockToml:
             For a name that could not stand in images.csv.
         """
         for name in self.model.camera:
-            if not name or name != name.strip() or any(ord(c) < 32 or ord(c) == 127 for c in name):
+            if not name or name != name.strip(BLANKS) or re.search(CONTROL_CHARACTERS, name):
                 raise self.error(("camera", name), f"{name[:60]!r} is no name for a camera", "name it by a short text")
         return tuple(camera.camera(name) for name, camera in self.model.camera.items())
 
