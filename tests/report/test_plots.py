@@ -1,5 +1,6 @@
 """Plots: drawn without warnings, every axis named with its unit, nothing on top of anything, honest numbers."""
 
+import functools
 import time
 import warnings
 from dataclasses import replace
@@ -66,9 +67,16 @@ def test_all_plots(adjusted):
         assert adjusted.block.name in figure.texts[0].get_text()
 
 
+@functools.cache
+def plots_of(strips, per_strip):
+    """All plots of a block of that shape, drawn."""
+    figures = all_plots(make_adjusted_block(strips, per_strip, n_points=200))
+    return {name: drawn(figure) for name, figure in figures.items()}
+
+
 @pytest.mark.parametrize("name", NAMES)
-def test_axes_have_units(adjusted, name):
-    figure = all_plots(adjusted)[name]
+def test_axes_have_units(name):
+    figure = plots_of(4, 10)[name]
     for axes in figure.axes[:2]:
         labels = axes.get_xlabel() + axes.get_ylabel()
         assert name == "correlations" or "[" in labels
@@ -86,7 +94,7 @@ def tick_labels(axis):
 @pytest.mark.parametrize("shape", [(4, 10), (1, 14), (12, 3)])
 def test_nothing_overlaps(name, shape):
     """Title, subtitle, legends, axis labels and scale texts keep apart from one another and inside the figure."""
-    figure = drawn(all_plots(make_adjusted_block(*shape, n_points=200))[name])
+    figure = plots_of(*shape)[name]
     renderer = figure.canvas.get_renderer()
     parts = [*figure.texts, *figure.legends]
     for axes in figure.axes:
