@@ -26,7 +26,7 @@ def small_spec(**changes) -> dict:
             "position_sigma_m": [5.0, 5.0, 3.0],
         },
         "terrain": {"kind": "undulating", "height_m": 100.0, "relief_rms_m": 30.0, "wavelength_m": 900.0},
-        "tie_points": {"per_image": 60, "rays_per_point": 4.0, "sigma_um": 2.0},
+        "tie_points": {"per_image": 60, "probability": 0.9, "sigma_um": 2.0},
         "control": {"distance_bases": 3.0, "sigma_m": [0.03, 0.03, 0.05], "check_points": 8},
         "start_values": {"kind": "perturbed", "position_sigma_m": 1.0, "angle_sigma_deg": 0.05},
     }

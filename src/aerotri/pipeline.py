@@ -19,7 +19,7 @@ from aerotri.adjustment.unknowns import StartValues, State
 from aerotri.formats.solution import SavedSolution
 from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import AdjustedBlock, Outcome
-from aerotri.statistics.summarise import count_observations, summarise
+from aerotri.statistics.summarise import count_observations, inseparable, summarise
 
 
 class AdjustmentFailedError(Exception):
@@ -87,6 +87,7 @@ def adjust_keeping_system(
     solved = time.perf_counter()
     warnings = prepared.warnings + _doubts(block, counts.redundancy)
     result = summarise(system, solution, factor, prepared.ray_status, warnings)
+    result = _with_warnings(result, inseparable(result.parameters))
     timings = {
         "start_values": started - begun, "solve": solved - started, "statistics": time.perf_counter() - solved,
     }  # fmt: skip
@@ -109,6 +110,10 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     solution = Solution(saved.status, state, equations, estimator, saved.iterations)
     result = summarise(system, solution, _refuse_defects(system, state, equations), saved.ray_status, saved.warnings)
     return Adjustment(result, system, solution)
+
+
+def _with_warnings(result: AdjustedBlock, more: tuple[str, ...]) -> AdjustedBlock:
+    return replace(result, outcome=replace(result.outcome, warnings=result.outcome.warnings + more))
 
 
 def _doubts(block: Block, redundancy: int) -> tuple[str, ...]:

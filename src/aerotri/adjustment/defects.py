@@ -73,11 +73,28 @@ def _name_motions(system, state, scale, vectors) -> tuple[list[str], np.ndarray]
     motions /= np.linalg.norm(motions, axis=0)
     inside = np.linalg.norm(vectors.T @ motions, axis=0) > 0.999
     free = [name for name, free in zip(FREEDOMS, inside, strict=True) if free]
+    mixed, combinations = _mixed_motions(motions, inside, vectors)
+    free += mixed
     if not free:
         return [], vectors
-    named = np.linalg.qr(motions[:, inside])[0]
+    named = np.linalg.qr(np.hstack([motions[:, inside], combinations]))[0]
     left, size, _ = np.linalg.svd(vectors - named @ (named.T @ vectors), full_matrices=False)
     return [f"the datum is free in {', '.join(free)}"], left[:, size > 0.5]
+
+
+def _mixed_motions(motions, inside, vectors) -> tuple[list[str], np.ndarray]:
+    """Motions of the whole block that are none of the seven alone, such as a rotation about two control points."""
+    pure = np.linalg.qr(motions[:, inside])[0] if inside.any() else motions[:, :0]
+    span, scale, mix = np.linalg.svd(motions - pure @ (pure.T @ motions), full_matrices=False)
+    span, mix = span[:, scale > 1e-8], mix[scale > 1e-8] / scale[scale > 1e-8, None]
+    left, cosine, _ = np.linalg.svd(span.T @ vectors, full_matrices=False)
+    shared = left[:, cosine > 0.999]
+    weight = np.abs(mix.T @ shared)
+    names = [
+        "a combination of " + " and ".join(f for f, w in zip(FREEDOMS, column / column.max(), strict=True) if w > 0.05)
+        for column in weight.T
+    ]
+    return names, span @ shared
 
 
 def _add_shifts(system: NormalSystem, motions: np.ndarray, first: int) -> None:

@@ -18,6 +18,7 @@ from aerotri.adjustment.unknowns import State
 
 COST_TOLERANCE = 1e-9
 STEP_TOLERANCE = 1e-3
+ROBUST_COST_TOLERANCE, ROBUST_STEP_TOLERANCE = 1e-4, 1e-2
 FIRST_DAMPING, LAST_DAMPING, NO_DAMPING = 1e-5, 1e12, 1e-11
 SCALE_TOLERANCE = 0.01
 MAX_SCALE_CHANGES = 20
@@ -77,7 +78,7 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
             if damping.value > LAST_DAMPING:
                 return Solution("not converged", state, equations, estimator, iteration, tuple(costs))
             step = _step(system, state, equations, estimator, damping.value)
-        settled = damping.value == 0.0 and _settled(equations, step, redundancy)
+        settled = damping.value == 0.0 and _settled(equations, step, redundancy, estimator)
         damping = damping.lowered(step.gain_ratio(equations))
         state, equations = step.state, step.equations
         costs.append(equations.cost)
@@ -147,9 +148,16 @@ def _step(system: NormalSystem, state: State, equations: NormalEquations, estima
     return _Trial(there, system.assemble(there, 0.0, estimator), decrement)
 
 
-def _settled(equations: NormalEquations, step: _Trial, redundancy: int) -> bool:
-    """Every unknown moved by less than STEP_TOLERANCE of its σ: |dx_i|/σ_i ≤ √(dxᵀN dx)/σ̂0 for all i."""
+def _settled(equations: NormalEquations, step: _Trial, redundancy: int, estimator: Estimator) -> bool:
+    """Every unknown moved by less than STEP_TOLERANCE of its σ: |dx_i|/σ_i ≤ √(dxᵀN dx)/σ̂0 for all i.
+
+    Re-weighting converges linearly, and a point whose two rays contradict each other creeps along a flat valley for
+    ever: robust, the orientations and shared parameters have to stand within ROBUST_STEP_TOLERANCE, and the cost.
+    """
     variance = max(step.equations.cost, 1e-30) / max(redundancy, 1)
+    if estimator.is_robust:
+        still = abs(equations.cost - step.equations.cost) <= ROBUST_COST_TOLERANCE * equations.cost
+        return still and step.decrement - equations.point_decrement <= ROBUST_STEP_TOLERANCE**2 * variance
     return abs(step.decrement) <= STEP_TOLERANCE**2 * variance or step.decrement <= 1e-13 * equations.cost
 
 

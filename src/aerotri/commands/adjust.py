@@ -107,8 +107,7 @@ def _draw(result: AdjustedBlock, folder: Path) -> None:
     from aerotri.report.plots import all_plots, save_plots
 
     figures = all_plots(result)
-    save_plots(figures, folder / "plots")
-    write_report(result, figures, folder / "report.html")
+    write_report(result, save_plots(figures, folder / "plots"), folder / "report.html")
 
 
 def _folder_name(path: Path) -> str:

@@ -12,7 +12,6 @@ from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.functional_model.observed_unknowns import predict_antennas
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.statistics.adjusted_block import (
-    RAY_STATUS,
     AdjustedBlock,
     GroundPointResults,
     ImageResults,
@@ -23,7 +22,11 @@ from aerotri.statistics.adjusted_block import (
     SharedParameters,
 )
 from aerotri.statistics.covariance import Cofactors, cofactors, correlations, orientation_cofactors, total_correlations
-from aerotri.statistics.reliability import normalised_residuals
+from aerotri.statistics.reliability import normalised_residuals, suspected_blunders
+
+
+INSEPARABLE = 0.999
+"""Correlation beyond which two parameters are reported as one."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,7 @@ def summarise(
     Parameters
     ----------
     factor : undamped, at the solution.
-    ray_status : (m,) index into `RAY_STATUS` of every ray of the block.
+    ray_status : (m,) status of every ray, an index into `adjusted_block.RAY_STATUS`.
     """
     block, counts = system.unknowns.block, count_observations(system)
     q = cofactors(system, solution.state, factor, solution.estimator)
@@ -92,6 +95,7 @@ def summarise(
         control=control,
         check=check,
         groups=_groups(system, solution, q, rays, control),
+        blunders=suspected_blunders(block, rays),
     )
 
 
@@ -173,6 +177,18 @@ def _parameters(system: NormalSystem, solution: Solution, q: Cofactors, sigma0: 
         total_correlation=total,
         status=np.where(weighted, "weighted", "estimated").astype(object),
         reason=np.full(s, "", dtype=object),
+    )
+
+
+def inseparable(parameters: SharedParameters) -> tuple[str, ...]:
+    """Sentences about pairs of shared parameters that the block cannot tell apart."""
+    pairs = {}
+    for k in np.flatnonzero(np.abs(np.nan_to_num(parameters.max_correlation)) > INSEPARABLE):
+        pair = frozenset((str(parameters.names[k]), str(parameters.max_correlation_with[k])))
+        pairs.setdefault(pair, parameters.max_correlation[k])
+    return tuple(
+        f"{' and '.join(sorted(pair))} cannot be told apart (correlation {100.0 * r:.2f} %)"
+        for pair, r in pairs.items()
     )
 
 
@@ -268,5 +284,3 @@ def _prior_group(system: NormalSystem, solution: Solution, q: Cofactors) -> list
     pvv = float(np.sum(normed**2))
     return [_group("weighted parameters", int(known.sum()), 1.0, float(np.sqrt(pvv / known.sum())), redundancy, pvv)]
 
-
-USED = RAY_STATUS.index("used")

@@ -1,0 +1,211 @@
+"""The adjustment as a whole on simulated blocks: start values, robustness, defects, what is left out, reopening."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aerotri.adjustment.start_values import resect, start_values
+from aerotri.conventions import InputError
+from aerotri.formats.solution import read_solution, write_solution
+from aerotri.functional_model.rotation import rotation_from_angles
+from aerotri.observations import Control, Prior
+from aerotri.pipeline import AdjustmentFailedError, adjust, adjust_keeping_system, reopen
+from small_blocks import small_block, with_adjustment
+
+DENSE_CONTROL = {"control": {"distance_bases": 0.9, "sigma_m": [0.03, 0.03, 0.05], "check_points": 5}}
+
+
+def without_start(block, keep=()):
+    images = block.images
+    centre, angles = np.full_like(images.centre, np.nan), np.full_like(images.angles, np.nan)
+    keep = list(keep)
+    centre[keep], angles[keep] = images.centre[keep], images.angles[keep]
+    return replace(block, images=replace(images, centre=centre, angles=angles))
+
+
+def test_start_from_control_alone_and_growth():
+    """Some photographs see four control points, the rest are resected from intersected points."""
+    block, truth = small_block(11, **DENSE_CONTROL)
+    bare = without_start(block)
+    start = start_values(bare)
+    assert np.isfinite(start.centre).all()
+    np.testing.assert_allclose(start.centre + start.origin, truth.centre, atol=3.0)
+    result, expected = adjust(bare), adjust(block)
+    np.testing.assert_allclose(result.outcome.vtpv, expected.outcome.vtpv, rtol=1e-9)
+
+
+def test_start_grows_from_two_oriented_photographs():
+    block, _ = small_block(12)
+    grown = adjust(without_start(block, keep=(0, 1)))
+    np.testing.assert_allclose(grown.outcome.vtpv, adjust(block).outcome.vtpv, rtol=1e-9)
+
+
+def test_start_survives_gross_errors():
+    """Five per cent of the rays off by up to 0.2 mm: the orientation still starts within metres."""
+    block, truth = small_block(13, **DENSE_CONTROL, gross_errors={"fraction": 0.05, "range_sigma": [10.0, 100.0]})
+    start = start_values(without_start(block))
+    np.testing.assert_allclose(start.centre + start.origin, truth.centre, atol=8.0)
+
+
+def test_resection_single_photograph():
+    rng = np.random.default_rng(5)
+    rotation = rotation_from_angles(np.radians([2.0, -1.0, 77.0]))
+    centre = np.array([500.0, -300.0, 1200.0])
+    points = np.column_stack([rng.uniform(100, 900, 12), rng.uniform(-700, 100, 12), rng.uniform(0, 80, 12)])
+    u = (points - centre) @ rotation
+    tangent = -u[:, :2] / u[:, 2:]
+    tangent[3] += 0.05
+    pose = resect(points, tangent, 1e-4)
+    assert pose is not None
+    np.testing.assert_allclose(pose[1], centre, atol=1e-3)
+    np.testing.assert_allclose(pose[0], rotation, atol=1e-6)
+
+
+def test_no_start_values_is_refused():
+    with pytest.raises(InputError, match="no photograph has start values"):
+        adjust(without_start(small_block(12)[0]))
+
+
+def test_no_control_names_the_datum():
+    block = replace(small_block(14)[0], control=Control.empty())
+    with pytest.raises(AdjustmentFailedError, match="no control: the datum is free in X, Y, Z, ω, φ, κ, scale") as failure:
+        adjust(block)
+    assert failure.value.outcome.status == "rank deficient"
+
+
+def test_two_control_points_leave_a_rotation():
+    block = small_block(14)[0]
+    control = block.control
+    two = np.flatnonzero(~control.is_check)[:2]
+    few = Control(control.point[two], control.xyz[two], control.sigma[two], control.is_check[two])
+    with pytest.raises(AdjustmentFailedError, match="too little control: the datum is free in a combination of .*ω"):
+        adjust(replace(block, control=few))
+
+
+def test_height_control_only_names_what_is_free():
+    block = small_block(14)[0]
+    xyz = block.control.xyz.copy()
+    xyz[:, :2] = np.nan
+    with pytest.raises(AdjustmentFailedError, match="the datum is free in X, Y, κ") as failure:
+        adjust(replace(block, control=replace(block.control, xyz=xyz)))
+    assert "scale" not in failure.value.outcome.message.split("κ")[1][:4]
+
+
+def test_parameters_that_cannot_be_told_apart_are_named():
+    """[D] K1 ↔ −P9 plus a scale: with the principal distance free the three are one pattern too many."""
+    block = small_block(15, "brown:K1,bluh:9")[0]
+    camera = block.cameras[0]
+    free = {**camera.interior, "focal_length_mm": Prior(101.4)}
+    result = adjust(replace(block, cameras=(replace(camera, interior=free),)))
+    row = list(result.parameters.names).index("bluh.9")
+    assert result.parameters.max_correlation_with[row] == "brown.K1"
+    assert any("bluh.9 and brown.K1" in w or "brown.K1 and bluh.9" in w for w in result.outcome.warnings)
+
+
+def test_tile_without_rays_is_named():
+    block = small_block(16, "ultracam_d:42-73")[0]
+    rays = block.image_points
+    in_corner = (rays.xy[:, 0] < -10) & (rays.xy[:, 1] > 8)
+    keep = ~in_corner
+    block = replace(
+        block,
+        image_points=replace(
+            rays, image=rays.image[keep], point=rays.point[keep], xy=rays.xy[keep], sigma=rays.sigma[keep]
+        ),
+    )
+    with pytest.raises(AdjustmentFailedError, match=r"no ray depends on ultracam_d\.42"):
+        adjust(block)
+
+
+def test_what_is_left_out_is_said_and_marked():
+    block = small_block(17)[0]
+    rays = block.image_points
+    lonely = np.setdiff1d(rays.point, block.control.point)[0]
+    first = np.flatnonzero(rays.point == lonely)[0]
+    keep = (rays.point != lonely) | (np.arange(len(rays)) == first)
+    block = replace(
+        block,
+        image_points=replace(
+            rays, image=rays.image[keep], point=rays.point[keep], xy=rays.xy[keep], sigma=rays.sigma[keep]
+        ),
+    )
+    result = adjust(block)
+    left_out = np.flatnonzero(rays.point[keep] == lonely)
+    assert any(str(block.points[lonely]) in warning for warning in result.outcome.warnings)
+    assert result.rays.status[left_out] == [1]
+    assert np.isnan(result.rays.v[left_out]).all()
+    assert np.isnan(result.points.xyz[lonely]).all()
+
+
+def test_huber_resists_gross_errors():
+    clean, _ = small_block(18)
+    foul, truth = small_block(18, gross_errors={"fraction": 0.05, "range_sigma": [10.0, 100.0]})
+    robust = with_adjustment(foul, robust="huber")
+    reference, plain, huber = adjust(clean), adjust(foul), adjust(robust)
+    sigma = reference.images.sigma[:, :3]
+
+    def off(result):
+        return np.abs((result.images.centre - reference.images.centre) / sigma).max()
+
+    assert huber.outcome.status == "converged"
+    assert off(huber) < 3.0 < off(plain)
+    wrong = np.asarray(truth.gross_errors)
+    assert np.median(huber.rays.weight[wrong]) < 0.3
+    good = np.setdiff1d(np.arange(len(foul.image_points)), wrong)
+    assert np.nanmean(huber.rays.weight[good]) > 0.9
+    redundancy = huber.outcome.redundancy
+    assert abs(sum(g.redundancy for g in huber.groups) - redundancy) < 1e-6 * redundancy
+
+
+def test_huber_changes_nothing_on_clean_observations_but_the_tails():
+    block, _ = small_block(19)
+    plain, robust = adjust(block), adjust(with_adjustment(block, robust="huber"))
+    shift = np.abs(plain.images.centre - robust.images.centre) / plain.images.sigma[:, :3]
+    assert shift.max() < 0.6
+    assert 0.9 < robust.outcome.sigma0 / plain.outcome.sigma0 <= 1.001
+
+
+def test_reopened_result_equals_the_one_in_memory(tmp_path):
+    from aerotri.formats.block_folder import read_block, write_block
+
+    for k, settings in enumerate(({}, {"datum": "inner"}, {"robust": "huber"})):
+        block = with_adjustment(small_block(20, "bluh:1-4")[0], **settings)
+        adjustment = adjust_keeping_system(block)
+        folder = tmp_path / str(k)
+        write_block(block, folder / "block")
+        write_solution(folder / "solution.npz", adjustment.system, adjustment.solution, adjustment.result)
+        again = reopen(read_block(folder / "block"), read_solution(folder / "solution.npz")).result
+        kept = adjustment.result
+        for name in ("images.covariance", "points.covariance", "parameters.covariance", "rays.r"):
+            record, attribute = name.split(".")
+            a, b = (np.asarray(getattr(getattr(r, record), attribute)) for r in (kept, again))
+            scale = np.nanmax(np.abs(a))
+            np.testing.assert_allclose(b / scale, a / scale, rtol=1e-10, atol=1e-10, err_msg=name)
+        np.testing.assert_allclose(again.outcome.sigma0, kept.outcome.sigma0, rtol=1e-10)
+        np.testing.assert_array_equal(again.points.xyz, kept.points.xyz)
+
+
+def test_damaged_solution_is_refused(tmp_path):
+    path = tmp_path / "solution.npz"
+    with pytest.raises(InputError, match="is missing"):
+        read_solution(path)
+    path.write_bytes(b"PK\x03\x04 nonsense")
+    with pytest.raises(InputError, match="cannot be read"):
+        read_solution(path)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"robust": "danish"}, "robust"),
+        ({"parameter_selection": "on"}, "parameter_selection"),
+        ({"variance_components": "on"}, "variance_components"),
+        ({"datum": "fixed"}, "datum_fixed"),
+        ({"datum": "fixed", "datum_fixed": (("nobody", "X0"),)}, "nobody"),
+        ({"datum": "inner", "datum_points": ("nowhere",)}, "nowhere"),
+    ],
+)
+def test_settings_not_honoured_are_refused(settings, words):
+    with pytest.raises(InputError, match=words):
+        adjust(with_adjustment(small_block(21)[0], **settings))
