@@ -138,7 +138,7 @@ def test_strasbourg_with_projection_centres(shared_data):
 def test_strasbourg_variants_that_go_wrong(strasbourg):
     """targets.md 1: half a pixel off gives 1.178646, y flipped 1.18446, without the point seen once 1.1727.
 
-    The figure for y flipped comes with the half pixel added instead of subtracted as well: y0 = 38.811 − 38.988 + 0.003.
+    The figure for y flipped comes with the half pixel added instead of subtracted: y0 = 38.811 − 38.988 + 0.003.
     """
     block = strasbourg[0]
     rays = block.image_points

@@ -69,7 +69,9 @@ def test_no_start_values_is_refused():
 
 def test_no_control_names_the_datum():
     block = replace(small_block(14)[0], control=Control.empty())
-    with pytest.raises(AdjustmentFailedError, match="no control: the datum is free in X, Y, Z, ω, φ, κ, scale") as failure:
+    with pytest.raises(
+        AdjustmentFailedError, match="no control: the datum is free in X, Y, Z, ω, φ, κ, scale"
+    ) as failure:
         adjust(block)
     assert failure.value.outcome.status == "rank deficient"
 
