@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.adjustment.datum import restore_datum
+from aerotri.adjustment.datum import FREEDOMS, control_share, nothing_holds, restore_datum
 from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.prepare import build_system, prepare
@@ -20,6 +20,10 @@ from aerotri.formats.solution import SavedSolution
 from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import AdjustedBlock, Outcome
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
+
+
+LITTLE_CONTROL = 0.25
+"""Share of the block's area that height control should span at least."""
 
 
 class AdjustmentFailedError(Exception):
@@ -76,6 +80,9 @@ def adjust_keeping_system(
     system, state = prepared.system, prepared.state
     started = time.perf_counter()
     counts = count_observations(system)
+    if nothing_holds(system):
+        free = f"the datum is free in {', '.join(FREEDOMS)}"
+        raise AdjustmentFailedError(_failure(system, "rank deficient", _in_words(system, [free])))
     _refuse_defects(system, state, system.assemble(state, 0.0, LEAST_SQUARES))
     settings = block.settings.adjustment
     options = SolveOptions(settings.max_iterations, settings.robust, report)
@@ -85,7 +92,7 @@ def adjust_keeping_system(
         solution = replace(solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator))
     factor = _refuse_defects(system, solution.state, solution.equations)
     solved = time.perf_counter()
-    warnings = prepared.warnings + _doubts(block, counts.redundancy)
+    warnings = prepared.warnings + _doubts(system, solution.state, counts.redundancy)
     result = summarise(system, solution, factor, prepared.ray_status, warnings)
     result = _with_warnings(result, inseparable(result.parameters))
     timings = {
@@ -116,8 +123,14 @@ def _with_warnings(result: AdjustedBlock, more: tuple[str, ...]) -> AdjustedBloc
     return replace(result, outcome=replace(result.outcome, warnings=result.outcome.warnings + more))
 
 
-def _doubts(block: Block, redundancy: int) -> tuple[str, ...]:
-    doubts = []
+def _doubts(system: NormalSystem, state: State, redundancy: int) -> tuple[str, ...]:
+    block, doubts = system.unknowns.block, []
+    share = control_share(system.unknowns, state)
+    if block.settings.adjustment.datum == "control" and system.centres is None and share < LITTLE_CONTROL:
+        doubts.append(
+            f"the height control spans {100.0 * share:.0f} % of the block's area: beyond it heights are extrapolated, "
+            "see their σ"
+        )
     if redundancy <= 0:
         doubts.append(f"redundancy {redundancy}: nothing controls the observations, σ is not known")
     if block.gnss_ins is not None and np.isfinite(block.gnss_ins.angles).any():
@@ -151,7 +164,7 @@ def _in_words(system: NormalSystem, defects: list[str]) -> str:
     text = "; ".join(defects)
     if u.block.settings.adjustment.datum != "control" or "datum" not in text:
         return text
-    if not (u.prior_weight > 0.0).any() and system.centres is None:
+    if nothing_holds(system):
         return f'no control: {text}. Give control points, or set datum = "minimal" or "inner"'
     return f"too little control: {text}"
 

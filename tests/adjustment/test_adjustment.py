@@ -81,7 +81,7 @@ def test_two_control_points_leave_a_rotation():
     control = block.control
     two = np.flatnonzero(~control.is_check)[:2]
     few = Control(control.point[two], control.xyz[two], control.sigma[two], control.is_check[two])
-    with pytest.raises(AdjustmentFailedError, match="too little control: the datum is free in a combination of .*ω"):
+    with pytest.raises(AdjustmentFailedError, match=r"too little control: the datum is free in a combination of .*ω"):
         adjust(replace(block, control=few))
 
 
@@ -211,3 +211,31 @@ def test_damaged_solution_is_refused(tmp_path):
 def test_settings_not_honoured_are_refused(settings, words):
     with pytest.raises(InputError, match=words):
         adjust(with_adjustment(small_block(21)[0], **settings))
+
+
+def test_control_in_one_corner_is_said():
+    block = small_block(22)[0]
+    corner = np.argsort(np.abs(block.control.xyz[:, :2] - block.control.xyz[0, :2]).sum(axis=1))[:4]
+    is_check = np.ones(len(block.control), bool)
+    is_check[corner] = False
+    result = adjust(replace(block, control=replace(block.control, is_check=is_check)))
+    assert any("of the block's area" in warning for warning in result.outcome.warnings)
+    far = np.nanargmax(result.check.sigma[:, 2])
+    assert result.check.sigma[far, 2] > 2.5 * np.nanmin(result.check.sigma[:, 2])
+
+
+def test_points_at_infinity_are_named():
+    """Two rays that do not meet under a real angle: the point is left out, and named."""
+    block = small_block(23)[0]
+    rays = block.image_points
+    count = np.bincount(rays.point, minlength=len(block.points))
+    chosen = np.setdiff1d(np.flatnonzero(count == 2), block.control.point)[0]
+    one, two = np.flatnonzero(rays.point == chosen)
+    start = start_values(block)
+    direction = start.rotation[rays.image[one]] @ np.array([*rays.xy[one], -101.4])
+    seen = start.rotation[rays.image[two]].T @ direction
+    xy = rays.xy.copy()
+    xy[two] = -101.4 * seen[:2] / seen[2]
+    result = adjust(replace(block, image_points=replace(rays, xy=xy)))
+    assert any("do not intersect" in w and str(block.points[chosen]) in w for w in result.outcome.warnings)
+    assert (result.rays.status[[one, two]] == 3).all()

@@ -8,10 +8,16 @@ S-transformation [L: Baarda 1973; Teunissen 1985].
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from aerotri.adjustment.unknowns import State, Step, Unknowns
 from aerotri.functional_model.rotation import cross_matrix, exponential
+
+if TYPE_CHECKING:
+    from aerotri.adjustment.normal_equations import NormalSystem
 
 FREEDOMS = ("X", "Y", "Z", "ω", "φ", "κ", "scale")
 
@@ -113,3 +119,19 @@ def restore_datum(unknowns: Unknowns, state: State, reference: np.ndarray) -> St
         if np.abs(g @ motion).max() < 1e-9:
             break
     return state
+
+
+def nothing_holds(system: NormalSystem) -> bool:
+    """Whether nothing observed or held ties the block to the object frame."""
+    u = system.unknowns
+    held = not (u.eo_free.all() and u.point_free.all())
+    return not held and system.centres is None and not (u.prior_weight > 0.0).any()
+
+
+def control_share(unknowns: Unknowns, state: State) -> float:
+    """Area of the convex hull of the height control over that of the object points, in plan; 0 below three points."""
+    control = state.points[unknowns.prior_weight[:, 2] > 0.0, :2]
+    try:
+        return float(ConvexHull(control).volume / ConvexHull(state.points[:, :2]).volume)
+    except (QhullError, ValueError):
+        return 0.0

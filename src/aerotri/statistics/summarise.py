@@ -24,7 +24,6 @@ from aerotri.statistics.adjusted_block import (
 from aerotri.statistics.covariance import Cofactors, cofactors, correlations, orientation_cofactors, total_correlations
 from aerotri.statistics.reliability import normalised_residuals, suspected_blunders
 
-
 INSEPARABLE = 0.999
 """Correlation beyond which two parameters are reported as one."""
 
