@@ -12,7 +12,7 @@ from aerotri.adjustment.datum import FREEDOMS, control_share, nothing_holds, res
 from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.prepare import build_system, prepare
-from aerotri.adjustment.robust import LEAST_SQUARES, Estimator
+from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import StartValues, State
@@ -21,6 +21,8 @@ from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import AdjustedBlock, Outcome
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
 
+RUNAWAY = 5.0
+"""Factor by which a principal distance may change before the adjustment is taken for lost."""
 
 LITTLE_CONTROL = 0.25
 """Share of the block's area that height control should span at least."""
@@ -83,10 +85,12 @@ def adjust_keeping_system(
     if nothing_holds(system):
         free = f"the datum is free in {', '.join(FREEDOMS)}"
         raise AdjustmentFailedError(_failure(system, "rank deficient", _in_words(system, [free])))
-    _refuse_defects(system, state, system.assemble(state, 0.0, LEAST_SQUARES))
     settings = block.settings.adjustment
     options = SolveOptions(settings.max_iterations, settings.robust, report)
     solution = minimise(system, state, counts.redundancy, options)
+    if solution.defects:
+        raise AdjustmentFailedError(_failure(system, "rank deficient", _in_words(system, list(solution.defects))))
+    solution = _without_runaway(system, solution)
     if settings.datum in ("minimal", "inner"):
         moved = restore_datum(system.unknowns, solution.state, state.points)
         solution = replace(solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator))
@@ -117,6 +121,23 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     solution = Solution(saved.status, state, equations, estimator, saved.iterations)
     result = summarise(system, solution, _refuse_defects(system, state, equations), saved.ray_status, saved.warnings)
     return Adjustment(result, system, solution)
+
+
+def _without_runaway(system: NormalSystem, solution: Solution) -> Solution:
+    """A principal distance that ran away is no convergence, however small the residuals have become.
+
+    Raises
+    ------
+    AdjustmentFailedError
+    """
+    u = system.unknowns
+    ratio = u.interior(solution.state)[:, 0] / u.lens.base[:, 0]
+    if (np.abs(np.log(np.maximum(ratio, 1e-12))) > np.log(RUNAWAY)).any():
+        worst = int(np.argmax(np.abs(np.log(np.maximum(ratio, 1e-12)))))
+        c, start = u.interior(solution.state)[worst, 0], u.lens.base[worst, 0]
+        text = f"the principal distance ran from {start:g} to {c:.3g} mm: the parameters chosen cannot be told apart"
+        raise AdjustmentFailedError(replace(_failure(system, "not converged", text), iterations=solution.iterations))
+    return solution
 
 
 def _with_warnings(result: AdjustedBlock, more: tuple[str, ...]) -> AdjustedBlock:

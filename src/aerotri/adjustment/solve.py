@@ -6,18 +6,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from aerotri.adjustment.datum import without_motion
+from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.robust import LEAST_SQUARES, Estimator, huber, scale_of
-from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
+from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import State
 
 COST_TOLERANCE = 1e-9
-STEP_TOLERANCE = 1e-3
+STEP_TOLERANCE = 1e-5
+SURE_CONTRACTION = 1e-2
 ROBUST_COST_TOLERANCE, ROBUST_STEP_TOLERANCE = 1e-4, 1e-2
 FIRST_DAMPING, LAST_DAMPING, NO_DAMPING = 1e-5, 1e12, 1e-11
 SCALE_TOLERANCE = 0.01
@@ -42,6 +44,7 @@ class Solution:
 
     status : 'converged', 'not converged' or 'rank deficient'.
     costs : Σρ at the start and after every iteration.
+    defects : sentences naming what the observations leave free, when rank deficient.
     """
 
     status: str
@@ -49,7 +52,8 @@ class Solution:
     equations: NormalEquations
     estimator: Estimator
     iterations: int
-    costs: tuple[float, ...] = field(default_factory=tuple)
+    costs: tuple[float, ...] = ()
+    defects: tuple[str, ...] = ()
 
 
 def minimise(system: NormalSystem, state: State, redundancy: int, options: SolveOptions) -> Solution:
@@ -70,15 +74,20 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
     if options.robust != "off":
         estimator, equations = _rescale(system, state, equations, estimator, redundancy)
     costs = [equations.cost]
-    damping, scale_changes = Damping(), 0
+    damping, scale_changes, last_decrement = Damping(), 0, np.inf
     for iteration in range(1, options.max_iterations + 1):
         step = _step(system, state, equations, estimator, damping.value)
+        if iteration == 1 and (step is None or step.smallest_pivot < SUSPECT_PIVOT):
+            defects = find_defects(system, state, equations)
+            if defects:
+                return Solution("rank deficient", state, equations, estimator, 0, tuple(costs), tuple(defects))
         while step is None or not step.improves(equations):
             damping = damping.raised()
             if damping.value > LAST_DAMPING:
                 return Solution("not converged", state, equations, estimator, iteration, tuple(costs))
             step = _step(system, state, equations, estimator, damping.value)
-        settled = damping.value == 0.0 and _settled(equations, step, redundancy, estimator)
+        settled = damping.value == 0.0 and _settled(equations, step, redundancy, estimator, last_decrement)
+        last_decrement = step.decrement if damping.value == 0.0 else np.inf
         damping = damping.lowered(step.gain_ratio(equations))
         state, equations = step.state, step.equations
         costs.append(equations.cost)
@@ -87,7 +96,7 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
         if estimator.is_robust and scale_changes < MAX_SCALE_CHANGES:
             fresh, rescaled = _rescale(system, state, equations, estimator, redundancy)
             if abs(fresh.limit / estimator.limit - 1.0) > SCALE_TOLERANCE:
-                estimator, equations, settled = fresh, rescaled, False
+                estimator, equations, settled, last_decrement = fresh, rescaled, False, np.inf
                 scale_changes += 1
         if settled:
             return Solution("converged", state, equations, estimator, iteration, tuple(costs))
@@ -121,6 +130,7 @@ class _Trial:
     state: State
     equations: NormalEquations
     decrement: float
+    smallest_pivot: float
 
     def improves(self, before: NormalEquations) -> bool:
         # at the minimum the cost stands still within rounding
@@ -145,11 +155,14 @@ def _step(system: NormalSystem, state: State, equations: NormalEquations, estima
     if not all(np.isfinite(part).all() for part in (step.images, step.shared, step.points)):
         return None
     there = system.unknowns.advance(state, step)
-    return _Trial(there, system.assemble(there, 0.0, estimator), decrement)
+    return _Trial(there, system.assemble(there, 0.0, estimator), decrement, factor.smallest_pivot)
 
 
-def _settled(equations: NormalEquations, step: _Trial, redundancy: int, estimator: Estimator) -> bool:
-    """Every unknown moved by less than STEP_TOLERANCE of its σ: |dx_i|/σ_i ≤ √(dxᵀN dx)/σ̂0 for all i.
+def _settled(equations, step: _Trial, redundancy: int, estimator: Estimator, last_decrement: float) -> bool:
+    """The next step would change no unknown by STEP_TOLERANCE of its σ: |dx_i|/σ_i ≤ √(dxᵀN dx)/σ̂0 for all i.
+
+    The decrement dxᵀN dx of the next step is foretold from how the last pair of undamped steps contracted, by no more
+    than SURE_CONTRACTION: the first steps contract faster than the last.
 
     Re-weighting converges linearly, and a point whose two rays contradict each other creeps along a flat valley for
     ever: robust, the orientations and shared parameters have to stand within ROBUST_STEP_TOLERANCE, and the cost.
@@ -158,7 +171,11 @@ def _settled(equations: NormalEquations, step: _Trial, redundancy: int, estimato
     if estimator.is_robust:
         still = abs(equations.cost - step.equations.cost) <= ROBUST_COST_TOLERANCE * equations.cost
         return still and step.decrement - equations.point_decrement <= ROBUST_STEP_TOLERANCE**2 * variance
-    return abs(step.decrement) <= STEP_TOLERANCE**2 * variance or step.decrement <= 1e-13 * equations.cost
+    contraction = min(1.0, max(SURE_CONTRACTION, abs(step.decrement) / last_decrement))
+    if not np.isfinite(last_decrement):
+        contraction = 1.0
+    next_decrement = abs(step.decrement) * contraction
+    return next_decrement <= STEP_TOLERANCE**2 * variance or next_decrement <= 1e-13 * equations.cost
 
 
 def _rescale(system, state, equations, estimator, redundancy):
@@ -170,10 +187,3 @@ def _rescale(system, state, equations, estimator, redundancy):
         return estimator, equations
     return fresh, system.assemble(state, 0.0, fresh)
 
-
-def final_factor(system: NormalSystem, solution: Solution) -> Factor | None:
-    """The undamped factor at the solution, for steps and covariances; None where the matrix is singular."""
-    try:
-        return system.factorise(solution.equations)
-    except NotPositiveDefiniteError:
-        return None

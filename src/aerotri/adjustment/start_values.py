@@ -6,10 +6,11 @@ and further photographs resected from them, until nothing is added.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.adjustment import _intersection_kernels
 from aerotri.adjustment.unknowns import StartValues
 from aerotri.functional_model.additional_parameters import brown, lens
 from aerotri.functional_model.collinearity import interior_row
@@ -63,10 +64,41 @@ def start_values(block: Block, given_points: np.ndarray | None = None) -> StartV
             if not _resect_into(rotation, centre, points, block, directions, tolerance):
                 break
             points = known.copy()
+            _intersect_into(points, block, directions, rotation, centre)
+            refine(block, origin, rotation, centre, points)
     if given_points is not None:
         there = np.isfinite(given_points).all(axis=1)
         points[there] = given_points[there] - origin
     return StartValues(origin, rotation, centre, points)
+
+
+def refine(block: Block, origin: np.ndarray, rotation, centre, points, iterations: int = 6) -> None:
+    """A short robust adjustment of what is oriented so far, in place, so that errors do not grow along a strip.
+
+    Without additional parameters; in the datum of the control where there is enough of it, else of seven coordinates.
+    """
+    from aerotri.adjustment.prepare import USED, build_system, ray_status
+    from aerotri.adjustment.solve import SolveOptions, minimise
+
+    start = StartValues(origin, rotation, centre, points)
+    controlled = int(np.isfinite(points[block.control.point[~block.control.is_check], 0]).sum()) >= MIN_RESECTION_POINTS
+    for datum in ("control", "minimal") if controlled else ("minimal",):
+        settings = replace(block.settings.adjustment, additional_parameters=(), datum=datum, datum_points=())
+        bare = replace(block, gnss_ins=None, settings=replace(block.settings, adjustment=settings))
+        status, _ = ray_status(bare, start)
+        if (status == USED).sum() < 10:
+            return
+        system, state = build_system(bare, start, status)
+        redundancy = max(2 * int((status == USED).sum()) - system.unknowns.count, 1)
+        solution = minimise(system, state, redundancy, SolveOptions(iterations, "huber"))
+        if not solution.defects:
+            break
+    else:
+        return
+    u = system.unknowns
+    rotation[u.images], centre[u.images], points[u.points] = (
+        solution.state.rotation, solution.state.centre, solution.state.points,
+    )  # fmt: skip
 
 
 def _full_control(block: Block, origin: np.ndarray) -> np.ndarray:
@@ -121,39 +153,12 @@ def intersect(n_points: int, point: np.ndarray, centre: np.ndarray, ray: np.ndar
     -------
     (n_points, 3) m, NaN where fewer than two rays meet or they meet under too small an angle or behind the camera.
     """
-    across = np.eye(3) - ray[:, :, None] * ray[:, None, :]
-    weight = np.ones(len(point))
-    xyz = np.full((n_points, 3), np.nan)
-    if not len(point):
-        return xyz
-    count = np.bincount(point, minlength=n_points)
-    for iteration in range(6):
-        normal = _sum_by_point(weight[:, None, None] * across, point, n_points)
-        right = _sum_by_point(weight[:, None] * np.einsum("mij,mj->mi", across, centre), point, n_points)
-        total = np.bincount(point, weights=weight, minlength=n_points)
-        solvable = count >= 2
-        smallest = np.zeros(n_points)
-        smallest[solvable] = np.linalg.eigvalsh(normal[solvable])[:, 0] / total[solvable]
-        solvable &= smallest > MIN_INTERSECTION
-        xyz[:] = np.nan
-        xyz[solvable] = np.linalg.solve(normal[solvable], right[solvable][:, :, None])[:, :, 0]
-        reach = xyz[point] - centre
-        distance = np.linalg.norm(reach, axis=1)
-        with np.errstate(invalid="ignore"):
-            angle = np.linalg.norm(np.einsum("mij,mj->mi", across, reach), axis=1) / distance
-            scale = np.maximum(tolerance * 3.0, np.nanmedian(angle)) if np.isfinite(angle).any() else tolerance * 3.0
-            weight = np.where(np.isfinite(angle), 1.0 / (1.0 + (angle / scale) ** 2), 1.0) if iteration < 5 else weight
-            # rays to near points count more in metres than in angle: weigh by distance as well
-            weight = weight / np.where(np.isfinite(distance), distance, 1.0) ** 2 * np.nanmean(distance) ** 2
-    behind = np.bincount(point, weights=np.nan_to_num(np.einsum("mi,mi->m", reach, ray)) < 0.0, minlength=n_points)
-    xyz[behind > 0.5 * count] = np.nan
+    order = np.argsort(point, kind="stable")
+    start = np.concatenate([[0], np.cumsum(np.bincount(point, minlength=n_points))]).astype(np.int64)
+    xyz = np.empty((n_points, 3))
+    arrays = (np.ascontiguousarray(a[order]) for a in (centre, ray, tolerance))
+    _intersection_kernels.intersect_points(start, *arrays, MIN_INTERSECTION, xyz)
     return xyz
-
-
-def _sum_by_point(values: np.ndarray, point: np.ndarray, n_points: int) -> np.ndarray:
-    flat = values.reshape(len(values), -1)
-    columns = [np.bincount(point, weights=flat[:, k], minlength=n_points) for k in range(flat.shape[1])]
-    return np.stack(columns, axis=-1).reshape(n_points, *values.shape[1:])
 
 
 def _resect_into(rotation, centre, points, block: Block, directions: _Directions, tolerance: float) -> bool:
