@@ -7,6 +7,8 @@ in Fortran order (element (r, c) at r + c·rows), so that each kernel is compile
 
 from __future__ import annotations
 
+import numpy as np
+
 from aerotri.compiled import kernel
 
 B = 6
@@ -87,36 +89,57 @@ def extend_add(update, place, n_own, n_border, n_rows, top, low, rest):
 
 
 @kernel
-def extract_symmetric(above, above_size, place, n_border, out):
-    """The rows of a child out of its parent's full symmetric front."""
+def extract_lower(top, low, rest, n_own, place, n_border, out):
+    """Lower triangle of a child's rows out of its parent's inverse, kept in three parts as a front is."""
+    own = B * n_own
+    rows = len(low) // own if own else int(np.sqrt(len(rest)) + 0.5)
     size = B * len(place) + n_border
     for bj in range(len(place)):
+        pj = place[bj]
         for c in range(B):
-            source, target = (B * place[bj] + c) * above_size, (B * bj + c) * size
-            for bi in range(len(place)):
-                for r in range(B):
-                    out[target + B * bi + r] = above[source + B * place[bi] + r]
-            for t in range(n_border):
-                value = above[source + above_size - n_border + t]
-                out[target + size - n_border + t] = value
-                out[B * bj + c + (size - n_border + t) * size] = value
+            target = (B * bj + c) * size
+            if pj < n_own:
+                in_top, in_low = (B * pj + c) * own, (B * pj + c) * rows
+                for bi in range(bj, len(place)):
+                    pi = place[bi]
+                    if pi < n_own:
+                        for r in range(B):
+                            out[target + B * bi + r] = top[in_top + B * pi + r]
+                    else:
+                        for r in range(B):
+                            out[target + B * bi + r] = low[in_low + B * (pi - n_own) + r]
+                for t in range(n_border):
+                    out[target + size - n_border + t] = low[in_low + rows - n_border + t]
+            else:
+                in_rest = (B * (pj - n_own) + c) * rows
+                for bi in range(bj, len(place)):
+                    pi = B * (place[bi] - n_own)
+                    for r in range(B):
+                        out[target + B * bi + r] = rest[in_rest + pi + r]
+                for t in range(n_border):
+                    out[target + size - n_border + t] = rest[in_rest + rows - n_border + t]
     for c in range(n_border):
-        source = (above_size - n_border + c) * above_size + above_size - n_border
+        source = (rows - n_border + c) * rows + rows - n_border
         target = (size - n_border + c) * size + size - n_border
-        for t in range(n_border):
-            out[target + t] = above[source + t]
+        for t in range(c, n_border):
+            out[target + t] = rest[source + t]
 
 
 @kernel
-def gather_blocks(block, local_row, local_col, flipped, front, size, block_row, block_col, scale, blocks):
-    """The inverse's blocks out of a full symmetric front, scaled back; the reverse of `scatter_blocks`."""
+def gather_blocks(block, local_row, local_col, flipped, top, low, own, rows, block_row, block_col, scale, blocks):
+    """The inverse's blocks out of a front, scaled back; the reverse of `scatter_blocks`."""
     for k in range(len(block)):
         b = block[k]
         i, j = block_row[b], block_col[b]
         r0, c0 = B * local_row[k], B * local_col[k]
         for c in range(B):
             for r in range(B):
-                value = front[r0 + r + (c0 + c) * size]
+                if r0 < own:
+                    # only the lower triangle holds numbers
+                    row, column = max(r0 + r, c0 + c), min(r0 + r, c0 + c)
+                    value = top[row + column * own]
+                else:
+                    value = low[r0 - own + r + (c0 + c) * rows]
                 if flipped[k]:
                     blocks[b, c, r] = value * scale[i, c] * scale[j, r]
                 else:
@@ -124,12 +147,12 @@ def gather_blocks(block, local_row, local_col, flipped, front, size, block_row, 
 
 
 @kernel
-def gather_border(images, front, size, scale, border_scale, border):
+def gather_border(images, low, rows, scale, border_scale, border):
     """The inverse's border of the front's own photographs, scaled back."""
     n_border = border.shape[2]
     for k in range(len(images)):
         i = images[k]
         for c in range(B):
-            source = (B * k + c) * size + size - n_border
+            source = (B * k + c) * rows + rows - n_border
             for t in range(n_border):
-                border[i, c, t] = front[source + t] * scale[i, c] * border_scale[t]
+                border[i, c, t] = low[source + t] * scale[i, c] * border_scale[t]

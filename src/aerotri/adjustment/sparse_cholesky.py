@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.blas import dgemm, dsyrk, dtrsm  # pyright: ignore[reportAttributeAccessIssue]
+from scipy.linalg.blas import dgemm, dsymm, dsyrk, dtrsm  # pyright: ignore[reportAttributeAccessIssue]
 from scipy.linalg.lapack import dpotrf, dpotri  # pyright: ignore[reportAttributeAccessIssue]
 
 from aerotri.adjustment import _factor_kernels as _kernels
@@ -329,47 +329,66 @@ class Factor:
             out.corner[:] = _symmetric_from_lower(dpotri(s._corner, lower=1)[0])
         by_image = np.ascontiguousarray(self._scale[: B * s.n].reshape(s.n, B)[s.rank])
         by_border = self._scale[B * s.n :]
-        work: dict[int, np.ndarray] = {}
+        buffers = [_Buffers() for _ in range(max((front.depth for front in s.fronts), default=0) + 1)]
         for k in range(len(s.fronts) - 1, -1, -1):
             front = s.fronts[k]
-            z = self._inverse_front(k, work, out.corner)
-            work[front.depth] = z
+            top, low, _ = parts = self._inverse_front(k, buffers, out.corner)
             own = s.tree.order[front.first : front.first + front.n_own]
-            flat = _flat(z)
             _kernels.gather_blocks(
-                front.block, front.local_row, front.local_col, front.flipped, flat, len(z), s.block_row, s.block_col,
-                by_image, out.blocks,
+                front.block, front.local_row, front.local_col, front.flipped, _flat(top), _flat(low), len(top),
+                len(low), s.block_row, s.block_col, by_image, out.blocks,
             )  # fmt: skip
-            _kernels.gather_border(own, flat, len(z), by_image, by_border, out.border)
+            _kernels.gather_border(own, _flat(low), len(low), by_image, by_border, out.border)
+            buffers[front.depth].parts = parts
         out.corner[:] *= by_border[:, None] * by_border[None, :]
         return out
 
-    def _inverse_front(self, k: int, work: dict[int, np.ndarray], corner: np.ndarray) -> np.ndarray:
-        """Inverse over the front's own columns and rows (full symmetric, Fortran order)."""
+    def _inverse_front(self, k: int, buffers: list[_Buffers], corner: np.ndarray) -> _Parts:
+        """Lower triangle of the inverse over the front's own columns and its rows, in the three parts of a front.
+
+        Z_RR comes from the parent, Z_RC = −Z_RR·Y and Z_CC = L11⁻ᵀ·L11⁻¹ − Yᵀ·Z_RC with Y = L21·L11⁻¹.
+        """
         s = self._symbolic
-        front = s.fronts[k]
+        front, own_buffers = s.fronts[k], buffers[s.fronts[k].depth]
         top, low = s.panel(k)
-        c, r = top.shape[0], low.shape[0]
-        z = np.empty((c + r, c + r), order="F")
+        c, r = len(top), len(low)
+        rest = own_buffers.matrix("rest", r, r)
         if front.parent >= 0:
-            above = work[front.depth - 1]
-            zrr = np.empty((r, r), order="F")
-            _kernels.extract_symmetric(_flat(above), len(above), front.place, s.n_border, _flat(zrr))
+            above = buffers[front.depth - 1].parts
+            flat_above = (_flat(part) for part in above)
+            _kernels.extract_lower(
+                *flat_above, s.fronts[front.parent].n_own, front.place, s.n_border, _flat(rest)
+            )  # fmt: skip
         else:
-            zrr = np.asfortranarray(corner)
-        if c == 0:
-            return zrr
-        inverse, _ = dpotri(top, lower=1)
-        zcc = _symmetric_from_lower(inverse)
-        if r:
-            y = dtrsm(1.0, top, low, side=1, lower=1)
-            zrc = dgemm(-1.0, zrr, y)
-            zcc = zcc - dgemm(1.0, y, zrc, trans_a=1)
-            z[c:, :c] = zrc
-            z[:c, c:] = zrc.T
-            z[c:, c:] = zrr
-        z[:c, :c] = 0.5 * (zcc + zcc.T)
-        return z
+            rest[:] = corner
+        own, rows = own_buffers.matrix("own", c, c), own_buffers.matrix("rows", r, c)
+        if c:
+            own[:] = top
+            own, _ = dpotri(own, lower=1, overwrite_c=1)
+        if c and r:
+            y = own_buffers.matrix("y", r, c)
+            y[:] = low
+            dtrsm(1.0, top, y, side=1, lower=1, overwrite_b=1)
+            dsymm(-1.0, rest, y, c=rows, lower=1, overwrite_c=1)
+            dgemm(-1.0, y, rows, beta=1.0, c=own, trans_a=1, overwrite_c=1)
+        return own, rows, rest
+
+
+_Parts = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+class _Buffers:
+    """Work space of one depth of the tree, grown as needed; only one front of a depth is alive at a time."""
+
+    def __init__(self):
+        self._memory: dict[str, np.ndarray] = {}
+        self.parts: _Parts = (np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0)))
+
+    def matrix(self, name: str, rows: int, columns: int) -> np.ndarray:
+        """An uninitialised Fortran-ordered matrix."""
+        if name not in self._memory or len(self._memory[name]) < rows * columns:
+            self._memory[name] = np.zeros(rows * columns)
+        return self._memory[name][: rows * columns].reshape(rows, columns, order="F")
 
 
 def _flat(a: np.ndarray) -> np.ndarray:
