@@ -18,10 +18,10 @@ _state: dict[str, Any] = {"cached": True, "example": None}
 def kernel(function: Callable) -> Any:
     """Compile a function on first use. Without a writable place for the cache it is compiled anew in every run."""
     try:
-        compiled = njit(cache=True, nogil=True)(function)
+        compiled = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})(function)
     except RuntimeError:  # numba found no writable place
         _state["cached"] = False
-        return njit(nogil=True)(function)
+        return njit(nogil=True, error_model="numpy", fastmath={"contract"})(function)
     _state["example"] = compiled
     return compiled
 

@@ -25,7 +25,7 @@ def random_bordered(n, n_border, seed, ties=2.6):
     units = 10.0 ** rng.uniform(-3, 3, size)
     dense *= units[:, None] * units[None, :]
     blocks = np.stack([dense[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] for i, j in zip(block_row, block_col, strict=True)])
-    matrix = BorderedMatrix(blocks, dense[: 6 * n, 6 * n :].reshape(n, 6, n_border).copy(), dense[6 * n :, 6 * n :])
+    matrix = BorderedMatrix(blocks, np.swapaxes(dense[: 6 * n, 6 * n :].reshape(n, 6, n_border), 1, 2).copy(), dense[6 * n :, 6 * n :])
     return Symbolic(n, block_row, block_col, position, n_border), matrix, dense
 
 
@@ -46,7 +46,7 @@ def test_solve_and_inverse_against_dense(n, n_border):
         si, sj = scale[6 * i : 6 * i + 6], scale[6 * j : 6 * j + 6]
         got = pattern.blocks[b] / si[:, None] / sj[None, :]
         np.testing.assert_allclose(got, normed[6 * i : 6 * i + 6, 6 * j : 6 * j + 6], atol=1e-10)
-    flat = pattern.border.reshape(6 * n, n_border) / scale[: 6 * n, None] / scale[None, 6 * n :]
+    flat = np.swapaxes(pattern.border, 1, 2).reshape(6 * n, n_border) / scale[: 6 * n, None] / scale[None, 6 * n :]
     np.testing.assert_allclose(flat, normed[: 6 * n, 6 * n :], atol=1e-10)
     np.testing.assert_allclose(
         pattern.corner / np.outer(scale[6 * n :], scale[6 * n :]), normed[6 * n :, 6 * n :], atol=1e-10
@@ -74,7 +74,7 @@ def test_two_separate_blocks():
     for b, (i, j) in enumerate(zip(block_row, block_col, strict=True)):
         dense[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] = blocks[b]
         dense[6 * j : 6 * j + 6, 6 * i : 6 * i + 6] = blocks[b].T
-    factor = symbolic.factorise(BorderedMatrix(blocks, np.zeros((n, 6, 0)), np.zeros((0, 0))))
+    factor = symbolic.factorise(BorderedMatrix(blocks, np.zeros((n, 0, 6)), np.zeros((0, 0))))
     rhs = rng.normal(size=6 * n)
     np.testing.assert_allclose(dense @ factor.solve(rhs), rhs, atol=1e-10)
 

@@ -27,7 +27,7 @@ def point_cofactors(
     With the point eliminated, x_p = N⁻¹(b − N_pr·x_r), G = N⁻¹·N_pr and H = Q_rr·Gᵀ: Q_pp = N⁻¹ + G·H, and the row
     (a_r, a_p) of a ray has the cofactor a_r·Q_rr·a_rᵀ − 2·a_r·H·a_pᵀ + a_p·Q_pp·a_pᵀ.
 
-    inverse : blocks (nb, 6, 6), border (n, 6, s), corner (s, s) of the inverse on the pattern.
+    inverse : blocks (nb, 6, 6), border (n, s, 6), corner (s, s) of the inverse on the pattern.
     """
     start, image = rays[0], rays[1]
     pair_start, pair_block = pattern
@@ -70,7 +70,7 @@ def point_cofactors(
                     for b in range(E):
                         inner += blocks[i, a, b] * by_eo[q, row, b]
                     for t in range(n_columns[q]):
-                        inner += 2.0 * border[i, a, union[columns[q, t]]] * by_sh[q, row, t]
+                        inner += 2.0 * border[i, union[columns[q, t]], a] * by_sh[q, row, t]
                     for b in range(3):
                         inner -= 2.0 * h[q, a, b] * a_p[b]
                     explained += by_eo[q, row, a] * inner
@@ -116,12 +116,15 @@ def _coupled_cofactors(
                 value = 0.0
                 for c in range(E):
                     value += blocks[i, a, c] * g[q, b, c]
-                for t in range(n_union):
-                    value += border[i, a, union[t]] * g_shared[b, t]
                 h[q, a, b] = value
-            for t in range(n_union):
-                for b in range(3):
-                    h_shared[t, b] += border[i, a, union[t]] * g[q, b, a]
+        for t in range(n_union):
+            row = border[i, union[t]]
+            for b in range(3):
+                value = 0.0
+                for a in range(E):
+                    h[q, a, b] += row[a] * g_shared[b, t]
+                    value += row[a] * g[q, b, a]
+                h_shared[t, b] += value
     for q in range(n_rays):
         for other in range(q + 1, n_rays):
             block = blocks[pair_block[pair]]

@@ -40,13 +40,13 @@ def scatter_blocks(block, local_row, local_col, flipped, blocks, block_row, bloc
 @kernel
 def scatter_border(images, border, scale, border_scale, rows, low):
     """Scaled border of the front's own photographs into the last rows of `low`."""
-    n_border = border.shape[2]
+    n_border = border.shape[1]
     for k in range(len(images)):
         i = images[k]
         for c in range(B):
             target = (B * k + c) * rows + rows - n_border
             for t in range(n_border):
-                low[target + t] = border[i, c, t] * scale[i, c] * border_scale[t]
+                low[target + t] = border[i, t, c] * scale[i, c] * border_scale[t]
 
 
 @kernel
@@ -149,10 +149,10 @@ def gather_blocks(block, local_row, local_col, flipped, top, low, own, rows, blo
 @kernel
 def gather_border(images, low, rows, scale, border_scale, border):
     """The inverse's border of the front's own photographs, scaled back."""
-    n_border = border.shape[2]
+    n_border = border.shape[1]
     for k in range(len(images)):
         i = images[k]
         for c in range(B):
             source = (B * k + c) * rows + rows - n_border
             for t in range(n_border):
-                border[i, c, t] = low[source + t] * scale[i, c] * border_scale[t]
+                border[i, t, c] = low[source + t] * scale[i, c] * border_scale[t]

@@ -112,38 +112,44 @@ def linearise_point(p, rays, table, state, estimator, limit, weight, residual, w
 
 
 @kernel
-def reduce_point(p, n_rays, n_union, table, points, damping, work, lower, misclosure):
-    """Eliminate point p: `lower` = Cholesky factor L of its 3 × 3 normals, `misclosure` = L⁻¹·(right side).
+def point_normals(p, n_rays, table, points, damping, work, lower, misclosure):
+    """Cholesky factor L of the 3 × 3 normals of point p into `lower`, L⁻¹·(right side) into `misclosure`.
 
-    The couplings L⁻¹·N_pe and L⁻¹·N_ps go into `work`. Returns the cost of the coordinates observed, and False where
-    the rays do not determine the point.
+    Returns the cost of the coordinates observed, and False where the rays do not determine the point.
     """
     _, _, _, prior_xyz, prior_weight, point_free = table
-    by_eo, by_pt, by_sh, whitened, columns, n_columns, _, _, couple, couple_shared, _, _ = work
-    n = np.zeros((3, 3))
+    by_pt, whitened = work[1], work[3]
     cost = 0.0
+    n00, n10, n11, n20, n21, n22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    y0, y1, y2 = 0.0, 0.0, 0.0
+    for q in range(n_rays):
+        for row in range(2):
+            p0, p1, p2, e = by_pt[q, row, 0], by_pt[q, row, 1], by_pt[q, row, 2], whitened[q, row]
+            n00 += p0 * p0
+            n10 += p1 * p0
+            n11 += p1 * p1
+            n20 += p2 * p0
+            n21 += p2 * p1
+            n22 += p2 * p2
+            y0 += p0 * e
+            y1 += p1 * e
+            y2 += p2 * e
+    lower[0, 0], lower[1, 0], lower[1, 1], lower[2, 0], lower[2, 1], lower[2, 2] = n00, n10, n11, n20, n21, n22
+    misclosure[0], misclosure[1], misclosure[2] = y0, y1, y2
     for t in range(3):
-        misclosure[t] = 0.0
         if prior_weight[p, t] > 0.0:
             gap = prior_xyz[p, t] - points[p, t]
             cost += prior_weight[p, t] * gap * gap
-            n[t, t] += prior_weight[p, t] * point_free[p, t]
+            lower[t, t] += prior_weight[p, t] * point_free[p, t]
             misclosure[t] += prior_weight[p, t] * gap * point_free[p, t]
-    for q in range(n_rays):
-        for row in range(2):
-            for a in range(3):
-                misclosure[a] += by_pt[q, row, a] * whitened[q, row]
-                for b in range(a + 1):
-                    n[a, b] += by_pt[q, row, a] * by_pt[q, row, b]
+        if point_free[p, t] == 0.0:
+            lower[t, t] = 1.0
     ok = True
     for a in range(3):
-        if point_free[p, a] == 0.0:
-            n[a, a] = 1.0
-    for a in range(3):
-        n[a, a] *= 1.0 + damping
-        diagonal = n[a, a]
+        lower[a, a] *= 1.0 + damping
+        diagonal = lower[a, a]
         for b in range(a + 1):
-            value = n[a, b]
+            value = lower[a, b]
             for c in range(b):
                 value -= lower[a, c] * lower[b, c]
             if b < a:
@@ -157,20 +163,31 @@ def reduce_point(p, n_rays, n_union, table, points, damping, work, lower, misclo
         for c in range(a):
             misclosure[a] -= lower[a, c] * misclosure[c]
         misclosure[a] /= lower[a, a]
+    return cost, ok
+
+
+@kernel
+def reduce_point(p, n_rays, n_union, table, points, damping, work, lower, misclosure):
+    """Eliminate point p: `point_normals`, and the couplings L⁻¹·N_pe and L⁻¹·N_ps into `work`."""
+    by_eo, by_pt, by_sh, _, columns, n_columns, _, _, couple, couple_shared, _, _ = work
+    cost, ok = point_normals(p, n_rays, table, points, damping, work, lower, misclosure)
     for t in range(n_union):
         for a in range(3):
             couple_shared[a, t] = 0.0
     for q in range(n_rays):
         for a in range(3):
+            p0, p1 = by_pt[q, 0, a], by_pt[q, 1, a]
             for t in range(E):
-                couple[q, a, t] = by_pt[q, 0, a] * by_eo[q, 0, t] + by_pt[q, 1, a] * by_eo[q, 1, t]
+                couple[q, a, t] = p0 * by_eo[q, 0, t] + p1 * by_eo[q, 1, t]
             for t in range(n_columns[q]):
-                couple_shared[a, columns[q, t]] += by_pt[q, 0, a] * by_sh[q, 0, t] + by_pt[q, 1, a] * by_sh[q, 1, t]
-        for t in range(E):
-            for a in range(3):
-                for c in range(a):
+                couple_shared[a, columns[q, t]] += p0 * by_sh[q, 0, t] + p1 * by_sh[q, 1, t]
+        for a in range(3):
+            for c in range(a):
+                for t in range(E):
                     couple[q, a, t] -= lower[a, c] * couple[q, c, t]
-                couple[q, a, t] /= lower[a, a]
+            inverse = 1.0 / lower[a, a]
+            for t in range(E):
+                couple[q, a, t] *= inverse
     for t in range(n_union):
         for a in range(3):
             for c in range(a):
@@ -180,17 +197,21 @@ def reduce_point(p, n_rays, n_union, table, points, damping, work, lower, misclo
 
 
 @kernel
-def assemble(first, last, rays, pattern, table, state, damping, estimator, limit, sums, residual, weight, work):
+def assemble(
+    first, last, rays, pattern, table, state, damping, estimator, limit, offsets, sums, residual, weight, work
+):
     """Reduced normal equations of points first..last, added to `sums`.
 
-    sums : blocks (nb, 6, 6), border (n, 6, s), corner (s, s), right (n, 6), right_shared (s).
+    sums : diagonal (ni, 6, 6), pairs (no, 6, 6), border (ni, s, 6), corner (s, s), right (ni, 6), right_shared (s), of
+        the photographs and pairs this range of points touches; `offsets` are the numbers of the first of each.
 
     Returns the cost, the part of the Newton decrement that belongs to the points, and the number of a point that its
     rays do not determine (−1 when all are).
     """
     start, image = rays[0], rays[1]
     pair_start, pair_block = pattern
-    blocks, border, corner, right, right_shared = sums
+    diagonal, pairs, border, corner, right, right_shared = sums
+    first_image, first_pair = offsets
     by_eo, _, by_sh, whitened, columns, n_columns, union, _, couple, couple_shared, _, _ = work
     lower, misclosure = np.zeros((3, 3)), np.zeros(3)
     cost, decrement, undetermined = 0.0, 0.0, -1
@@ -201,56 +222,43 @@ def assemble(first, last, rays, pattern, table, state, damping, estimator, limit
         if not ok:
             undetermined = p
         cost += ray_cost + prior_cost
-        for a in range(3):
-            decrement += misclosure[a] * misclosure[a]
+        y0, y1, y2 = misclosure[0], misclosure[1], misclosure[2]
+        decrement += y0 * y0 + y1 * y1 + y2 * y2
         pair = pair_start[p]
         for q in range(n_rays):
-            i = image[start[p] + q]
+            i = image[start[p] + q] - first_image
+            own, e0, e1 = diagonal[i], by_eo[q, 0], by_eo[q, 1]
+            c0, c1, c2 = couple[q, 0], couple[q, 1], couple[q, 2]
             for a in range(E):
-                value = by_eo[q, 0, a] * whitened[q, 0] + by_eo[q, 1, a] * whitened[q, 1]
-                for c in range(3):
-                    value -= couple[q, c, a] * misclosure[c]
-                right[i, a] += value
+                right[i, a] += e0[a] * whitened[q, 0] + e1[a] * whitened[q, 1] - c0[a] * y0 - c1[a] * y1 - c2[a] * y2
                 for b in range(E):
-                    blocks[i, a, b] += (
-                        by_eo[q, 0, a] * by_eo[q, 0, b] + by_eo[q, 1, a] * by_eo[q, 1, b]
-                        - couple[q, 0, a] * couple[q, 0, b] - couple[q, 1, a] * couple[q, 1, b]
-                        - couple[q, 2, a] * couple[q, 2, b]
-                    )  # fmt: skip
-                for t in range(n_columns[q]):
-                    border[i, a, union[columns[q, t]]] += (
-                        by_eo[q, 0, a] * by_sh[q, 0, t] + by_eo[q, 1, a] * by_sh[q, 1, t]
-                    )
-                for t in range(n_union):
-                    border[i, a, union[t]] -= (
-                        couple[q, 0, a] * couple_shared[0, t] + couple[q, 1, a] * couple_shared[1, t]
-                        + couple[q, 2, a] * couple_shared[2, t]
-                    )  # fmt: skip
+                    own[a, b] += e0[a] * e0[b] + e1[a] * e1[b] - c0[a] * c0[b] - c1[a] * c1[b] - c2[a] * c2[b]
+            for t in range(n_columns[q]):
+                row, s0, s1 = border[i, union[columns[q, t]]], by_sh[q, 0, t], by_sh[q, 1, t]
+                for a in range(E):
+                    row[a] += e0[a] * s0 + e1[a] * s1
+            for t in range(n_union):
+                row = border[i, union[t]]
+                s0, s1, s2 = couple_shared[0, t], couple_shared[1, t], couple_shared[2, t]
+                for a in range(E):
+                    row[a] -= c0[a] * s0 + c1[a] * s1 + c2[a] * s2
             for other in range(q + 1, n_rays):
-                block = blocks[pair_block[pair]]
+                block = pairs[pair_block[pair] - first_pair]
                 pair += 1
+                o0, o1, o2 = couple[other, 0], couple[other, 1], couple[other, 2]
                 for a in range(E):
                     for b in range(E):
-                        block[a, b] -= (
-                            couple[q, 0, a] * couple[other, 0, b] + couple[q, 1, a] * couple[other, 1, b]
-                            + couple[q, 2, a] * couple[other, 2, b]
-                        )  # fmt: skip
+                        block[a, b] -= c0[a] * o0[b] + c1[a] * o1[b] + c2[a] * o2[b]
             for t in range(n_columns[q]):
-                column = union[columns[q, t]]
-                right_shared[column] += by_sh[q, 0, t] * whitened[q, 0] + by_sh[q, 1, t] * whitened[q, 1]
+                column, s0, s1 = union[columns[q, t]], by_sh[q, 0, t], by_sh[q, 1, t]
+                right_shared[column] += s0 * whitened[q, 0] + s1 * whitened[q, 1]
                 for c in range(n_columns[q]):
-                    corner[column, union[columns[q, c]]] += (
-                        by_sh[q, 0, t] * by_sh[q, 0, c] + by_sh[q, 1, t] * by_sh[q, 1, c]
-                    )
+                    corner[column, union[columns[q, c]]] += s0 * by_sh[q, 0, c] + s1 * by_sh[q, 1, c]
         for t in range(n_union):
-            column = union[t]
-            for a in range(3):
-                right_shared[column] -= couple_shared[a, t] * misclosure[a]
+            row, s0, s1, s2 = corner[union[t]], couple_shared[0, t], couple_shared[1, t], couple_shared[2, t]
+            right_shared[union[t]] -= s0 * y0 + s1 * y1 + s2 * y2
             for c in range(n_union):
-                corner[column, union[c]] -= (
-                    couple_shared[0, t] * couple_shared[0, c] + couple_shared[1, t] * couple_shared[1, c]
-                    + couple_shared[2, t] * couple_shared[2, c]
-                )  # fmt: skip
+                row[union[c]] -= s0 * couple_shared[0, c] + s1 * couple_shared[1, c] + s2 * couple_shared[2, c]
     return cost, decrement, undetermined
 
 
@@ -258,22 +266,27 @@ def assemble(first, last, rays, pattern, table, state, damping, estimator, limit
 def back_substitute(
     first, last, rays, table, state, damping, estimator, limit, step, step_shared, step_points, residual, weight, work
 ):
-    """Steps of the points first..last (P, 3) from those of the photographs (n, 6) and shared parameters (s)."""
+    """Steps of the points first..last (P, 3) from those of the photographs (n, 6) and shared parameters (s).
+
+    Each ray's misclosure is shortened by what the photograph and the shared parameters explain; what is left belongs to
+    the point.
+    """
     start, image = rays[0], rays[1]
-    union, couple, couple_shared = work[6], work[8], work[9]
+    by_eo, by_sh, whitened, columns, n_columns, union = work[0], work[2], work[3], work[4], work[5], work[6]
     lower, d = np.zeros((3, 3)), np.zeros(3)
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        _, n_union = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
-        reduce_point(p, n_rays, n_union, table, state[2], damping, work, lower, d)
+        linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
         for q in range(n_rays):
             i = image[start[p] + q]
-            for a in range(3):
+            for row in range(2):
+                explained = 0.0
                 for t in range(E):
-                    d[a] -= couple[q, a, t] * step[i, t]
-        for t in range(n_union):
-            for a in range(3):
-                d[a] -= couple_shared[a, t] * step_shared[union[t]]
+                    explained += by_eo[q, row, t] * step[i, t]
+                for t in range(n_columns[q]):
+                    explained += by_sh[q, row, t] * step_shared[union[columns[q, t]]]
+                whitened[q, row] -= explained
+        point_normals(p, n_rays, table, state[2], damping, work, lower, d)
         for a in range(2, -1, -1):
             for c in range(a + 1, 3):
                 d[a] -= lower[c, a] * d[c]

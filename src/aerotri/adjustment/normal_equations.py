@@ -37,6 +37,43 @@ class NormalEquations:
     undetermined: int
 
 
+class _ChunkSums:
+    """Sums of one chunk of points, over the photographs and pairs that it touches and no others."""
+
+    def __init__(self, unknowns: Unknowns, first: int, last: int, n_shared: int):
+        image = unknowns.rays.image[unknowns.rays.start[first] : unknowns.rays.start[last]]
+        pair = unknowns.pair_block[unknowns.pair_start[first] : unknowns.pair_start[last]]
+        self._images = slice(int(image.min()), int(image.max()) + 1)
+        n = len(unknowns.images)
+        self._pairs = slice(int(pair.min()), int(pair.max()) + 1) if len(pair) else slice(n, n)
+        n_images, n_pairs = self._images.stop - self._images.start, self._pairs.stop - self._pairs.start
+        self.offsets = (self._images.start, self._pairs.start)
+        self._arrays = (
+            np.empty((n_images, 6, 6)),
+            np.empty((n_pairs, 6, 6)),
+            np.empty((n_images, n_shared, 6)),
+            np.empty((n_shared, n_shared)),
+            np.empty((n_images, 6)),
+            np.empty(n_shared),
+        )
+
+    def cleared(self) -> tuple[np.ndarray, ...]:
+        """The arrays, set to zero."""
+        for array in self._arrays:
+            array.fill(0.0)
+        return self._arrays
+
+    def add_to(self, blocks, border, corner, right, right_shared) -> None:
+        """Add to the sums over all chunks."""
+        diagonal, pairs, own_border, own_corner, own_right, own_right_shared = self._arrays
+        blocks[self._images] += diagonal
+        blocks[self._pairs] += pairs
+        border[self._images] += own_border
+        corner += own_corner
+        right[self._images] += own_right
+        right_shared += own_right_shared
+
+
 class NormalSystem:
     """Assembles and back-substitutes for one set of unknowns; owns the buffers and the symbolic factor.
 
@@ -54,16 +91,7 @@ class NormalSystem:
         self._max_rays = int(counts.max(initial=1))
         n, s = len(unknowns.images), len(unknowns.shared)
         self.symbolic = Symbolic(n, unknowns.block_row, unknowns.block_col, position, s)
-        self._sums = [
-            (
-                np.empty((len(unknowns.block_row), 6, 6)),
-                np.empty((n, 6, s)),
-                np.empty((s, s)),
-                np.empty((n, 6)),
-                np.empty(s),
-            )
-            for _ in self._bounds
-        ]
+        self._sums = [_ChunkSums(unknowns, first, last, s) for first, last in self._bounds]
         sigma = np.array(unknowns.shared.sigma).reshape(-1)
         self._prior_weight = np.where(np.isfinite(sigma), 1.0 / sigma**2, 0.0)
         self._prior_value = np.array(unknowns.shared.start).reshape(-1)
@@ -107,18 +135,18 @@ class NormalSystem:
 
         def chunk(k: int):
             sums = self._sums[k]
-            for array in sums:
-                array.fill(0.0)
             first, last = self._bounds[k]
             return _kernels.assemble(
-                first, last, rays, pattern, table, kernel_state, damping, estimator.code, estimator.limit, sums,
-                residual, weight, self._work(),
+                first, last, rays, pattern, table, kernel_state, damping, estimator.code, estimator.limit,
+                sums.offsets, sums.cleared(), residual, weight, self._work(),
             )  # fmt: skip
 
         outcomes = run_chunks(chunk, len(self._bounds))
-        blocks, border, corner, right, right_shared = (
-            sum((sums[part] for sums in self._sums[1:]), self._sums[0][part].copy()) for part in range(5)
-        )
+        n, s = len(u.images), len(u.shared)
+        blocks, border, right = np.zeros((len(u.block_row), 6, 6)), np.zeros((n, s, 6)), np.zeros((n, 6))
+        corner, right_shared = np.zeros((s, s)), np.zeros(s)
+        for sums in self._sums:
+            sums.add_to(blocks, border, corner, right, right_shared)
         cost = sum(o[0] for o in outcomes)
         cost += self._add_centres(state, blocks, border, corner, right, right_shared)
         cost += self._add_priors(state, corner, right_shared)
@@ -154,7 +182,7 @@ class NormalSystem:
         gap = np.where(observed.inv_sigma > 0.0, gap, 0.0)
         np.add.at(blocks, observed.image, np.einsum("gka,gkb->gab", by_image, by_image))
         np.add.at(right, observed.image, np.einsum("gka,gk->ga", by_image, gap))
-        np.add.at(border, observed.image, np.einsum("gka,gks->gas", by_image, by_shared))
+        np.add.at(border, observed.image, np.einsum("gka,gks->gsa", by_image, by_shared))
         corner += np.einsum("gks,gkt->st", by_shared, by_shared)
         right_shared += np.einsum("gks,gk->s", by_shared, gap)
         return float(np.sum(gap**2))

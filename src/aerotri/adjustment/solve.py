@@ -186,4 +186,3 @@ def _rescale(system, state, equations, estimator, redundancy):
     if estimator.is_robust and abs(fresh.limit / estimator.limit - 1.0) <= SCALE_TOLERANCE:
         return estimator, equations
     return fresh, system.assemble(state, 0.0, fresh)
-

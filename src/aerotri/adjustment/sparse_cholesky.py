@@ -35,7 +35,7 @@ class BorderedMatrix:
     Parameters
     ----------
     blocks : (nb, 6, 6) blocks of S listed in the pattern of `Symbolic` (row photograph ≤ column photograph).
-    border : (n, 6, s); corner : (s, s).
+    border : (n, s, 6); corner : (s, s).
     """
 
     blocks: np.ndarray
@@ -262,7 +262,7 @@ def _eliminate(top: np.ndarray, low: np.ndarray, rest: np.ndarray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class InverseOnPattern:
-    """The inverse where the matrix has blocks: blocks (nb, 6, 6), border (n, 6, s), corner (s, s)."""
+    """The inverse where the matrix has blocks: blocks (nb, 6, 6), border (n, s, 6), corner (s, s)."""
 
     blocks: np.ndarray
     border: np.ndarray
@@ -323,7 +323,7 @@ class Factor:
         """The inverse on the pattern of the matrix, by the Takahashi recursion from the root down."""
         s = self._symbolic
         out = InverseOnPattern(
-            np.zeros((len(s.block_row), B, B)), np.zeros((s.n, B, s.n_border)), np.zeros((s.n_border, s.n_border))
+            np.zeros((len(s.block_row), B, B)), np.zeros((s.n, s.n_border, B)), np.zeros((s.n_border, s.n_border))
         )
         if s.n_border:
             out.corner[:] = _symmetric_from_lower(dpotri(s._corner, lower=1)[0])

@@ -7,9 +7,9 @@ nadir direction comes from the rotation matrix. ``measured = ideal + displacemen
 Refraction [D] In a plane layered atmosphere n·sin α is constant along the ray, so the angle at the camera is too large
 by dα = K·tan α, K = 1/(H − h)·∫(n(z) − n(H)) dz from the ground h to the camera H. With n − 1 proportional to the
 density and the atmosphere at rest, ∫ρ dz = (p(h) − p(H))/g, and with the pressure of the standard atmosphere K is
-closed. This is the form of Saastamoinen's formula for aerial photographs, and agrees with the K of the Manual of
-Photogrammetry, 2410·H/(H² − 6H + 250) − 2410·h/(h² − 6h + 250)·h/H [L], within its own few per cent. On a vertical
-photograph dr = K·(r + r³/c²) [L].
+closed; its numbers are those of Saastamoinen's formula [L]. On a vertical photograph dr = K·(r + r³/c²) [L]. The K of
+the Manual of Photogrammetry, 2410e-6·H/(H² − 6H + 250) over sea level, H in km, agrees within 6 % from 3 to 9 km; at
+1 km it is a fifth smaller than traced rays are.
 
 Earth curvature [D] of a frame whose X, Y are distances along the ground and whose Z are heights, as of a block without
 a CRS: the ray is met with a sphere. To first order dr = −(H − h)·r³/(2·R·c²) [L].

@@ -48,7 +48,7 @@ def cofactors(system: NormalSystem, state: State, factor: Factor, estimator: Est
 
 
 def _without_held(unknowns: Unknowns, inverse: InverseOnPattern) -> tuple[np.ndarray, np.ndarray]:
-    images, border = inverse.blocks[: len(unknowns.images)].copy(), inverse.border.copy()
+    images, border = inverse.blocks[: len(unknowns.images)].copy(), np.swapaxes(inverse.border, 1, 2).copy()
     held = ~unknowns.eo_free
     images[held] = 0.0
     np.swapaxes(images, 1, 2)[held] = 0.0

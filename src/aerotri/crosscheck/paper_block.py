@@ -1,0 +1,313 @@
+"""A block as the cross-check's own adjustment sees it: one vector of unknowns, its observations, what is held.
+
+The vector x holds six values a photograph (X0, Y0, Z0, ω, φ, κ), then the shared entries owner by owner, then three
+values a point. Everything is taken from the `Block` and from which rays took part; the adjustment's own set-up is not
+looked at, so that a mistake there shows as a difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.crosscheck import paper_patterns as patterns
+from aerotri.crosscheck.paper_rays import ELEMENTS, INTERIOR
+from aerotri.observations import Block, Camera, Prior
+
+Owner = tuple[str, str]
+"""What a shared entry belongs to: ('camera', name), ('group', name) or ('gnss', strip)."""
+
+LINEAR: Mapping[str, tuple[tuple[str, ...], str | None, Callable[[Camera, np.ndarray, np.ndarray], np.ndarray]]] = {
+    "bluh": (patterns.BLUH_ITEMS, None, lambda camera, x, y: patterns.bluh(x, y, camera.r_max_mm)),
+    "ultracam_d": (
+        patterns.ULTRACAM_ITEMS,
+        "ultracam_d",
+        lambda camera, x, y: patterns.ultracam_d(
+            x, y, (2.0 * camera.half_format_mm[0], 2.0 * camera.half_format_mm[1]), camera.flight_axis or "+y"
+        ),
+    ),
+}
+"""Items, camera model and patterns of the families that are linear in their parameters."""
+
+
+class UnknownToPaperError(Exception):
+    """The block has observations or parameters for which no independent formula stands here."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shared:
+    """Shared entries in the order of x; those of one owner stand together.
+
+    Parameters
+    ----------
+    names, owners : of the s entries. start : (s,). sigma : (s,) of observed ones, ∞ elsewhere. free : (s,) bool.
+    """
+
+    names: tuple[str, ...]
+    owners: tuple[Owner, ...]
+    start: np.ndarray
+    sigma: np.ndarray
+    free: np.ndarray
+
+    def place(self) -> dict[tuple[str, Owner], int]:
+        return {key: i for i, key in enumerate(zip(self.names, self.owners, strict=True))}
+
+    def spans(self) -> dict[Owner, slice]:
+        """The entries of every owner."""
+        first: dict[Owner, int] = {}
+        for i, owner in enumerate(self.owners):
+            first.setdefault(owner, i)
+        ends = [*list(first.values())[1:], len(self.owners)]
+        return {owner: slice(begin, end) for (owner, begin), end in zip(first.items(), ends, strict=True)}
+
+
+@dataclass(frozen=True, eq=False)
+class PaperRays:
+    """The m rays, sorted by point.
+
+    Parameters
+    ----------
+    image, point, setup : (m,) rows; xy, inv_sigma : (m, 2).
+    elements : (S, 15) shared entry of every element of `paper_rays.ELEMENTS`, for each setup (camera and group).
+    linear : (S, q) shared entries of the linear patterns, 0 where a setup has fewer; patterns : (m, 2, q) mm, 0 there.
+    """
+
+    image: np.ndarray
+    point: np.ndarray
+    setup: np.ndarray
+    xy: np.ndarray
+    inv_sigma: np.ndarray
+    elements: np.ndarray
+    linear: np.ndarray
+    patterns: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Antennas:
+    """Observed antenna positions, g of them: photograph, local position (g, 3), 1/σ (0 where not observed), shared
+    entries of shift and drift (g, 3; −1 where there is none), seconds from the strip's mean (g,), lever arm (3,) m."""
+
+    image: np.ndarray
+    xyz: np.ndarray
+    inv_sigma: np.ndarray
+    shift: np.ndarray
+    drift: np.ndarray
+    since: np.ndarray
+    lever_arm: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class PaperBlock:
+    """Observations and unknowns of the independent adjustment.
+
+    Parameters
+    ----------
+    images, points : rows of the block that take part. origin : (3,) m. order : of the angles.
+    point_value, point_inv_sigma : (P, 3) observed coordinates, local; 1/σ is 0 where not observed.
+    """
+
+    images: np.ndarray
+    points: np.ndarray
+    origin: np.ndarray
+    order: str
+    shared: Shared
+    rays: PaperRays
+    antennas: Antennas | None
+    point_value: np.ndarray
+    point_inv_sigma: np.ndarray
+
+    @property
+    def observations(self) -> int:
+        count = 2 * len(self.rays.image) + int((self.point_inv_sigma > 0.0).sum())
+        count += int((np.isfinite(self.shared.sigma) & self.shared.free).sum())
+        return count + (0 if self.antennas is None else int((self.antennas.inv_sigma > 0.0).sum()))
+
+
+def paper_block(block: Block, used: np.ndarray, weight: np.ndarray, origin: np.ndarray) -> PaperBlock:
+    """The block for an independent adjustment.
+
+    Parameters
+    ----------
+    used : (m,) bool, rays that take part. weight : (m,) robust factors, kept as they are. origin : (3,) m, local.
+
+    Raises
+    ------
+    UnknownToPaperError
+    """
+    _refuse_unknown(block)
+    rows = np.flatnonzero(used)
+    rows = rows[np.lexsort((block.image_points.image[rows], block.image_points.point[rows]))]
+    images, image = np.unique(block.image_points.image[rows], return_inverse=True)
+    points, point = np.unique(block.image_points.point[rows], return_inverse=True)
+    groups = _groups(block)[images]
+    entries = _Entries()
+    setups = list(dict.fromkeys(zip(block.images.camera[images].tolist(), groups.tolist(), strict=True)))
+    elements = np.array([_element_entries(block, *setup, entries) for setup in setups])
+    linear = [_linear_entries(block, setup[1], groups, block.images.camera[images], entries) for setup in setups]
+    antennas = _antennas(block, images, origin, entries)
+    shared, place = entries.sorted()
+    number = {setup: k for k, setup in enumerate(setups)}
+    of_image = [number[key] for key in zip(block.images.camera[images].tolist(), groups.tolist(), strict=True)]
+    setup = np.array(of_image)[image]
+    xy = block.image_points.xy[rows]
+    inv_sigma = np.sqrt(weight[rows])[:, None] / block.image_points.sigma[rows]
+    lines, values = _patterns(block, setups, linear, setup, xy)
+    return PaperBlock(
+        images, points, origin, block.rotation, shared,
+        PaperRays(image, point, setup, xy, inv_sigma, place[elements], place[lines], values),
+        None if antennas is None else _replaced(antennas, place),
+        *_control(block, points, origin),
+    )  # fmt: skip
+
+
+def _refuse_unknown(block: Block) -> None:
+    settings = block.settings
+    families = {family for family, _ in settings.adjustment.additional_parameters}
+    unknown = sorted(families - set(LINEAR) - {"brown", "lens"})
+    if unknown:
+        raise UnknownToPaperError(f"no independent formula stands here for the parameters '{unknown[0]}'")
+    if settings.refraction != "off" or settings.earth_curvature != "off":
+        raise UnknownToPaperError("refraction and earth curvature have no independent formula here")
+
+
+def _groups(block: Block) -> np.ndarray:
+    """(n,) str, the parameter group of every photograph."""
+    how = block.settings.adjustment.parameter_groups
+    if how == "camera":
+        return np.array([block.cameras[k].name for k in block.images.camera], dtype=object)
+    if how == "block":
+        return np.array(["block"] * len(block.images), dtype=object)
+    return np.asarray(block.images.strip if how == "strip" else block.images.columns[how], dtype=object)
+
+
+class _Entries:
+    """Shared entries while they are listed; numbered as they come, put in order of their owners at the end."""
+
+    def __init__(self) -> None:
+        self._rows: dict[tuple[str, Owner], tuple[float, float, bool]] = {}
+
+    def add(self, name: str, owner: Owner, prior: Prior) -> int:
+        """The provisional number of an entry; the first to name it says what is known of it."""
+        sigma = np.inf if prior.sigma is None else prior.sigma
+        self._rows.setdefault((name, owner), (prior.value, sigma, not prior.fixed))
+        return list(self._rows).index((name, owner))
+
+    def sorted(self) -> tuple[Shared, np.ndarray]:
+        """The entries, and the final place of every provisional number."""
+        keys = list(self._rows)
+        owners = list(dict.fromkeys(owner for _, owner in keys))
+        order = sorted(range(len(keys)), key=lambda i: owners.index(keys[i][1]))
+        place = np.empty(len(keys), np.int64)
+        place[order] = np.arange(len(keys))
+        start, sigma, free = (np.array([self._rows[keys[i]][k] for i in order]) for k in range(3))
+        names, of = tuple(keys[i][0] for i in order), tuple(keys[i][1] for i in order)
+        return Shared(names, of, start, sigma, free.astype(bool)), place
+
+
+def _element_entries(block: Block, camera_row: int, group: str, entries: _Entries) -> list[int]:
+    camera = block.cameras[camera_row]
+    chosen = dict(block.settings.adjustment.additional_parameters)
+    numbers = []
+    for element in ELEMENTS:
+        if element in INTERIOR:
+            numbers.append(entries.add(element, ("camera", camera.name), camera.interior[element]))
+            continue
+        family, item = element.split(".")
+        known = (camera.brown if family == "brown" else camera.lens).get(item)
+        estimated = item in chosen.get(family, ()) and not (known is not None and known.fixed)
+        if estimated:
+            numbers.append(entries.add(element, ("group", group), known or Prior()))
+        else:
+            value = 0.0 if known is None else known.value
+            numbers.append(entries.add(element, ("camera", camera.name), Prior(value, fixed=True)))
+    return numbers
+
+
+def _linear_entries(block: Block, group: str, groups: np.ndarray, cameras: np.ndarray, entries: _Entries):
+    """Entries of the linear families of a group: (family, item, number), families with a fitting camera only."""
+    models = {block.cameras[k].model for k in cameras[groups == group].tolist()}
+    found = []
+    for family, items in block.settings.adjustment.additional_parameters:
+        if family in LINEAR and LINEAR[family][1] in (None, *models):
+            found += [
+                (family, item, entries.add(f"{family}.{item}", ("group", group), Prior()))
+                for item in LINEAR[family][0]
+                if item in items
+            ]
+    return found
+
+
+def _patterns(block: Block, setups: list, linear: list, setup: np.ndarray, xy: np.ndarray):
+    """Entries (S, q) and patterns (m, 2, q) of the linear families at the rays."""
+    width = max((len(found) for found in linear), default=0)
+    entries, values = np.zeros((len(setups), width), np.int64), np.zeros((len(xy), 2, width))
+    for k, (camera_row, _) in enumerate(setups):
+        camera, own = block.cameras[camera_row], np.flatnonzero(setup == k)
+        entries[k, : len(linear[k])] = [number for _, _, number in linear[k]]
+        for family in dict.fromkeys(family for family, _, _ in linear[k]):
+            known, model, formula = LINEAR[family]
+            if model not in (None, camera.model):
+                continue
+            all_items = formula(camera, xy[own, 0], xy[own, 1])
+            columns = [c for c, (f, _, _) in enumerate(linear[k]) if f == family]
+            values[own[:, None, None], np.arange(2)[:, None], columns] = all_items[
+                :, :, [known.index(linear[k][c][1]) for c in columns]
+            ]
+    return entries, values
+
+
+def _control(block: Block, points: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    value, inv_sigma = np.zeros((len(points), 3)), np.zeros((len(points), 3))
+    if block.settings.adjustment.datum == "control":
+        row = {int(p): k for k, p in enumerate(points)}
+        control = block.control
+        for k in range(len(control)):
+            at = row.get(int(control.point[k]))
+            if at is not None and not control.is_check[k]:
+                known = np.isfinite(control.xyz[k])
+                value[at, known] = (control.xyz[k] - origin)[known]
+                inv_sigma[at, known] = 1.0 / control.sigma[k, known]
+    return value, inv_sigma
+
+
+def _antennas(block: Block, images: np.ndarray, origin: np.ndarray, entries: _Entries) -> Antennas | None:
+    observed, settings = block.gnss_ins, block.settings.gnss
+    if observed is None:
+        return None
+    row = {int(i): k for k, i in enumerate(images)}
+    used = [g for g in range(len(observed)) if int(observed.image[g]) in row and np.isfinite(observed.xyz[g]).any()]
+    if not used:
+        return None
+    strips = [str(block.images.strip[i]) for i in observed.image[used]]
+    known = np.isfinite(observed.xyz[used])
+    columns = []
+    for what, per in (("shift", settings.shift), ("drift", settings.drift)):
+        column = np.full((len(used), 3), -1)
+        for g, strip in enumerate(strips if per == "strip" else ["block"] * len(used)):
+            for axis in np.flatnonzero(known[g]) if per != "off" else ():
+                column[g, axis] = entries.add(f"gnss.{what}_{'XYZ'[axis]}", ("gnss", strip), Prior())
+        # a coordinate that is not observed has no effect, whatever stands in its column
+        columns.append(column)
+    since = np.nan_to_num(observed.time[used])
+    for strip in set(strips):
+        own = np.array([s == strip for s in strips])
+        since[own] -= since[own].mean()
+    return Antennas(
+        image=np.array([row[int(i)] for i in observed.image[used]]),
+        xyz=np.where(known, observed.xyz[used] - origin, 0.0),
+        inv_sigma=np.where(known, 1.0 / np.where(known, observed.sigma[used], 1.0), 0.0),
+        shift=columns[0],
+        drift=columns[1],
+        since=since,
+        lever_arm=np.array(settings.lever_arm_m, dtype=float),
+    )
+
+
+def _replaced(antennas: Antennas, place: np.ndarray) -> Antennas:
+    """The antennas with the final places of their entries."""
+    final = [np.where(column >= 0, place[np.maximum(column, 0)], -1) for column in (antennas.shift, antennas.drift)]
+    return Antennas(
+        antennas.image, antennas.xyz, antennas.inv_sigma, *final, antennas.since, antennas.lever_arm
+    )
