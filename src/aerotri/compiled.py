@@ -26,6 +26,11 @@ def kernel(function: Callable) -> Any:
     return compiled
 
 
+def inlined(function: Callable) -> Any:
+    """A small kernel put into its callers."""
+    return njit(nogil=True, error_model="numpy", fastmath={"contract"}, inline="always")(function)
+
+
 def compilation_notice() -> str:
     """A sentence for the user when kernels have to be compiled in this run; '' when they come from the cache."""
     if not _state["cached"]:

@@ -16,7 +16,6 @@ from aerotri.formats.block_folder import read_block, write_block
 from aerotri.observations import Block, Prior
 
 
-
 def test_small_block_is_read(small_block):
     block = read_block(small_block())
     assert block.name == "small"
@@ -102,7 +101,7 @@ def test_angle_units(small_block, unit, right_angle):
 
 
 def test_names_stay_text(small_block):
-    points = "image,point,x,y\n007,NA,1,1\n007,1e5,1,2\n007,<b>&amp;</b>,1,3\n007,\"q\"\"o,te\",1,4\n 8 ,null,1,5\n"
+    points = 'image,point,x,y\n007,NA,1,1\n007,1e5,1,2\n007,<b>&amp;</b>,1,3\n007,"q""o,te",1,4\n 8 ,null,1,5\n'
     images = "image,camera\n007,cam\n8,cam\n"
     block = read_block(small_block({"images.csv": images, "image_points.csv": points, "gnss_ins.csv": None}))
     assert block.images.names.tolist() == ["007", "8"]
@@ -112,7 +111,7 @@ def test_names_stay_text(small_block):
 
 def test_comments_blank_lines_bom_carriage_returns_and_own_columns(small_block):
     points = (
-        b"\xef\xbb\xbf# measured by hand, \"open quote\r\n\r\nimage, point ,x,y,x_note\r\na,p1,10.5,-3.25,\r\n"
+        b'\xef\xbb\xbf# measured by hand, "open quote\r\n\r\nimage, point ,x,y,x_note\r\na,p1,10.5,-3.25,\r\n'
         b"  # ,,,,,\r\na,p2, 1 ,+2,7\r\n#\xff\r\nb,p1,-10.5,3.25,\r\nb,p2,-3,-4,"
     )
     assert_same_block(read_block(small_block({"image_points.csv": points})), read_block(small_block()))
@@ -133,7 +132,9 @@ def test_sigma_that_stands_for_all_is_the_median_where_the_settings_give_none(sm
 
 
 def test_empty_tables_of_what_is_not_built_do_no_harm(small_block):
-    folder = small_block({"constraints.csv": "kind,points,value,sigma\n", "edits.csv": "", "fiducials.csv": "# later\n"})
+    folder = small_block(
+        {"constraints.csv": "kind,points,value,sigma\n", "edits.csv": "", "fiducials.csv": "# later\n"}
+    )
     read_block(folder)
 
 
@@ -143,7 +144,7 @@ def test_round_trip(small_block, tmp_path, tables):
         'additional_parameters = ["bluh:1-3+12", "brown:K1"]\nparameter_groups = "day"\ndatum = "inner"\n'
         'datum_points = ["p1", "p9"]\nmax_iterations = 7\n'
         "[camera.cam.brown]\nK1 = { value = 1.5e-9, sigma = 1e-10 }\n[camera.cam.interior]\nx0_mm = { value = 0.02 }\n"
-        "[gnss]\nshift = \"block\"\nlever_arm_m = [0.1, 0.2, 0.3]\nlever_arm_sigma_m = [0.1, 0.1, 0.1]\n"
+        '[gnss]\nshift = "block"\nlever_arm_m = [0.1, 0.2, 0.3]\nlever_arm_sigma_m = [0.1, 0.1, 0.1]\n'
         '[ins]\nboresight = "off"\n[corrections]\nrefraction = "standard"\n'
     )
     block = read_block(small_block({"block.toml": text}))
@@ -154,13 +155,13 @@ def test_round_trip(small_block, tmp_path, tables):
 
 def test_odd_names_survive_writing(small_block, tmp_path):
     block = read_block(small_block({"gnss_ins.csv": None, "control.csv": None}))
-    names = np.array(["#7,\"x\"", "é – <b>"])
+    names = np.array(['#7,"x"', "é – <b>"])
     odd = replace(
         block,
         name='quotes " and \\ back\u007fslash\n',
         images=replace(block.images, names=names, columns={'d,"ay': np.array(["", "#"])}),
         points=np.array(["'", "  inner  blanks".strip() + "\u00a0"]),
-        cameras=(replace(block.cameras[0], name="Ω.[cam] \"1\""),),
+        cameras=(replace(block.cameras[0], name='Ω.[cam] "1"'),),
     )
     for tables in ("csv", "parquet"):
         write_block(odd, tmp_path / "odd", tables=tables)

@@ -32,9 +32,7 @@ letters = st.characters(exclude_categories=("Cc", "Cs"))
 names = st.text(letters, min_size=1, max_size=12).filter(lambda name: name == name.strip(" \t\n\r\v\f"))
 lengths = st.floats(-1e7, 1e7, allow_nan=False)
 positive = st.floats(1e-6, 1e6)
-priors = st.one_of(
-    st.builds(Prior, lengths, st.none() | positive), st.builds(lambda v: Prior(v, fixed=True), lengths)
-)
+priors = st.one_of(st.builds(Prior, lengths, st.none() | positive), st.builds(lambda v: Prior(v, fixed=True), lengths))
 
 
 def some(elements, **options):
@@ -166,7 +164,9 @@ def damage(draw) -> dict[str, bytes]:
     for _ in range(draw(st.integers(1, 4))):
         at = draw(st.integers(0, max(len(data) - 1, 0)))
         kind = draw(st.sampled_from(["cut", "change", "insert", "remove"]))
-        some_bytes = draw(st.sampled_from([b",", b'"', b"\n", b"\r", b"#", b"[", b"=", b"\xff", b"-", b"9", b"e", b"\x00"]))
+        some_bytes = draw(
+            st.sampled_from([b",", b'"', b"\n", b"\r", b"#", b"[", b"=", b"\xff", b"-", b"9", b"e", b"\x00"])
+        )
         if kind == "cut":
             del data[at:]
         elif kind == "remove":

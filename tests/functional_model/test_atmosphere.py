@@ -60,11 +60,11 @@ def test_constant_against_saastamoinen(flying_km, ground_km):
     assert refraction_constant(1e3 * flying_km, 1e3 * ground_km) == pytest.approx(1e-6 * published, rel=4e-3)
 
 
-@pytest.mark.parametrize("flying_km", [3.0, 6.0, 9.0])
+@pytest.mark.parametrize("flying_km", [6.0, 9.0, 12.0])
 def test_constant_against_the_manual_of_photogrammetry(flying_km):
-    """K = 2410·H/(H² − 6H + 250), of the ARDC atmosphere over ground at sea level: within 6 %."""
+    """K = 2410·H/(H² − 6H + 250), of the ARDC atmosphere over ground at sea level: within 5 %."""
     manual = 2410e-6 * flying_km / (flying_km**2 - 6.0 * flying_km + 250.0)
-    assert refraction_constant(1e3 * flying_km, 0.0) == pytest.approx(manual, rel=0.06)
+    assert refraction_constant(1e3 * flying_km, 0.0) == pytest.approx(manual, rel=0.05)
 
 
 def test_standard_atmosphere_at_tabulated_heights():
@@ -125,7 +125,7 @@ def test_earth_curvature_of_a_tilted_photograph():
 
 
 def small_adjusted(**settings):
-    block = make_adjusted_block(strips=2, per_strip=3, n_points=60).block
+    block = make_adjusted_block(strips=2, per_strip=3, n_points=60, parameters="none").block
     return replace(block, settings=replace(block.settings, **settings))
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.compiled import kernel
+from aerotri.compiled import inlined, kernel
 from aerotri.functional_model._kernels import linearise_ray, predict_ray
 
 E = 6
@@ -196,6 +196,60 @@ def reduce_point(p, n_rays, n_union, table, points, damping, work, lower, misclo
     return cost, ok
 
 
+@inlined
+def add_rank_two(block, e):
+    """block += eᵀ·e, e (2, 6). Written out: the compiler cannot know that the arrays do not overlap."""
+    x0, x1, x2, x3, x4, x5 = e[0, 0], e[0, 1], e[0, 2], e[0, 3], e[0, 4], e[0, 5]
+    y0, y1, y2, y3, y4, y5 = e[1, 0], e[1, 1], e[1, 2], e[1, 3], e[1, 4], e[1, 5]
+    for a in range(E):
+        x, y = e[0, a], e[1, a]
+        row = block[a]
+        v0, v1, v2 = row[0] + x * x0 + y * y0, row[1] + x * x1 + y * y1, row[2] + x * x2 + y * y2
+        v3, v4, v5 = row[3] + x * x3 + y * y3, row[4] + x * x4 + y * y4, row[5] + x * x5 + y * y5
+        row[0], row[1], row[2], row[3], row[4], row[5] = v0, v1, v2, v3, v4, v5
+
+
+@inlined
+def subtract_rank_three(block, c, o):
+    """block −= cᵀ·o, c and o (3, 6); see `add_rank_two`."""
+    x0, x1, x2, x3, x4, x5 = o[0, 0], o[0, 1], o[0, 2], o[0, 3], o[0, 4], o[0, 5]
+    y0, y1, y2, y3, y4, y5 = o[1, 0], o[1, 1], o[1, 2], o[1, 3], o[1, 4], o[1, 5]
+    z0, z1, z2, z3, z4, z5 = o[2, 0], o[2, 1], o[2, 2], o[2, 3], o[2, 4], o[2, 5]
+    for a in range(E):
+        x, y, z = c[0, a], c[1, a], c[2, a]
+        row = block[a]
+        v0, v1 = row[0] - x * x0 - y * y0 - z * z0, row[1] - x * x1 - y * y1 - z * z1
+        v2, v3 = row[2] - x * x2 - y * y2 - z * z2, row[3] - x * x3 - y * y3 - z * z3
+        v4, v5 = row[4] - x * x4 - y * y4 - z * z4, row[5] - x * x5 - y * y5 - z * z5
+        row[0], row[1], row[2], row[3], row[4], row[5] = v0, v1, v2, v3, v4, v5
+
+
+@inlined
+def add_own_border(rows, union, columns, n_columns, e, by_shared):
+    """rows[column] += eᵀ·(the ray's column) for the columns that act at the ray; rows (s, 6), e (2, 6)."""
+    x0, x1, x2, x3, x4, x5 = e[0, 0], e[0, 1], e[0, 2], e[0, 3], e[0, 4], e[0, 5]
+    y0, y1, y2, y3, y4, y5 = e[1, 0], e[1, 1], e[1, 2], e[1, 3], e[1, 4], e[1, 5]
+    for t in range(n_columns):
+        row, x, y = rows[union[columns[t]]], by_shared[0, t], by_shared[1, t]
+        v0, v1, v2 = row[0] + x * x0 + y * y0, row[1] + x * x1 + y * y1, row[2] + x * x2 + y * y2
+        v3, v4, v5 = row[3] + x * x3 + y * y3, row[4] + x * x4 + y * y4, row[5] + x * x5 + y * y5
+        row[0], row[1], row[2], row[3], row[4], row[5] = v0, v1, v2, v3, v4, v5
+
+
+@inlined
+def subtract_border(rows, union, n_union, c, couple_shared):
+    """rows[column] −= cᵀ·(coupling of the column) for all columns of the point; rows (s, 6), c (3, 6)."""
+    x0, x1, x2, x3, x4, x5 = c[0, 0], c[0, 1], c[0, 2], c[0, 3], c[0, 4], c[0, 5]
+    y0, y1, y2, y3, y4, y5 = c[1, 0], c[1, 1], c[1, 2], c[1, 3], c[1, 4], c[1, 5]
+    z0, z1, z2, z3, z4, z5 = c[2, 0], c[2, 1], c[2, 2], c[2, 3], c[2, 4], c[2, 5]
+    for t in range(n_union):
+        row, x, y, z = rows[union[t]], couple_shared[0, t], couple_shared[1, t], couple_shared[2, t]
+        v0, v1 = row[0] - x * x0 - y * y0 - z * z0, row[1] - x * x1 - y * y1 - z * z1
+        v2, v3 = row[2] - x * x2 - y * y2 - z * z2, row[3] - x * x3 - y * y3 - z * z3
+        v4, v5 = row[4] - x * x4 - y * y4 - z * z4, row[5] - x * x5 - y * y5 - z * z5
+        row[0], row[1], row[2], row[3], row[4], row[5] = v0, v1, v2, v3, v4, v5
+
+
 @kernel
 def assemble(
     first, last, rays, pattern, table, state, damping, estimator, limit, offsets, sums, residual, weight, work
@@ -203,7 +257,8 @@ def assemble(
     """Reduced normal equations of points first..last, added to `sums`.
 
     sums : diagonal (ni, 6, 6), pairs (no, 6, 6), border (ni, s, 6), corner (s, s), right (ni, 6), right_shared (s), of
-        the photographs and pairs this range of points touches; `offsets` are the numbers of the first of each.
+        the photographs and pairs this range of points touches; `offsets` are the numbers of the first of each. Of the
+        corner each element is added on one side of the diagonal, whichever.
 
     Returns the cost, the part of the Newton decrement that belongs to the points, and the number of a point that its
     rays do not determine (−1 when all are).
@@ -231,33 +286,23 @@ def assemble(
             c0, c1, c2 = couple[q, 0], couple[q, 1], couple[q, 2]
             for a in range(E):
                 right[i, a] += e0[a] * whitened[q, 0] + e1[a] * whitened[q, 1] - c0[a] * y0 - c1[a] * y1 - c2[a] * y2
-                for b in range(E):
-                    own[a, b] += e0[a] * e0[b] + e1[a] * e1[b] - c0[a] * c0[b] - c1[a] * c1[b] - c2[a] * c2[b]
-            for t in range(n_columns[q]):
-                row, s0, s1 = border[i, union[columns[q, t]]], by_sh[q, 0, t], by_sh[q, 1, t]
-                for a in range(E):
-                    row[a] += e0[a] * s0 + e1[a] * s1
-            for t in range(n_union):
-                row = border[i, union[t]]
-                s0, s1, s2 = couple_shared[0, t], couple_shared[1, t], couple_shared[2, t]
-                for a in range(E):
-                    row[a] -= c0[a] * s0 + c1[a] * s1 + c2[a] * s2
+            add_rank_two(own, by_eo[q])
+            subtract_rank_three(own, couple[q], couple[q])
+            if n_union:
+                add_own_border(border[i], union, columns[q], n_columns[q], by_eo[q], by_sh[q])
+                subtract_border(border[i], union, n_union, couple[q], couple_shared)
             for other in range(q + 1, n_rays):
-                block = pairs[pair_block[pair] - first_pair]
+                subtract_rank_three(pairs[pair_block[pair] - first_pair], couple[q], couple[other])
                 pair += 1
-                o0, o1, o2 = couple[other, 0], couple[other, 1], couple[other, 2]
-                for a in range(E):
-                    for b in range(E):
-                        block[a, b] -= c0[a] * o0[b] + c1[a] * o1[b] + c2[a] * o2[b]
             for t in range(n_columns[q]):
                 column, s0, s1 = union[columns[q, t]], by_sh[q, 0, t], by_sh[q, 1, t]
                 right_shared[column] += s0 * whitened[q, 0] + s1 * whitened[q, 1]
-                for c in range(n_columns[q]):
+                for c in range(t + 1):
                     corner[column, union[columns[q, c]]] += s0 * by_sh[q, 0, c] + s1 * by_sh[q, 1, c]
         for t in range(n_union):
             row, s0, s1, s2 = corner[union[t]], couple_shared[0, t], couple_shared[1, t], couple_shared[2, t]
             right_shared[union[t]] -= s0 * y0 + s1 * y1 + s2 * y2
-            for c in range(n_union):
+            for c in range(t + 1):
                 row[union[c]] -= s0 * couple_shared[0, c] + s1 * couple_shared[1, c] + s2 * couple_shared[2, c]
     return cost, decrement, undetermined
 

@@ -147,6 +147,7 @@ class NormalSystem:
         corner, right_shared = np.zeros((s, s)), np.zeros(s)
         for sums in self._sums:
             sums.add_to(blocks, border, corner, right, right_shared)
+        corner = corner + corner.T - np.diag(np.diagonal(corner))
         cost = sum(o[0] for o in outcomes)
         cost += self._add_centres(state, blocks, border, corner, right, right_shared)
         cost += self._add_priors(state, corner, right_shared)

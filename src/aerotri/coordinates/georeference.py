@@ -104,23 +104,16 @@ def georeference(crs: str, around: np.ndarray, geoid: str | os.PathLike | None =
         When the CRS is unknown or of a kind that cannot carry a block, and when a grid is missing.
     """
     from pyproj import Transformer
-    from pyproj.exceptions import CRSError
 
     whole = _read_crs(crs)
     flat = whole.sub_crs_list[0] if whole.is_compound else whole
-    geographic = flat.geodetic_crs
-    _check_kind(crs, whole, flat)
-    if geographic is None:  # pragma: no cover, every projected or geographic CRS has one
-        raise InputError(f"crs {crs} has no ellipsoid", CRS_REMEDY, file="block.toml")
-    try:
-        horizontal = Transformer.from_crs(flat.to_2d(), geographic.to_2d(), always_xy=True, allow_ballpark=False)
-    except CRSError as error:  # pragma: no cover
-        raise InputError(f"crs {crs} cannot be transformed: {error}", CRS_REMEDY, file="block.toml") from error
-    lon, lat = horizontal.transform(around[:, 0], around[:, 1])
+    geographic = _checked_geographic(crs, whole, flat)
+    horizontal = Transformer.from_crs(flat.to_2d(), geographic.to_2d(), always_xy=True, allow_ballpark=False)
     if geoid is not None:
         vertical = _geoid_file(Path(geoid), crs, whole)
     elif whole.is_compound:
-        vertical = _known_heights(crs, whole, geographic, np.asarray(lon), np.asarray(lat))
+        lon, lat = horizontal.transform(around[:, 0], around[:, 1])
+        vertical = _known_heights(crs, whole, geographic, lon, lat)
     else:
         vertical = None
     ellipsoid = geographic.ellipsoid
@@ -148,9 +141,10 @@ def _read_crs(crs: str) -> CRS:
         raise InputError(f"crs '{crs}' is not known to PROJ", CRS_REMEDY, file="block.toml") from None
 
 
-def _check_kind(crs: str, whole: CRS, flat: CRS) -> None:
-    """Refuse what cannot carry a block: geocentric or vertical systems, feet, gon, depths, foreign meridians."""
-    if not (flat.is_projected or flat.is_geographic):
+def _checked_geographic(crs: str, whole: CRS, flat: CRS) -> CRS:
+    """The geographic system below a CRS. Refused: geocentric or vertical systems, feet, gon, depths, other meridians."""
+    geographic = flat.geodetic_crs
+    if geographic is None or geographic.ellipsoid is None or not (flat.is_projected or flat.is_geographic):
         raise InputError(f"crs {crs} ({whole.name}) is neither projected nor geographic", CRS_REMEDY, file="block.toml")
     for number, axis in enumerate(whole.axis_info):
         wanted = "degree" if flat.is_geographic and number < 2 else "metre"
@@ -162,13 +156,14 @@ def _check_kind(crs: str, whole: CRS, flat: CRS) -> None:
             )
         if axis.direction == "down":
             raise InputError(f"crs {crs} counts depths", "transform the block to heights", file="block.toml")
-    meridian = flat.prime_meridian
+    meridian = geographic.prime_meridian
     if meridian is not None and meridian.longitude != 0.0:
         raise InputError(
             f"crs {crs} ({whole.name}) counts longitudes from {meridian.name}",
             "transform the block to a CRS on Greenwich",
             file="block.toml",
         )
+    return geographic
 
 
 def _geoid_file(path: Path, crs: str, whole: CRS) -> Transformer:
@@ -196,7 +191,8 @@ def _geoid_file(path: Path, crs: str, whole: CRS) -> Transformer:
         return Transformer.from_pipeline("+proj=pipeline " + units.format(shift))
     except ProjError:
         raise InputError(
-            f"{path} cannot be read as a geoid grid", "give a vertical grid that PROJ reads, for example from cdn.proj.org"
+            f"{path} cannot be read as a geoid grid",
+            "give a vertical grid that PROJ reads, for example from cdn.proj.org",
         ) from None
 
 
@@ -213,9 +209,8 @@ def _known_heights(crs: str, whole: CRS, geographic: CRS, lon: np.ndarray, lat: 
     there = np.isfinite(lon) & np.isfinite(lat)
     area = None
     if there.any():
-        area = AreaOfInterest(
-            *(float(v) for v in (lon[there].min(), lat[there].min(), lon[there].max(), lat[there].max()))
-        )
+        corners = (lon[there].min(), lat[there].min(), lon[there].max(), lat[there].max())
+        area = AreaOfInterest(*(float(value) for value in corners))
     with warnings.catch_warnings():
         # pyproj warns about the missing grid that the error below names
         warnings.simplefilter("ignore")
@@ -227,9 +222,8 @@ def _known_heights(crs: str, whole: CRS, geographic: CRS, lon: np.ndarray, lat: 
     missing = [g.short_name for o in group.unavailable_operations[:1] for g in o.grids if not g.available]
     if missing:
         raise InputError(
-            f"the heights of {crs} ({whole.name}) need the geoid grid {' and '.join(missing)}, which PROJ does not have",
-            "give it as --geoid FILE, or install it with `projsync --file "
-            f"{missing[0]}`",
+            f"the heights of {crs} ({whole.name}) need the geoid grid {' and '.join(missing)}, which is missing",
+            f"give it as --geoid FILE, or install it with `projsync --file {missing[0]}`",
         )
     raise InputError(
         f"PROJ knows no way from the heights of {crs} ({whole.name}) to the ellipsoid",

@@ -88,9 +88,7 @@ class LocalFrame:
         enu = self.local_from_geocentric @ _east_north_up(geographic)
         if self.georeference.is_projected:
             plan_by_enu = self._plan_partials(geographic)
-            turn = np.arctan2(
-                plan_by_enu[:, 1, 0] - plan_by_enu[:, 0, 1], plan_by_enu[:, 0, 0] + plan_by_enu[:, 1, 1]
-            )
+            turn = np.arctan2(plan_by_enu[:, 1, 0] - plan_by_enu[:, 0, 1], plan_by_enu[:, 0, 0] + plan_by_enu[:, 1, 1])
             enu = enu @ _about_z(-turn)
         axes[there] = enu
         return axes

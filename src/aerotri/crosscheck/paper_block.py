@@ -8,7 +8,7 @@ looked at, so that a mistake there shows as a difference.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -186,13 +186,12 @@ class _Entries:
     """Shared entries while they are listed; numbered as they come, put in order of their owners at the end."""
 
     def __init__(self) -> None:
-        self._rows: dict[tuple[str, Owner], tuple[float, float, bool]] = {}
+        self._rows: dict[tuple[str, Owner], tuple[int, float, float, bool]] = {}
 
     def add(self, name: str, owner: Owner, prior: Prior) -> int:
         """The provisional number of an entry; the first to name it says what is known of it."""
         sigma = np.inf if prior.sigma is None else prior.sigma
-        self._rows.setdefault((name, owner), (prior.value, sigma, not prior.fixed))
-        return list(self._rows).index((name, owner))
+        return self._rows.setdefault((name, owner), (len(self._rows), prior.value, sigma, not prior.fixed))[0]
 
     def sorted(self) -> tuple[Shared, np.ndarray]:
         """The entries, and the final place of every provisional number."""
@@ -201,7 +200,7 @@ class _Entries:
         order = sorted(range(len(keys)), key=lambda i: owners.index(keys[i][1]))
         place = np.empty(len(keys), np.int64)
         place[order] = np.arange(len(keys))
-        start, sigma, free = (np.array([self._rows[keys[i]][k] for i in order]) for k in range(3))
+        start, sigma, free = (np.array([self._rows[keys[i]][k] for i in order]) for k in (1, 2, 3))
         names, of = tuple(keys[i][0] for i in order), tuple(keys[i][1] for i in order)
         return Shared(names, of, start, sigma, free.astype(bool)), place
 
@@ -288,7 +287,6 @@ def _antennas(block: Block, images: np.ndarray, origin: np.ndarray, entries: _En
         for g, strip in enumerate(strips if per == "strip" else ["block"] * len(used)):
             for axis in np.flatnonzero(known[g]) if per != "off" else ():
                 column[g, axis] = entries.add(f"gnss.{what}_{'XYZ'[axis]}", ("gnss", strip), Prior())
-        # a coordinate that is not observed has no effect, whatever stands in its column
         columns.append(column)
     since = np.nan_to_num(observed.time[used])
     for strip in set(strips):
@@ -308,6 +306,4 @@ def _antennas(block: Block, images: np.ndarray, origin: np.ndarray, entries: _En
 def _replaced(antennas: Antennas, place: np.ndarray) -> Antennas:
     """The antennas with the final places of their entries."""
     final = [np.where(column >= 0, place[np.maximum(column, 0)], -1) for column in (antennas.shift, antennas.drift)]
-    return Antennas(
-        antennas.image, antennas.xyz, antennas.inv_sigma, *final, antennas.since, antennas.lever_arm
-    )
+    return replace(antennas, shift=final[0], drift=final[1])

@@ -8,8 +8,8 @@ Refraction [D] In a plane layered atmosphere n·sin α is constant along the ray
 by dα = K·tan α, K = 1/(H − h)·∫(n(z) − n(H)) dz from the ground h to the camera H. With n − 1 proportional to the
 density and the atmosphere at rest, ∫ρ dz = (p(h) − p(H))/g, and with the pressure of the standard atmosphere K is
 closed; its numbers are those of Saastamoinen's formula [L]. On a vertical photograph dr = K·(r + r³/c²) [L]. The K of
-the Manual of Photogrammetry, 2410e-6·H/(H² − 6H + 250) over sea level, H in km, agrees within 6 % from 3 to 9 km; at
-1 km it is a fifth smaller than traced rays are.
+the Manual of Photogrammetry, 2410e-6·H/(H² − 6H + 250) over sea level, H in km, agrees within 5 % from 6 to 12 km; at
+1 km it is a fifth smaller than what rays traced through the standard atmosphere give.
 
 Earth curvature [D] of a frame whose X, Y are distances along the ground and whose Z are heights, as of a block without
 a CRS: the ray is met with a sphere. To first order dr = −(H − h)·r³/(2·R·c²) [L].
@@ -40,7 +40,7 @@ STEEPEST_COS = np.cos(np.radians(80.0))
 """Rays flatter than 80° off the nadir are refused: layers are no longer plane for them."""
 
 
-def standard_atmosphere(height_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def standard_atmosphere(height_m: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
     """Pressure and density of the standard atmosphere [L: ISO 2533], up to 20 km.
 
     Parameters
@@ -59,7 +59,7 @@ def standard_atmosphere(height_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return pressure, pressure / (GAS_CONSTANT * temperature)
 
 
-def refraction_constant(flying_height_m: np.ndarray, ground_height_m: np.ndarray) -> np.ndarray:
+def refraction_constant(flying_height_m: np.ndarray | float, ground_height_m: np.ndarray | float) -> np.ndarray:
     """K of dα = K·tan α, rad.
 
     Parameters
@@ -82,8 +82,8 @@ def refraction_constant(flying_height_m: np.ndarray, ground_height_m: np.ndarray
 def refraction_mm(
     xy_from_principal_point: np.ndarray,
     focal_length_mm: float,
-    flying_height_m: np.ndarray,
-    ground_height_m: np.ndarray,
+    flying_height_m: np.ndarray | float,
+    ground_height_m: np.ndarray | float,
     nadir: np.ndarray | None = None,
 ) -> np.ndarray:
     """Displacement of image points by refraction: away from the nadir.
@@ -109,8 +109,8 @@ def refraction_mm(
 def earth_curvature_mm(
     xy_from_principal_point: np.ndarray,
     focal_length_mm: float,
-    flying_height_m: np.ndarray,
-    ground_height_m: np.ndarray,
+    flying_height_m: np.ndarray | float,
+    ground_height_m: np.ndarray | float,
     nadir: np.ndarray | None = None,
 ) -> np.ndarray:
     """Displacement of image points by the curvature of the earth: towards the nadir. Arguments as `refraction_mm`."""

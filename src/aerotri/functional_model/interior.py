@@ -64,7 +64,7 @@ class FiducialFit:
 
     @property
     def sigma(self) -> np.ndarray:
-        """(p,) σ of the parameters, σ̂0 included; NaN without redundancy."""
+        """(p,) σ of the parameters for the reduced pixels, σ̂0 included; NaN without redundancy."""
         return self.sigma0_mm * np.sqrt(np.diagonal(self.cofactor))
 
     @property
@@ -139,7 +139,7 @@ def mm_from_scan(fit: FiducialFit, column_row: np.ndarray) -> np.ndarray:
     return _transform(fit.kind, fit.parameters, _reduced(np.asarray(column_row, float), fit.origin_px, fit.scale_px))
 
 
-def measurement_sigma(fit: FiducialFit, column_row: np.ndarray, sigma_px: np.ndarray) -> np.ndarray:
+def measurement_sigma(fit: FiducialFit, column_row: np.ndarray, sigma_px: np.ndarray | float) -> np.ndarray:
     """σ of image coordinates from the σ of their measurement alone: what weighs a ray.
 
     Parameters
@@ -173,7 +173,7 @@ def _check_marks(column_row: np.ndarray, calibrated: np.ndarray, kind: str, imag
     needed = MARKS_NEEDED[kind]
     if len(column_row) < needed:
         raise InputError(
-            f"{len(column_row)} fiducial marks{of_image} do not give a {kind} interior orientation, which takes {needed}",
+            f"{len(column_row)} fiducial marks{of_image} give no {kind} interior orientation, which takes {needed}",
             "measure more marks, or choose an interior orientation with fewer parameters",
             file="fiducials.csv",
         )
