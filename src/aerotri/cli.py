@@ -53,13 +53,16 @@ def adjust(
         str | None, typer.Option(help="Additional parameters, such as bluh:1-8+12,ultracam_d:42-73, brown:K1+K2, none.")
     ] = None,
     robust: Annotated[str | None, typer.Option(help="off or huber.")] = None,
+    geoid: Annotated[
+        Path | None, typer.Option(help="Geoid grid (PROJ GeoTIFF) for heights that the CRS does not bring along.")
+    ] = None,
     plots: Annotated[bool, typer.Option(help="Draw the plots and the report.")] = True,
     json_: Json = False,
 ) -> None:
     """Adjust a block: orientation, points, self-calibration, and σ of everything."""
     from aerotri.commands.adjust import run_adjust
 
-    raise typer.Exit(run_adjust(block, out, parameters, robust, plots, json_))
+    raise typer.Exit(run_adjust(block, out, parameters, robust, geoid, plots, json_))
 
 
 @app.command(epilog="Example: aerotri simulate blocks/frederiksstad_ultracam/simulation.toml --out demo --seed 1")

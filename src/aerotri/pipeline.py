@@ -1,14 +1,15 @@
-"""The chain of stages: block → start values → unknowns → adjustment → statistics."""
+"""The chain of stages: block → local frame → start values → unknowns → adjustment → statistics → CRS of the block."""
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.adjustment.datum import FREEDOMS, control_share, nothing_holds, restore_datum
+from aerotri.adjustment.datum import FREEDOMS, nothing_holds, restore_datum
 from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.prepare import build_system, prepare
@@ -16,40 +17,39 @@ from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import StartValues, State
+from aerotri.coordinates import LocalFrame
+from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block, transform_result
 from aerotri.formats.solution import SavedSolution
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock, Outcome
+from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.statistics.doubts import AdjustmentFailedError, defects_in_words, doubts, failure, refuse_runaway
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
 
-RUNAWAY = 5.0
-"""Factor by which a principal distance may change before the adjustment is taken for lost."""
+__all__ = ["Adjustment", "AdjustmentFailedError", "adjust", "adjust_keeping_system", "reopen"]
 
-LITTLE_CONTROL = 0.25
-"""Share of the block's area that height control should span at least."""
-
-
-class AdjustmentFailedError(Exception):
-    """The adjustment has no result; `outcome` says why."""
-
-    def __init__(self, outcome: Outcome):
-        self.outcome = outcome
-        super().__init__(f"{outcome.status}: {outcome.message}")
+Report = Callable[[int, float, float], None]
+FRAME_ROUNDS = 2
+"""Adjustments after the first one where a coordinate's place in the local frame depends on the adjusted position."""
 
 
 @dataclass(frozen=True, eq=False)
 class Adjustment:
-    """A result together with the system and solution it came from, for stages that need covariances beyond σ."""
+    """A result together with what it came from, for stages that need covariances beyond σ.
+
+    Parameters
+    ----------
+    result : in the block's CRS. local : the same in the local frame, where `system` and `solution` live.
+    frame : the local frame, None for a block in local coordinates.
+    """
 
     result: AdjustedBlock
+    local: AdjustedBlock
     system: NormalSystem
     solution: Solution
+    frame: LocalFrame | None = None
 
 
-def adjust(
-    block: Block,
-    report: Callable[[int, float, float], None] | None = None,
-    given_points: np.ndarray | None = None,
-) -> AdjustedBlock:
+def adjust(block: Block, report: Report | None = None, given_points: np.ndarray | None = None) -> AdjustedBlock:
     """Adjust a block.
 
     Parameters
@@ -73,36 +73,25 @@ def adjust(
 
 def adjust_keeping_system(
     block: Block,
-    report: Callable[[int, float, float], None] | None = None,
+    report: Report | None = None,
     given_points: np.ndarray | None = None,
+    geoid: str | os.PathLike | None = None,
 ) -> Adjustment:
-    """As `adjust`, with the equations and the solution beside the result."""
-    begun = time.perf_counter()
-    prepared = prepare(block, given_points)
-    system, state = prepared.system, prepared.state
-    started = time.perf_counter()
-    counts = count_observations(system)
-    if nothing_holds(system):
-        free = f"the datum is free in {', '.join(FREEDOMS)}"
-        raise AdjustmentFailedError(_failure(system, "rank deficient", _in_words(system, [free])))
-    settings = block.settings.adjustment
-    options = SolveOptions(settings.max_iterations, settings.robust, report)
-    solution = minimise(system, state, counts.redundancy, options)
-    if solution.defects:
-        raise AdjustmentFailedError(_failure(system, "rank deficient", _in_words(system, list(solution.defects))))
-    solution = _without_runaway(system, solution)
-    if settings.datum in ("minimal", "inner"):
-        moved = restore_datum(system.unknowns, solution.state, state.points)
-        solution = replace(solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator))
-    factor = _refuse_defects(system, solution.state, solution.equations)
-    solved = time.perf_counter()
-    warnings = prepared.warnings + _doubts(system, solution.state, counts.redundancy)
-    result = summarise(system, solution, factor, prepared.ray_status, warnings)
-    result = _with_warnings(result, inseparable(result.parameters))
-    timings = {
-        "start_values": started - begun, "solve": solved - started, "statistics": time.perf_counter() - solved,
-    }  # fmt: skip
-    return Adjustment(replace(result, outcome=replace(result.outcome, timings_s=timings)), system, solution)
+    """As `adjust`, with the equations and the solution beside the result.
+
+    Parameters
+    ----------
+    geoid : grid of geoid undulations for a block whose CRS has none of its own.
+    """
+    if block.crs == "local":
+        return _adjust_local(block, report, given_points)
+    frame = frame_of_block(block, geoid)
+    points = None if given_points is None else frame.to_local(given_points)
+    found = _adjust_local(transform_block(block, frame), report, points)
+    for _ in range(FRAME_ROUNDS if needs_positions(block) else 0):
+        local = transform_block(block, frame, found.local.points.xyz, found.local.images.centre)
+        found = _adjust_local(local, report, found.local.points.xyz)
+    return replace(found, result=transform_result(found.local, block, frame), frame=frame)
 
 
 def reopen(block: Block, saved: SavedSolution) -> Adjustment:
@@ -112,54 +101,56 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     ----------
     block : as it was adjusted (the result's block/). saved : its solution.npz.
     """
+    frame, local = None, block
+    if block.crs != "local":
+        frame = frame_of_block(block, saved.geoid or None, saved.frame_origin)
+        local = transform_block(block, frame, saved.points + saved.origin, saved.centre + saved.origin)
     start = StartValues(saved.origin, saved.rotation, saved.centre, saved.points)
     held = [(int(point), int(axis)) for point, axis in saved.held]
-    system, state = build_system(block, start, saved.ray_status, held)
+    measured = replace(local, image_points=replace(local.image_points, xy=saved.xy))
+    system, state = build_system(measured, start, saved.ray_status, held)
     state = replace(state, shared=saved.shared)
     estimator = Estimator(saved.estimator_code, saved.estimator_limit)
     equations = system.assemble(state, 0.0, estimator)
     solution = Solution(saved.status, state, equations, estimator, saved.iterations)
-    result = summarise(system, solution, _refuse_defects(system, state, equations), saved.ray_status, saved.warnings)
-    return Adjustment(result, system, solution)
+    factor = _factor(system, state, equations)
+    result = replace(summarise(system, solution, factor, saved.ray_status, saved.warnings), block=local)
+    delivered = result if frame is None else transform_result(result, block, frame)
+    return Adjustment(delivered, result, system, solution, frame)
 
 
-def _without_runaway(system: NormalSystem, solution: Solution) -> Solution:
-    """A principal distance that ran away is no convergence, however small the residuals have become.
-
-    Raises
-    ------
-    AdjustmentFailedError
-    """
-    u = system.unknowns
-    ratio = u.interior(solution.state)[:, 0] / u.lens.base[:, 0]
-    if (np.abs(np.log(np.maximum(ratio, 1e-12))) > np.log(RUNAWAY)).any():
-        worst = int(np.argmax(np.abs(np.log(np.maximum(ratio, 1e-12)))))
-        c, start = u.interior(solution.state)[worst, 0], u.lens.base[worst, 0]
-        text = f"the principal distance ran from {start:g} to {c:.3g} mm: the parameters chosen cannot be told apart"
-        raise AdjustmentFailedError(replace(_failure(system, "not converged", text), iterations=solution.iterations))
-    return solution
-
-
-def _with_warnings(result: AdjustedBlock, more: tuple[str, ...]) -> AdjustedBlock:
-    return replace(result, outcome=replace(result.outcome, warnings=result.outcome.warnings + more))
-
-
-def _doubts(system: NormalSystem, state: State, redundancy: int) -> tuple[str, ...]:
-    block, doubts = system.unknowns.block, []
-    share = control_share(system.unknowns, state)
-    if block.settings.adjustment.datum == "control" and system.centres is None and share < LITTLE_CONTROL:
-        doubts.append(
-            f"the height control spans {100.0 * share:.0f} % of the block's area: beyond it heights are extrapolated, "
-            "see their σ"
-        )
-    if redundancy <= 0:
-        doubts.append(f"redundancy {redundancy}: nothing controls the observations, σ is not known")
-    if block.gnss_ins is not None and np.isfinite(block.gnss_ins.angles).any():
-        doubts.append("observed attitudes are not used as observations in this version")
-    return tuple(doubts)
+def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray | None) -> Adjustment:
+    begun = time.perf_counter()
+    prepared = prepare(block, given_points)
+    system, state = prepared.system, prepared.state
+    started = time.perf_counter()
+    if nothing_holds(system):
+        free = f"the datum is free in {', '.join(FREEDOMS)}"
+        raise failure(system, "rank deficient", defects_in_words(system, [free]))
+    settings = block.settings.adjustment
+    options = SolveOptions(settings.max_iterations, settings.robust, report)
+    solution = minimise(system, state, count_observations(system).redundancy, options)
+    if solution.defects:
+        raise failure(system, "rank deficient", defects_in_words(system, solution.defects))
+    refuse_runaway(system, solution)
+    if settings.datum in ("minimal", "inner"):
+        moved = restore_datum(system.unknowns, solution.state, state.points)
+        solution = replace(solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator))
+    factor = _factor(system, solution.state, solution.equations)
+    solved = time.perf_counter()
+    warnings = prepared.warnings + doubts(system, solution.state)
+    result = summarise(system, solution, factor, prepared.ray_status, warnings)
+    timings = {
+        "start_values": started - begun,
+        "solve": solved - started,
+        "statistics": time.perf_counter() - solved,
+    }
+    said = (*result.outcome.warnings, *inseparable(result.parameters))
+    result = replace(result, block=block, outcome=replace(result.outcome, warnings=said, timings_s=timings))
+    return Adjustment(result, result, system, solution)
 
 
-def _refuse_defects(system: NormalSystem, state: State, equations: NormalEquations) -> Factor:
+def _factor(system: NormalSystem, state: State, equations: NormalEquations) -> Factor:
     """The factor of the undamped equations; a defect ends the adjustment with the unknowns named.
 
     Raises
@@ -173,27 +164,8 @@ def _refuse_defects(system: NormalSystem, state: State, equations: NormalEquatio
     except NotPositiveDefiniteError:
         factor = None
     defects = find_defects(system, state, equations)
-    if not defects:
-        defects = [] if factor is not None else ["the normal equations are singular"]
+    if factor is None and not defects:
+        defects = ["the normal equations are singular"]
     if defects:
-        raise AdjustmentFailedError(_failure(system, "rank deficient", _in_words(system, defects)))
+        raise failure(system, "rank deficient", defects_in_words(system, defects))
     return system.factorise(equations)
-
-
-def _in_words(system: NormalSystem, defects: list[str]) -> str:
-    u = system.unknowns
-    text = "; ".join(defects)
-    if u.block.settings.adjustment.datum != "control" or "datum" not in text:
-        return text
-    if nothing_holds(system):
-        return f'no control: {text}. Give control points, or set datum = "minimal" or "inner"'
-    return f"too little control: {text}"
-
-
-def _failure(system: NormalSystem, status: str, message: str) -> Outcome:
-    counts = count_observations(system)
-    return Outcome(
-        status=status, message=message, iterations=0, sigma0=np.nan, sigma0_um=np.nan, vtpv=np.nan,
-        observations=counts.observations, unknowns=counts.unknowns, conditions=counts.conditions,
-        redundancy=counts.redundancy,
-    )  # fmt: skip

@@ -19,6 +19,7 @@ from aerotri.adjustment.unknowns import (
     hold_points,
 )
 from aerotri.conventions import InputError
+from aerotri.functional_model.atmosphere import corrected_image_points
 from aerotri.functional_model.observed_unknowns import CentreObservations
 from aerotri.observations import Block
 
@@ -57,7 +58,17 @@ def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
             file="images.csv",
         )
     status, warnings = ray_status(block, start)
-    return Prepared(*build_system(block, start, status), status, tuple(warnings))
+    measured = _freed_of_the_air(block, start)
+    return Prepared(*build_system(measured, start, status), status, tuple(warnings))
+
+
+def _freed_of_the_air(block: Block, start: StartValues) -> Block:
+    """The block with image points corrected for refraction and earth curvature, as its settings ask."""
+    if block.settings.refraction == "off" and block.settings.earth_curvature == "off":
+        return block
+    ground = float(np.nanmedian(start.points[:, 2])) + start.origin[2]
+    xy = corrected_image_points(block, start.rotation, start.centre + start.origin, ground)
+    return replace(block, image_points=replace(block.image_points, xy=xy))
 
 
 def build_system(
@@ -89,8 +100,6 @@ def check_settings(block: Block) -> None:
         (s.adjustment.robust not in ("off", "huber"), f'robust = "{s.adjustment.robust}"', 'use "off" or "huber"'),
         (s.adjustment.parameter_selection != "off", "parameter_selection", 'set it to "off"'),
         (s.adjustment.variance_components != "off", "variance_components", 'set it to "off"'),
-        (s.refraction != "off", "refraction", 'set it to "off"'),
-        (s.earth_curvature != "off", "earth_curvature", 'set it to "off"'),
         (s.gnss.lever_arm_sigma_m is not None, "lever_arm_sigma_m", "leave it out: the lever arm is then held"),
         (s.gnss.time_offset != "off", "time_offset", 'set it to "off"'),
     ]

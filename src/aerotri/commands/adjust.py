@@ -23,7 +23,13 @@ RESULT_NAMES = (
 
 
 def run_adjust(
-    path: Path, out: Path | None, parameters: str | None, robust: str | None, plots: bool, as_json: bool
+    path: Path,
+    out: Path | None,
+    parameters: str | None,
+    robust: str | None,
+    geoid: Path | None,
+    plots: bool,
+    as_json: bool,
 ) -> int:
     """Exit code of the command: 0 when converged, 1 when not; arguments as on the command line."""
     console = Console(quiet=as_json)
@@ -40,7 +46,7 @@ def run_adjust(
 
     console.progress(compilation_notice())
     try:
-        adjustment = adjust_keeping_system(block, report=console.iteration)
+        adjustment = adjust_keeping_system(block, report=console.iteration, geoid=geoid)
     except AdjustmentFailedError as failure:
         from aerotri.formats.result import outcome_json
 
@@ -90,7 +96,9 @@ def write_all(adjustment: Adjustment, target: Path, plots: bool, console: Consol
     begun = time.perf_counter()
     with atomic_folder(target, own=RESULT_NAMES) as folder:
         write_block(result.block, folder / "block")
-        write_solution(folder / "solution.npz", adjustment.system, adjustment.solution, result)
+        write_solution(
+            folder / "solution.npz", adjustment.system, adjustment.solution, adjustment.local, adjustment.frame
+        )
         timings = {**result.outcome.timings_s, "write": time.perf_counter() - begun}
         if plots:
             console.progress("drawing")

@@ -147,8 +147,8 @@ def _positions_to_local(xyz: np.ndarray, sigma: np.ndarray, guess: np.ndarray, f
 
 
 def _partly_known(xyz: np.ndarray) -> np.ndarray:
-    known = np.isfinite(xyz)
-    return known.any(axis=1) & ~known.all(axis=1)
+    count = np.isfinite(xyz).sum(axis=1)
+    return (count > 0) & (count < 3)
 
 
 def _completed(xyz: np.ndarray, guess: np.ndarray) -> np.ndarray:

@@ -116,9 +116,10 @@ def georeference(crs: str, around: np.ndarray, geoid: str | os.PathLike | None =
         vertical = _known_heights(crs, whole, geographic, lon, lat)
     else:
         vertical = None
-    ellipsoid = geographic.ellipsoid
-    size = f"+a={ellipsoid.semi_major_metre!r} +b={ellipsoid.semi_minor_metre!r}"
-    cart = f"+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=cart {size}"
+    geod = geographic.get_geod()
+    if geod is None:
+        raise InputError(f"crs {crs} ({whole.name}) has no ellipsoid", CRS_REMEDY, file="block.toml")
+    cart = f"+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=cart +a={geod.a!r} +b={geod.b!r}"
     return Georeference(
         crs=crs,
         is_projected=flat.is_projected,
@@ -142,9 +143,9 @@ def _read_crs(crs: str) -> CRS:
 
 
 def _checked_geographic(crs: str, whole: CRS, flat: CRS) -> CRS:
-    """The geographic system below a CRS. Refused: geocentric or vertical systems, feet, gon, depths, other meridians."""
+    """The geographic system below a CRS. Refused: geocentric and vertical systems, feet, gon, depths, Paris."""
     geographic = flat.geodetic_crs
-    if geographic is None or geographic.ellipsoid is None or not (flat.is_projected or flat.is_geographic):
+    if geographic is None or not (flat.is_projected or flat.is_geographic):
         raise InputError(f"crs {crs} ({whole.name}) is neither projected nor geographic", CRS_REMEDY, file="block.toml")
     for number, axis in enumerate(whole.axis_info):
         wanted = "degree" if flat.is_geographic and number < 2 else "metre"
@@ -215,7 +216,11 @@ def _known_heights(crs: str, whole: CRS, geographic: CRS, lon: np.ndarray, lat: 
         # pyproj warns about the missing grid that the error below names
         warnings.simplefilter("ignore")
         group = TransformerGroup(
-            source, geographic.to_3d(), always_xy=True, allow_ballpark=False, area_of_interest=area
+            source,
+            geographic.to_3d(),
+            always_xy=True,
+            allow_ballpark=False,
+            area_of_interest=area,  # pyright: ignore[reportArgumentType]
         )
     if group.best_available and group.transformers:
         return group.transformers[0]

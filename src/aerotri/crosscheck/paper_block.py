@@ -71,7 +71,7 @@ class PaperRays:
     ----------
     image, point, setup : (m,) rows; xy, inv_sigma : (m, 2).
     elements : (S, 15) shared entry of every element of `paper_rays.ELEMENTS`, for each setup (camera and group).
-    linear : (S, q) shared entries of the linear patterns, 0 where a setup has fewer; patterns : (m, 2, q) mm, 0 there.
+    linear : (S, q) shared entries of the linear patterns, −1 where a setup has fewer; patterns : (m, 2, q) mm, 0 there.
     """
 
     image: np.ndarray
@@ -156,7 +156,7 @@ def paper_block(block: Block, used: np.ndarray, weight: np.ndarray, origin: np.n
     lines, values = _patterns(block, setups, linear, setup, xy)
     return PaperBlock(
         images, points, origin, block.rotation, shared,
-        PaperRays(image, point, setup, xy, inv_sigma, place[elements], place[lines], values),
+        PaperRays(image, point, setup, xy, inv_sigma, place[elements], _final(lines, place), values),
         None if antennas is None else _replaced(antennas, place),
         *_control(block, points, origin),
     )  # fmt: skip
@@ -241,7 +241,7 @@ def _linear_entries(block: Block, group: str, groups: np.ndarray, cameras: np.nd
 def _patterns(block: Block, setups: list, linear: list, setup: np.ndarray, xy: np.ndarray):
     """Entries (S, q) and patterns (m, 2, q) of the linear families at the rays."""
     width = max((len(found) for found in linear), default=0)
-    entries, values = np.zeros((len(setups), width), np.int64), np.zeros((len(xy), 2, width))
+    entries, values = np.full((len(setups), width), -1), np.zeros((len(xy), 2, width))
     for k, (camera_row, _) in enumerate(setups):
         camera, own = block.cameras[camera_row], np.flatnonzero(setup == k)
         entries[k, : len(linear[k])] = [number for _, _, number in linear[k]]
@@ -305,5 +305,8 @@ def _antennas(block: Block, images: np.ndarray, origin: np.ndarray, entries: _En
 
 def _replaced(antennas: Antennas, place: np.ndarray) -> Antennas:
     """The antennas with the final places of their entries."""
-    final = [np.where(column >= 0, place[np.maximum(column, 0)], -1) for column in (antennas.shift, antennas.drift)]
-    return replace(antennas, shift=final[0], drift=final[1])
+    return replace(antennas, shift=_final(antennas.shift, place), drift=_final(antennas.drift, place))
+
+
+def _final(numbers: np.ndarray, place: np.ndarray) -> np.ndarray:
+    return np.where(numbers >= 0, place[np.maximum(numbers, 0)], -1)

@@ -66,7 +66,7 @@ def ray_rows(paper: PaperBlock, layout: Layout, x: np.ndarray, rows: slice) -> _
     prediction, by_pose, by_elements = linearise(
         x[layout.poses[image]], mount, x[layout.points[point]], elements, rays.xy[rows], paper.order, layout.active
     )
-    linear = layout.shared[rays.linear][setup]
+    linear = layout.shared[np.maximum(rays.linear, 0)][setup]
     prediction += np.einsum("kiq,kq->ki", rays.patterns[rows], x[linear])
     values = np.concatenate([by_pose, -by_pose[:, :, :3], by_elements, rays.patterns[rows]], axis=2)
     columns = np.concatenate(

@@ -24,6 +24,8 @@ from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints,
 
 PIXEL_UM = 1000.0
 CAMERA_VALUES = 9
+FARTHEST_PX = 1e6
+"""No photograph reaches farther from its centre."""
 WRITTEN_LENS = ("k1", "k2")
 
 
@@ -151,6 +153,10 @@ def _check_observations(observations: np.ndarray, counts: tuple[int, int], raw: 
     if len(bad):
         line = _line_of_word(raw, 3 + 4 * int(bad[0]))
         raise InputError("an observation names a camera or point that there is not", "repair the line", path, line)
+    far = np.flatnonzero((np.abs(observations[:, 2:]) > FARTHEST_PX).any(axis=1))
+    if len(far):
+        line = _line_of_word(raw, 3 + 4 * int(far[0]))
+        raise InputError("an image point lies outside of any image", "coordinates are pixels", path, line)
     key = index[:, 0] * counts[1] + index[:, 1]
     _, first = np.unique(key, return_index=True)
     if len(first) < len(key):

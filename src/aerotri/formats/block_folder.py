@@ -61,8 +61,8 @@ def read_block(path: str | os.PathLike) -> Block:
     cameras = settings.cameras()
     model = settings.model
     radians = RADIANS_PER[model.angle_unit]
-    images = _images(_table_file(folder, "images", required=True), cameras, radians)
-    rays = read_image_points(_table_file(folder, "image_points", required=True), images, cameras, settings)
+    images = _images(_required_table(folder, "images"), cameras, radians)
+    rays = read_image_points(_required_table(folder, "image_points"), images, cameras, settings)
     control, points = read_control(_table_file(folder, "control"), rays.point_names, settings)
     block = Block(
         name=folder.resolve().name if model.name is None else model.name,
@@ -95,15 +95,19 @@ def _settings_file(path: Path) -> Path:
     return path
 
 
-def _table_file(folder: Path, name: str, required: bool = False) -> Path | None:
+def _required_table(folder: Path, name: str) -> Path:
+    path = _table_file(folder, name)
+    if path is None:
+        place = folder / f"{name}.csv"
+        raise InputError("is missing", f"a block needs a table {place.name} beside its block.toml", place)
+    return path
+
+
+def _table_file(folder: Path, name: str) -> Path | None:
     """The table of a name as .csv or .parquet; None where there is none."""
     found = [path for path in (folder / f"{name}.csv", folder / f"{name}.parquet") if path.exists()]
     if len(found) > 1:
         raise InputError(f"{name}.csv and {name}.parquet are both there", "remove one of them", folder / name)
-    if required and not found:
-        raise InputError(
-            "is missing", f"a block needs a table {name}.csv beside its block.toml", folder / f"{name}.csv"
-        )
     return found[0] if found else None
 
 
@@ -115,9 +119,7 @@ def _refuse_what_is_not_built(folder: Path) -> None:
             raise InputError("is not supported in this version", f"remove the rows, or {path.name}", path)
 
 
-def _images(path: Path | None, cameras: tuple[Camera, ...], radians: float) -> Images:
-    if path is None:
-        raise InputError("is missing", "a block needs a table of its images", "images.csv")
+def _images(path: Path, cameras: tuple[Camera, ...], radians: float) -> Images:
     table = read_table(path, IMAGE_COLUMNS)
     table.require("image", "camera")
     if not table.length:

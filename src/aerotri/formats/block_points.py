@@ -40,7 +40,7 @@ class Rays:
     image_sigma_um: float
 
 
-def read_image_points(path: Path | None, images: Images, cameras: tuple[Camera, ...], settings: BlockToml) -> Rays:
+def read_image_points(path: Path, images: Images, cameras: tuple[Camera, ...], settings: BlockToml) -> Rays:
     """Image points in mm from the image centre.
 
     Raises
@@ -48,8 +48,6 @@ def read_image_points(path: Path | None, images: Images, cameras: tuple[Camera, 
     InputError
         See `block_folder.read_block`.
     """
-    if path is None:
-        raise InputError("is missing", "a block needs a table of its image points", "image_points.csv")
     table = read_table(path, IMAGE_POINT_COLUMNS)
     table.require("image", "point", "x", "y")
     if not table.length:
@@ -133,12 +131,14 @@ def _image_sigma(
         table,
         ("sx", "sy"),
         np.ones((table.length, 2), bool),
-        np.full(2, np.nan) if given is None else np.full(2, -1.0),
+        np.full(2, np.nan if given is None else np.inf),
         "give it in the table, or image_sigma_um under [stochastic] in block.toml",
     )
-    default_mm = 0.0 if given is None else given * 1e-3
-    sigma = np.where(sigma < 0.0, default_mm, sigma * scale[:, None])
-    return sigma, float(np.median(sigma) * 1e3) if given is None else float(given)
+    if given is None:
+        sigma *= scale[:, None]
+        return sigma, float(np.median(sigma) * 1e3)
+    # an infinite σ marks the empty cells: the default is in µm, whatever unit the table has
+    return np.where(np.isinf(sigma), given * 1e-3, sigma * scale[:, None]), float(given)
 
 
 def read_control(path: Path | None, measured: pa.StringArray, settings: BlockToml) -> tuple[Control, pa.StringArray]:

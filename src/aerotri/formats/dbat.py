@@ -131,6 +131,7 @@ def _start_values(script: Script, ids: list[str]) -> tuple[np.ndarray, np.ndarra
         return centre, angles
     table = script.table(file, ("id", "x", "y", "z"), ("omega", "phi", "kappa"))
     rows = _rows_of(table, "id", ids, "image")
+    refuse_duplicates(table, rows, lambda row: f"image '{table.cell('id', row)}'")
     centre[rows] = table.stack("x", "y", "z")
     if "omega" in table.numbers:
         unit = ANGLE_UNITS.get(file.get("units", ""))

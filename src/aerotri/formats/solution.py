@@ -15,6 +15,7 @@ import numpy as np
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.conventions import InputError
+from aerotri.coordinates import LocalFrame
 from aerotri.statistics.adjusted_block import AdjustedBlock
 
 SCHEMA = 1
@@ -28,6 +29,8 @@ class SavedSolution:
     ----------
     origin : (3,) m. rotation : (n, 3, 3). centre : (n, 3) m, points : (N, 3) m, from the origin; NaN if not adjusted.
     shared : (s,) values, shared_names, shared_groups : (s,) str, shared_cofactor : (s, s), without σ̂0².
+    xy : (m, 2) mm, image points as adjusted, freed of refraction and earth curvature where the settings ask.
+    frame_origin : (3,) of the local frame, NaN for a block in local coordinates; geoid : its grid file, '' if none.
     held : (k, 2) point and axis of coordinates held for the datum.
     ray_status, weight : (m,).
     """
@@ -40,6 +43,9 @@ class SavedSolution:
     shared_names: np.ndarray
     shared_groups: np.ndarray
     shared_cofactor: np.ndarray
+    xy: np.ndarray
+    frame_origin: np.ndarray
+    geoid: str
     held: np.ndarray
     ray_status: np.ndarray
     weight: np.ndarray
@@ -51,8 +57,19 @@ class SavedSolution:
     warnings: tuple[str, ...]
 
 
-def write_solution(path: str | os.PathLike, system: NormalSystem, solution: Solution, result: AdjustedBlock) -> None:
-    """Write solution.npz."""
+def write_solution(
+    path: str | os.PathLike,
+    system: NormalSystem,
+    solution: Solution,
+    result: AdjustedBlock,
+    frame: LocalFrame | None = None,
+) -> None:
+    """Write solution.npz.
+
+    Parameters
+    ----------
+    result : in the frame of `system`. frame : the local frame of a block with a CRS.
+    """
     u, state = system.unknowns, solution.state
     n, count = len(u.block.images), len(u.block.points)
     centre, rotation, points = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((count, 3), np.nan)
@@ -69,6 +86,9 @@ def write_solution(path: str | os.PathLike, system: NormalSystem, solution: Solu
         shared_names=np.array(u.shared.names, dtype=str),
         shared_groups=np.array(u.shared.groups, dtype=str),
         shared_cofactor=result.parameters.covariance / result.outcome.sigma0**2,
+        xy=u.block.image_points.xy,
+        frame_origin=np.full(3, np.nan) if frame is None else frame.origin,
+        geoid=np.array("" if frame is None or frame.geoid is None else os.fspath(frame.geoid)),
         held=np.column_stack([u.points[row], axis]),
         ray_status=result.rays.status,
         weight=result.rays.weight,
@@ -95,7 +115,8 @@ def read_solution(path: str | os.PathLike) -> SavedSolution:
             arrays = {name: file[name] for name in file.files}
         if int(arrays.pop("schema")) != SCHEMA:
             raise InputError("was written by another version", "adjust the block again", path)
-        scalars = {"estimator_code": int, "estimator_limit": float, "sigma0": float, "iterations": int, "status": str}
+        scalars = {"estimator_code": int, "estimator_limit": float, "sigma0": float, "iterations": int}
+        scalars |= {"status": str, "geoid": str}
         values = {name: scalars[name](array) if name in scalars else array for name, array in arrays.items()}
         values["warnings"] = tuple(str(w) for w in arrays["warnings"])
         return SavedSolution(**values)

@@ -1,0 +1,125 @@
+"""Our adjustment against an independent one: forward model from the papers, self-calibration included."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from aerotri.crosscheck.comparison import Difference, PeerCheck, difference, judge
+from aerotri.crosscheck.freed import used_rays, with_fixed_weights
+from aerotri.crosscheck.paper_block import PaperBlock, UnknownToPaperError, paper_block
+from aerotri.crosscheck.paper_rays import angles_of
+from aerotri.crosscheck.paper_system import PaperSolution, solve_normal_equations
+from aerotri.crosscheck.paper_unknowns import KnownSolution, Layout, lay_out, rotations
+from aerotri.observations import Block
+from aerotri.statistics.adjusted_block import AdjustedBlock
+
+PEER = "independent model"
+QUESTION = "all unknowns with the forward model written from the papers alone, self-calibration included"
+ELEMENTS = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
+KINDS = {"interior": "interior orientation", "additional": "additional parameters", "gnss": "GNSS shifts and drifts"}
+
+
+def check_with_paper(adjusted: AdjustedBlock, adjust: Callable[[Block], AdjustedBlock]) -> PeerCheck:
+    """Adjust the block independently, from a start away from the solution, and compare all unknowns.
+
+    Parameters
+    ----------
+    adjust : our adjustment, for a robust one is repeated with its final weights.
+    """
+    notes = []
+    if adjusted.block.settings.adjustment.robust != "off":
+        adjusted = adjust(with_fixed_weights(adjusted))
+        notes.append("ours adjusted again by least squares with the final weights of the robust estimation")
+    origin = np.round(np.nanmean(adjusted.images.centre, axis=0))
+    begun = time.perf_counter()
+    try:
+        paper = paper_block(adjusted.block, used_rays(adjusted), adjusted.rays.weight, origin)
+    except UnknownToPaperError as unknown:
+        return PeerCheck(PEER, QUESTION, "not available", str(unknown))
+    layout, start = lay_out(paper, _known(adjusted, paper))
+    solution = _solve(paper, layout, start)
+    check = PeerCheck(
+        PEER,
+        QUESTION,
+        status="not converged",
+        reason=f"{solution.solver} stopped after {solution.iterations} iterations",
+        solver=solution.solver,
+        iterations=solution.iterations,
+        seconds=time.perf_counter() - begun,
+        observations=paper.observations,
+        unknowns=int(layout.free.sum()),
+        vtpv=adjusted.outcome.vtpv,
+        vtpv_peer=solution.vtpv,
+        differences=_differences(adjusted, paper, layout, solution.x),
+        notes=(*notes, *_notes(adjusted, solution)),
+    )
+    return judge(check) if solution.converged else check
+
+
+def _notes(adjusted: AdjustedBlock, solution: PaperSolution) -> list[str]:
+    notes = []
+    if solution.solver == "SciPy":
+        notes.append("pyceres is not installed: solved by SciPy's sparse factor (pip install 'aerotri[ceres]')")
+    if adjusted.block.settings.adjustment.datum in ("minimal", "inner"):
+        notes.append("datum: seven point coordinates held at our values")
+    return notes
+
+
+def _solve(paper: PaperBlock, layout: Layout, start: np.ndarray) -> PaperSolution:
+    try:
+        from aerotri.crosscheck.ceres_solver import solve_with_ceres
+    except ImportError:
+        return solve_normal_equations(paper, layout, start)
+    return solve_with_ceres(paper, layout, start)
+
+
+def _known(adjusted: AdjustedBlock, paper: PaperBlock) -> KnownSolution:
+    settings = adjusted.block.settings.adjustment
+    held = np.zeros((len(paper.images), 6), dtype=bool)
+    if settings.datum == "fixed":
+        row = {str(name): k for k, name in enumerate(adjusted.block.images.names[paper.images])}
+        for image, element in settings.datum_fixed:
+            if image in row:
+                held[row[image], ELEMENTS.index(element)] = True
+    return KnownSolution(
+        centre=adjusted.images.centre[paper.images] - paper.origin,
+        angles=adjusted.images.angles[paper.images],
+        points=adjusted.points.xyz[paper.points] - paper.origin,
+        held_poses=held,
+        datum_free=settings.datum in ("minimal", "inner"),
+    )
+
+
+def _differences(adjusted: AdjustedBlock, paper: PaperBlock, layout: Layout, x: np.ndarray) -> tuple[Difference, ...]:
+    block, images, points = adjusted.block, adjusted.images, adjusted.points
+    names = block.images.names[paper.images]
+    sigma = images.sigma[paper.images]
+    centre = x[layout.poses[:, :3]] + paper.origin - images.centre[paper.images]
+    turn = angles_of(rotations(layout, x, paper.order), paper.order) - images.angles[paper.images]
+    turn = (turn + np.pi) % (2.0 * np.pi) - np.pi
+    point = x[layout.points] + paper.origin - points.xyz[paper.points]
+    found = [
+        difference("projection centres", centre, sigma[:, :3], names, ELEMENTS[:3]),
+        difference("orientation angles", turn, sigma[:, 3:], names, ELEMENTS[3:]),
+        difference("object points", point, points.sigma[paper.points], block.points[paper.points], ("X", "Y", "Z")),
+        *_shared_differences(adjusted, paper, x[layout.shared]),
+    ]
+    return tuple(d for d in found if d is not None)
+
+
+def _shared_differences(adjusted: AdjustedBlock, paper: PaperBlock, values: np.ndarray) -> list[Difference | None]:
+    p, place = adjusted.parameters, paper.shared.place()
+    owner_kind = {"interior": "camera", "additional": "group", "gnss": "gnss"}
+    peer = np.full(len(p), np.nan)
+    for k, (name, group, kind) in enumerate(zip(p.names, p.groups, p.kinds, strict=True)):
+        entry = place.get((str(name), (owner_kind[str(kind)], str(group))))
+        peer[k] = np.nan if entry is None or not paper.shared.free[entry] else values[entry]
+    labels = np.array([f"{name} ({group})" for name, group in zip(p.names, p.groups, strict=True)], dtype=object)
+    return [
+        difference(title, (peer - p.value)[own, None], p.sigma[own, None], labels[own], ("",))
+        for kind, title in KINDS.items()
+        if len(own := np.flatnonzero(p.kinds == kind))
+    ]

@@ -1,0 +1,41 @@
+"""Both checks of an adjusted block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from aerotri.crosscheck.comparison import CrosscheckResult, PeerCheck
+from aerotri.crosscheck.paper_check import check_with_paper
+from aerotri.observations import Block
+from aerotri.statistics.adjusted_block import AdjustedBlock
+
+
+def crosscheck(
+    adjusted: AdjustedBlock,
+    adjust: Callable[[Block], AdjustedBlock],
+    report: Callable[[str], None] | None = None,
+) -> CrosscheckResult:
+    """The block through pycolmap and through an independent model, differences against our σ.
+
+    Parameters
+    ----------
+    adjusted : a converged adjustment.
+    adjust : adjusts a block; needed again for blocks freed of systematic errors or with fixed weights.
+    report : called with what is being done.
+    """
+    tell = report or (lambda text: None)
+    tell("adjusting through pycolmap")
+    colmap = _colmap(adjusted, adjust)
+    tell("adjusting by the independent model")
+    return CrosscheckResult(adjusted.block.name, (colmap, check_with_paper(adjusted, adjust)))
+
+
+def _colmap(adjusted: AdjustedBlock, adjust: Callable[[Block], AdjustedBlock]) -> PeerCheck:
+    try:
+        from aerotri.crosscheck.colmap_check import check_with_colmap
+    except ImportError as missing:
+        return PeerCheck(
+            "pycolmap", "points and orientation through pycolmap", "not available",
+            f"{missing.name} is not installed (pip install 'aerotri[ceres]')",
+        )  # fmt: skip
+    return check_with_colmap(adjusted, adjust)

@@ -1,0 +1,94 @@
+"""What the user has to be told beside the numbers: why there is no result, and what to doubt in the one there is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerotri.adjustment.datum import control_share, nothing_holds
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.solve import Solution
+from aerotri.adjustment.unknowns import State
+from aerotri.statistics.adjusted_block import Outcome
+from aerotri.statistics.summarise import count_observations
+
+RUNAWAY = 5.0
+"""Factor by which a principal distance may change before the adjustment is taken for lost."""
+
+LITTLE_CONTROL = 0.25
+"""Share of the block's area that height control should span at least."""
+
+
+class AdjustmentFailedError(Exception):
+    """The adjustment has no result; `outcome` says why."""
+
+    def __init__(self, outcome: Outcome):
+        self.outcome = outcome
+        super().__init__(f"{outcome.status}: {outcome.message}")
+
+
+def failure(system: NormalSystem, status: str, message: str, iterations: int = 0) -> AdjustmentFailedError:
+    """The error of an adjustment without result."""
+    counts = count_observations(system)
+    return AdjustmentFailedError(
+        Outcome(
+            status=status,
+            message=message,
+            iterations=iterations,
+            sigma0=np.nan,
+            sigma0_um=np.nan,
+            vtpv=np.nan,
+            observations=counts.observations,
+            unknowns=counts.unknowns,
+            conditions=counts.conditions,
+            redundancy=counts.redundancy,
+        )
+    )
+
+
+def defects_in_words(system: NormalSystem, defects: list[str] | tuple[str, ...]) -> str:
+    """The rank defects with their cause and remedy."""
+    text = "; ".join(defects)
+    if system.unknowns.block.settings.adjustment.datum != "control" or "datum" not in text:
+        return text
+    if nothing_holds(system):
+        return f'no control: {text}. Give control points, or set datum = "minimal" or "inner"'
+    return f"too little control: {text}"
+
+
+def refuse_runaway(system: NormalSystem, solution: Solution) -> None:
+    """A principal distance that ran away is no convergence, however small the residuals have become.
+
+    Raises
+    ------
+    AdjustmentFailedError
+    """
+    base = system.unknowns.lens.base[:, 0]
+    found = system.unknowns.interior(solution.state)[:, 0]
+    change = np.abs(np.log(np.maximum(found / base, 1e-12)))
+    if (change > np.log(RUNAWAY)).any():
+        worst = int(np.argmax(change))
+        raise failure(
+            system,
+            "not converged",
+            f"the principal distance ran from {base[worst]:g} to {found[worst]:.3g} mm: the parameters chosen cannot be "
+            "told apart",
+            solution.iterations,
+        )
+
+
+def doubts(system: NormalSystem, state: State) -> tuple[str, ...]:
+    """Sentences about what the block itself leaves doubtful."""
+    block, said = system.unknowns.block, []
+    if block.settings.adjustment.datum == "control" and system.centres is None:
+        share = control_share(system.unknowns, state)
+        if share < LITTLE_CONTROL:
+            said.append(
+                f"the height control spans {100.0 * share:.0f} % of the block's area: beyond it heights are "
+                "extrapolated, see their σ"
+            )
+    redundancy = count_observations(system).redundancy
+    if redundancy <= 0:
+        said.append(f"redundancy {redundancy}: nothing controls the observations, σ is not known")
+    if block.gnss_ins is not None and np.isfinite(block.gnss_ins.angles).any():
+        said.append("observed attitudes are not used as observations in this version")
+    return tuple(said)
