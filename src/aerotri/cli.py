@@ -94,5 +94,17 @@ def convert(
     run_convert(source, target, to, positions, json_)
 
 
+@app.command(epilog="Example: aerotri crosscheck blocks/frederiksstad_ultracam --out check")
+def crosscheck(
+    source: Annotated[Path, typer.Argument(help="A result folder, a block, or any format that convert reads.")],
+    out: Annotated[Path | None, typer.Option(help="Folder to write; default NAME_crosscheck here.")] = None,
+    json_: Json = False,
+) -> None:
+    """Adjust the same block by pycolmap and by Ceres with an independent model, and compare against σ."""
+    from aerotri.commands.crosscheck import run_crosscheck
+
+    raise typer.Exit(run_crosscheck(source, out, json_))
+
+
 if __name__ == "__main__":
     main()

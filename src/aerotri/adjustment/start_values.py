@@ -11,17 +11,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment import _intersection_kernels
+from aerotri.adjustment.track import AXIS_ANGLE, headings, strips_of_track, vertical_rotations
 from aerotri.adjustment.unknowns import StartValues
 from aerotri.functional_model.additional_parameters import brown, lens
 from aerotri.functional_model.collinearity import interior_row
 from aerotri.functional_model.rotation import rotation_from_angles
-from aerotri.observations import Block
+from aerotri.observations import Block, Control, GnssIns, GnssSettings
 
 MIN_RESECTION_POINTS = 4
 RESECTION_TOLERANCES = (8.0, 40.0)
 """Reprojection errors a ray may have in a resection, in a-priori σ or pixels; the second as last resort."""
 MIN_INTERSECTION = 1e-6
 """Smallest eigenvalue of the intersection's normal matrix per ray: sin² of half the angle, about 0.1°."""
+MIN_TRACK = 3
+"""Projection centres from which a direction of flight is taken."""
+LOOSE_CENTRE = 0.01
+"""σ of a projection centre while start values are sought, as a share of the flying height."""
+TRACK_ROUNDS = (15, 15)
+"""Iterations of the adjustments that refine vertical photographs; points are intersected anew between."""
 OPENCV_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
 
 
@@ -55,9 +62,12 @@ def start_values(block: Block, given_points: np.ndarray | None = None) -> StartV
     oriented = np.isfinite(centre).all(axis=1) & np.isfinite(block.images.angles).all(axis=1)
     rotation = np.full((len(block.images), 3, 3), np.nan)
     rotation[oriented] = rotation_from_angles(block.images.angles[oriented], block.rotation)
-    centre[~oriented] = np.nan
     known = _full_control(block, origin)
     points = known.copy()
+    observed = _observed_centres(block, centre, origin)
+    centre[~oriented] = np.nan
+    if not oriented.any() and np.isfinite(observed[:, 0]).sum() >= MIN_TRACK:
+        points = _orient_along_track(block, origin, directions, observed, rotation, centre, known)
     for tolerance in RESECTION_TOLERANCES:
         while True:
             _intersect_into(points, block, directions, rotation, centre)
@@ -72,19 +82,70 @@ def start_values(block: Block, given_points: np.ndarray | None = None) -> StartV
     return StartValues(origin, rotation, centre, points)
 
 
-def refine(block: Block, origin: np.ndarray, rotation, centre, points, iterations: int = 6) -> None:
+def _observed_centres(block: Block, centre: np.ndarray, origin: np.ndarray) -> np.ndarray:
+    """(n, 3) m, projection centres given or observed by GNSS, local; NaN where neither."""
+    observed = centre.copy()
+    if block.gnss_ins is not None:
+        rows = block.gnss_ins.image
+        missing = ~np.isfinite(observed[rows]).all(axis=1)
+        observed[rows[missing]] = block.gnss_ins.xyz[missing] - origin
+    observed[~np.isfinite(observed).all(axis=1)] = np.nan
+    return observed
+
+
+def _orient_along_track(block: Block, origin, directions, observed, rotation, centre, known) -> np.ndarray:
+    """Vertical photographs along the track, refined with the centres as observations; the points they intersect."""
+    there = np.flatnonzero(np.isfinite(observed[:, 0]))
+    strip = strips_of_track(observed[there], np.asarray(block.images.strip)[there])
+    heading = headings(observed[there], strip)
+    stated = [block.cameras[c].flight_axis for c in block.images.camera[there]]
+    best = None
+    for axis in AXIS_ANGLE if any(a is None for a in stated) else ("+y",):
+        axes = np.array([a or axis for a in stated])
+        trial = np.full_like(rotation, np.nan)
+        trial[there] = vertical_rotations(heading, axes)
+        points = np.full_like(known, np.nan)
+        miss = _intersect_into(points, block, directions, trial, observed)
+        if best is None or miss < best[0]:
+            best = (miss, trial, points)
+    if best is not None:
+        rotation[:], points = best[1], best[2]
+        centre[there] = observed[there]
+        height = float(np.nanmedian(observed[:, 2]) - np.nanmedian(points[:, 2]))
+        centres = _loose_centres(block, observed + origin, LOOSE_CENTRE * max(abs(height), 1.0))
+        for iterations in TRACK_ROUNDS:
+            refine(block, origin, rotation, centre, points, iterations, centres)
+            _intersect_into(points, block, directions, rotation, centre)
+    return points
+
+
+def _loose_centres(block: Block, observed: np.ndarray, sigma_m: float) -> GnssIns:
+    """The centres as observations that hold the block without forcing it; `observed` (n, 3) m."""
+    rows = np.flatnonzero(np.isfinite(observed[:, 0]))
+    nothing = np.full((len(rows), 3), np.nan)
+    return GnssIns(rows, observed[rows], np.full((len(rows), 3), sigma_m), nothing, nothing, nothing[:, 0])
+
+
+def refine(block: Block, origin, rotation, centre, points, iterations: int = 6, centres: GnssIns | None = None) -> None:
     """A short robust adjustment of what is oriented so far, in place, so that errors do not grow along a strip.
 
-    Without additional parameters; in the datum of the control where there is enough of it, else of seven coordinates.
+    Without additional parameters; in the datum of `centres` where they are given, of the control where there is enough
+    of it, else of seven coordinates.
     """
     from aerotri.adjustment.prepare import USED, build_system, ray_status
     from aerotri.adjustment.solve import SolveOptions, minimise
 
     start = StartValues(origin, rotation, centre, points)
     controlled = int(np.isfinite(points[block.control.point[~block.control.is_check], 0]).sum()) >= MIN_RESECTION_POINTS
-    for datum in ("control", "minimal") if controlled else ("minimal",):
+    datums = ("control", "minimal") if controlled else ("minimal",)
+    for datum in datums if centres is None else ("control",):
         settings = replace(block.settings.adjustment, additional_parameters=(), datum=datum, datum_points=())
-        bare = replace(block, gnss_ins=None, settings=replace(block.settings, adjustment=settings))
+        bare = replace(
+            block,
+            gnss_ins=centres,
+            control=block.control if centres is None else Control.empty(),
+            settings=replace(block.settings, adjustment=settings, gnss=GnssSettings(shift="off")),
+        )
         status, _ = ray_status(bare, start)
         if (status == USED).sum() < 10:
             return
@@ -128,8 +189,11 @@ def _directions(block: Block) -> _Directions:
     return _Directions(tangent, tolerance)
 
 
-def _intersect_into(points, block: Block, directions: _Directions, rotation, centre) -> None:
-    """Intersect every point from the oriented photographs; points that cannot be keep what they have."""
+def _intersect_into(points, block: Block, directions: _Directions, rotation, centre) -> float:
+    """Intersect every point from the oriented photographs; points that cannot be keep what they have.
+
+    Returns the median angular distance (rad) of rays from their points, π where a point could not be had.
+    """
     rays = block.image_points
     use = np.isfinite(centre[rays.image, 0])
     image, point = rays.image[use], rays.point[use]
@@ -139,6 +203,11 @@ def _intersect_into(points, block: Block, directions: _Directions, rotation, cen
     found = intersect(len(points), point, centre[image], ray, directions.tolerance[use])
     there = np.isfinite(found).all(axis=1)
     points[there] = found[there]
+    reach = found[point] - centre[image]
+    with np.errstate(invalid="ignore"):
+        along = np.einsum("mi,mi->m", reach, ray) / np.linalg.norm(reach, axis=1)
+    miss = np.where(np.isfinite(along), np.arccos(np.clip(along, -1.0, 1.0)), np.pi)
+    return float(np.median(miss)) if len(miss) else np.pi
 
 
 def intersect(n_points: int, point: np.ndarray, centre: np.ndarray, ray: np.ndarray, tolerance: np.ndarray):

@@ -1,0 +1,71 @@
+"""Orientation from projection centres alone: vertical photographs, κ from the direction of flight [C].
+
+Strips are taken from the images' strip names, or found where the track turns. Which image axis points along the flight
+is the camera's `flight_axis`; where it is not stated, all four are tried by the caller.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerotri.functional_model.rotation import rotation_from_angles
+
+TURN = np.radians(45.0)
+"""Change of direction between two legs that ends a strip."""
+LONG_LEG = 3.0
+"""A leg this many times the usual one ends a strip."""
+
+AXIS_ANGLE = {"+x": 0.0, "+y": np.pi / 2.0, "-x": np.pi, "-y": -np.pi / 2.0}
+"""Direction of the flight in the image, counted from the x axis."""
+
+
+def strips_of_track(centre: np.ndarray, names: np.ndarray) -> np.ndarray:
+    """(n,) number of the strip every photograph belongs to.
+
+    Parameters
+    ----------
+    centre : (n, 3) m in the order of exposure. names : (n,) strip names, '' where unknown.
+    """
+    if len(names) and all(str(name) for name in names):
+        return np.unique(names.astype(str), return_inverse=True)[1]
+    leg = np.diff(centre[:, :2], axis=0)
+    length = np.hypot(leg[:, 0], leg[:, 1])
+    usual = np.median(length[length > 0]) if (length > 0).any() else 1.0
+    heading = np.arctan2(leg[:, 1], leg[:, 0])
+    strip, number = np.zeros(len(centre), dtype=np.int64), 0
+    for k in range(1, len(centre)):
+        turned = k >= 2 and strip[k - 2] == number and abs(_wrapped(heading[k - 1] - heading[k - 2])) > TURN
+        if length[k - 1] > LONG_LEG * usual or turned:
+            number += 1
+        strip[k] = number
+    return strip
+
+
+def headings(centre: np.ndarray, strip: np.ndarray) -> np.ndarray:
+    """(n,) rad, direction of flight of every photograph, counted from the X axis; NaN for a strip of one.
+
+    The direction of a strip is that from its first to its last half; of a short one, of its neighbours.
+    """
+    heading = np.full(len(centre), np.nan)
+    for number in np.unique(strip):
+        own = np.flatnonzero(strip == number)
+        if len(own) > 1:
+            half = len(own) // 2
+            way = centre[own[-half:], :2].mean(axis=0) - centre[own[:half], :2].mean(axis=0)
+            heading[own] = np.arctan2(way[1], way[0])
+    known = np.flatnonzero(np.isfinite(heading))
+    for k in np.flatnonzero(~np.isfinite(heading)):
+        if len(known):
+            heading[k] = heading[known[np.argmin(np.abs(known - k))]]
+    return heading
+
+
+def vertical_rotations(heading: np.ndarray, axis: str | np.ndarray) -> np.ndarray:
+    """(n, 3, 3) rotations of vertical photographs whose image axis `axis` points along the flight."""
+    angle = np.array([AXIS_ANGLE[a] for a in np.broadcast_to(axis, heading.shape)])
+    zero = np.zeros_like(heading)
+    return rotation_from_angles(np.column_stack([zero, zero, np.nan_to_num(heading) - angle]))
+
+
+def _wrapped(angle: float) -> float:
+    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)

@@ -1,0 +1,82 @@
+"""crosscheck.json: what the comparison with other programs found, for machines.
+
+    { "aerotri": "0.1.0", "block": "saar",
+      "verdict": "agrees",                      // agrees | differs | not checked
+      "message": "agrees — …",                  // the verdict in a line
+      "limits": {"sigma": 0.05, "vtpv": 1e-9, "covariance": 0.001},
+      "checks": [
+        { "peer": "pycolmap",                   // pycolmap | independent model
+          "question": "…",                      // what is compared
+          "status": "agrees",                   // agrees | differs | not converged | not available
+          "reason": "", "solver": "…", "iterations": 0, "seconds": 0, "observations": 0, "unknowns": 0,
+          "vtpv": 0, "vtpv_peer": 0, "vtpv_difference": 0,             // relative, peer − ours
+          "differences": [{"kind": "object points", "count": 0, "max": 0, "rms": 0, "worst": "Z 1007"}],   // |Δ|/σ
+          "covariance": {"photographs": 0, "sigma": 0, "correlation": 0, "worst": ""},   // of the orientation, or null
+          "notes": [""] } ] }
+
+`max` and `rms` are null where the peer has no number for an unknown of the kind. In `covariance`, `sigma` is the
+largest |σ_peer/σ_ours − 1| and `correlation` the largest difference of a correlation.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from aerotri.crosscheck.comparison import COVARIANCE_LIMIT, LIMIT, VTPV_LIMIT, CrosscheckResult, PeerCheck
+
+
+def crosscheck_json(result: CrosscheckResult) -> dict[str, Any]:
+    """The content of crosscheck.json as plain Python values, without NaN."""
+    return {
+        "aerotri": _version(),
+        "block": str(result.block),
+        "verdict": result.verdict,
+        "message": result.sentence,
+        "limits": {"sigma": LIMIT, "vtpv": VTPV_LIMIT, "covariance": COVARIANCE_LIMIT},
+        "checks": [_check(check) for check in result.checks],
+    }
+
+
+def _check(check: PeerCheck) -> dict[str, Any]:
+    covariance = check.covariance
+    return {
+        "peer": check.peer,
+        "question": check.question,
+        "status": check.status,
+        "reason": check.reason,
+        "solver": check.solver,
+        "iterations": int(check.iterations),
+        "seconds": float(check.seconds),
+        "observations": int(check.observations),
+        "unknowns": int(check.unknowns),
+        "vtpv": _number(check.vtpv),
+        "vtpv_peer": _number(check.vtpv_peer),
+        "vtpv_difference": _number(check.vtpv_difference),
+        "differences": [
+            {"kind": d.kind, "count": d.count, "max": _number(d.max), "rms": _number(d.rms), "worst": str(d.worst)}
+            for d in check.differences
+        ],
+        "covariance": None
+        if covariance is None
+        else {
+            "photographs": covariance.photographs,
+            "sigma": _number(covariance.sigma),
+            "correlation": _number(covariance.correlation),
+            "worst": covariance.worst,
+        },
+        "notes": list(check.notes),
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _version() -> str:
+    try:
+        return version("aerotri")
+    except PackageNotFoundError:
+        return "unknown"
