@@ -47,7 +47,12 @@ class InputError(Exception):
         if place and self.line is not None:
             place += f":{self.line}"
         text = f"{place}: {self.message}" if place else self.message
-        return f"{text} — {self.remedy}" if self.remedy else text
+        return _printable(f"{text} — {self.remedy}" if self.remedy else text)
+
+
+def _printable(text: str) -> str:
+    """Text as it may go to a terminal: what a file brought along that is not printable is escaped."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def mm_from_px(column_row: np.ndarray, size_px: tuple[int, int], pixel_mm: float) -> np.ndarray:

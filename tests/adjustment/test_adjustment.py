@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from aerotri.adjustment.start_values import resect, start_values
+from aerotri.adjustment.track import headings, strips_of_track
 from aerotri.conventions import InputError
 from aerotri.formats.solution import read_solution, write_solution
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -244,3 +245,36 @@ def test_points_at_infinity_are_named():
     result = adjust(replace(block, image_points=replace(rays, xy=xy)))
     assert any("do not intersect" in w and str(block.points[chosen]) in w for w in result.outcome.warnings)
     assert (result.rays.status[[one, two]] == 3).all()
+
+
+@pytest.mark.parametrize("axis", ["+y", "-y", "+x", None])
+def test_start_from_centres_alone(axis):
+    """No angles: vertical photographs along the track, crab of 2°, tilts of 1°, 5 % gross errors; axis also unknown."""
+    block, truth = small_block(24, gross_errors={"fraction": 0.05, "range_sigma": [10.0, 100.0]})
+    images, camera = block.images, block.cameras[0]
+    turn = {"+y": 0, "-y": 180, "+x": -90, None: 0}[axis]
+    angle = np.radians(turn)
+    rotate = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    size = camera.size_px[::-1] if axis == "+x" else camera.size_px
+    bare = replace(
+        block,
+        cameras=(replace(camera, model="frame", flight_axis=axis, size_px=size),),
+        images=replace(images, angles=np.full_like(images.angles, np.nan), strip=np.full_like(images.strip, "")),
+        image_points=replace(block.image_points, xy=block.image_points.xy @ rotate.T),
+    )
+    start = start_values(bare)
+    np.testing.assert_allclose(start.centre + start.origin, truth.centre, atol=12.0)
+    result = adjust(with_adjustment(bare, robust="huber"))
+    assert result.outcome.status == "converged"
+    np.testing.assert_allclose(result.images.centre, truth.centre, atol=1.0)
+    # one strip name for each line of flight, and the crossing one
+    assert len(np.unique(strips_of_track(truth.centre, bare.images.strip))) == 4
+
+
+def test_track_with_named_strips_and_single_photographs():
+    centre = np.array([[0.0, 0, 0], [10, 0, 0], [20, 0, 0], [20, 30, 0], [10, 30, 0], [0, 30, 0], [80, 80, 0]])
+    np.testing.assert_array_equal(strips_of_track(centre, np.full(7, "")), [0, 0, 0, 1, 1, 1, 2])
+    named = np.array(["b", "b", "b", "a", "a", "a", "c"])
+    np.testing.assert_array_equal(strips_of_track(centre, named), [1, 1, 1, 0, 0, 0, 2])
+    heading = headings(centre, strips_of_track(centre, named))
+    np.testing.assert_allclose(heading, [0, 0, 0, np.pi, np.pi, np.pi, np.pi])

@@ -2,70 +2,138 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from aerotri.conventions import InputError
-from aerotri.functional_model.additional_parameters import FAMILIES, brown, parameter_set, parse_parameters, ultracam_d
-from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
+from aerotri.functional_model.additional_parameters import (
+    FAMILIES,
+    brown,
+    describe,
+    dmc,
+    format_parameters,
+    is_item,
+    mark_of,
+    parameter_set,
+    parameter_sets,
+    parse_parameters,
+    text_of,
+    ultracam_d,
+)
+from aerotri.functional_model.additional_parameters.native_frame import native_from_image
+from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES, default_items, sizes_of
 from aerotri.observations import Camera, Prior
 
 INTERIOR = {name: Prior(value, fixed=True) for name, value in (("focal_length_mm", 101.4), ("x0_mm", 0), ("y0_mm", 0))}
 
 
+DMC_INTERIOR = INTERIOR | {"focal_length_mm": Prior(120.0, fixed=True)}
+
+
 def camera_for(family: str, flight_axis: str = "+y", size=(11500, 7500), pixel_um=9.0) -> Camera:
-    model = LINEAR_FAMILIES[family].CAMERA_MODEL or "frame"
+    model, interior = LINEAR_FAMILIES[family].CAMERA_MODEL or "frame", INTERIOR
+    if model == "dmc":
+        size, pixel_um, interior = (13824, 7680), 12.0, DMC_INTERIOR
     if flight_axis[1] == "x":
         size = size[::-1]
-    return Camera("cam", model, size, pixel_um, INTERIOR, flight_axis=flight_axis)
+    return Camera("cam", model, size, pixel_um, interior, flight_axis=flight_axis)
 
 
 def full_set(family: str, flight_axis: str = "+y"):
-    return parameter_set(family, LINEAR_FAMILIES[family].ITEMS, camera_for(family, flight_axis))
+    return parameter_set(family, default_items(family), camera_for(family, flight_axis))
+
+
+def all_sets(family: str, flight_axis: str = "+y"):
+    """Sets that hold every item of a family between them; items that exclude each other apart."""
+    camera, items = camera_for(family, flight_axis), LINEAR_FAMILIES[family].ITEMS
+    choices = [items] if family != "dmc" else [dmc.DEFAULT_ITEMS, ("79", "80")]
+    return [parameter_set(family, choice, camera) for choice in choices]
 
 
 def inner_points(camera: Camera, n=400, seed=1):
-    """Image points clear of tile seams and of the axes, where patterns are smooth."""
+    """Image points clear of tile seams, of the axes and of the nodes of default grids, where patterns are smooth."""
     rng = np.random.default_rng(seed)
     half = np.array(camera.half_format_mm)
     xy = rng.uniform(-0.98, 0.98, (n, 2)) * half
-    native = xy @ ultracam_d.native_from_image(camera).T
+    native = xy @ native_from_image(camera).T
     pixel = ultracam_d.native_pixel_mm(camera)
     seams_x = (ultracam_d.SEAM_COLUMNS - ultracam_d.SENSOR_SIZE_PX[0] / 2) * pixel
     seams_y = (ultracam_d.SENSOR_SIZE_PX[1] / 2 - ultracam_d.SEAM_ROWS) * pixel
     clear = (np.abs(native[:, :1] - seams_x).min(axis=1) > 0.01) & (np.abs(native[:, 1:] - seams_y).min(axis=1) > 0.01)
+    clear &= (np.abs(xy) > 0.01).all(axis=1)
+    for family in ("grid", "collocation"):
+        spacing = 2.0 * half / (np.array(sizes_of(family).default) - 1.0)
+        place = (xy + half) / spacing
+        clear &= (np.abs(place - np.round(place)) * spacing > 0.01).all(axis=1)
     return xy[clear].T
 
 
 @pytest.mark.parametrize("family", LINEAR_FAMILIES)
 @pytest.mark.parametrize("flight_axis", ["+x", "-x", "+y", "-y"])
 def test_partials_are_the_derivatives(family, flight_axis):
-    chosen = full_set(family, flight_axis)
-    x, y = inner_points(chosen.camera)
-    analytic, h = chosen.partials(x, y), 1e-5
-    numeric = np.stack(
-        [
-            (chosen.basis(x + h, y) - chosen.basis(x - h, y)) / (2 * h),
-            (chosen.basis(x, y + h) - chosen.basis(x, y - h)) / (2 * h),
-        ],
-        axis=-1,
-    )
-    scale = np.abs(analytic).max(axis=(0, 1, 3))[:, None] + 1e-12
-    np.testing.assert_allclose(analytic / scale, numeric / scale, atol=1e-7)
+    for chosen in all_sets(family, flight_axis):
+        x, y = inner_points(chosen.camera)
+        assert len(x) > 200
+        analytic, h = chosen.partials(x, y), 1e-5
+        numeric = np.stack(
+            [
+                (chosen.basis(x + h, y) - chosen.basis(x - h, y)) / (2 * h),
+                (chosen.basis(x, y + h) - chosen.basis(x, y - h)) / (2 * h),
+            ],
+            axis=-1,
+        )
+        scale = np.abs(analytic).max(axis=(0, 1, 3))[:, None] + 1e-12
+        np.testing.assert_allclose(analytic / scale, numeric / scale, atol=1e-7)
 
 
 @pytest.mark.parametrize("family", LINEAR_FAMILIES)
 def test_contract(family):
-    module, chosen = LINEAR_FAMILIES[family], full_set(family)
-    assert chosen.names == tuple(f"{family}.{item}" for item in module.ITEMS)
+    module = LINEAR_FAMILIES[family]
     assert set(module.MARK) <= set("PLDC")
     assert len(module.REFERENCE) > 10
-    x, y = inner_points(chosen.camera, 30)
-    basis = chosen.basis(x, y)
-    assert basis.shape == (len(x), 2, len(module.ITEMS))
-    assert np.isfinite(chosen.basis(np.zeros(1), np.zeros(1))).all()
-    for k in (0, len(module.ITEMS) // 2, len(module.ITEMS) - 1):
-        alone = parameter_set(family, [module.ITEMS[k]], chosen.camera)
-        np.testing.assert_array_equal(alone.basis(x, y)[:, :, 0], basis[:, :, k])
-    assert chosen.basis(np.zeros(0), np.zeros(0)).shape == (0, 2, len(module.ITEMS))
+    assert len(set(module.ITEMS)) == len(module.ITEMS)
+    assert set(default_items(family)) <= set(module.ITEMS)
+    assert all(module.DESCRIPTION[item] for item in module.ITEMS)
+    assert {item for chosen in all_sets(family) for item in chosen.items} == set(module.ITEMS)
+    for chosen in all_sets(family):
+        x, y = inner_points(chosen.camera, 30)
+        basis = chosen.basis(x, y)
+        assert chosen.names == tuple(f"{family}.{item}" for item in chosen.items)
+        assert basis.shape == (len(x), 2, len(chosen.items))
+        assert np.abs(basis).max(axis=(0, 1)).min() > 0.0 or len(chosen.items) > 2 * len(x)
+        assert np.isfinite(chosen.basis(np.zeros(1), np.zeros(1))).all()
+        assert chosen.basis(np.zeros(0), np.zeros(0)).shape == (0, 2, len(chosen.items))
+        for k in (0, len(chosen.items) // 2, len(chosen.items) - 1):
+            alone = parameter_set(family, [chosen.items[k]], chosen.camera)
+            np.testing.assert_array_equal(alone.basis(x, y)[:, :, 0], basis[:, :, k])
+
+
+@pytest.mark.parametrize("family", LINEAR_FAMILIES)
+def test_terms(family):
+    """Partials only on request; every second item gives the same columns; few act where a family is local."""
+    chosen = full_set(family)
+    x, y = inner_points(chosen.camera, 60)
+    terms = chosen.terms(x, y)
+    assert terms.partial is None
+    with_partials = chosen.terms(x, y, partials=True)
+    np.testing.assert_array_equal(with_partials.value, terms.value)
+    assert with_partials.partial.shape == (*terms.value.shape, 2)
+    acting = {"ultracam_d": 4, "dmc": 5, "grid": 8, "collocation": 8}.get(family, len(chosen.items))
+    assert terms.index.shape == (len(x), acting)
+    assert terms.value.shape == (len(x), 2, acting)
+    some = parameter_set(family, chosen.items[::2], chosen.camera)
+    np.testing.assert_array_equal(some.basis(x, y), chosen.basis(x, y)[:, :, ::2])
+    np.testing.assert_array_equal(some.partials(x, y), chosen.partials(x, y)[:, :, ::2])
+    assert parameter_set(family, [], chosen.camera).basis(x, y).shape == (len(x), 2, 0)
+
+
+@pytest.mark.parametrize("family", ["bluh", "ebner", "gruen", "fourier", "legendre", "chebyshev"])
+def test_many_points_are_filled_piece_by_piece(family):
+    """9000 points take three pieces; the last is not full."""
+    chosen = full_set(family)
+    x, y = inner_points(chosen.camera)
+    again = np.arange(9000) % len(x)
+    np.testing.assert_allclose(chosen.basis(x[again], y[again]), chosen.basis(x, y)[again], rtol=1e-12, atol=1e-9)
 
 
 def test_bluh_by_hand():
@@ -144,6 +212,31 @@ def test_bluh_5_and_6_are_weak_by_nature():
     assert (np.delete(taken, [4, 5, 8]) < 0.92).all()
 
 
+@pytest.mark.parametrize(
+    ("size", "pixel_um", "f", "expected"),
+    [
+        ((23000, 23000), 10.0, 153.0, (0.80, 0.59, 0.60, 0.00)),
+        ((11500, 7500), 9.0, 101.4, (0.81, 0.63, 0.58, 0.56)),
+        ((13824, 7680), 12.0, 120.0, (0.82, 0.64, 0.57, 0.68)),
+    ],
+)
+def test_bluh_correlations(size, pixel_um, f, expected):
+    """models.md 2: (1,4) .80, (9,10) .6, (2,3) .6, (4,12) up to .68.
+
+    They are the cosines between the patterns over an evenly covered format, less what the orientation of a photograph
+    over flat ground takes: film, UltraCamD, DMC.
+    """
+    camera = Camera("c", "frame", size, pixel_um, INTERIOR)
+    half = camera.half_format_mm
+    x, y = (g.ravel() for g in np.meshgrid(np.linspace(-half[0], half[0], 61), np.linspace(-half[1], half[1], 61)))
+    basis = parameter_set("bluh", LINEAR_FAMILIES["bluh"].ITEMS, camera).basis(x, y).reshape(-1, 12)
+    orientation = orientation_columns(x, y, f).reshape(-1, 6)
+    left = basis - orientation @ np.linalg.lstsq(orientation, basis, rcond=None)[0]
+    left /= np.linalg.norm(left, axis=0)
+    cosines = [left[:, i - 1] @ left[:, j - 1] for i, j in ((1, 4), (9, 10), (2, 3), (4, 12))]
+    np.testing.assert_allclose(cosines, expected, atol=0.012)
+
+
 def test_ultracam_tiles_single_points():
     """Tile and patterns of single pixels, by hand: tile centres at columns 2004, 5750, 9496, rows 1336, 3750, 6164."""
     chosen = full_set("ultracam_d")
@@ -213,10 +306,141 @@ def test_parse_parameters_refuses(spec):
         parse_parameters(spec)
 
 
+@pytest.mark.parametrize(
+    ("spec", "counts"),
+    [
+        ("dmc", {"dmc": 17}),
+        ("dmc:30-41+79+80", {"dmc": 14}),
+        ("ebner:all,gruen:all", {"ebner": 12, "gruen": 44}),
+        ("fourier:1x1", {"fourier": 16}),
+        ("fourier", {"fourier": 16}),
+        ("fourier:2x1+xc0p2", {"fourier": 29}),
+        ("legendre", {"legendre": 12}),
+        ("legendre:2x2", {"legendre": 12}),
+        ("legendre:4x4", {"legendre": 44}),
+        ("legendre:5x5,chebyshev:2x3", {"legendre": 66, "chebyshev": 18}),
+        ("collocation", {"collocation": 494}),
+        ("collocation:13x9,grid:2x2", {"collocation": 234, "grid": 8}),
+    ],
+)
+def test_parse_parameters_of_families_with_sizes(spec, counts):
+    """Counts of models.md 4."""
+    assert {family: len(items) for family, items in parse_parameters(spec)} == counts
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ("dmc:74+80", "dmc.80 stands for the sum"),
+        ("dmc:30-41+74-77,dmc:80", "dmc.80 stands for the sum"),
+        ("dmc:29", "dmc.29 depends on the heights"),
+        ("dmc:42", "it has 30-41\\+74-77\\+79-80"),
+        ("bluh:2-1", "a range goes upwards"),
+        ("bluh:1-99999999999", "a range goes upwards"),
+        ("bluh:2x2", "'bluh' has no parameter '2x2'"),
+        ("legendre:1x1", "choose from 2x2 to 6x6"),
+        ("fourier:7x1", "choose from 1x1 to 6x6"),
+        ("fourier:xc7p0", "as in fourier:1x1"),
+        ("collocation:5x5+7x7", "choose one grid"),
+        ("collocation:100000x100000", "'collocation' has no parameter"),
+        ("grid:5x5_x_5_0", "'grid' has no parameter '5x5_x_5_0'"),
+    ],
+)
+def test_parse_parameters_says_what_is_wrong(spec, message):
+    with pytest.raises(InputError, match=message):
+        parse_parameters(spec)
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        ["bluh:1-12", "ultracam_d:42-73", "brown:K1+K2+P1"],
+        ["bluh:1-3+5+11-12"],
+        ["dmc:30-41+74-77+79"],
+        ["gruen:all", "ebner:1-4"],
+        ["fourier:2x1", "legendre:4x4", "chebyshev:2x3"],
+        ["collocation:19x13", "grid:5x4"],
+        ["grid:5x4_x_0_0+5x4_y_4_3"],
+        ["legendre:affinity+ax0y2"],
+        ["lens:all"],
+    ],
+)
+def test_format_parameters_by_example(spec):
+    assert format_parameters(parse_parameters(spec)) == spec
+
+
+def test_format_parameters_of_nothing():
+    assert format_parameters(()) == []
+    assert parse_parameters([]) == ()
+
+
+@st.composite
+def choices(draw):
+    """Any legal choice, items in the family's order."""
+    chosen = []
+    for family in draw(st.lists(st.sampled_from(sorted(FAMILIES)), max_size=4, unique=True)):
+        known = default_items(family) if family == "dmc" else FAMILIES[family].ITEMS
+        sizes = sizes_of(family)
+        if sizes is not None and draw(st.booleans()):
+            known = sizes.items(draw(st.sampled_from([(2, 2), (3, 2), (2, 5), (6, 6)])))
+        some = draw(st.one_of(st.just(set(known)), st.sets(st.sampled_from(known), min_size=1, max_size=9)))
+        chosen.append((family, tuple(item for item in known if item in some)))
+    return tuple(chosen)
+
+
+@given(choices())
+def test_format_parameters_is_the_inverse_of_parse(chosen):
+    texts = format_parameters(chosen)
+    assert parse_parameters(texts) == parse_parameters(",".join(texts)) == chosen
+    assert parse_parameters([f"{family}:{'+'.join(items)}" for family, items in chosen]) == chosen
+
+
+def test_unknown_items_are_refused_by_parameter_set():
+    with pytest.raises(InputError, match="no parameter '13'"):
+        parameter_set("bluh", ["1", "13"], camera_for("bluh"))
+    with pytest.raises(InputError, match="sum of"):
+        parameter_set("dmc", ["74", "80"], camera_for("dmc"))
+
+
+def test_parameter_sets_of_names():
+    """What a result knows are names; the sets behind them, whatever the size of a grid."""
+    camera = camera_for("ultracam_d")
+    names = ["bluh.3", "bluh.1", "ultracam_d.42", "dmc.34", "brown.K1", "collocation.5x4_x_0_0", "gnss.shift_X"]
+    sets = parameter_sets(names, camera)
+    found = [name for chosen in sets for name in chosen.names]
+    assert found == ["bluh.1", "bluh.3", "ultracam_d.42", "collocation.5x4_x_0_0"]
+
+
+def test_is_item():
+    assert is_item("bluh", "12")
+    assert is_item("collocation", "5x4_y_4_3")
+    assert is_item("brown", "K1")
+    assert not is_item("bluh", "13")
+    assert not is_item("collocation", "5x4_y_5_3")
+    assert not is_item("collocation", "999x999_y_5_3")
+
+
+def test_describe():
+    lines = describe()
+    assert {line.family for line in lines} == set(FAMILIES)
+    assert all(line.text and line.reference and set(line.mark) <= set("PLDC") for line in lines)
+    by_name = {(line.family, line.item): line for line in lines}
+    assert by_name["bluh", "1"].text == "angular affinity"
+    assert (by_name["dmc", "34"].mark, by_name["dmc", "79"].mark, by_name["dmc", "30"].mark) == ("P", "D", "PD")
+    assert "494 parameters" in by_name["collocation", "19x13"].text
+    assert len([line for line in lines if line.family == "collocation"]) == 1
+    assert mark_of("bluh", "1") == "P"
+    assert text_of("collocation", "5x4_y_4_3") == "dy at node 4, 3 of 5x4"
+    assert text_of("bluh", "99") == ""
+
+
 def test_family_of_another_camera_is_refused():
     with pytest.raises(InputError, match="camera model 'ultracam_d'"):
         parameter_set("ultracam_d", ["42"], camera_for("bluh"))
 
 
 def test_all_families_are_listed():
-    assert {"bluh", "ultracam_d", "brown", "lens"} <= set(FAMILIES)
+    assert set(FAMILIES) == {
+        "bluh", "ultracam_d", "dmc", "ebner", "gruen", "fourier", "legendre", "chebyshev", "grid", "collocation",
+        "brown", "lens",
+    }  # fmt: skip

@@ -340,6 +340,45 @@ def back_substitute(
 
 
 @kernel
+def settle_points(first, last, rays, table, state, estimator, limit, rounds, residual, weight, work):
+    """Move the points first..last, in place, to where their rays want them while the photographs stand still.
+
+    Each point goes its own damped way and only downhill.
+    """
+    start, points, prior_xyz, prior_weight = rays[0], state[2], table[3], table[4]
+    lower, d, old = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+    for p in range(first, last):
+        n_rays = start[p + 1] - start[p]
+        before, _ = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
+        for a in range(3):
+            before += prior_weight[p, a] * (prior_xyz[p, a] - points[p, a]) ** 2
+        damping = 1e-4
+        for _ in range(rounds):
+            point_normals(p, n_rays, table, points, damping, work, lower, d)
+            for a in range(2, -1, -1):
+                for c in range(a + 1, 3):
+                    d[a] -= lower[c, a] * d[c]
+                d[a] /= lower[a, a]
+            for a in range(3):
+                old[a] = points[p, a]
+                points[p, a] += d[a]
+            after, _ = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
+            for a in range(3):
+                after += prior_weight[p, a] * (prior_xyz[p, a] - points[p, a]) ** 2
+            if after < before:
+                damping *= 0.1
+                small = before - after < 1e-3 * before
+                before = after
+                if small:
+                    break
+            else:
+                for a in range(3):
+                    points[p, a] = old[a]
+                damping *= 30.0
+                linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
+
+
+@kernel
 def residuals(first, last, rays, state, residual):
     """Measured minus predicted (mm) of the rays of points first..last."""
     start, image, lens_row, xy, _, ap_index, ap_value = rays

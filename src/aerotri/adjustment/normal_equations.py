@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -219,6 +219,22 @@ class NormalSystem:
 
         run_chunks(chunk, len(self._bounds))
         return Step(images, shared, points)
+
+    def settle_points(self, state: State, estimator: Estimator, rounds: int = 8) -> State:
+        """The state with every point moved, on its own and only downhill, to where its rays want it."""
+        settled = replace(state, points=state.points.copy())
+        residual, weight = np.empty((len(self.unknowns.rays.image), 2)), np.empty(len(self.unknowns.rays.image))
+        rays, table, kernel_state = self.unknowns.rays.as_tuple(), self._table(state), self._state(settled)
+
+        def chunk(k: int):
+            first, last = self._bounds[k]
+            _kernels.settle_points(
+                first, last, rays, table, kernel_state, estimator.code, estimator.limit, rounds, residual, weight,
+                self._work(),
+            )  # fmt: skip
+
+        run_chunks(chunk, len(self._bounds))
+        return settled
 
     def point_cofactors(self, state: State, inverse: InverseOnPattern, estimator: Estimator):
         """Cofactors of the points (P, 3, 3) and redundancy numbers of the rays (m, 2), in the order of `unknowns`."""

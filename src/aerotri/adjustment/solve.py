@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,12 +82,16 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
             if defects:
                 return Solution("rank deficient", state, equations, estimator, 0, tuple(costs), tuple(defects))
         while step is None or not step.improves(equations):
+            if step is not None:
+                step = _with_settled_points(system, step, estimator)
+                if step.improves(equations):
+                    break
             damping = damping.raised()
             if damping.value > LAST_DAMPING:
                 return Solution("not converged", state, equations, estimator, iteration, tuple(costs))
             step = _step(system, state, equations, estimator, damping.value)
-        settled = damping.value == 0.0 and _settled(equations, step, redundancy, estimator, last_decrement)
-        last_decrement = step.decrement if damping.value == 0.0 else np.inf
+        settled = damping.value == 0.0 and not step.points_settled and _settled(equations, step, redundancy, estimator, last_decrement)
+        last_decrement = step.decrement if damping.value == 0.0 and not step.points_settled else np.inf
         damping = damping.lowered(step.gain_ratio(equations))
         state, equations = step.state, step.equations
         costs.append(equations.cost)
@@ -131,6 +135,7 @@ class _Trial:
     equations: NormalEquations
     decrement: float
     smallest_pivot: float
+    points_settled: bool = False
 
     def improves(self, before: NormalEquations) -> bool:
         # at the minimum the cost stands still within rounding
@@ -156,6 +161,12 @@ def _step(system: NormalSystem, state: State, equations: NormalEquations, estima
         return None
     there = system.unknowns.advance(state, step)
     return _Trial(there, system.assemble(there, 0.0, estimator), decrement, factor.smallest_pivot)
+
+
+def _with_settled_points(system: NormalSystem, step: _Trial, estimator: Estimator) -> _Trial:
+    """A step too long for some points (weak rays, gross errors), with these led back to their own minimum."""
+    state = system.settle_points(step.state, estimator)
+    return replace(step, state=state, equations=system.assemble(state, 0.0, estimator), points_settled=True)
 
 
 def _settled(equations, step: _Trial, redundancy: int, estimator: Estimator, last_decrement: float) -> bool:

@@ -23,12 +23,14 @@ RESECTION_TOLERANCES = (8.0, 40.0)
 """Reprojection errors a ray may have in a resection, in a-priori σ or pixels; the second as last resort."""
 MIN_INTERSECTION = 1e-6
 """Smallest eigenvalue of the intersection's normal matrix per ray: sin² of half the angle, about 0.1°."""
-MIN_TRACK = 3
+MIN_TRACK = 6
 """Projection centres from which a direction of flight is taken."""
 LOOSE_CENTRE = 0.01
 """σ of a projection centre while start values are sought, as a share of the flying height."""
-TRACK_ROUNDS = (15, 15)
-"""Iterations of the adjustments that refine vertical photographs; points are intersected anew between."""
+TRACK_ITERATIONS = 20
+"""Iterations of the adjustment that refines vertical photographs."""
+TRACK_TOLERANCE = 20.0
+"""Median miss of the rays, in tolerances, beyond which the track was no track."""
 OPENCV_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
 
 
@@ -113,10 +115,14 @@ def _orient_along_track(block: Block, origin, directions, observed, rotation, ce
         centre[there] = observed[there]
         height = float(np.nanmedian(observed[:, 2]) - np.nanmedian(points[:, 2]))
         centres = _loose_centres(block, observed + origin, LOOSE_CENTRE * max(abs(height), 1.0))
-        for iterations in TRACK_ROUNDS:
-            refine(block, origin, rotation, centre, points, iterations, centres)
-            _intersect_into(points, block, directions, rotation, centre)
-    return points
+        refine(block, origin, rotation, centre, points, TRACK_ITERATIONS, centres)
+        trial = known.copy()
+        if _intersect_into(trial, block, directions, rotation, centre) < TRACK_TOLERANCE * np.median(
+            directions.tolerance
+        ):
+            return points
+        rotation[:], centre[:] = np.nan, np.nan
+    return known.copy()
 
 
 def _loose_centres(block: Block, observed: np.ndarray, sigma_m: float) -> GnssIns:

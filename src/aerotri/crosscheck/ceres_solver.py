@@ -1,6 +1,6 @@
 """The independent adjustment solved by Ceres: one cost function an object point, its rays evaluated together.
 
-pyceres is an extra and is imported by this module and `colmap_problem` alone; both are imported only where a check runs.
+pyceres is an extra and is imported by this module alone, which is itself imported only where a check runs.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pyceres
 
-from aerotri.crosscheck.paper_block import Owner, PaperBlock
+from aerotri.crosscheck.paper_block import Antennas, Owner, PaperBlock
 from aerotri.crosscheck.paper_rays import linearise, linearise_antenna, predict
 from aerotri.crosscheck.paper_system import PaperSolution, observed_entries
 from aerotri.crosscheck.paper_unknowns import Layout
@@ -120,7 +120,9 @@ def _point_costs(paper: PaperBlock, layout: Layout, x: np.ndarray, spans: dict[O
 class _PointCost(pyceres.CostFunction):
     """The rays of one object point. Blocks: the point, a pose for each ray, the shared blocks its rays depend on."""
 
-    def __init__(self, paper: PaperBlock, layout: Layout, x: np.ndarray, spans: dict, rows: slice, local: _LocalEntries):
+    def __init__(
+        self, paper: PaperBlock, layout: Layout, x: np.ndarray, spans: dict, rows: slice, local: _LocalEntries
+    ):
         super().__init__()
         rays, image = paper.rays, paper.rays.image[rows]
         self._order, self._active, self._local = paper.order, layout.active, local
@@ -205,10 +207,9 @@ def _observed_costs(paper: PaperBlock, layout: Layout, x: np.ndarray, spans: dic
 class _AntennaCost(pyceres.CostFunction):
     """One observed antenna. Blocks: the pose, and the block of shifts and drifts where there is one."""
 
-    def __init__(self, paper: PaperBlock, layout: Layout, x: np.ndarray, spans: dict, g: int):
+    def __init__(self, a: Antennas, order: str, layout: Layout, x: np.ndarray, spans: dict, g: int):
         super().__init__()
-        a = paper.antennas
-        self._order, self._lever_arm = paper.order, a.lever_arm
+        self._order, self._lever_arm = order, a.lever_arm
         self._mount = None if layout.mount is None else layout.mount[a.image[g], None]
         self._xyz, self._inv_sigma = a.xyz[g], a.inv_sigma[g]
         image, shared = int(a.image[g]), int(layout.shared[0])
@@ -239,6 +240,7 @@ class _AntennaCost(pyceres.CostFunction):
 
 
 def _antenna_costs(paper: PaperBlock, layout: Layout, x: np.ndarray, spans: dict[Owner, slice]) -> list[_AntennaCost]:
-    if paper.antennas is None:
+    a = paper.antennas
+    if a is None:
         return []
-    return [_AntennaCost(paper, layout, x, spans, g) for g in range(len(paper.antennas.image))]
+    return [_AntennaCost(a, paper.order, layout, x, spans, g) for g in range(len(a.image))]

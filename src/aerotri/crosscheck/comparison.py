@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -162,8 +162,6 @@ class CrosscheckResult:
 
 def judge(check: PeerCheck) -> PeerCheck:
     """The check with its status and reason, from the numbers in it."""
-    from dataclasses import replace
-
     reasons = [
         f"{d.kind} by up to {d.max:.3g} σ ({d.worst})" for d in check.differences if not d.max <= LIMIT
     ]

@@ -57,13 +57,13 @@ def freed_block(adjusted: AdjustedBlock) -> FreedBlock:
     freed = _with_rays(replace(block, cameras=cameras), keep, oriented.corrected_xy(), sigma)
     by_control = block.settings.adjustment.datum == "control" and block.gnss_ins is None
     notes = ["image points freed of the adjusted systematic errors; camera held as adjusted"]
-    if adjusted.parameters.kinds.size and "lens" in {str(n).split(".")[0] for n in adjusted.parameters.names}:
+    if any(camera.lens for camera in block.cameras):
         notes[0] += ", its lens in COLMAP's own model"
     if np.ptp(in_pixels[keep]) > 1e-9 * sigma_px:
         notes.append(f"ours adjusted again with one σ of {sigma_px:.3g} px for all image points")
     left_out = int(used_rays(adjusted).sum() - keep.sum())
     if left_out:
-        notes.append(f"{left_out} rays left out (robust weight below {LEAST_WEIGHT}, or the only ray of a point)")
+        notes.append(f"rays left out: {left_out} (the only ray of a point, or a robust weight below {LEAST_WEIGHT})")
     if not by_control:
         notes.append("adjusted without observed projection centres, in a minimal datum" if block.gnss_ins is not None
                      else "datum: seven point coordinates held")  # fmt: skip

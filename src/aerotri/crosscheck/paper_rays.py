@@ -113,4 +113,4 @@ def linearise_antenna(pose, mount, lever_arm: np.ndarray, order: str) -> tuple[n
     for direction in range(6):
         poses[direction, :, direction] += 1j * STEP
     position = np.stack(antenna(poses, mount, lever_arm, order), axis=-1)
-    return position[0].real, np.moveaxis(position.imag, 0, -1) / STEP
+    return np.real(position[0]), np.moveaxis(np.imag(position), 0, -1) / STEP

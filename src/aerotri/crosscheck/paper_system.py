@@ -67,11 +67,10 @@ def ray_rows(paper: PaperBlock, layout: Layout, x: np.ndarray, rows: slice) -> _
         x[layout.poses[image]], mount, x[layout.points[point]], elements, rays.xy[rows], paper.order, layout.active
     )
     linear = layout.shared[np.maximum(rays.linear, 0)][setup]
+    active = layout.shared[rays.elements[:, layout.active]][setup]
     prediction += np.einsum("kiq,kq->ki", rays.patterns[rows], x[linear])
     values = np.concatenate([by_pose, -by_pose[:, :, :3], by_elements, rays.patterns[rows]], axis=2)
-    columns = np.concatenate(
-        [layout.poses[image], layout.points[point], layout.shared[rays.elements[:, layout.active]][setup], linear], axis=1
-    )
+    columns = np.concatenate([layout.poses[image], layout.points[point], active, linear], axis=1)
     inv_sigma = rays.inv_sigma[rows]
     return _Rows(
         (rays.xy[rows] - prediction) * inv_sigma,

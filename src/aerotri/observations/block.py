@@ -8,12 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 INTERIOR_ELEMENTS = ("focal_length_mm", "x0_mm", "y0_mm")
 BROWN_NAMES = ("K1", "K2", "K3", "P1", "P2", "b1", "b2")
 LENS_NAMES = ("k1", "k2", "p1", "p2", "k3")
+INTERIOR_ORIENTATIONS = ("similarity", "affine", "projective")
+EDIT_ACTIONS = ("off", "check", "control")
+CONSTRAINT_KINDS = ("vertical", "horizontal", "height_difference", "distance", "plane", "line")
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,8 @@ class Camera:
     lens : `Prior` of the forward lens parameters by name (`LENS_NAMES`, dimensionless); a function of the ideal
         direction, as OpenCV, COLMAP and Bundler have it.
     flight_axis : image axis along the flight ('+x', '-x', '+y', '-y') or None when not stated.
+    fiducials : calibrated positions (x, y) in mm of the fiducial marks of a film camera, by name.
+    interior_orientation : one of `INTERIOR_ORIENTATIONS`, how scans of a film camera are brought to the marks.
     """
 
     name: str
@@ -56,6 +62,8 @@ class Camera:
     brown: Mapping[str, Prior] = field(default_factory=dict)
     lens: Mapping[str, Prior] = field(default_factory=dict)
     flight_axis: str | None = None
+    fiducials: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    interior_orientation: str | None = None
 
     @property
     def pixel_mm(self) -> float:
@@ -173,6 +181,72 @@ class GnssIns:
         return len(self.image)
 
 
+@dataclass(frozen=True, eq=False)
+class Fiducials:
+    """Measured fiducial marks of scanned photographs, f of them.
+
+    Parameters
+    ----------
+    image : (f,) index.
+    name : (f,) str, marks of the photograph's camera.
+    column_row : (f, 2) px in the scan, (0, 0) the upper left corner of the upper left pixel.
+    """
+
+    image: np.ndarray
+    name: np.ndarray
+    column_row: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.image)
+
+
+@dataclass(frozen=True, eq=False)
+class Edits:
+    """The operator's decisions, e of them, kept apart from the measurements.
+
+    `off` with an image takes one ray out of the adjustment; `off` without an image takes out the coordinates of a
+    control or check point (its rays stay), or every ray of a point that is neither. `check` and `control`, always
+    without an image, make a control or check point the one or the other, whatever its role in the table.
+
+    Parameters
+    ----------
+    image : (e,) index, −1 where no image is named.
+    point : (e,) index into the block's point names.
+    action : (e,) str, of `EDIT_ACTIONS`.
+    reason : (e,) str, '' where none is given.
+    """
+
+    image: np.ndarray
+    point: np.ndarray
+    action: np.ndarray
+    reason: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.image)
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """Conditions between object points, k of them.
+
+    Parameters
+    ----------
+    kind : (k,) str, of `CONSTRAINT_KINDS`: vertical (same X and Y), horizontal (same Z), height_difference (Z of the
+        second less Z of the first point), distance, plane, line (the points lie on one).
+    points : for each its points, an index array into the block's point names, in the order given.
+    value : (k,) m, NaN for kinds that have none.
+    sigma : (k,) m.
+    """
+
+    kind: np.ndarray
+    points: tuple[np.ndarray, ...]
+    value: np.ndarray
+    sigma: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+
 @dataclass(frozen=True)
 class AdjustmentSettings:
     """What `[adjustment]` of block.toml says; the meaning of every key is in the README.
@@ -244,6 +318,9 @@ class Block:
     cameras : the cameras; images refer to them by index.
     points : (N,) str, the names of all points measured or given.
     gnss_ins : None when nothing was observed.
+    edits, fiducials, constraints : None when there are none.
+    interior_fits : of scanned photographs by index, the `functional_model.interior.FiducialFit` that brought their
+        image points from pixels of the scan to the mm that `image_points` holds.
     """
 
     name: str
@@ -256,3 +333,7 @@ class Block:
     settings: Settings = Settings()
     crs: str = "local"
     rotation: str = "omega-phi-kappa"
+    edits: Edits | None = None
+    fiducials: Fiducials | None = None
+    constraints: Constraints | None = None
+    interior_fits: Mapping[int, Any] = field(default_factory=dict)

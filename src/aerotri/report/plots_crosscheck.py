@@ -11,6 +11,7 @@ from aerotri.report.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, new_
 from aerotri.report.tables import Column, Table
 
 FEWEST_DECADES = 6
+MOST_STEPS = 400
 LOOKS = {
     "projection centres": (INK, "-", 1.6),
     "orientation angles": (INK, (0, (5, 2)), 1.4),
@@ -29,7 +30,8 @@ def crosscheck_table(result: CrosscheckResult) -> Table:
     )  # fmt: skip
     rows = []
     for check in result.checks:
-        rows += [(check.peer, d.kind, d.count, d.max, d.rms, d.worst, _outcome(d.max, LIMIT)) for d in check.differences]
+        for d in check.differences:
+            rows.append((check.peer, d.kind, d.count, d.max, d.rms, d.worst, _outcome(d.max, LIMIT)))
         if check.covariance is not None:
             c = check.covariance
             for what, value in (("σ of the orientation, relative", c.sigma), ("its correlations", c.correlation)):
@@ -76,9 +78,9 @@ def _draw(axes: Axes, check: PeerCheck, left: float) -> None:
     axes.axvline(LIMIT, color=INK, lw=0.9, ls=":")
     for d in check.differences:
         color, style, width = LOOKS[d.kind]
-        at = np.sort(np.clip(np.nan_to_num(d.normalised, posinf=right), left, right))
-        share = np.arange(1, len(at) + 1) / len(at)
-        axes.step([left, *at, right], [0.0, *(100.0 * share), 100.0], where="post", color=color, ls=style, lw=width,
+        share = np.linspace(0.0, 100.0, min(len(d.normalised), MOST_STEPS) + 1)
+        at = np.percentile(np.nan_to_num(d.normalised, posinf=right), share, method="inverted_cdf")
+        axes.step([*np.clip(at, left, right), right], [*share, 100.0], where="post", color=color, ls=style, lw=width,
                   label=f"{d.kind}\n{d.count}, largest {d.max:.1e}")  # fmt: skip
     axes.set_xscale("log")
     axes.set_xlim(left, right)

@@ -23,6 +23,20 @@ UNITS = (
     (r"bluh\.9", "1/mm²"),
     (r"ultracam_d\.(5\d|6[0-5])", "mm"),
     (r"ultracam_d\.(6[6-9]|7\d)", "rad"),
+    (r"dmc\.29", "m"),
+    (r"dmc\.(3\d|4[01])", "1/mm"),
+    (r"dmc\.(7[4-7]|80)", "1/mm²"),
+    (r"ebner\.[3-6]", "1/mm"),
+    (r"ebner\.([789]|10)", "1/mm²"),
+    (r"ebner\.1[12]", "1/mm³"),
+    (r"gruen\.[ab](22|31|13)", "1/mm"),
+    (r"gruen\.[ab](14|23|32|41)", "1/mm²"),
+    (r"gruen\.[ab](15|24|33|42|51)", "1/mm³"),
+    (r"gruen\.[ab](25|34|43|52)", "1/mm⁴"),
+    (r"gruen\.[ab](35|44|53)", "1/mm⁵"),
+    (r"gruen\.[ab](45|54)", "1/mm⁶"),
+    (r"gruen\.[ab]55", "1/mm⁷"),
+    (r"(fourier|legendre|chebyshev|grid|collocation)\..*", "mm"),
     (r"brown\.K1", "1/mm²"),
     (r"brown\.K2", "1/mm⁴"),
     (r"brown\.K3", "1/mm⁶"),
@@ -30,7 +44,7 @@ UNITS = (
     (r"gnss\.shift.*", "m"),
     (r"gnss\.drift.*", "m/s"),
 )
-"""Units by parameter name; those of BLUH in its normalised image coordinates."""
+"""Units by parameter name; those of BLUH, and of dmc.74-77 and 80, in its normalised image coordinates."""
 
 
 @dataclass(frozen=True)

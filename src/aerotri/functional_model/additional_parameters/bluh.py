@@ -7,6 +7,8 @@ half diagonal of 115·√2 mm; displacements come out in the same unit and are s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from aerotri.functional_model.additional_parameters.terms import Terms, dense_terms
@@ -17,8 +19,24 @@ ITEMS = tuple(str(i) for i in range(1, 13))
 MARK = "P"
 CAMERA_MODEL = None
 REFERENCE = "Spreckels, Schlienkamp, Jacobsen, Model deformation – accuracy of digital frame cameras, Table 1"
+DESCRIPTION = {
+    "1": "angular affinity",
+    "2": "affinity",
+    "3": "radial, cos 2b",
+    "4": "radial, sin 2b",
+    "5": "radial, cos b",
+    "6": "radial, sin b",
+    "7": "tangential distortion 1",
+    "8": "tangential distortion 2",
+    "9": "radial symmetric r³",
+    "10": "radial symmetric, sin(πr/64)",
+    "11": "radial symmetric, sin(πr/32)",
+    "12": "radial, sin 4b",
+}
 
 NORMAL_R_MAX = 115.0 * np.sqrt(2.0)
+ZERO_RADIUS_SQUARED = 128.0**2
+FREQUENCY = {"10": np.pi / 64.0, "11": np.pi / 32.0}
 
 
 def scale(camera: Camera) -> float:
@@ -26,59 +44,89 @@ def scale(camera: Camera) -> float:
     return NORMAL_R_MAX / camera.r_max_mm
 
 
-def _along_radius(u, v, g, g_u, g_v):
-    """Pattern −(u, v)·g and its partials, for a scalar function g with partials g_u, g_v."""
-    return (-u * g, -v * g), (-g - u * g_u, -u * g_v, -v * g_u, -g - v * g_v)
+class _Polar:
+    """r, cos b and sin b of normalised positions, and the functions of b; all but r are 0 at r = 0.
 
-
-def _patterns(u: np.ndarray, v: np.ndarray):
-    """The twelve patterns and their partials in normalised coordinates.
-
-    cos b = u/r and sin b = v/r keep the quadrant that a plain arctan(v/u) would lose; every term is 0 at r = 0.
+    cos b = u/r and sin b = v/r keep the quadrant that a plain arctan(v/u) would lose.
     """
-    r = np.hypot(u, v)
-    at_centre = r == 0.0
-    ri = 1.0 / np.where(at_centre, 1.0, r)
-    ri[at_centre] = 0.0
-    cos_b, sin_b = u * ri, v * ri
-    zero, one = np.zeros_like(u), np.ones_like(u)
-    # the gradient of b is (−sin b, cos b)/r, that of r is (cos b, sin b)
-    b_u, b_v = -sin_b * ri, cos_b * ri
-    b = np.arctan2(v, u)
-    yield (-v, -u), (zero, -one, -one, zero)
-    yield (-u, v), (-one, zero, zero, one)
-    for order, function, derivative in (
-        (2, np.cos, lambda a: -np.sin(a)),
-        (2, np.sin, np.cos),
-        (1, np.cos, lambda a: -np.sin(a)),
-        (1, np.sin, np.cos),
-    ):
-        slope = order * derivative(order * b)
-        g = np.where(at_centre, 0.0, function(order * b))
-        yield _along_radius(u, v, g, slope * b_u, slope * b_v)
+
+    def __init__(self, u: np.ndarray, v: np.ndarray):
+        self.r = np.hypot(u, v)
+        self.per_r = np.divide(1.0, self.r, out=np.zeros_like(self.r), where=self.r > 0.0)
+        self.cos, self.sin = u * self.per_r, v * self.per_r
+
+    def of_angle(self, item: str) -> tuple[np.ndarray, np.ndarray]:
+        """The function of b of item 3, 4, 5, 6 or 12 and its derivative by b."""
+        if item == "5":
+            return self.cos, -self.sin
+        if item == "6":
+            return self.sin, self.cos
+        cos_2b, sin_2b = self.cos**2 - self.sin**2, 2.0 * self.sin * self.cos
+        if item == "3":
+            return cos_2b, -2.0 * sin_2b
+        if item == "4":
+            return sin_2b, 2.0 * cos_2b
+        return 2.0 * sin_2b * cos_2b, 4.0 * (cos_2b**2 - sin_2b**2)
+
+
+def _radial_factor(item: str, u: np.ndarray, v: np.ndarray, polar: _Polar, partials: bool):
+    """The scalar g of a pattern −(u, v)·g, and its gradient (None unless asked for)."""
+    if item == "9":
+        return polar.r**2 - ZERO_RADIUS_SQUARED, (2.0 * u, 2.0 * v)
+    if item in FREQUENCY:
+        frequency = FREQUENCY[item]
+        if not partials:
+            return np.sin(frequency * polar.r), None
+        slope = frequency * np.cos(frequency * polar.r)
+        return np.sin(frequency * polar.r), (slope * polar.cos, slope * polar.sin)
+    g, slope = polar.of_angle(item)
+    # the gradient of b is (−sin b, cos b)/r
+    return g, (-slope * polar.sin * polar.per_r, slope * polar.cos * polar.per_r) if partials else None
+
+
+def _pattern(item: str, u: np.ndarray, v: np.ndarray, polar: _Polar, partials: bool):
+    """Pattern (Δu, Δv) of an item and its partials (Δu_u, Δu_v, Δv_u, Δv_v), in normalised coordinates."""
+    if item == "1":
+        return (-v, -u), (0.0, -1.0, -1.0, 0.0)
+    if item == "2":
+        return (-u, v), (-1.0, 0.0, 0.0, 1.0)
     # r·cos b = u and r·sin b = v
-    yield (v * u, -u * u), (v, u, -2.0 * u, zero)
-    yield (v * v, -u * v), (zero, 2.0 * v, -v, -u)
-    yield _along_radius(u, v, r * r - 128.0**2, 2.0 * u, 2.0 * v)
-    for frequency in (np.pi / 64.0, np.pi / 32.0):
-        slope = frequency * np.cos(frequency * r)
-        yield _along_radius(u, v, np.sin(frequency * r), slope * cos_b, slope * sin_b)
-    slope = 4.0 * np.cos(4.0 * b)
-    yield _along_radius(u, v, np.where(at_centre, 0.0, np.sin(4.0 * b)), slope * b_u, slope * b_v)
+    if item == "7":
+        return (v * u, -u * u), (v, u, -2.0 * u, 0.0)
+    if item == "8":
+        return (v * v, -u * v), (0.0, 2.0 * v, -v, -u)
+    g, gradient = _radial_factor(item, u, v, polar, partials)
+    if gradient is None:
+        return (-u * g, -v * g), None
+    return (-u * g, -v * g), (-g - u * gradient[0], -u * gradient[1], -v * gradient[0], -g - v * gradient[1])
 
 
-def terms(camera: Camera, x: np.ndarray, y: np.ndarray) -> Terms:
+def terms(
+    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
+) -> Terms:
     """Patterns 1–12 at image points.
 
     Parameters
     ----------
     x, y : (n,) mm from the image centre.
+    partials : whether the derivatives are wanted.
+    items : which items, all unless given.
 
     Returns
     -------
-    Terms with 12 columns.
+    Terms with a column for every item.
     """
-    s = scale(camera)
-    u, v = s * np.asarray(x, dtype=float), s * np.asarray(y, dtype=float)
-    values, partials = zip(*_patterns(u, v), strict=True)
-    return dense_terms([p[0] / s for p in values], [p[1] / s for p in values], list(partials))
+    chosen, s = ITEMS if items is None else items, scale(camera)
+
+    def fill(x: np.ndarray, y: np.ndarray, value: np.ndarray, partial: np.ndarray | None) -> None:
+        u, v = s * x, s * y
+        polar = _Polar(u, v)
+        for k, item in enumerate(chosen):
+            (du, dv), derivatives = _pattern(item, u, v, polar, partials)
+            np.divide(du, s, out=value[:, 0, k])
+            np.divide(dv, s, out=value[:, 1, k])
+            if partial is not None and derivatives is not None:
+                for place, derivative in enumerate(derivatives):
+                    partial[:, place // 2, k, place % 2] = derivative
+
+    return dense_terms(x, y, len(chosen), partials, fill)

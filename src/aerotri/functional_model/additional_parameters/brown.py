@@ -16,6 +16,15 @@ ITEMS = BROWN_NAMES
 MARK = "L"
 CAMERA_MODEL = None
 REFERENCE = "Fraser, Digital camera self-calibration, ISPRS Journal 52 (1997); sign as in DBAT"
+DESCRIPTION = {
+    "K1": "radial r³",
+    "K2": "radial r⁵",
+    "K3": "radial r⁷",
+    "P1": "decentring along x",
+    "P2": "decentring along y",
+    "b1": "affinity, scale of x",
+    "b2": "affinity, shear of x",
+}
 
 
 def image_error(x_bar: np.ndarray, y_bar: np.ndarray, parameters: np.ndarray) -> np.ndarray:

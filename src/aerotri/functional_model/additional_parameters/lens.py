@@ -16,6 +16,13 @@ ITEMS = LENS_NAMES
 MARK = "L"
 CAMERA_MODEL = None
 REFERENCE = "OpenCV calib3d; Agarwal et al., Bundle Adjustment in the Large (2010)"
+DESCRIPTION = {
+    "k1": "radial ρ³ of the ideal direction",
+    "k2": "radial ρ⁵ of the ideal direction",
+    "p1": "decentring along y",
+    "p2": "decentring along x",
+    "k3": "radial ρ⁷ of the ideal direction",
+}
 
 
 def distort(a: np.ndarray, b: np.ndarray, parameters: np.ndarray) -> np.ndarray:

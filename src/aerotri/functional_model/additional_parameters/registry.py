@@ -1,20 +1,37 @@
-"""The families by name, and the choice of items of one family for one camera."""
+"""The families by name, the choice of items of one family for one camera, and what there is to choose from."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from types import ModuleType
 
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.functional_model.additional_parameters import bluh, brown, lens, ultracam_d
-from aerotri.functional_model.additional_parameters.terms import Terms
+from aerotri.functional_model.additional_parameters import (
+    bluh,
+    brown,
+    chebyshev,
+    collocation,
+    dmc,
+    ebner,
+    fourier,
+    grid,
+    gruen,
+    legendre,
+    lens,
+    ultracam_d,
+)
+from aerotri.functional_model.additional_parameters.sizes import Sizes, size_of, size_text
+from aerotri.functional_model.additional_parameters.terms import Terms, dense_terms
 from aerotri.observations import Camera
 
-LINEAR_FAMILIES: dict[str, ModuleType] = {m.FAMILY: m for m in (bluh, ultracam_d)}
+LINEAR_FAMILIES: dict[str, ModuleType] = {
+    m.FAMILY: m
+    for m in (bluh, ultracam_d, dmc, ebner, gruen, fourier, legendre, chebyshev, grid, collocation)
+}  # fmt: skip
 """Families whose image error is linear in the parameters and a function of the measured position alone."""
 
 INTERIOR_FAMILIES: dict[str, ModuleType] = {m.FAMILY: m for m in (brown, lens)}
@@ -43,33 +60,34 @@ class ParameterSet:
         """'bluh.1' and so on."""
         return tuple(f"{self.family}.{item}" for item in self.items)
 
-    def terms(self, x: np.ndarray, y: np.ndarray) -> Terms:
-        """Acting patterns at points; `index` counts within `items`, columns of items not chosen are zero."""
-        module = LINEAR_FAMILIES[self.family]
-        terms = module.terms(self.camera, np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        place = np.full(len(module.ITEMS), -1)
-        place[[module.ITEMS.index(item) for item in self.items]] = np.arange(len(self.items))
-        index = place[terms.index]
-        keep = np.flatnonzero((index >= 0).any(axis=0)) if len(index) else np.arange(index.shape[1])
-        index, value, partial = index[:, keep], terms.value[:, :, keep], terms.partial[:, :, keep]
-        chosen = index >= 0
-        return Terms(np.where(chosen, index, 0), value * chosen[:, None, :], partial * chosen[:, None, :, None])
+    def terms(self, x: np.ndarray, y: np.ndarray, partials: bool = False) -> Terms:
+        """Acting patterns at points; `index` counts within `items`, what belongs to items not chosen is zero."""
+        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        if not self.items:
+            return dense_terms(x, y, 0, partials, lambda *_: None)
+        return LINEAR_FAMILIES[self.family].terms(self.camera, x, y, partials, self.items)
 
     def basis(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """(n, 2, p) image error per unit of each parameter, mm."""
-        return self._scatter(self.terms(x, y), with_partials=False)
+        terms = self.terms(x, y)
+        return self._scatter(terms.index, terms.value)
 
     def partials(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """(n, 2, p, 2) derivative of `basis` by x and y."""
-        return self._scatter(self.terms(x, y), with_partials=True)
+        terms = self.terms(x, y, partials=True)
+        if terms.partial is None:
+            raise TypeError(f"family '{self.family}' returned no partials")
+        return self._scatter(terms.index, terms.partial)
 
-    def _scatter(self, terms: Terms, with_partials: bool) -> np.ndarray:
-        n, k = terms.index.shape
-        source = terms.partial if with_partials else terms.value
-        dense = np.zeros((n, 2, len(self.items), *source.shape[3:]))
+    def _scatter(self, index: np.ndarray, source: np.ndarray) -> np.ndarray:
+        """Acting columns (n, 2, k, …) at their places among all p of them."""
+        (n, k), p = index.shape, len(self.items)
+        if k == p and (index == np.arange(p)).all():
+            return source
+        dense = np.zeros((n, 2, p, *source.shape[3:]))
         rows = np.arange(n)
         for column in range(k):
-            dense[rows, :, terms.index[:, column]] += source[:, :, column]
+            dense[rows, :, index[:, column]] += source[:, :, column]
         return dense
 
 
@@ -79,7 +97,7 @@ def parameter_set(family: str, items: Iterable[str], camera: Camera) -> Paramete
     Raises
     ------
     InputError
-        When the family belongs to another camera model.
+        When the family belongs to another camera model, has no such item, or items exclude each other.
     """
     module = LINEAR_FAMILIES[family]
     if module.CAMERA_MODEL not in (None, camera.model):
@@ -88,52 +106,94 @@ def parameter_set(family: str, items: Iterable[str], camera: Camera) -> Paramete
             f"'{camera.model}'",
             f'set model = "{module.CAMERA_MODEL}" or leave the family out',
         )
-    wanted = set(items)
-    return ParameterSet(family, tuple(item for item in module.ITEMS if item in wanted), camera)
+    return ParameterSet(family, checked_items(family, items), camera)
 
 
-def parse_parameters(spec: str | Iterable[str]) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """Families and items of a specification such as ``bluh:1-8+12,ultracam_d:42-73`` (or ``none``).
+def parameter_sets(names: Iterable[str], camera: Camera) -> tuple[ParameterSet, ...]:
+    """The linear sets that parameters such as 'bluh.1' belong to, as far as they are of this camera's model.
 
-    Parameters
-    ----------
-    spec : the text of the command line, or the list of block.toml.
+    Names of other families and of other camera models are left out.
+    """
+    items: dict[str, list[str]] = {}
+    for name in names:
+        family, _, item = name.partition(".")
+        if family in LINEAR_FAMILIES and LINEAR_FAMILIES[family].CAMERA_MODEL in (None, camera.model):
+            items.setdefault(family, []).append(item)
+    return tuple(parameter_set(family, items[family], camera) for family in LINEAR_FAMILIES if family in items)
 
-    Returns
-    -------
-    (family, items) pairs; items without repetition in the family's order.
+
+def default_items(family: str) -> tuple[str, ...]:
+    """What ``family:all`` means."""
+    module = FAMILIES[family]
+    return getattr(module, "DEFAULT_ITEMS", module.ITEMS)
+
+
+def sizes_of(family: str) -> Sizes | None:
+    """The sizes in which a family comes; None for one with a fixed list of items."""
+    return getattr(FAMILIES[family], "SIZES", None)
+
+
+def is_item(family: str, item: str) -> bool:
+    """Whether a linear or interior family has an item."""
+    try:
+        return item in _places(family, _size_in_name(family, item))
+    except InputError:
+        return False
+
+
+def checked_items(family: str, items: Iterable[str]) -> tuple[str, ...]:
+    """Items without repetition in the family's order.
 
     Raises
     ------
     InputError
-        For an unknown family or item, naming those there are.
+        For an item that the family does not have, and for items that exclude each other.
     """
-    parts = spec.split(",") if isinstance(spec, str) else list(spec)
-    parts = [part.strip() for part in parts if part.strip()]
-    if parts == ["none"]:
-        return ()
-    chosen: dict[str, set[str]] = {}
-    for part in parts:
-        family, _, items = part.partition(":")
-        if family not in FAMILIES:
-            raise InputError(f"unknown parameter family '{family}'", f"known are {', '.join(FAMILIES)}, or none")
-        chosen.setdefault(family, set()).update(_items(family, items or "all"))
-    return tuple((family, tuple(i for i in FAMILIES[family].ITEMS if i in items)) for family, items in chosen.items())
-
-
-def _items(family: str, text: str) -> list[str]:
-    known = FAMILIES[family].ITEMS
-    if text == "all":
-        return list(known)
-    items: list[str] = []
-    for piece in text.split("+"):
-        span = re.fullmatch(r"(\d+)-(\d+)", piece.strip())
-        names = [str(i) for i in range(int(span[1]), int(span[2]) + 1)] if span else [piece.strip()]
-        unknown = [name for name in names if name not in known]
-        if unknown or not names:
+    module, wanted = FAMILIES[family], dict.fromkeys(items)
+    for item in wanted:
+        if item in getattr(module, "NEEDS_HEIGHT", ()):
             raise InputError(
-                f"'{family}' has no parameter '{unknown[0] if unknown else piece}'",
-                f"it has {known[0]} to {known[-1]}" if known[0].isdigit() else f"it has {', '.join(known)}",
+                f"{family}.{item} depends on the heights of the points and is no pattern of the image", "leave it out"
             )
-        items += names
-    return items
+        if item not in _places(family, _size_in_name(family, item)):
+            raise InputError(f"'{family}' has no parameter '{item}'", items_text(family))
+    if wanted and hasattr(module, "check_items"):
+        module.check_items(tuple(wanted))
+    homes = dict.fromkeys(_size_in_name(family, item) for item in wanted)
+    return tuple(item for home in homes for item in _places(family, home) if item in wanted)
+
+
+def _size_in_name(family: str, item: str) -> tuple[int, int] | None:
+    """The size that begins the name of an item of a grid; None for the items of other families."""
+    return None if sizes_of(family) is None else size_of(item.partition("_")[0])
+
+
+@lru_cache(maxsize=64)
+def _places(family: str, size: tuple[int, int] | None) -> dict[str, int]:
+    """Place of every item, by its name, in the family or among the items of a size."""
+    sizes = sizes_of(family)
+    known = FAMILIES[family].ITEMS if size is None or sizes is None else sizes.items(size)
+    return {item: place for place, item in enumerate(known)}
+
+
+def items_text(family: str) -> str:
+    """What a family has to offer, for messages."""
+    known, sizes = FAMILIES[family].ITEMS, sizes_of(family)
+    if sizes is not None:
+        return (
+            f"it has sizes from {size_text(sizes.smallest)} to {size_text(sizes.largest)}, as in "
+            f"{family}:{size_text(sizes.default)}, and items such as {known[0]}"
+        )
+    return f"it has {joined_items(known)}" if known[0].isdigit() else f"it has {', '.join(known)}"
+
+
+def joined_items(items: Iterable[str]) -> str:
+    """Items as a specification has them: '1-8+12', names joined by +."""
+    runs: list[list[str]] = []
+    for item in items:
+        follows = bool(runs) and item.isdigit() and runs[-1][-1].isdigit() and int(item) == int(runs[-1][-1]) + 1
+        if follows:
+            runs[-1].append(item)
+        else:
+            runs.append([item])
+    return "+".join(run[0] if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)

@@ -8,9 +8,12 @@ The tiles live in the sensor's native frame, x across the flight; `flight_axis` 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from aerotri.functional_model.additional_parameters.terms import Terms
+from aerotri.functional_model.additional_parameters.native_frame import native_from_image
+from aerotri.functional_model.additional_parameters.terms import Terms, only, turned
 from aerotri.observations import Camera
 
 FAMILY = "ultracam_d"
@@ -26,19 +29,14 @@ SEAM_COLUMNS = np.array([3877.0, 7623.0])
 SEAM_ROWS = np.array([2543.0, 4957.0])
 CENTRE_TILE = 4
 OUTER_TILES = tuple(tile for tile in range(9) if tile != CENTRE_TILE)
-
-# rows: image axes of the native axes (across, along) for each flight axis
-NATIVE_FROM_IMAGE = {
-    "+y": np.array([[1.0, 0.0], [0.0, 1.0]]),
-    "-y": np.array([[-1.0, 0.0], [0.0, -1.0]]),
-    "+x": np.array([[0.0, -1.0], [1.0, 0.0]]),
-    "-x": np.array([[0.0, 1.0], [-1.0, 0.0]]),
+TILE_NAMES = (
+    "upper left", "upper", "upper right", "left", "right", "lower left", "lower", "lower right",
+)  # fmt: skip
+DESCRIPTION = {
+    str(42 + 8 * kind + tile): f"{what}, {name} tile"
+    for kind, what in enumerate(("scale", "shift x", "shift y", "rotation"))
+    for tile, name in enumerate(TILE_NAMES)
 }
-
-
-def native_from_image(camera: Camera) -> np.ndarray:
-    """(2, 2) rotation from image axes into the sensor's native axes (x across, y along the flight)."""
-    return NATIVE_FROM_IMAGE[camera.flight_axis or "+y"]
 
 
 def native_pixel_mm(camera: Camera) -> float:
@@ -62,16 +60,20 @@ def tile_of(camera: Camera, x_native: np.ndarray, y_native: np.ndarray) -> np.nd
     return 3 * row + column
 
 
-def terms(camera: Camera, x: np.ndarray, y: np.ndarray) -> Terms:
+def terms(
+    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
+) -> Terms:
     """The four patterns of the tile each point lies in: scale, shift x, shift y, rotation.
 
     Parameters
     ----------
     x, y : (n,) mm from the image centre, the measured position.
+    partials : whether the derivatives are wanted.
+    items : which items, all unless given.
 
     Returns
     -------
-    Terms with 4 columns; all zero within the centre tile, which is held.
+    Terms with up to 4 columns; all zero within the centre tile, which is held.
     """
     turn = native_from_image(camera)
     native = np.stack([x, y], axis=-1) @ turn.T
@@ -82,11 +84,11 @@ def terms(camera: Camera, x: np.ndarray, y: np.ndarray) -> Terms:
     value[:, :, 0] = offset
     value[:, 0, 1] = value[:, 1, 2] = acts
     value[:, 0, 3], value[:, 1, 3] = -offset[:, 1], offset[:, 0]
-    partial = np.zeros((len(tile), 2, 4, 2))
-    partial[:, 0, 0, 0] = partial[:, 1, 0, 1] = acts
-    partial[:, 0, 3, 1], partial[:, 1, 3, 0] = -acts, acts
+    partial = None
+    if partials:
+        partial = np.zeros((len(tile), 2, 4, 2))
+        partial[:, 0, 0, 0] = partial[:, 1, 0, 1] = acts
+        partial[:, 0, 3, 1], partial[:, 1, 3, 0] = -acts, acts
     number = np.where(tile > CENTRE_TILE, tile - 1, np.minimum(tile, CENTRE_TILE - 1))
     index = number[:, None] + 8 * np.arange(4)
-    value = np.einsum("ia,nak->nik", turn.T, value)
-    partial = np.einsum("ia,nakb,bj->nikj", turn.T, partial, turn)
-    return Terms(index, value, partial)
+    return turned(only(Terms(index, value, partial), ITEMS, ITEMS if items is None else items), turn)

@@ -1,0 +1,72 @@
+"""Products of Chebyshev polynomials: the set of `legendre` with T_m(x/bx)·T_n(y/by), which weighs the edges more.
+
+[C] Orthogonal over the format, and to the orientation of a photograph, with the weight of Chebyshev's polynomials,
+1/√((1 − x²/bx²)·(1 − y²/by²)); in that weight q = 2 for k = x² − bx²/2 (see `products`), which is 1 for T_2.
+12 parameters for 2 × 2, 44 for 4 × 4, 66 for 5 × 5. The parameters are millimetres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from aerotri.functional_model.additional_parameters.legendre import PATTERNS, items_of_order, largest_degree
+from aerotri.functional_model.additional_parameters.products import (
+    Polynomials,
+    ProductBasis,
+    pattern_text,
+    product_terms,
+)
+from aerotri.functional_model.additional_parameters.sizes import Sizes
+from aerotri.functional_model.additional_parameters.terms import Terms
+from aerotri.observations import Camera
+
+FAMILY = "chebyshev"
+MARK = "C"
+CAMERA_MODEL = None
+REFERENCE = "Products of Chebyshev polynomials over the format less the orientation; composition of this project"
+LARGEST = (6, 6)
+Q = 1.0
+ITEMS = tuple(PATTERNS)
+SIZES = Sizes("order in x and in y", (2, 2), (2, 2), LARGEST, items_of_order)
+DEFAULT_ITEMS = SIZES.items(SIZES.default)
+NAMES = [["", *(f"T{k}({axis})" for k in range(1, max(LARGEST) + 1))] for axis in "xy"]
+DESCRIPTION = {item: pattern_text(pattern, "", *NAMES) for item, pattern in PATTERNS.items()}
+
+
+def polynomials(degree: int, x: np.ndarray, b: float, partials: bool) -> Polynomials:
+    """T_0 … T_degree of x/b: T_{k+1} = 2u·T_k − T_{k−1}, and the same differentiated."""
+    u = x / b
+    value = np.empty((degree + 1, len(u)))
+    value[0], value[1] = 1.0, u
+    for k in range(1, degree):
+        value[k + 1] = 2.0 * u * value[k] - value[k - 1]
+    if not partials:
+        return Polynomials(value, None)
+    slope = np.zeros_like(value)
+    slope[1] = 1.0 / b
+    for k in range(1, degree):
+        slope[k + 1] = 2.0 / b * value[k] + 2.0 * u * slope[k] - slope[k - 1]
+    return Polynomials(value, slope)
+
+
+def terms(
+    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
+) -> Terms:
+    """Chebyshev patterns at image points.
+
+    Parameters
+    ----------
+    x, y : (n,) mm from the image centre.
+    partials : whether the derivatives are wanted.
+    items : which items, all there are unless given.
+
+    Returns
+    -------
+    Terms with a column for every item.
+    """
+    patterns = [PATTERNS[item] for item in (ITEMS if items is None else items)]
+    basis = ProductBasis(partial(polynomials, largest_degree(patterns)), Q, of_unit_square=True)
+    return product_terms(basis, patterns, camera, x, y, partials)

@@ -1,0 +1,83 @@
+"""Collocation: the image error as a random field, known through the nodes of a bilinear grid. It knows no camera.
+
+[D] dx and dy are independent fields of covariance σ_d²·exp(−ρ/ℓ), ρ the distance in the image; the spacing of the nodes
+has to be well below ℓ. The field enters as one weighted observation of the node vector, L⁻¹·p = 0 with L the Cholesky
+factor of its covariance, so that every node can be estimated however few rays are near it. Items as in `grid`.
+Between the nodes interpolation makes the field a little smoother than the covariance says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aerotri.functional_model.additional_parameters.grid import (
+    LARGEST,
+    SMALLEST,
+    check_items,
+    item_text,
+    node_items,
+    node_positions,
+)
+from aerotri.functional_model.additional_parameters.grid import terms as grid_terms
+from aerotri.functional_model.additional_parameters.sizes import Sizes
+from aerotri.functional_model.additional_parameters.terms import Terms
+from aerotri.observations import Camera
+
+__all__ = ["check_items", "item_text", "prior_covariance", "prior_factor", "terms"]
+
+FAMILY = "collocation"
+MARK = "D"
+CAMERA_MODEL = None
+REFERENCE = "Image error as a random field, bilinear between nodes; derived for this project"
+SIZES = Sizes("nodes along x and along y", (19, 13), SMALLEST, LARGEST, node_items)
+ITEMS = SIZES.items(SIZES.default)
+DESCRIPTION = {item: item_text(item) for item in ITEMS}
+
+
+def terms(
+    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
+) -> Terms:
+    """Weights of the four nodes around each point, for dx and for dy.
+
+    Parameters
+    ----------
+    x, y : (n,) mm from the image centre.
+    partials : whether the derivatives are wanted.
+    items : nodes of one grid, the default grid unless given.
+
+    Returns
+    -------
+    Terms with up to 8 columns.
+    """
+    return grid_terms(camera, x, y, partials, ITEMS if items is None else items)
+
+
+def prior_covariance(
+    camera: Camera, items: Sequence[str], sigma_d: float, length: float, nugget: float = 0.0
+) -> np.ndarray:
+    """Covariance of the nodes before anything is measured: σ_d²·exp(−ρ/ℓ) within dx and within dy, 0 between them.
+
+    Parameters
+    ----------
+    items : p nodes of one grid.
+    sigma_d : mm, σ of the field.
+    length : mm, correlation length ℓ.
+    nugget : mm, σ of what each node has of its own, for jumps at seams.
+
+    Returns
+    -------
+    (p, p) mm², positive definite.
+    """
+    position, axis = node_positions(camera, items)
+    distance = np.hypot(*(position[:, None, :] - position[None, :, :]).transpose(2, 0, 1))
+    covariance = np.where(axis[:, None] == axis[None, :], sigma_d**2 * np.exp(-distance / length), 0.0)
+    return covariance + nugget**2 * np.eye(len(axis))
+
+
+def prior_factor(
+    camera: Camera, items: Sequence[str], sigma_d: float, length: float, nugget: float = 0.0
+) -> np.ndarray:
+    """(p, p) lower Cholesky factor L of `prior_covariance`; L⁻¹·p = 0 is the observation of the node vector p."""
+    return np.linalg.cholesky(prior_covariance(camera, items, sigma_d, length, nugget))

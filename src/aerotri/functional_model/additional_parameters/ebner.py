@@ -1,0 +1,76 @@
+"""Ebner's twelve parameters: orthogonal on 3 × 3 points of the image and to the orientation of a photograph.
+
+[L] With k = x² − 2b²/3 and l = y² − 2b²/3: dx = p1·x + p2·y − 2·p3·k + p4·xy + p5·l + p7·xl + p9·yk + p11·kl,
+dy = −p1·y + p2·x + p3·xy − 2·p4·l + p6·k + p8·yk + p10·xl + p12·kl. b is half the format here, not the base [C]; a
+format of unequal half widths takes the generalised pairs of `products`, q = 2 [D]. Millimetres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aerotri.functional_model.additional_parameters.products import (
+    AFFINITY,
+    SHEAR,
+    TILT_X,
+    TILT_Y,
+    Pattern,
+    Polynomials,
+    ProductBasis,
+    pattern_text,
+    product_terms,
+)
+from aerotri.functional_model.additional_parameters.terms import Terms
+from aerotri.observations import Camera
+
+FAMILY = "ebner"
+MARK = "L"
+CAMERA_MODEL = None
+REFERENCE = "Ebner, Self calibrating block adjustment, Bildmessung und Luftbildwesen 44 (1976)"
+PATTERNS: dict[str, Pattern] = {
+    "1": AFFINITY,
+    "2": SHEAR,
+    "3": TILT_X,
+    "4": TILT_Y,
+    "5": ("x", 0, 2),
+    "6": ("y", 2, 0),
+    "7": ("x", 1, 2),
+    "8": ("y", 2, 1),
+    "9": ("x", 2, 1),
+    "10": ("y", 1, 2),
+    "11": ("x", 2, 2),
+    "12": ("y", 2, 2),
+}
+ITEMS = tuple(PATTERNS)
+DESCRIPTION = {item: pattern_text(p, "2", ("", "x", "k"), ("", "y", "l")) for item, p in PATTERNS.items()}
+
+
+def polynomials(x: np.ndarray, b: float, partials: bool) -> Polynomials:
+    """1, x and k = x² − 2b²/3: orthogonal on −b, 0, b."""
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    value = np.stack([one, x, x**2 - 2.0 * b**2 / 3.0])
+    return Polynomials(value, np.stack([zero, one, 2.0 * x]) if partials else None)
+
+
+BASIS = ProductBasis(polynomials, q=2.0)
+
+
+def terms(
+    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
+) -> Terms:
+    """Ebner's patterns at image points.
+
+    Parameters
+    ----------
+    x, y : (n,) mm from the image centre.
+    partials : whether the derivatives are wanted.
+    items : which items, all unless given.
+
+    Returns
+    -------
+    Terms with a column for every item.
+    """
+    patterns = [PATTERNS[item] for item in (ITEMS if items is None else items)]
+    return product_terms(BASIS, patterns, camera, x, y, partials)
