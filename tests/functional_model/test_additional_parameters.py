@@ -30,12 +30,12 @@ INTERIOR = {name: Prior(value, fixed=True) for name, value in (("focal_length_mm
 DMC_INTERIOR = INTERIOR | {"focal_length_mm": Prior(120.0, fixed=True)}
 
 
-def camera_for(family: str, flight_axis: str = "+y", size=(11500, 7500), pixel_um=9.0) -> Camera:
+def camera_for(family: str, flight_axis: str = "+y", size: tuple[int, int] = (11500, 7500), pixel_um=9.0) -> Camera:
     model, interior = LINEAR_FAMILIES[family].CAMERA_MODEL or "frame", INTERIOR
     if model == "dmc":
         size, pixel_um, interior = (13824, 7680), 12.0, DMC_INTERIOR
     if flight_axis[1] == "x":
-        size = size[::-1]
+        size = (size[1], size[0])
     return Camera("cam", model, size, pixel_um, interior, flight_axis=flight_axis)
 
 
@@ -62,7 +62,7 @@ def inner_points(camera: Camera, n=400, seed=1):
     clear = (np.abs(native[:, :1] - seams_x).min(axis=1) > 0.01) & (np.abs(native[:, 1:] - seams_y).min(axis=1) > 0.01)
     clear &= (np.abs(xy) > 0.01).all(axis=1)
     for family in ("grid", "collocation"):
-        spacing = 2.0 * half / (np.array(sizes_of(family).default) - 1.0)
+        spacing = 2.0 * half / (np.array(LINEAR_FAMILIES[family].SIZES.default) - 1.0)
         place = (xy + half) / spacing
         clear &= (np.abs(place - np.round(place)) * spacing > 0.01).all(axis=1)
     return xy[clear].T
@@ -117,6 +117,7 @@ def test_terms(family):
     assert terms.partial is None
     with_partials = chosen.terms(x, y, partials=True)
     np.testing.assert_array_equal(with_partials.value, terms.value)
+    assert with_partials.partial is not None
     assert with_partials.partial.shape == (*terms.value.shape, 2)
     acting = {"ultracam_d": 4, "dmc": 5, "grid": 8, "collocation": 8}.get(family, len(chosen.items))
     assert terms.index.shape == (len(x), acting)

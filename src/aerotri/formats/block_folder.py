@@ -2,7 +2,7 @@
 
 The format stands in the README. Two keys of this program's own: ``[adjustment] datum_fixed = ["IMAGE:X0", …]`` names
 the orientation elements held by datum = "fixed"; ``[camera.<name>.lens]`` holds the forward lens parameters k1 k2 p1
-p2 k3 as `[camera.<name>.brown]` holds Brown's.
+p2 k3 as `[camera.<name>.brown]` holds Brown's. Of scanned film see `scanned_film`.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerotri.conventions import RADIANS_PER, InputError
+from aerotri.formats.block_extras import read_constraints, read_edits
 from aerotri.formats.block_points import read_control, read_gnss_ins, read_image_points
 from aerotri.formats.block_writer import write_block
-from aerotri.formats.csv_text import is_blank
+from aerotri.formats.scanned_film import read_fiducials
 from aerotri.formats.table_checks import refuse_duplicates, three_or_none
 from aerotri.formats.tables import Columns, as_str_array, read_table
 from aerotri.observations import Block, Camera, Images
@@ -32,15 +33,15 @@ IMAGE_COLUMNS = Columns(
     optional_numbers=("X0", "Y0", "Z0", "omega", "phi", "kappa"),
     free_text=True,
 )
-NOT_YET = ("fiducials", "constraints", "edits")
 
 
-def read_block(path: str | os.PathLike) -> Block:
+def read_block(path: str | os.PathLike, rays_needed: bool = True) -> Block:
     """A block from its folder.
 
     Parameters
     ----------
     path : the folder, or its block.toml.
+    rays_needed : whether a block without image points is an error; photographs alone will do for what only needs them.
 
     Returns
     -------
@@ -62,21 +63,30 @@ def read_block(path: str | os.PathLike) -> Block:
     model = settings.model
     radians = RADIANS_PER[model.angle_unit]
     images = _images(_required_table(folder, "images"), cameras, radians)
-    rays = read_image_points(_required_table(folder, "image_points"), images, cameras, settings)
-    control, points = read_control(_table_file(folder, "control"), rays.point_names, settings)
+    fiducials, fits = read_fiducials(_table_file(folder, "fiducials"), images, cameras)
+    if fiducials is not None and model.image_unit != "px":
+        message = f"image_unit = '{model.image_unit}', but fiducials.csv says the photographs are scans"
+        raise settings.error(("image_unit",), message, 'measure in pixels of the scan: image_unit = "px"')
+    table = _required_table(folder, "image_points")
+    rays = read_image_points(table, images, cameras, settings, fits, may_be_empty=not rays_needed)
+    control, names = read_control(_table_file(folder, "control"), rays.point_names, settings)
+    points = as_str_array(names)
     block = Block(
         name=folder.resolve().name if model.name is None else model.name,
         cameras=cameras,
         images=images,
-        points=as_str_array(points),
+        points=points,
         image_points=rays.image_points,
         control=control,
         gnss_ins=read_gnss_ins(_table_file(folder, "gnss_ins"), images, radians),
         settings=settings.settings(rays.image_sigma_um),
         crs=model.crs,
         rotation=model.rotation,
+        edits=read_edits(_table_file(folder, "edits"), images, points, rays.image_points, control),
+        fiducials=fiducials,
+        constraints=read_constraints(_table_file(folder, "constraints"), points),
+        interior_fits=fits,
     )
-    _refuse_what_is_not_built(folder)
     _check_names_in_settings(block, settings)
     return block
 
@@ -109,14 +119,6 @@ def _table_file(folder: Path, name: str) -> Path | None:
     if len(found) > 1:
         raise InputError(f"{name}.csv and {name}.parquet are both there", "remove one of them", folder / name)
     return found[0] if found else None
-
-
-def _refuse_what_is_not_built(folder: Path) -> None:
-    """Tables of the format that this version would have to ignore; a header alone is harmless."""
-    for name in NOT_YET:
-        path = _table_file(folder, name)
-        if path is not None and not is_blank(path) and read_table(path, Columns(free_text=True)).length:
-            raise InputError("is not supported in this version", f"remove the rows, or {path.name}", path)
 
 
 def _images(path: Path, cameras: tuple[Camera, ...], radians: float) -> Images:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,8 @@ import numpy as np
 from aerotri.conventions import InputError, mm_from_px
 from aerotri.formats.arrow_compute import arrow_compute
 from aerotri.formats.csv_text import is_blank
-from aerotri.formats.table_checks import refuse_duplicates, sigma_columns, three_or_none
+from aerotri.formats.scanned_film import of_scans, refuse_unfitted
+from aerotri.formats.table_checks import image_index, refuse_duplicates, sigma_columns, three_or_none
 from aerotri.formats.tables import Columns, Table, TextColumn, read_table
 from aerotri.observations import Camera, Control, GnssIns, ImagePoints, Images
 
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from aerotri.formats.block_settings import BlockToml
+    from aerotri.functional_model.interior import FiducialFit
 
 IMAGE_POINT_COLUMNS = Columns(text=("image", "point"), numbers=("x", "y"), optional_numbers=("sx", "sy"))
 CONTROL_COLUMNS = Columns(text=("point", "role"), numbers=("X", "Y", "Z"), optional_numbers=("sX", "sY", "sZ"))
@@ -40,8 +43,20 @@ class Rays:
     image_sigma_um: float
 
 
-def read_image_points(path: Path, images: Images, cameras: tuple[Camera, ...], settings: BlockToml) -> Rays:
-    """Image points in mm from the image centre.
+def read_image_points(
+    path: Path,
+    images: Images,
+    cameras: tuple[Camera, ...],
+    settings: BlockToml,
+    fits: Mapping[int, FiducialFit],
+    may_be_empty: bool = False,
+) -> Rays:
+    """Image points in mm: from the image centre, or in the frame of the fiducial marks of scanned film.
+
+    Parameters
+    ----------
+    fits : interior orientation of scanned photographs by index; their image points are pixel positions of the scan.
+    may_be_empty : whether a table without rows will do.
 
     Raises
     ------
@@ -50,7 +65,7 @@ def read_image_points(path: Path, images: Images, cameras: tuple[Camera, ...], s
     """
     table = read_table(path, IMAGE_POINT_COLUMNS)
     table.require("image", "point", "x", "y")
-    if not table.length:
+    if not table.length and not may_be_empty:
         raise InputError("holds no image points", "give a row for every measured point", path)
     image = image_index(table, images)
     point = table.text["point"]
@@ -62,28 +77,12 @@ def read_image_points(path: Path, images: Images, cameras: tuple[Camera, ...], s
     camera = images.camera[image]
     unit = settings.model.image_unit
     xy = _to_mm(table.stack("x", "y"), unit, camera, cameras)
-    _refuse_points_outside(table, xy, camera, cameras, unit)
     sigma, image_sigma_um = _image_sigma(table, camera, cameras, settings)
+    if fits:
+        refuse_unfitted(table, image, images, fits)
+        xy, sigma = of_scans(table, image, fits, xy, sigma)
+    _refuse_points_outside(table, xy, camera, cameras, unit)
     return Rays(ImagePoints(image, point.index, xy, sigma), point.names, image_sigma_um)
-
-
-def image_index(table: Table, images: Images) -> np.ndarray:
-    """(n,) index of the images a table names.
-
-    Raises
-    ------
-    InputError
-        At a name that images.csv does not have.
-    """
-    known = {name: i for i, name in enumerate(images.names.tolist())}
-    column = table.text["image"]
-    index = np.array([known.get(name, -1) for name in column.names.to_pylist()], dtype=np.int64)[column.index]
-    unknown = np.flatnonzero(index < 0)
-    if len(unknown):
-        row = int(unknown[0])
-        name = table.cell("image", row)
-        raise table.error(row, f"image '{name}' is not in the table of images", "add it there, or remove its rows")
-    return index
 
 
 def _to_mm(values: np.ndarray, unit: str, camera: np.ndarray, cameras: tuple[Camera, ...]) -> np.ndarray:

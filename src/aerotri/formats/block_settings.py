@@ -91,6 +91,8 @@ class CameraModel(_Section):
     interior: InteriorModel = InteriorModel()
     brown: BrownModel = BrownModel()
     lens: LensModel = LensModel()
+    interior_orientation: Literal["affine", "projective", "similarity"] | None = None
+    fiducials: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = {}
 
     @model_validator(mode="after")
     def _focal_length_positive(self) -> CameraModel:
@@ -115,6 +117,8 @@ class CameraModel(_Section):
             brown=_priors(self.brown, BROWN_NAMES),
             lens=_priors(self.lens, LENS_NAMES),
             flight_axis=self.flight_axis,
+            fiducials={name: (float(x), float(y)) for name, (x, y) in self.fiducials.items()},
+            interior_orientation=self.interior_orientation,
         )
 
 
@@ -201,11 +205,16 @@ class BlockToml:
         Raises
         ------
         InputError
-            For a name that could not stand in images.csv.
+            For a name that could not stand in a table.
         """
         for name in self.model.camera:
-            if not name or name != name.strip(BLANKS) or re.search(CONTROL_CHARACTERS, name):
+            if _is_no_name(name):
                 raise self.error(("camera", name), f"{name[:60]!r} is no name for a camera", "name it by a short text")
+        for name, camera in self.model.camera.items():
+            for mark in camera.fiducials:
+                if _is_no_name(mark):
+                    key = ("camera", name, "fiducials")
+                    raise self.error(key, f"{mark[:60]!r} is no name for a fiducial", "name it by a short text")
         return tuple(camera.camera(name) for name, camera in self.model.camera.items())
 
     def settings(self, image_sigma_um: float) -> Settings:
@@ -251,6 +260,10 @@ class BlockToml:
                 f"write IMAGE:ELEMENT, the element one of {' '.join(ORIENTATION_ELEMENTS)}",
             )
         return image, element
+
+
+def _is_no_name(name: str) -> bool:
+    return not name or name != name.strip(BLANKS) or re.search(CONTROL_CHARACTERS, name) is not None
 
 
 def _triple(values: list[float]) -> tuple[float, float, float]:

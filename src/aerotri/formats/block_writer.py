@@ -10,6 +10,7 @@ import numpy as np
 
 from aerotri.conventions import RADIANS_PER, InputError
 from aerotri.formats.atomic import atomic_folder
+from aerotri.formats.scanned_film import measured_px
 from aerotri.formats.table_writer import check_names, write_table
 from aerotri.formats.toml_text import Inline, toml_of
 from aerotri.observations import Block, Camera, Prior
@@ -24,8 +25,8 @@ IMAGE_FIELDS = ("image", "camera", "strip", "X0", "Y0", "Z0", "omega", "phi", "k
 def write_block(block: Block, folder: str | os.PathLike, tables: Literal["csv", "parquet"] = "csv") -> None:
     """Write a block; the folder appears when it is whole.
 
-    Tables of an older block of that name are replaced, whatever else the folder holds is kept. Units are mm and
-    degrees; floating point numbers are written so that they are read back the same.
+    Tables of an older block of that name are replaced, whatever else the folder holds is kept. Units are mm (pixels
+    where film was scanned) and degrees; floating point numbers are written so that they are read back the same.
 
     Parameters
     ----------
@@ -68,6 +69,7 @@ def _check_all_names(block: Block) -> None:
 
 def _tables(block: Block) -> dict[str, dict[str, np.ndarray]]:
     images, rays, control = block.images, block.image_points, block.control
+    xy, sigma = measured_px(block) if block.interior_fits else (rays.xy, rays.sigma)
     per_radian = 1.0 / RADIANS_PER[ANGLE_UNIT]
     camera_names = np.array([camera.name for camera in block.cameras], dtype=str)
     tables = {
@@ -76,8 +78,8 @@ def _tables(block: Block) -> dict[str, dict[str, np.ndarray]]:
         | _columns(("X0", "Y0", "Z0"), images.centre)
         | _columns(("omega", "phi", "kappa"), images.angles * per_radian),
         "image_points": {"image": images.names[rays.image], "point": block.points[rays.point]}
-        | _columns(("x", "y"), rays.xy)
-        | _columns(("sx", "sy"), _sigma_unless_common(block)),
+        | _columns(("x", "y"), xy)
+        | _columns(("sx", "sy"), sigma if not _common_sigma(block) else np.full_like(sigma, np.nan)),
     }
     if len(control):
         role = np.where(control.is_check, "check", "control")
@@ -97,7 +99,7 @@ def _tables(block: Block) -> dict[str, dict[str, np.ndarray]]:
             | _columns(("s_omega", "s_phi", "s_kappa"), observed.angles_sigma * per_radian)
             | _columns(("time",), observed.time[:, None])
         )
-    return tables
+    return tables | _extra_tables(block)
 
 
 def _columns(names: tuple[str, ...], values: np.ndarray, always: bool = False) -> dict[str, np.ndarray]:
@@ -107,11 +109,43 @@ def _columns(names: tuple[str, ...], values: np.ndarray, always: bool = False) -
     return {name: values[:, k] for k, name in enumerate(names)}
 
 
-def _sigma_unless_common(block: Block) -> np.ndarray:
-    """The σ of the image points, unknown (so not written) when they are all the block's own."""
-    sigma = block.image_points.sigma
-    common = (sigma == block.settings.image_sigma_um * 1e-3).all()
-    return np.full_like(sigma, np.nan) if common else sigma
+def _common_sigma(block: Block) -> bool:
+    """Whether the σ of the image points are all the block's own, and so need not be written."""
+    return bool((block.image_points.sigma == block.settings.image_sigma_um * 1e-3).all())
+
+
+def _extra_tables(block: Block) -> dict[str, dict[str, np.ndarray]]:
+    """Decisions, fiducials and constraints, where there are any."""
+    tables, images = {}, block.images.names
+    if block.edits is not None and len(block.edits):
+        edits = block.edits
+        tables["edits"] = {
+            "image": np.where(edits.image < 0, "", images[edits.image]),
+            "point": block.points[edits.point],
+            "action": edits.action,
+            "reason": edits.reason,
+        }
+    if block.fiducials is not None and len(block.fiducials):
+        marks = block.fiducials
+        tables["fiducials"] = {"image": images[marks.image], "fiducial": marks.name} | _columns(
+            ("column", "row"), marks.column_row
+        )
+    if block.constraints is not None and len(block.constraints):
+        conditions = block.constraints
+        tables["constraints"] = {
+            "kind": conditions.kind,
+            "points": np.array([_members(block.points[p]) for p in conditions.points], dtype=str),
+            "value": conditions.value,
+            "sigma": conditions.sigma,
+        }
+    return tables
+
+
+def _members(names: np.ndarray) -> str:
+    odd = [name for name in names.tolist() if len(name.split()) != 1]
+    if odd:
+        raise InputError(f"point {odd[0]!r} of a constraint has a blank in its name", "rename it")
+    return " ".join(names.tolist())
 
 
 def _settings(block: Block) -> dict[str, Any]:
@@ -121,7 +155,7 @@ def _settings(block: Block) -> dict[str, Any]:
         "crs": block.crs,
         "angle_unit": ANGLE_UNIT,
         "rotation": block.rotation,
-        "image_unit": "mm",
+        "image_unit": "px" if block.interior_fits else "mm",
         "camera": {camera.name: _camera(camera) for camera in block.cameras},
         "stochastic": {"image_sigma_um": settings.image_sigma_um},
         "adjustment": {
@@ -169,6 +203,10 @@ def _camera(camera: Camera) -> dict[str, Any]:
     for section, priors in (("interior", interior), ("brown", camera.brown), ("lens", camera.lens)):
         if priors:
             content[section] = {name: _prior(prior) for name, prior in priors.items()}
+    if camera.interior_orientation is not None:
+        content["interior_orientation"] = camera.interior_orientation
+    if camera.fiducials:
+        content["fiducials"] = {name: list(xy) for name, xy in camera.fiducials.items()}
     return content
 
 

@@ -1,4 +1,4 @@
-"""Checks that several tables share: nothing twice, three values or none, positive standard deviations."""
+"""Checks that several tables share: known images, nothing twice, three values or none, positive standard deviations."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.tables import Table
+from aerotri.observations import Images
 
 
 def refuse_duplicates(table: Table, keys: np.ndarray, name: Callable[[int], str]) -> None:
@@ -92,3 +93,24 @@ def sigma_columns(
         row, k = missing[0].tolist()
         raise table.error(row, f"{columns[k]} is not given", remedy)
     return np.where(wanted, sigma, np.nan)
+
+
+def image_index(table: Table, images: Images, may_be_empty: bool = False) -> np.ndarray:
+    """(n,) index of the images a table names; −1 for an empty cell where there may be some.
+
+    Raises
+    ------
+    InputError
+        At a name that images.csv does not have.
+    """
+    known = {name: i for i, name in enumerate(images.names.tolist())}
+    column = table.text["image"]
+    names = column.names.to_pylist()
+    index = np.array([known.get(name, -1) for name in names], dtype=np.int64)[column.index]
+    empty = names.index("") if may_be_empty and "" in names else -1
+    unknown = np.flatnonzero((index < 0) & (column.index != empty))
+    if len(unknown):
+        row = int(unknown[0])
+        name = table.cell("image", row)
+        raise table.error(row, f"image '{name}' is not in the table of images", "add it there, or remove its rows")
+    return index
