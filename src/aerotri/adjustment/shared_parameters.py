@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.functional_model.additional_parameters import FAMILIES, ParameterSet, parameter_set
+from aerotri.functional_model.additional_parameters import FAMILIES, ParameterSet, mark_of, parameter_set
 from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, interior_row
 from aerotri.observations import Block, Camera, Prior
@@ -142,8 +142,10 @@ def linear_columns(
         first: dict[str, int] = {}
         for camera, group in zip(cameras.tolist(), groups.tolist(), strict=True):
             if camera in sets and group not in first:
+                chosen = sets[camera]
                 added = [
-                    shared.add(name, group, "additional", LINEAR_FAMILIES[family].MARK) for name in sets[camera].names
+                    shared.add(name, group, "additional", mark_of(family, item))
+                    for name, item in zip(chosen.names, chosen.items, strict=True)
                 ]
                 first[group] = added[0]
         offset = np.array(

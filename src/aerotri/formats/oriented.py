@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.functional_model.additional_parameters import ParameterSet, brown
-from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
+from aerotri.functional_model.additional_parameters import brown, parameter_sets
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block, Camera, Prior
 from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
@@ -171,9 +170,6 @@ def _held(
 def _linear_errors(camera: Camera, values: dict[str, float], xy: np.ndarray) -> np.ndarray:
     """(n, 2) mm, the image errors of the linear families."""
     errors = np.zeros_like(xy)
-    for family, module in LINEAR_FAMILIES.items():
-        items = tuple(item for item in module.ITEMS if values.get(f"{family}.{item}"))
-        if items:
-            chosen = ParameterSet(family, items, camera)
-            errors += chosen.basis(xy[:, 0], xy[:, 1]) @ np.array([values[name] for name in chosen.names])
+    for chosen in parameter_sets((name for name, value in values.items() if value), camera):
+        errors += chosen.basis(xy[:, 0], xy[:, 1]) @ np.array([values[name] for name in chosen.names])
     return errors

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.functional_model.additional_parameters import ParameterSet, brown, lens
-from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
+from aerotri.functional_model.additional_parameters import brown, lens, parameter_sets
 from aerotri.image_errors.groups import (
     ImageGroup,
     image_group,
@@ -186,12 +185,9 @@ def _errors_with_jacobian(
 def _families(adjusted: AdjustedBlock, group: ImageGroup, rows: np.ndarray, x: np.ndarray, y: np.ndarray):
     """Names, image errors (n, 2) and patterns (n, 2, p) of every family that acts in a group."""
     camera, values = group.camera, _values_in_force(adjusted, group, rows)
-    for family, module in LINEAR_FAMILIES.items():
-        items = tuple(item for item in module.ITEMS if f"{family}.{item}" in values)
-        if items and module.CAMERA_MODEL in (None, camera.model):
-            chosen = ParameterSet(family, items, camera)
-            basis = chosen.basis(x, y)
-            yield chosen.names, basis @ np.array([values[name] for name in chosen.names]), basis
+    for chosen in parameter_sets(values, camera):
+        basis = chosen.basis(x, y)
+        yield chosen.names, basis @ np.array([values[name] for name in chosen.names]), basis
     (c, x0, y0), _ = interior_elements(adjusted, camera)
     for module in (brown, lens):
         names = tuple(f"{module.FAMILY}.{item}" for item in module.ITEMS)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.functional_model.additional_parameters import brown, parameter_set
+from aerotri.functional_model.additional_parameters import brown, is_item, parameter_set
 from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES, ParameterSet
 from aerotri.functional_model.additional_parameters.ultracam_d import native_from_image
 from aerotri.observations import Camera
@@ -154,7 +154,7 @@ def _parametric_parts(camera: Camera, errors: ErrorSpec) -> list[Field]:
         family, _, item = name.partition(".")
         if family not in LINEAR_FAMILIES:
             raise InputError(f"'{key}' has the unknown key '{name}'", f"families are {', '.join(LINEAR_FAMILIES)}")
-        if item not in LINEAR_FAMILIES[family].ITEMS:
+        if not is_item(family, item):
             items = LINEAR_FAMILIES[family].ITEMS
             raise InputError(f"'{key}' has the unknown key '{name}'", f"'{family}' has {items[0]} to {items[-1]}")
         families.setdefault(family, {})[item] = value
