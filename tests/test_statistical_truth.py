@@ -4,6 +4,7 @@ Bounds of targets.md 2: over n seeds |mean z| < 3.3/√n and the variance of z w
 unknown; σ0² passes χ². At most 30 photographs here; the full counts run in tools/recovery.py.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +12,21 @@ import pytest
 from scipy.stats import chi2
 
 from aerotri.functional_model.additional_parameters import parse_parameters
+from aerotri.functional_model.rotation import logarithm, rotation_from_angles
 from aerotri.image_errors import averaged_residuals
+from aerotri.observations import InsSettings
+from aerotri.observations.block import Constraints
 from aerotri.pipeline import adjust
 from aerotri.simulation import read_spec, simulate
 from small_blocks import small_block, with_adjustment
 
 SEEDS = range(100, 150)
+
+
+def _boresight_vector(degrees):
+    return logarithm(rotation_from_angles(np.radians(degrees)))
+
+
 BLUH = {
     f"bluh.{k}": v
     for k, v in zip(
@@ -33,6 +43,11 @@ TILES = {
 }
 
 
+BORESIGHT_DEG = [0.05, -0.03, 0.1]
+KNOWN = {f"ins.boresight_{a}": v for a, v in zip("xyz", _boresight_vector(BORESIGHT_DEG), strict=True)}
+KNOWN |= {f"gnss.lever_arm_{a}": v for a, v in zip("xyz", [0.2, -0.3, 1.1], strict=True)}
+
+
 def errors(**kinds):
     return {"camera": {"ucd": {"preset": "ultracam_d", "errors": kinds}}}
 
@@ -46,12 +61,58 @@ CASES = {
         errors(parameters={k: BLUH[k] for k in ("bluh.1", "bluh.2", "bluh.3", "bluh.4")})
         | {"gnss": {"sigma_m": [0.05, 0.05, 0.08], "shift_sigma_m": [0.3, 0.3, 0.3], "lever_arm_m": [0.2, -0.3, 1.1]}},
     ),
+    "attitudes": (
+        "none",
+        {
+            "gnss": {"sigma_m": [0.05, 0.05, 0.08]},
+            "ins": {"sigma_deg": [0.002, 0.002, 0.004], "boresight_deg": BORESIGHT_DEG},
+        },
+    ),
+    "lever arm": ("none", {"gnss": {"sigma_m": [0.05, 0.05, 0.08], "lever_arm_m": [0.2, -0.3, 1.1]}}),
+    "conditions": ("none", {}),
 }  # fmt: skip
 
 
-def normalised_errors(parameters, changes, seed):
+def with_ins(block, truth, seed):
+    """Attitudes observed by an INS that is turned against the camera; σ of 0.002 and 0.004 degrees."""
+    return replace(block, settings=replace(block.settings, ins=InsSettings("camera", "off")))
+
+
+def with_lever_arm(block, truth, seed):
+    """The lever arm known to 5 cm only, given 3 cm wrong within that."""
+    rng = np.random.default_rng(seed + 9000)
+    given = np.array([0.2, -0.3, 1.1]) + rng.normal(0, 0.05, 3)
+    gnss = replace(block.settings.gnss, lever_arm_m=tuple(given), lever_arm_sigma_m=(0.05, 0.05, 0.05))
+    return replace(block, settings=replace(block.settings, gnss=gnss))
+
+
+def with_conditions(block, truth, seed):
+    """Conditions of every kind between tie points, their values true but for noise of 2 cm."""
+    rng = np.random.default_rng(seed + 7000)
+    often = np.setdiff1d(np.argsort(-np.bincount(block.image_points.point))[:40], block.control.point)
+    pairs = often[:12].reshape(6, 2)
+    z, xyz = truth.points[:, 2], truth.points
+    kinds, members, values = [], [], []
+    for a, b in pairs[:3]:
+        kinds.append("height_difference")
+        members.append(np.array([a, b]))
+        values.append(z[b] - z[a] + rng.normal(0, 0.02))
+    for a, b in pairs[3:]:
+        kinds.append("distance")
+        members.append(np.array([a, b]))
+        values.append(np.linalg.norm(xyz[b] - xyz[a]) + rng.normal(0, 0.02))
+    given = Constraints(np.array(kinds, object), tuple(members), np.array(values), np.full(len(kinds), 0.02))
+    return replace(block, constraints=given)
+
+
+PREPARED = {"attitudes": with_ins, "lever arm": with_lever_arm, "conditions": with_conditions}
+
+
+def normalised_errors(parameters, changes, seed, prepare=None):
     """z of single unknowns by name, vᵀPv and redundancy of one simulated block."""
     block, truth = small_block(seed, parameters, **changes)
+    if prepare is not None:
+        block = prepare(block, truth, seed)
     result = adjust(block)
     z = {}
     true_value = dict(zip(truth.parameter_names, truth.parameter_values, strict=True))
@@ -59,6 +120,8 @@ def normalised_errors(parameters, changes, seed):
     for k, name in enumerate(p.names):
         if p.kinds[k] == "additional":
             z[name] = (p.value[k] - true_value.get(name, 0.0)) / p.sigma[k]
+        elif name in KNOWN:
+            z[name] = (p.value[k] - KNOWN[name]) / p.sigma[k]
     photo = 7
     gap = np.concatenate(
         [result.images.centre[photo] - truth.centre[photo], result.images.angles[photo] - truth.angles[photo]]
@@ -78,7 +141,7 @@ def normalised_errors(parameters, changes, seed):
 @pytest.mark.parametrize("case", CASES)
 def test_recovery(case):
     parameters, changes = CASES[case]
-    runs = [normalised_errors(parameters, changes, seed) for seed in SEEDS]
+    runs = [normalised_errors(parameters, changes, seed, PREPARED.get(case)) for seed in SEEDS]
     n = len(runs)
     low, high = chi2.ppf([0.0005, 0.9995], n) / n
     for name in runs[0][0]:

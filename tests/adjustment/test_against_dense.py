@@ -7,7 +7,6 @@ import pytest
 
 from aerotri.adjustment.datum import datum_rows, motions_of_points
 from aerotri.functional_model.collinearity import linearise
-from aerotri.functional_model.observed_unknowns import antenna_partials
 from aerotri.functional_model.rotation import small_rotation_per_angle
 from aerotri.observations import Prior
 from aerotri.pipeline import adjust_keeping_system
@@ -34,12 +33,15 @@ def dense_design(adjustment):
                 block[:, 6 * n + column] += partials.by_interior[k, :, t]
         for t in range(rays.ap_index.shape[1]):
             block[:, 6 * n + rays.ap_index[k, t]] += rays.ap_value[k, :, t]
-        at = 6 * n + s + 3 * ray_point[k]
-        block[:, at : at + 3] = partials.by_point[k] * u.point_free[ray_point[k]]
+        p = ray_point[k]
+        if u.kept[p] >= 0:
+            block[:, 6 * n + u.kept[p] : 6 * n + u.kept[p] + 3] = partials.by_point[k]
+        at = 6 * n + s + 3 * p
+        block[:, at : at + 3] = partials.by_point[k] * u.point_free[p]
         rows.append(block * (rays.inv_sigma[k] * np.sqrt(adjustment.solution.equations.weight[k]))[:, None])
     design = np.concatenate(rows)
     extra = []
-    for point, axis in zip(*np.nonzero(u.prior_weight), strict=True):
+    for point, axis in zip(*np.nonzero(u.prior_weight * (u.kept < 0)[:, None]), strict=True):
         row = np.zeros(design.shape[1])
         row[6 * n + s + 3 * point + axis] = np.sqrt(u.prior_weight[point, axis])
         extra.append(row)
@@ -48,17 +50,16 @@ def dense_design(adjustment):
             row = np.zeros(design.shape[1])
             row[6 * n + column] = 1.0 / sigma
             extra.append(row)
-    if system.centres is not None:
-        observed = system.centres
-        by_eo = antenna_partials(observed, state.rotation)
-        for g in range(len(observed)):
-            for axis in range(3):
-                row = np.zeros(design.shape[1])
-                row[6 * observed.image[g] : 6 * observed.image[g] + 6] = by_eo[g, axis]
-                for columns, factor in ((observed.shift, 1.0), (observed.drift, observed.time[g])):
-                    if columns[g, axis] >= 0:
-                        row[6 * n + columns[g, axis]] = factor
-                extra.append(row * observed.inv_sigma[g, axis])
+    for kind in system.extras:
+        rows = kind.rows(state.centre, state.rotation, state.shared)
+        for g, axis in zip(*np.nonzero(rows.inv_sigma), strict=True):
+            row = np.zeros(design.shape[1])
+            if rows.image[g] >= 0:
+                row[6 * rows.image[g] : 6 * rows.image[g] + 6] = rows.by_image[g, axis]
+            for column, partial in zip(rows.columns[g], rows.by_shared[g, axis], strict=True):
+                if column >= 0:
+                    row[6 * n + column] += partial
+            extra.append(row * rows.inv_sigma[g, axis])
     return np.concatenate([design, np.array(extra)]) if extra else design
 
 

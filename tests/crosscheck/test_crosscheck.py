@@ -7,13 +7,16 @@ import pytest
 
 from aerotri.crosscheck import LIMIT, crosscheck
 from aerotri.crosscheck import paper_check as paper_check_module
+from aerotri.crosscheck.freed import as_adjusted, used_rays
 from aerotri.crosscheck.outcome_json import crosscheck_json
+from aerotri.crosscheck.paper_block import paper_block
 from aerotri.crosscheck.paper_check import check_with_paper
 from aerotri.crosscheck.paper_system import solve_normal_equations
 from aerotri.formats.dbat import read_dbat
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Prior
-from aerotri.pipeline import adjust
+from aerotri.observations.block import Edits
+from aerotri.pipeline import adjust, adjust_keeping_system
 from aerotri.report.plots_crosscheck import crosscheck_table, plot_crosscheck
 from small_blocks import small_block, with_adjustment
 
@@ -130,11 +133,41 @@ def test_photographs_taken_at_the_singularity_of_the_angles():
     assert_agrees(check)
 
 
-def test_parameters_without_an_independent_formula_are_said(adjusted):
-    settings = replace(adjusted.block.settings, refraction="standard")
-    check = check_with_paper(replace(adjusted, block=replace(adjusted.block, settings=settings)), adjust)
-    assert check.status == "not available"
-    assert "refraction" in check.reason
+def test_what_has_no_independent_formula_is_said(adjusted):
+    refracted = replace(adjusted.block, settings=replace(adjusted.block.settings, refraction="standard"))
+    unknown_family = with_adjustment(adjusted.block, additional_parameters=(("ebner", ("1",)),))
+    for block, word in ((refracted, "refraction"), (unknown_family, "'ebner'")):
+        check = check_with_paper(replace(adjusted, block=block), adjust)
+        assert check.status == "not available"
+        assert word in check.reason
+
+
+def test_block_in_a_crs_with_refraction():
+    """Checked in the frame of its adjustment, its image points freed of what the peers do not know."""
+    block, _ = small_block(8, "bluh:1-4")
+    shift = np.array([400000.0, 5500000.0, 0.0])
+    images = replace(block.images, centre=block.images.centre + shift)
+    control = replace(block.control, xyz=block.control.xyz + shift)
+    settings = replace(block.settings, refraction="standard")
+    block = replace(block, images=images, control=control, settings=settings, crs="EPSG:25832")
+    adjustment = adjust_keeping_system(block)
+    checkable = as_adjusted(adjustment.local, adjustment.system.unknowns.block)
+    for check in crosscheck(checkable, adjust).checks:
+        if check.compared:
+            assert_agrees(check)
+
+
+def test_the_operators_decisions_count():
+    """Control taken out, and a check point made control, in the independent model alone: seen in the observations."""
+    block, _ = small_block(9)
+    result = adjust(block)
+    first, check_point = int(block.control.point[0]), int(block.control.point[block.control.is_check][0])
+    texts = np.array(["off", "control"]), np.array(["", ""])
+    edits = Edits(np.array([-1, -1]), np.array([first, check_point]), *texts)
+    paper = paper_block(replace(block, edits=edits), used_rays(result), np.ones(len(block.image_points)), np.zeros(3))
+    rows = {int(p): k for k, p in enumerate(paper.points)}
+    assert not paper.point_inv_sigma[rows[first]].any()
+    assert paper.point_inv_sigma[rows[check_point]].all()
 
 
 def test_table_plot_and_json(adjusted):

@@ -102,6 +102,7 @@ def test_observations_that_were_not_used(adjusted):
     without = adjust(replace(block, control=control))
     check = check_with_paper(replace(without, block=block), adjust)
     assert check.status == "differs"
+    assert check.reason.startswith(f"observations: ours {check.observations - 3}, independently {check.observations}")
 
 
 def test_pycolmap_finds_a_moved_point_and_a_wrong_sigma(adjusted):

@@ -22,6 +22,16 @@ default_control_sigma_m = [0.1, 0.2, 0.3]
 [adjustment]
 robust = "off"
 """
+FILM_TOML = BLOCK_TOML.replace('"mm"', '"px"').replace(
+    "[stochastic]",
+    """interior_orientation = "affine"
+[camera.cam.fiducials]
+F1 = [-49.0, 39.0]
+F2 = [49.0, 39.0]
+F3 = [49.0, -39.0]
+F4 = [-49.0, -39.0]
+[stochastic]""",
+)
 IMAGES = """\
 image,camera,strip,day,X0,Y0,Z0,omega,phi,kappa
 a,cam,1,mon,1,2,1000,0,0,90
@@ -69,6 +79,8 @@ def assert_same_block(found: Block, expected: Block, angle_tolerance: float = 1e
     np.testing.assert_allclose(a.angles, b.angles, rtol=angle_tolerance, atol=0)
     for name in ("image", "point", "xy", "sigma"):
         np.testing.assert_array_equal(getattr(found.image_points, name), getattr(expected.image_points, name))
+    for name in ("edits", "constraints", "fiducials"):
+        assert_same_record(getattr(found, name), getattr(expected, name))
     for name in ("point", "xyz", "sigma", "is_check"):
         np.testing.assert_array_equal(getattr(found.control, name), getattr(expected.control, name))
     assert (found.gnss_ins is None) == (expected.gnss_ins is None)
@@ -78,3 +90,14 @@ def assert_same_block(found: Block, expected: Block, angle_tolerance: float = 1e
         for name in ("angles", "angles_sigma"):
             one, other = getattr(found.gnss_ins, name), getattr(expected.gnss_ins, name)
             np.testing.assert_allclose(one, other, rtol=angle_tolerance, atol=0)
+
+
+def assert_same_record(found, expected) -> None:
+    """Two records of arrays, or nothing twice."""
+    assert (found is None) == (expected is None)
+    for name in () if expected is None else expected.__dataclass_fields__:
+        one, other = getattr(found, name), getattr(expected, name)
+        if isinstance(other, tuple):
+            assert [part.tolist() for part in one] == [part.tolist() for part in other]
+        else:
+            np.testing.assert_array_equal(one, other)

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 
 import pytest
-from format_samples import BLOCK_TOML, CONTROL, GNSS, IMAGE_POINTS, IMAGES
+from format_samples import BLOCK_TOML, CONTROL, FILM_TOML, GNSS, IMAGE_POINTS, IMAGES
 
 from aerotri.conventions import InputError
 from aerotri.formats.block_folder import read_block
@@ -39,9 +39,24 @@ def gnss(*rows: str) -> str:
     return GNSS.splitlines()[0] + "\n" + "".join(f"{row}\n" for row in rows)
 
 
+def edits(*rows: str) -> str:
+    return "image,point,action,reason\n" + "".join(f"{row}\n" for row in rows)
+
+
+def conditions(*rows: str) -> str:
+    return "kind,points,value,sigma\n" + "".join(f"{row}\n" for row in rows)
+
+
+def marks(*rows: str) -> str:
+    return "image,fiducial,column,row\n" + "".join(f"{row}\n" for row in rows)
+
+
 TOML_BEGIN = BLOCK_TOML.replace('robust = "off"\n', "")
 LINES = TOML_BEGIN.count("\n")
 P, I, C, G, T = "image_points.csv", "images.csv", "control.csv", "gnss_ins.csv", "block.toml"
+E, K, F = "edits.csv", "constraints.csv", "fiducials.csv"
+FOUR = ("a,F1,100,100", "a,F2,9900,110", "a,F3,9890,7900", "a,F4,110,7890")
+FILM = ((T, FILM_TOML), (G, None))
 
 TABLES = {
     "row too short": Case(P, points("a,p1,1,2", "# c", "", "a,p2,1"), 5, "3 cells"),
@@ -110,9 +125,42 @@ TABLES = {
     "gnss without sigma": Case(G, gnss("a,1,2,3,1,1,,,,,,,,"), 2, "sZ is not given"),
     "angles without sigma": Case(G, gnss("a,1,2,3,1,1,1,0,0,0,0.1,,0.1,"), 2, "s_phi is not given"),
     "gnss of nothing": Case(G, gnss("a,,,,1,1,1,,,,,,,5"), 2, "observes nothing"),
-    "constraints": Case("constraints.csv", "kind,points,value,sigma\nvertical,p1 p2,,0.1\n", None, "not supported"),
-    "fiducials": Case("fiducials.csv", "image,fiducial,column,row\na,1,2,3\n", None, "not supported"),
-    "edits": Case("edits.csv", "image,point,action,reason\na,p1,off,bad\n", None, "not supported"),
+    "edit action": Case(E, edits("a,p1,of,"), 2, "action = 'of'"),
+    "edit image": Case(E, edits("a,p1,off,", "c,p1,off,"), 3, "image 'c' is not in the table"),
+    "edit point": Case(E, edits("a,p7,off,"), 2, "there is no point 'p7'"),
+    "edit point empty": Case(E, edits("a,,off,"), 2, "point is empty"),
+    "edit of no ray": Case(E, edits("b,p9,off,"), 2, "point 'p9' is not measured in image 'b'"),
+    "edit role of a ray": Case(E, edits("a,p1,check,"), 2, "leave image empty"),
+    "edit role of no control": Case(E, edits(",p2,check,"), 2, "point 'p2' is no control or check point"),
+    "edit twice": Case(E, edits("a,p1,off,", ",p1,off,", "a,p1,off,again"), 4, "is there twice, first in line 2"),
+    "edit both": Case(E, edits(",p1,off,", ",p1,check,"), 3, "a decision on point 'p1' is there twice"),
+    "edit column": Case(E, "image,point,action,why\n", 1, "unknown column 'why'"),
+    "constraint kind": Case(K, conditions("upright,p1 p2,,1"), 2, "kind = 'upright'"),
+    "constraint point": Case(K, conditions("vertical,p1 p2,,1", "vertical,p1 p7,,1"), 3, "there is no point 'p7'"),
+    "constraint points": Case(K, conditions("plane,p1 p2 p9,,1"), 2, "it needs 4 or more"),
+    "constraint points, two": Case(K, conditions("distance,p1 p2 p9,5,1"), 2, "it needs 2,"),
+    "constraint point twice": Case(K, conditions("line,p1 p2 p1,,1"), 2, "names a point twice"),
+    "constraint value": Case(K, conditions("height_difference,p1 p2,,1"), 2, "has no value"),
+    "constraint no value": Case(K, conditions("horizontal,p1 p2,5,1"), 2, "has a value"),
+    "constraint distance": Case(K, conditions("distance,p1 p2,-5,1"), 2, "is not positive"),
+    "constraint sigma": Case(K, conditions("vertical,p1 p2,,"), 2, "sigma is not given"),
+    "constraint sigma zero": Case(K, conditions("vertical,p1 p2,,0"), 2, "sigma = 0"),
+    "fiducial image": Case(F, marks("c,F1,1,2"), 2, "image 'c' is not in the table", FILM),
+    "fiducial name": Case(F, marks("a,F1,1,2", "a,F9,1,2"), 3, "has no fiducial 'F9'", FILM),
+    "fiducial twice": Case(F, marks("a,F1,1,2", "a,F2,1,2", "a,F1,1,2"), 4, "is there twice, first in line 2", FILM),
+    "fiducial empty": Case(F, marks("a,F1,,2"), 2, "column is empty", FILM),
+    "fiducials of no camera": Case(F, marks("a,F1,1,2"), 2, "has no calibrated fiducials"),
+    "fiducials too few": Case(F, marks(*FOUR[:2]), 2, "2 fiducial marks of photograph a give no affine", FILM),
+    "fiducials in a line": Case(
+        F, marks("a,F1,0,0", "a,F2,100,0", "a,F3,200,0", "a,F4,300,0"), 2, "do not determine", FILM
+    ),
+    "fiducials of one image": Case(
+        P, points("a,p1,100,200", "b,p1,100,200"), 3, "image 'b' has no fiducials", (*FILM, (F, marks(*FOUR)))
+    ),
+    "point outside of a scan": Case(
+        P, points("a,p1,100,200", "a,p2,100,90000"), 3, "lies outside the format",
+        (*FILM, (F, marks(*FOUR)), (I, images("a,cam,,,,,,"))),
+    ),
 }  # fmt: skip
 
 SETTINGS = {
@@ -149,6 +197,13 @@ SETTINGS = {
         T, BLOCK_TOML + "[camera.cam.brown]\nK1 = { fixed = true, sigma = 1.0 }\n", LINES + 3, "exclude each other"
     ),
     "prior sigma": Case(T, BLOCK_TOML + "[camera.cam.brown]\nK1 = { sigma = 0.0 }\n", LINES + 3, "greater than 0"),
+    "unit of scans": Case(
+        T, FILM_TOML.replace('image_unit = "px"', 'image_unit = "mm"'), 2, "are scans", ((F, marks(*FOUR)),)
+    ),
+    "interior orientation": Case(T, FILM_TOML.replace('"affine"', '"afine"'), None, "'afine': should be 'affine'"),
+    "fiducial position": Case(T, FILM_TOML.replace("F1 = [-49.0, 39.0]", "F1 = [-49.0]"), None, "too few entries"),
+    "fiducial no number": Case(T, FILM_TOML.replace("F1 = [-49.0, 39.0]", 'F1 = ["x", 1.0]'), None, "F1.0 = 'x'"),
+    "fiducial without name": Case(T, FILM_TOML.replace("F1 =", '" " ='), None, "is no name for a fiducial"),
     "family": Case(T, TOML_BEGIN + 'additional_parameters = ["blu:1"]\n', LINES + 1, "unknown parameter family 'blu'"),
     "item": Case(T, TOML_BEGIN + 'additional_parameters = ["bluh:13"]\n', LINES + 1, "no parameter '13'"),
     "grouping": Case(T, TOML_BEGIN + 'parameter_groups = "week"\n', LINES + 1, "no column 'week'"),
@@ -228,3 +283,10 @@ def test_parquet_rows_are_numbered(small_block):
 
 def test_the_samples_are_good(small_block):
     read_block(small_block({"images.csv": IMAGES, "image_points.csv": IMAGE_POINTS, "control.csv": CONTROL}))
+
+
+def test_what_a_file_brought_along_is_escaped():
+    """An error cannot steer the terminal it is printed on, nor run over several lines."""
+    error = InputError("odd \x1b[2J\nname \u202e\x9b ÄΩ", "rename\r it", "fi\x07le.csv", 3)
+    assert str(error) == r"fi\x07le.csv:3: odd \x1b[2J\nname \u202e\x9b ÄΩ — rename\r it"
+    assert str(error).isprintable()

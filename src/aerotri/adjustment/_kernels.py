@@ -6,7 +6,7 @@ Rays lie in point order and, within a point, by photograph. `rays`, `pattern`, `
 rays    : start (P+1), image (m), lens_row (m), xy (m, 2), inv_sigma (m, 2), ap_index (m, ka), ap_value (m, 2, ka)
 pattern : pair_start (P+1), pair_block (·) block of every pair of rays of a point, first ray's photograph < second's
 table   : lens_columns (L, 15) shared parameter or −1, eo_free (n, 6) 1 or 0, turn (n, 3, 3) basis of small rotations,
-          prior_xyz, prior_weight, point_free (P, 3)
+          prior_xyz, prior_weight, point_free (P, 3), kept (P) first shared parameter of a point not eliminated or −1
 state   : rotation (n, 3, 3), centre (n, 3), points (P, 3), interior (L, 15), shared (s)
 work    : scratch of one thread, see `scratch`
 """
@@ -57,7 +57,7 @@ def linearise_point(p, rays, table, state, estimator, limit, weight, residual, w
     Returns the cost of its rays and the number of shared parameters that act on them.
     """
     start, image, lens_row, xy, inv_sigma, ap_index, ap_value = rays
-    lens_columns, eo_free, turn, _, _, point_free = table
+    lens_columns, eo_free, turn, _, _, point_free, kept = table
     rotation, centre, points, interior, shared = state
     by_eo, by_pt, by_sh, whitened, columns, n_columns, union, place, _, _, by_interior, prediction = work
     cost, n_union = 0.0, 0
@@ -80,6 +80,11 @@ def linearise_point(p, rays, table, state, estimator, limit, weight, residual, w
                 by_sh[q, 0, n], by_sh[q, 1, n] = ap_value[ray, 0, t], ap_value[ray, 1, t]
                 prediction[0] += ap_value[ray, 0, t] * shared[ap_index[ray, t]]
                 prediction[1] += ap_value[ray, 1, t] * shared[ap_index[ray, t]]
+                n += 1
+        if kept[p] >= 0:
+            for t in range(3):
+                columns[q, n] = kept[p] + t
+                by_sh[q, 0, n], by_sh[q, 1, n] = by_pt[q, 0, t], by_pt[q, 1, t]
                 n += 1
         n_columns[q] = n
         residual[ray, 0], residual[ray, 1] = xy[ray, 0] - prediction[0], xy[ray, 1] - prediction[1]
@@ -117,7 +122,7 @@ def point_normals(p, n_rays, table, points, damping, work, lower, misclosure):
 
     Returns the cost of the coordinates observed, and False where the rays do not determine the point.
     """
-    _, _, _, prior_xyz, prior_weight, point_free = table
+    _, _, _, prior_xyz, prior_weight, point_free, _ = table
     by_pt, whitened = work[1], work[3]
     cost = 0.0
     n00, n10, n11, n20, n21, n22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

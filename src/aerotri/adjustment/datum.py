@@ -45,7 +45,8 @@ def minimal_coordinates(unknowns: Unknowns, state: State) -> list[tuple[int, int
 
     X, Y, Z of both ends of the longest distance, and of the third point the axis nearest to the normal of their plane.
     """
-    a, b, c = spread_points(state.points, np.diff(unknowns.rays.start))
+    rays = np.where(unknowns.kept < 0, np.diff(unknowns.rays.start), 0)
+    a, b, c = spread_points(state.points, rays)
     normal = np.cross(state.points[b] - state.points[a], state.points[c] - state.points[a])
     axis = int(np.argmax(np.abs(normal)))
     return [(a, 0), (a, 1), (a, 2), (b, 0), (b, 1), (b, 2), (c, axis)]
@@ -77,7 +78,7 @@ def datum_rows(unknowns: Unknowns) -> np.ndarray:
     return np.flatnonzero(np.isin(names.astype(str), np.array(wanted, dtype=str)))
 
 
-def without_motion(state: State, step: Step) -> Step:
+def without_motion(unknowns: Unknowns, state: State, step: Step) -> Step:
     """A free block's step, freed of the motion of the whole: each iteration then turns and scales as little as it can.
 
     Which coordinates are held decides how far a linear step is from the truth; far points would swing the block about.
@@ -87,8 +88,14 @@ def without_motion(state: State, step: Step) -> Step:
     weight = 1.0 / np.maximum(1.0, distance / max(np.median(distance), 1e-12)) ** 2
     g = motions_of_points(state.points)
     weighted = (g * weight[:, None, None]).reshape(-1, 7)
-    motion = np.linalg.solve(weighted.T @ g.reshape(-1, 7), weighted.T @ step.points.ravel())
-    return Step(step.images - motions_of_images(state.centre) @ motion, step.shared, step.points - g @ motion)
+    kept, columns = unknowns.kept_rows, unknowns.kept_columns
+    points, shared = step.points.copy(), step.shared.copy()
+    points[kept] = shared[columns]
+    motion = np.linalg.solve(weighted.T @ g.reshape(-1, 7), weighted.T @ points.ravel())
+    points -= g @ motion
+    shared[columns] = points[kept]
+    points[kept] = 0.0
+    return Step(step.images - motions_of_images(state.centre) @ motion, shared, points)
 
 
 def restore_datum(unknowns: Unknowns, state: State, reference: np.ndarray) -> State:
@@ -105,7 +112,7 @@ def restore_datum(unknowns: Unknowns, state: State, reference: np.ndarray) -> St
     if unknowns.block.settings.adjustment.datum == "inner":
         datum[datum_rows(unknowns)] = True
     else:
-        datum = ~unknowns.point_free
+        datum = unknowns.point_held
     for _ in range(20):
         g = motions_of_points(state.points)[datum]
         motion = np.linalg.lstsq(g, (reference - state.points)[datum], rcond=None)[0]
@@ -114,8 +121,9 @@ def restore_datum(unknowns: Unknowns, state: State, reference: np.ndarray) -> St
             centre=scale * state.centre @ turn.T + motion[:3],
             rotation=turn @ state.rotation,
             points=scale * state.points @ turn.T + motion[:3],
-            shared=state.shared,
+            shared=state.shared.copy(),
         )
+        state.shared[unknowns.kept_columns] = state.points[unknowns.kept_rows]
         if np.abs(g @ motion).max() < 1e-9:
             break
     return state
@@ -124,8 +132,8 @@ def restore_datum(unknowns: Unknowns, state: State, reference: np.ndarray) -> St
 def nothing_holds(system: NormalSystem) -> bool:
     """Whether nothing observed or held ties the block to the object frame."""
     u = system.unknowns
-    held = not (u.eo_free.all() and u.point_free.all())
-    return not held and system.centres is None and not (u.prior_weight > 0.0).any()
+    held = not u.eo_free.all() or u.point_held.any()
+    return not held and not system.observes_centres and not (u.prior_weight > 0.0).any()
 
 
 def control_share(unknowns: Unknowns, state: State) -> float:

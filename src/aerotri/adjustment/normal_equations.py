@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -11,7 +13,16 @@ from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, InverseOnPattern, Symbolic
 from aerotri.adjustment.unknowns import State, Step, Unknowns
-from aerotri.functional_model.observed_unknowns import CentreObservations, antenna_partials, predict_antennas
+from aerotri.functional_model.observed_unknowns import CentreObservations, Rows
+
+
+class ExtraObservations(Protocol):
+    """Observations beside the image points: they linearise themselves."""
+
+    @property
+    def count(self) -> int: ...
+
+    def rows(self, centre: np.ndarray, rotation: np.ndarray, shared: np.ndarray) -> Rows: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,12 +91,12 @@ class NormalSystem:
     Parameters
     ----------
     unknowns : what is to be found.
-    centres : observed projection centres, or None.
+    extras : observations beside the image points.
     position : (n, 2) plan positions of the photographs, for the ordering.
     """
 
-    def __init__(self, unknowns: Unknowns, centres: CentreObservations | None, position: np.ndarray):
-        self.unknowns, self.centres = unknowns, centres
+    def __init__(self, unknowns: Unknowns, extras: Sequence[ExtraObservations], position: np.ndarray):
+        self.unknowns, self.extras = unknowns, tuple(extras)
         counts = np.diff(unknowns.rays.start).astype(float)
         self._bounds = chunk_bounds(counts * (counts + 4.0))
         self._max_rays = int(counts.max(initial=1))
@@ -94,15 +105,19 @@ class NormalSystem:
         self._sums = [_ChunkSums(unknowns, first, last, s) for first, last in self._bounds]
         sigma = np.array(unknowns.shared.sigma).reshape(-1)
         self._prior_weight = np.where(np.isfinite(sigma), 1.0 / sigma**2, 0.0)
-        self._prior_value = np.array(unknowns.shared.start).reshape(-1)
+        self._prior_value = np.array(unknowns.shared.observed).reshape(-1)
+        # the kernels see no prior of a point that is not eliminated: it stands with the shared parameters
+        self._point_prior = np.where((unknowns.kept < 0)[:, None], unknowns.prior_weight, 0.0)
 
     @property
     def n_shared_priors(self) -> int:
-        return int((self._prior_weight > 0.0).sum())
+        """Observed shared parameters, coordinates of points apart."""
+        of_points = np.array(self.unknowns.shared.kinds) == "point"
+        return int((self._prior_weight[~of_points] > 0.0).sum()) if len(of_points) else 0
 
     def _work(self):
         u = self.unknowns
-        most = int((u.lens.columns >= 0).sum(axis=1).max(initial=0)) + u.rays.ap_index.shape[1]
+        most = int((u.lens.columns >= 0).sum(axis=1).max(initial=0)) + u.rays.ap_index.shape[1] + 3
         return _kernels.scratch(self._max_rays, max(most, 1), len(u.shared))
 
     def _table(self, state: State):
@@ -112,8 +127,9 @@ class NormalSystem:
             u.eo_free.astype(float),
             u.turn(state),
             u.prior_xyz,
-            u.prior_weight,
+            self._point_prior,
             u.point_free.astype(float),
+            u.kept,
         )
 
     def _state(self, state: State):
@@ -149,7 +165,7 @@ class NormalSystem:
             sums.add_to(blocks, border, corner, right, right_shared)
         corner = corner + corner.T - np.diag(np.diagonal(corner))
         cost = sum(o[0] for o in outcomes)
-        cost += self._add_centres(state, blocks, border, corner, right, right_shared)
+        cost += self._add_extras(state, blocks, border, corner, right, right_shared)
         cost += self._add_priors(state, corner, right_shared)
         held_image, held_column = np.nonzero(~u.eo_free)
         blocks[held_image, held_column, held_column] = 1.0
@@ -172,35 +188,54 @@ class NormalSystem:
         right_shared += self._prior_weight * gap
         return float(np.sum(self._prior_weight * gap**2))
 
-    def _add_centres(self, state: State, blocks, border, corner, right, right_shared) -> float:
-        observed = self.centres
-        if observed is None:
-            return 0.0
-        by_image, by_shared = self.whitened_centre_partials(state)
-        gap = (
-            observed.xyz - predict_antennas(observed, state.centre, state.rotation, state.shared)
-        ) * observed.inv_sigma
-        gap = np.where(observed.inv_sigma > 0.0, gap, 0.0)
-        np.add.at(blocks, observed.image, np.einsum("gka,gkb->gab", by_image, by_image))
-        np.add.at(right, observed.image, np.einsum("gka,gk->ga", by_image, gap))
-        np.add.at(border, observed.image, np.einsum("gka,gks->gsa", by_image, by_shared))
-        corner += np.einsum("gks,gkt->st", by_shared, by_shared)
-        right_shared += np.einsum("gks,gk->s", by_shared, gap)
-        return float(np.sum(gap**2))
+    def _add_extras(self, state: State, blocks, border, corner, right, right_shared) -> float:
+        """Add the observations beside the image points; returns their vᵀPv."""
+        cost = 0.0
+        for rows in self.whitened_rows(state):
+            image, own = rows.image, rows.image >= 0
+            at, e, gap = image[own], rows.by_image[own], rows.gap[own]
+            np.add.at(blocks, at, np.einsum("gka,gkb->gab", e, e))
+            np.add.at(right, at, np.einsum("gka,gk->ga", e, gap))
+            for c in range(rows.columns.shape[1]):
+                column, there = rows.columns[:, c], rows.columns[:, c] >= 0
+                value = rows.by_shared[:, :, c]
+                both = there & own
+                np.add.at(
+                    border, (image[both], column[both]), np.einsum("gka,gk->ga", rows.by_image[both], value[both])
+                )
+                np.add.at(right_shared, column[there], np.sum(value[there] * rows.gap[there], axis=1))
+                for d in range(rows.columns.shape[1]):
+                    pair = there & (rows.columns[:, d] >= 0)
+                    product = np.sum(value[pair] * rows.by_shared[pair, :, d], axis=1)
+                    np.add.at(corner, (column[pair], rows.columns[pair, d]), product)
+            cost += float(np.sum(rows.gap**2))
+        return cost
 
-    def whitened_centre_partials(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """(g, 3, 6) and (g, 3, s), the rows of the observed centres divided by σ."""
-        u, observed = self.unknowns, self.centres
-        if observed is None:
-            return np.zeros((0, 3, 6)), np.zeros((0, 3, len(u.shared)))
-        by_image = antenna_partials(observed, state.rotation)
-        by_image[:, :, 3:] = by_image[:, :, 3:] @ self._table(state)[2][observed.image]
-        by_image *= u.eo_free[observed.image][:, None, :] * observed.inv_sigma[:, :, None]
-        by_shared = np.zeros((len(observed), 3, len(u.shared)))
-        for columns, factor in ((observed.shift, 1.0), (observed.drift, observed.time[:, None])):
-            g, axis = np.nonzero(columns >= 0)
-            by_shared[g, axis, columns[g, axis]] += (observed.inv_sigma * factor)[g, axis]
-        return by_image, by_shared
+    def whitened_rows(self, state: State) -> list[Rows]:
+        """The observations beside the image points, linearised at `state` and divided by σ, in the unknowns' axes."""
+        out = []
+        turn = self._table(state)[2]
+        for extra in self.extras:
+            rows = extra.rows(state.centre, state.rotation, state.shared)
+            by_image = rows.by_image.copy()
+            own = rows.image >= 0
+            by_image[own, :, 3:] = by_image[own, :, 3:] @ turn[rows.image[own]]
+            by_image[own] *= self.unknowns.eo_free[rows.image[own]][:, None, :]
+            weight = rows.inv_sigma[:, :, None]
+            out.append(
+                replace(
+                    rows,
+                    gap=rows.gap * rows.inv_sigma,
+                    by_image=by_image * weight,
+                    by_shared=rows.by_shared * weight * (rows.columns >= 0)[:, None, :],
+                )
+            )
+        return out
+
+    @property
+    def observes_centres(self) -> bool:
+        """Whether projection centres were observed."""
+        return any(isinstance(extra, CentreObservations) for extra in self.extras)
 
     def back_substitute(self, state: State, x: np.ndarray, damping: float, equations: NormalEquations, estimator):
         """The full step from the solution x (6·n + s,) of the reduced equations."""
@@ -253,9 +288,11 @@ class NormalSystem:
             )  # fmt: skip
 
         run_chunks(chunk, len(self._bounds))
-        held = ~u.point_free
+        held = u.point_held
         cofactor[held] = 0.0
         np.swapaxes(cofactor, 1, 2)[held] = 0.0
+        for row, columns in zip(u.kept_rows, u.kept_columns, strict=True):
+            cofactor[row] = inverse.corner[np.ix_(columns, columns)]
         return cofactor, redundancy
 
     def factorise(self, equations: NormalEquations) -> Factor:
@@ -289,6 +326,7 @@ class NormalSystem:
         right = np.concatenate(
             [np.sum([r[0] for r in rights], axis=0).reshape(6 * n, k), np.sum([r[1] for r in rights], axis=0)]
         )
+        right[6 * n + u.kept_columns] += sides[u.kept_rows]
         x = factor.solve(right)
         images, shared = np.ascontiguousarray(x[: 6 * n].reshape(n, 6, k)), np.ascontiguousarray(x[6 * n :])
         points = np.empty((len(u.points), 3, k))
@@ -299,4 +337,6 @@ class NormalSystem:
             )
 
         run_chunks(expand, len(self._bounds))
-        return images, shared, points * u.point_free[:, :, None]
+        points *= u.point_free[:, :, None]
+        points[u.kept_rows] = shared[u.kept_columns]
+        return images, shared, points

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment.datum import minimal_coordinates
+from aerotri.adjustment.extra_observations import extra_observations
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.start_values import start_values
 from aerotri.adjustment.unknowns import (
@@ -20,7 +21,6 @@ from aerotri.adjustment.unknowns import (
 )
 from aerotri.conventions import InputError
 from aerotri.functional_model.atmosphere import corrected_image_points
-from aerotri.functional_model.observed_unknowns import CentreObservations
 from aerotri.observations import Block
 
 USED, ONE_RAY, OFF, NO_START, NOT_FINITE = range(5)
@@ -83,9 +83,9 @@ def build_system(
     """
     unknowns, state = build_unknowns(block, start, status == USED)
     unknowns = _with_datum(unknowns, state, held)
-    centres = _centre_observations(block, unknowns)
+    unknowns, extras = extra_observations(unknowns, state)
     state = replace(state, shared=np.array(unknowns.shared.start, dtype=float))
-    return NormalSystem(unknowns, centres, state.centre[:, :2]), state
+    return NormalSystem(unknowns, extras, state.centre[:, :2]), state
 
 
 def check_settings(block: Block) -> None:
@@ -100,8 +100,6 @@ def check_settings(block: Block) -> None:
         (s.adjustment.robust not in ("off", "huber"), f'robust = "{s.adjustment.robust}"', 'use "off" or "huber"'),
         (s.adjustment.parameter_selection != "off", "parameter_selection", 'set it to "off"'),
         (s.adjustment.variance_components != "off", "variance_components", 'set it to "off"'),
-        (s.gnss.lever_arm_sigma_m is not None, "lever_arm_sigma_m", "leave it out: the lever arm is then held"),
-        (s.gnss.time_offset != "off", "time_offset", 'set it to "off"'),
     ]
     for wrong, what, remedy in refused:
         if wrong:
@@ -184,53 +182,3 @@ def _with_datum(unknowns: Unknowns, state: State, held: list[tuple[int, int]] | 
         row = {int(point): k for k, point in enumerate(unknowns.points)}
         return hold_points(unknowns, [(row[point], axis) for point, axis in held])
     return unknowns
-
-
-def _centre_observations(block: Block, unknowns: Unknowns) -> CentreObservations | None:
-    """Observed projection centres of the photographs that take part; shifts and drifts join the shared parameters."""
-    observed = block.gnss_ins
-    if observed is None:
-        return None
-    row = np.full(len(block.images), -1)
-    row[unknowns.images] = np.arange(len(unknowns.images))
-    used = np.flatnonzero((row[observed.image] >= 0) & np.isfinite(observed.xyz).any(axis=1))
-    if not len(used):
-        return None
-    image, settings = observed.image[used], block.settings.gnss
-    known = np.isfinite(observed.xyz[used])
-    strips = np.asarray(block.images.strip, dtype=object)[image]
-    time = observed.time[used]
-    if settings.drift != "off" and not np.isfinite(time).all():
-        raise InputError(
-            "a GNSS drift needs the time of every photograph", "add the column time, or set drift = \"off\"",
-            file="gnss_ins.csv",
-        )  # fmt: skip
-    return CentreObservations(
-        image=row[image],
-        xyz=np.where(known, observed.xyz[used] - unknowns.origin, 0.0),
-        inv_sigma=np.where(known, 1.0 / observed.sigma[used], 0.0),
-        shift=_gnss_columns(unknowns, "shift", settings.shift, strips, known),
-        drift=_gnss_columns(unknowns, "drift", settings.drift, strips, known),
-        time=_since_mean(time, strips),
-        lever_arm=np.array(settings.lever_arm_m),
-    )
-
-
-def _gnss_columns(unknowns: Unknowns, what: str, per: str, strips: np.ndarray, known: np.ndarray) -> np.ndarray:
-    columns = np.full((len(strips), 3), -1, dtype=np.int64)
-    if per == "off":
-        return columns
-    groups = strips if per == "strip" else np.full(len(strips), "block", dtype=object)
-    for group in dict.fromkeys(groups.tolist()):
-        own = groups == group
-        for axis, letter in enumerate("XYZ"):
-            if known[own, axis].any():
-                columns[own, axis] = unknowns.shared.add(f"gnss.{what}_{letter}", str(group), "gnss")
-    return columns
-
-
-def _since_mean(time: np.ndarray, strips: np.ndarray) -> np.ndarray:
-    since = np.nan_to_num(time)
-    for strip in set(strips.tolist()):
-        since[strips == strip] -= since[strips == strip].mean()
-    return since

@@ -28,15 +28,19 @@ class SharedList:
     kinds: list[str] = field(default_factory=list)
     marks: list[str] = field(default_factory=list)
     start: list[float] = field(default_factory=list)
+    observed: list[float] = field(default_factory=list)
     sigma: list[float] = field(default_factory=list)
 
-    def add(self, name: str, group: str, kind: str, mark: str = "", prior: Prior = FREE) -> int:
-        """Append one parameter; its column."""
+    def add(
+        self, name: str, group: str, kind: str, mark: str = "", prior: Prior = FREE, start: float | None = None
+    ) -> int:
+        """Append one parameter; its column. It starts at the value observed, unless `start` says otherwise."""
         self.names.append(name)
         self.groups.append(group)
         self.kinds.append(kind)
         self.marks.append(mark)
-        self.start.append(prior.value)
+        self.start.append(prior.value if start is None else start)
+        self.observed.append(prior.value)
         self.sigma.append(np.inf if prior.sigma is None else prior.sigma)
         return len(self.names) - 1
 

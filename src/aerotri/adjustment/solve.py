@@ -155,8 +155,8 @@ def _step(system: NormalSystem, state: State, equations: NormalEquations, estima
     x = factor.solve(damped.right)
     decrement = float(x @ damped.right) + damped.point_decrement
     step = system.back_substitute(state, x, damping, damped, estimator)
-    if not system.unknowns.point_free.all():
-        step = without_motion(state, step)
+    if system.unknowns.point_held.any():
+        step = without_motion(system.unknowns, state, step)
     if not all(np.isfinite(part).all() for part in (step.images, step.shared, step.points)):
         return None
     there = system.unknowns.advance(state, step)

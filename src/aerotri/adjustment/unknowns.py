@@ -18,7 +18,7 @@ from aerotri.functional_model.rotation import (
     rotation_from_angles,
     small_rotation_per_angle,
 )
-from aerotri.observations import Block
+from aerotri.observations import Block, Prior
 
 ORIENTATION_ELEMENTS = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
 
@@ -81,6 +81,7 @@ class Unknowns:
     eo_free : (n, 6) bool, point_free : (P, 3) bool: False where a value is held.
     by_angles : (n,) bool: small rotations run along ω, φ, κ, so that single angles can be held.
     prior_xyz, prior_weight : (P, 3) observed coordinates (local, m) and 1/σ², 0 where not observed.
+    kept : (P,) first of the three shared parameters that stand for a point which is not eliminated, −1 for the others.
     pair_start, pair_block, block_row, block_col : pattern of the reduced normal matrix.
     """
 
@@ -96,6 +97,7 @@ class Unknowns:
     point_free: np.ndarray
     prior_xyz: np.ndarray
     prior_weight: np.ndarray
+    kept: np.ndarray
     pair_start: np.ndarray
     pair_block: np.ndarray
     block_row: np.ndarray
@@ -130,12 +132,37 @@ class Unknowns:
             rotation[self.by_angles] = rotation_from_angles(
                 angles + step.images[self.by_angles, 3:], self.block.rotation
             )
-        return State(
-            centre=state.centre + step.images[:, :3],
-            rotation=rotation,
-            points=state.points + step.points,
-            shared=state.shared + step.shared,
+        return self.with_kept_points(
+            State(
+                centre=state.centre + step.images[:, :3],
+                rotation=rotation,
+                points=state.points + step.points,
+                shared=state.shared + step.shared,
+            )
         )
+
+    @property
+    def point_held(self) -> np.ndarray:
+        """(P, 3) bool, coordinates held for the datum."""
+        return ~self.point_free & (self.kept < 0)[:, None]
+
+    @property
+    def kept_rows(self) -> np.ndarray:
+        """Rows of the points that are not eliminated."""
+        return np.flatnonzero(self.kept >= 0)
+
+    @property
+    def kept_columns(self) -> np.ndarray:
+        """(·, 3) shared parameters of `kept_rows`."""
+        return self.kept[self.kept_rows][:, None] + np.arange(3)
+
+    def with_kept_points(self, state: State) -> State:
+        """The state with the points that are not eliminated taken from the shared parameters."""
+        if (self.kept < 0).all():
+            return state
+        points = state.points.copy()
+        points[self.kept_rows] = state.shared[self.kept_columns]
+        return replace(state, points=points)
 
     def name_of(self, column: int) -> str:
         """Name of an unknown of the reduced system, for messages: 'X0 of photo 1' or 'bluh.1 (ucd8)'."""
@@ -197,6 +224,7 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
         point_free=np.ones((len(points), 3), dtype=bool),
         prior_xyz=prior_xyz,
         prior_weight=prior_weight,
+        kept=np.full(len(points), -1, dtype=np.int64),
         pair_start=pair_start,
         pair_block=pair_block,
         block_row=block_row,
@@ -249,6 +277,21 @@ def _control_priors(block: Block, points: np.ndarray, origin: np.ndarray):
     xyz[rows] = np.where(known, control.xyz[used] - origin, 0.0)
     weight[rows] = np.where(known, 1.0 / control.sigma[used] ** 2, 0.0)
     return xyz, weight
+
+
+def keep_points(unknowns: Unknowns, state: State, rows: np.ndarray) -> Unknowns:
+    """The unknowns with points that conditions tie together moved from elimination to the shared parameters."""
+    kept, point_free = unknowns.kept.copy(), unknowns.point_free.copy()
+    for row in rows:
+        name = str(unknowns.block.points[unknowns.points[row]])
+        columns = []
+        for axis, letter in enumerate("XYZ"):
+            weight = unknowns.prior_weight[row, axis]
+            prior = Prior(unknowns.prior_xyz[row, axis], weight**-0.5 if weight > 0.0 else None)
+            columns.append(unknowns.shared.add(letter, name, "point", prior=prior, start=state.points[row, axis]))
+        kept[row] = columns[0]
+        point_free[row] = False
+    return replace(unknowns, kept=kept, point_free=point_free)
 
 
 def hold_orientation(unknowns: Unknowns, held: tuple[tuple[str, str], ...]) -> Unknowns:

@@ -11,6 +11,7 @@ from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
     from aerotri.crosscheck import CrosscheckResult
+    from aerotri.pipeline import Adjustment
     from aerotri.statistics.adjusted_block import AdjustedBlock
 
 OWN_NAMES = ("crosscheck.json", "crosscheck.csv", "plots")
@@ -51,20 +52,27 @@ def _refuse_foreign_folder(target: Path) -> None:
 
 
 def _adjusted(source: Path, console: Console) -> AdjustedBlock:
-    """A result as it was adjusted, or a block of any format adjusted now."""
+    """A result as it was adjusted, or a block of any format adjusted now; in the frame of its adjustment."""
+    from aerotri.crosscheck.freed import as_adjusted
+
+    adjustment = _adjustment(source, console)
+    return as_adjusted(adjustment.local, adjustment.system.unknowns.block)
+
+
+def _adjustment(source: Path, console: Console) -> Adjustment:
     from aerotri.compiled import compilation_notice
-    from aerotri.pipeline import adjust, reopen
+    from aerotri.pipeline import adjust_keeping_system, reopen
 
     console.progress(compilation_notice())
     if (source / "solution.npz").is_file():
         from aerotri.formats.block_folder import read_block
         from aerotri.formats.solution import read_solution
 
-        return reopen(read_block(source / "block"), read_solution(source / "solution.npz")).result
+        return reopen(read_block(source / "block"), read_solution(source / "solution.npz"))
     from aerotri.formats.convert import read_any
 
     block, points = read_any(source)
-    return adjust(block, console.iteration, points)
+    return adjust_keeping_system(block, console.iteration, points)
 
 
 def _write(result: CrosscheckResult, target: Path) -> None:

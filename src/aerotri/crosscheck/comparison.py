@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -160,11 +161,15 @@ class CrosscheckResult:
         return f"{self.verdict} — {'; '.join(parts)}"
 
 
-def judge(check: PeerCheck) -> PeerCheck:
-    """The check with its status and reason, from the numbers in it."""
-    reasons = [
-        f"{d.kind} by up to {d.max:.3g} σ ({d.worst})" for d in check.differences if not d.max <= LIMIT
-    ]
+def judge(check: PeerCheck, more: Sequence[str] = ()) -> PeerCheck:
+    """The check with its status and reason, from the numbers in it.
+
+    Parameters
+    ----------
+    more : reasons besides, why the two differ.
+    """
+    reasons = [*more]
+    reasons += [f"{d.kind} by up to {d.max:.3g} σ ({d.worst})" for d in check.differences if not d.max <= LIMIT]
     if not abs(check.vtpv_difference) <= VTPV_LIMIT:
         reasons.append(f"vᵀPv by {check.vtpv_difference:+.1e} of itself")
     if check.covariance is not None and not check.covariance.agrees:

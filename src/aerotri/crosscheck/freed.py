@@ -15,8 +15,20 @@ from aerotri.formats.oriented import oriented_from_adjusted
 from aerotri.observations import AdjustmentSettings, Block, Control, ImagePoints, Settings
 from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
 
+NO_CORRECTIONS = {"refraction": "off", "earth_curvature": "off"}
 LEAST_WEIGHT = 0.5
 """Robust weight below which a ray is left out of an adjustment with equal weights."""
+
+
+def as_adjusted(local: AdjustedBlock, measured: Block) -> AdjustedBlock:
+    """A result whose block needs no correction any more: the peers know neither the air nor the curved earth.
+
+    Parameters
+    ----------
+    local : the result in the frame of the adjustment. measured : the block that the equations were made of, its image
+        points freed of refraction and earth curvature.
+    """
+    return replace(local, block=replace(measured, settings=replace(measured.settings, **NO_CORRECTIONS)))
 
 
 def used_rays(adjusted: AdjustedBlock) -> np.ndarray:
@@ -64,15 +76,19 @@ def freed_block(adjusted: AdjustedBlock) -> FreedBlock:
     left_out = int(used_rays(adjusted).sum() - keep.sum())
     if left_out:
         notes.append(f"rays left out: {left_out} (the only ray of a point, or a robust weight below {LEAST_WEIGHT})")
-    if not by_control:
-        notes.append("adjusted without observed projection centres, in a minimal datum" if block.gnss_ins is not None
-                     else "datum: seven point coordinates held")  # fmt: skip
+    if block.gnss_ins is not None:
+        notes.append("both without observed projection centres and attitudes, in a minimal datum")
+    elif not by_control:
+        notes.append("datum: seven point coordinates held")
+    if block.constraints is not None and len(block.constraints):
+        notes.append("both without constraints")
     settings = Settings(
         adjustment=AdjustmentSettings(datum="control" if by_control else "minimal"),
         image_sigma_um=block.settings.image_sigma_um,
     )
     control = block.control if by_control else Control.empty()
-    freed = replace(_from_solution(freed, adjusted), control=control, gnss_ins=None, settings=settings)
+    freed = _from_solution(freed, adjusted)
+    freed = replace(freed, control=control, gnss_ins=None, edits=None, constraints=None, settings=settings)
     return FreedBlock(freed, sigma_px, tuple(notes))
 
 

@@ -163,6 +163,10 @@ def paper_block(block: Block, used: np.ndarray, weight: np.ndarray, origin: np.n
 
 
 def _refuse_unknown(block: Block) -> None:
+    if block.crs != "local":
+        raise UnknownToPaperError(f"the block is in {block.crs}, not in the frame of its adjustment")
+    if block.constraints is not None and len(block.constraints):
+        raise UnknownToPaperError("constraints between points have no independent formula here")
     settings = block.settings
     families = {family for family, _ in settings.adjustment.additional_parameters}
     unknown = sorted(families - set(LINEAR) - {"brown", "lens"})
@@ -261,14 +265,24 @@ def _control(block: Block, points: np.ndarray, origin: np.ndarray) -> tuple[np.n
     value, inv_sigma = np.zeros((len(points), 3)), np.zeros((len(points), 3))
     if block.settings.adjustment.datum == "control":
         row = {int(p): k for k, p in enumerate(points)}
-        control = block.control
+        control, in_use = block.control, _control_in_use(block)
         for k in range(len(control)):
             at = row.get(int(control.point[k]))
-            if at is not None and not control.is_check[k]:
+            if at is not None and in_use[k]:
                 known = np.isfinite(control.xyz[k])
                 value[at, known] = (control.xyz[k] - origin)[known]
                 inv_sigma[at, known] = 1.0 / control.sigma[k, known]
     return value, inv_sigma
+
+
+def _control_in_use(block: Block) -> np.ndarray:
+    """(k,) bool, what is control after the operator's decisions: off, check and control, the last one holds."""
+    in_use = ~block.control.is_check
+    if block.edits is not None:
+        for image, point, action in zip(block.edits.image, block.edits.point, block.edits.action, strict=True):
+            if image < 0:
+                in_use[block.control.point == point] = action == "control"
+    return in_use
 
 
 def _antennas(block: Block, images: np.ndarray, origin: np.ndarray, entries: _Entries) -> Antennas | None:

@@ -56,7 +56,23 @@ def check_with_paper(adjusted: AdjustedBlock, adjust: Callable[[Block], Adjusted
         differences=_differences(adjusted, paper, layout, solution.x),
         notes=(*notes, *_notes(adjusted, solution)),
     )
-    return judge(check) if solution.converged else check
+    if not solution.converged:
+        return check
+    reasons = _counts_differ(adjusted, check)
+    attitudes = adjusted.block.gnss_ins is not None and np.isfinite(adjusted.block.gnss_ins.angles).any()
+    if reasons and attitudes:
+        return PeerCheck(PEER, QUESTION, "not available", "observed attitudes have no independent formula here")
+    return judge(check, reasons)
+
+
+def _counts_differ(adjusted: AdjustedBlock, check: PeerCheck) -> list[str]:
+    """Observations and unknowns that one of the two does not have; the conditions of an inner datum are not counted."""
+    o = adjusted.outcome
+    pairs = (
+        ("observations", o.observations, check.observations),
+        ("unknowns", o.unknowns - o.conditions, check.unknowns),
+    )
+    return [f"{what}: ours {ours}, independently {peer}" for what, ours, peer in pairs if ours != peer]
 
 
 def _notes(adjusted: AdjustedBlock, solution: PaperSolution) -> list[str]:

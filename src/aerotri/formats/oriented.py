@@ -53,6 +53,24 @@ class OrientedBlock:
         known = np.asarray(np.isfinite(self.points).all(axis=1))
         return self.used & self.oriented[rays.image] & known[rays.point]
 
+    def rows_with_orientation(self, what: str) -> np.ndarray:
+        """(k,) the photographs that `what` can hold.
+
+        Raises
+        ------
+        InputError
+            When there is none.
+        """
+        rows = np.flatnonzero(self.oriented)
+        if not len(rows):
+            raise InputError(f"block '{self.block.name}' has no orientations for {what}", "adjust it first")
+        return rows
+
+    def unoriented(self) -> tuple[str, ...]:
+        """A sentence on photographs without orientation, if there are any."""
+        count = int((~self.oriented).sum())
+        return (f"could not be carried over: {count} photographs without orientation",) if count else ()
+
     def corrected_xy(self) -> np.ndarray:
         """(m, 2) mm, the rays free of Brown's and the linear errors; what the lens does is still in them."""
         rays = self.block.image_points

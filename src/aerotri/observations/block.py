@@ -236,12 +236,15 @@ class Constraints:
     points : for each its points, an index array into the block's point names, in the order given.
     value : (k,) m, NaN for kinds that have none.
     sigma : (k,) m.
+    axes : (k, 3, 3) east, north and up at the place, as columns, of a block brought into the local frame of its CRS;
+        None where Z is up everywhere.
     """
 
     kind: np.ndarray
     points: tuple[np.ndarray, ...]
     value: np.ndarray
     sigma: np.ndarray
+    axes: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.kind)

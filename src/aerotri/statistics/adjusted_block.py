@@ -116,7 +116,7 @@ class SharedParameters:
     ----------
     names : (s,) str such as 'focal_length_mm', 'bluh.1', 'brown.K1', 'gnss.shift_X'.
     groups : (s,) str, the camera, day or strip the parameter belongs to.
-    kinds : (s,) str, 'interior', 'additional' or 'gnss'.
+    kinds : (s,) str, 'interior', 'additional', 'gnss' or 'ins'.
     marks : (s,) str, P L D C of the family, '' otherwise.
     value : (s,); covariance : (s, s), σ̂0² included. Units: mm for interior elements, as the family states otherwise.
     max_correlation : (s,) the largest |r| with another shared parameter, signed; max_correlation_with : (s,) its name.
@@ -176,11 +176,33 @@ class GroundPointResults:
         return len(self.point)
 
 
+@dataclass(frozen=True, eq=False)
+class ObservationResults:
+    """Observations beside image points and control, o of them: GNSS, INS, conditions; in the local frame.
+
+    Parameters
+    ----------
+    group : (o,) str. label : (o,) str, the photograph or condition. component : (o,) str, such as X or omega.
+    v, sigma : (o,) m, rad for attitudes; sigma a priori. r : (o,) redundancy numbers. w : (o,) −v/(σ√r).
+    """
+
+    group: np.ndarray
+    label: np.ndarray
+    component: np.ndarray
+    v: np.ndarray
+    sigma: np.ndarray
+    r: np.ndarray
+    w: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.group)
+
+
 @dataclass(frozen=True)
 class ObservationGroup:
     """One group of observations: its share of the redundancy and how its residuals fit their σ.
 
-    `sigma_apriori` and `rms` in the unit of the group (µm for image points, m otherwise); `sigma_aposteriori` is
+    `sigma_apriori` and `rms` in the unit of the group (µm for image points, rad for attitudes, m otherwise); `sigma_aposteriori` is
     sigma_apriori·√(vᵀPv of the group / its redundancy).
     """
 
@@ -217,3 +239,4 @@ class AdjustedBlock:
     check: GroundPointResults
     groups: tuple[ObservationGroup, ...]
     blunders: tuple[Blunder, ...] = ()
+    observations: ObservationResults | None = None

@@ -72,11 +72,15 @@ def transform_datum(system: NormalSystem, state: State, factor: Factor, estimato
     a[rows] = np.linalg.solve(g_datum.T @ g_datum, g_datum.T).T.reshape(-1, 3, 7)
     qa_images, qa_shared, qa_points = system.solve_sides(state, factor, a, estimator)
     aqa = np.einsum("pia,pib->ab", a, qa_points)
+    # of the shared parameters only the points that are not eliminated move with the datum
+    g_shared = np.zeros((len(minimal.shared), 7))
+    g_shared[system.unknowns.kept_columns] = g_points[system.unknowns.kept_rows]
+    mixed = np.einsum("nia,sa->nis", g_images, qa_shared) + np.einsum("nia,sa->nis", qa_images, g_shared)
     return Cofactors(
         images=_transformed(minimal.images, g_images, qa_images, aqa),
-        shared=minimal.shared,
+        shared=_transformed(minimal.shared[None], g_shared[None], qa_shared[None], aqa)[0],
         points=_transformed(minimal.points, g_points, qa_points, aqa),
-        image_shared=minimal.image_shared - np.einsum("nia,sa->nis", g_images, qa_shared),
+        image_shared=minimal.image_shared - mixed + np.einsum("nia,ab,sb->nis", g_images, aqa, g_shared),
         ray_redundancy=minimal.ray_redundancy,
     )
 

@@ -79,7 +79,7 @@ def refuse_runaway(system: NormalSystem, solution: Solution) -> None:
 def doubts(system: NormalSystem, state: State) -> tuple[str, ...]:
     """Sentences about what the block itself leaves doubtful."""
     block, said = system.unknowns.block, []
-    if block.settings.adjustment.datum == "control" and system.centres is None:
+    if block.settings.adjustment.datum == "control" and not system.observes_centres:
         share = control_share(system.unknowns, state)
         if share < LITTLE_CONTROL:
             said.append(
@@ -89,6 +89,4 @@ def doubts(system: NormalSystem, state: State) -> tuple[str, ...]:
     redundancy = count_observations(system).redundancy
     if redundancy <= 0:
         said.append(f"redundancy {redundancy}: nothing controls the observations, σ is not known")
-    if block.gnss_ins is not None and np.isfinite(block.gnss_ins.angles).any():
-        said.append("observed attitudes are not used as observations in this version")
     return tuple(said)

@@ -9,13 +9,14 @@ import numpy as np
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
-from aerotri.functional_model.observed_unknowns import predict_antennas
+from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.statistics.adjusted_block import (
     AdjustedBlock,
     GroundPointResults,
     ImageResults,
     ObservationGroup,
+    ObservationResults,
     Outcome,
     PointResults,
     RayResults,
@@ -23,6 +24,9 @@ from aerotri.statistics.adjusted_block import (
 )
 from aerotri.statistics.covariance import Cofactors, cofactors, correlations, orientation_cofactors, total_correlations
 from aerotri.statistics.reliability import normalised_residuals, suspected_blunders
+
+OF_POINTS = ("point", "constraint")
+"""Kinds of shared parameters that belong to object points and not to cameras or flights."""
 
 INSEPARABLE = 0.999
 """Correlation beyond which two parameters are reported as one."""
@@ -44,9 +48,9 @@ class Counts:
 def count_observations(system: NormalSystem) -> Counts:
     """Counts of the adjustment that `system` stands for; an inner datum has seven conditions."""
     u = system.unknowns
-    held_observed = int(((u.prior_weight > 0.0) & u.point_free).sum())
-    centres = 0 if system.centres is None else system.centres.count
-    observations = 2 * len(u.rays.image) + held_observed + centres + system.n_shared_priors
+    held_observed = int(((u.prior_weight > 0.0) & ~u.point_held).sum())
+    extras = sum(extra.count for extra in system.extras)
+    observations = 2 * len(u.rays.image) + held_observed + extras + system.n_shared_priors
     inner = u.block.settings.adjustment.datum == "inner"
     return Counts(observations, u.count + (7 if inner else 0), 7 if inner else 0)
 
@@ -84,6 +88,7 @@ def summarise(
     rays = _rays(system, solution, q, ray_status)
     points = _points(system, solution, q, rays, sigma0)
     control, check = _ground_points(system, solution, q, points, sigma0)
+    extra_groups, observations = _extra_results(system, solution, q)
     return AdjustedBlock(
         block=block,
         outcome=outcome,
@@ -93,7 +98,8 @@ def summarise(
         parameters=_parameters(system, solution, q, sigma0),
         control=control,
         check=check,
-        groups=_groups(system, solution, q, rays, control),
+        groups=tuple(_groups(system, solution, q, rays, control) + extra_groups),
+        observations=observations,
         blunders=suspected_blunders(block, rays),
     )
 
@@ -151,26 +157,30 @@ def _rays(system: NormalSystem, solution: Solution, q: Cofactors, status: np.nda
 
 
 def _parameters(system: NormalSystem, solution: Solution, q: Cofactors, sigma0: float) -> SharedParameters:
-    u = system.unknowns
-    s = len(u.shared)
-    r = correlations(q.shared)
+    """The shared parameters but for the coordinates of points and what conditions brought along."""
+    shared = system.unknowns.shared
+    all_kinds = np.array(shared.kinds, dtype=object)
+    rows = np.flatnonzero(~np.isin(all_kinds.astype(str), OF_POINTS))
+    s, cofactor = len(rows), q.shared[np.ix_(rows, rows)]
+    r = correlations(cofactor)
     off = np.abs(r - np.diag(np.diagonal(r))) if s else np.zeros((0, 0))
     partner = off.argmax(axis=1) if s > 1 else np.zeros(s, dtype=int)
-    names = np.array(u.shared.names, dtype=object)
-    groups = np.array(u.shared.groups, dtype=object)
-    lens = np.array([kind in ("interior", "additional") for kind in u.shared.kinds], dtype=bool)
+    names, groups, kinds, marks = (
+        np.array(column, dtype=object)[rows] for column in (shared.names, shared.groups, shared.kinds, shared.marks)
+    )
+    lens = np.isin(kinds.astype(str), ("interior", "additional"))
     total = np.full(s, np.nan)
-    total[lens] = total_correlations(q.shared[np.ix_(lens, lens)])
-    weighted = np.isfinite(np.array(u.shared.sigma).reshape(-1))
+    total[lens] = total_correlations(cofactor[np.ix_(lens, lens)])
+    weighted = np.isfinite(np.array(shared.sigma).reshape(-1)[rows])
     one_group = len(set(groups.tolist())) <= 1
     labels = np.array([n if one_group else f"{n} ({g})" for n, g in zip(names, groups, strict=True)], dtype=object)
     return SharedParameters(
         names=names,
         groups=groups,
-        kinds=np.array(u.shared.kinds, dtype=object),
-        marks=np.array(u.shared.marks, dtype=object),
-        value=solution.state.shared.copy(),
-        covariance=sigma0**2 * q.shared,
+        kinds=kinds,
+        marks=marks,
+        value=solution.state.shared[rows],
+        covariance=sigma0**2 * cofactor,
         max_correlation=r[np.arange(s), partner] if s > 1 else np.full(s, np.nan),
         max_correlation_with=labels[partner] if s > 1 else np.full(s, "", dtype=object),
         total_correlation=total,
@@ -242,9 +252,7 @@ def _groups(system: NormalSystem, solution: Solution, q: Cofactors, rays: RayRes
                 rms = float(np.sqrt(np.mean(d[known] ** 2)))
                 apriori = float(np.median(s[known]))
                 groups.append(_group(name, int(known.sum()), apriori, rms, float(r[known].sum()), pvv))
-    groups += _centre_group(system, solution, q)
-    groups += _prior_group(system, solution, q)
-    return tuple(groups)
+    return groups + _prior_group(system, solution, q)
 
 
 def _group(name: str, count: int, apriori: float, rms: float, redundancy: float, pvv: float) -> ObservationGroup:
@@ -252,34 +260,52 @@ def _group(name: str, count: int, apriori: float, rms: float, redundancy: float,
     return ObservationGroup(name, count, apriori, rms, redundancy, posteriori)
 
 
-def _centre_group(system: NormalSystem, solution: Solution, q: Cofactors) -> list[ObservationGroup]:
-    observed, state = system.centres, solution.state
-    if observed is None:
-        return []
-    by_image, by_shared = system.whitened_centre_partials(state)
-    cofactor = np.einsum("gka,gab,gkb->gk", by_image, q.images[observed.image], by_image)
-    cofactor += 2.0 * np.einsum("gka,gas,gks->gk", by_image, q.image_shared[observed.image], by_shared)
-    cofactor += np.einsum("gks,st,gkt->gk", by_shared, q.shared, by_shared)
-    known = observed.inv_sigma > 0.0
-    gap = (observed.xyz - predict_antennas(observed, state.centre, state.rotation, state.shared))[known]
-    inv_sigma = observed.inv_sigma[known]
-    return [
-        _group(
-            "projection centres", int(known.sum()), float(np.median(1.0 / inv_sigma)), float(np.sqrt(np.mean(gap**2))),
-            float((1.0 - cofactor[known]).sum()), float(np.sum((gap * inv_sigma) ** 2)),
-        )
-    ]  # fmt: skip
+def _extra_results(system: NormalSystem, solution: Solution, q: Cofactors) -> tuple[list, ObservationResults | None]:
+    """Groups of the observations beside the image points, and their residuals one by one."""
+    groups, parts = [], []
+    for rows in system.whitened_rows(solution.state):
+        cofactor = _row_cofactors(rows, q)
+        known = rows.inv_sigma > 0.0
+        sigma = np.where(known, 1.0 / np.where(known, rows.inv_sigma, 1.0), np.nan)
+        v, r = -rows.gap * sigma, np.where(known, 1.0 - cofactor, np.nan)
+        groups.append(
+            _group(
+                rows.name, rows.count, float(np.median(sigma[known])), float(np.sqrt(np.mean(v[known] ** 2))),
+                float(r[known].sum()), float(np.sum(rows.gap[known] ** 2)),
+            )
+        )  # fmt: skip
+        labels = np.repeat(rows.labels[:, None], known.shape[1], axis=1)[known]
+        components = np.broadcast_to(np.array(rows.components, dtype=object), known.shape)[known]
+        names = np.full(len(labels), rows.name, dtype=object)
+        parts.append((names, labels, components, v[known], sigma[known], r[known]))
+    if not parts:
+        return groups, None
+    names, labels, components, v, sigma, r = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return groups, ObservationResults(names, labels, components, v, sigma, r, normalised_residuals(v, sigma, r))
+
+
+def _row_cofactors(rows: Rows, q: Cofactors) -> np.ndarray:
+    """(g, k) cofactors of the whitened predictions."""
+    cofactor = np.zeros(rows.gap.shape)
+    own = rows.image >= 0
+    image, e = rows.image[own], rows.by_image[own]
+    cofactor[own] += np.einsum("gka,gab,gkb->gk", e, q.images[image], e)
+    if len(q.shared):
+        columns, s = np.where(rows.columns >= 0, rows.columns, 0), rows.by_shared
+        cofactor += np.einsum("gkc,gcd,gkd->gk", s, q.shared[columns[:, :, None], columns[:, None, :]], s)
+        mixed = np.swapaxes(q.image_shared, 1, 2)[image[:, None], columns[own]]
+        cofactor[own] += 2.0 * np.einsum("gka,gca,gkc->gk", e, mixed, s[own])
+    return cofactor
 
 
 def _prior_group(system: NormalSystem, solution: Solution, q: Cofactors) -> list[ObservationGroup]:
     """Weighted interior elements and additional parameters; residuals in units of σ, for want of a common unit."""
     shared = system.unknowns.shared
     sigma = np.array(shared.sigma).reshape(-1)
-    known = np.isfinite(sigma)
+    known = np.isfinite(sigma) & (np.array(shared.kinds, dtype=object) != "point").reshape(-1)
     if not known.any():
         return []
-    normed = ((solution.state.shared - np.array(shared.start)) / sigma)[known]
+    normed = ((solution.state.shared - np.array(shared.observed)) / sigma)[known]
     redundancy = float((1.0 - np.diagonal(q.shared)[known] / sigma[known] ** 2).sum())
     pvv = float(np.sum(normed**2))
     return [_group("weighted parameters", int(known.sum()), 1.0, float(np.sqrt(pvv / known.sum())), redundancy, pvv)]
-

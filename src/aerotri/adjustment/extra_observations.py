@@ -1,0 +1,223 @@
+"""Observations beside the image points, from the block's tables: GNSS, INS, conditions between points.
+
+What they need of unknowns of their own (shifts, drifts, boresight, planes) joins the shared parameters here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerotri.adjustment.normal_equations import ExtraObservations
+from aerotri.adjustment.unknowns import State, Unknowns, keep_points
+from aerotri.conventions import InputError
+from aerotri.functional_model.constraints import Constraint, ConstraintObservations, flat_basis
+from aerotri.functional_model.observed_unknowns import AttitudeObservations, CentreObservations
+from aerotri.functional_model.rotation import logarithm, rotation_from_angles
+from aerotri.observations import Block, Prior
+
+LARGE_BORESIGHT = 0.2
+"""Boresight (rad) beyond which the mean of the start values is taken out first, so that what is estimated is small."""
+
+
+def extra_observations(unknowns: Unknowns, state: State) -> tuple[Unknowns, list[ExtraObservations]]:
+    """The unknowns with what the observations add to them, and the observations."""
+    extras: list[ExtraObservations] = []
+    block = unknowns.block
+    if block.gnss_ins is not None:
+        for make in (_centres, _attitudes):
+            observed = make(block, unknowns, state)
+            if observed is not None:
+                extras.append(observed)
+    if block.constraints is not None and len(block.constraints):
+        unknowns, conditions = _constraints(unknowns, state)
+        if conditions is not None:
+            extras.append(conditions)
+    return unknowns, extras
+
+
+def _used_rows(block: Block, unknowns: Unknowns, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of gnss_ins with a value whose photograph takes part, and the photographs' rows."""
+    row = np.full(len(block.images), -1)
+    row[unknowns.images] = np.arange(len(unknowns.images))
+    used = np.flatnonzero((row[block.gnss_ins.image] >= 0) & np.isfinite(values).any(axis=1))
+    return used, row[block.gnss_ins.image[used]]
+
+
+def _times(block: Block, used: np.ndarray, strips: np.ndarray, wanted: str) -> np.ndarray:
+    """(g,) s from the mean of the strip; an error where a time is missing that is needed."""
+    time = block.gnss_ins.time[used]
+    if wanted and not np.isfinite(time).all():
+        raise InputError(f"{wanted} needs the time of every photograph", "add the column time", file="gnss_ins.csv")
+    since = np.nan_to_num(time)
+    for strip in set(strips.tolist()):
+        since[strips == strip] -= since[strips == strip].mean()
+    return since
+
+
+def _groups(per: str, strips: np.ndarray) -> np.ndarray:
+    return strips if per == "strip" else np.full(len(strips), "block", dtype=object)
+
+
+def _columns(unknowns: Unknowns, name: str, letters: tuple[str, ...], groups: np.ndarray, known: np.ndarray):
+    """(g, len(letters)) shared parameters, one per letter and group that has such an observation."""
+    columns = np.full((len(groups), len(letters)), -1, dtype=np.int64)
+    kind = name.partition(".")[0]
+    for group in dict.fromkeys(groups.tolist()):
+        own = groups == group
+        for axis, letter in enumerate(letters):
+            if known[own, axis].any():
+                columns[own, axis] = unknowns.shared.add(f"{name}{letter}", str(group), kind)
+    return columns
+
+
+def _centres(block: Block, unknowns: Unknowns, state: State) -> CentreObservations | None:
+    observed, settings = block.gnss_ins, block.settings.gnss
+    used, row = _used_rows(block, unknowns, observed.xyz)
+    if not len(used):
+        return None
+    known = np.isfinite(observed.xyz[used])
+    strips = np.asarray(block.images.strip, dtype=object)[observed.image[used]]
+    needs_time = "a GNSS drift" if settings.drift != "off" else ""
+    needs_time = "a GNSS time offset" if settings.time_offset != "off" else needs_time
+    time = _times(block, used, strips, needs_time)
+    none = np.full((len(used), 3), -1, dtype=np.int64)
+    xyz = np.where(known, observed.xyz[used] - unknowns.origin, 0.0)
+    shift = (
+        none
+        if settings.shift == "off"
+        else _columns(unknowns, "gnss.shift_", tuple("XYZ"), _groups(settings.shift, strips), known)
+    )
+    drift = (
+        none
+        if settings.drift == "off"
+        else _columns(unknowns, "gnss.drift_", tuple("XYZ"), _groups(settings.drift, strips), known)
+    )
+    offset, velocity = np.full(len(used), -1, dtype=np.int64), np.zeros((len(used), 3))
+    if settings.time_offset != "off":
+        offset = _columns(unknowns, "gnss.time_offset", ("",), _groups(settings.time_offset, strips), known[:, :1])[
+            :, 0
+        ]
+        velocity = _velocities(state.centre[row], time, strips)
+    return CentreObservations(
+        labels=block.images.names[observed.image[used]],
+        image=row,
+        xyz=xyz,
+        inv_sigma=np.where(known, 1.0 / observed.sigma[used], 0.0),
+        shift=shift,
+        drift=drift,
+        lever=_lever_columns(unknowns),
+        lever_arm=np.array(settings.lever_arm_m),
+        offset=offset,
+        velocity=velocity,
+        time=time,
+    )
+
+
+def _lever_columns(unknowns: Unknowns) -> np.ndarray:
+    """(3,) shared parameters of a lever arm to be estimated, weighted by its σ; −1 where it is held."""
+    settings = unknowns.block.settings.gnss
+    if settings.lever_arm_sigma_m is None:
+        return np.full(3, -1, dtype=np.int64)
+    pairs = zip("xyz", settings.lever_arm_m, settings.lever_arm_sigma_m, strict=True)
+    return np.array(
+        [unknowns.shared.add(f"gnss.lever_arm_{a}", "block", "gnss", prior=Prior(v, s)) for a, v, s in pairs]
+    )
+
+
+def _velocities(centre: np.ndarray, time: np.ndarray, strips: np.ndarray) -> np.ndarray:
+    """(g, 3) m/s along the track of each strip; 0 for a strip of one."""
+    velocity = np.zeros_like(centre)
+    for strip in set(strips.tolist()):
+        own = np.flatnonzero(strips == strip)
+        own = own[np.argsort(time[own])]
+        if len(own) > 1 and (np.diff(time[own]) > 0).all():
+            velocity[own] = np.gradient(centre[own], time[own], axis=0)
+    return velocity
+
+
+def _attitudes(block: Block, unknowns: Unknowns, state: State) -> AttitudeObservations | None:
+    observed, settings = block.gnss_ins, block.settings.ins
+    used, row = _used_rows(block, unknowns, observed.angles)
+    used_all = np.isfinite(observed.angles[used]).all(axis=1)
+    if not used_all.all():
+        raise InputError("an attitude is given in part", "give omega, phi and kappa, or none", file="gnss_ins.csv")
+    if not len(used):
+        return None
+    image = observed.image[used]
+    strips = np.asarray(block.images.strip, dtype=object)[image]
+    cameras = np.array([block.cameras[c].name for c in block.images.camera[image]], dtype=object)
+    known = np.ones((len(used), 3), dtype=bool)
+    time = _times(block, used, strips, "an INS drift" if settings.drift != "off" else "")
+    angles = observed.angles[used]
+    rotation = rotation_from_angles(angles, block.rotation)
+    none = np.full((len(used), 3), -1, dtype=np.int64)
+    start = np.broadcast_to(np.eye(3), (len(used), 3, 3)).copy()
+    if settings.boresight != "off":
+        for camera in set(cameras.tolist()):
+            own = cameras == camera
+            start[own] = _boresight_start(np.swapaxes(state.rotation[row[own]], 1, 2) @ rotation[own])
+    boresight = (
+        none if settings.boresight == "off" else _columns(unknowns, "ins.boresight_", tuple("xyz"), cameras, known)
+    )
+    drift = none
+    if settings.drift != "off":
+        drift = _columns(unknowns, "ins.drift_", ("omega", "phi", "kappa"), _groups(settings.drift, strips), known)
+    return AttitudeObservations(
+        labels=block.images.names[image],
+        image=row,
+        rotation=rotation,
+        angles=angles,
+        order=block.rotation,
+        inv_sigma=1.0 / observed.angles_sigma[used],
+        boresight=boresight,
+        boresight_start=start,
+        drift=drift,
+        time=time,
+    )
+
+
+def _boresight_start(turns: np.ndarray) -> np.ndarray:
+    """(3, 3) the mean of rotations INS → camera where it is large, else the identity."""
+    u, _, vt = np.linalg.svd(turns.mean(axis=0))
+    mean = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    return mean if np.linalg.norm(logarithm(mean)) > LARGE_BORESIGHT else np.eye(3)
+
+
+def _constraints(unknowns: Unknowns, state: State) -> tuple[Unknowns, ConstraintObservations | None]:
+    block, given = unknowns.block, unknowns.block.constraints
+    row = np.full(len(block.points), -1)
+    row[unknowns.points] = np.arange(len(unknowns.points))
+    for k, points in enumerate(given.points):
+        missing = [str(block.points[p]) for p in points if row[p] < 0]
+        if missing:
+            raise InputError(
+                f"the {given.kind[k]} condition names point '{missing[0]}', which is not adjusted",
+                "measure it in two photographs, or remove the condition",
+                file="constraints.csv",
+            )
+    wanted = np.unique(np.concatenate([row[points] for points in given.points]))
+    unknowns = keep_points(unknowns, state, wanted)
+    conditions = []
+    for k, points in enumerate(given.points):
+        kind = str(given.kind[k])
+        rows = row[points]
+        centre, basis = flat_basis(state.points[rows], kind) if kind in ("plane", "line") else (None, None)
+        label = f"{kind} {' '.join(str(name) for name in block.points[points][:3])}" + (" …" if len(points) > 3 else "")
+        count = {"plane": 3, "line": 4}.get(kind, 0)
+        conditions.append(
+            Constraint(
+                kind=kind,
+                label=label,
+                columns=unknowns.kept[rows][:, None] + np.arange(3),
+                extra=np.array(
+                    [unknowns.shared.add(f"{kind}.{i}", label, "constraint") for i in range(count)], dtype=int
+                ),
+                value=float(given.value[k]) if np.isfinite(given.value[k]) else 0.0,
+                sigma=float(given.sigma[k]),
+                axes=np.eye(3) if given.axes is None else given.axes[k],
+                curved=given.axes is not None,
+                centre=centre,
+                basis=basis,
+            )
+        )
+    return unknowns, ConstraintObservations(tuple(conditions))

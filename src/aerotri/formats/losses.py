@@ -1,0 +1,67 @@
+"""What a format cannot hold of a block, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from aerotri.observations import Block
+
+Count = Callable[[Block], int]
+
+
+def _lens(block: Block) -> int:
+    priors = [prior for camera in block.cameras for prior in (*camera.brown.values(), *camera.lens.values())]
+    return sum(prior.value != 0.0 for prior in priors)
+
+
+def _principal_points(block: Block) -> int:
+    return sum(any(camera.principal_point_mm) for camera in block.cameras)
+
+
+def _control_sigmas(block: Block) -> int:
+    return int(np.isfinite(block.control.sigma).any(axis=1).sum())
+
+
+THINGS: dict[str, tuple[Count, str]] = {
+    "cameras": (lambda block: len(block.cameras), "{} camera(s) but for the name"),
+    "principal points": (_principal_points, "the principal point of {} camera(s)"),
+    "lens": (_lens, "{} lens parameters; image points are as measured"),
+    "image points": (lambda block: len(block.image_points), "{} image points"),
+    "sigmas": (
+        lambda block: len(np.unique(block.image_points.sigma)) - 1,
+        "standard deviations of single image points",
+    ),
+    "orientations": (lambda block: int(np.isfinite(block.images.centre).all(axis=1).sum()), "{} orientations"),
+    "control": (lambda block: int((~block.control.is_check).sum()), "{} control points"),
+    "check points": (lambda block: int(block.control.is_check.sum()), "{} check points"),
+    "control sigmas": (_control_sigmas, "the standard deviations of {} control and check points"),
+    "gnss": (
+        lambda block: 0 if block.gnss_ins is None else len(block.gnss_ins),
+        "{} observed projection centres or attitudes",
+    ),
+    "edits": (lambda block: 0 if block.edits is None else len(block.edits), "{} decisions on rays and points"),
+    "constraints": (lambda block: 0 if block.constraints is None else len(block.constraints), "{} constraints"),
+    "fiducials": (lambda block: 0 if block.fiducials is None else len(block.fiducials), "{} measured fiducials"),
+    "crs": (lambda block: int(block.crs != "local"), "the name of the coordinate system"),
+}
+"""Things by name: how many of them a block has, and words for them."""
+
+
+def losses(block: Block, *held: str) -> tuple[str, ...]:
+    """Sentences on what cannot be carried over.
+
+    Parameters
+    ----------
+    held : names of the `THINGS` that the format has a place for.
+    """
+    unknown = set(held) - set(THINGS)
+    if unknown:
+        raise ValueError(f"no such things: {unknown}")
+    said = []
+    for name, (count, words) in THINGS.items():
+        number = 0 if name in held else count(block)
+        if number > 0:
+            said.append(f"could not be carried over: {words.format(number)}")
+    return tuple(said)

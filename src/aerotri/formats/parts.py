@@ -1,0 +1,141 @@
+"""What one file of a project says: image points, orientations, positions or object points, by name.
+
+A block is put together from such parts (`assemble`). Names are those of the file; units are those of `conventions`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.observations import Block
+
+
+@dataclass(frozen=True, eq=False)
+class RayList:
+    """Image points of a file.
+
+    Parameters
+    ----------
+    path : the file.
+    images : (n,) str; cameras : (n,) str, the camera of each, '' where the file does not say.
+    points : (N,) str.
+    image, point : (m,) index into these.
+    xy : (m, 2) in `unit`.
+    unit : 'mm' from the image centre, y up; 'px' column and row, 0 the upper left corner.
+    focal_length_mm : (n,) of each photograph, NaN where the file does not say.
+    messages : what the user should know.
+    """
+
+    path: Path
+    images: np.ndarray
+    cameras: np.ndarray
+    points: np.ndarray
+    image: np.ndarray
+    point: np.ndarray
+    xy: np.ndarray
+    unit: str
+    focal_length_mm: np.ndarray
+    messages: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class OrientationList:
+    """Orientations of photographs.
+
+    Parameters
+    ----------
+    path : the file.
+    images : (n,) str; cameras : (n,) str, '' where the file does not say.
+    centre : (n, 3) m; rotation : (n, 3, 3) camera → object, NaN where not given.
+    choices : other readings of the rotation by name, (n, 3, 3) each, where the file alone does not settle it;
+        `rotation` is the first of them. Reprojection decides.
+    first_unless : whether the first choice stands where reprojection cannot tell; else that is an error.
+    messages : what the user should know.
+    """
+
+    path: Path
+    images: np.ndarray
+    cameras: np.ndarray
+    centre: np.ndarray
+    rotation: np.ndarray
+    choices: tuple[tuple[str, np.ndarray], ...] = ()
+    first_unless: bool = False
+    messages: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class PositionList:
+    """Observed positions of photographs.
+
+    Parameters
+    ----------
+    path : the file.
+    images : (n,) str.
+    xyz, sigma : (n, 3) m, NaN where not given.
+    yaw_pitch_roll : (n, 3) rad, NaN where not given: yaw clockwise from true north to the top of the image, pitch and
+        roll 0 for a photograph that looks straight down.
+    crs : coordinate system where the file names it, else ''.
+    messages : what the user should know.
+    """
+
+    path: Path
+    images: np.ndarray
+    xyz: np.ndarray
+    sigma: np.ndarray
+    yaw_pitch_roll: np.ndarray
+    crs: str = ""
+    messages: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class PointList:
+    """Control and check points.
+
+    Parameters
+    ----------
+    path : the file.
+    points : (n,) str.
+    xyz : (n, 3) m, NaN where unknown; sigma : (n, 3) m, NaN where not given.
+    is_check : (n,) bool.
+    crs : coordinate system where the file names it, else ''.
+    rays : image points of these points, where the file has them.
+    messages : what the user should know.
+    """
+
+    path: Path
+    points: np.ndarray
+    xyz: np.ndarray
+    sigma: np.ndarray
+    is_check: np.ndarray
+    crs: str = ""
+    rays: RayList | None = None
+    messages: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A block as far as files gave it.
+
+    Parameters
+    ----------
+    block : the block.
+    points : (N, 3) m, start values of object points, None where there are none.
+    messages : what the user should know.
+    """
+
+    block: Block
+    points: np.ndarray | None = None
+    messages: tuple[str, ...] = ()
+
+
+def no_sigma(count: int) -> np.ndarray:
+    """(n, 3) of NaN: nothing is said about the accuracy, the values or the angles."""
+    return np.full((count, 3), np.nan)
+
+
+def texts(names: list[str]) -> np.ndarray:
+    """(n,) str array of names."""
+    return np.array(names, dtype=str) if names else np.zeros(0, "<U1")

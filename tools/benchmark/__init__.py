@@ -1,0 +1,1 @@
+"""The adjustment beside its peers: blocks, measurements in processes of their own, table and plot."""
