@@ -11,6 +11,7 @@ from aerotri.conventions import InputError
 from aerotri.formats.solution import read_solution, write_solution
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Control, Prior
+from aerotri.observations.block import Constraints, Edits
 from aerotri.pipeline import AdjustmentFailedError, adjust, adjust_keeping_system, reopen
 from small_blocks import small_block, with_adjustment
 
@@ -278,3 +279,68 @@ def test_track_with_named_strips_and_single_photographs():
     np.testing.assert_array_equal(strips_of_track(centre, named), [1, 1, 1, 0, 0, 0, 2])
     heading = headings(centre, strips_of_track(centre, named))
     np.testing.assert_allclose(heading, [0, 0, 0, np.pi, np.pi, np.pi, np.pi])
+
+
+def edits(block, *rows):
+    image = {str(n): k for k, n in enumerate(block.images.names)}
+    point = {str(n): k for k, n in enumerate(block.points)}
+    columns = list(zip(*rows, strict=True))
+    return Edits(
+        np.array([image.get(i, -1) for i in columns[0]]), np.array([point[p] for p in columns[1]]),
+        np.array(columns[2], dtype=object), np.array([""] * len(rows), dtype=object),
+    )  # fmt: skip
+
+
+def test_edits_switch_rays_and_control():
+    block = small_block(25)[0]
+    rays = block.image_points
+    tie = int(np.setdiff1d(np.argsort(-np.bincount(rays.point)), block.control.point, assume_unique=True)[0])
+    photo = block.images.names[rays.image[rays.point == tie][0]]
+    names = [str(block.points[p]) for p in block.control.point]
+    control, check = np.flatnonzero(~block.control.is_check), np.flatnonzero(block.control.is_check)
+    made = edits(
+        block,
+        (photo, str(block.points[tie]), "off"),
+        ("", names[control[0]], "off"),
+        ("", names[control[1]], "check"),
+        ("", names[check[0]], "control"),
+    )
+    plain, edited = adjust(block), adjust(replace(block, edits=made))
+    assert (edited.rays.status == 2).sum() == 1
+    assert edited.points.rays[tie] == plain.points.rays[tie] - 1
+    assert edited.points.rays[block.control.point[control[0]]] == plain.points.rays[block.control.point[control[0]]]
+    kept = [str(block.points[p]) for p in edited.control.point]
+    assert names[control[1]] not in kept
+    assert names[check[0]] in kept
+    row = [str(block.points[p]) for p in edited.control.point].index(names[control[0]])
+    assert np.isnan(edited.control.difference[row]).all()
+    assert edited.outcome.observations == plain.outcome.observations - 2 - 3
+
+
+def test_conditions_hold_what_they_say():
+    """Two far points tied to the same height within a millimetre: they end up so, and the σ of the difference says so."""
+    block, truth = small_block(26, "bluh:1-2")
+    often = np.setdiff1d(np.argsort(-np.bincount(block.image_points.point)), block.control.point, assume_unique=True)
+    a, b = int(often[0]), int(often[5])
+    value = truth.points[b, 2] - truth.points[a, 2]
+    given = Constraints(
+        np.array(["height_difference"], object), (np.array([a, b]),), np.array([value]), np.array([0.001])
+    )
+    plain, tied = adjust(block), adjust(replace(block, constraints=given))
+    assert abs(tied.points.xyz[b, 2] - tied.points.xyz[a, 2] - value) < 0.002
+    assert tied.outcome.observations == plain.outcome.observations + 1
+    assert tied.outcome.unknowns == plain.outcome.unknowns
+    assert (tied.points.sigma[[a, b], 2] < plain.points.sigma[[a, b], 2]).all()
+    assert len(tied.parameters) == 2
+    assert tied.groups[-1].name == "constraints"
+    assert abs(sum(g.redundancy for g in tied.groups) - tied.outcome.redundancy) < 1e-6 * tied.outcome.redundancy
+
+
+def test_condition_on_a_point_that_is_not_adjusted_is_refused():
+    block = small_block(26)[0]
+    names = np.append(block.points, "nowhere")
+    given = Constraints(
+        np.array(["horizontal"], object), (np.array([0, len(names) - 1]),), np.array([np.nan]), np.array([0.01])
+    )
+    with pytest.raises(InputError, match="'nowhere', which is not adjusted"):
+        adjust(replace(block, points=names, constraints=given))

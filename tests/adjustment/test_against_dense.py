@@ -9,6 +9,7 @@ from aerotri.adjustment.datum import datum_rows, motions_of_points
 from aerotri.functional_model.collinearity import linearise
 from aerotri.functional_model.rotation import small_rotation_per_angle
 from aerotri.observations import Prior
+from aerotri.observations.block import Constraints
 from aerotri.pipeline import adjust_keeping_system
 from small_blocks import small_block, with_adjustment
 
@@ -76,8 +77,12 @@ def dense_cofactors(adjustment, inner=False):
         return design, q
     g = np.zeros((design.shape[1], 7))
     first = 6 * len(u.images) + len(u.shared)
-    rows = datum_rows(u)
-    g[first:].reshape(-1, 3, 7)[rows] = motions_of_points(state.points)[rows]
+    motions, of_points = motions_of_points(state.points), g[first:].reshape(-1, 3, 7)
+    for row in datum_rows(u):
+        if u.kept[row] >= 0:
+            g[6 * len(u.images) + u.kept[row] :][:3] = motions[row]
+        else:
+            of_points[row] = motions[row]
     conditions = g[live] / norm[live][:, None]
     conditions /= np.linalg.norm(conditions, axis=0)
     size = live.sum()
@@ -214,3 +219,50 @@ def test_same_result_bit_for_bit():
     np.testing.assert_array_equal(first.points.xyz, second.points.xyz)
     np.testing.assert_array_equal(first.rays.w, second.rays.w)
     np.testing.assert_array_equal(first.parameters.covariance, second.parameters.covariance)
+
+
+@pytest.mark.parametrize("datum", ["control", "inner"])
+def test_conditions_with_points_in_the_border(datum):
+    """Plane, vertical and distance at once: points that are not eliminated, with unknowns of the conditions."""
+    block, truth = small_block(10, "bluh:1-2", **TINY)
+    often = np.setdiff1d(np.argsort(-np.bincount(block.image_points.point)), block.control.point, assume_unique=True)
+    members = (often[:5], often[5:7], np.append(often[7], block.control.point[0]))
+    length = np.linalg.norm(np.diff(truth.points[members[2]], axis=0))
+    given = Constraints(
+        np.array(["plane", "vertical", "distance"], object), members, np.array([np.nan, np.nan, length]),
+        np.array([40.0, 300.0, 0.05]),
+    )  # fmt: skip
+    adjustment = adjust_keeping_system(with_adjustment(replace(block, constraints=given), datum=datum))
+    u = adjustment.system.unknowns
+    assert (u.kept >= 0).sum() == 9
+    if datum == "control":
+        design, q = dense_cofactors(adjustment)
+        check_points_and_shared(adjustment, q, design)
+    else:
+        held = u.point_held
+        adjustment.system.unknowns = replace(u, point_free=u.point_free | held)
+        design, q = dense_cofactors(adjustment, inner=True)
+        check_points_and_shared(adjustment, q, design)
+
+
+def check_points_and_shared(adjustment, q, design, tolerance=2e-9):
+    """As `check`, for blocks whose kept points stand in the border."""
+    result, u = adjustment.result, adjustment.system.unknowns
+    s0, n = result.outcome.sigma0, len(adjustment.system.unknowns.images)
+    first = 6 * n + len(u.shared)
+    for p in range(len(u.points)):
+        at = (
+            slice(first + 3 * p, first + 3 * p + 3)
+            if u.kept[p] < 0
+            else slice(6 * n + u.kept[p], 6 * n + u.kept[p] + 3)
+        )
+        sigma = np.sqrt(np.diagonal(q)[at])
+        assert_same(result.points.covariance[u.points[p]] / s0**2, q[at, at], np.outer(sigma, sigma), tolerance)
+    sigma = np.sqrt(np.diagonal(q)[6 * n : 6 * n + 2])
+    got = result.parameters.covariance / s0**2
+    assert_same(got, q[6 * n : 6 * n + 2, 6 * n : 6 * n + 2], np.outer(sigma, sigma), tolerance)
+    redundancy = 1.0 - np.einsum("ij,jk,ik->i", design, q, design)
+    m = len(u.rays.image)
+    np.testing.assert_allclose(result.rays.r[u.rays.source].ravel(), redundancy[: 2 * m], atol=tolerance)
+    np.testing.assert_allclose(result.observations.r, redundancy[-len(result.observations) :], atol=tolerance)
+    assert abs(sum(g.redundancy for g in result.groups) - result.outcome.redundancy) < 1e-6 * result.outcome.redundancy

@@ -25,7 +25,9 @@ def random_bordered(n, n_border, seed, ties=2.6):
     units = 10.0 ** rng.uniform(-3, 3, size)
     dense *= units[:, None] * units[None, :]
     blocks = np.stack([dense[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] for i, j in zip(block_row, block_col, strict=True)])
-    matrix = BorderedMatrix(blocks, np.swapaxes(dense[: 6 * n, 6 * n :].reshape(n, 6, n_border), 1, 2).copy(), dense[6 * n :, 6 * n :])
+    matrix = BorderedMatrix(
+        blocks, np.swapaxes(dense[: 6 * n, 6 * n :].reshape(n, 6, n_border), 1, 2).copy(), dense[6 * n :, 6 * n :]
+    )
     return Symbolic(n, block_row, block_col, position, n_border), matrix, dense
 
 

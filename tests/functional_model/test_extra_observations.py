@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aerotri.functional_model.constraints import Constraint, ConstraintObservations, flat_basis
+from aerotri.functional_model.constraints import NO_BASIS, Constraint, ConstraintObservations, flat_basis
 from aerotri.functional_model.observed_unknowns import (
     AttitudeObservations,
     CentreObservations,
@@ -113,7 +113,7 @@ def test_left_jacobian(size):
 
 def condition(kind, points, extra=(), **changes):
     count = len(points)
-    centre, basis = flat_basis(points, kind) if kind in ("plane", "line") else (None, None)
+    centre, basis = flat_basis(points, kind) if kind in ("plane", "line") else NO_BASIS
     given = dict(value=0.0, sigma=0.01, axes=np.eye(3), centre=centre, basis=basis) | changes
     return Constraint(
         kind=kind, label=kind, columns=np.arange(3 * count).reshape(count, 3), extra=np.array(extra, dtype=int), **given

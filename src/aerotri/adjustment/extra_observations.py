@@ -10,10 +10,11 @@ import numpy as np
 from aerotri.adjustment.normal_equations import ExtraObservations
 from aerotri.adjustment.unknowns import State, Unknowns, keep_points
 from aerotri.conventions import InputError
-from aerotri.functional_model.constraints import Constraint, ConstraintObservations, flat_basis
+from aerotri.functional_model.constraints import NO_BASIS, Constraint, ConstraintObservations, flat_basis
 from aerotri.functional_model.observed_unknowns import AttitudeObservations, CentreObservations
 from aerotri.functional_model.rotation import logarithm, rotation_from_angles
-from aerotri.observations import Block, Prior
+from aerotri.observations import Prior
+from aerotri.observations.block import Constraints, GnssIns
 
 LARGE_BORESIGHT = 0.2
 """Boresight (rad) beyond which the mean of the start values is taken out first, so that what is estimated is small."""
@@ -25,27 +26,26 @@ def extra_observations(unknowns: Unknowns, state: State) -> tuple[Unknowns, list
     block = unknowns.block
     if block.gnss_ins is not None:
         for make in (_centres, _attitudes):
-            observed = make(block, unknowns, state)
+            observed = make(block.gnss_ins, unknowns, state)
             if observed is not None:
                 extras.append(observed)
     if block.constraints is not None and len(block.constraints):
-        unknowns, conditions = _constraints(unknowns, state)
-        if conditions is not None:
-            extras.append(conditions)
+        unknowns, conditions = _constraints(block.constraints, unknowns, state)
+        extras.append(conditions)
     return unknowns, extras
 
 
-def _used_rows(block: Block, unknowns: Unknowns, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _used_rows(observed: GnssIns, unknowns: Unknowns, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rows of gnss_ins with a value whose photograph takes part, and the photographs' rows."""
-    row = np.full(len(block.images), -1)
+    row = np.full(len(unknowns.block.images), -1)
     row[unknowns.images] = np.arange(len(unknowns.images))
-    used = np.flatnonzero((row[block.gnss_ins.image] >= 0) & np.isfinite(values).any(axis=1))
-    return used, row[block.gnss_ins.image[used]]
+    used = np.flatnonzero((row[observed.image] >= 0) & np.isfinite(values).any(axis=1))
+    return used, row[observed.image[used]]
 
 
-def _times(block: Block, used: np.ndarray, strips: np.ndarray, wanted: str) -> np.ndarray:
+def _times(observed: GnssIns, used: np.ndarray, strips: np.ndarray, wanted: str) -> np.ndarray:
     """(g,) s from the mean of the strip; an error where a time is missing that is needed."""
-    time = block.gnss_ins.time[used]
+    time = observed.time[used]
     if wanted and not np.isfinite(time).all():
         raise InputError(f"{wanted} needs the time of every photograph", "add the column time", file="gnss_ins.csv")
     since = np.nan_to_num(time)
@@ -70,16 +70,16 @@ def _columns(unknowns: Unknowns, name: str, letters: tuple[str, ...], groups: np
     return columns
 
 
-def _centres(block: Block, unknowns: Unknowns, state: State) -> CentreObservations | None:
-    observed, settings = block.gnss_ins, block.settings.gnss
-    used, row = _used_rows(block, unknowns, observed.xyz)
+def _centres(observed: GnssIns, unknowns: Unknowns, state: State) -> CentreObservations | None:
+    block, settings = unknowns.block, unknowns.block.settings.gnss
+    used, row = _used_rows(observed, unknowns, observed.xyz)
     if not len(used):
         return None
     known = np.isfinite(observed.xyz[used])
     strips = np.asarray(block.images.strip, dtype=object)[observed.image[used]]
     needs_time = "a GNSS drift" if settings.drift != "off" else ""
     needs_time = "a GNSS time offset" if settings.time_offset != "off" else needs_time
-    time = _times(block, used, strips, needs_time)
+    time = _times(observed, used, strips, needs_time)
     none = np.full((len(used), 3), -1, dtype=np.int64)
     xyz = np.where(known, observed.xyz[used] - unknowns.origin, 0.0)
     shift = (
@@ -135,9 +135,9 @@ def _velocities(centre: np.ndarray, time: np.ndarray, strips: np.ndarray) -> np.
     return velocity
 
 
-def _attitudes(block: Block, unknowns: Unknowns, state: State) -> AttitudeObservations | None:
-    observed, settings = block.gnss_ins, block.settings.ins
-    used, row = _used_rows(block, unknowns, observed.angles)
+def _attitudes(observed: GnssIns, unknowns: Unknowns, state: State) -> AttitudeObservations | None:
+    block, settings = unknowns.block, unknowns.block.settings.ins
+    used, row = _used_rows(observed, unknowns, observed.angles)
     used_all = np.isfinite(observed.angles[used]).all(axis=1)
     if not used_all.all():
         raise InputError("an attitude is given in part", "give omega, phi and kappa, or none", file="gnss_ins.csv")
@@ -147,7 +147,7 @@ def _attitudes(block: Block, unknowns: Unknowns, state: State) -> AttitudeObserv
     strips = np.asarray(block.images.strip, dtype=object)[image]
     cameras = np.array([block.cameras[c].name for c in block.images.camera[image]], dtype=object)
     known = np.ones((len(used), 3), dtype=bool)
-    time = _times(block, used, strips, "an INS drift" if settings.drift != "off" else "")
+    time = _times(observed, used, strips, "an INS drift" if settings.drift != "off" else "")
     angles = observed.angles[used]
     rotation = rotation_from_angles(angles, block.rotation)
     none = np.full((len(used), 3), -1, dtype=np.int64)
@@ -183,8 +183,8 @@ def _boresight_start(turns: np.ndarray) -> np.ndarray:
     return mean if np.linalg.norm(logarithm(mean)) > LARGE_BORESIGHT else np.eye(3)
 
 
-def _constraints(unknowns: Unknowns, state: State) -> tuple[Unknowns, ConstraintObservations | None]:
-    block, given = unknowns.block, unknowns.block.constraints
+def _constraints(given: Constraints, unknowns: Unknowns, state: State) -> tuple[Unknowns, ConstraintObservations]:
+    block = unknowns.block
     row = np.full(len(block.points), -1)
     row[unknowns.points] = np.arange(len(unknowns.points))
     for k, points in enumerate(given.points):
@@ -201,7 +201,7 @@ def _constraints(unknowns: Unknowns, state: State) -> tuple[Unknowns, Constraint
     for k, points in enumerate(given.points):
         kind = str(given.kind[k])
         rows = row[points]
-        centre, basis = flat_basis(state.points[rows], kind) if kind in ("plane", "line") else (None, None)
+        centre, basis = flat_basis(state.points[rows], kind) if kind in ("plane", "line") else NO_BASIS
         label = f"{kind} {' '.join(str(name) for name in block.points[points][:3])}" + (" …" if len(points) > 3 else "")
         count = {"plane": 3, "line": 4}.get(kind, 0)
         conditions.append(

@@ -50,6 +50,7 @@ def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
         For settings this version cannot honour, and when no photograph has start values.
     """
     check_settings(block)
+    block, off = with_edits(block)
     start = start_values(block, given_points)
     if not np.isfinite(start.centre).all(axis=1).any():
         raise InputError(
@@ -57,7 +58,7 @@ def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
             "give X0, Y0, Z0, omega, phi, kappa of some photographs in images.csv, or more control points",
             file="images.csv",
         )
-    status, warnings = ray_status(block, start)
+    status, warnings = ray_status(block, start, off)
     measured = _freed_of_the_air(block, start)
     return Prepared(*build_system(measured, start, status), status, tuple(warnings))
 
@@ -131,14 +132,38 @@ def check_settings(block: Block) -> None:
         )
 
 
-def ray_status(block: Block, start: StartValues) -> tuple[np.ndarray, list[str]]:
-    """Status of every ray, and sentences about those left out.
+def with_edits(block: Block) -> tuple[Block, np.ndarray]:
+    """The block with the operator's decisions about control, and the rays (m,) bool that are switched off.
+
+    `off` without a photograph takes out the coordinates of a control point, whose rays stay, or every ray of a point
+    that is none.
+    """
+    off = np.zeros(len(block.image_points), dtype=bool)
+    edits, control = block.edits, block.control
+    if edits is None or not len(edits):
+        return block, off
+    xyz, is_check = control.xyz.copy(), control.is_check.copy()
+    row = {int(point): k for k, point in enumerate(control.point)}
+    for image, point, action in zip(edits.image.tolist(), edits.point.tolist(), edits.action.tolist(), strict=True):
+        if action != "off":
+            is_check[row[point]] = action == "check"
+        elif image >= 0 or point not in row:
+            off |= (block.image_points.point == point) & ((image < 0) | (block.image_points.image == image))
+        else:
+            xyz[row[point]] = np.nan
+    return replace(block, control=replace(control, xyz=xyz, is_check=is_check)), off
+
+
+def ray_status(block: Block, start: StartValues, off: np.ndarray | None = None) -> tuple[np.ndarray, list[str]]:
+    """Status of every ray, and sentences about those left out; `off` (m,) bool are switched off by the operator.
 
     A point needs two rays, or one ray and enough known coordinates; a photograph needs start values.
     """
     rays = block.image_points
     status = np.full(len(rays), USED, dtype=np.int8)
     status[~np.isfinite(start.centre[rays.image, 0])] = NO_START
+    if off is not None:
+        status[off] = OFF
     known = np.zeros(len(block.points), dtype=np.int64)
     if block.settings.adjustment.datum == "control":
         control = ~block.control.is_check

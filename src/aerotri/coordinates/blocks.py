@@ -17,6 +17,7 @@ from aerotri.conventions import InputError
 from aerotri.coordinates.local_frame import LocalFrame, local_frame
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles, small_rotation_per_angle
 from aerotri.observations import Block, Control, GnssIns, Images
+from aerotri.observations.block import Constraints
 from aerotri.statistics.adjusted_block import AdjustedBlock, GroundPointResults, ImageResults, PointResults
 from aerotri.statistics.reliability import normalised_residuals
 
@@ -42,6 +43,8 @@ def frame_of_block(
 def needs_positions(block: Block) -> bool:
     """Whether control or GNSS with missing coordinates makes the transformation depend on what is not measured."""
     observed = [block.control.xyz] + ([] if block.gnss_ins is None else [block.gnss_ins.xyz])
+    if block.constraints is not None and len(block.constraints):
+        return True
     return any(_partly_known(xyz).any() for xyz in observed)
 
 
@@ -77,7 +80,8 @@ def transform_block(
     images = _images_to_local(block.images, frame, block.rotation)
     control = _control_to_local(block, frame, points)
     gnss_ins = None if block.gnss_ins is None else _gnss_to_local(block, block.gnss_ins, frame, centres)
-    return replace(block, crs="local", images=images, control=control, gnss_ins=gnss_ins)
+    constraints = None if block.constraints is None else _constraints_to_local(block.constraints, frame, points)
+    return replace(block, crs="local", images=images, control=control, gnss_ins=gnss_ins, constraints=constraints)
 
 
 def transform_result(adjusted: AdjustedBlock, block: Block, frame: LocalFrame) -> AdjustedBlock:
@@ -100,6 +104,14 @@ def transform_result(adjusted: AdjustedBlock, block: Block, frame: LocalFrame) -
         control=_ground_from_local(adjusted, adjusted.control, points, block, frame, is_check=False),
         check=_ground_from_local(adjusted, adjusted.check, points, block, frame, is_check=True),
     )
+
+
+def _constraints_to_local(constraints: Constraints, frame: LocalFrame, points: np.ndarray | None) -> Constraints:
+    """Conditions with the axes of the CRS at their place: plumb lines and heights are those there, not the frame's."""
+    places = np.zeros((len(constraints), 3))
+    if points is not None:
+        places = np.array([points[members].mean(axis=0) for members in constraints.points]).reshape(-1, 3)
+    return replace(constraints, axes=frame.axes_at(frame.from_local(np.nan_to_num(places))))
 
 
 def _images_to_local(images: Images, frame: LocalFrame, order: str) -> Images:

@@ -101,6 +101,7 @@ class PointList:
     xyz : (n, 3) m, NaN where unknown; sigma : (n, 3) m, NaN where not given.
     is_check : (n,) bool.
     crs : coordinate system where the file names it, else ''.
+    heights : 'ellipsoidal' where the file calls them so, else ''.
     rays : image points of these points, where the file has them.
     messages : what the user should know.
     """
@@ -111,6 +112,7 @@ class PointList:
     sigma: np.ndarray
     is_check: np.ndarray
     crs: str = ""
+    heights: str = ""
     rays: RayList | None = None
     messages: tuple[str, ...] = ()
 

@@ -8,13 +8,15 @@ The points are unknowns of the border: `columns` give the three shared parameter
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from aerotri.functional_model.observed_unknowns import Rows
 
 EARTH_RADIUS = 6371000.0
+NO_BASIS = (np.zeros(3), np.eye(3))
+"""Of conditions that need none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +31,8 @@ class Constraint:
     value : m, where the kind has one. sigma : m.
     axes : (3, 3) east, north and up at the place, as columns.
     curved : the heights count from the curved earth (blocks in a local frame of a CRS).
-    centre, basis : of plane and line at the start: a point (3,), and the directions (3, 3) as rows, the line's direction
-        or the plane's normal last.
+    centre, basis : of plane and line at the start: a point (3,), and directions (3, 3) as rows, the line's direction or
+        the plane's normal last.
     """
 
     kind: str
@@ -41,8 +43,8 @@ class Constraint:
     sigma: float
     axes: np.ndarray
     curved: bool = False
-    centre: np.ndarray | None = None
-    basis: np.ndarray | None = None
+    centre: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    basis: np.ndarray = field(default_factory=lambda: np.eye(3))
 
     @property
     def count(self) -> int:

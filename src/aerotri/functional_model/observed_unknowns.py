@@ -2,8 +2,8 @@
 
 [L] X_gnss + v = X0 + R·lever_arm + shift + drift·(t − t_s) + velocity·time_offset; lever arm from the projection centre
 to the antenna in the camera frame, t_s the mean time of the strip.
-[L] R_ins + v = R·R_boresight (R_boresight: INS → camera): δ = Log(R_model·R_obsᵀ) in object axes, and v = E⁻¹δ with E of
-the observed angles, so that the σ of ω, φ, κ apply as they are given. Body axes would swap ω and φ at κ = 90°.
+[L] R_ins + v = R·R_boresight (R_boresight: INS → camera): δ = Log(R_model·R_obsᵀ) in object axes, and v = E⁻¹δ with E
+of the observed angles, so that the σ of ω, φ, κ apply as they are given. Body axes would swap ω and φ at κ = 90°.
 """
 
 from __future__ import annotations

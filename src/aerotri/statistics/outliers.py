@@ -20,7 +20,7 @@ class RayTests:
 
     Parameters
     ----------
-    w : (m,) normalised residual of that coordinate.
+    w : (m,) normalised residual of that coordinate. axis : (m,) which it is, 0 for x, 1 for y.
     estimated_mm : (m,) the error −v/r that would explain it alone.
     estimated_px : (m,) the same in pixels of the camera.
     scale : spread of all w, robust: 1 where the a-priori σ are right.
@@ -28,6 +28,7 @@ class RayTests:
     """
 
     w: np.ndarray
+    axis: np.ndarray
     estimated_mm: np.ndarray
     estimated_px: np.ndarray
     scale: float
@@ -80,6 +81,7 @@ def judge_rays(adjusted: AdjustedBlock) -> RayTests:
     scale, alpha = spread(w), block.settings.adjustment.alpha
     return RayTests(
         w=largest,
+        axis=axis[:, 0],
         estimated_mm=np.where(np.isfinite(largest), error, np.nan),
         estimated_px=np.where(np.isfinite(largest), error / pixel_mm_of_rays(block), np.nan),
         scale=scale,
