@@ -111,6 +111,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     system, state = build_system(measured, start, saved.ray_status, held)
     state = replace(state, shared=saved.shared)
     estimator = Estimator(saved.estimator_code, saved.estimator_limit)
+    system.refresh_motions(state)
     equations = system.assemble(state, 0.0, estimator)
     solution = Solution(saved.status, state, equations, estimator, saved.iterations)
     factor = _factor(system, state, equations)
@@ -134,7 +135,9 @@ def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray 
         raise failure(system, "rank deficient", defects_in_words(system, solution.defects))
     refuse_runaway(system, solution)
     if settings.datum in ("minimal", "inner"):
+        system.refresh_motions(solution.state)
         moved = restore_datum(system.unknowns, solution.state, state.points)
+        system.refresh_motions(moved)
         solution = replace(solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator))
     factor = _factor(system, solution.state, solution.equations)
     solved = time.perf_counter()

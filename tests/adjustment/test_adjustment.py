@@ -13,7 +13,7 @@ from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Control, Prior
 from aerotri.observations.block import Constraints, Edits
 from aerotri.pipeline import AdjustmentFailedError, adjust, adjust_keeping_system, reopen
-from small_blocks import small_block, with_adjustment
+from small_blocks import small_block, small_spec, with_adjustment
 
 DENSE_CONTROL = {"control": {"distance_bases": 0.9, "sigma_m": [0.03, 0.03, 0.05], "check_points": 5}}
 
@@ -344,3 +344,24 @@ def test_condition_on_a_point_that_is_not_adjusted_is_refused():
     )
     with pytest.raises(InputError, match="'nowhere', which is not adjusted"):
         adjust(replace(block, points=names, constraints=given))
+
+
+@pytest.mark.parametrize(
+    ("shift", "free"),
+    # models.md 1: none with GNSS as it is, three with one shift, four with a shift of each of parallel strips
+    [("off", 0), ("block", 3), ("strip", 4)],
+)
+def test_what_gnss_leaves_free(shift, free):
+    flight = {**small_spec()["flight"], "cross_strips": []}
+    block = small_block(27, flight=flight, gnss={"sigma_m": [0.05, 0.05, 0.08], "shift_sigma_m": [0.1, 0.1, 0.1]})[0]
+    gnss = replace(block.settings.gnss, shift=shift)
+    block = replace(block, settings=replace(block.settings, gnss=gnss))
+    for datum in ("minimal", "inner"):
+        adjustment = adjust_keeping_system(with_adjustment(block, datum=datum))
+        # exactly parallel strips leave the roll free, strips flown by hand hold it a little
+        expected = free if shift != "strip" else adjustment.system.unknowns.motions.count
+        assert adjustment.system.unknowns.motions.count == expected in (free, 3)
+        assert adjustment.system.unknowns.point_held.sum() == expected
+        result = adjustment.result
+        assert result.outcome.conditions == (expected if datum == "inner" else 0)
+        assert abs(sum(g.redundancy for g in result.groups) - result.outcome.redundancy) < 1e-6 * 2000

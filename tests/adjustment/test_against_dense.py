@@ -75,9 +75,11 @@ def dense_cofactors(adjustment, inner=False):
     if not inner:
         q[np.ix_(live, live)] = np.linalg.inv(scaled.T @ scaled) / np.outer(norm[live], norm[live])
         return design, q
-    g = np.zeros((design.shape[1], 7))
+    basis = u.motions.basis
+    d = basis.shape[1]
+    g = np.zeros((design.shape[1], d))
     first = 6 * len(u.images) + len(u.shared)
-    motions, of_points = motions_of_points(state.points), g[first:].reshape(-1, 3, 7)
+    motions, of_points = motions_of_points(state.points) @ basis, g[first:].reshape(-1, 3, d)
     for row in datum_rows(u):
         if u.kept[row] >= 0:
             g[6 * len(u.images) + u.kept[row] :][:3] = motions[row]
@@ -86,7 +88,7 @@ def dense_cofactors(adjustment, inner=False):
     conditions = g[live] / norm[live][:, None]
     conditions /= np.linalg.norm(conditions, axis=0)
     size = live.sum()
-    bordered = np.block([[scaled.T @ scaled, conditions], [conditions.T, np.zeros((7, 7))]])
+    bordered = np.block([[scaled.T @ scaled, conditions], [conditions.T, np.zeros((d, d))]])
     q[np.ix_(live, live)] = np.linalg.inv(bordered)[:size, :size] / np.outer(norm[live], norm[live])
     return design, q
 
@@ -232,14 +234,17 @@ def test_conditions_with_points_in_the_border(datum):
         np.array(["plane", "vertical", "distance"], object), members, np.array([np.nan, np.nan, length]),
         np.array([40.0, 300.0, 0.05]),
     )  # fmt: skip
+    if datum == "inner":
+        given = Constraints(given.kind[2:], given.points[2:], given.value[2:], given.sigma[2:])
     adjustment = adjust_keeping_system(with_adjustment(replace(block, constraints=given), datum=datum))
     u = adjustment.system.unknowns
-    assert (u.kept >= 0).sum() == 9
+    assert (u.kept >= 0).sum() == (9 if datum == "control" else 2)
     if datum == "control":
         design, q = dense_cofactors(adjustment)
         check_points_and_shared(adjustment, q, design)
     else:
         held = u.point_held
+        assert u.motions.count == held.sum() == adjustment.result.outcome.conditions == 6
         adjustment.system.unknowns = replace(u, point_free=u.point_free | held)
         design, q = dense_cofactors(adjustment, inner=True)
         check_points_and_shared(adjustment, q, design)

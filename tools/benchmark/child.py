@@ -6,7 +6,7 @@ import json
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -31,10 +31,8 @@ class Memory:
 
     def __init__(self) -> None:
         # 5 resets the kernel's record of the peak
-        try:
+        with suppress(OSError):
             CLEAR.write_text("5")
-        except OSError:
-            pass
         self._before = _resident("VmRSS")
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 
 from benchmark.measure import FACTORS, OURS, OURS_44, Run
 
+UNKNOWN = (float("nan"), float("nan"), float("nan"))
 OPTIMUM = 1e-9
 """Relative difference of ½Σr² within which two optima are the same."""
 
@@ -69,7 +70,7 @@ def _row(own: list[Run], everything: list[Run]) -> Row:
     first = own[0]
     nan = float("nan")
     if not good:
-        return Row(first.photographs, 0, first.program, nan, nan, nan, nan, (nan,) * 3, nan, nan, first.failure)
+        return Row(first.photographs, 0, first.program, nan, nan, nan, nan, UNKNOWN, nan, nan, first.failure)
     ours = {run.repeat: run for run in everything if run.photographs == first.photographs and run.program == OURS.name}
     ratios = [
         seconds(run, "iterations", "solve") / seconds(ours[run.repeat], "prepare", "iterations")
@@ -87,11 +88,16 @@ def _row(own: list[Run], everything: list[Run]) -> Row:
         iterations=statistics.median(iterations) if iterations else nan,
         solve=statistics.median(seconds(run, "iterations", "solve") for run in good),
         statistics=statistics.median(seconds(run, "statistics") for run in good),
-        ratio=(statistics.median(ratios), min(ratios), max(ratios)) if ratios else (nan,) * 3,
+        ratio=_spread(ratios),
         vtpv_difference=(good[0].outcome["vtpv"] - reference) / reference if same_model else nan,
         peak=statistics.median(run.outcome["peak"] for run in good),
         failure="" if good[0].outcome.get("status") in ("converged", "convergence") else good[0].outcome["status"],
     )
+
+
+def _spread(ratios: list[float]) -> tuple[float, float, float]:
+    """Median, smallest and largest."""
+    return (statistics.median(ratios), min(ratios), max(ratios)) if ratios else UNKNOWN
 
 
 def growth(rows: Sequence[Row], value: str) -> list[tuple[str, list[tuple[int, int, float]]]]:
@@ -138,7 +144,7 @@ def _factor_row(runs: list[Run], photographs: int, parameters: str, library: str
     unknowns, nan = runs[0].outcome["unknowns"], float("nan")
     if "missing" in entries[0]:
         missing = entries[0]["missing"]
-        return FactorRow(photographs, unknowns, parameters, library, nan, nan, (nan,) * 3, nan, missing)
+        return FactorRow(photographs, unknowns, parameters, library, nan, nan, UNKNOWN, nan, missing)
     ratios = [e["factor"] / run.outcome["factors"]["ours"]["factor"] for e, run in zip(entries, runs, strict=True)]
     return FactorRow(
         photographs,
@@ -147,6 +153,6 @@ def _factor_row(runs: list[Run], photographs: int, parameters: str, library: str
         library,
         symbolic=statistics.median(e["symbolic"] for e in entries),
         factor=statistics.median(e["factor"] for e in entries),
-        ratio=(statistics.median(ratios), min(ratios), max(ratios)),
+        ratio=_spread(ratios),
         error=max(e["error"] for e in entries),
     )

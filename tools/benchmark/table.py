@@ -23,7 +23,8 @@ def markdown(runs: Sequence[Run], threads: int) -> str:
     """Everything that was measured."""
     rows, factors = rows_of(runs), factor_rows(runs)
     repeats = 1 + max((run.repeat for run in runs), default=0)
-    parts = ["# Adjustment beside its peers", _machine(), READING.format(repeats=repeats, threads=threads), _adjustments(rows)]
+    reading = READING.format(repeats=repeats, threads=threads)
+    parts = ["# Adjustment beside its peers", _machine(), reading, _adjustments(rows)]
     if factors:
         parts += ["## The factor of the reduced matrix", _factors(factors)]
     if len({row.photographs for row in rows}) > 1:

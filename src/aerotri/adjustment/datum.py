@@ -1,25 +1,31 @@
 """The datum: what fixes the frame, which directions stay free, and the inner (free network) datum.
 
-A free block may be moved, turned and scaled without changing a residual; self-calibration adds no further freedom.
-Minimal datum: the best-spread coordinates of three points are held. Inner datum: the same solution, moved by a
-similarity so that GᵀdX = 0 over the datum points, dX counted from the start values; covariances follow by the
-S-transformation [L: Baarda 1973; Teunissen 1985].
+A free block may be moved, turned and scaled without changing a residual; self-calibration adds no further freedom, and
+GNSS, INS and conditions take some of it away. Minimal datum: as many well-spread coordinates as are free are held.
+Inner datum: the same solution, moved by a similarity so that GᵀdX = 0 over the datum points, dX counted from the start
+values; covariances follow by the S-transformation [L: Baarda 1973; Teunissen 1985].
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import qr
 from scipy.spatial import ConvexHull, QhullError
 
-from aerotri.adjustment.unknowns import State, Step, Unknowns
+from aerotri.adjustment.unknowns import FreeMotions, State, Step, Unknowns
 from aerotri.functional_model.rotation import cross_matrix, exponential
 
 if TYPE_CHECKING:
-    from aerotri.adjustment.normal_equations import NormalSystem
+    from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
 
 FREEDOMS = ("X", "Y", "Z", "ω", "φ", "κ", "scale")
+FOLLOWING = ("gnss", "ins", "constraint")
+"""Kinds of shared parameters that may move with the whole block."""
+NOTICED = 1e-7
+"""Share of the largest effect below which an observation does not notice a motion."""
 
 
 def spread_points(points: np.ndarray, rays: np.ndarray) -> tuple[int, int, int]:
@@ -41,15 +47,55 @@ def spread_points(points: np.ndarray, rays: np.ndarray) -> tuple[int, int, int]:
 
 
 def minimal_coordinates(unknowns: Unknowns, state: State) -> list[tuple[int, int]]:
-    """Seven coordinates that fix the datum: (row of the point, axis) pairs.
+    """The coordinates that fix what is free, as (row of the point, axis) pairs: of three points far apart.
 
-    X, Y, Z of both ends of the longest distance, and of the third point the axis nearest to the normal of their plane.
+    Of the nine coordinates those are held that the free motions move most independently (pivoting); in a block without
+    further observations seven.
     """
     rays = np.where(unknowns.kept < 0, np.diff(unknowns.rays.start), 0)
-    a, b, c = spread_points(state.points, rays)
-    normal = np.cross(state.points[b] - state.points[a], state.points[c] - state.points[a])
-    axis = int(np.argmax(np.abs(normal)))
-    return [(a, 0), (a, 1), (a, 2), (b, 0), (b, 1), (b, 2), (c, axis)]
+    rows = np.array(spread_points(state.points, rays))
+    moved = (motions_of_points(state.points[rows]) @ unknowns.motions.basis).reshape(9, -1)
+    moved = moved / np.maximum(np.linalg.norm(moved, axis=0), 1e-300)
+    order = qr(moved.T, pivoting=True, mode="r")[1][: unknowns.motions.count]
+    return [(int(rows[k // 3]), int(k % 3)) for k in sorted(order)]
+
+
+def free_motions(unknowns: Unknowns, extras: Sequence[ExtraObservations], state: State) -> FreeMotions:
+    """Which of the seven motions no observation beside the image points notices.
+
+    Shifts, drifts, boresight and the conditions' own unknowns move along where that hides a motion; a distance takes
+    the scale away, a plumb line two rotations, GNSS without shifts all seven.
+    """
+    s = len(unknowns.shared)
+    g_shared = np.zeros((s, 7))
+    g_shared[unknowns.kept_columns] = motions_of_points(state.points)[unknowns.kept_rows]
+    along = [k for k in range(s) if unknowns.shared.kinds[k] in FOLLOWING and np.isinf(unknowns.shared.sigma[k])]
+    g_images = motions_of_images(state.centre)
+    noticed = [np.zeros((0, 7 + len(along)))]
+    for extra in extras:
+        rows = extra.rows(state.centre, state.rotation, state.shared)
+        of_shared = np.zeros((*rows.gap.shape, s))
+        for c in range(rows.columns.shape[1]):
+            there = np.flatnonzero(rows.columns[:, c] >= 0)
+            of_shared[there, :, rows.columns[there, c]] += rows.by_shared[there, :, c]
+        motion = of_shared @ g_shared
+        own = rows.image >= 0
+        motion[own] += rows.by_image[own] @ g_images[rows.image[own]]
+        both = np.concatenate([motion, of_shared[:, :, along]], axis=2)
+        noticed.append(both[rows.inv_sigma > 0.0])
+    matrix = np.concatenate(noticed)
+    size = max(float(np.abs(state.points - state.points.mean(axis=0)).max()), 1.0)
+    unit = np.concatenate([np.ones(3), np.full(4, 1.0 / size), np.ones(len(along))])
+    norm = np.linalg.norm(matrix * unit, axis=0)
+    unit[7:] /= np.maximum(norm[7:], 1e-300)
+    _, values, vectors = np.linalg.svd(np.vstack([matrix * unit, np.zeros((7 + len(along), 7 + len(along)))]))
+    null = vectors[values < NOTICED * max(values.max(), 1e-300)].T * unit[:, None]
+    left, scale, right = np.linalg.svd(null[:7] / unit[:7, None], full_matrices=False)
+    real = scale > NOTICED
+    combined = right[real].T / scale[real]
+    shared = g_shared @ (left[:, real] * unit[:7, None])
+    shared[along] += null[7:] @ combined
+    return FreeMotions(left[:, real] * unit[:7, None], shared)
 
 
 def motions_of_points(points: np.ndarray) -> np.ndarray:
@@ -88,14 +134,16 @@ def without_motion(unknowns: Unknowns, state: State, step: Step) -> Step:
     weight = 1.0 / np.maximum(1.0, distance / max(np.median(distance), 1e-12)) ** 2
     g = motions_of_points(state.points)
     weighted = (g * weight[:, None, None]).reshape(-1, 7)
+    free = unknowns.motions
     kept, columns = unknowns.kept_rows, unknowns.kept_columns
-    points, shared = step.points.copy(), step.shared.copy()
-    points[kept] = shared[columns]
-    motion = np.linalg.solve(weighted.T @ g.reshape(-1, 7), weighted.T @ points.ravel())
+    points = step.points.copy()
+    points[kept] = step.shared[columns]
+    g, weighted = g @ free.basis, weighted @ free.basis
+    motion = np.linalg.solve(weighted.T @ g.reshape(-1, free.count), weighted.T @ points.ravel())
     points -= g @ motion
-    shared[columns] = points[kept]
     points[kept] = 0.0
-    return Step(step.images - motions_of_images(state.centre) @ motion, shared, points)
+    images = step.images - motions_of_images(state.centre) @ free.basis @ motion
+    return Step(images, step.shared - free.shared @ motion, points)
 
 
 def restore_datum(unknowns: Unknowns, state: State, reference: np.ndarray) -> State:
@@ -109,22 +157,25 @@ def restore_datum(unknowns: Unknowns, state: State, reference: np.ndarray) -> St
     reference : (P, 3) m, local start values.
     """
     datum = np.zeros(state.points.shape, dtype=bool)
+    if not unknowns.motions.count:
+        return state
     if unknowns.block.settings.adjustment.datum == "inner":
         datum[datum_rows(unknowns)] = True
     else:
         datum = unknowns.point_held
     for _ in range(20):
-        g = motions_of_points(state.points)[datum]
-        motion = np.linalg.lstsq(g, (reference - state.points)[datum], rcond=None)[0]
+        g = motions_of_points(state.points)[datum] @ unknowns.motions.basis
+        share = np.linalg.lstsq(g, (reference - state.points)[datum], rcond=None)[0]
+        motion = unknowns.motions.basis @ share
         turn, scale = exponential(motion[3:6]), 1.0 + motion[6]
         state = State(
             centre=scale * state.centre @ turn.T + motion[:3],
             rotation=turn @ state.rotation,
             points=scale * state.points @ turn.T + motion[:3],
-            shared=state.shared.copy(),
+            shared=state.shared + unknowns.motions.shared @ share,
         )
         state.shared[unknowns.kept_columns] = state.points[unknowns.kept_rows]
-        if np.abs(g @ motion).max() < 1e-9:
+        if np.abs(g @ share).max(initial=0.0) < 1e-9:
             break
     return state
 

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from aerotri.adjustment import _covariance_kernels, _kernels
+from aerotri.adjustment.datum import free_motions
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, InverseOnPattern, Symbolic
@@ -231,6 +232,11 @@ class NormalSystem:
                 )
             )
         return out
+
+    def refresh_motions(self, state: State) -> None:
+        """Linearise anew, at `state`, what the observations leave free of a block in a minimal or inner datum."""
+        if self.unknowns.block.settings.adjustment.datum in ("minimal", "inner"):
+            self.unknowns = replace(self.unknowns, motions=free_motions(self.unknowns, self.extras, state))
 
     @property
     def observes_centres(self) -> bool:

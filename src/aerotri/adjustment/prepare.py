@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.adjustment.datum import minimal_coordinates
+from aerotri.adjustment.datum import free_motions, minimal_coordinates
 from aerotri.adjustment.extra_observations import extra_observations
-from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
 from aerotri.adjustment.start_values import start_values
 from aerotri.adjustment.unknowns import (
     ORIENTATION_ELEMENTS,
@@ -83,9 +83,9 @@ def build_system(
         datum; chosen anew where None.
     """
     unknowns, state = build_unknowns(block, start, status == USED)
-    unknowns = _with_datum(unknowns, state, held)
     unknowns, extras = extra_observations(unknowns, state)
     state = replace(state, shared=np.array(unknowns.shared.start, dtype=float))
+    unknowns = _with_datum(unknowns, state, extras, held)
     return NormalSystem(unknowns, extras, state.centre[:, :2]), state
 
 
@@ -105,12 +105,6 @@ def check_settings(block: Block) -> None:
     for wrong, what, remedy in refused:
         if wrong:
             raise InputError(f"{what} is not built into this version", remedy, file="block.toml")
-    if s.adjustment.datum in ("minimal", "inner") and block.gnss_ins is not None:
-        raise InputError(
-            f'datum = "{s.adjustment.datum}" together with observed projection centres is not built into this version',
-            'use datum = "control", which takes the datum from both, or remove gnss_ins.csv',
-            file="block.toml",
-        )
     if s.adjustment.datum == "fixed" and not s.adjustment.datum_fixed:
         raise InputError(
             'datum = "fixed" needs the elements to hold', 'give datum_fixed = ["photo:X0", …]', file="block.toml"
@@ -197,11 +191,14 @@ def _some(names: np.ndarray, noun: str) -> str:
     return f"{len(names)} {noun}{'s' if len(names) > 1 else ''} ({shown}{more})"
 
 
-def _with_datum(unknowns: Unknowns, state: State, held: list[tuple[int, int]] | None) -> Unknowns:
+def _with_datum(
+    unknowns: Unknowns, state: State, extras: list[ExtraObservations], held: list[tuple[int, int]] | None
+) -> Unknowns:
     settings = unknowns.block.settings.adjustment
     if settings.datum == "fixed":
         return hold_orientation(unknowns, settings.datum_fixed)
     if settings.datum in ("minimal", "inner"):
+        unknowns = replace(unknowns, motions=free_motions(unknowns, extras, state))
         if held is None:
             return hold_points(unknowns, minimal_coordinates(unknowns, state))
         row = {int(point): k for k, point in enumerate(unknowns.points)}

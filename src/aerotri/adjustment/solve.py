@@ -90,8 +90,9 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
             if damping.value > LAST_DAMPING:
                 return Solution("not converged", state, equations, estimator, iteration, tuple(costs))
             step = _step(system, state, equations, estimator, damping.value)
-        settled = damping.value == 0.0 and not step.points_settled and _settled(equations, step, redundancy, estimator, last_decrement)
-        last_decrement = step.decrement if damping.value == 0.0 and not step.points_settled else np.inf
+        plain = damping.value == 0.0 and not step.points_settled
+        settled = plain and _settled(equations, step, redundancy, estimator, last_decrement)
+        last_decrement = step.decrement if plain else np.inf
         damping = damping.lowered(step.gain_ratio(equations))
         state, equations = step.state, step.equations
         costs.append(equations.cost)
@@ -155,7 +156,7 @@ def _step(system: NormalSystem, state: State, equations: NormalEquations, estima
     x = factor.solve(damped.right)
     decrement = float(x @ damped.right) + damped.point_decrement
     step = system.back_substitute(state, x, damping, damped, estimator)
-    if system.unknowns.point_held.any():
+    if system.unknowns.point_held.any() and system.unknowns.motions.count:
         step = without_motion(system.unknowns, state, step)
     if not all(np.isfinite(part).all() for part in (step.images, step.shared, step.points)):
         return None

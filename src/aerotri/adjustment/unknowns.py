@@ -67,6 +67,24 @@ class Rays:
 
 
 @dataclass(frozen=True, eq=False)
+class FreeMotions:
+    """What the observations leave free of the seven motions of the whole block: d independent ones.
+
+    Parameters
+    ----------
+    basis : (7, d) combinations of X, Y, Z, the rotations and the scale.
+    shared : (s, d) what shifts, drifts and conditions do along with them.
+    """
+
+    basis: np.ndarray
+    shared: np.ndarray
+
+    @property
+    def count(self) -> int:
+        return self.basis.shape[1]
+
+
+@dataclass(frozen=True, eq=False)
 class Unknowns:
     """The unknowns of one adjustment.
 
@@ -82,6 +100,7 @@ class Unknowns:
     by_angles : (n,) bool: small rotations run along ω, φ, κ, so that single angles can be held.
     prior_xyz, prior_weight : (P, 3) observed coordinates (local, m) and 1/σ², 0 where not observed.
     kept : (P,) first of the three shared parameters that stand for a point which is not eliminated, −1 for the others.
+    motions : what is free in a free block.
     pair_start, pair_block, block_row, block_col : pattern of the reduced normal matrix.
     """
 
@@ -98,6 +117,7 @@ class Unknowns:
     prior_xyz: np.ndarray
     prior_weight: np.ndarray
     kept: np.ndarray
+    motions: FreeMotions
     pair_start: np.ndarray
     pair_block: np.ndarray
     block_row: np.ndarray
@@ -225,6 +245,7 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
         prior_xyz=prior_xyz,
         prior_weight=prior_weight,
         kept=np.full(len(points), -1, dtype=np.int64),
+        motions=FreeMotions(np.eye(7), np.zeros((len(shared), 7))),
         pair_start=pair_start,
         pair_block=pair_block,
         block_row=block_row,

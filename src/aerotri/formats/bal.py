@@ -19,6 +19,7 @@ from aerotri.conventions import InputError
 from aerotri.formats.atomic import atomic_file
 from aerotri.formats.csv_text import read_bytes
 from aerotri.formats.oriented import OrientedBlock
+from aerotri.formats.text_lines import line_of_word
 from aerotri.functional_model.rotation import angles_from_rotation, exponential, logarithm
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Prior, Settings
 
@@ -127,7 +128,7 @@ def _parse(path: Path) -> tuple[int, int, np.ndarray, np.ndarray, np.ndarray]:
     if len(bad):
         place = int(bad[0]) + 3
         word = words[place][:60].decode("utf-8", "replace")
-        line = _line_of_word(raw, place)
+        line = line_of_word(raw, place)
         raise InputError(f"'{word}' is not a finite number", "repair the file", path, line)
     observations = values[: 4 * m].reshape(m, 4)
     cameras = values[4 * m : 4 * m + CAMERA_VALUES * n_images].reshape(n_images, CAMERA_VALUES)
@@ -135,7 +136,7 @@ def _parse(path: Path) -> tuple[int, int, np.ndarray, np.ndarray, np.ndarray]:
     short = np.flatnonzero(cameras[:, 6] <= 0.0)
     if len(short):
         place = 3 + 4 * m + CAMERA_VALUES * int(short[0]) + 6
-        raise InputError("a focal length is not positive", "repair the camera", path, _line_of_word(raw, place))
+        raise InputError("a focal length is not positive", "repair the camera", path, line_of_word(raw, place))
     return n_images, n_points, observations, cameras, values[4 * m + CAMERA_VALUES * n_images :].reshape(n_points, 3)
 
 
@@ -151,17 +152,17 @@ def _check_observations(observations: np.ndarray, counts: tuple[int, int], raw: 
     index = observations[:, :2]
     bad = np.flatnonzero(((index < 0) | (index >= np.array(counts)) | (index != np.floor(index))).any(axis=1))
     if len(bad):
-        line = _line_of_word(raw, 3 + 4 * int(bad[0]))
+        line = line_of_word(raw, 3 + 4 * int(bad[0]))
         raise InputError("an observation names a camera or point that there is not", "repair the line", path, line)
     far = np.flatnonzero((np.abs(observations[:, 2:]) > FARTHEST_PX).any(axis=1))
     if len(far):
-        line = _line_of_word(raw, 3 + 4 * int(far[0]))
+        line = line_of_word(raw, 3 + 4 * int(far[0]))
         raise InputError("an image point lies outside of any image", "coordinates are pixels", path, line)
     key = index[:, 0] * counts[1] + index[:, 1]
     _, first = np.unique(key, return_index=True)
     if len(first) < len(key):
         repeated = np.setdiff1d(np.arange(len(key)), first)
-        line = _line_of_word(raw, 3 + 4 * int(repeated[0]))
+        line = line_of_word(raw, 3 + 4 * int(repeated[0]))
         raise InputError("a point is observed twice in one image", "keep one of the lines", path, line)
 
 
@@ -170,16 +171,6 @@ def _number(word: bytes) -> float:
         return float(word)
     except ValueError:
         return np.nan
-
-
-def _line_of_word(raw: bytes, number: int) -> int | None:
-    """Line of the file (from 1) that a word (from 0) stands on."""
-    seen = 0
-    for line, text in enumerate(raw.splitlines(), 1):
-        seen += len(text.split())
-        if seen > number:
-            return line
-    return None
 
 
 def write_bal(oriented: OrientedBlock, path: str | os.PathLike) -> tuple[str, ...]:

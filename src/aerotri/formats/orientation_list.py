@@ -99,13 +99,12 @@ def read_ortho_camera(path: str | os.PathLike) -> Camera:
 def _camera_section(file: TextFile) -> tuple[str, dict[str, tuple[int, str]]]:
     """Name and entries (row, text) of the section with im_size: what YAML has of two levels, and no more of it."""
     sections: list[tuple[str, dict[str, tuple[int, str]]]] = []
-    raw = file.path.read_text(encoding="utf-8").replace("\r\n", "\n").split("\n")
-    for row, (line, number) in enumerate(zip(file.lines, file.numbers, strict=True)):
+    for row, line in enumerate(file.lines):
         key, colon, value = line.partition(":")
         value = value.split(" #")[0].strip().strip("'\"")
         if not colon:
             raise file.error(row, f"'{line[:60]}' is no entry", "entries are key: value")
-        if not raw[number - 1][:1].isspace():
+        if not file.is_indented[row]:
             sections.append((key.strip(), {}))
         elif sections:
             sections[-1][1][key.strip()] = (row, value)

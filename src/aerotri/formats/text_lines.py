@@ -34,10 +34,12 @@ class TextFile:
     def __init__(self, path: Path, comments: bool = True):
         self.path = path
         text = _decoded(read_bytes(path), path)
-        lines = [line.strip() for line in text.split("\n")]
+        raw = text.split("\n")
+        lines = [line.strip() for line in raw]
         kept = [(i, line) for i, line in enumerate(lines, 1) if line and not (comments and line[0] == "#")]
         self.numbers = [number for number, _ in kept]
         self.lines = [line for _, line in kept]
+        self.is_indented = [raw[number - 1][:1].isspace() for number in self.numbers]
         self.last_line = max(len(lines) - (not lines[-1]), 1)
 
     def __len__(self) -> int:
@@ -148,6 +150,16 @@ def first_lines(path: Path, count: int = 8, comments: bool = True) -> list[str]:
 def all_numbers(words: Sequence[str]) -> bool:
     """Whether all words are numbers, of which there is at least one."""
     return bool(words) and all(is_number(word) for word in words)
+
+
+def line_of_word(raw: bytes, number: int) -> int | None:
+    """Line of a file (from 1) that a word (from 0) stands on."""
+    seen = 0
+    for line, text in enumerate(raw.splitlines(), 1):
+        seen += len(text.split())
+        if seen > number:
+            return line
+    return None
 
 
 def check_words(names: np.ndarray, what: str, format: str) -> None:

@@ -12,11 +12,14 @@ from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Camera
 from aerotri.simulation.flight import FlightFrame, FlownImages
 from aerotri.simulation.random_streams import scattered
-from aerotri.simulation.spec import ControlSpec, TiePointSpec
+from aerotri.simulation.spec import ControlSpec, TiePointSpec, TowerSpec
 
 CONTROL_REACH = 0.7
 """Control lies as far beyond the outer strip axes as this share of half a footprint."""
 CHECK_SURPLUS = 2
+TOWER_REACH = (0.1, 0.5)
+"""Where towers stand, from the middle of a photograph along and across the flight, in units of the half format [C]: at
+60 % end lap the neighbours see them too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +53,7 @@ def tie_candidates(
     -------
     (count, 2) m.
     """
-    if spec.distribution == "clusters":
+    if spec.distribution != "uniform":
         return _clustered(spec, count, flown, cameras, ground_m, rng)
     corners = _on_ground(
         np.arange(len(flown)), np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)]), flown, cameras, ground_m
@@ -64,12 +67,33 @@ def _clustered(
     spec: TiePointSpec, count: int, flown: FlownImages, cameras: Sequence[Camera], ground_m: float, rng
 ) -> np.ndarray:
     """Around the nodes of a pattern in each image, as Gruber laid them out; the nodes of overlapping images meet."""
-    image = rng.integers(len(flown), size=count)
-    along, across = (_nodes(number)[rng.integers(number, size=count)] for number in spec.pattern)
-    is_x = np.array([(c.flight_axis or "+y")[1] == "x" for c in cameras])[flown.camera[image]]
-    position = np.where(is_x[:, None], np.stack([along, across], 1), np.stack([across, along], 1))
+    if spec.distribution == "nodes":
+        cells = len(flown) * spec.pattern[0] * spec.pattern[1]
+        order = np.concatenate([rng.permutation(cells) for _ in range(-(-count // cells))])[:count]
+        image, *node = np.unravel_index(order, (len(flown), *spec.pattern))
+    else:
+        image = rng.integers(len(flown), size=count)
+        node = [rng.integers(number, size=count) for number in spec.pattern]
+    along, across = (_nodes(number)[which] for number, which in zip(spec.pattern, node, strict=True))
+    position = _by_axes(along, across, image, flown, cameras)
     position = position + 2.0 * spec.cluster_sigma * rng.normal(size=(count, 2))
     return _on_ground(image, position[:, None, :], flown, cameras, ground_m)[:, 0]
+
+
+def tower_places(
+    spec: TowerSpec, flown: FlownImages, cameras: Sequence[Camera], ground_m: float, rng: np.random.Generator
+) -> np.ndarray:
+    """(t, 2) m plan positions of the towers, in the order of the photographs they stand in."""
+    image = np.repeat(np.arange(len(flown)), spec.per_image)
+    along, across = (rng.uniform(-reach, reach, size=len(image)) for reach in TOWER_REACH)
+    position = _by_axes(along, across, image, flown, cameras)
+    return _on_ground(image, position[:, None, :], flown, cameras, ground_m)[:, 0]
+
+
+def _by_axes(along: np.ndarray, across: np.ndarray, image: np.ndarray, flown: FlownImages, cameras: Sequence[Camera]):
+    """(n, 2) x, y in the photographs of positions along and across the flight."""
+    is_x = np.array([(c.flight_axis or "+y")[1] == "x" for c in cameras])[flown.camera[image]]
+    return np.where(is_x[:, None], np.stack([along, across], 1), np.stack([across, along], 1))
 
 
 def _nodes(count: int) -> np.ndarray:

@@ -152,6 +152,7 @@ class TiePointSpec(Table):
     """Tie points. `rays_per_point` sets the probability of a point being measured in an image that sees it.
 
     'clusters': around the nodes of a `pattern` (along, across) in every image, `cluster_sigma` in units of the format;
+    'nodes': the same, with a point at every node of every image before any node has its second;
     'uniform': evenly over the ground.
     """
 
@@ -160,7 +161,7 @@ class TiePointSpec(Table):
     probability: Probability | None = None
     min_rays: Annotated[int, Field(strict=True, ge=1)] = 2
     max_rays: Annotated[int, Field(strict=True, ge=2)] | None = None
-    distribution: Literal["uniform", "clusters"] = "uniform"
+    distribution: Literal["uniform", "clusters", "nodes"] = "uniform"
     pattern: tuple[Count, Count] = (3, 3)
     cluster_sigma: Positive = 0.04
     sigma_um: NotNegative
@@ -209,6 +210,18 @@ class ControlSpec(Table):
         if self.distance_bases is not None and self.positions:
             raise ValueError("give either distance_bases or positions")
         return self
+
+
+class TowerSpec(Table):
+    """Towers, `per_image` of them in the inner part of every photograph: the foot on the ground, the top `height_m` above.
+
+    Both are measured in every photograph that sees them. The top leaves the plumb line through the foot by `sigma_m` in
+    X and in Y; the block has a condition of that σ for every tower.
+    """
+
+    height_m: Positive
+    per_image: Count = 1
+    sigma_m: Positive = 0.01
 
 
 class GnssSpec(Table):
@@ -265,6 +278,7 @@ class SimulationSpec(Table):
     terrain: TerrainSpec = TerrainSpec()
     tie_points: TiePointSpec
     control: ControlSpec = ControlSpec()
+    towers: TowerSpec | None = None
     gnss: GnssSpec | None = None
     ins: InsSpec | None = None
     gross_errors: GrossErrorSpec | None = None

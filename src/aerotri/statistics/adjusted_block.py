@@ -202,8 +202,8 @@ class ObservationResults:
 class ObservationGroup:
     """One group of observations: its share of the redundancy and how its residuals fit their σ.
 
-    `sigma_apriori` and `rms` in the unit of the group (µm for image points, rad for attitudes, m otherwise); `sigma_aposteriori` is
-    sigma_apriori·√(vᵀPv of the group / its redundancy).
+    `sigma_apriori` and `rms` in the unit of the group (µm for image points, rad for attitudes, m otherwise);
+    `sigma_aposteriori` is sigma_apriori·√(vᵀPv of the group / its redundancy).
     """
 
     name: str

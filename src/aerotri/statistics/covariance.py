@@ -42,7 +42,7 @@ def cofactors(system: NormalSystem, state: State, factor: Factor, estimator: Est
     points, redundancy = system.point_cofactors(state, inverse, estimator)
     images, border = _without_held(system.unknowns, inverse)
     result = Cofactors(images, inverse.corner, points, border, redundancy)
-    if system.unknowns.block.settings.adjustment.datum == "inner":
+    if system.unknowns.block.settings.adjustment.datum == "inner" and system.unknowns.motions.count:
         return transform_datum(system, state, factor, estimator, result)
     return result
 
@@ -60,21 +60,22 @@ def transform_datum(system: NormalSystem, state: State, factor: Factor, estimato
     """Cofactors in the inner datum over the datum points, from those in a minimal datum.
 
     With A = (GᵀDG)⁻¹GᵀD, D choosing the datum points, and S = I − G·A: SQSᵀ = Q − G(AQ) − (AQ)ᵀGᵀ + G(AQAᵀ)Gᵀ. Only
-    the seven columns Q·Aᵀ are needed beyond the pattern.
+    the columns Q·Aᵀ, as many as motions are free, are needed beyond the pattern.
     """
-    g_points = motions_of_points(state.points)
-    g_images = motions_of_images(state.centre)
+    free = system.unknowns.motions
+    d = free.count
+    g_points = motions_of_points(state.points) @ free.basis
+    g_images = motions_of_images(state.centre) @ free.basis
     turn = system.unknowns.turn(state)
     g_images[:, 3:] = np.linalg.solve(turn, g_images[:, 3:])
+    g_shared = free.shared.copy()
+    g_shared[system.unknowns.kept_columns] = g_points[system.unknowns.kept_rows]
     rows = datum_rows(system.unknowns)
-    g_datum = g_points[rows].reshape(-1, 7)
-    a = np.zeros((len(state.points), 3, 7))
-    a[rows] = np.linalg.solve(g_datum.T @ g_datum, g_datum.T).T.reshape(-1, 3, 7)
+    g_datum = g_points[rows].reshape(-1, d)
+    a = np.zeros((len(state.points), 3, d))
+    a[rows] = np.linalg.solve(g_datum.T @ g_datum, g_datum.T).T.reshape(-1, 3, d)
     qa_images, qa_shared, qa_points = system.solve_sides(state, factor, a, estimator)
     aqa = np.einsum("pia,pib->ab", a, qa_points)
-    # of the shared parameters only the points that are not eliminated move with the datum
-    g_shared = np.zeros((len(minimal.shared), 7))
-    g_shared[system.unknowns.kept_columns] = g_points[system.unknowns.kept_rows]
     mixed = np.einsum("nia,sa->nis", g_images, qa_shared) + np.einsum("nia,sa->nis", qa_images, g_shared)
     return Cofactors(
         images=_transformed(minimal.images, g_images, qa_images, aqa),

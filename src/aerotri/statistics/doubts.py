@@ -70,8 +70,8 @@ def refuse_runaway(system: NormalSystem, solution: Solution) -> None:
         raise failure(
             system,
             "not converged",
-            f"the principal distance ran from {base[worst]:g} to {found[worst]:.3g} mm: the parameters chosen cannot be "
-            "told apart",
+            f"the principal distance ran from {base[worst]:g} to {found[worst]:.3g} mm: the parameters chosen cannot "
+            "be told apart",
             solution.iterations,
         )
 

@@ -19,8 +19,8 @@ from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import AdjustedBlock
 from aerotri.statistics.doubts import AdjustmentFailedError
-from aerotri.statistics.free_verdict import CONTROL, FREE, POSITIONS, FreeCheck, Stage, Suspect, poor_fit
-from aerotri.statistics.outliers import judge_rays, sure_value
+from aerotri.statistics.free_verdict import CONTROL, FREE, POSITIONS, FreeCheck, Stage, Suspect
+from aerotri.statistics.outliers import RayTests, judge_rays, sure_value
 from aerotri.statistics.reliability import critical_value
 from aerotri.statistics.similarity import Similarity, fit_similarity
 
@@ -49,24 +49,19 @@ def check_free(block: Block, adjust: Adjust, full: AdjustedBlock | None = None) 
     except AdjustmentFailedError as failure:
         stage = _failed(FREE, failure)
         nothing = np.zeros(0, dtype=str)
-        return FreeCheck((stage,), sigma0_full, np.nan, 0, (), nothing, None, None, robust)
+        return FreeCheck((stage,), sigma0_full, np.nan, 0, nothing, None, None, robust)
     o = free.outcome
-    stages = [Stage(FREE, o.status, o.message, o.sigma0, o.vtpv, o.redundancy)]
-    found, results = _stages(block, adjust, free, full)
     tests = judge_rays(free)
-    stages += found
-    suspects = _ray_suspects(free) if poor_fit(stages[0], tests.scale) else []
-    for stage in stages[1:]:
-        suspects += [] if stage.fits or stage.name not in results else _added_suspects(results[stage.name], o.sigma0)
+    first = Stage(FREE, o.status, o.message, o.sigma0, o.vtpv, o.redundancy, suspects=_ray_suspects(free, tests))
+    added, by_control = _stages(block, adjust, free, full)
     return FreeCheck(
-        stages=tuple(stages),
+        stages=(first, *added),
         sigma0_full=sigma0_full,
         spread=tests.scale,
         beyond=int((np.abs(np.nan_to_num(tests.w)) > tests.sure).sum()),
-        suspects=tuple(suspects),
         point=free.block.points[free.control.point].astype(str),
         similarity=_similarity(free),
-        position_offset=_position_offset(block, results.get(CONTROL)),
+        position_offset=_position_offset(block, by_control),
         robust=robust,
     )
 
@@ -84,7 +79,7 @@ def free_block(block: Block) -> Block:
 
 
 def _stages(block: Block, adjust: Adjust, free: AdjustedBlock, full: AdjustedBlock | None):
-    """The adjustments after the free one with their tests, and the results of those that succeeded, by name."""
+    """The adjustments after the free one with their tests, and the result of the one with control alone, or None."""
     scale = free.outcome.sigma0 if free.outcome.redundancy > 0 else 1.0
     if abs(scale - 1.0) < SAME_SCALE:
         scale = 1.0
@@ -92,7 +87,7 @@ def _stages(block: Block, adjust: Adjust, free: AdjustedBlock, full: AdjustedBlo
     todo = [(CONTROL, replace(weighted, gnss_ins=None))]
     if block.gnss_ins is not None:
         todo.append((POSITIONS, weighted))
-    stages, results, before = [], {}, free
+    stages, by_control, before = [], None, free
     for name, chosen in todo:
         same = scale == 1.0 and full is not None and name == todo[-1][0]
         try:
@@ -102,8 +97,8 @@ def _stages(block: Block, adjust: Adjust, free: AdjustedBlock, full: AdjustedBlo
                 stages.append(_failed(name, failure))
             continue
         stages.append(_tested(name, before, after, free))
-        before = results[name] = after
-    return stages, results
+        by_control, before = (after if name == CONTROL else by_control), after
+    return stages, by_control
 
 
 def _as_stated(block: Block, scale: float) -> Block:
@@ -128,8 +123,9 @@ def _tested(name: str, before: AdjustedBlock, after: AdjustedBlock, free: Adjust
         variance = free.outcome.vtpv / freedom
         ratio = max(o.vtpv - before.outcome.vtpv, 0.0) / added / variance
         limit = float(fdtri(added, freedom, 1.0 - alpha))
-    w = np.array([suspect.w for suspect in _added_values(after, free.outcome.sigma0)])
-    w = np.abs(w[np.isfinite(w)])
+    values = sorted(_added_values(after, free.outcome.sigma0), key=lambda value: -abs(value.w))
+    w_limit = sure_value(alpha, len(values))
+    large = tuple(value for value in values if abs(value.w) > critical_value(alpha))
     return Stage(
         name=name,
         status=o.status,
@@ -140,8 +136,9 @@ def _tested(name: str, before: AdjustedBlock, after: AdjustedBlock, free: Adjust
         added=o.observations - before.outcome.observations,
         ratio=ratio,
         limit=limit,
-        largest_w=float(w.max()) if len(w) else np.nan,
-        w_limit=sure_value(alpha, len(w)),
+        largest_w=abs(values[0].w) if values else np.nan,
+        w_limit=w_limit,
+        suspects=large[:NAMED_SUSPECTS],
     )
 
 
@@ -165,26 +162,19 @@ def _added_values(after: AdjustedBlock, sigma0: float) -> list[Suspect]:
     if observed is not None:
         for k in np.flatnonzero(np.isfinite(observed.w)):
             w, gap = float(observed.w[k]) / sigma0, float(-observed.v[k] / observed.r[k])
-            values.append(Suspect("position", str(observed.label[k]), str(observed.component[k]), w, gap))
+            values.append(Suspect(str(observed.group[k]), str(observed.label[k]), str(observed.component[k]), w, gap))
     return values
 
 
-def _added_suspects(after: AdjustedBlock, sigma0: float) -> list[Suspect]:
-    limit = critical_value(after.block.settings.adjustment.alpha)
-    found = [value for value in _added_values(after, sigma0) if abs(value.w) > limit]
-    return sorted(found, key=lambda value: -abs(value.w))[:NAMED_SUSPECTS]
-
-
-def _ray_suspects(free: AdjustedBlock) -> list[Suspect]:
-    block, tests = free.block, judge_rays(free)
-    found = []
+def _ray_suspects(free: AdjustedBlock, tests: RayTests) -> tuple[Suspect, ...]:
+    block, found = free.block, []
     for row in tests.order[:NAMED_SUSPECTS]:
         if abs(tests.w[row]) > tests.sure:
             point = block.points[block.image_points.point[row]]
             name = f"{point} in {block.images.names[block.image_points.image[row]]}"
             error, pixels = float(tests.estimated_mm[row]), float(tests.estimated_px[row])
             found.append(Suspect("ray", name, "xy"[tests.axis[row]], float(tests.w[row]), error, pixels))
-    return found
+    return tuple(found)
 
 
 def _similarity(free: AdjustedBlock) -> Similarity | None:

@@ -18,6 +18,25 @@ ANGLES = ("omega", "phi", "kappa")
 
 
 @dataclass(frozen=True)
+class Suspect:
+    """A value that contradicts the rest.
+
+    Parameters
+    ----------
+    kind : 'ray', 'control', or the group of other observations. name : the point, photograph or condition. component :
+        'X', 'x', 'omega' ….
+    w : normalised residual. error : −v/r, m (rad for attitudes, mm for rays). error_px : pixels, of rays.
+    """
+
+    kind: str
+    name: str
+    component: str
+    w: float
+    error: float
+    error_px: float = np.nan
+
+
+@dataclass(frozen=True)
 class Stage:
     """One adjustment of the row, and the test of what it added to the one before.
 
@@ -28,6 +47,7 @@ class Stage:
     added : observations and conditions it has more. ratio : Δ(vᵀPv)/Δr/σ̂0²free, NaN where nothing is tested.
     limit : what the ratio exceeds with probability α.
     largest_w, w_limit : largest normalised residual of what was added, and what the largest exceeds with probability α.
+    suspects : the first of the values with a large w, largest first; rays in the free block.
     """
 
     name: str
@@ -41,6 +61,7 @@ class Stage:
     limit: float = np.nan
     largest_w: float = np.nan
     w_limit: float = np.nan
+    suspects: tuple[Suspect, ...] = ()
 
     @property
     def tested(self) -> bool:
@@ -52,24 +73,6 @@ class Stage:
         return self.tested and self.ratio <= self.limit and not self.largest_w > self.w_limit
 
 
-@dataclass(frozen=True)
-class Suspect:
-    """A value that contradicts the rest.
-
-    Parameters
-    ----------
-    kind : 'ray', 'control' or 'position'. name : the point, or photograph and point. component : 'X', 'x', 'omega' ….
-    w : normalised residual. error : −v/r, m (rad for attitudes, mm for rays). error_px : pixels, of rays.
-    """
-
-    kind: str
-    name: str
-    component: str
-    w: float
-    error: float
-    error_px: float = np.nan
-
-
 @dataclass(frozen=True, eq=False)
 class FreeCheck:
     """Tie points or control?
@@ -78,7 +81,6 @@ class FreeCheck:
     ----------
     stages : the adjustments, the free one first. sigma0_full : of the adjustment as delivered, NaN if there is none.
     spread : robust spread of w in the free block. beyond : rays whose |w| no chance explains.
-    suspects : largest |w| first: rays where the tie points do not fit, control and positions where these do not.
     point : (k,) str, control points of the free block. similarity : onto their given coordinates, None if these do not
         determine it.
     position_offset : (3,) m, mean of observed positions less where control alone puts them; None if not known.
@@ -89,7 +91,6 @@ class FreeCheck:
     sigma0_full: float
     spread: float
     beyond: int
-    suspects: tuple[Suspect, ...]
     point: np.ndarray
     similarity: Similarity | None
     position_offset: np.ndarray | None
@@ -101,15 +102,16 @@ class FreeCheck:
 
     @property
     def verdict(self) -> str:
-        """'fits', 'control', 'tie points', 'both', 'not tested' or 'failed'."""
+        """'fits', 'control', 'positions', 'tie points', 'both' (tie points and others), 'not tested' or 'failed'."""
         free, added = self.stages[0], self.stages[1:]
-        if np.isnan(free.sigma0) and free.status != "converged":
+        if free.status != "converged":
             return "failed"
-        contradicts = any(stage.status != "converged" or (stage.tested and not stage.fits) for stage in added)
+        against = [stage.name for stage in added if stage.status != "converged" or (stage.tested and not stage.fits)]
         if self.tie_points_poor:
-            return "both" if contradicts else "tie points"
-        if contradicts:
-            return "control"
+            return "both" if against else "tie points"
+        if against:
+            alone = against == [POSITIONS] and any(stage.name == CONTROL for stage in added)
+            return "positions" if alone else "control"
         return "fits" if any(stage.tested for stage in added) else "not tested"
 
     @property
@@ -145,7 +147,8 @@ def suspect_text(suspect: Suspect) -> str:
     too = "large" if suspect.error > 0 else "small"
     unit, value = ("rad", f"{size:.2e}") if suspect.component in ANGLES else ("m", f"{size:.{DECIMALS}f}")
     given = "given" if suspect.kind == "control" else "observed"
-    return f"{suspect.name}: {given} {suspect.component} too {too} by {value} {unit} ({w})"
+    what = f"{given} {suspect.component}".rstrip()
+    return f"{suspect.name}: {what} too {too} by {value} {unit} ({w})"
 
 
 def _tie_points(check: FreeCheck) -> str:
@@ -157,50 +160,51 @@ def _tie_points(check: FreeCheck) -> str:
         all_the_same = f"; {stand_out} stand{'s' if check.beyond == 1 else ''} out all the same" if check.beyond else ""
         return f"The tie points fit one another (σ0 free {free.sigma0:.2f}{all_the_same})."
     if free.sigma0 > INFLATED * check.spread and check.beyond:
-        rays = [suspect for suspect in check.suspects if suspect.kind == "ray"]
-        first = f" Look at {suspect_text(rays[0])} first." if rays else ""
+        first = f" Look first at {suspect_text(free.suspects[0])}." if free.suspects else ""
         return (
             f"The tie points themselves do not fit (σ0 free {free.sigma0:.2f}, {free.sigma0 / check.spread:.1f} times "
             f"the spread of most residuals, {stand_out} beyond chance).{first}"
         )
     return (
-        f"The tie points themselves do not fit (σ0 free {free.sigma0:.2f}) though few rays stand out: the a-priori σ of "
-        "the image points is too small, or systematic image errors are not modelled."
+        f"The tie points themselves do not fit (σ0 free {free.sigma0:.2f}) though few rays stand out: the a-priori σ "
+        "of the image points is too small, or systematic image errors are not modelled."
     )
 
 
 def _added(check: FreeCheck, stage: Stage) -> str:
-    what, to = _subjects(check, stage)
-    verb = "do" if what.endswith("s") else "does"
+    what, to, several = _subjects(check, stage)
+    do_not_fit, fit = ("do not fit", "fit") if several else ("does not fit", "fits")
     if stage.status != "converged":
-        return f"With {what} the adjustment has no result ({stage.status}: {stage.message}): {_offset(check)}"
+        return f"With {what} the adjustment has no result ({stage.status}: {stage.message})."
     if not stage.tested:
         return f"Nothing tests {what}: no redundancy is gained."
     numbers = f"vᵀPv grows by {stage.ratio:.2f} σ0² per redundancy gained, by chance up to {stage.limit:.2f}"
     if stage.fits:
-        return f"{_capital(what)} {'fit' if verb == 'do' else 'fits'} {to} ({numbers})."
-    kind = "control" if stage.name == CONTROL else "position"
-    of_kind = [s for s in check.suspects if s.kind == kind] or [s for s in check.suspects if s.kind != "ray"]
-    first = f"look at {suspect_text(of_kind[0])} first" if of_kind else "no single value stands out"
-    offset = "" if kind == "control" else f" {_capital(_offset(check))}"
-    return f"{_capital(what)} {verb} not fit {to} ({numbers}): {first}.{offset}".rstrip()
+        return f"{_capital(what)} {fit} {to} ({numbers})."
+    return f"{_capital(what)} {do_not_fit} {to} ({numbers}). {_where_to_look(check, stage)}"
 
 
-def _subjects(check: FreeCheck, stage: Stage) -> tuple[str, str]:
-    """What is judged, and what it is held against."""
+def _subjects(check: FreeCheck, stage: Stage) -> tuple[str, str, bool]:
+    """What is judged, what it is held against, and whether the first is a plural."""
     if stage.name == CONTROL:
-        return "the control", "the tie points"
-    alone = not any(other.name == CONTROL for other in check.stages)
-    if alone and len(check.point):
-        return "the control and the observed positions", "the tie points"
-    return "the observed positions", "the tie points" if alone else "the tie points and the control"
+        return "the control", "the tie points", False
+    if any(other.name == CONTROL for other in check.stages):
+        return "the observed positions", "the tie points and the control", True
+    if len(check.point):
+        return "the control and the observed positions", "the tie points", True
+    return "the observed positions", "the tie points", True
 
 
-def _offset(check: FreeCheck) -> str:
-    if check.position_offset is None:
-        return "look at its σ, its coordinate system and its heights."
+def _where_to_look(check: FreeCheck, stage: Stage) -> str:
+    first = f"Look first at {suspect_text(stage.suspects[0])}." if stage.suspects else "No single value stands out."
+    if stage.name == CONTROL or check.position_offset is None:
+        return first if stage.suspects else f"{first} Look at σ, coordinate system and heights."
     x, y, z = (f"{value:+.{DECIMALS}f}" for value in check.position_offset)
-    return f"on average they lie {x}, {y}, {z} m (X, Y, Z) from where the control alone puts the photographs."
+    offset = f"On average they lie {x}, {y}, {z} m (X, Y, Z) from where the control alone puts the photographs."
+    control = next(other for other in check.stages if other.name == CONTROL)
+    # control that fitted the tie points and now complains is outvoted by a common error of the positions
+    outvoted = control.fits and stage.suspects and stage.suspects[0].kind == "control"
+    return offset if outvoted else f"{offset} {first}"
 
 
 def _capital(text: str) -> str:

@@ -37,9 +37,9 @@ class RayTests:
 
     @property
     def order(self) -> np.ndarray:
-        """Rows of the tested rays, largest |w| first."""
-        size = np.nan_to_num(np.abs(self.w))
-        rows = np.argsort(-size, kind="stable")
+        """Rows of the tested rays, largest |w| first; of equal ones that first which the smaller error explains."""
+        size = np.round(np.nan_to_num(np.abs(self.w)), 3)
+        rows = np.lexsort((np.nan_to_num(np.abs(self.estimated_mm)), -size))
         return rows[size[rows] > 0.0]
 
 

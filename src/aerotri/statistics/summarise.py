@@ -46,13 +46,13 @@ class Counts:
 
 
 def count_observations(system: NormalSystem) -> Counts:
-    """Counts of the adjustment that `system` stands for; an inner datum has seven conditions."""
+    """Counts of the adjustment that `system` stands for; an inner datum has a condition for all that is free."""
     u = system.unknowns
     held_observed = int(((u.prior_weight > 0.0) & ~u.point_held).sum())
     extras = sum(extra.count for extra in system.extras)
     observations = 2 * len(u.rays.image) + held_observed + extras + system.n_shared_priors
-    inner = u.block.settings.adjustment.datum == "inner"
-    return Counts(observations, u.count + (7 if inner else 0), 7 if inner else 0)
+    conditions = u.motions.count if u.block.settings.adjustment.datum == "inner" else 0
+    return Counts(observations, u.count + conditions, conditions)
 
 
 def summarise(
