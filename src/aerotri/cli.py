@@ -56,13 +56,29 @@ def adjust(
     geoid: Annotated[
         Path | None, typer.Option(help="Geoid grid (PROJ GeoTIFF) for heights that the CRS does not bring along.")
     ] = None,
+    check_free: Annotated[
+        bool, typer.Option("--check-free", help="Adjust free as well: is an error in the tie points or in the control?")
+    ] = False,
     plots: Annotated[bool, typer.Option(help="Draw the plots and the report.")] = True,
     json_: Json = False,
 ) -> None:
     """Adjust a block: orientation, points, self-calibration, and σ of everything."""
     from aerotri.commands.adjust import run_adjust
 
-    raise typer.Exit(run_adjust(block, out, parameters, robust, geoid, plots, json_))
+    raise typer.Exit(run_adjust(block, out, parameters, robust, geoid, plots, json_, check_free))
+
+
+@app.command(epilog="Example: aerotri diff before_result after_result --top 10")
+def diff(
+    first: Annotated[Path, typer.Argument(help="Result folder of the first run.")],
+    second: Annotated[Path, typer.Argument(help="Result folder of the second run; its σ measure the changes.")],
+    top: Annotated[int, typer.Option(help="How many photographs, points, rays to name.")] = 5,
+    json_: Json = False,
+) -> None:
+    """What changed between two runs, against σ."""
+    from aerotri.commands.diff import run_diff
+
+    raise typer.Exit(run_diff(first, second, top, json_))
 
 
 @app.command(epilog="Example: aerotri simulate blocks/frederiksstad_ultracam/simulation.toml --out demo --seed 1")

@@ -22,6 +22,7 @@ from aerotri.coordinates.blocks import frame_of_block, needs_positions, transfor
 from aerotri.formats.solution import SavedSolution
 from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.statistics.common_height import common_height
 from aerotri.statistics.doubts import AdjustmentFailedError, defects_in_words, doubts, failure, refuse_runaway
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
 
@@ -149,6 +150,9 @@ def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray 
         "statistics": time.perf_counter() - solved,
     }
     said = (*result.outcome.warnings, *inseparable(result.parameters))
+    shared_height = common_height(system, solution, factor, result.outcome.sigma0)
+    if shared_height is not None:
+        said += tuple(s for s in [shared_height.sentence(float(np.nanmedian(result.points.sigma[:, 2])))] if s)
     result = replace(result, block=block, outcome=replace(result.outcome, warnings=said, timings_s=timings))
     return Adjustment(result, result, system, solution)
 

@@ -365,3 +365,20 @@ def test_what_gnss_leaves_free(shift, free):
         result = adjustment.result
         assert result.outcome.conditions == (expected if datum == "inner" else 0)
         assert abs(sum(g.redundancy for g in result.groups) - result.outcome.redundancy) < 1e-6 * 2000
+
+
+def test_heights_that_hang_on_the_principal_distance_are_said():
+    """GNSS alone over flat ground with a free principal distance: a good σ0, and heights that share one uncertainty."""
+    block, truth = small_block(28, terrain={"kind": "flat", "height_m": 100.0}, gnss={"sigma_m": [0.03, 0.03, 0.05]})
+    camera = block.cameras[0]
+    free = replace(block, cameras=(replace(camera, interior={**camera.interior, "focal_length_mm": Prior(101.4)}),))
+    alone = adjust(replace(free, control=replace(free.control, is_check=np.ones(len(free.control), bool))))
+    said = [w for w in alone.outcome.warnings if "all heights share an uncertainty" in w]
+    assert len(said) == 1
+    assert "principal distance of ucd" in said[0]
+    shared = float(said[0].split("uncertainty of ")[1].split(" m")[0])
+    common = np.nanmean(alone.points.xyz[:, 2] - truth.points[:, 2])
+    assert abs(common) < 3.3 * shared
+    # the check points' own σ contain it
+    assert (alone.check.sigma[:, 2] > 0.9 * shared).all()
+    assert not any("all heights share" in w for w in adjust(block).outcome.warnings)

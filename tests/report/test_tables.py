@@ -188,7 +188,7 @@ def test_cameras_table(adjusted):
     ],
 )  # fmt: skip
 def test_items_as_on_the_command_line(items, text):
-    assert tables._ranges(items) == text
+    assert tables.item_ranges(items) == text
 
 
 def test_metre_digits():

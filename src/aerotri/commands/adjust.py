@@ -15,10 +15,11 @@ if TYPE_CHECKING:
     from aerotri.observations import Block
     from aerotri.pipeline import Adjustment
     from aerotri.statistics.adjusted_block import AdjustedBlock
+    from aerotri.statistics.free_verdict import FreeCheck
 
 RESULT_NAMES = (
     "adjustment.json", "images.csv", "points.csv", "residuals.parquet", "parameters.csv", "control.csv", "check.csv",
-    "block", "solution.npz", "plots", "report.html",
+    "block", "solution.npz", "plots", "report.html", "check_free.json",
 )  # fmt: skip
 
 
@@ -30,6 +31,7 @@ def run_adjust(
     geoid: Path | None,
     plots: bool,
     as_json: bool,
+    check_free: bool = False,
 ) -> int:
     """Exit code of the command: 0 when converged, 1 when not; arguments as on the command line."""
     console = Console(quiet=as_json)
@@ -37,6 +39,8 @@ def run_adjust(
     from aerotri.formats.block_folder import read_block
 
     block = with_settings(read_block(path), parameters, robust)
+    if check_free:
+        refuse_free_datum(block)
     read_s = time.perf_counter() - begun
     target = out or Path(f"{_folder_name(path)}_result")
     refuse_foreign_folder(target)
@@ -51,14 +55,17 @@ def run_adjust(
         from aerotri.formats.result import outcome_json
 
         console.failure(str(failure))
+        if check_free:
+            _tell_free(_checked_unadjusted(block, geoid, console), as_json, console)
         if as_json:
             print(json.dumps(outcome_json(block, failure.outcome), indent=2, ensure_ascii=False))
         return 1
     outcome = adjustment.result.outcome
     timings = {"read": read_s, **outcome.timings_s}
     result = replace(adjustment.result, outcome=replace(outcome, timings_s=timings))
-    result = write_all(replace(adjustment, result=result), target, plots, console)
-    _tell(result, target, console, as_json)
+    checked = _checked(adjustment, console) if check_free else None
+    result = write_all(replace(adjustment, result=result), target, plots, console, checked)
+    _tell(result, target, console, as_json, checked)
     return 0 if result.outcome.status == "converged" else 1
 
 
@@ -85,7 +92,52 @@ def refuse_foreign_folder(target: Path) -> None:
         raise InputError(f"'{target}' holds other files", "choose another --out, or an empty folder")
 
 
-def write_all(adjustment: Adjustment, target: Path, plots: bool, console: Console) -> AdjustedBlock:
+def refuse_free_datum(block: Block) -> None:
+    """A free adjustment tells errors of control only from a block that control holds.
+
+    Raises
+    ------
+    InputError
+    """
+    datum = block.settings.adjustment.datum
+    if datum != "control":
+        raise InputError(
+            f'with datum = "{datum}" the block is free of its control already',
+            'leave --check-free out, or set datum = "control"',
+            file="block.toml",
+        )
+
+
+def _checked(adjustment: Adjustment, console: Console) -> FreeCheck:
+    """The free check in the local frame of the adjustment, so that all its stages share one frame."""
+    from aerotri.pipeline import adjust
+    from aerotri.statistics.free_check import check_free
+
+    console.progress("adjusting free")
+    return check_free(adjustment.local.block, adjust, adjustment.local)
+
+
+def _checked_unadjusted(block: Block, geoid: Path | None, console: Console) -> FreeCheck:
+    """The free check of a block that has no result with its control."""
+    from aerotri.coordinates.blocks import frame_of_block, transform_block
+    from aerotri.pipeline import adjust
+    from aerotri.statistics.free_check import check_free
+
+    console.progress("adjusting free")
+    local = block if block.crs == "local" else transform_block(block, frame_of_block(block, geoid))
+    return check_free(local, adjust)
+
+
+def _tell_free(checked: FreeCheck, as_json: bool, console: Console) -> None:
+    from aerotri.report.work_tables import free_check_lines
+
+    if not as_json:
+        console.lines(free_check_lines(checked))
+
+
+def write_all(
+    adjustment: Adjustment, target: Path, plots: bool, console: Console, checked: FreeCheck | None = None
+) -> AdjustedBlock:
     """Write tables, solution, block, plots and report to a temporary folder, and rename it."""
     from aerotri.formats.atomic import atomic_folder
     from aerotri.formats.block_folder import write_block
@@ -103,19 +155,26 @@ def write_all(adjustment: Adjustment, target: Path, plots: bool, console: Consol
         if plots:
             console.progress("drawing")
             begun = time.perf_counter()
-            _draw(result, folder)
+            _draw(adjustment, folder, checked)
             timings["plots"] = time.perf_counter() - begun
         result = replace(result, outcome=replace(result.outcome, timings_s=timings))
+        if checked is not None:
+            from aerotri.report.free_check_json import free_check_json
+
+            text = json.dumps(free_check_json(checked), indent=2, ensure_ascii=False, allow_nan=False)
+            (folder / "check_free.json").write_text(text + "\n", encoding="utf-8")
         write_result(result, folder)
     return result
 
 
-def _draw(result: AdjustedBlock, folder: Path) -> None:
-    from aerotri.report.html import write_report
+def _draw(adjustment: Adjustment, folder: Path, checked: FreeCheck | None) -> None:
+    from aerotri.report.html import Findings, write_report
     from aerotri.report.plots import all_plots, save_plots
+    from aerotri.statistics.work_list import work_list
 
-    figures = all_plots(result)
-    write_report(result, save_plots(figures, folder / "plots"), folder / "report.html")
+    plots = save_plots(all_plots(adjustment.result), folder / "plots")
+    findings = Findings(work_list(adjustment.local), checked)
+    write_report(adjustment.result, plots, folder / "report.html", findings)
 
 
 def _folder_name(path: Path) -> str:
@@ -123,7 +182,9 @@ def _folder_name(path: Path) -> str:
     return (folder.parent if folder.is_file() else folder).name
 
 
-def _tell(result: AdjustedBlock, target: Path, console: Console, as_json: bool) -> None:
+def _tell(
+    result: AdjustedBlock, target: Path, console: Console, as_json: bool, checked: FreeCheck | None = None
+) -> None:
     if as_json:
         from aerotri.formats.result import adjustment_json
 
@@ -132,5 +193,7 @@ def _tell(result: AdjustedBlock, target: Path, console: Console, as_json: bool) 
     from aerotri.report.tables import summary_lines
 
     console.lines(summary_lines(result))
+    if checked is not None:
+        _tell_free(checked, as_json, console)
     report = target / "report.html"
     console.lines([f"Written to {target}" + (f", report: {report}" if report.exists() else "")])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -182,6 +183,12 @@ class BlockModel(_Section):
     ins: InsModel = InsModel()
 
 
+class CamerasModel(_Section):
+    """The cameras of block.toml in a file of their own."""
+
+    camera: Annotated[dict[str, CameraModel], Field(min_length=1)]
+
+
 class BlockToml:
     """A block.toml that holds what it may hold.
 
@@ -207,15 +214,7 @@ class BlockToml:
         InputError
             For a name that could not stand in a table.
         """
-        for name in self.model.camera:
-            if _is_no_name(name):
-                raise self.error(("camera", name), f"{name[:60]!r} is no name for a camera", "name it by a short text")
-        for name, camera in self.model.camera.items():
-            for mark in camera.fiducials:
-                if _is_no_name(mark):
-                    key = ("camera", name, "fiducials")
-                    raise self.error(key, f"{mark[:60]!r} is no name for a fiducial", "name it by a short text")
-        return tuple(camera.camera(name) for name, camera in self.model.camera.items())
+        return _camera_records(self.model.camera, self.error)
 
     def settings(self, image_sigma_um: float) -> Settings:
         """The settings record; `image_sigma_um` as it stands here or, where it does not, as the table's σ tell."""
@@ -260,6 +259,39 @@ class BlockToml:
                 f"write IMAGE:ELEMENT, the element one of {' '.join(ORIENTATION_ELEMENTS)}",
             )
         return image, element
+
+
+def _camera_records(
+    cameras: dict[str, CameraModel], error: Callable[[tuple[str, ...], str, str], InputError]
+) -> tuple[Camera, ...]:
+    remedy = "name it by a short text"
+    for name, camera in cameras.items():
+        if _is_no_name(name):
+            raise error(("camera", name), f"{name[:60]!r} is no name for a camera", remedy)
+        for mark in camera.fiducials:
+            if _is_no_name(mark):
+                raise error(("camera", name, "fiducials"), f"{mark[:60]!r} is no name for a fiducial", remedy)
+    return tuple(camera.camera(name) for name, camera in cameras.items())
+
+
+def read_cameras_toml(path: Path) -> tuple[Camera, ...]:
+    """The cameras of a file that holds tables [camera.NAME] as block.toml does, and nothing else.
+
+    Raises
+    ------
+    InputError
+        As `read_block_toml`.
+    """
+    content, text = read_toml(path)
+    try:
+        model = CamerasModel.model_validate(content)
+    except (ValidationError, OverflowError) as error:
+        raise _as_input_error(error, path, text) from error
+
+    def error_at(key: tuple[str, ...], message: str, remedy: str) -> InputError:
+        return InputError(message, remedy, path, line_of_key(text, key))
+
+    return _camera_records(model.camera, error_at)
 
 
 def _is_no_name(name: str) -> bool:

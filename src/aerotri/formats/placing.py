@@ -44,10 +44,9 @@ def to_crs(xyz: np.ndarray, source: str, target: str, geoid: str | os.PathLike |
         message = f"a point in {source} has no plan position and cannot be brought to {target}"
         raise InputError(message, f"give it in {target}")
     known = np.isfinite(xyz[:, 2])
-    here, there = georeference(source, xyz), None
-    filled = np.where(np.isnan(xyz), 0.0, xyz)
-    geographic = here.to_geographic(filled)
-    there = georeference(target, georeference(horizontal_part(target), xyz).from_geographic(geographic), geoid)
+    here, plain = georeference(source, xyz), georeference(horizontal_part(target), xyz)
+    geographic = here.to_geographic(np.where(np.isnan(xyz), 0.0, xyz))
+    there = georeference(target, plain.from_geographic(geographic), geoid)
     if _datum(here) != _datum(there):
         remedy = f"transform the coordinates to {target} beforehand"
         raise InputError(f"{source} and {target} are on different datums", remedy)

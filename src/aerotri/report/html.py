@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,11 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from aerotri.report import quality, tables
+from aerotri.report import quality, tables, work_tables
 from aerotri.report.rendering import RenderedPlot, render_plots
 from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.statistics.free_verdict import FreeCheck
+from aerotri.statistics.work_list import WorkList, work_list
 
 LARGEST_SVG = 450_000
 """Bytes above which a plot is embedded as PNG: thousands of photographs as vectors weigh more than they say."""
@@ -35,7 +38,26 @@ CAPTIONS = {
 }
 
 
-def report_html(adjusted: AdjustedBlock, plots: Mapping[str, Figure | RenderedPlot]) -> str:
+@dataclass(frozen=True)
+class Findings:
+    """What the page says beside the result itself.
+
+    Parameters
+    ----------
+    work : the work list; None: made from the result, which must then be in metres.
+    free_check : None where no free adjustment was asked for.
+    """
+
+    work: WorkList | None = None
+    free_check: FreeCheck | None = None
+
+
+NOTHING_BESIDE = Findings()
+
+
+def report_html(
+    adjusted: AdjustedBlock, plots: Mapping[str, Figure | RenderedPlot], findings: Findings = NOTHING_BESIDE
+) -> str:
     """The page as text.
 
     Parameters
@@ -47,15 +69,21 @@ def report_html(adjusted: AdjustedBlock, plots: Mapping[str, Figure | RenderedPl
         loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    return environment.get_template("report.html.j2").render(_content(adjusted, render_plots(plots)))
+    return environment.get_template("report.html.j2").render(_content(adjusted, render_plots(plots), findings))
 
 
-def write_report(adjusted: AdjustedBlock, plots: Mapping[str, Figure | RenderedPlot], path: str | Path) -> None:
+def write_report(
+    adjusted: AdjustedBlock,
+    plots: Mapping[str, Figure | RenderedPlot],
+    path: str | Path,
+    findings: Findings = NOTHING_BESIDE,
+) -> None:
     """Write the page; arguments as in `report_html`."""
-    Path(path).write_text(report_html(adjusted, plots), encoding="utf-8")
+    Path(path).write_text(report_html(adjusted, plots, findings), encoding="utf-8")
 
 
-def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot]) -> dict[str, Any]:
+def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside: Findings) -> dict[str, Any]:
+    work = work_list(adjusted) if beside.work is None else beside.work
     return {
         "name": quality.printable(adjusted.block.name),
         "outcome": adjusted.outcome,
@@ -65,7 +93,21 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot]) -> dict
         "warnings": [quality.printable(text, 1000) for text in adjusted.outcome.warnings],
         "asprs": quality.asprs_warning(adjusted),
         "plots": {name: _embedded(name, plot) for name, plot in plots.items()},
-        "tables": _tables(adjusted),
+        "tables": _tables(adjusted) | {"work": work_tables.work_table(work)},
+        "work_counts": work_tables.work_counts(work),
+        "free": None if beside.free_check is None else _free_check(beside.free_check),
+    }
+
+
+def _free_check(check: FreeCheck) -> dict[str, Any]:
+    return {
+        "verdict": check.verdict,
+        "fits": check.verdict == "fits",
+        "sentence": quality.printable(check.sentence, 4000),
+        "stages": work_tables.stages_table(check),
+        "suspects": work_tables.suspects_table(check),
+        "similarity": work_tables.similarity_table(check),
+        "similarity_text": work_tables.similarity_text(check),
     }
 
 
@@ -78,6 +120,7 @@ def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
         "check_accuracy": tables.ground_accuracy(adjusted, check, f"Check points ({len(check)})"),
         "control": tables.ground_points(adjusted, control, "Control points, one by one"),
         "check": tables.ground_points(adjusted, check, "Check points, one by one"),
+        "control_rays": work_tables.control_rays_table(adjusted),
         "cameras": tables.cameras(adjusted),
         "parameters": tables.parameters(adjusted),
         "largest": tables.largest_residuals(adjusted),

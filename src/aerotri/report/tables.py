@@ -95,7 +95,7 @@ def summary(adjusted: AdjustedBlock) -> Table:
     """What was adjusted, and with which settings."""
     block, o, a = adjusted.block, adjusted.outcome, adjusted.block.settings.adjustment
     used = int(np.sum(adjusted.rays.status == RAY_STATUS.index("used")))
-    families = [f"{family}:{_ranges(items)}" for family, items in a.additional_parameters]
+    families = [f"{family}:{item_ranges(items)}" for family, items in a.additional_parameters]
     cameras = ", ".join(f"{c.name} ({c.model})" for c in block.cameras)
     gnss = 0 if block.gnss_ins is None else len(block.gnss_ins)
     rows = [
@@ -117,7 +117,7 @@ def summary(adjusted: AdjustedBlock) -> Table:
     return Table("What was adjusted", (Column("item"), Column("value")), tuple(rows))
 
 
-def _ranges(items: tuple[str, ...]) -> str:
+def item_ranges(items: tuple[str, ...]) -> str:
     """Items as on the command line: '1-8+12', names joined by +."""
     numbers = [int(item) if item.isdigit() else None for item in items]
     runs: list[list[int]] = []

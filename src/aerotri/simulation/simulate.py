@@ -29,6 +29,7 @@ from aerotri.simulation.projection import Photographs, Rays, TrueCamera
 from aerotri.simulation.random_streams import stream
 from aerotri.simulation.spec import ControlSpec, SimulationSpec
 from aerotri.simulation.terrain import Terrain, make_terrain
+from aerotri.simulation.towers import build_towers, plumb_lines
 from aerotri.simulation.truth import ImageErrorSample, Truth
 
 SAMPLES = (46, 30)
@@ -45,7 +46,7 @@ class Scene:
     ----------
     names : (N,) str, in the order they are first measured; xyz : (N, 3) m.
     rays : sorted by image.
-    signals : (k,) index of control and check points; is_check : (k,) bool.
+    signals : (k,) index of control and check points; is_check : (k,) bool. towers : (t, 2) index of foot and top.
     """
 
     names: np.ndarray
@@ -53,6 +54,7 @@ class Scene:
     rays: Rays
     signals: np.ndarray
     is_check: np.ndarray
+    towers: np.ndarray
 
 
 def simulate(spec: SimulationSpec, seed: int) -> tuple[Block, Truth]:
@@ -88,6 +90,7 @@ def simulate(spec: SimulationSpec, seed: int) -> tuple[Block, Truth]:
         gnss_ins=observe_navigation(spec.gnss, spec.ins, flown, spec.rotation, stream(seed, "navigation")),
         settings=settings,
         rotation=spec.rotation,
+        constraints=None if spec.towers is None else plumb_lines(scene.towers, spec.towers.sigma_m),
     )
     names, groups, values = _parameters(spec)
     truth = Truth(
@@ -146,14 +149,22 @@ def _scene(
     base = (1.0 - spec.control.base_end_lap) * frame.footprint[0]
     layout = lay_out_control(spec.control, frame, base, stream(seed, "control"))
     layout, signals, signal_rays = _measured_signals(spec, layout, on_ground(layout.xy), imaging)
+    towers = build_towers(spec, flown, imaging, on_ground, seed)
     ties, rays = tie_rays(spec.tie_points, imaging, candidates, lambda: stream(seed, "measuring"))
-    names = np.array([*layout.names, *(f"T{i + 1:06d}" for i in range(len(ties)))])
-    both = Rays(
-        np.concatenate([signal_rays.image, rays.image]),
-        np.concatenate([signal_rays.point, rays.point + len(signals)]),
-        np.concatenate([signal_rays.xy, rays.xy]),
+    names = np.array([*layout.names, *towers.names, *(f"T{i + 1:06d}" for i in range(len(ties)))])
+    xyz = np.concatenate([signals, towers.xyz, ties])
+    all_rays = _joined([(signal_rays, len(signals)), (towers.rays, len(towers.xyz)), (rays, len(ties))])
+    return _in_order(names, xyz, all_rays, layout.is_check, len(towers.xyz))
+
+
+def _joined(parts: list[tuple[Rays, int]]) -> Rays:
+    """The rays of several lists of points, (rays, number of points) each, numbered through."""
+    first = np.cumsum([0, *(count for _, count in parts[:-1])])
+    return Rays(
+        np.concatenate([rays.image for rays, _ in parts]),
+        np.concatenate([rays.point + start for (rays, _), start in zip(parts, first, strict=True)]),
+        np.concatenate([rays.xy for rays, _ in parts]),
     )
-    return _in_order(names, np.concatenate([signals, ties]), both, layout.is_check)
 
 
 def _measured_signals(
@@ -172,16 +183,22 @@ def _measured_signals(
     return ControlPoints(names, layout.xy[used], check), xyz[used], Rays(rays.image, number[rays.point], rays.xy)
 
 
-def _in_order(names: np.ndarray, xyz: np.ndarray, rays: Rays, is_check: np.ndarray) -> Scene:
-    """Rays by image, points by their first ray: as a reader of the written block numbers them."""
+def _in_order(names: np.ndarray, xyz: np.ndarray, rays: Rays, is_check: np.ndarray, tower_points: int) -> Scene:
+    """Rays by image, points by their first ray: as a reader of the written block numbers them.
+
+    Parameters
+    ----------
+    names, xyz : signalised points first, then `tower_points` points of towers, foot and top by turns.
+    """
     rays = rays.take(np.lexsort((rays.point, rays.image)))
     points, first = np.unique(rays.point, return_index=True)
     order = points[np.argsort(first)]
     number = np.empty(len(names), dtype=np.int64)
     number[order] = np.arange(len(order))
-    return Scene(
-        names[order], xyz[order], Rays(rays.image, number[rays.point], rays.xy), number[: len(is_check)], is_check
-    )
+    k = len(is_check)
+    towers = number[k : k + tower_points].reshape(-1, 2)
+    in_order = Rays(rays.image, number[rays.point], rays.xy)
+    return Scene(names[order], xyz[order], in_order, number[:k], is_check, towers)
 
 
 def _observe(

@@ -213,7 +213,7 @@ class ControlSpec(Table):
 
 
 class TowerSpec(Table):
-    """Towers, `per_image` of them in the inner part of every photograph: the foot on the ground, the top `height_m` above.
+    """Towers, `per_image` in the inner part of every photograph: the foot on the ground, the top `height_m` over it.
 
     Both are measured in every photograph that sees them. The top leaves the plumb line through the foot by `sigma_m` in
     X and in Y; the block has a condition of that σ for every tower.

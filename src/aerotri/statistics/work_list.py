@@ -9,19 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.statistics.adjusted_block import AdjustedBlock
-from aerotri.statistics.control_rays import control_ray_rows
-from aerotri.statistics.outliers import RayTests, judge_rays, sure_value
-from aerotri.statistics.reliability import critical_value
+from aerotri.statistics.outliers import judge_rays, spread
 from aerotri.statistics.summarise import INSEPARABLE
 from aerotri.statistics.ties import Ties, intersection_angles, photograph_ties
+from aerotri.statistics.work_items import KINDS, WorkItem, residual_items
 
-PRIORITIES = ("wrong", "weak", "doubtful")
-"""What a priority of 1, 2, 3 means."""
+__all__ = ["WorkItem", "WorkLimits", "WorkList", "work_list"]
 
-KINDS = (
-    "left out", "control", "check point", "control ray", "ray", "observation", "part", "photograph", "parameters",
-    "point",
-)  # fmt: skip
+FEWEST_RAYS = 10
 
 
 @dataclass(frozen=True)
@@ -40,29 +35,11 @@ class WorkLimits:
     shared_points: int = 10
     pair_points: int = 6
     sigma_ratio: float = 3.0
+    residual_ratio: float = 1.7
     point_sigma_ratio: float = 8.0
     angle_deg: float = 4.0
     per_kind: int = 10
     items: int = 40
-
-
-@dataclass(frozen=True)
-class WorkItem:
-    """Something to look at.
-
-    Parameters
-    ----------
-    priority : 1 wrong (chance does not explain it), 2 weak (little holds or controls it), 3 doubtful.
-    kind : one of `KINDS`. where : names. what : the finding with its numbers. hint : what to do.
-    severity : how many times beyond its limit; infinite for what was left out.
-    """
-
-    priority: int
-    kind: str
-    where: str
-    what: str
-    severity: float
-    hint: str
 
 
 @dataclass(frozen=True)
@@ -89,9 +66,7 @@ def work_list(adjusted: AdjustedBlock, limits: WorkLimits | None = None) -> Work
     ties = photograph_ties(adjusted, limits.shared_points)
     found = [
         *_left_out(adjusted),
-        *_ground_coordinates(adjusted, tests.scale),
-        *_rays(adjusted, tests),
-        *_observations(adjusted, tests.scale),
+        *residual_items(adjusted, tests),
         *_parts(adjusted, ties, limits),
         *_photographs(adjusted, ties, limits),
         *_parameters(adjusted),
@@ -119,87 +94,8 @@ def _left_out(adjusted: AdjustedBlock) -> list[WorkItem]:
     rays = np.bincount(block.image_points.point, minlength=len(block.points))
     for point in np.setdiff1d(block.control.point, there):
         what = f"given coordinates, {rays[point]} ray{'s' * (rays[point] != 1)} measured, not used"
-        hint = "measure it" if rays[point] == 0 else "see whether it was switched off, or measure it in another photograph"
+        hint = "see whether it was switched off, or measure it in another photograph" if rays[point] else "measure it"
         items.append(WorkItem(3, "left out", str(block.points[point]), what, 1.0, hint))
-    return items
-
-
-def _ground_coordinates(adjusted: AdjustedBlock, scale: float) -> list[WorkItem]:
-    """Given coordinates of control and check points that contradict the block.
-
-    A control point's w counts in units of the a-priori σ, as does the block it is compared with; a check point's holds
-    σ̂0 already.
-    """
-    items, alpha = [], adjusted.block.settings.adjustment.alpha
-    for results, kind, unit, hint in (
-        (adjusted.control, "control", max(scale, 1.0), "look at its rays, then at the given coordinate; --check-free"),
-        (adjusted.check, "check point", 1.0, "its rays or its coordinates are wrong, or the block is deformed there"),
-    ):
-        size = np.abs(np.nan_to_num(results.w)) / unit
-        limit, sure = critical_value(alpha), sure_value(alpha, int(np.isfinite(results.w).sum()))
-        for row, axis in zip(*np.nonzero(size > limit), strict=True):
-            d = results.difference[row, axis]
-            what = f"{'XYZ'[axis]}: adjusted − given {d:+.3f} m, w {results.w[row, axis]:+.1f}"
-            if kind == "control" and results.r[row, axis] > 0.0:
-                what += f", given value off by {-d / results.r[row, axis]:+.3f} m"
-            priority = 1 if size[row, axis] > sure else 3
-            name = str(adjusted.block.points[results.point[row]])
-            items.append(WorkItem(priority, kind, name, what, float(size[row, axis] / limit), hint))
-    return items
-
-
-def _rays(adjusted: AdjustedBlock, tests: RayTests) -> list[WorkItem]:
-    """Rays with large residuals: of control and check points every one, of a tie point the largest."""
-    block = adjusted.block
-    rows = tests.order[np.abs(tests.w[tests.order]) > tests.limit]
-    is_control = np.zeros(len(block.points), dtype=bool)
-    is_control[block.image_points.point[control_ray_rows(adjusted)]] = True
-    point_of, seen, items = block.image_points.point, set(), []
-    large = np.bincount(point_of[rows], minlength=len(block.points))
-    for row in rows:
-        point = int(point_of[row])
-        if point in seen and not is_control[point]:
-            continue
-        seen.add(point)
-        w, others = abs(tests.w[row]), int(large[point]) - 1
-        what = (
-            f"w{'xy'[tests.axis[row]]} {tests.w[row]:+.1f}, error {1e3 * tests.estimated_mm[row]:+.1f} µm "
-            f"({tests.estimated_px[row]:+.1f} px)" + (f"; {others} more ray{'s' * (others > 1)} of the point" * (others > 0))
-        )
-        where = f"{block.points[point]} in {block.images.names[block.image_points.image[row]]}"
-        kind = "control ray" if is_control[point] else "ray"
-        hint = _ray_hint(int(adjusted.points.rays[point]), others, float(adjusted.rays.weight[row]))
-        items.append(WorkItem(1 if w > tests.sure else 3, kind, where, what, float(w / tests.limit), hint))
-    return items
-
-
-def _ray_hint(rays: int, others: int, weight: float) -> str:
-    down = f"weighted down to {weight:.2f} already; " if weight < 1.0 else ""
-    if rays == 2:
-        return f"{down}two rays only: the other one may be the wrong one; measure it in a third photograph"
-    if others + 1 > rays / 2:
-        return f"{down}most rays of the point contradict: measure the whole point again, or rename a confused one"
-    return f"{down}measure the ray again, or switch it off in edits.csv"
-
-
-def _observations(adjusted: AdjustedBlock, scale: float) -> list[WorkItem]:
-    """Observed positions, attitudes and conditions that contradict the block."""
-    observed = adjusted.observations
-    if observed is None:
-        return []
-    alpha = adjusted.block.settings.adjustment.alpha
-    size = np.abs(np.nan_to_num(observed.w)) / max(scale, 1.0)
-    limit, sure = critical_value(alpha), sure_value(alpha, int(np.isfinite(observed.w).sum()))
-    items = []
-    for row in np.flatnonzero(size > limit):
-        in_angle = observed.group[row] == "attitudes"
-        v = f"{np.degrees(observed.v[row]):+.4f}°" if in_angle else f"{observed.v[row]:+.3f} m"
-        what = f"{observed.group[row]} {observed.component[row]}: adjusted − observed {v}, w {observed.w[row]:+.1f}"
-        hint = "look at the observation and its σ; at shift and drift where many are listed"
-        priority = 1 if size[row] > sure else 3
-        items.append(
-            WorkItem(priority, "observation", str(observed.label[row]), what, float(size[row] / limit), hint)
-        )
     return items
 
 
@@ -217,10 +113,16 @@ def _parts(adjusted: AdjustedBlock, ties: Ties, limits: WorkLimits) -> list[Work
 
 
 def _photographs(adjusted: AdjustedBlock, ties: Ties, limits: WorkLimits) -> list[WorkItem]:
-    """Photographs that little holds: few common points, none with any single neighbour, σ beyond the usual."""
+    """Photographs that little holds: few common points, none with any single neighbour, σ or residuals too large."""
     names, sigma = adjusted.block.images.names, adjusted.images.sigma
-    groups = {"position": np.linalg.norm(sigma[:, :3], axis=1), "attitude": np.linalg.norm(sigma[:, 3:], axis=1)}
-    ratio = {name: size / np.nanmedian(size) for name, size in groups.items() if np.isfinite(size).any()}
+    sizes = {
+        "σ of the position": (np.linalg.norm(sigma[:, :3], axis=1), limits.sigma_ratio),
+        "σ of the attitude": (np.linalg.norm(sigma[:, 3:], axis=1), limits.sigma_ratio),
+        "residuals": (_residual_sizes(adjusted), limits.residual_ratio),
+    }
+    ratios = {
+        name: (size / np.nanmedian(size), limit) for name, (size, limit) in sizes.items() if np.isfinite(size).any()
+    }
     items = []
     for image in np.flatnonzero(adjusted.images.rays > 0):
         shared, strongest, found = int(ties.shared[image]), int(ties.strongest[image]), []
@@ -229,15 +131,26 @@ def _photographs(adjusted: AdjustedBlock, ties: Ties, limits: WorkLimits) -> lis
         if strongest < limits.pair_points:
             other = f", {names[ties.neighbour[image]]}" if strongest else ""
             found.append((limits.pair_points / max(strongest, 0.5), f"{strongest} with the nearest one{other}"))
-        for name, values in ratio.items():
-            if values[image] > limits.sigma_ratio:
-                found.append((values[image] / limits.sigma_ratio, f"σ of the {name} {values[image]:.1f} times the median"))
+        for name, (ratio, limit) in ratios.items():
+            if ratio[image] > limit:
+                found.append((ratio[image] / limit, f"{name} {ratio[image]:.1f} times the median"))
         if found:
             what = f"{adjusted.images.rays[image]} rays; " + "; ".join(text for _, text in found)
             severity = float(max(size for size, _ in found))
-            hint = "measure tie points in it and its neighbours"
+            only_residuals = len(found) == 1 and found[0][1].startswith("residuals")
+            hint = "blurred, or of another camera?" if only_residuals else "measure tie points in it and its neighbours"
             items.append(WorkItem(2, "photograph", str(names[image]), what, severity, hint))
     return items
+
+
+def _residual_sizes(adjusted: AdjustedBlock) -> np.ndarray:
+    """(n,) robust spread of w in each photograph; NaN below `FEWEST_RAYS` rays, which say little."""
+    image, w = adjusted.block.image_points.image, adjusted.rays.w
+    order = np.argsort(image, kind="stable")
+    ends = np.cumsum(np.bincount(image, minlength=len(adjusted.block.images)))
+    parts = np.split(w[order], ends[:-1])
+    tested = [part[np.isfinite(part).all(axis=1)] for part in parts]
+    return np.array([spread(part) if len(part) >= FEWEST_RAYS else np.nan for part in tested])
 
 
 def _parameters(adjusted: AdjustedBlock) -> list[WorkItem]:

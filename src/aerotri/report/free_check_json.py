@@ -1,0 +1,76 @@
+"""The content of check_free.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from aerotri.statistics.free_verdict import FreeCheck, Stage, Suspect
+
+
+def free_check_json(check: FreeCheck) -> dict[str, Any]:
+    """A free check as plain values: metres, degrees (attitudes of suspects: rad), null where not known."""
+    return {
+        "verdict": check.verdict,
+        "sentence": check.sentence,
+        "sigma0_free": _number(check.stages[0].sigma0),
+        "sigma0_full": _number(check.sigma0_full),
+        "spread_free": _number(check.spread),
+        "rays_beyond": check.beyond,
+        "robust": check.robust,
+        "stages": [_stage(stage) for stage in check.stages],
+        "transformation": _similarity(check),
+        "position_offset_m": None if check.position_offset is None else [float(v) for v in check.position_offset],
+    }
+
+
+def _stage(stage: Stage) -> dict[str, Any]:
+    return {
+        "name": stage.name,
+        "status": stage.status,
+        "message": stage.message,
+        "sigma0": _number(stage.sigma0),
+        "vtpv": _number(stage.vtpv),
+        "redundancy": stage.redundancy,
+        "added_observations": stage.added,
+        "ratio": _number(stage.ratio),
+        "limit": _number(stage.limit),
+        "largest_w": _number(stage.largest_w),
+        "w_limit": _number(stage.w_limit),
+        "fits": stage.fits if stage.tested else None,
+        "suspects": [_suspect(suspect) for suspect in stage.suspects],
+    }
+
+
+def _suspect(suspect: Suspect) -> dict[str, Any]:
+    return {
+        "kind": suspect.kind,
+        "name": suspect.name,
+        "component": suspect.component,
+        "w": _number(suspect.w),
+        "error": _number(suspect.error),
+        "error_px": _number(suspect.error_px),
+    }
+
+
+def _similarity(check: FreeCheck) -> dict[str, Any] | None:
+    s = check.similarity
+    if s is None:
+        return None
+    points = [
+        {"point": str(name)} | {f"d{axis}": _number(value) for axis, value in zip("XYZ", row, strict=True)}
+        for name, row in zip(check.point, s.residual, strict=True)
+    ]
+    return {
+        "translation_m": [float(value) for value in s.translation],
+        "rotation_deg": [float(value) for value in np.degrees(s.rotation)],
+        "scale_ppm": (s.scale - 1.0) * 1e6,
+        "redundancy": s.redundancy,
+        "rms": {axis: _number(value) for axis, value in zip("XYZ", s.rms, strict=True)},
+        "points": points,
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
