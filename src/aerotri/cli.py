@@ -94,20 +94,83 @@ def simulate(
     run_simulate(spec, out, seed, json_)
 
 
-@app.command(epilog="Example: aerotri convert ../shared/data/dbat_sxb sxb")
+@app.command(epilog="Example: aerotri convert tp_bingo.txt block --positions rtk.csv --control gcp.csv --camera p1.toml")
 def convert(
-    source: Annotated[Path, typer.Argument(help="A DBAT script or its folder, a BAL file, a COLMAP model, a block.")],
-    target: Annotated[Path, typer.Argument(help="Block folder, BAL file (.txt) or COLMAP folder to write.")],
-    to: Annotated[str, typer.Option(help="block, bal, colmap (binary) or colmap-text.")] = "block",
-    positions: Annotated[
-        Path | None, typer.Option(help="Observed projection centres to add (DBAT: label, X, Y, Z, σ).")
+    source: Annotated[
+        str,
+        typer.Argument(
+            help="Block, result, DBAT, BAL, COLMAP, Bundler, OpenSfM, a folder of IGN or PAT-B files, image points "
+            "(BINGO, .im, .mes, gcp_list.txt) or a list of orientations; PATH or kind:PATH."
+        ),
+    ],
+    target: Annotated[Path, typer.Argument(help="File or folder to write.")],
+    to: Annotated[
+        str,
+        typer.Option(
+            help="block, bal, colmap, colmap-text, bundler, opensfm, metashape (opk), pix4d-eo, ign, patb, bingo, "
+            "pix4d-gcp, pix4d-geo, odm-gcp."
+        ),
+    ] = "block",
+    image_points: Annotated[list[str] | None, typer.Option(help="More image points; may be repeated.")] = None,
+    positions: Annotated[str, typer.Option(help="Observed positions of the photographs.")] = "",
+    control: Annotated[str, typer.Option(help="Control points.")] = "",
+    orientation: Annotated[str, typer.Option(help="Orientations, as start values.")] = "",
+    camera: Annotated[Path | None, typer.Option(help="Camera: [camera.NAME] tables (.toml), IGN, orthority.")] = None,
+    camera_name: Annotated[str, typer.Option(help="Name of the camera.")] = "",
+    camera_size: Annotated[str, typer.Option(help="Columns and rows, as 8192x5460.")] = "",
+    pixel_um: Annotated[float | None, typer.Option(min=1e-6, help="Size of a pixel, µm.")] = None,
+    focal_length_mm: Annotated[float | None, typer.Option(min=1e-6, help="Principal distance, mm.")] = None,
+    flight_axis: Annotated[str | None, typer.Option(help="Image axis along the flight: +x, -x, +y, -y.")] = None,
+    free_interior: Annotated[bool, typer.Option(help="Focal length and principal point are unknowns.")] = False,
+    crs: Annotated[str, typer.Option(help="Coordinate system, as EPSG:32647 or EPSG:25832+7837.")] = "",
+    geoid: Annotated[Path | None, typer.Option(help="Geoid grid for its heights.")] = None,
+    image_sigma_um: Annotated[float | None, typer.Option(min=1e-6, help="σ of image coordinates, µm.")] = None,
+    image_sigma_px: Annotated[float | None, typer.Option(min=1e-6, help="σ of image coordinates, pixels.")] = None,
+    positions_sigma_m: Annotated[str, typer.Option(help="σ of positions without one: X,Y,Z in m.")] = "",
+    control_sigma_m: Annotated[str, typer.Option(help="σ of control points without one: X,Y,Z in m.")] = "",
+    control_prefix: Annotated[str, typer.Option(help="What image points have before names of control.")] = "",
+    control_heights: Annotated[str, typer.Option(help="crs, or ellipsoidal.")] = "crs",
+    check: Annotated[list[str] | None, typer.Option(help="Control point that is a check point; may repeat.")] = None,
+    gnss_shift: Annotated[str | None, typer.Option(help="off, block or strip.")] = None,
+    axes: Annotated[str | None, typer.Option(help="Order of coordinates in lists of Pix4D: xy or yx.")] = None,
+    offset: Annotated[Path | None, typer.Option(help="_offset.xyz of Pix4D, added to orientations.")] = None,
+    patb_rotation: Annotated[str | None, typer.Option(help="camera-to-object or object-to-camera.")] = None,
+    linear_alteration: Annotated[
+        float | None, typer.Option(help="Height of the ground, where heights of .OPK are corrected for scale.")
     ] = None,
     json_: Json = False,
 ) -> None:
-    """Convert between formats; a block without orientation is adjusted first where the target needs one."""
-    from aerotri.commands.convert import run_convert
+    """Convert between formats, or make a block of several files; adjusts first where the target needs it."""
+    from aerotri.commands.convert import camera_spec, run_convert, three_values
+    from aerotri.formats.assemble import Statements
+    from aerotri.formats.project import Request
 
-    run_convert(source, target, to, positions, json_)
+    request = Request(
+        source=source,
+        name="",
+        image_points=tuple(image_points or ()),
+        orientation=orientation,
+        positions=positions,
+        control=control,
+        camera=camera_spec(camera, camera_name, camera_size, pixel_um, focal_length_mm, flight_axis, free_interior),
+        stated=Statements(
+            crs=crs,
+            geoid=geoid,
+            control_sigma_m=three_values(control_sigma_m, "--control-sigma-m"),
+            positions_sigma_m=three_values(positions_sigma_m, "--positions-sigma-m"),
+            control_prefix=control_prefix,
+            control_heights=control_heights,
+            linear_alteration_m=linear_alteration,
+            patb_rotation=patb_rotation,
+        ),
+        check=tuple(check or ()),
+        axes=axes,
+        offset=offset,
+        image_sigma_um=image_sigma_um,
+        image_sigma_px=image_sigma_px,
+        gnss_shift=gnss_shift,
+    )
+    run_convert(request, target, to, json_)
 
 
 @app.command(epilog="Example: aerotri crosscheck blocks/frederiksstad_ultracam --out check")

@@ -92,3 +92,14 @@ def test_singular_matrix_is_refused():
     matrix.blocks[3] = np.outer(np.ones(6), np.ones(6))
     with pytest.raises(NotPositiveDefiniteError):
         symbolic.factorise(matrix)
+
+
+def test_memory_is_predicted_and_refused(monkeypatch):
+    from aerotri.adjustment import parallel
+    from aerotri.conventions import InputError
+
+    symbolic, _, _ = random_bordered(60, 3, seed=1)
+    assert symbolic.bytes_needed > 8 * symbolic.factor_entries
+    monkeypatch.setattr(parallel, "available_bytes", lambda: symbolic.bytes_needed - 1)
+    with pytest.raises(InputError, match="the normal equations of 60 photographs need"):
+        random_bordered(60, 3, seed=1)

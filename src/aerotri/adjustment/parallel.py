@@ -1,4 +1,7 @@
-"""Threads, set in one place: kernels run over a fixed number of chunks, whatever the machine, so that sums repeat."""
+"""Threads and memory, in one place.
+
+Kernels run over a fixed number of chunks, whatever the machine, so that sums repeat.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,8 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
+
+from aerotri.conventions import InputError
 
 CHUNKS = 4
 """Pieces of every parallel sum. A constant of the program, never the number of threads: it decides the rounding."""
@@ -41,3 +46,28 @@ def run_chunks(function: Callable[[int], object], count: int) -> list:
         return [function(k) for k in range(count)]
     with ThreadPoolExecutor(threads) as pool:
         return list(pool.map(function, range(count)))
+
+
+def available_bytes() -> int | None:
+    """Memory that may still be taken; None where the system does not tell."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            fields = dict(line.split(":", 1) for line in file)
+        return 1024 * int(fields["MemAvailable"].split()[0])
+    except (OSError, KeyError, ValueError):
+        return None
+
+
+def refuse_more_than_there_is(needed: int, what: str) -> None:
+    """Say before taking it that the memory will not do.
+
+    Raises
+    ------
+    InputError
+    """
+    there = available_bytes()
+    if there is not None and needed > there:
+        raise InputError(
+            f"{what} need {needed / 2**30:.1f} GiB of memory, {there / 2**30:.1f} GiB are free",
+            "use a larger machine, fewer additional parameters or conditions, or divide the block",
+        )

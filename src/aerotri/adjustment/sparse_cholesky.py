@@ -16,6 +16,7 @@ from scipy.linalg.lapack import dpotrf, dpotri  # pyright: ignore[reportAttribut
 
 from aerotri.adjustment import _factor_kernels as _kernels
 from aerotri.adjustment.dissection import Tree, dissect
+from aerotri.adjustment.parallel import refuse_more_than_there_is
 
 B = 6
 """Unknowns of a photograph."""
@@ -170,9 +171,19 @@ class Symbolic:
             tops[side] += r * r
             peaks[side] = max(peaks[side], tops[side])
         self._spans, self._updates = spans, updates
+        self.bytes_needed = 8 * (offset + sum(peaks) + self._inverse_entries())
+        refuse_more_than_there_is(self.bytes_needed, f"the normal equations of {self.n} photographs")
         self._panels = np.empty(offset)
         self._stacks = [np.empty(peaks[0]), np.empty(peaks[1])]
         self._corner = np.empty((self.n_border, self.n_border), order="F")
+
+    def _inverse_entries(self) -> int:
+        """Numbers that the inverse on the pattern holds at once: its blocks, and a front for each depth of the tree."""
+        largest: dict[int, int] = {}
+        for front in self.fronts:
+            c, r = B * front.n_own, len(front.scalar_rows)
+            largest[front.depth] = max(largest.get(front.depth, 0), c * c + 2 * r * c + r * r)
+        return sum(largest.values()) + len(self.block_row) * B * B + self.size * self.n_border
 
     def panel(self, k: int) -> tuple[np.ndarray, np.ndarray]:
         """L of supernode k: its own triangle and the rows below, Fortran order."""

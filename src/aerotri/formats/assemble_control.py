@@ -14,6 +14,9 @@ from aerotri.formats.parts import PointList, Reading, no_sigma
 from aerotri.observations import Block, Control
 
 
+HEIGHTS = ("crs", "ellipsoidal")
+
+
 def with_control(reading: Reading, given: PointList, stated: Statements) -> Reading:
     """Control points, beside those there are.
 
@@ -63,6 +66,8 @@ def with_control(reading: Reading, given: PointList, stated: Statements) -> Read
 
 def _in_block(block: Block, given: PointList, stated: Statements) -> tuple[np.ndarray, list[str]]:
     """(k, 3) coordinates in the block's CRS, and what to say of it."""
+    if stated.control_heights not in HEIGHTS:
+        raise InputError(f"--control-heights {stated.control_heights}", f"it is {' or '.join(HEIGHTS)}")
     if given.crs:
         refuse_local(block, given.crs, given.path)
         return placing.to_crs(given.xyz, given.crs, block.crs, stated.geoid), []

@@ -1,4 +1,7 @@
-"""The formats by name: which one a path holds, reading and writing any of them."""
+"""The formats by name: which one a path holds, reading and writing any of them.
+
+Whole blocks are read here; blocks that are put together from several files, in `project`.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +13,21 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.bal import is_bal, read_bal, write_bal
+from aerotri.formats.bingo import write_bingo
 from aerotri.formats.block_folder import read_block, write_block
+from aerotri.formats.bundler import is_bundler, read_bundler, write_bundler
 from aerotri.formats.colmap import is_colmap, read_colmap, write_colmap
 from aerotri.formats.dbat import read_dbat
 from aerotri.formats.dbat_script import is_dbat
+from aerotri.formats.ign import write_ign_opk
+from aerotri.formats.metashape import write_metashape
+from aerotri.formats.odm import write_odm_gcp
+from aerotri.formats.opensfm import is_opensfm, read_opensfm, write_opensfm
 from aerotri.formats.oriented import OrientedBlock, oriented_block
+from aerotri.formats.parts import Reading
+from aerotri.formats.patb import write_patb
+from aerotri.formats.pix4d import write_pix4d_eo, write_pix4d_gcp, write_pix4d_geo
+from aerotri.formats.placing import in_local_frame
 from aerotri.observations import Block
 
 
@@ -27,15 +40,48 @@ RECOGNISERS: Mapping[str, Callable[[Path], bool]] = {
     "colmap": is_colmap,
     "dbat": is_dbat,
     "bal": is_bal,
+    "bundler": is_bundler,
+    "opensfm": is_opensfm,
 }
+
+
+def _block_and_points(reading: Reading) -> tuple[Block, np.ndarray | None]:
+    return reading.block, reading.points
+
+
 READERS: Mapping[str, Callable[[Path], tuple[Block, np.ndarray | None]]] = {
     "block": lambda path: (read_block(path), None),
     "colmap": read_colmap,
     "dbat": lambda path: (read_dbat(path), None),
     "bal": read_bal,
+    "bundler": lambda path: _block_and_points(read_bundler(path)),
+    "opensfm": lambda path: _block_and_points(read_opensfm(path)),
 }
-WRITERS: Mapping[str, Callable[[OrientedBlock, Path], tuple[str, ...]]] = {"bal": write_bal, "colmap": write_colmap}
-"""Formats of orientations and points; a block folder is written from a `Block`."""
+OrientedWriter = Callable[[OrientedBlock, Path], tuple[str, ...]]
+WRITERS: Mapping[str, OrientedWriter] = {
+    "bal": write_bal,
+    "colmap": write_colmap,
+    "colmap-text": lambda oriented, path: write_colmap(oriented, path, binary=False),
+    "bundler": write_bundler,
+    "opensfm": write_opensfm,
+}
+"""Formats of orientations and points, in coordinates in which rays are straight."""
+ORIENTATION_WRITERS: Mapping[str, OrientedWriter] = {
+    "metashape": write_metashape,
+    "opk": write_metashape,
+    "pix4d-eo": write_pix4d_eo,
+    "ign": write_ign_opk,
+    "patb": write_patb,
+}
+"""Formats of orientations in the coordinates of the block; they need no object points."""
+BLOCK_WRITERS: Mapping[str, Callable[[Block, Path], tuple[str, ...]]] = {
+    "bingo": write_bingo,
+    "pix4d-gcp": write_pix4d_gcp,
+    "pix4d-geo": write_pix4d_geo,
+    "odm-gcp": write_odm_gcp,
+}
+"""Formats of what was measured."""
+TARGETS = ("block", *WRITERS, *ORIENTATION_WRITERS, *BLOCK_WRITERS)
 
 
 def detect_format(path: str | os.PathLike) -> str:
@@ -86,7 +132,7 @@ def write_any(
     Parameters
     ----------
     path : file or folder to be.
-    format : 'block' or a key of `WRITERS`.
+    format : one of `TARGETS`.
     points : (N, 3) m, the object points for formats that hold them.
 
     Returns
@@ -100,15 +146,27 @@ def write_any(
     if format == "block":
         write_block(block, path)
         return () if points is None else ("could not be carried over: start values of object points",)
-    if format not in WRITERS:
+    if format in BLOCK_WRITERS:
+        return BLOCK_WRITERS[format](block, Path(path))
+    if format not in TARGETS:
         raise _unknown(format)
     if points is None:
-        raise InputError(f"a {format} model needs object points", "adjust the block and export the result", path)
+        if format in WRITERS:
+            raise InputError(f"a {format} model needs object points", "adjust the block and export the result", path)
+        points = np.full((len(block.points), 3), np.nan)
     return write_oriented(oriented_block(block, points), path, format)
 
 
-def write_oriented(oriented: OrientedBlock, path: str | os.PathLike, format: str) -> tuple[str, ...]:
-    """Write orientation, points and rays in a format that holds them; see `oriented_from_adjusted` for results.
+def write_oriented(
+    oriented: OrientedBlock, path: str | os.PathLike, format: str, geoid: str | os.PathLike | None = None
+) -> tuple[str, ...]:
+    """Write orientations in a format that holds them; see `oriented_from_adjusted` for results.
+
+    Formats with object points know no coordinate systems: a block with a CRS is written in its local frame.
+
+    Parameters
+    ----------
+    geoid : grid for the heights of the block's CRS, where PROJ does not have it.
 
     Returns
     -------
@@ -118,10 +176,15 @@ def write_oriented(oriented: OrientedBlock, path: str | os.PathLike, format: str
     ------
     InputError
     """
+    if format in ORIENTATION_WRITERS:
+        return ORIENTATION_WRITERS[format](oriented, Path(path))
     if format not in WRITERS:
         raise _unknown(format)
-    return WRITERS[format](oriented, Path(path))
+    if oriented.block.crs == "local":
+        return WRITERS[format](oriented, Path(path))
+    local, said = in_local_frame(oriented, geoid)
+    return (*WRITERS[format](local, Path(path)), said)
 
 
 def _unknown(format: str) -> InputError:
-    return InputError(f"'{format}' is not a format that is written", f"known are block, {', '.join(WRITERS)}")
+    return InputError(f"'{format}' is not a format that is written", f"known are {', '.join(TARGETS)}")

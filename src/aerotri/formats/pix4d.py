@@ -1,9 +1,10 @@
 """Lists of Pix4D: ground control, image positions, exterior orientation, and the offset of its local coordinates.
 
 Ground control, no header: ``label,c1,c2,z[,acc_h,acc_v]``. Image positions: ``image,c1,c2,z[,yaw,pitch,roll][,acc_h,
-acc_v]``. c1, c2 come in the order that the coordinate system has or the writer chose: the reader is told. Exterior
-orientation: a header ``imageName X Y Z Omega Phi Kappa``, rows separated by blanks, degrees, R = Rx·Ry·Rz camera →
-object. Offset (``…_offset.xyz``): what is to be added to local X Y Z.
+acc_v]``; one accuracy instead of two counts for all three coordinates [C]. c1, c2 come in the order that the coordinate
+system has or the writer chose: the reader is told. Exterior orientation: a header ``imageName X Y Z Omega Phi Kappa``,
+rows separated by blanks, degrees, R = Rx·Ry·Rz camera → object. Offset (``…_offset.xyz``): what is to be added to local
+X Y Z.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from aerotri.functional_model.rotation import angles_from_rotation, rotation_fro
 from aerotri.observations import Block
 
 EO_HEADER = ["imageName", "X", "Y", "Z", "Omega", "Phi", "Kappa"]
-GCP_WIDTHS, GEO_WIDTHS = (4, 6), (4, 6, 7, 9)
+GCP_WIDTHS, GEO_WIDTHS = (4, 5, 6), (4, 5, 6, 7, 8, 9)
 AXES = ("xy", "yx")
 
 
@@ -34,12 +35,12 @@ def is_pix4d_eo(path: Path) -> bool:
 
 
 def is_pix4d_gcp(path: Path) -> bool:
-    """Whether rows are a name and three or five numbers."""
+    """Whether rows are a name and three to five numbers."""
     return _is_list(path, GCP_WIDTHS)
 
 
 def is_pix4d_geo(path: Path) -> bool:
-    """Whether rows are a name and three, five, six or eight numbers."""
+    """Whether rows are a name and three to eight numbers."""
     return _is_list(path, GEO_WIDTHS)
 
 
@@ -105,10 +106,8 @@ def read_pix4d_gcp(path: str | os.PathLike, axes: str = "xy") -> PointList:
     InputError
         With the line.
     """
-    file, names, values = _rows(Path(path), GCP_WIDTHS, "label,c1,c2,z, or label,c1,c2,z,acc_h,acc_v", "point")
-    xyz, sigma = _ordered(values[:, :3], axes), no_sigma(len(names))
-    if values.shape[1] == 5:
-        sigma = _spread(file, values[:, 3:])
+    file, names, values = _rows(Path(path), GCP_WIDTHS, "label,c1,c2,z, then acc_h,acc_v or not", "point")
+    xyz, sigma = _ordered(values[:, :3], axes), _spread(file, values[:, 3:])
     return PointList(file.path, texts(names), xyz, sigma, np.zeros(len(names), bool))
 
 
@@ -126,11 +125,9 @@ def read_pix4d_geo(path: str | os.PathLike, axes: str = "xy") -> PositionList:
     """
     form = "image,c1,c2,z, then yaw,pitch,roll or not, then acc_h,acc_v or not"
     file, names, values = _rows(Path(path), GEO_WIDTHS, form, "photograph")
-    width, angles, sigma = values.shape[1], no_sigma(len(names)), no_sigma(len(names))
-    if width >= 6:
-        angles = np.radians(values[:, 3:6])
-    if width in (5, 8):
-        sigma = _spread(file, values[:, -2:])
+    has_angles = values.shape[1] > 5
+    angles = np.radians(values[:, 3:6]) if has_angles else no_sigma(len(names))
+    sigma = _spread(file, values[:, 6 if has_angles else 3 :])
     return PositionList(file.path, texts(names), _ordered(values[:, :3], axes), sigma, angles)
 
 
@@ -157,11 +154,13 @@ def _ordered(values: np.ndarray, axes: str) -> np.ndarray:
 
 
 def _spread(file: TextFile, accuracy: np.ndarray) -> np.ndarray:
-    """(n, 3) σ of horizontal and vertical accuracies."""
+    """(n, 3) σ of horizontal and vertical accuracies, of one for both, or of none."""
+    if not accuracy.shape[1]:
+        return no_sigma(len(accuracy))
     bad = np.flatnonzero((accuracy <= 0.0).any(axis=1))
     if len(bad):
         raise file.error(int(bad[0]), "an accuracy is not greater than 0", "give a small one, in metres")
-    return accuracy[:, [0, 0, 1]]
+    return accuracy[:, [0, 0, -1]]
 
 
 def write_pix4d_eo(oriented: OrientedBlock, path: str | os.PathLike) -> tuple[str, ...]:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.coordinates import local_frame
+from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.coordinates.georeference import Georeference, georeference
 from aerotri.formats.ign import without_linear_alteration
+from aerotri.formats.oriented import OrientedBlock
 
 NORTH_STEP_DEG = 1e-5
 """Half the length of the piece of meridian that gives the direction of north in a grid: 1 m."""
@@ -132,6 +135,30 @@ def true_heights(centre: np.ndarray, crs: str, ground: float) -> np.ndarray:
     plan = frame.crs_per_local(frame.to_local(on_ellipsoid))[:, :2, :2]
     scale = np.sqrt(np.abs(np.linalg.det(plan)))
     return np.column_stack([centre[:, :2], without_linear_alteration(centre[:, 2], ground, scale)])
+
+
+def in_local_frame(oriented: OrientedBlock, geoid: str | os.PathLike | None = None) -> tuple[OrientedBlock, str]:
+    """A block with a CRS in its local topocentric frame, in which rays are straight, and where that is.
+
+    Raises
+    ------
+    InputError
+        When a grid for its heights is missing.
+    """
+    frame = frame_of_block(oriented.block, geoid)
+    there = oriented.oriented
+    rotation = oriented.rotation.copy()
+    rotation[there] = frame.axes_at(oriented.centre[there]) @ oriented.rotation[there]
+    local = replace(
+        oriented,
+        block=transform_block(oriented.block, frame),
+        centre=frame.to_local(oriented.centre),
+        rotation=rotation,
+        points=frame.to_local(oriented.points),
+    )
+    lon, lat, _ = frame.origin.tolist()
+    words = f"coordinates are local: east, north of the grid and up around longitude {lon:.9g}, latitude {lat:.9g}"
+    return local, f"{words} on the ellipsoid of {oriented.block.crs}"
 
 
 def refuse_exchanged_axes(points: np.ndarray, photographs: np.ndarray, file: os.PathLike) -> None:

@@ -1,7 +1,7 @@
 """A block from several files at once: image points from one, positions, control and orientations from others.
 
 The source is a whole block (`convert.READERS`), a reconstruction, a folder of IGN or PAT-B files, a file of image
-points, or a list of orientations (photographs alone). What else is given is added to it, in the order of `read_project`.
+points, or a list of orientations (photographs alone). What else is given is added, in the order of `read_project`.
 """
 
 from __future__ import annotations
@@ -17,19 +17,23 @@ from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.formats import convert, kinds
 from aerotri.formats.assemble import Statements, with_crs, with_orientations, with_positions, with_rays
 from aerotri.formats.assemble_control import with_check_points, with_control
-from aerotri.formats.bundler import is_bundler, read_bundler
+from aerotri.formats.block_folder import read_block
+from aerotri.formats.bundler import read_bundler
 from aerotri.formats.camera_spec import CameraSpec, camera_of_each, cameras_of
 from aerotri.formats.colmap import read_colmap
 from aerotri.formats.ign import files_of, is_ign, is_ign_camera, read_ign_app, read_ign_camera, read_ign_mes
 from aerotri.formats.kinds import ReadingOptions
-from aerotri.formats.opensfm import is_opensfm, read_opensfm
+from aerotri.formats.opensfm import read_opensfm
 from aerotri.formats.parts import OrientationList, PointList, RayList, Reading, no_sigma
 from aerotri.formats.pix4d import read_pix4d_offset
 from aerotri.formats.reprojection import FEWEST, control_at_start, residuals_at_start
-from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Settings
+from aerotri.observations import AdjustmentSettings, Block, Camera, GnssSettings, ImagePoints, Images
 
+FOLDERS = {"ign": "IGN", "patb": "PAT-B"}
+"""Kinds of folders whose files are parts."""
 UNKNOWN_PIXEL_UM = 1.0
 """Size of a pixel where nothing tells it; a principal distance of 3000 pixels then reads 3 mm."""
+SHIFTS = ("off", "block", "strip")
 
 
 @dataclass(frozen=True)
@@ -52,8 +56,8 @@ class Request:
     orientation: str = ""
     positions: str = ""
     control: str = ""
-    camera: CameraSpec = CameraSpec()
-    stated: Statements = Statements()
+    camera: CameraSpec = field(default_factory=CameraSpec)
+    stated: Statements = field(default_factory=Statements)
     check: tuple[str, ...] = ()
     axes: str | None = None
     offset: str | os.PathLike | None = None
@@ -71,7 +75,7 @@ class _Parts:
     control: tuple[PointList, ...] = ()
     cameras: tuple[Camera, ...] = ()
     messages: tuple[str, ...] = ()
-    files: tuple[Path, ...] = field(default=())
+    files: tuple[Path, ...] = ()
 
 
 def read_project(request: Request) -> Reading:
@@ -116,12 +120,13 @@ def _options(request: Request) -> ReadingOptions:
 
 def _whole(request: Request) -> Reading | None:
     """The source as a whole block; None where it is made of parts."""
-    readers = (*convert.READERS, "bundler", "opensfm")
-    stated, path = kinds.split_kind(request.source, dict.fromkeys(readers), dict.fromkeys(("ign", "patb")), kinds.RAYS)
+    stated, path = kinds.split_kind(request.source, convert.READERS, FOLDERS, kinds.RAYS, kinds.ORIENTATIONS)
     if not path.exists():
         raise InputError("there is no such file or folder", "check the path", path)
-    kind = _whole_kind(path) if stated is None else stated
-    if kind not in readers:
+    kind = (
+        next((name for name, is_it in convert.RECOGNISERS.items() if is_it(path)), None) if stated is None else stated
+    )
+    if kind not in convert.READERS:
         return None
     if request.camera.file is not None or request.camera.focal_length_mm is not None:
         raise InputError("has its cameras", "leave the camera out, but for the size of pixels", path)
@@ -138,22 +143,17 @@ def _whole(request: Request) -> Reading | None:
         return replace(read, messages=(*read.messages, *said))
     if pixel_um is not None:
         raise InputError("has its cameras", "leave --pixel-um out", path)
-    return Reading(*convert.read_any(path, kind))
-
-
-def _whole_kind(path: Path) -> str | None:
-    if is_bundler(path):
-        return "bundler"
-    found = next((name for name, recognises in convert.RECOGNISERS.items() if recognises(path)), None)
-    if found is None and is_opensfm(path):
-        return "opensfm"
-    return found
+    if kind == "block":
+        return Reading(read_block(path, rays_needed=False))
+    block, points = convert.read_any(path, kind)
+    if kind == "dbat":
+        # DBAT takes positions as they are
+        block = replace(block, settings=replace(block.settings, gnss=GnssSettings(shift="off")))
+    return Reading(block, points)
 
 
 def _parts(request: Request, options: ReadingOptions) -> _Parts:
-    stated, path = kinds.split_kind(
-        request.source, dict.fromkeys(("ign", "patb")), kinds.RAYS, kinds.ORIENTATIONS, kinds.CONTROL
-    )
+    stated, path = kinds.split_kind(request.source, FOLDERS, kinds.RAYS, kinds.ORIENTATIONS)
     if path.is_dir():
         if stated == "ign" or (stated is None and is_ign(path)):
             return _ign(path, request)
@@ -171,7 +171,7 @@ def _parts(request: Request, options: ReadingOptions) -> _Parts:
         return _Parts((kinds.read_rays(f"{kind}:{path}", options),))
     if kind in kinds.ORIENTATIONS:
         return _Parts(orientations=kinds.read_orientations(f"{kind}:{path}", options))
-    known = ", ".join((*convert.RECOGNISERS, "bundler", "opensfm", "ign", "patb", *kinds.RAYS, *kinds.ORIENTATIONS))
+    known = ", ".join((*convert.RECOGNISERS, *FOLDERS, *kinds.RAYS, *kinds.ORIENTATIONS))
     raise InputError("is of no known format", f"known are {known}; state it as kind:PATH", path)
 
 
@@ -253,7 +253,11 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
     if is_new and not len(block.control) and block.gnss_ins is None:
         settings = replace(settings, adjustment=AdjustmentSettings(datum="minimal"))
     if request.gnss_shift is not None:
+        if request.gnss_shift not in SHIFTS:
+            raise InputError(f"--gnss-shift {request.gnss_shift}", f"it is {', '.join(SHIFTS)}")
         settings = replace(settings, gnss=replace(settings.gnss, shift=request.gnss_shift))
+    elif request.positions and settings.gnss.shift != "off":
+        messages.append(f"GNSS positions may be shifted ({settings.gnss.shift}): state it with --gnss-shift")
     block = replace(block, settings=settings, image_points=replace(rays, sigma=sigma))
     messages += fit_of_start_values(block, request.stated.geoid)
     return replace(reading, block=block, messages=tuple(messages))

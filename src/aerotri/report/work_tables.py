@@ -125,7 +125,7 @@ def similarity_text(check: FreeCheck) -> str:
     turn = ", ".join(f"{value:+.2f}" for value in s.rotation * MGON_PER_RADIAN)
     return (
         f"Residuals after a transformation by seven parameters (turned by {turn} mgon about X, Y, Z, scale "
-        f"{(s.scale - 1.0) * 1e6:+.1f} ppm; redundancy {s.redundancy}): differences transformed − given. They hold the "
+        f"{round((s.scale - 1.0) * 1e6, 1) + 0.0:+.1f} ppm; redundancy {s.redundancy}): differences transformed − given. They hold the "
         "deformation of a block that nothing holds, heights above all, beside errors of the control."
     )
 

@@ -1,0 +1,302 @@
+"""Variance components: the σ of whole groups of observations, estimated from the residuals of the adjustment itself.
+
+[L: Helmert 1907; Förstner 1979] Förstner's σ̂²_g = Ω_g/r_g, with Ω_g = vᵀPv and r_g = Σ redundancy numbers of the group,
+is right once it is 1 in every group, and comes there slowly where r_g is much smaller than the number of observations.
+So each round solves Helmert's S·θ = Ω for the factors θ of the variances, S_gh = Σ R_ij² over i in g, j in h and
+R = Q_vv·P: the same fixed point, Ω_g = r_g, in a few rounds. 2·S⁻¹ is the covariance of the factors, so that a group
+counts 1/(S⁻¹)_gg degrees of freedom: less than r_g, since its residuals are correlated and partly owed to other groups.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.solve import Solution
+from aerotri.statistics.adjusted_block import AdjustedBlock, ObservationGroup
+from aerotri.statistics.observation_groups import EXTRA_GROUPS, GroupFit, group_fits
+from aerotri.statistics.residual_response import ResidualResponse, cross_redundancy
+
+MAX_ROUNDS = 10
+SETTLED = 0.01
+"""Relative change of every σ below which the components stand still."""
+
+LARGEST_STEP = 3.0
+"""Factor by which a σ may change in one round."""
+
+LEAST_FREEDOM = 3.0
+"""Degrees of freedom below which a group says too little of its σ [C]: its own σ would be uncertain by over 40 %."""
+
+NO_FREEDOM = 0.05
+"""Sum S_gg below which a group is not moved: its residuals are zero whatever its σ."""
+
+MEDIAN_EFFICIENCY = 0.37
+"""Efficiency of a σ from the median of |w|, against that from squares [L: Huber 1981]."""
+
+PROBES, LAST_PROBES = 4, 16
+"""Random products a group for S, on the way and for the final uncertainty: 16 give it to some 5 %."""
+
+AGREES, TOO_SMALL, TOO_LARGE, NOT_TESTABLE = "agrees", "σ given too small", "σ given too large", "not testable"
+
+
+@dataclass(frozen=True)
+class ChiSquareTest:
+    """Two-sided test of the σ given for a group against its residuals.
+
+    Parameters
+    ----------
+    ratio : σ a posteriori / σ a priori. statistic : freedom·ratio², distributed as χ² of `freedom` where the σ is right.
+    low, high : what the statistic may be at the level `alpha` of the block.
+    verdict : 'agrees', 'σ given too small', 'σ given too large' or 'not testable'.
+    """
+
+    group: str
+    ratio: float
+    freedom: float
+    statistic: float
+    low: float
+    high: float
+    verdict: str
+
+
+@dataclass(frozen=True)
+class VarianceComponent:
+    """The estimated σ of one group.
+
+    Parameters
+    ----------
+    unit : 'µm', 'm' or 'rad'. count : observations. redundancy : Σ of their redundancy numbers.
+    sigma_apriori : median σ as given, in the unit. factor : by which all σ of the group were multiplied; 1 where held.
+    factor_sigma : σ of the factor. freedom : degrees of freedom behind it.
+    held : why the σ was left as given, '' where it was estimated.
+    """
+
+    group: str
+    unit: str
+    count: int
+    redundancy: float
+    sigma_apriori: float
+    factor: float
+    factor_sigma: float
+    freedom: float
+    held: str
+    test: ChiSquareTest
+
+    @property
+    def sigma(self) -> float:
+        """The median σ used in the final adjustment, in the unit."""
+        return self.sigma_apriori * self.factor
+
+
+@dataclass(frozen=True)
+class VarianceComponents:
+    """The components of all groups, after `rounds` re-adjustments; `settled`: the last changed no σ by 1 %."""
+
+    components: tuple[VarianceComponent, ...]
+    rounds: int
+    settled: bool
+
+    @property
+    def factors(self) -> dict[str, float]:
+        """The factor of every group's σ."""
+        return {c.group: c.factor for c in self.components}
+
+    def as_dict(self) -> dict[str, Any]:
+        """As plain values for JSON, NaN as None."""
+        return _without_nan(asdict(self))
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> VarianceComponents:
+        """The inverse of `as_dict`."""
+        components = tuple(
+            VarianceComponent(**_with_nan({**c, "test": ChiSquareTest(**_with_nan(c["test"]))}))
+            for c in content["components"]
+        )
+        return cls(components, content["rounds"], content["settled"])
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """An adjustment as the estimation needs it: the result in the frame of the equations, and these."""
+
+    adjusted: AdjustedBlock
+    system: NormalSystem
+    solution: Solution
+
+
+def estimate_components(
+    first: Fitted, readjust: Callable[[Mapping[str, float]], Fitted]
+) -> tuple[VarianceComponents, Fitted]:
+    """Estimate the components of an adjustment and adjust anew with them, until nothing moves.
+
+    A group that turns out to have less than `LEAST_FREEDOM` gets its given σ back, and the others are estimated anew.
+
+    Parameters
+    ----------
+    first : the adjustment with the σ as given.
+    readjust : adjusts with the σ as given times the factors of the groups.
+
+    Returns
+    -------
+    The components, and the adjustment with them.
+    """
+    fitted, held = first, {}
+    factors = {fit.name: 1.0 for fit in group_fits(first.adjusted)}
+    rounds, settled = 0, False
+    while True:
+        changes = _changes(fitted, held)
+        settled = all(abs(change - 1.0) < SETTLED for change in changes.values())
+        if settled or rounds >= MAX_ROUNDS:
+            freedom = _freedom(fitted, held)
+            weak = [name for name, f in freedom.items() if name not in held and not f >= LEAST_FREEDOM]
+            if not weak:
+                return _components(fitted, factors, freedom, held, rounds, settled), fitted
+            # the weakest alone: without it the others may be told apart
+            name = min(weak, key=lambda weak_name: freedom[weak_name])
+            held[name] = f"{freedom[name]:.1f} degrees of freedom are too few"
+            factors[name], rounds = 1.0, min(rounds, MAX_ROUNDS // 2)
+        else:
+            factors = {name: factor * changes.get(name, 1.0) for name, factor in factors.items()}
+        fitted, rounds = readjust(factors), rounds + 1
+
+
+def _changes(fitted: Fitted, held: Mapping[str, str]) -> dict[str, float]:
+    """The factors by which the σ of the groups not held should change, from one solution of S·θ = Ω."""
+    fits = [fit for fit in group_fits(fitted.adjusted) if fit.name not in held]
+    s = cross_redundancy(ResidualResponse(fitted.system, fitted.solution), tuple(f.name for f in fits), PROBES)
+    awake = np.flatnonzero(np.diagonal(s) > NO_FREEDOM)
+    excess = np.array([fits[k].omega - fits[k].redundancy for k in awake])
+    theta = 1.0 + np.linalg.lstsq(s[np.ix_(awake, awake)], excess, rcond=1e-3)[0]
+    bounded = np.clip(theta, LARGEST_STEP**-2, LARGEST_STEP**2)
+    return {fits[k].name: float(np.sqrt(t)) for k, t in zip(awake, bounded, strict=True)}
+
+
+def _freedom(fitted: Fitted, held: Mapping[str, str]) -> dict[str, float]:
+    """Degrees of freedom 1/(S⁻¹)_gg of every group; those held count for themselves alone."""
+    fits = group_fits(fitted.adjusted)
+    names = tuple(fit.name for fit in fits)
+    s = cross_redundancy(ResidualResponse(fitted.system, fitted.solution), names, LAST_PROBES)
+    freedom = {}
+    free = [k for k, name in enumerate(names) if name not in held and s[k, k] > NO_FREEDOM]
+    inverse = np.linalg.pinv(s[np.ix_(free, free)], hermitian=True)
+    for k, fit in enumerate(fits):
+        alone = fit.redundancy**2 / s[k, k] if s[k, k] > NO_FREEDOM else 0.0
+        value = 1.0 / inverse[free.index(k), free.index(k)] if k in free else alone
+        freedom[fit.name] = float(value) * (MEDIAN_EFFICIENCY if fit.robust else 1.0)
+    return freedom
+
+
+def _components(
+    fitted: Fitted,
+    factors: Mapping[str, float],
+    freedom: Mapping[str, float],
+    held: Mapping[str, str],
+    rounds: int,
+    settled: bool,
+) -> VarianceComponents:
+    alpha = fitted.adjusted.block.settings.adjustment.alpha
+    out = []
+    for fit in group_fits(fitted.adjusted):
+        name, factor = fit.name, factors[fit.name]
+        f = freedom[name]
+        test = _test(name, factor * _ratio(fit), f, alpha)
+        out.append(
+            VarianceComponent(
+                group=name,
+                unit=fit.unit,
+                count=fit.count,
+                redundancy=fit.redundancy,
+                sigma_apriori=fit.sigma / factor,
+                factor=factor,
+                factor_sigma=float("nan") if name in held else factor / float(np.sqrt(2.0 * f)),
+                freedom=f,
+                held=held.get(name, ""),
+                test=test,
+            )
+        )
+    return VarianceComponents(tuple(out), rounds, settled)
+
+
+def _ratio(fit: GroupFit) -> float:
+    """σ a posteriori / σ used, of one group alone: Förstner's √(Ω/r)."""
+    return float(np.sqrt(fit.omega / fit.redundancy)) if fit.redundancy > NO_FREEDOM else float("nan")
+
+
+def _test(group: str, ratio: float, freedom: float, alpha: float) -> ChiSquareTest:
+    if not (freedom >= 1.0 and np.isfinite(ratio)):
+        nan = float("nan")
+        return ChiSquareTest(group, ratio, freedom, nan, nan, nan, NOT_TESTABLE)
+    statistic = freedom * ratio**2
+    low, high = (float(limit) for limit in chi2.ppf([alpha / 2.0, 1.0 - alpha / 2.0], freedom))
+    verdict = TOO_SMALL if statistic > high else TOO_LARGE if statistic < low else AGREES
+    return ChiSquareTest(group, ratio, freedom, statistic, low, high, verdict)
+
+
+def chi_square_tests(adjusted: AdjustedBlock) -> tuple[ChiSquareTest, ...]:
+    """Whether the σ given for every group agree with its residuals, two-sided at the level `alpha` of the block.
+
+    With variance components: of the factors found, with their degrees of freedom. Without: Ω_g against χ² of r_g, as if
+    the σ of the other groups were right; the residuals of a group being correlated, it finds less than it might, and
+    raises no more false alarms than `alpha`.
+
+    Parameters
+    ----------
+    adjusted : in the frame of the adjustment, or of a block in local coordinates.
+    """
+    if adjusted.components is not None:
+        return tuple(component.test for component in adjusted.components.components)
+    alpha = adjusted.block.settings.adjustment.alpha
+    return tuple(_test(fit.name, _ratio(fit), fit.redundancy, alpha) for fit in group_fits(adjusted))
+
+
+def with_components(adjusted: AdjustedBlock, components: VarianceComponents) -> AdjustedBlock:
+    """The result of the adjustment with the components' σ: its groups are those of the components.
+
+    Their `sigma_apriori` is as given, `sigma_aposteriori` the σ that the final residuals ask for.
+    """
+    factors, groups = components.factors, []
+    for fit in group_fits(adjusted):
+        given = fit.sigma / factors[fit.name]
+        groups.append(
+            ObservationGroup(fit.name, fit.count, given, fit.rms, fit.redundancy, given * factors[fit.name] * _ratio(fit))
+        )
+    replaced = {"control plan", "control height", *(name for name, _ in EXTRA_GROUPS)}
+    others = [g for g in adjusted.groups if g.name not in replaced and not g.name.startswith("image points")]
+    return replace(adjusted, groups=(*groups, *others), components=components)
+
+
+def in_words(components: VarianceComponents) -> tuple[str, ...]:
+    """Sentences about what was changed, what was not, and what did not settle."""
+    said = []
+    for c in components.components:
+        if c.held:
+            said.append(f"the σ of {c.group} is held as given: {c.held}")
+        elif abs(c.factor - 1.0) > SETTLED:
+            said.append(
+                f"the σ of {c.group} was changed from {_value(c.sigma_apriori, c.unit)} to {_value(c.sigma, c.unit)}, "
+                f"by a factor of {c.factor:.3g} ± {c.factor_sigma:.2g}: {c.test.verdict}"
+            )
+    if not components.settled:
+        said.append(f"the variance components did not settle within {components.rounds} rounds")
+    return tuple(said)
+
+
+def _value(sigma: float, unit: str) -> str:
+    return f"{np.degrees(sigma):.3g}°" if unit == "rad" else f"{sigma:.3g} {unit}"
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nan(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(v) for v in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def _with_nan(record: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: float("nan") if value is None else value for key, value in record.items()}
