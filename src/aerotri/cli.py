@@ -68,6 +68,18 @@ def adjust(
     raise typer.Exit(run_adjust(block, out, parameters, robust, geoid, plots, json_, check_free))
 
 
+@app.command(epilog="Example: aerotri parameters --family dmc --draw patterns")
+def parameters(
+    family: Annotated[str | None, typer.Option(help="One family in full, such as bluh or dmc.")] = None,
+    draw: Annotated[Path | None, typer.Option(help="Folder to picture every pattern in.")] = None,
+    json_: Json = False,
+) -> None:
+    """The sets of additional parameters: names, mark, source, pattern."""
+    from aerotri.commands.parameters import run_parameters
+
+    run_parameters(draw, family, json_)
+
+
 @app.command(epilog="Example: aerotri diff before_result after_result --top 10")
 def diff(
     first: Annotated[Path, typer.Argument(help="Result folder of the first run.")],
@@ -94,7 +106,7 @@ def simulate(
     run_simulate(spec, out, seed, json_)
 
 
-@app.command(epilog="Example: aerotri convert tp_bingo.txt block --positions rtk.csv --control gcp.csv --camera p1.toml")
+@app.command(epilog="Example: aerotri convert bingo.txt block --positions rtk.csv --control gcp.csv --camera p1.toml")
 def convert(
     source: Annotated[
         str,
@@ -127,6 +139,8 @@ def convert(
     image_sigma_um: Annotated[float | None, typer.Option(min=1e-6, help="σ of image coordinates, µm.")] = None,
     image_sigma_px: Annotated[float | None, typer.Option(min=1e-6, help="σ of image coordinates, pixels.")] = None,
     positions_sigma_m: Annotated[str, typer.Option(help="σ of positions without one: X,Y,Z in m.")] = "",
+    orientation_sigma_m: Annotated[str, typer.Option(help="Orientations are observations: σ X,Y,Z in m.")] = "",
+    orientation_sigma_deg: Annotated[str, typer.Option(help="The same of omega,phi,kappa in degrees.")] = "",
     control_sigma_m: Annotated[str, typer.Option(help="σ of control points without one: X,Y,Z in m.")] = "",
     control_prefix: Annotated[str, typer.Option(help="What image points have before names of control.")] = "",
     control_heights: Annotated[str, typer.Option(help="crs, or ellipsoidal.")] = "crs",
@@ -158,6 +172,8 @@ def convert(
             geoid=geoid,
             control_sigma_m=three_values(control_sigma_m, "--control-sigma-m"),
             positions_sigma_m=three_values(positions_sigma_m, "--positions-sigma-m"),
+            orientation_sigma_m=three_values(orientation_sigma_m, "--orientation-sigma-m"),
+            orientation_sigma_deg=three_values(orientation_sigma_deg, "--orientation-sigma-deg"),
             control_prefix=control_prefix,
             control_heights=control_heights,
             linear_alteration_m=linear_alteration,

@@ -190,3 +190,14 @@ def test_json_of_the_command_is_that_of_the_package(result_folder):
     computed = adjustment_json(adjust(read_block(result_folder / "block")))
     for key in ("sigma0", "vtpv", "check_points", "control_points", "additional_parameters", "groups"):
         np.testing.assert_equal(written[key], json.loads(json.dumps(computed[key])))
+
+
+def test_parameters_lists_and_draws(tmp_path):
+    done = run("parameters", "--family", "bluh", "--draw", tmp_path / "drawn")
+    assert done.returncode == 0, done.stderr
+    assert "9            [P] radial symmetric r³" in done.stdout
+    assert {p.name for p in (tmp_path / "drawn").iterdir()} == {"bluh.png", "bluh.svg"}
+    entries = json.loads(run("parameters", "--json").stdout)
+    families = {e["family"] for e in entries}
+    assert {"bluh", "ultracam_d", "dmc", "brown", "ebner", "gruen", "fourier", "legendre"} <= families
+    assert run("parameters", "--family", "nonsense").returncode == 2
