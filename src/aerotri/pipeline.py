@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +25,15 @@ from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import AdjustedBlock
 from aerotri.statistics.common_height import common_height
 from aerotri.statistics.doubts import AdjustmentFailedError, defects_in_words, doubts, failure, refuse_runaway
+from aerotri.statistics.observation_groups import with_scaled_sigmas
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
+from aerotri.statistics.variance_components import (
+    Fitted,
+    VarianceComponents,
+    estimate_components,
+    in_words,
+    with_components,
+)
 
 __all__ = ["Adjustment", "AdjustmentFailedError", "adjust", "adjust_keeping_system", "reopen"]
 
@@ -84,6 +93,15 @@ def adjust_keeping_system(
     ----------
     geoid : grid of geoid undulations for a block whose CRS has none of its own.
     """
+    found = _adjust_in_frame(block, report, given_points, geoid)
+    if block.settings.adjustment.variance_components == "on":
+        return _with_variance_components(block, found, report, geoid)
+    return found
+
+
+def _adjust_in_frame(
+    block: Block, report: Report | None, given_points: np.ndarray | None, geoid: str | os.PathLike | None
+) -> Adjustment:
     if block.crs == "local":
         return _adjust_local(block, report, given_points)
     frame = frame_of_block(block, geoid)
@@ -93,6 +111,39 @@ def adjust_keeping_system(
         local = transform_block(block, frame, found.local.points.xyz, found.local.images.centre)
         found = _adjust_local(local, report, found.local.points.xyz)
     return replace(found, result=transform_result(found.local, block, frame), frame=frame)
+
+
+def _with_variance_components(
+    block: Block, first: Adjustment, report: Report | None, geoid: str | os.PathLike | None
+) -> Adjustment:
+    """The adjustment with the σ of every group estimated; the block of the result has these σ."""
+    latest, used = first, block
+    seconds = Counter(first.result.outcome.timings_s)
+
+    def readjust(factors: Mapping[str, float]) -> Fitted:
+        nonlocal latest, used
+        used = with_scaled_sigmas(block, factors)
+        latest = _adjust_in_frame(_continued(used, latest.result), report, latest.result.points.xyz, geoid)
+        seconds.update(latest.result.outcome.timings_s)
+        return Fitted(latest.local, latest.system, latest.solution)
+
+    started = time.perf_counter()
+    components, _ = estimate_components(Fitted(first.local, first.system, first.solution), readjust)
+    spent = sum(seconds.values()) - sum(first.result.outcome.timings_s.values())
+    seconds["statistics"] += time.perf_counter() - started - spent
+    said = (*latest.result.outcome.warnings, *in_words(components))
+    outcome = replace(latest.result.outcome, warnings=said, timings_s=dict(seconds))
+    local = replace(with_components(latest.local, components), outcome=outcome)
+    result = replace(latest.result, groups=local.groups, components=components, outcome=outcome, block=used)
+    return replace(latest, result=result, local=local if latest.frame is not None else result)
+
+
+def _continued(block: Block, result: AdjustedBlock) -> Block:
+    """The block with what was adjusted as start values."""
+    images, found = block.images, result.images
+    there = np.isfinite(found.centre).all(axis=1)[:, None]
+    centre, angles = np.where(there, found.centre, images.centre), np.where(there, found.angles, images.angles)
+    return replace(block, images=replace(images, centre=centre, angles=angles))
 
 
 def reopen(block: Block, saved: SavedSolution) -> Adjustment:
@@ -117,6 +168,8 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     solution = Solution(saved.status, state, equations, estimator, saved.iterations)
     factor = _factor(system, state, equations)
     result = replace(summarise(system, solution, factor, saved.ray_status, saved.warnings), block=local)
+    if saved.components:
+        result = with_components(result, VarianceComponents.from_json(saved.components))
     delivered = result if frame is None else transform_result(result, block, frame)
     return Adjustment(delivered, result, system, solution, frame)
 

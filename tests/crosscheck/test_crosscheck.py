@@ -157,6 +157,19 @@ def test_block_in_a_crs_with_refraction():
             assert_agrees(check)
 
 
+def test_a_parameter_that_was_removed_stays_out():
+    """As a selection would leave it: still among the parameters, with status 'removed'."""
+    result = adjust(small_block(10, "bluh:1-4")[0])
+    fewer = adjust(with_adjustment(result.block, additional_parameters=(("bluh", ("1", "2", "4")),)))
+    p, rows = result.parameters, np.array([0, 1, 3])
+    value, status, covariance = np.zeros(4), p.status.copy(), np.full((4, 4), np.nan)
+    value[rows], status[2] = fewer.parameters.value, "removed"
+    covariance[np.ix_(rows, rows)] = fewer.parameters.covariance
+    parameters = replace(p, value=value, status=status, covariance=covariance)
+    check = check_with_paper(replace(fewer, block=result.block, parameters=parameters), adjust)
+    assert_agrees(check, (fewer.outcome.observations, fewer.outcome.unknowns))
+
+
 def test_the_operators_decisions_count():
     """Control taken out, and a check point made control, in the independent model alone: seen in the observations."""
     block, _ = small_block(9)

@@ -101,3 +101,26 @@ def assert_same_record(found, expected) -> None:
             assert [part.tolist() for part in one] == [part.tolist() for part in other]
         else:
             np.testing.assert_array_equal(one, other)
+
+
+def damaged(data, raw: bytes) -> bytes:
+    """Bytes with some cut off, changed, put in or removed, drawn from hypothesis' `data`."""
+    from hypothesis import strategies as st
+
+    found = bytearray(raw)
+    bits = [b",", b'"', b"\n", b"\r", b"#", b" ", b"=", b"\xff", b"-", b"9", b"e", b"\x00", b".", b"-99", b"nan", b"\t"]
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, max(len(found) - 1, 0)))
+        kind = data.draw(st.sampled_from(["cut", "change", "insert", "remove", "line"]))
+        some = data.draw(st.sampled_from(bits))
+        if kind == "cut":
+            del found[at:]
+        elif kind == "remove":
+            del found[at : at + data.draw(st.integers(1, 9))]
+        elif kind == "insert":
+            found[at:at] = some
+        elif kind == "line":
+            found[at:at] = found[at : at + data.draw(st.integers(1, 60))]
+        else:
+            found[at : at + 1] = some
+    return bytes(found)

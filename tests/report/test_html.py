@@ -131,7 +131,8 @@ def test_numbers_of_the_result(adjusted, page):
 def test_reads_top_to_bottom(page):
     headings = re.findall(r"<h2[^>]*>(.*?)</h2>", page)
     assert headings == [
-        "What was adjusted", "Is it good?", "Control and check points", "What the camera does wrong", "Residuals",
+        "What was adjusted", "Is it good?", "What to look at first", "Control and check points",
+        "What the camera does wrong", "Residuals",
         "Gross errors and weak places", "Exterior orientation", "Warnings",
     ]  # fmt: skip
 

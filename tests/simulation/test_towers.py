@@ -56,7 +56,7 @@ def test_towers_leave_control_and_flight_alone_and_are_read_back(small_spec, tmp
 
 
 def test_a_tower_in_one_photograph_is_refused(small_spec):
-    with pytest.raises(InputError, match=r"tower point 'W\d+_\w+' is in fewer than two photographs"):
+    with pytest.raises(InputError, match=r"tower \d+ is in fewer than two photographs"):
         simulate(small_spec(flight={"strips": 1, "images_per_strip": 2, "end_lap": 0.2}, towers=TOWERS), 1)
 
 

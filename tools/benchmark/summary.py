@@ -53,6 +53,11 @@ def seconds(run: Run, *phases: str) -> float:
     return float(sum(found)) if found else float("nan")
 
 
+def _compared(run: Run) -> float:
+    """Seconds that are compared: with ours the set-up counts, of a peer the solution alone."""
+    return seconds(run, "prepare", "iterations", "solve")
+
+
 def rows_of(runs: Sequence[Run]) -> list[Row]:
     """A row for every block and program, in the order they were measured."""
     adjusting = [run for run in runs if run.program not in {f.name for f in FACTORS}]
@@ -73,7 +78,7 @@ def _row(own: list[Run], everything: list[Run]) -> Row:
         return Row(first.photographs, 0, first.program, nan, nan, nan, nan, UNKNOWN, nan, nan, first.failure)
     ours = {run.repeat: run for run in everything if run.photographs == first.photographs and run.program == OURS.name}
     ratios = [
-        seconds(run, "iterations", "solve") / seconds(ours[run.repeat], "prepare", "iterations")
+        _compared(run) / _compared(ours[run.repeat])
         for run in good
         if run.repeat in ours and not ours[run.repeat].failure
     ]

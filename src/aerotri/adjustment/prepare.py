@@ -9,6 +9,7 @@ import numpy as np
 from aerotri.adjustment.datum import free_motions, minimal_coordinates
 from aerotri.adjustment.extra_observations import extra_observations
 from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
+from aerotri.adjustment.robust import STAGES
 from aerotri.adjustment.start_values import start_values
 from aerotri.adjustment.unknowns import (
     ORIENTATION_ELEMENTS,
@@ -98,9 +99,8 @@ def check_settings(block: Block) -> None:
     """
     s = block.settings
     refused = [
-        (s.adjustment.robust not in ("off", "huber"), f'robust = "{s.adjustment.robust}"', 'use "off" or "huber"'),
+        (s.adjustment.robust not in STAGES, f'robust = "{s.adjustment.robust}"', f"use {', '.join(STAGES)}"),
         (s.adjustment.parameter_selection != "off", "parameter_selection", 'set it to "off"'),
-        (s.adjustment.variance_components != "off", "variance_components", 'set it to "off"'),
     ]
     for wrong, what, remedy in refused:
         if wrong:

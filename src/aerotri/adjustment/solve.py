@@ -13,16 +13,15 @@ import numpy as np
 from aerotri.adjustment.datum import without_motion
 from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
-from aerotri.adjustment.robust import LEAST_SQUARES, Estimator, huber, scale_of
+from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for, normalised_lengths
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import State
 
 COST_TOLERANCE = 1e-9
 STEP_TOLERANCE = 1e-5
 SURE_CONTRACTION = 1e-2
-ROBUST_COST_TOLERANCE, ROBUST_STEP_TOLERANCE = 1e-4, 1e-2
+ROBUST_COST_TOLERANCE, ROBUST_STEP_TOLERANCE, EARLY_STEP_TOLERANCE = 1e-4, 1e-2, 0.3
 FIRST_DAMPING, LAST_DAMPING, NO_DAMPING = 1e-5, 1e12, 1e-11
-SCALE_TOLERANCE = 0.01
 MAX_SCALE_CHANGES = 20
 
 
@@ -30,6 +29,7 @@ MAX_SCALE_CHANGES = 20
 class SolveOptions:
     """When to stop: after `max_iterations`, or when the next step changes no unknown by more than 0.001 of its σ.
 
+    robust : a key of `robust.STAGES`; each of its stages has `max_iterations`.
     report : called after every iteration with (iteration, cost, damping), for progress.
     """
 
@@ -43,7 +43,7 @@ class Solution:
     """Where `minimise` ended: values, equations and estimator there, and how it went.
 
     status : 'converged', 'not converged' or 'rank deficient'.
-    costs : Σρ at the start and after every iteration.
+    costs : Σρ at the start and after every iteration of the last stage.
     defects : sentences naming what the observations leave free, when rank deficient.
     """
 
@@ -56,8 +56,21 @@ class Solution:
     defects: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Stage:
+    """One estimator on the way: its name, the iterations before it, and how still it has to stand at its end."""
+
+    name: str
+    done: int = 0
+    step_tolerance: float = ROBUST_STEP_TOLERANCE
+
+    @property
+    def is_robust(self) -> bool:
+        return self.name != "off"
+
+
 def minimise(system: NormalSystem, state: State, redundancy: int, options: SolveOptions) -> Solution:
-    """Minimise Σρ over all unknowns.
+    """Minimise Σρ over all unknowns, through the stages of the robust estimator.
 
     Parameters
     ----------
@@ -69,13 +82,23 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
     Solution
         Its equations are assembled, undamped, at its state.
     """
-    estimator = LEAST_SQUARES
-    equations = system.assemble(state, 0.0, estimator)
-    if options.robust != "off":
-        estimator, equations = _rescale(system, state, equations, estimator, redundancy)
+    *early, last = STAGES[options.robust]
+    done = 0
+    for name in early:
+        solution = _descend(system, state, redundancy, options, Stage(name, done, EARLY_STEP_TOLERANCE))
+        if solution.defects:
+            return solution
+        state, done = solution.state, solution.iterations
+    return _descend(system, state, redundancy, options, Stage(last, done))
+
+
+def _descend(system: NormalSystem, state: State, redundancy: int, options: SolveOptions, stage: Stage) -> Solution:
+    """Gauss-Newton with the estimator of one stage."""
+    equations = system.assemble(state, 0.0, LEAST_SQUARES)
+    estimator, equations = _estimated(system, state, equations, LEAST_SQUARES, stage.name, redundancy)
     costs = [equations.cost]
     damping, scale_changes, last_decrement = Damping(), 0, np.inf
-    for iteration in range(1, options.max_iterations + 1):
+    for iteration in range(stage.done + 1, stage.done + options.max_iterations + 1):
         step = _step(system, state, equations, estimator, damping.value)
         if iteration == 1 and (step is None or step.smallest_pivot < SUSPECT_PIVOT):
             defects = find_defects(system, state, equations)
@@ -91,7 +114,7 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
                 return Solution("not converged", state, equations, estimator, iteration, tuple(costs))
             step = _step(system, state, equations, estimator, damping.value)
         plain = damping.value == 0.0 and not step.points_settled
-        settled = plain and _settled(equations, step, redundancy, estimator, last_decrement)
+        settled = plain and _settled(equations, step, redundancy, stage, last_decrement)
         last_decrement = step.decrement if plain else np.inf
         damping = damping.lowered(step.gain_ratio(equations))
         state, equations = step.state, step.equations
@@ -99,13 +122,13 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
         if options.report:
             options.report(iteration, equations.cost, damping.value)
         if estimator.is_robust and scale_changes < MAX_SCALE_CHANGES:
-            fresh, rescaled = _rescale(system, state, equations, estimator, redundancy)
-            if abs(fresh.limit / estimator.limit - 1.0) > SCALE_TOLERANCE:
-                estimator, equations, settled, last_decrement = fresh, rescaled, False, np.inf
+            fresh, again = _estimated(system, state, equations, estimator, stage.name, redundancy)
+            if fresh is not estimator:
+                estimator, equations, settled, last_decrement = fresh, again, False, np.inf
                 scale_changes += 1
         if settled:
             return Solution("converged", state, equations, estimator, iteration, tuple(costs))
-    return Solution("not converged", state, equations, estimator, options.max_iterations, tuple(costs))
+    return Solution("not converged", state, equations, estimator, stage.done + options.max_iterations, tuple(costs))
 
 
 @dataclass(frozen=True)
@@ -170,19 +193,19 @@ def _with_settled_points(system: NormalSystem, step: _Trial, estimator: Estimato
     return replace(step, state=state, equations=system.assemble(state, 0.0, estimator), points_settled=True)
 
 
-def _settled(equations, step: _Trial, redundancy: int, estimator: Estimator, last_decrement: float) -> bool:
+def _settled(equations, step: _Trial, redundancy: int, stage: Stage, last_decrement: float) -> bool:
     """The next step would change no unknown by STEP_TOLERANCE of its σ: |dx_i|/σ_i ≤ √(dxᵀN dx)/σ̂0 for all i.
 
     The decrement dxᵀN dx of the next step is foretold from how the last pair of undamped steps contracted, by no more
     than SURE_CONTRACTION: the first steps contract faster than the last.
 
     Re-weighting converges linearly, and a point whose two rays contradict each other creeps along a flat valley for
-    ever: robust, the orientations and shared parameters have to stand within ROBUST_STEP_TOLERANCE, and the cost.
+    ever: robust, the orientations and shared parameters have to stand within the stage's tolerance, and the cost.
     """
     variance = max(step.equations.cost, 1e-30) / max(redundancy, 1)
-    if estimator.is_robust:
+    if stage.is_robust:
         still = abs(equations.cost - step.equations.cost) <= ROBUST_COST_TOLERANCE * equations.cost
-        return still and step.decrement - equations.point_decrement <= ROBUST_STEP_TOLERANCE**2 * variance
+        return still and step.decrement - equations.point_decrement <= stage.step_tolerance**2 * variance
     contraction = min(1.0, max(SURE_CONTRACTION, abs(step.decrement) / last_decrement))
     if not np.isfinite(last_decrement):
         contraction = 1.0
@@ -190,11 +213,13 @@ def _settled(equations, step: _Trial, redundancy: int, estimator: Estimator, las
     return next_decrement <= STEP_TOLERANCE**2 * variance or next_decrement <= 1e-13 * equations.cost
 
 
-def _rescale(system, state, equations, estimator, redundancy):
-    """Robust estimator for the residuals at `state`, and the equations with its weights."""
+def _estimated(
+    system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, name: str, redundancy: int
+) -> tuple[Estimator, NormalEquations]:
+    """The estimator for the residuals at `state`, and the equations with its weights; the same ones if it stands."""
     rays = system.unknowns.rays
     share = redundancy / max(redundancy + system.unknowns.count, 1)
-    fresh = huber(scale_of(equations.residual, rays.inv_sigma, share))
-    if estimator.is_robust and abs(fresh.limit / estimator.limit - 1.0) <= SCALE_TOLERANCE:
+    fresh = estimator_for(name, normalised_lengths(equations.residual, rays.inv_sigma), share)
+    if fresh.is_near(estimator):
         return estimator, equations
     return fresh, system.assemble(state, 0.0, fresh)

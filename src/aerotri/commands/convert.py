@@ -21,10 +21,11 @@ The data sets that stand beside the project:
       --camera-name P1 --camera-size 8192x5460 --pixel-um 4.27246 --focal-length-mm 35.01 --free-interior \\
       --image-sigma-px 0.5 --crs EPSG:32647
 
-    # seven UltraCam Eagle M3: heights of .OPK above the geoid and corrected for scale, those of .app ellipsoidal
+    # seven UltraCam Eagle M3: heights of .OPK above the geoid and corrected for scale, those of .app ellipsoidal; the
+    # seventeen tie points alone do not hold them, so the orientations are observations too
     aerotri convert ../shared/data/ultracam_eagle_m3 eagle --pixel-um 4 --image-sigma-px 0.5 --crs EPSG:2154+5720 \\
       --geoid ../shared/data/ultracam_eagle_m3/fr_ign_RAF20.tif --control-heights ellipsoidal \\
-      --linear-alteration 5 --control-sigma-m 0.05,0.05,0.05
+      --linear-alteration 5 --control-sigma-m 0.05 --orientation-sigma-m 0.1 --orientation-sigma-deg 0.002
 
     # four DMC photographs: orientations and camera, no image points
     aerotri convert ../shared/data/dmc_ngi/camera_pos_ori.txt dmc --camera ../shared/data/dmc_ngi/config.yaml
@@ -63,7 +64,7 @@ def three_values(text: str, option: str) -> tuple[float, float, float] | None:
         return None
     words = [word.strip() for word in text.split(",")]
     if len(words) not in (1, 3) or not all(is_number(word) and float(word) > 0.0 for word in words):
-        raise InputError(f"{option} {text[:60]}", "give X,Y,Z in metres, each greater than 0, or one value for all")
+        raise InputError(f"{option} {text[:60]}", "give three values greater than 0, as 0.1,0.1,0.2, or one for all")
     values = [float(word) for word in words] * (3 // len(words))
     return values[0], values[1], values[2]
 

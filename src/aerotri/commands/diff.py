@@ -68,6 +68,5 @@ def read_result(folder: Path, console: Console) -> AdjustedBlock:
         # both folders have files of the same names
         raise InputError(f"result '{folder}': {error}") from None
     except (AdjustmentFailedError, ValueError, IndexError) as error:
-        raise InputError(
-            f"result '{folder}': solution.npz does not belong to the block beside it ({error})", "adjust the block again"
-        ) from error
+        what = f"result '{folder}': solution.npz does not belong to the block beside it ({error})"
+        raise InputError(what, "adjust the block again") from error

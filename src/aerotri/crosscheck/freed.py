@@ -42,8 +42,8 @@ def with_fixed_weights(adjusted: AdjustedBlock) -> Block:
     rays = block.image_points
     weight = np.where(used, adjusted.rays.weight, 1.0)
     block = _with_rays(block, used, rays.xy, rays.sigma / np.sqrt(weight)[:, None])
-    settings = replace(block.settings, adjustment=replace(block.settings.adjustment, robust="off"))
-    return replace(_from_solution(block, adjusted), settings=settings)
+    plain = replace(block.settings.adjustment, robust="off", variance_components="off", parameter_selection="off")
+    return replace(_from_solution(block, adjusted), settings=replace(block.settings, adjustment=plain))
 
 
 @dataclass(frozen=True, eq=False)

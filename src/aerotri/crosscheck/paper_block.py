@@ -7,7 +7,7 @@ looked at, so that a mistake there shows as a difference.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,10 @@ from aerotri.observations import Block, Camera, Prior
 Owner = tuple[str, str]
 """What a shared entry belongs to: ('camera', name), ('group', name) or ('gnss', strip)."""
 
-LINEAR: Mapping[str, tuple[tuple[str, ...], str | None, Callable[[Camera, np.ndarray, np.ndarray], np.ndarray]]] = {
+Removed = frozenset[tuple[str, str]]
+"""Names and groups of parameters."""
+
+LINEAR: dict[str, tuple[tuple[str, ...], str | None, Callable[[Camera, np.ndarray, np.ndarray], np.ndarray]]] = {
     "bluh": (patterns.BLUH_ITEMS, None, lambda camera, x, y: patterns.bluh(x, y, camera.r_max_mm)),
     "ultracam_d": (
         patterns.ULTRACAM_ITEMS,
@@ -125,12 +128,15 @@ class PaperBlock:
         return count + (0 if self.antennas is None else int((self.antennas.inv_sigma > 0.0).sum()))
 
 
-def paper_block(block: Block, used: np.ndarray, weight: np.ndarray, origin: np.ndarray) -> PaperBlock:
+def paper_block(
+    block: Block, used: np.ndarray, weight: np.ndarray, origin: np.ndarray, removed: Removed = frozenset()
+) -> PaperBlock:
     """The block for an independent adjustment.
 
     Parameters
     ----------
     used : (m,) bool, rays that take part. weight : (m,) robust factors, kept as they are. origin : (3,) m, local.
+    removed : additional parameters that a selection took out.
 
     Raises
     ------
@@ -142,7 +148,7 @@ def paper_block(block: Block, used: np.ndarray, weight: np.ndarray, origin: np.n
     images, image = np.unique(block.image_points.image[rows], return_inverse=True)
     points, point = np.unique(block.image_points.point[rows], return_inverse=True)
     groups = _groups(block)[images]
-    entries = _Entries()
+    entries = _Entries(removed)
     setups = list(dict.fromkeys(zip(block.images.camera[images].tolist(), groups.tolist(), strict=True)))
     elements = np.array([_element_entries(block, *setup, entries) for setup in setups])
     linear = [_linear_entries(block, setup[1], groups, block.images.camera[images], entries) for setup in setups]
@@ -163,17 +169,23 @@ def paper_block(block: Block, used: np.ndarray, weight: np.ndarray, origin: np.n
 
 
 def _refuse_unknown(block: Block) -> None:
-    if block.crs != "local":
-        raise UnknownToPaperError(f"the block is in {block.crs}, not in the frame of its adjustment")
-    if block.constraints is not None and len(block.constraints):
-        raise UnknownToPaperError("constraints between points have no independent formula here")
-    settings = block.settings
+    settings, observed = block.settings, block.gnss_ins
+    free = settings.adjustment.datum in ("minimal", "inner")
     families = {family for family, _ in settings.adjustment.additional_parameters}
     unknown = sorted(families - set(LINEAR) - {"brown", "lens"})
-    if unknown:
-        raise UnknownToPaperError(f"no independent formula stands here for the parameters '{unknown[0]}'")
-    if settings.refraction != "off" or settings.earth_curvature != "off":
-        raise UnknownToPaperError("refraction and earth curvature have no independent formula here")
+    refused = [
+        (block.crs != "local", f"a block in {block.crs}, which is not the frame of its adjustment"),
+        (block.constraints is not None and len(block.constraints) > 0, "conditions between points"),
+        (observed is not None and np.isfinite(observed.angles).any(), "observed attitudes"),
+        (observed is not None and free, "a free datum beside observed projection centres"),
+        (settings.gnss.lever_arm_sigma_m is not None, "a free lever arm"),
+        (settings.gnss.time_offset != "off", "a time offset of GNSS"),
+        (settings.refraction != "off" or settings.earth_curvature != "off", "refraction and earth curvature"),
+        (bool(unknown), f"the parameters '{unknown[0] if unknown else ''}'"),
+    ]
+    for there, what in refused:
+        if there:
+            raise UnknownToPaperError(f"no independent formula stands here for {what}")
 
 
 def _groups(block: Block) -> np.ndarray:
@@ -189,11 +201,14 @@ def _groups(block: Block) -> np.ndarray:
 class _Entries:
     """Shared entries while they are listed; numbered as they come, put in order of their owners at the end."""
 
-    def __init__(self) -> None:
+    def __init__(self, removed: Removed) -> None:
+        self._removed = removed
         self._rows: dict[tuple[str, Owner], tuple[int, float, float, bool]] = {}
 
     def add(self, name: str, owner: Owner, prior: Prior) -> int:
         """The provisional number of an entry; the first to name it says what is known of it."""
+        if owner[0] == "group" and (name, owner[1]) in self._removed:
+            prior = Prior(0.0, fixed=True)
         sigma = np.inf if prior.sigma is None else prior.sigma
         return self._rows.setdefault((name, owner), (len(self._rows), prior.value, sigma, not prior.fixed))[0]
 
@@ -276,13 +291,14 @@ def _control(block: Block, points: np.ndarray, origin: np.ndarray) -> tuple[np.n
 
 
 def _control_in_use(block: Block) -> np.ndarray:
-    """(k,) bool, what is control after the operator's decisions: off, check and control, the last one holds."""
-    in_use = ~block.control.is_check
+    """(k,) bool, what is control after the operator's decisions; what is off stays off."""
+    in_use, off = ~block.control.is_check, np.zeros(len(block.control), dtype=bool)
     if block.edits is not None:
         for image, point, action in zip(block.edits.image, block.edits.point, block.edits.action, strict=True):
-            if image < 0:
-                in_use[block.control.point == point] = action == "control"
-    return in_use
+            own = (block.control.point == point) & (image < 0)
+            off |= own & (action == "off")
+            in_use[own] = action == "control"
+    return in_use & ~off
 
 
 def _antennas(block: Block, images: np.ndarray, origin: np.ndarray, entries: _Entries) -> Antennas | None:

@@ -14,7 +14,7 @@ from aerotri.crosscheck.paper_rays import angles_of
 from aerotri.crosscheck.paper_system import PaperSolution, solve_normal_equations
 from aerotri.crosscheck.paper_unknowns import KnownSolution, Layout, lay_out, rotations
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.statistics.adjusted_block import AdjustedBlock, SharedParameters
 
 PEER = "independent model"
 QUESTION = "all unknowns with the forward model written from the papers alone, self-calibration included"
@@ -36,7 +36,9 @@ def check_with_paper(adjusted: AdjustedBlock, adjust: Callable[[Block], Adjusted
     origin = np.round(np.nanmean(adjusted.images.centre, axis=0))
     begun = time.perf_counter()
     try:
-        paper = paper_block(adjusted.block, used_rays(adjusted), adjusted.rays.weight, origin)
+        paper = paper_block(
+            adjusted.block, used_rays(adjusted), adjusted.rays.weight, origin, _removed(adjusted.parameters)
+        )
     except UnknownToPaperError as unknown:
         return PeerCheck(PEER, QUESTION, "not available", str(unknown))
     layout, start = lay_out(paper, _known(adjusted, paper))
@@ -56,13 +58,12 @@ def check_with_paper(adjusted: AdjustedBlock, adjust: Callable[[Block], Adjusted
         differences=_differences(adjusted, paper, layout, solution.x),
         notes=(*notes, *_notes(adjusted, solution)),
     )
-    if not solution.converged:
-        return check
-    reasons = _counts_differ(adjusted, check)
-    attitudes = adjusted.block.gnss_ins is not None and np.isfinite(adjusted.block.gnss_ins.angles).any()
-    if reasons and attitudes:
-        return PeerCheck(PEER, QUESTION, "not available", "observed attitudes have no independent formula here")
-    return judge(check, reasons)
+    return judge(check, _counts_differ(adjusted, check)) if solution.converged else check
+
+
+def _removed(parameters: SharedParameters) -> frozenset[tuple[str, str]]:
+    rows = np.flatnonzero(parameters.status == "removed")
+    return frozenset((str(parameters.names[k]), str(parameters.groups[k])) for k in rows)
 
 
 def _counts_differ(adjusted: AdjustedBlock, check: PeerCheck) -> list[str]:
@@ -131,7 +132,7 @@ def _shared_differences(adjusted: AdjustedBlock, paper: PaperBlock, values: np.n
     owner_kind = {"interior": "camera", "additional": "group", "gnss": "gnss"}
     peer = np.full(len(p), np.nan)
     for k, (name, group, kind) in enumerate(zip(p.names, p.groups, p.kinds, strict=True)):
-        entry = place.get((str(name), (owner_kind[str(kind)], str(group))))
+        entry = place.get((str(name), (owner_kind.get(str(kind), ""), str(group))))
         peer[k] = np.nan if entry is None or not paper.shared.free[entry] else values[entry]
     labels = np.array([f"{name} ({group})" for name, group in zip(p.names, p.groups, strict=True)], dtype=object)
     return [

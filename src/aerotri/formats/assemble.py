@@ -31,6 +31,8 @@ class Statements:
     crs : of the block, '' where the files tell.
     geoid : grid for heights of that CRS, where PROJ does not have it.
     control_sigma_m, positions_sigma_m : (X, Y, Z), for points and photographs without their own.
+    orientation_sigma_m, orientation_sigma_deg : (X, Y, Z) and (ω, φ, κ), where orientations are to be observations
+        beside start values; None: they are not.
     control_prefix : stands before the names of control points in the files of image points.
     control_heights : 'crs', or 'ellipsoidal' where the list has those and the block others.
     linear_alteration_m : mean height of the ground where heights of orientations are corrected for the scale of the
@@ -42,6 +44,8 @@ class Statements:
     geoid: str | os.PathLike | None = None
     control_sigma_m: tuple[float, float, float] | None = None
     positions_sigma_m: tuple[float, float, float] | None = None
+    orientation_sigma_m: tuple[float, float, float] | None = None
+    orientation_sigma_deg: tuple[float, float, float] | None = None
     control_prefix: str = ""
     control_heights: str = "crs"
     linear_alteration_m: float | None = None
@@ -54,9 +58,9 @@ def with_crs(reading: Reading, crs: str) -> Reading:
     Raises
     ------
     InputError
-        When the block is in another one.
+        When there is no such system, or the block is in another one.
     """
-    block = reading.block
+    block, crs = reading.block, placing.known_crs(crs)
     if not crs or crs == block.crs:
         return reading
     if block.crs != "local":
@@ -175,8 +179,28 @@ def with_orientations(reading: Reading, given: OrientationList, stated: Statemen
     rotation[own] = chosen[rows]
     angles = block.images.angles.copy()
     angles[own] = angles_from_rotation(rotation[own], block.rotation)
-    images = replace(block.images, centre=centre, angles=angles)
-    return replace(reading, block=replace(block, images=images), messages=tuple(messages))
+    block = replace(block, images=replace(block.images, centre=centre, angles=angles))
+    if stated.orientation_sigma_m is not None or stated.orientation_sigma_deg is not None:
+        block = _observed(block, own, stated)
+    return replace(reading, block=block, messages=tuple(messages))
+
+
+def _observed(block: Block, rows: np.ndarray, stated: Statements) -> Block:
+    """The block with the orientations of photographs as observations, free of shifts and of a boresight."""
+    unknown = no_sigma(len(rows))
+    xyz, sigma, angles, angles_sigma = unknown, unknown, unknown, unknown
+    if stated.orientation_sigma_m is not None:
+        xyz, sigma = block.images.centre[rows], np.tile(stated.orientation_sigma_m, (len(rows), 1))
+    if stated.orientation_sigma_deg is not None:
+        angles = block.images.angles[rows]
+        angles_sigma = np.tile(np.radians(stated.orientation_sigma_deg), (len(rows), 1))
+    settings = replace(
+        block.settings,
+        gnss=replace(block.settings.gnss, shift="off"),
+        ins=replace(block.settings.ins, boresight="off"),
+    )
+    observed = GnssIns(rows, xyz, sigma, angles, angles_sigma, unknown[:, 0])
+    return replace(block, gnss_ins=observed, settings=settings)
 
 
 def _refuse_strangers(names: np.ndarray, index: np.ndarray, block: Block, file: os.PathLike) -> None:
@@ -212,9 +236,12 @@ def with_positions(reading: Reading, given: PositionList, stated: Statements) ->
     Raises
     ------
     InputError
-        When no photograph is named, a position has no standard deviation, or lies where its axes are exchanged.
+        When no photograph is named, positions are there already or have no standard deviation, or their axes are
+        exchanged.
     """
     block = reading.block
+    if block.gnss_ins is not None:
+        raise InputError("the block has observed positions already", "give them once", given.path)
     index, loosely = match_photographs(given.images, block.images.names)
     rows = np.flatnonzero(index >= 0)
     _refuse_strangers(given.images, index, block, given.path)

@@ -13,7 +13,6 @@ from aerotri.formats.names_match import likely_prefix
 from aerotri.formats.parts import PointList, Reading, no_sigma
 from aerotri.observations import Block, Control
 
-
 HEIGHTS = ("crs", "ellipsoidal")
 
 

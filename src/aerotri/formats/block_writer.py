@@ -78,7 +78,7 @@ def _tables(block: Block) -> dict[str, dict[str, np.ndarray]]:
         | _columns(("X0", "Y0", "Z0"), images.centre)
         | _columns(("omega", "phi", "kappa"), images.angles * per_radian),
         "image_points": {"image": images.names[rays.image], "point": block.points[rays.point]}
-        | _columns(("x", "y"), xy)
+        | _columns(("x", "y"), xy, always=True)
         | _columns(("sx", "sy"), sigma if not _common_sigma(block) else np.full_like(sigma, np.nan)),
     }
     if len(control):
@@ -104,7 +104,7 @@ def _tables(block: Block) -> dict[str, dict[str, np.ndarray]]:
 
 def _columns(names: tuple[str, ...], values: np.ndarray, always: bool = False) -> dict[str, np.ndarray]:
     """Columns of an array, left out when all of it is unknown."""
-    if not always and np.isnan(values).all() and len(values):
+    if not always and np.isnan(values).all():
         return {}
     return {name: values[:, k] for k, name in enumerate(names)}
 

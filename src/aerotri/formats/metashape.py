@@ -50,7 +50,7 @@ def read_metashape(path: str | os.PathLike) -> OrientationList:
         raise file.error(0, "holds no photographs", "export the cameras as Omega Phi Kappa")
     rows, left = [], 0
     for row, line in enumerate(words):
-        if len(line) > 1 and not any(line[1:7]):
+        if not any(line[1:7]):
             left += 1
             continue
         if len(line) < 7 or len(line) > 7 + len(MATRIX) or 7 < len(line) < 7 + len(MATRIX):

@@ -3,7 +3,7 @@
 Both begin with the coordinate system: ``EPSG:n``, a PROJ string, or ``WGS84 UTM 16N``. gcp_list.txt then has
 ``geo_x geo_y geo_z im_x im_y image [point] [extras]``, a row an image point; pixels count from 0 at the CENTRE of the
 upper left one, as OpenSfM takes them, so half a pixel is added. geo.txt has ``image geo_x geo_y [geo_z] [yaw] [pitch]
-[roll] [h_acc] [v_acc]``, angles in degrees, pitch 0 straight down [C].
+[roll] [h_acc v_acc]``, angles in degrees, pitch 0 straight down [C].
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from aerotri.observations import Block
 FIRST_PIXEL = 0.5
 """Position of the centre of the first pixel, which OpenSfM calls 0."""
 UNKNOWN = ("nan", "-nan")
-WIDTHS = (3, 4, 7, 8, 9)
+WIDTHS = (3, 4, 7, 9)
+"""Words of a row of geo.txt; what follows is the user's own."""
 
 
 def crs_of_header(text: str) -> str | None:
@@ -178,7 +179,7 @@ def read_odm_geo(path: str | os.PathLike) -> PositionList:
     InputError
         With the line: no coordinate system, a row that is not of the form, a photograph there twice.
     """
-    form = "image geo_x geo_y [geo_z] [yaw pitch roll] [h_acc] [v_acc]"
+    form = "image geo_x geo_y [geo_z] [yaw pitch roll] [h_acc v_acc]"
     file, crs, messages = _begin(Path(path), form)
     words, rows = file.words(), list(range(1, len(file)))
     for row in rows:
@@ -187,10 +188,10 @@ def read_odm_geo(path: str | os.PathLike) -> PositionList:
     names = [words[row][0] for row in rows]
     file.check_names(names, rows, "photograph")
     file.refuse_repeated(names, rows, "photograph")
-    values = np.full((len(rows), 8), np.nan)
+    values, extra = np.full((len(rows), 8), np.nan), 0
     for i, row in enumerate(rows):
-        # whatever follows the known columns is of the user's own
         width = max(width for width in WIDTHS if width <= len(words[row]))
+        extra += len(words[row]) > width
         part = words[row][1:width]
         known = [k for k, word in enumerate(part) if word.lower() not in UNKNOWN]
         values[i, known] = file.values([part[k] for k in known], [row] * len(known), "value")
@@ -204,10 +205,19 @@ def read_odm_geo(path: str | os.PathLike) -> PositionList:
     angles = np.radians(values[:, 3:6])
     angles[np.isnan(angles).any(axis=1)] = np.nan
     there = ~np.isnan(values[:, 2])
-    left = (f"{file.path.name}: {int((~there).sum())} positions without height were left out",)
-    said = (*messages, *_about_heights(file.path, values[there, 2], "photographs"), *(() if there.all() else left))
+    said = [*messages, *_about_heights(file.path, values[there, 2], "photographs")]
+    if not there.all():
+        said.append(f"{file.path.name}: {int((~there).sum())} positions without height were left out")
+    if extra:
+        said.append(f"{file.path.name}: what follows the known columns in {extra} rows was not carried over")
     return PositionList(
-        file.path, texts(names)[there], values[there, :3], accuracy[there][:, [0, 0, 1]], angles[there], crs, said
+        file.path,
+        texts(names)[there],
+        values[there, :3],
+        accuracy[there][:, [0, 0, 1]],
+        angles[there],
+        crs,
+        tuple(said),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.coordinates import local_frame
 from aerotri.coordinates.blocks import frame_of_block, transform_block
-from aerotri.coordinates.georeference import Georeference, georeference
+from aerotri.coordinates.georeference import CRS_PATTERN, CRS_REMEDY, Georeference, georeference
 from aerotri.formats.ign import without_linear_alteration
 from aerotri.formats.oriented import OrientedBlock
 
@@ -25,6 +25,22 @@ NEARER = 0.1
 def horizontal_part(crs: str) -> str:
     """The CRS without its height system."""
     return crs.partition("+")[0]
+
+
+def known_crs(crs: str) -> str:
+    """A CRS as block.toml has it, '' or 'local' as they are.
+
+    Raises
+    ------
+    InputError
+        When PROJ does not know it, or a block cannot be in it; of a height system only the form is looked at.
+    """
+    if crs in ("", "local"):
+        return crs
+    georeference(horizontal_part(crs), np.zeros((0, 3)))
+    if not CRS_PATTERN.fullmatch(crs):
+        raise InputError(f"crs '{crs}' is not understood", CRS_REMEDY)
+    return crs.upper()
 
 
 def to_crs(xyz: np.ndarray, source: str, target: str, geoid: str | os.PathLike | None) -> np.ndarray:

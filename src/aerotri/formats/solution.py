@@ -33,6 +33,7 @@ class SavedSolution:
     frame_origin : (3,) of the local frame, NaN for a block in local coordinates; geoid : its grid file, '' if none.
     held : (k, 2) point and axis of coordinates held for the datum.
     ray_status, weight : (m,).
+    components : the variance components as JSON, '' where there are none; the block has the σ they led to.
     """
 
     origin: np.ndarray
@@ -55,6 +56,7 @@ class SavedSolution:
     status: str
     iterations: int
     warnings: tuple[str, ...]
+    components: str = ""
 
 
 def write_solution(
@@ -98,6 +100,7 @@ def write_solution(
         status=np.array(solution.status),
         iterations=solution.iterations,
         warnings=np.array(result.outcome.warnings, dtype=str),
+        components=np.array("" if result.components is None else result.components.to_json()),
     )
 
 
@@ -116,7 +119,7 @@ def read_solution(path: str | os.PathLike) -> SavedSolution:
         if int(arrays.pop("schema")) != SCHEMA:
             raise InputError("was written by another version", "adjust the block again", path)
         scalars = {"estimator_code": int, "estimator_limit": float, "sigma0": float, "iterations": int}
-        scalars |= {"status": str, "geoid": str}
+        scalars |= {"status": str, "geoid": str, "components": str}
         values = {name: scalars[name](array) if name in scalars else array for name, array in arrays.items()}
         values["warnings"] = tuple(str(w) for w in arrays["warnings"])
         return SavedSolution(**values)

@@ -199,7 +199,7 @@ def _check_points(c: Comparison) -> Table:
 
 def _warnings(c: Comparison) -> Table:
     rows = [("gone", text) for text in c.warnings_gone] + [("new", text) for text in c.warnings_new]
-    return Table("Warnings", (Column("it is"), Column("warning")), tuple(rows))
+    return Table("Warnings", (Column(""), Column("warning")), tuple(rows))
 
 
 def _change(change: Change) -> dict[str, Any]:

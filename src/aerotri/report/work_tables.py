@@ -33,7 +33,7 @@ def work_table(work: WorkList) -> Table:
     return table(
         "What to look at first",
         (Column("", "", "d"), range(1, len(items) + 1)),
-        (Column("it is"), [PRIORITIES[item.priority - 1] for item in items]),
+        (Column("level"), [PRIORITIES[item.priority - 1] for item in items]),
         (Column("kind"), [KIND_TITLES[item.kind] for item in items]),
         (Column("where"), [item.where for item in items]),
         (Column("what"), [item.what for item in items]),
@@ -46,9 +46,14 @@ def work_counts(work: WorkList) -> str:
     """How many items there are of each kind, and how many of them are listed; '' without any."""
     if not work.found:
         return ""
-    counts = [f"{work.found[kind]} {KIND_TITLES[kind]}" for kind in KINDS if work.found.get(kind)]
+    counts = [f"{work.found[kind]} {_several(kind, work.found[kind])}" for kind in KINDS if work.found.get(kind)]
     listed = f"; {len(work.items)} of {sum(work.found.values())} are listed" if work.unlisted else ""
     return f"Found: {', '.join(counts)}{listed}."
+
+
+def _several(kind: str, count: int) -> str:
+    title = KIND_TITLES[kind]
+    return title if count == 1 or kind in ("left out", "parameters") else f"{title}s"
 
 
 def control_rays_table(adjusted: AdjustedBlock) -> Table:
@@ -92,7 +97,7 @@ def stages_table(check: FreeCheck) -> Table:
         (Column("at most", "", ".2f"), [s.limit for s in stages]),
         (Column("largest |w|", "", ".1f"), [s.largest_w for s in stages]),
         (Column("at most", "", ".1f"), [s.w_limit for s in stages]),
-        (Column("it"), verdicts),
+        (Column("verdict"), verdicts),
     )
 
 
@@ -123,10 +128,11 @@ def similarity_text(check: FreeCheck) -> str:
     if s is None:
         return "The control does not determine a transformation of the free block." if len(check.point) else ""
     turn = ", ".join(f"{value:+.2f}" for value in s.rotation * MGON_PER_RADIAN)
+    scale = f"{round((s.scale - 1.0) * 1e6, 1) + 0.0:+.1f} ppm"
     return (
-        f"Residuals after a transformation by seven parameters (turned by {turn} mgon about X, Y, Z, scale "
-        f"{round((s.scale - 1.0) * 1e6, 1) + 0.0:+.1f} ppm; redundancy {s.redundancy}): differences transformed − given. They hold the "
-        "deformation of a block that nothing holds, heights above all, beside errors of the control."
+        f"Residuals (transformed − given) after a transformation by seven parameters: turned by {turn} mgon about "
+        f"X, Y, Z, scale {scale}; redundancy {s.redundancy}. Beside errors of the control they hold the deformation of "
+        "a block that nothing holds, heights above all."
     )
 
 

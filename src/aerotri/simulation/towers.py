@@ -17,7 +17,10 @@ from aerotri.simulation.ground_points import tower_places
 from aerotri.simulation.measuring import Imaging
 from aerotri.simulation.projection import Rays
 from aerotri.simulation.random_streams import stream
-from aerotri.simulation.spec import SimulationSpec
+from aerotri.simulation.spec import SimulationSpec, TowerSpec
+
+ATTEMPTS = 20
+"""So often a tower is moved that a tilt has put out of all photographs but one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,18 +46,33 @@ def build_towers(
         nothing = np.zeros(0, np.int64)
         return Towers(np.zeros(0, dtype=str), np.zeros((0, 3)), Rays(nothing, nothing, np.zeros((0, 2))))
     rng = stream(seed, "towers")
-    foot = on_ground(tower_places(spec.towers, flown, imaging.cameras, spec.terrain.height_m, rng))
-    top = foot + np.array([0.0, 0.0, spec.towers.height_m])
-    top[:, :2] += spec.towers.sigma_m * rng.normal(size=(len(foot), 2))
-    xyz = np.stack([foot, top], axis=1).reshape(-1, 3)
-    names = np.array([f"W{k + 1:03d}_{end}" for k in range(len(foot)) for end in ("foot", "top")])
-    rays, _ = imaging.measure(imaging.rays(xyz), spec.tie_points.margin_px)
-    weak = names[np.bincount(rays.point, minlength=len(xyz)) < 2]
-    if len(weak):
-        raise InputError(
-            f"tower point '{weak[0]}' is in fewer than two photographs", "raise 'flight.end_lap', or leave 'towers' out"
-        )
-    return Towers(names, xyz, rays)
+    xyz, weak = np.zeros((0, 2, 3)), np.zeros(0, np.int64)
+    for attempt in range(ATTEMPTS):
+        drawn = _drawn(spec.towers, spec.terrain.height_m, flown, imaging, on_ground, rng)
+        xyz = drawn if attempt == 0 else np.where(np.isin(np.arange(len(xyz)), weak)[:, None, None], drawn, xyz)
+        rays, _ = imaging.measure(imaging.rays(xyz.reshape(-1, 3)), spec.tie_points.margin_px)
+        weak = np.flatnonzero((np.bincount(rays.point, minlength=2 * len(xyz)) < 2).reshape(-1, 2).any(axis=1))
+        if not len(weak):
+            names = [f"W{k + 1:03d}_{end}" for k in range(len(xyz)) for end in ("foot", "top")]
+            return Towers(np.array(names), xyz.reshape(-1, 3), rays)
+    raise InputError(
+        f"tower {weak[0] + 1} is in fewer than two photographs", "raise 'flight.end_lap', or leave 'towers' out"
+    )
+
+
+def _drawn(
+    spec: TowerSpec,
+    ground_m: float,
+    flown: FlownImages,
+    imaging: Imaging,
+    on_ground: Callable[[np.ndarray], np.ndarray],
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """(t, 2, 3) m, foot and top of every tower."""
+    foot = on_ground(tower_places(spec, flown, imaging.cameras, ground_m, rng))
+    top = foot + np.array([0.0, 0.0, spec.height_m])
+    top[:, :2] += spec.sigma_m * rng.normal(size=(len(foot), 2))
+    return np.stack([foot, top], axis=1)
 
 
 def plumb_lines(towers: np.ndarray, sigma_m: float) -> Constraints:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from aerotri.observations import Block
+
+if TYPE_CHECKING:
+    from aerotri.statistics.variance_components import VarianceComponents
 
 RAY_STATUS = ("used", "one ray", "off", "no start value", "not finite")
 """Status of a ray: adjusted, or why it was left out. The records hold the index into this tuple."""
@@ -227,7 +231,10 @@ class Blunder:
 
 @dataclass(frozen=True, eq=False)
 class AdjustedBlock:
-    """A block after its adjustment; what the later stages start from."""
+    """A block after its adjustment; what the later stages start from.
+
+    `components` is there where `variance_components = "on"`: `block` then has the σ they led to.
+    """
 
     block: Block
     outcome: Outcome
@@ -240,3 +247,4 @@ class AdjustedBlock:
     groups: tuple[ObservationGroup, ...]
     blunders: tuple[Blunder, ...] = ()
     observations: ObservationResults | None = None
+    components: VarianceComponents | None = None

@@ -43,6 +43,8 @@ def check_free(block: Block, adjust: Adjust, full: AdjustedBlock | None = None) 
     full : the adjustment of `block` where it is known already.
     """
     sigma0_full = np.nan if full is None else full.outcome.sigma0
+    block, changed = _comparable(block)
+    full = None if changed else full
     robust = block.settings.adjustment.robust != "off"
     try:
         free = adjust(free_block(block))
@@ -64,6 +66,14 @@ def check_free(block: Block, adjust: Adjust, full: AdjustedBlock | None = None) 
         position_offset=_position_offset(block, by_control),
         robust=robust,
     )
+
+
+def _comparable(block: Block) -> tuple[Block, bool]:
+    """The block with the same observations, weights and unknowns in every stage, and whether that changed a setting."""
+    given = block.settings.adjustment
+    robust = given.robust if given.robust == "off" else "huber"
+    settings = replace(given, robust=robust, variance_components="off", parameter_selection="off")
+    return replace(block, settings=replace(block.settings, adjustment=settings)), settings != given
 
 
 def free_block(block: Block) -> Block:

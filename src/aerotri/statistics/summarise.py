@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.robust import weights_and_costs
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.functional_model.observed_unknowns import Rows
@@ -71,7 +72,8 @@ def summarise(
     vtpv = solution.equations.cost
     if solution.estimator.is_robust:
         vtpv = _weighted_sum(system, solution)
-        sigma0 = float(np.sqrt(vtpv / counts.redundancy)) if counts.redundancy > 0 else np.nan
+        freedom = counts.redundancy - _turned_down(solution, q)
+        sigma0 = float(np.sqrt(vtpv / freedom)) if freedom > 0.0 else np.nan
     outcome = Outcome(
         status=solution.status,
         message="" if solution.status == "converged" else _message(solution),
@@ -109,12 +111,21 @@ def _message(solution: Solution) -> str:
 
 
 def _weighted_sum(system: NormalSystem, solution: Solution) -> float:
-    """vᵀPv with the final weights: what Huber's cost is not."""
+    """vᵀPv with the final weights: what the cost of a robust estimator is not."""
     rays, equations = system.unknowns.rays, solution.equations
     squares = np.sum((equations.residual * rays.inv_sigma) ** 2, axis=1)
-    length, limit = np.sqrt(squares), solution.estimator.limit
-    robust_cost = np.where(length > limit, 2.0 * limit * length - limit**2, squares)
+    robust_cost = weights_and_costs(solution.estimator, np.sqrt(squares))[1]
     return float(equations.cost - robust_cost.sum() + np.sum(equations.weight * squares))
+
+
+def _turned_down(solution: Solution, q: Cofactors) -> float:
+    """Σ(1 − weight)·r, the share of the redundancy that robust weights take away.
+
+    [D] vᵀPv over the rest, Σ weight·r, gives σ̂0 of the good observations: a ray switched off counts in neither sum, and
+    of normal errors Huber, Danish, Cauchy and adaptive weights leave σ of the unknowns right within 4 %. Over the whole
+    redundancy Cauchy's would be 10 % too small.
+    """
+    return float(np.sum((1.0 - solution.equations.weight) * q.ray_redundancy.sum(axis=1)))
 
 
 def _images(system: NormalSystem, solution: Solution, q: Cofactors, sigma0: float) -> ImageResults:

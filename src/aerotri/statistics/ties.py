@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, diags_array
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
 from aerotri.statistics.adjusted_block import AdjustedBlock
@@ -57,9 +57,8 @@ def photograph_ties(adjusted: AdjustedBlock, fewest: int) -> Ties:
     sees.data[:] = 1.0
     several = np.asarray(sees.sum(axis=0)).ravel() >= 2
     shared = np.asarray(sees[:, several].sum(axis=1)).ravel().astype(int)
-    common = (sees @ sees.T).tolil()
-    common.setdiag(0)
-    common = common.tocsr()
+    common = (sees @ sees.T).tocsr()
+    common = (common - diags_array(common.diagonal())).tocsr()
     common.eliminate_zeros()
     strongest = common.max(axis=1).toarray().ravel().astype(int) if n else np.zeros(0, int)
     neighbour = np.asarray(common.argmax(axis=1)).ravel() if common.nnz else np.zeros(n, int)

@@ -9,6 +9,7 @@ counts 1/(S⁻¹)_gg degrees of freedom: less than r_g, since its residuals are 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -29,17 +30,24 @@ SETTLED = 0.01
 LARGEST_STEP = 3.0
 """Factor by which a σ may change in one round."""
 
+CAUTION = 2.0
+"""Added to an S_gg below `LEAST_FREEDOM`, but no more than r_g: a group that says little of itself yet moves no faster
+than by Förstner's ratio."""
+
+FRESH = 0.2
+"""Relative change of a σ up to which S is not computed anew."""
+
 LEAST_FREEDOM = 3.0
 """Degrees of freedom below which a group says too little of its σ [C]: its own σ would be uncertain by over 40 %."""
 
-NO_FREEDOM = 0.05
-"""Sum S_gg below which a group is not moved: its residuals are zero whatever its σ."""
+NO_REDUNDANCY = 1e-3
+"""Redundancy of a group below which its residuals are zero whatever its σ."""
 
 MEDIAN_EFFICIENCY = 0.37
 """Efficiency of a σ from the median of |w|, against that from squares [L: Huber 1981]."""
 
-PROBES, LAST_PROBES = 4, 16
-"""Random products a group for S, on the way and for the final uncertainty: 16 give it to some 5 %."""
+PROBES, LAST_PROBES = 4, 8
+"""Random products a group for S, on the way and for the final uncertainty: 8 give it to some 5 %."""
 
 AGREES, TOO_SMALL, TOO_LARGE, NOT_TESTABLE = "agrees", "σ given too small", "σ given too large", "not testable"
 
@@ -106,18 +114,16 @@ class VarianceComponents:
         """The factor of every group's σ."""
         return {c.group: c.factor for c in self.components}
 
-    def as_dict(self) -> dict[str, Any]:
-        """As plain values for JSON, NaN as None."""
-        return _without_nan(asdict(self))
+    def to_json(self) -> str:
+        """As JSON: what is not known is null."""
+        return json.dumps(_without_nan(asdict(self)), indent=2, ensure_ascii=False, allow_nan=False)
 
     @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> VarianceComponents:
-        """The inverse of `as_dict`."""
-        components = tuple(
-            VarianceComponent(**_with_nan({**c, "test": ChiSquareTest(**_with_nan(c["test"]))}))
-            for c in content["components"]
-        )
-        return cls(components, content["rounds"], content["settled"])
+    def from_json(cls, text: str) -> VarianceComponents:
+        """The inverse of `to_json`."""
+        content = json.loads(text)
+        components = [_with_nan(c) | {"test": ChiSquareTest(**_with_nan(c["test"]))} for c in content["components"]]
+        return cls(tuple(VarianceComponent(**c) for c in components), content["rounds"], content["settled"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,11 +153,14 @@ def estimate_components(
     """
     fitted, held = first, {}
     factors = {fit.name: 1.0 for fit in group_fits(first.adjusted)}
-    rounds, settled = 0, False
+    rounds, last_round = 0, MAX_ROUNDS
+    information = _Information.at(fitted, factors)
     while True:
-        changes = _changes(fitted, held)
+        if not information.serves(factors):
+            information = _Information.at(fitted, factors)
+        changes = _changes(fitted, information, held)
         settled = all(abs(change - 1.0) < SETTLED for change in changes.values())
-        if settled or rounds >= MAX_ROUNDS:
+        if settled or rounds >= last_round:
             freedom = _freedom(fitted, held)
             weak = [name for name, f in freedom.items() if name not in held and not f >= LEAST_FREEDOM]
             if not weak:
@@ -159,34 +168,53 @@ def estimate_components(
             # the weakest alone: without it the others may be told apart
             name = min(weak, key=lambda weak_name: freedom[weak_name])
             held[name] = f"{freedom[name]:.1f} degrees of freedom are too few"
-            factors[name], rounds = 1.0, min(rounds, MAX_ROUNDS // 2)
+            factors, last_round = {**factors, name: 1.0}, max(last_round, rounds + MAX_ROUNDS // 2)
         else:
             factors = {name: factor * changes.get(name, 1.0) for name, factor in factors.items()}
         fitted, rounds = readjust(factors), rounds + 1
 
 
-def _changes(fitted: Fitted, held: Mapping[str, str]) -> dict[str, float]:
+@dataclass(frozen=True, eq=False)
+class _Information:
+    """S, and the factors it was computed at: it serves the way to the solution while they change little."""
+
+    names: tuple[str, ...]
+    s: np.ndarray
+    factors: Mapping[str, float]
+
+    @classmethod
+    def at(cls, fitted: Fitted, factors: Mapping[str, float], probes: int = PROBES) -> _Information:
+        names = tuple(fit.name for fit in group_fits(fitted.adjusted))
+        s = cross_redundancy(ResidualResponse(fitted.system, fitted.solution), names, probes)
+        return cls(names, s, dict(factors))
+
+    def serves(self, factors: Mapping[str, float]) -> bool:
+        return all(abs(np.log(factors[name] / self.factors[name])) < FRESH for name in self.names)
+
+
+def _changes(fitted: Fitted, information: _Information, held: Mapping[str, str]) -> dict[str, float]:
     """The factors by which the σ of the groups not held should change, from one solution of S·θ = Ω."""
-    fits = [fit for fit in group_fits(fitted.adjusted) if fit.name not in held]
-    s = cross_redundancy(ResidualResponse(fitted.system, fitted.solution), tuple(f.name for f in fits), PROBES)
-    awake = np.flatnonzero(np.diagonal(s) > NO_FREEDOM)
+    fits = group_fits(fitted.adjusted)
+    awake = [k for k, fit in enumerate(fits) if fit.name not in held and fit.redundancy > NO_REDUNDANCY]
+    s = information.s[np.ix_(awake, awake)]
     excess = np.array([fits[k].omega - fits[k].redundancy for k in awake])
-    theta = 1.0 + np.linalg.lstsq(s[np.ix_(awake, awake)], excess, rcond=1e-3)[0]
+    redundancy = np.array([fits[k].redundancy for k in awake])
+    caution = np.where(np.diagonal(s) < LEAST_FREEDOM, np.minimum(redundancy, CAUTION), 0.0)
+    theta = 1.0 + np.linalg.solve(s + np.diag(caution), excess)
     bounded = np.clip(theta, LARGEST_STEP**-2, LARGEST_STEP**2)
     return {fits[k].name: float(np.sqrt(t)) for k, t in zip(awake, bounded, strict=True)}
 
 
 def _freedom(fitted: Fitted, held: Mapping[str, str]) -> dict[str, float]:
-    """Degrees of freedom 1/(S⁻¹)_gg of every group; those held count for themselves alone."""
+    """Degrees of freedom 1/(S⁻¹)_gg of every group; r_g of those held."""
     fits = group_fits(fitted.adjusted)
-    names = tuple(fit.name for fit in fits)
-    s = cross_redundancy(ResidualResponse(fitted.system, fitted.solution), names, LAST_PROBES)
+    information = _Information.at(fitted, {}, LAST_PROBES)
+    names, s = information.names, information.s
     freedom = {}
-    free = [k for k, name in enumerate(names) if name not in held and s[k, k] > NO_FREEDOM]
+    free = [k for k, name in enumerate(names) if name not in held and s[k, k] > NO_REDUNDANCY]
     inverse = np.linalg.pinv(s[np.ix_(free, free)], hermitian=True)
     for k, fit in enumerate(fits):
-        alone = fit.redundancy**2 / s[k, k] if s[k, k] > NO_FREEDOM else 0.0
-        value = 1.0 / inverse[free.index(k), free.index(k)] if k in free else alone
+        value = 1.0 / inverse[free.index(k), free.index(k)] if k in free else fit.redundancy
         freedom[fit.name] = float(value) * (MEDIAN_EFFICIENCY if fit.robust else 1.0)
     return freedom
 
@@ -224,7 +252,7 @@ def _components(
 
 def _ratio(fit: GroupFit) -> float:
     """σ a posteriori / σ used, of one group alone: Förstner's √(Ω/r)."""
-    return float(np.sqrt(fit.omega / fit.redundancy)) if fit.redundancy > NO_FREEDOM else float("nan")
+    return float(np.sqrt(fit.omega / fit.redundancy)) if fit.redundancy > NO_REDUNDANCY else float("nan")
 
 
 def _test(group: str, ratio: float, freedom: float, alpha: float) -> ChiSquareTest:
@@ -279,7 +307,7 @@ def in_words(components: VarianceComponents) -> tuple[str, ...]:
         elif abs(c.factor - 1.0) > SETTLED:
             said.append(
                 f"the σ of {c.group} was changed from {_value(c.sigma_apriori, c.unit)} to {_value(c.sigma, c.unit)}, "
-                f"by a factor of {c.factor:.3g} ± {c.factor_sigma:.2g}: {c.test.verdict}"
+                f"by a factor of {c.factor:.3g} ± {c.factor_sigma:.2g} (χ² test of the σ given: {c.test.verdict})"
             )
     if not components.settled:
         said.append(f"the variance components did not settle within {components.rounds} rounds")

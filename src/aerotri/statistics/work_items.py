@@ -96,7 +96,7 @@ def _rays(adjusted: AdjustedBlock, tests: RayTests) -> list[WorkItem]:
         axis, error_um = "xy"[tests.axis[row]], 1e3 * tests.estimated_mm[row]
         what = f"w{axis} {tests.w[row]:+.1f}, error {error_um:+.1f} µm ({tests.estimated_px[row]:+.1f} px)"
         if others:
-            what += f"; {others} more ray{'s' * (others > 1)} of the point"
+            what += f"; {others} more {'ray' if others == 1 else 'rays'} of the point"
         where = f"{block.points[point]} in {block.images.names[block.image_points.image[row]]}"
         kind = "control ray" if is_control[point] else "ray"
         hint = _ray_hint(int(adjusted.points.rays[point]), others, float(adjusted.rays.weight[row]))

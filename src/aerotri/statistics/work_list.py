@@ -93,7 +93,7 @@ def _left_out(adjusted: AdjustedBlock) -> list[WorkItem]:
     there = np.concatenate([adjusted.control.point, adjusted.check.point])
     rays = np.bincount(block.image_points.point, minlength=len(block.points))
     for point in np.setdiff1d(block.control.point, there):
-        what = f"given coordinates, {rays[point]} ray{'s' * (rays[point] != 1)} measured, not used"
+        what = f"given coordinates, {rays[point]} {'ray' if rays[point] == 1 else 'rays'} measured, not used"
         hint = "see whether it was switched off, or measure it in another photograph" if rays[point] else "measure it"
         items.append(WorkItem(3, "left out", str(block.points[point]), what, 1.0, hint))
     return items
@@ -121,7 +121,9 @@ def _photographs(adjusted: AdjustedBlock, ties: Ties, limits: WorkLimits) -> lis
         "residuals": (_residual_sizes(adjusted), limits.residual_ratio),
     }
     ratios = {
-        name: (size / np.nanmedian(size), limit) for name, (size, limit) in sizes.items() if np.isfinite(size).any()
+        name: (size / np.nanmedian(size), limit)
+        for name, (size, limit) in sizes.items()
+        if np.isfinite(size).any() and np.nanmedian(size) > 0.0
     }
     items = []
     for image in np.flatnonzero(adjusted.images.rays > 0):
@@ -182,7 +184,8 @@ def _points(adjusted: AdjustedBlock, limits: WorkLimits) -> list[WorkItem]:
     there = (points.rays > 0) & np.isfinite(sigma).all(axis=1)
     if not there.any():
         return []
-    ratio = np.where(there[:, None], sigma / np.median(sigma[there], axis=0), 0.0)
+    usual = np.median(sigma[there], axis=0)
+    ratio = np.where(there[:, None] & (usual > 0.0), sigma / np.where(usual > 0.0, usual, 1.0), 0.0)
     small = np.where(there, limits.angle_deg / np.maximum(angle, 1e-3), 0.0)
     wide = ratio.max(axis=1) / limits.point_sigma_ratio
     severity = np.fmax(np.nan_to_num(small), wide)
