@@ -2,7 +2,7 @@
 
 Every control point in turn becomes a check point; the last lines take all control away. Prints a Markdown table.
 
-Example: python tools/leave_one_out.py sbr
+Example: python tools/leave_one_out.py cu_sbr_p1 --parameters brown:K1+K2+K3+P1+P2 --robust huber
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from aerotri.commands.adjust import with_settings
 from aerotri.formats.block_folder import read_block
 from aerotri.observations import Block
 from aerotri.pipeline import AdjustmentFailedError, adjust
@@ -76,13 +77,16 @@ def lines(block: Block) -> list[Line]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("block", type=Path, help="block folder")
-    table = lines(read_block(parser.parse_args().block))
+    parser.add_argument("--parameters", help="additional parameters, in place of block.toml's")
+    parser.add_argument("--robust", help="robust estimator, in place of block.toml's")
+    options = parser.parse_args()
+    table = lines(with_settings(read_block(options.block), options.parameters, options.robust))
     print("| datum | left out | dX m | dY m | dZ m | c mm | σ0 µm |\n|---|---|---|---|---|---|---|")
     for entry in table:
         print("| " + " | ".join(entry.cells()) + " |")
     print()
-    for warning in sorted({w for entry in table if entry.result for w in entry.result.outcome.warnings}):
-        print(f"- {warning}")
+    for warning in table[-1].result.outcome.warnings if table[-1].result else ():
+        print(f"- {table[-1].control}: {warning}")
 
 
 if __name__ == "__main__":
