@@ -1,6 +1,7 @@
 """`aerotri diff` and `adjust --check-free` as a user meets them."""
 
 import json
+import re
 import shutil
 from dataclasses import replace
 
@@ -8,6 +9,8 @@ import numpy as np
 import pytest
 from test_cli import run
 
+from aerotri.commands.diff import run_diff
+from aerotri.conventions import InputError
 from aerotri.formats.block_folder import write_block
 from small_blocks import small_block, with_adjustment
 
@@ -84,12 +87,14 @@ def test_diff_refuses_what_is_no_result(results, tmp_path):
         (tmp_path / "nowhere", "nowhere"), (tmp_path / "empty", "adjustment.json"), (no_solution, "solution.npz"),
         (damaged, "solution.npz"), (other, "solution.npz"), (folder / "good", "adjustment.json"),
     ):  # fmt: skip
-        done = run("diff", folder / "first", bad)
-        assert done.returncode == 2, f"{bad}: {done.stdout}{done.stderr}"
-        assert len(done.stderr.strip().splitlines()) == 1
-        assert words in done.stderr
-        assert bad.name in done.stderr, "both folders hold files of the same names"
-    assert run("diff", folder / "first", folder / "second", "--top", "-1").returncode == 2
+        with pytest.raises(InputError, match=re.escape(words)) as caught:
+            run_diff(folder / "first", bad, 5, False)
+        assert bad.name in str(caught.value), "both folders hold files of the same names"
+    with pytest.raises(InputError, match="--top -1"):
+        run_diff(folder / "first", folder / "second", -1, False)
+    done = run("diff", folder / "first", no_solution)
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1
 
 
 def test_check_free_names_the_control_point(results):

@@ -307,6 +307,8 @@ STRANGE = {
     "shift": ({"gnss_shift": "on"}, "--gnss-shift on"),
     "axes": ({"axes": "zy"}, "--axes zy"),
     "two sigmas": ({"image_sigma_um": 1.0, "image_sigma_px": 1.0}, "exclude each other"),
+    "offset": ({"orientation": "opk.txt", "offset": "shift.xyz"}, "is no orientation of Pix4D"),
+    "prefix": ({"stated": Statements(control_prefix="t")}, "--control-prefix without control points"),
     "patb": ({"stated": Statements(patb_rotation="up")}, "--patb-rotation up"),
     "crs": ({"stated": Statements(crs="UTM 47")}, "crs 'UTM 47' is not understood"),
     "crs unknown": ({"stated": Statements(crs="EPSG:99999999")}, "is not known to PROJ"),
@@ -324,7 +326,8 @@ STRANGE = {
 
 @pytest.mark.parametrize(("changes", "says"), STRANGE.values(), ids=STRANGE)
 def test_strange_requests(files, changes, says):
-    paths = {k: str(files / v) if k in ("control", "orientation") else v for k, v in changes.items()}
+    (files / "shift.xyz").write_text("1 2 3")
+    paths = {k: str(files / v) if k in ("control", "orientation", "offset") else v for k, v in changes.items()}
     with pytest.raises(InputError, match=re.escape(says)):
         read_project(request(files, **paths))
 
@@ -377,6 +380,18 @@ def test_longitude_and_latitude_in_a_block_of_utm(files):
     expected = Transformer.from_crs("EPSG:4326", "EPSG:32647", always_xy=True).transform(101.013526, 14.517)
     assert reading.block.gnss_ins is not None
     np.testing.assert_allclose(reading.block.gnss_ins.xyz, [[*expected, 150]], rtol=0, atol=1e-6)
+
+
+def test_orientations_of_pix4d_are_shifted(files):
+    from aerotri.formats.pix4d import write_pix4d_eo
+
+    write_pix4d_eo(oriented_sample(), files / "eo.txt")
+    (files / "eo_offset.xyz").write_text("717000 1606000 0\n")
+    reading = read_project(request(files, orientation=str(files / "eo.txt"), offset=files / "eo_offset.xyz"))
+    np.testing.assert_allclose(reading.block.images.centre, oriented_sample(shift=UTM).centre, rtol=0, atol=5.1e-7)
+    observed = Statements(orientation_sigma_m=(0.1, 0.1, 0.1))
+    with pytest.raises(InputError, match="has observed positions already"):
+        read_project(request(files, "block", camera=CameraSpec(), orientation=str(files / "opk.txt"), stated=observed))
 
 
 def test_coordinates_of_another_datum_are_refused():

@@ -158,7 +158,8 @@ def with_orientations(reading: Reading, given: OrientationList, stated: Statemen
     Raises
     ------
     InputError
-        When no photograph is named, or the rotations can be read in several ways that reprojection cannot tell apart.
+        When no photograph is named, the rotations can be read in several ways that reprojection cannot tell apart, or
+        orientations are to be observations beside others.
     """
     block = reading.block
     index, loosely = match_photographs(given.images, block.images.names)
@@ -181,6 +182,8 @@ def with_orientations(reading: Reading, given: OrientationList, stated: Statemen
     angles[own] = angles_from_rotation(rotation[own], block.rotation)
     block = replace(block, images=replace(block.images, centre=centre, angles=angles))
     if stated.orientation_sigma_m is not None or stated.orientation_sigma_deg is not None:
+        if block.gnss_ins is not None:
+            raise InputError("the block has observed positions already", "leave --orientation-sigma-… out", given.path)
         block = _observed(block, own, stated)
     return replace(reading, block=block, messages=tuple(messages))
 

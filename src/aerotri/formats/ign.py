@@ -209,7 +209,7 @@ def without_linear_alteration(height: np.ndarray, ground: float, scale: np.ndarr
 
 
 def write_ign_opk(oriented: OrientedBlock, path: str | os.PathLike) -> tuple[str, ...]:
-    """Write an .OPK file: positions to a millimetre of the given heights, angles in degrees with twelve decimals.
+    """Write an .OPK file: positions to a tenth of a millimetre, angles in degrees with twelve decimals.
 
     Returns
     -------

@@ -118,6 +118,8 @@ def kind_of(path: Path, kinds: Kinds) -> str | None:
 def _read(text: str, kinds: Kinds, what: str, options: ReadingOptions) -> Any:
     stated, path = split_kind(text, kinds)
     kind = kind_of(path, kinds) if stated is None else stated
+    if kinds is ORIENTATIONS and kind != "pix4d-eo" and options.offset is not None:
+        raise InputError("is no orientation of Pix4D, to which an offset belongs", "leave --offset out", path)
     if kind is None:
         known = ", ".join(kinds)
         raise InputError(f"is of no known kind of {what}", f"known are {known}; state it as kind:PATH", path)

@@ -40,7 +40,8 @@ def crs_of_header(text: str) -> str | None:
         return _utm(int(found[1]), found[2].upper() == "S")
     if not plain.startswith("+proj="):
         return None
-    words = dict(word.lstrip("+").partition("=")[::2] for word in plain.split())
+    parts = [word.lstrip("+").partition("=") for word in plain.split()]
+    words = {key: value for key, _, value in parts}
     if "WGS84" not in (words.get("datum"), words.get("ellps")) or words.get("units", "m") != "m":
         return ""
     if words["proj"] == "utm" and words.get("zone", "").isdigit():

@@ -114,6 +114,8 @@ def read_project(request: Request) -> Reading:
 
 def _options(request: Request) -> ReadingOptions:
     offset = None if request.offset is None else read_pix4d_offset(request.offset)
+    if not request.control and request.stated.control_prefix:
+        raise InputError("--control-prefix without control points", "give them: --control FILE")
     axes = kinds.axes_of(request.stated.crs) if request.axes is None else request.axes
     return ReadingOptions(axes, offset, request.stated.patb_rotation)
 
@@ -128,9 +130,9 @@ def _whole(request: Request) -> Reading | None:
     )
     if kind not in convert.READERS:
         return None
-    if request.camera.file is not None or request.camera.focal_length_mm is not None:
-        raise InputError("has its cameras", "leave the camera out, but for the size of pixels", path)
     pixel_um, size_px = request.camera.pixel_um, request.camera.size_px
+    if request.camera != CameraSpec(pixel_um=pixel_um, size_px=size_px):
+        raise InputError("has its cameras", "leave the camera out, but for the size of pixels", path)
     if size_px is not None and kind != "bundler":
         raise InputError("has its cameras", "leave --camera-size out", path)
     said = () if pixel_um is not None else (f"a pixel counts as {UNKNOWN_PIXEL_UM:g} µm: state it with --pixel-um",)
@@ -228,7 +230,8 @@ def _begin(request: Request, parts: _Parts) -> Reading:
     )
     nothing = np.zeros(0, np.int64)
     rays = ImagePoints(nothing, nothing, np.zeros((0, 2)), np.zeros((0, 2)))
-    block = Block(request.name, cameras, images, np.zeros(0, "<U1"), rays)
+    name = request.name or Path(request.source).stem
+    block = Block(name, cameras, images, np.zeros(0, "<U1"), rays)
     return Reading(block, None, (*parts.messages, *said))
 
 
@@ -265,7 +268,8 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
 
 def fit_of_start_values(block: Block, geoid: str | os.PathLike | None = None) -> list[str]:
     """How well image points fit the orientations that were given, in words; nothing where there are none."""
-    known = np.isfinite(block.images.centre).all(axis=1) & np.isfinite(block.images.angles).all(axis=1)
+    start = np.column_stack([block.images.centre, block.images.angles])
+    known = np.asarray(np.isfinite(start).all(axis=1))
     if not known.any() or not known[block.image_points.image].any():
         return []
     try:

@@ -77,7 +77,7 @@ def reproject(block: Block, centre: np.ndarray, rotation: np.ndarray) -> Reproje
     centre : (n, 3) m; rotation : (n, 3, 3), NaN for photographs without orientation.
     """
     rays, tangent = block.image_points, ideal_tangents(block)
-    known = np.isfinite(centre).all(axis=1) & np.isfinite(rotation).all(axis=(1, 2))
+    known = np.asarray(np.isfinite(centre).all(axis=1) & np.isfinite(rotation).all(axis=(1, 2)))
     residual = np.full(len(rays), np.nan)
     if not known.any() or not len(rays):
         return Reprojection(np.full((len(block.points), 3), np.nan), residual)

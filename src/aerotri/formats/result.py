@@ -33,8 +33,8 @@ PARAMETER_KEYS = (
 def write_result(adjusted: AdjustedBlock, folder: str | Path) -> None:
     """Write adjustment.json, images, points, parameters, control and check as CSV, and residuals.parquet.
 
-    The files are written one after the other, adjustment.json last: who needs all or nothing passes a temporary folder
-    and renames it.
+    Beside them variance_components.json where they were estimated. The files are written one after the other,
+    adjustment.json last: who needs all or nothing passes a temporary folder and renames it.
 
     Parameters
     ----------
@@ -49,6 +49,8 @@ def write_result(adjusted: AdjustedBlock, folder: str | Path) -> None:
     _write_csv(folder / "control.csv", ground_point_columns(adjusted, adjusted.control))
     _write_csv(folder / "check.csv", ground_point_columns(adjusted, adjusted.check))
     _write_residuals(folder / "residuals.parquet", adjusted)
+    if adjusted.components is not None:
+        (folder / "variance_components.json").write_text(adjusted.components.to_json() + "\n", encoding="utf-8")
     content = adjustment_json(adjusted)
     content["timings_s"]["write"] += time.perf_counter() - started
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
