@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -33,6 +34,12 @@ def main() -> None:
     except InputError as error:
         print(f"aerotri: {error}", file=sys.stderr)
         raise SystemExit(2) from None
+    except Exception as error:
+        if os.environ.get("AEROTRI_DEBUG"):
+            raise
+        text = f"aerotri: unexpected {type(error).__name__}: {error} — please report it; AEROTRI_DEBUG=1 tells where"
+        print(text, file=sys.stderr)
+        raise SystemExit(1) from None
     except KeyboardInterrupt:
         print("aerotri: interrupted, nothing was written", file=sys.stderr)
         raise SystemExit(130) from None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -22,10 +21,12 @@ from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block, transform_result
 from aerotri.formats.solution import SavedSolution
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.statistics.adjusted_block import AdjustedBlock, Blunder
 from aerotri.statistics.common_height import common_height
 from aerotri.statistics.doubts import AdjustmentFailedError, defects_in_words, doubts, failure, refuse_runaway
 from aerotri.statistics.observation_groups import with_scaled_sigmas
+from aerotri.statistics.removal import with_datum_of
+from aerotri.statistics.snooping import snoop
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
 from aerotri.statistics.variance_components import (
     Fitted,
@@ -110,7 +111,8 @@ def _adjust_in_frame(
     for _ in range(FRAME_ROUNDS if needs_positions(block) else 0):
         local = transform_block(block, frame, found.local.points.xyz, found.local.images.centre)
         found = _adjust_local(local, report, found.local.points.xyz)
-    return replace(found, result=transform_result(found.local, block, frame), frame=frame)
+    used = with_datum_of(block, found.local.block)
+    return replace(found, result=transform_result(found.local, used, frame), frame=frame)
 
 
 def _with_variance_components(
@@ -118,30 +120,32 @@ def _with_variance_components(
 ) -> Adjustment:
     """The adjustment with the σ of every group estimated; the block of the result has these σ."""
     latest, used = first, block
-    seconds = Counter(first.result.outcome.timings_s)
+    timings = [dict(first.result.outcome.timings_s)]
 
     def readjust(factors: Mapping[str, float]) -> Fitted:
         nonlocal latest, used
         used = with_scaled_sigmas(block, factors)
         latest = _adjust_in_frame(_continued(used, latest.result), report, latest.result.points.xyz, geoid)
-        seconds.update(latest.result.outcome.timings_s)
+        timings.append(dict(latest.result.outcome.timings_s))
         return Fitted(latest.local, latest.system, latest.solution)
 
     started = time.perf_counter()
     components, _ = estimate_components(Fitted(first.local, first.system, first.solution), readjust)
-    spent = sum(seconds.values()) - sum(first.result.outcome.timings_s.values())
-    seconds["statistics"] += time.perf_counter() - started - spent
+    readjusting = sum(sum(round_.values()) for round_ in timings[1:])
+    seconds = {stage: sum(round_.get(stage, 0.0) for round_ in timings) for stage in timings[0]}
+    seconds["statistics"] += time.perf_counter() - started - readjusting
     said = (*latest.result.outcome.warnings, *in_words(components))
-    outcome = replace(latest.result.outcome, warnings=said, timings_s=dict(seconds))
+    outcome = replace(latest.result.outcome, warnings=said, timings_s=seconds)
     local = replace(with_components(latest.local, components), outcome=outcome)
-    result = replace(latest.result, groups=local.groups, components=components, outcome=outcome, block=used)
+    result = replace(latest.result, groups=local.groups, components=components, outcome=outcome,
+                     block=with_datum_of(used, latest.result.block))  # fmt: skip
     return replace(latest, result=result, local=local if latest.frame is not None else result)
 
 
 def _continued(block: Block, result: AdjustedBlock) -> Block:
     """The block with what was adjusted as start values."""
     images, found = block.images, result.images
-    there = np.isfinite(found.centre).all(axis=1)[:, None]
+    there = np.isfinite(found.centre).all(axis=1, keepdims=True)
     centre, angles = np.where(there, found.centre, images.centre), np.where(there, found.angles, images.angles)
     return replace(block, images=replace(images, centre=centre, angles=angles))
 
@@ -188,6 +192,12 @@ def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray 
     if solution.defects:
         raise failure(system, "rank deficient", defects_in_words(system, solution.defects))
     refuse_runaway(system, solution)
+    removed: tuple[Blunder, ...] = ()
+    if settings.robust == "data-snooping":
+        snooped = snoop(prepared, solution, options)
+        prepared, solution, removed = snooped.prepared, snooped.solution, snooped.blunders
+        system, state = prepared.system, prepared.state
+        block = with_datum_of(block, system.unknowns.block)
     if settings.datum in ("minimal", "inner"):
         system.refresh_motions(solution.state)
         moved = restore_datum(system.unknowns, solution.state, state.points)
@@ -206,7 +216,9 @@ def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray 
     shared_height = common_height(system, solution, factor, result.outcome.sigma0)
     if shared_height is not None:
         said += tuple(s for s in [shared_height.sentence(float(np.nanmedian(result.points.sigma[:, 2])))] if s)
-    result = replace(result, block=block, outcome=replace(result.outcome, warnings=said, timings_s=timings))
+    blunders = removed + result.blunders
+    outcome = replace(result.outcome, warnings=said, timings_s=timings)
+    result = replace(result, block=block, outcome=outcome, blunders=blunders)
     return Adjustment(result, result, system, solution)
 
 

@@ -290,3 +290,28 @@ def _carried(domain: str | None) -> bool:
 def _without_statistics(tags: Mapping[str, str]) -> dict[str, str]:
     """Statistics of the old pixels are none of the new ones."""
     return {key: value for key, value in tags.items() if not key.startswith("STATISTICS_")}
+
+
+def write_grid(
+    path: str | os.PathLike,
+    values: np.ndarray,
+    upper_left: tuple[float, float],
+    cell: float,
+    bands: tuple[str, ...],
+    tags: Mapping[str, str],
+) -> None:
+    """A raster of numbers over a plane, without a coordinate system.
+
+    Parameters
+    ----------
+    values : (bands, rows, columns). upper_left : corner of the first cell, y up. cell : size.
+    bands : descriptions. tags : what goes with the file.
+    """
+    transform = Affine(cell, 0.0, upper_left[0], 0.0, -cell, upper_left[1])
+    count, rows, columns = values.shape
+    with create_image(
+        path, columns, rows, count, values.dtype.name, transform=transform, compress="deflate", predictor=3
+    ) as writer:
+        writer.dataset.descriptions = bands
+        writer.dataset.update_tags(**tags)
+        writer.write(0, values)

@@ -79,6 +79,10 @@ def test_free_check_verdicts():
     assert free_check(stages=(replace(stages[0], sigma0=1.9), good), spread=1.85).verdict == "tie points"
     positions = replace(stages[1], name=POSITIONS)
     assert free_check(stages=(stages[0], good, positions)).verdict == "positions"
+    together = replace(stages[1], largest_w=3.5)
+    sentence = free_check(stages=(stages[0], together)).sentence
+    assert "No single value explains it (the largest: C05: given Z too large" in sentence
+    assert "off by 0.010, 0.020, 0.354 m" in sentence
     untested = replace(good, ratio=np.nan)
     assert free_check(stages=(stages[0], untested)).verdict == "not tested"
     no_result = Stage(CONTROL, "rank deficient", "too little control", np.nan, np.nan, 0)

@@ -211,3 +211,20 @@ def test_suspects_in_words(block):
     text = suspect_text(check_free(bad, adjust).stages[1].suspects[0])
     assert text.startswith(f"{name}: given Y too small by 0.")
     assert " m (w " in text
+
+
+def test_robust_weights_are_the_same_in_every_stage(block):
+    """Gross errors turned down do not disturb the test of control: clean control fits, a wrong point is named."""
+    rng = np.random.default_rng(5)
+    xy = block.image_points.xy.copy()
+    rows = rng.choice(len(xy), len(xy) // 20, replace=False)
+    xy[rows] += rng.choice([-1.0, 1.0], (len(rows), 2)) * 0.03
+    robust = with_adjustment(with_image_points(block, xy=xy), robust="huber")
+    check = check_free(robust, adjust, adjust(robust))
+    assert check.robust
+    assert check.verdict == "tie points"
+    assert check.stages[1].ratio < check.stages[1].limit
+    bad, name = moved_control(robust, 3, 0, 1.0)
+    wrong = check_free(bad, adjust)
+    assert wrong.verdict == "both"
+    assert wrong.stages[1].suspects[0].name == name

@@ -1,4 +1,7 @@
-"""Kernels of the covariance: points and rays from the inverse on the pattern of the reduced normal matrix."""
+"""Kernels of the covariance: points and rays from the inverse on the pattern of the reduced normal matrix.
+
+Arguments as in `_kernels`; inverse : blocks (nb, 6, 6), border (n, s, 6), corner (s, s) of the inverse on the pattern.
+"""
 
 from __future__ import annotations
 
@@ -22,70 +25,93 @@ def solve_lower_transposed(lower, rhs):
 def point_cofactors(
     first, last, rays, pattern, table, state, estimator, limit, inverse, cofactor, redundancy, residual, weight, work
 ):
-    """Cofactors (P, 3, 3) of points first..last and redundancy numbers (m, 2) of their rays.
-
-    With the point eliminated, x_p = N⁻¹(b − N_pr·x_r), G = N⁻¹·N_pr and H = Q_rr·Gᵀ: Q_pp = N⁻¹ + G·H, and the row
-    (a_r, a_p) of a ray has the cofactor a_r·Q_rr·a_rᵀ − 2·a_r·H·a_pᵀ + a_p·Q_pp·a_pᵀ.
-
-    inverse : blocks (nb, 6, 6), border (n, s, 6), corner (s, s) of the inverse on the pattern.
-    """
+    """Cofactors (P, 3, 3) of points first..last and redundancy numbers (m, 2) of their rays."""
     start, image = rays[0], rays[1]
-    pair_start, pair_block = pattern
-    blocks, border, corner = inverse
-    by_eo, by_pt, by_sh, _, columns, n_columns, union, _, couple, couple_shared, _, _ = work
-    max_rays, n_shared = by_eo.shape[0], len(union)
-    h, h_shared = np.empty((max_rays, E, 3)), np.empty((n_shared, 3))
+    h, h_shared = coupling_scratch(work)
     lower, misclosure = np.zeros((3, 3)), np.zeros(3)
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
         _, n_union = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
         reduce_point(p, n_rays, n_union, table, state[2], 0.0, work, lower, misclosure)
+        couple_point(p, rays, pattern, inverse, n_union, lower, work, h, h_shared, cofactor[p])
         for q in range(n_rays):
-            solve_lower_transposed(lower, couple[q])
-        solve_lower_transposed(lower, couple_shared[:, :n_union])
-        _coupled_cofactors(
-            start[p], n_rays, n_union, image, pair_start[p], pair_block, blocks, border, corner, couple, couple_shared,
-            union, h, h_shared,
-        )  # fmt: skip
-        q_pp = cofactor[p]
-        own = np.eye(3)
-        _solve_lower(lower, own)
-        solve_lower_transposed(lower, own)
-        for a in range(3):
-            for b in range(3):
-                value = own[a, b]
-                for q in range(n_rays):
-                    for t in range(E):
-                        value += couple[q, a, t] * h[q, t, b]
-                for t in range(n_union):
-                    value += couple_shared[a, t] * h_shared[t, b]
-                q_pp[a, b] = value
-        for q in range(n_rays):
-            i = image[start[p] + q]
             for row in range(2):
-                a_p = by_pt[q, row]
-                explained = 0.0
-                for a in range(E):
-                    inner = 0.0
-                    for b in range(E):
-                        inner += blocks[i, a, b] * by_eo[q, row, b]
-                    for t in range(n_columns[q]):
-                        inner += 2.0 * border[i, union[columns[q, t]], a] * by_sh[q, row, t]
-                    for b in range(3):
-                        inner -= 2.0 * h[q, a, b] * a_p[b]
-                    explained += by_eo[q, row, a] * inner
-                for t in range(n_columns[q]):
-                    column = columns[q, t]
-                    inner = 0.0
-                    for c in range(n_columns[q]):
-                        inner += corner[union[column], union[columns[q, c]]] * by_sh[q, row, c]
-                    for b in range(3):
-                        inner -= 2.0 * h_shared[column, b] * a_p[b]
-                    explained += by_sh[q, row, t] * inner
-                for a in range(3):
-                    for b in range(3):
-                        explained += a_p[a] * q_pp[a, b] * a_p[b]
+                explained = row_cofactor(q, row, row, image[start[p] + q], inverse, work, h, h_shared, cofactor[p])
                 redundancy[start[p] + q, row] = 1.0 - explained
+
+
+@kernel
+def coupling_scratch(work):
+    """H over the photographs (rays, 6, 3) and shared parameters (s, 3) of a point, to be filled by `couple_point`."""
+    return np.empty((work[0].shape[0], E, 3)), np.empty((len(work[6]), 3))
+
+
+@kernel
+def couple_point(p, rays, pattern, inverse, n_union, lower, work, h, h_shared, q_pp):
+    """G in place of L⁻¹·N_pr in `work`, H and Q_pp of point p.
+
+    With the point eliminated, x_p = N⁻¹(b − N_pr·x_r), G = N⁻¹·N_pr and H = Q_rr·Gᵀ: Q_pp = N⁻¹ + G·H, Q_rp = −H.
+    """
+    start, image = rays[0], rays[1]
+    pair_start, pair_block = pattern
+    blocks, border, corner = inverse
+    n_rays = start[p + 1] - start[p]
+    union, couple, couple_shared = work[6], work[8], work[9]
+    for q in range(n_rays):
+        solve_lower_transposed(lower, couple[q])
+    solve_lower_transposed(lower, couple_shared[:, :n_union])
+    _coupled_cofactors(
+        start[p], n_rays, n_union, image, pair_start[p], pair_block, blocks, border, corner, couple, couple_shared,
+        union, h, h_shared,
+    )  # fmt: skip
+    own = np.eye(3)
+    _solve_lower(lower, own)
+    solve_lower_transposed(lower, own)
+    for a in range(3):
+        for b in range(3):
+            value = own[a, b]
+            for q in range(n_rays):
+                for t in range(E):
+                    value += couple[q, a, t] * h[q, t, b]
+            for t in range(n_union):
+                value += couple_shared[a, t] * h_shared[t, b]
+            q_pp[a, b] = value
+
+
+@kernel
+def row_cofactor(q, row, other, i, inverse, work, h, h_shared, q_pp):
+    """Cofactor between the predictions of the coordinates `row` and `other` of ray q in photograph i.
+
+    Rows (a_r, a_p) and (b_r, b_p) have a_r·Q_rr·b_rᵀ − a_r·H·b_pᵀ − a_p·Hᵀ·b_rᵀ + a_p·Q_pp·b_pᵀ.
+    """
+    blocks, border, corner = inverse
+    by_eo, by_pt, by_sh, _, columns, n_columns, union, _, _, _, _, _ = work
+    a_p, b_p = by_pt[q, row], by_pt[q, other]
+    explained = 0.0
+    for a in range(E):
+        inner, mirrored = 0.0, 0.0
+        for b in range(E):
+            inner += blocks[i, a, b] * by_eo[q, other, b]
+        for t in range(n_columns[q]):
+            inner += border[i, union[columns[q, t]], a] * by_sh[q, other, t]
+            mirrored += border[i, union[columns[q, t]], a] * by_sh[q, row, t]
+        for b in range(3):
+            inner -= h[q, a, b] * b_p[b]
+            mirrored -= h[q, a, b] * a_p[b]
+        explained += by_eo[q, row, a] * inner + by_eo[q, other, a] * mirrored
+    for t in range(n_columns[q]):
+        column = columns[q, t]
+        inner = 0.0
+        for c in range(n_columns[q]):
+            inner += corner[union[column], union[columns[q, c]]] * by_sh[q, other, c]
+        for b in range(3):
+            inner -= h_shared[column, b] * b_p[b]
+            explained -= h_shared[column, b] * a_p[b] * by_sh[q, other, t]
+        explained += by_sh[q, row, t] * inner
+    for a in range(3):
+        for b in range(3):
+            explained += a_p[a] * q_pp[a, b] * b_p[b]
+    return explained
 
 
 @kernel

@@ -49,7 +49,7 @@ def scratch(max_rays, max_columns, n_shared):
 
 @kernel
 def robust_factor(error, estimator, limit):
-    """Weight factor w and cost ρ of a ray with normalised length `error`, ρ ≈ error² for short ones and w = ρ'/(2·error).
+    """Weight factor w and cost ρ of a ray with normalised length `error`: w = ρ'/(2·error), ρ ≈ error² for short ones.
 
     The estimators are described in `robust`; the codes from ADAPTIVE on carry the spread and the odds of gross errors.
     """

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -300,6 +301,27 @@ class NormalSystem:
         for row, columns in zip(u.kept_rows, u.kept_columns, strict=True):
             cofactor[row] = inverse.corner[np.ix_(columns, columns)]
         return cofactor, redundancy
+
+    def over_points(self, state: State, kernel: Callable[..., object]) -> None:
+        """kernel(first, last, rays, pattern, table, state, work) over ranges of points, in threads."""
+        u = self.unknowns
+        arguments = u.rays.as_tuple(), (u.pair_start, u.pair_block), self._table(state), self._state(state)
+        run_chunks(lambda k: kernel(*self._bounds[k], *arguments, self._work()), len(self._bounds))
+
+    def without(self, rays_off: np.ndarray, control_off: np.ndarray) -> NormalSystem:
+        """The same system with rays (m,) bool and the given coordinates of points (P,) bool switched off.
+
+        They keep their places with weight 0, so that nothing is sorted or ordered anew; the counts are not theirs.
+        """
+        u, other = self.unknowns, copy(self)
+        inv_sigma = np.where(rays_off[:, None], 0.0, u.rays.inv_sigma)
+        weight = np.where(control_off[:, None], 0.0, u.prior_weight)
+        other.unknowns = replace(u, rays=replace(u.rays, inv_sigma=inv_sigma), prior_weight=weight)
+        other._point_prior = np.where((u.kept < 0)[:, None], weight, 0.0)
+        other._prior_weight = self._prior_weight.copy()
+        off = control_off[u.kept_rows]
+        other._prior_weight[u.kept_columns[off]] = 0.0
+        return other
 
     def factorise(self, equations: NormalEquations) -> Factor:
         """Factor of the reduced matrix; valid until the next one."""

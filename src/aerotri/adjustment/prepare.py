@@ -24,7 +24,7 @@ from aerotri.conventions import InputError
 from aerotri.functional_model.atmosphere import corrected_image_points
 from aerotri.observations import Block
 
-USED, ONE_RAY, OFF, NO_START, NOT_FINITE = range(5)
+USED, ONE_RAY, OFF, NO_START, NOT_FINITE, REMOVED = range(6)
 """Status of a ray; the words stand in `statistics.adjusted_block.RAY_STATUS`."""
 
 

@@ -296,7 +296,8 @@ def _colmap_text(errors: dict[int, ErrorFunction], names: dict[int, str], as_mea
         if as_measured:
             nearest = nearest_opencv(function)
             camera = nearest.camera
-            told = f"as measured; the model leaves {nearest.rms_mm * 1e3:.2f} um RMS, {nearest.max_mm * 1e3:.2f} um at most"
+            left = f"{nearest.rms_mm * 1e3:.2f} um RMS, {nearest.max_mm * 1e3:.2f} um at most"
+            told = f"as measured; the model leaves {left}"
         lines.append(f"# {number}: {_plain(names[k])}, {told}")
         lines.append(_colmap_line(number, camera, *colmap_camera(camera)))
     return "\n".join(lines) + "\n"
@@ -333,9 +334,7 @@ def _resample_all(
 
         started = time.perf_counter()
         with atomic_file(out / job.name) as place:
-            lost = ideal_photograph(
-                job.source, place, maps[job.group], options.resampling, options.compression, report
-            )
+            lost = ideal_photograph(job.source, place, maps[job.group], options.resampling, options.compression, report)
         done.append({
             "file": str(job.source), "written": job.name, "group": errors[job.group].group,
             "left_out": list(lost), "seconds": round(time.perf_counter() - started, 3),

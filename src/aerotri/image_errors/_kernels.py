@@ -14,13 +14,23 @@ from aerotri.compiled import inlined, kernel
 PAD = 3
 """Pixels by which the source has to reach beyond the image on every side, for the taps next to the border."""
 LONGEST = 1.0e6
-LANCZOS_DRIFT = 1.0 / 64.0
-"""Pixels by which the position may drift within a run whose Lanczos weights are interpolated between its ends."""
+ONE, TWO, THREE, FOUR, FIVE = np.uintp(1), np.uintp(2), np.uintp(3), np.uintp(4), np.uintp(5)
+COSINES = np.cos(np.pi * (2.0 - np.arange(6)) / 3.0)
+SINES = np.sin(np.pi * (2.0 - np.arange(6)) / 3.0)
+LANCZOS_DRIFT = 1.0 / 8.0
+"""Pixels by which the source position may drift within a run whose Lanczos weights are a parabola through those of its
+start, middle and end: wrong by less than 3e-4 then."""
+
+
+@inlined
+def _pixel(value, low, high, is_integer):
+    """A sum as a pixel can hold it."""
+    return np.floor(min(max(value, low), high) + np.float32(0.5)) if is_integer else value
 
 
 @inlined
 def _cubic(t):
-    """Weights of the four neighbours at the place t between the inner two: Keys' cubic, a = −½, of third order."""
+    """Weights of four neighbours at the place t between the inner two: Keys' cubic, a = −½, of third order."""
     half, one = np.float32(0.5), np.float32(1.0)
     first = half * t * (t * (np.float32(2.0) - t) - one)
     third = half * t * (one + t * (np.float32(4.0) - np.float32(3.0) * t))
@@ -28,91 +38,104 @@ def _cubic(t):
     return first, one - first - third - fourth, third, fourth
 
 
+@inlined
+def _four(source, row, c, a):
+    """Four neighbours in a row, weighted."""
+    left = a[0] * source[row, c] + a[1] * source[row, c + ONE]
+    return left + a[2] * source[row, c + TWO] + a[3] * source[row, c + THREE]
+
+
 @kernel
-def cubic_run(r0, r1, r2, r3, out, at, is_integer):
-    """A run of pixels by bicubic interpolation.
+def cubic_run(source, first, out, to, n, x, dx, y, dy, low, high, is_integer):
+    """A run of n pixels from four by four taps.
 
     Parameters
     ----------
-    r0 … r3 : (n + 3,) the four source rows, from the first tap of the first pixel.
-    out : (n,). at : (6,) place between columns and its change per pixel, place between rows and its change, smallest
-        and largest value of the type of pixel; of the type the sums are to have.
+    source : (rows, columns) of the type of the sums. first : row and column of the first tap of the first pixel.
+    out : (rows, columns). to : row and column of the first pixel. Rows and columns are unsigned numbers, which the
+        compiler need not look up from the end of the array.
+    x, y : place of the first pixel between its inner taps; dx, dy : its change from pixel to pixel; low, high :
+        smallest and largest value of a pixel; all of the type of the sums.
     """
-    x, dx, y, dy, low, high = at[0], at[1], at[2], at[3], at[4], at[5]
-    for i in range(len(out)):
+    r0, c0 = first
+    r1, r2, r3 = r0 + ONE, r0 + TWO, r0 + THREE
+    row, column = to
+    for i in range(n):
         k = np.float32(i)
-        a = _cubic(x + dx * k)
-        b = _cubic(y + dy * k)
-        v = b[0] * (a[0] * r0[i] + a[1] * r0[i + 1] + a[2] * r0[i + 2] + a[3] * r0[i + 3])
-        v += b[1] * (a[0] * r1[i] + a[1] * r1[i + 1] + a[2] * r1[i + 2] + a[3] * r1[i + 3])
-        v += b[2] * (a[0] * r2[i] + a[1] * r2[i + 1] + a[2] * r2[i + 2] + a[3] * r2[i + 3])
-        v += b[3] * (a[0] * r3[i] + a[1] * r3[i + 1] + a[2] * r3[i + 2] + a[3] * r3[i + 3])
-        if is_integer:
-            v = np.floor(min(max(v, low), high) + np.float32(0.5))
-        out[i] = v
+        a, b = _cubic(x + dx * k), _cubic(y + dy * k)
+        c = c0 + i
+        v = b[0] * _four(source, r0, c, a) + b[1] * _four(source, r1, c, a)
+        v += b[2] * _four(source, r2, c, a) + b[3] * _four(source, r3, c, a)
+        out[row, column + i] = _pixel(v, low, high, is_integer)
 
 
 @kernel
 def lanczos_weights(t, weights):
     """(6,) out: Lanczos' windowed sinc of three lobes at the place t between the inner two of six neighbours, sum 1."""
+    sine, sine_3, cosine_3 = np.sin(np.pi * t), np.sin(np.pi * t / 3.0), np.cos(np.pi * t / 3.0)
     total = 0.0
     for j in range(6):
-        u = np.pi * (t + 2.0 - j)
-        weights[j] = 1.0 if abs(u) < 1e-9 else 3.0 * np.sin(u) * np.sin(u / 3.0) / (u * u)
+        u, sign = t + 2.0 - j, 1.0 - 2.0 * (j % 2)
+        turned = sine_3 * COSINES[j] + cosine_3 * SINES[j]
+        weights[j] = 1.0 if abs(u) < 1e-6 else 3.0 * sign * sine * turned / (np.pi * u) ** 2
         total += weights[j]
     for j in range(6):
         weights[j] /= total
 
 
-@inlined
-def _six(row, i, a):
-    left = a[0] * row[i] + a[1] * row[i + 1] + a[2] * row[i + 2]
-    return left + a[3] * row[i + 3] + a[4] * row[i + 4] + a[5] * row[i + 5]
+@kernel
+def lanczos_parabola(place, drift, n, scratch, weights):
+    """(3, 6) out: weights of pixel k of a run of n are w0 + k·(w1 + k·w2); scratch : (3, 6)."""
+    for j in range(3):
+        lanczos_weights(place + 0.5 * j * n * drift, scratch[j])
+    for j in range(6):
+        start, middle, end = scratch[0, j], scratch[1, j], scratch[2, j]
+        weights[0, j] = start
+        weights[1, j] = (4.0 * middle - 3.0 * start - end) / n
+        weights[2, j] = 2.0 * (start - 2.0 * middle + end) / n**2
 
 
 @inlined
-def _weights_of(table, row):
-    return table[row, 0], table[row, 1], table[row, 2], table[row, 3], table[row, 4], table[row, 5]
+def _six(w, row):
+    return w[row, 0], w[row, 1], w[row, 2], w[row, 3], w[row, 4], w[row, 5]
 
 
 @inlined
-def _linear(a, change, k):
-    """Weights of pixel k of a run from those of its first pixel and their change per pixel."""
+def _at(k, a, b, c):
     return (
-        a[0] + k * change[0],
-        a[1] + k * change[1],
-        a[2] + k * change[2],
-        a[3] + k * change[3],
-        a[4] + k * change[4],
-        a[5] + k * change[5],
-    )
+        a[0] + k * (b[0] + k * c[0]), a[1] + k * (b[1] + k * c[1]), a[2] + k * (b[2] + k * c[2]),
+        a[3] + k * (b[3] + k * c[3]), a[4] + k * (b[4] + k * c[4]), a[5] + k * (b[5] + k * c[5]),
+    )  # fmt: skip
+
+
+@inlined
+def _sum(source, row, c, a):
+    """Six neighbours in a row, weighted."""
+    left = a[0] * source[row, c] + a[1] * source[row, c + ONE] + a[2] * source[row, c + TWO]
+    return left + a[3] * source[row, c + THREE] + a[4] * source[row, c + FOUR] + a[5] * source[row, c + FIVE]
 
 
 @kernel
-def lanczos_run(source, row, column, out, at, weights, is_integer):
-    """As `cubic_run` with six taps from `row` and `column` on; weights : (4, 6) scratch of the type of the sums."""
-    n, low, high = len(out), at[4], at[5]
-    start, end = np.empty(6), np.empty(6)
-    for part in range(2):
-        lanczos_weights(at[2 * part], start)
-        lanczos_weights(at[2 * part] + n * at[2 * part + 1], end)
-        for j in range(6):
-            weights[2 * part, j] = start[j]
-            weights[2 * part + 1, j] = (end[j] - start[j]) / n
-    last = column + n + 5
-    r0, r1, r2 = source[row, column:last], source[row + 1, column:last], source[row + 2, column:last]
-    r3, r4, r5 = source[row + 3, column:last], source[row + 4, column:last], source[row + 5, column:last]
+def lanczos_run(source, first, out, to, n, weights, low, high, is_integer):
+    """As `cubic_run` from six by six taps.
+
+    Parameters
+    ----------
+    weights : (6, 6) of the columns, three rows as `lanczos_parabola` gives them, and of the rows.
+    """
     # numbers of their own, since the table might, for all the compiler knows, lie in the output
-    a0, da, b0, db = _weights_of(weights, 0), _weights_of(weights, 1), _weights_of(weights, 2), _weights_of(weights, 3)
+    a0, a1, a2 = _six(weights, 0), _six(weights, 1), _six(weights, 2)
+    b0, b1, b2 = _six(weights, 3), _six(weights, 4), _six(weights, 5)
+    r0, c0 = first
+    r1, r2, r3, r4, r5 = r0 + ONE, r0 + TWO, r0 + THREE, r0 + FOUR, r0 + FIVE
+    row, column = to
     for i in range(n):
         k = np.float32(i)
-        a = _linear(a0, da, k)
-        b = _linear(b0, db, k)
-        v = b[0] * _six(r0, i, a) + b[1] * _six(r1, i, a) + b[2] * _six(r2, i, a)
-        v += b[3] * _six(r3, i, a) + b[4] * _six(r4, i, a) + b[5] * _six(r5, i, a)
-        if is_integer:
-            v = np.floor(min(max(v, low), high) + np.float32(0.5))
-        out[i] = v
+        a, b = _at(k, a0, a1, a2), _at(k, b0, b1, b2)
+        c = c0 + i
+        v = b[0] * _sum(source, r0, c, a) + b[1] * _sum(source, r1, c, a) + b[2] * _sum(source, r2, c, a)
+        v += b[3] * _sum(source, r3, c, a) + b[4] * _sum(source, r4, c, a) + b[5] * _sum(source, r5, c, a)
+        out[row, column + i] = _pixel(v, low, high, is_integer)
 
 
 @inlined
@@ -126,39 +149,48 @@ def _stay(place, change):
 
 
 @kernel
-def resample_run(source, source_row, out, x, dx, y, dy, size, fill, at, weights, is_integer, lanczos):
-    """A run of pixels whose source position changes linearly.
+def resample_run(
+    source, source_row, out, r, first, n, x, dx, y, dy, size, limits, weights, scratch, is_integer, lanczos
+):  # fmt: skip
+    """A run of n pixels whose source position changes linearly.
 
     Parameters
     ----------
     source : rows of the image from `source_row` on, `PAD` columns more on either side.
-    out : (n,). x, y : source column and row of the first pixel, 0 the centre of the first one; dx, dy : their change
-        from pixel to pixel, dx less 1.
-    size : (2,) rows and columns of the image. fill : value outside of it.
-    at, weights : scratch, at[4:] set.
+    out : (rows, columns); r, first : row and column of the first pixel.
+    x, y : source column and row of the first pixel, 0 the centre of the first one; dx, dy : their change from pixel to
+        pixel, dx less 1.
+    size : (2,) rows and columns of the image.
+    limits : (3,) smallest and largest value of a pixel, and the value outside the image.
+    weights : (7, 6) scratch, as limits and source of the type of the sums. scratch : (3, 6) of double precision.
     """
-    done, n, taps = 0, len(out), PAD if lanczos else PAD - 1
+    done = 0
+    longest = int(min(LANCZOS_DRIFT / (max(abs(dx), abs(dy)) + 1e-30), LONGEST)) + 1 if lanczos else n
     while done < n:
         column, row = int(np.floor(x)), int(np.floor(y))
-        many = min(n - done, _stay(x - column, dx), _stay(y - row, dy))
+        many = min(n - done, longest, _stay(x - column, dx), _stay(y - row, dy))
         if column < -1 or row < -1 or column >= size[1] or row >= size[0]:
-            out[done : done + many] = fill
+            out[r, first + done : first + done + many] = limits[2]
         else:
-            at[0], at[1], at[2], at[3] = x - column, dx, y - row, dy
-            i, j = row - taps + 1 - source_row, column - taps + 1 + PAD
+            taps = 2 if lanczos else 1
+            at = np.uintp(row - taps - source_row), np.uintp(column - taps + PAD)
+            to = np.uintp(r), np.uintp(first + done)
             if lanczos:
-                many = min(many, int(min(LANCZOS_DRIFT / (abs(dx) + abs(dy) + 1e-30), LONGEST)) + 1)
-                lanczos_run(source, i, j, out[done : done + many], at, weights, is_integer)
+                lanczos_parabola(x - column, dx, many, scratch, weights[:3])
+                lanczos_parabola(y - row, dy, many, scratch, weights[3:6])
+                lanczos_run(source, at, out, to, np.uintp(many), weights, limits[0], limits[1], is_integer)
             else:
-                # every row on its own: only then the compiler knows that neighbours are neighbours in memory
-                k = j + many + 3
-                r0, r1, r2, r3 = source[i, j:k], source[i + 1, j:k], source[i + 2, j:k], source[i + 3, j:k]
-                cubic_run(r0, r1, r2, r3, out[done : done + many], at, is_integer)
-            if column < 0 or row < 0 or column >= size[1] - 1 or row >= size[0] - 1:
-                for k in range(many):
-                    u, v = x + k * (1.0 + dx), y + k * dy
-                    if u < -0.5 or v < -0.5 or u > size[1] - 0.5 or v > size[0] - 0.5:
-                        out[done + k] = fill
+                # through the table, since that makes them numbers of the type of the sums
+                weights[6, 0], weights[6, 1], weights[6, 2], weights[6, 3] = x - column, dx, y - row, dy
+                cubic_run(
+                    source, at, out, to, np.uintp(many), weights[6, 0], weights[6, 1], weights[6, 2], weights[6, 3],
+                    limits[0], limits[1], is_integer,
+                )  # fmt: skip
+        if column < 0 or row < 0 or column >= size[1] - 1 or row >= size[0] - 1:
+            for k in range(many):
+                u, v = x + k * (1.0 + dx), y + k * dy
+                if u < -0.5 or v < -0.5 or u > size[1] - 0.5 or v > size[0] - 0.5:
+                    out[r, first + done + k] = limits[2]
         done += many
         x += many * (1.0 + dx)
         y += many * dy
@@ -166,14 +198,14 @@ def resample_run(source, source_row, out, x, dx, y, dy, size, fill, at, weights,
 
 @kernel
 def resample_tile(
-    source, source_row, out, out_row, nodes, origin, step, begin, end, top, bottom, size, fill, at, weights, is_integer,
-    lanczos,
+    source, source_row, out, out_row, nodes, origin, step, begin, end, top, bottom, size, limits, weights, scratch,
+    is_integer, lanczos,
 ):  # fmt: skip
     """The pixels of some rows that belong to one tile.
 
     Parameters
     ----------
-    source, source_row, size, fill, at, weights : as in `resample_run`.
+    source, source_row, size, limits, weights, scratch : as in `resample_run`.
     out : rows of the output from `out_row` on.
     nodes : (k, l, 2) px, source less output position (column, row) at nodes every `step` pixels, from pixel `origin`
         (2,) = row, column on.
@@ -206,6 +238,7 @@ def resample_tile(
             x += column + (column - first) * dx
             y += row + (column - first) * dy
             resample_run(
-                source, source_row, out[r, column:stop], x, dx, y, dy, size, fill, at, weights, is_integer, lanczos
-            )
+                source, source_row, out, r, column, stop - column, x, dx, y, dy, size, limits, weights, scratch,
+                is_integer, lanczos,
+            )  # fmt: skip
             column = stop

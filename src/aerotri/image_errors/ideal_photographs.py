@@ -67,9 +67,8 @@ class IdealMap:
         least, most = 0.0, 0.0
         for row in self.tiles:
             for grid in row:
-                i = np.clip((np.array([first, last]) - grid.row) // grid.step, 0, grid.nodes.shape[0] - 2)
-                moved = grid.nodes[i[0] : i[1] + 2, :, 1]
-                least, most = min(least, float(moved.min())), max(most, float(moved.max()))
+                low, high = grid.bounds((first, last), (0, self.size[1]))
+                least, most = min(least, float(low[1])), max(most, float(high[1]))
         low = min(max(int(np.floor(first + least)), -1), self.size[0])
         high = max(min(int(np.floor(last - 1 + most)), self.size[0] - 1), -1)
         return low - _kernels.PAD + 1, max(high, low) + _kernels.PAD + 1
@@ -196,43 +195,49 @@ class _Tasks:
     """The work on some rows in pieces that may run at the same time."""
 
     def __init__(self, source, source_row, rows, ideal: IdealMap, kind: PixelType, method: str):
+        self.source, self.source_row = source, source_row
         self.ideal, self.kind, self.lanczos, self.first = ideal, kind, method == "lanczos", rows[0]
         self.out = np.empty((len(source), rows[1] - rows[0], ideal.size[1]), source.dtype)
-        low, high = ideal.source_rows(*rows)
-        within = source[:, max(low, 0) - source_row : min(high, ideal.size[0]) - source_row]
-        pad = (max(-low, 0), max(high - ideal.size[0], 0))
-        self.padded = np.pad(within, ((0, 0), pad, (_kernels.PAD, _kernels.PAD)), mode="edge")
-        self.low = low
         self.pieces = -(-self.out.shape[1] // TASK_ROWS)
         self.count = self.pieces * len(source)
 
     def __call__(self, k: int) -> None:
         band, piece = divmod(k, self.pieces)
-        part = slice(piece * TASK_ROWS, (piece + 1) * TASK_ROWS)
-        out, padded = self.out[band, part], self.padded[band]
-        self._fill(padded, out, part.start)
+        out = self.out[band, piece * TASK_ROWS : (piece + 1) * TASK_ROWS]
+        first = self.first + piece * TASK_ROWS
+        source = self._padded(band, self.ideal.source_rows(first, first + len(out)))
+        self._fill(source, out, first, (self.kind.low, self.kind.high, self.kind.fill))
         if self.kind.nodata is not None:
-            invalid = _is(padded, self.kind.nodata)
+            invalid = _is(source, self.kind.nodata)
             if invalid.any():
-                weight = np.zeros(out.shape, np.float32)
-                self._fill(invalid.astype(np.float32), weight, part.start)
+                weight = np.zeros(out.shape, source.dtype)
+                self._fill(invalid.astype(source.dtype), weight, first, (0.0, 1.0, 0.0))
                 out[np.abs(weight) > 1e-6] = self.kind.nodata
 
-    def _fill(self, padded: np.ndarray, out: np.ndarray, start: int) -> None:
-        ideal, first = self.ideal, self.first + start
-        exact = out.dtype == np.float32 or out.itemsize <= 2
-        real = np.float32 if exact else np.float64
-        at, weights = np.zeros(6, real), np.zeros((4, 6), real)
-        at[4:] = (self.kind.low, self.kind.high)
-        rows = slice(first, first + len(out))
+    def _padded(self, band: int, rows: tuple[int, int]) -> np.ndarray:
+        """Source rows in the type of the sums, the pixels on the border of the image repeated beyond it."""
+        wide, pad = self.out.dtype.itemsize > 2 and self.out.dtype != np.float32, _kernels.PAD
+        number = np.clip(np.arange(*rows), 0, self.ideal.size[0] - 1) - self.source_row
+        padded = np.empty((len(number), self.ideal.size[1] + 2 * pad), np.float64 if wide else np.float32)
+        if len(number) == number[-1] - number[0] + 1:
+            padded[:, pad:-pad] = self.source[band, number[0] : number[-1] + 1]
+        else:
+            padded[:, pad:-pad] = self.source[band, number]
+        padded[:, :pad], padded[:, -pad:] = padded[:, pad, None], padded[:, -pad - 1, None]
+        return padded
+
+    def _fill(self, source: np.ndarray, out: np.ndarray, first: int, limits: tuple[float, float, float]) -> None:
+        ideal, rows = self.ideal, slice(first, first + len(out))
+        limit, weights, scratch = np.array(limits, source.dtype), np.empty((7, 6), source.dtype), np.empty((3, 6))
+        low, _ = ideal.source_rows(first, rows.stop)
         for i, line in enumerate(ideal.tiles):
             if ideal.rows[i].min() >= rows.stop or ideal.rows[i + 1].max() <= first:
                 continue
             for j, grid in enumerate(line):
                 _kernels.resample_tile(
-                    padded, self.low, out, first, grid.nodes, np.array([grid.row, grid.column]), grid.step,
+                    source, low, out, first, grid.nodes, np.array([grid.row, grid.column]), grid.step,
                     ideal.columns[j, rows], ideal.columns[j + 1, rows], ideal.rows[i], ideal.rows[i + 1],
-                    np.array(ideal.size), self.kind.fill, at, weights, out.dtype.kind in "iu", self.lanczos,
+                    np.array(ideal.size), limit, weights, scratch, out.dtype.kind in "iu", self.lanczos,
                 )  # fmt: skip
 
 
@@ -320,6 +325,6 @@ def _stream(photograph: Photograph, write, ideal: IdealMap, method: str, report:
             going.result()
 
 
-def stem_of(path: Path) -> str:
+def name_of(path: Path) -> str:
     """Name of the ideal photograph of a file."""
     return path.stem + (path.suffix if path.suffix.lower() in (".tif", ".tiff") else ".tif")

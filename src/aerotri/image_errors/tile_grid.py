@@ -75,6 +75,13 @@ class TileGrid:
         lower = (1.0 - s) * self.nodes[i + 1, j] + s * self.nodes[i + 1, j + 1]
         return (1.0 - t) * upper + t * lower
 
+    def bounds(self, rows: tuple[int, int], columns: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest and largest value (2,) that pixels in these rows and columns, first and last, can have."""
+        first, _ = _cell(np.array(rows) - self.row, self.step, 0, self)
+        left, _ = _cell(np.array(columns) - self.column, self.step, 1, self)
+        nodes = self.nodes[first[0] : first[1] + 2, left[0] : left[1] + 2].reshape(-1, 2)
+        return nodes.min(axis=0), nodes.max(axis=0)
+
 
 def _cell(offset: np.ndarray, step: int, axis: int, grid: TileGrid) -> tuple[np.ndarray, np.ndarray]:
     """(n,) first node of the cell, and (n, 1) place in it."""

@@ -13,8 +13,8 @@ from aerotri.observations import Block
 if TYPE_CHECKING:
     from aerotri.statistics.variance_components import VarianceComponents
 
-RAY_STATUS = ("used", "one ray", "off", "no start value", "not finite")
-"""Status of a ray: adjusted, or why it was left out. The records hold the index into this tuple."""
+RAY_STATUS = ("used", "one ray", "off", "no start value", "not finite", "removed")
+"""Status of a ray: adjusted, or why it was left out; data snooping removes. The records hold the index into this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +113,25 @@ class RayResults:
 
 
 @dataclass(frozen=True, eq=False)
+class RayEffects:
+    """External reliability of the m rays: the greatest effect of errors that just stay undetected; see there.
+
+    Parameters
+    ----------
+    size : (m, 2) of the effects of x and y, over σ of the unknown; NaN where there is no test.
+    unknown : (m, 2) which: 0–2 X, Y, Z of the ray's point, 3–8 X0, Y0, Z0, ω, φ, κ of its photograph, 9 + k the shared
+        parameter k, −1 for none.
+    height : (m, 2) m, effect on Z of the ray's point.
+    shared : (s,) str, the shared parameters.
+    """
+
+    size: np.ndarray
+    unknown: np.ndarray
+    height: np.ndarray
+    shared: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class SharedParameters:
     """Unknowns shared by many rays: interior orientation, additional parameters, GNSS shifts; s of them.
 
@@ -188,6 +207,7 @@ class ObservationResults:
     ----------
     group : (o,) str. label : (o,) str, the photograph or condition. component : (o,) str, such as X or omega.
     v, sigma : (o,) m, rad for attitudes; sigma a priori. r : (o,) redundancy numbers. w : (o,) −v/(σ√r).
+    effect : (o,) greatest effect of an error that just stays undetected, over σ of the unknown; effect_on : (o,) str.
     """
 
     group: np.ndarray
@@ -197,6 +217,8 @@ class ObservationResults:
     sigma: np.ndarray
     r: np.ndarray
     w: np.ndarray
+    effect: np.ndarray | None = None
+    effect_on: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.group)
@@ -248,3 +270,4 @@ class AdjustedBlock:
     blunders: tuple[Blunder, ...] = ()
     observations: ObservationResults | None = None
     components: VarianceComponents | None = None
+    effects: RayEffects | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,25 @@ from aerotri.functional_model.rotation import angles_from_rotation, small_rotati
 
 
 @dataclass(frozen=True, eq=False)
+class InnerDatum:
+    """What leads from a minimal to the inner datum: Q becomes SQSᵀ, S = I − G·A, A the conditions GᵀD scaled.
+
+    Parameters
+    ----------
+    images (n, 6, d), shared (s, d), points (P, 3, d) : the d free motions G in the unknowns.
+    q_images, q_shared, q_points : Q·Aᵀ, of the same shapes. both : (d, d), A·Q·Aᵀ.
+    """
+
+    images: np.ndarray
+    shared: np.ndarray
+    points: np.ndarray
+    q_images: np.ndarray
+    q_shared: np.ndarray
+    q_points: np.ndarray
+    both: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Cofactors:
     """Cofactors (covariance divided by σ0²) at the solution.
 
@@ -24,6 +43,8 @@ class Cofactors:
     shared : (s, s). points : (P, 3, 3).
     image_shared : (n, 6, s).
     ray_redundancy : (m, 2), in the order of `unknowns.rays`.
+    inverse : of the normal matrix on its pattern, in the minimal datum where there is an inner one.
+    inner : None unless the datum is an inner one.
     """
 
     images: np.ndarray
@@ -31,6 +52,8 @@ class Cofactors:
     points: np.ndarray
     image_shared: np.ndarray
     ray_redundancy: np.ndarray
+    inverse: InverseOnPattern
+    inner: InnerDatum | None = None
 
 
 def cofactors(system: NormalSystem, state: State, factor: Factor, estimator: Estimator) -> Cofactors:
@@ -41,9 +64,9 @@ def cofactors(system: NormalSystem, state: State, factor: Factor, estimator: Est
     inverse = factor.inverse_on_pattern()
     points, redundancy = system.point_cofactors(state, inverse, estimator)
     images, border = _without_held(system.unknowns, inverse)
-    result = Cofactors(images, inverse.corner, points, border, redundancy)
+    result = Cofactors(images, inverse.corner, points, border, redundancy, inverse)
     if system.unknowns.block.settings.adjustment.datum == "inner" and system.unknowns.motions.count:
-        return transform_datum(system, state, factor, estimator, result)
+        return transform_datum(result, inner_datum(system, state, factor, estimator))
     return result
 
 
@@ -56,11 +79,10 @@ def _without_held(unknowns: Unknowns, inverse: InverseOnPattern) -> tuple[np.nda
     return images, border
 
 
-def transform_datum(system: NormalSystem, state: State, factor: Factor, estimator: Estimator, minimal: Cofactors):
-    """Cofactors in the inner datum over the datum points, from those in a minimal datum.
+def inner_datum(system: NormalSystem, state: State, factor: Factor, estimator: Estimator) -> InnerDatum:
+    """The inner datum over the datum points: A = (GᵀDG)⁻¹GᵀD, D choosing them.
 
-    With A = (GᵀDG)⁻¹GᵀD, D choosing the datum points, and S = I − G·A: SQSᵀ = Q − G(AQ) − (AQ)ᵀGᵀ + G(AQAᵀ)Gᵀ. Only
-    the columns Q·Aᵀ, as many as motions are free, are needed beyond the pattern.
+    Only the columns Q·Aᵀ, as many as motions are free, are needed beyond the pattern.
     """
     free = system.unknowns.motions
     d = free.count
@@ -74,15 +96,24 @@ def transform_datum(system: NormalSystem, state: State, factor: Factor, estimato
     g_datum = g_points[rows].reshape(-1, d)
     a = np.zeros((len(state.points), 3, d))
     a[rows] = np.linalg.solve(g_datum.T @ g_datum, g_datum.T).T.reshape(-1, 3, d)
-    qa_images, qa_shared, qa_points = system.solve_sides(state, factor, a, estimator)
-    aqa = np.einsum("pia,pib->ab", a, qa_points)
-    mixed = np.einsum("nia,sa->nis", g_images, qa_shared) + np.einsum("nia,sa->nis", qa_images, g_shared)
-    return Cofactors(
-        images=_transformed(minimal.images, g_images, qa_images, aqa),
-        shared=_transformed(minimal.shared[None], g_shared[None], qa_shared[None], aqa)[0],
-        points=_transformed(minimal.points, g_points, qa_points, aqa),
-        image_shared=minimal.image_shared - mixed + np.einsum("nia,ab,sb->nis", g_images, aqa, g_shared),
-        ray_redundancy=minimal.ray_redundancy,
+    q_images, q_shared, q_points = system.solve_sides(state, factor, a, estimator)
+    both = np.einsum("pia,pib->ab", a, q_points)
+    return InnerDatum(g_images, g_shared, g_points, q_images, q_shared, q_points, both)
+
+
+def transform_datum(minimal: Cofactors, inner: InnerDatum) -> Cofactors:
+    """Cofactors in the inner datum from those in a minimal one: SQSᵀ = Q − G(AQ) − (AQ)ᵀGᵀ + G(AQAᵀ)Gᵀ."""
+    mixed = np.einsum("nia,sa->nis", inner.images, inner.q_shared)
+    mixed += np.einsum("nia,sa->nis", inner.q_images, inner.shared)
+    return replace(
+        minimal,
+        images=_transformed(minimal.images, inner.images, inner.q_images, inner.both),
+        shared=_transformed(minimal.shared[None], inner.shared[None], inner.q_shared[None], inner.both)[0],
+        points=_transformed(minimal.points, inner.points, inner.q_points, inner.both),
+        image_shared=minimal.image_shared
+        - mixed
+        + np.einsum("nia,ab,sb->nis", inner.images, inner.both, inner.shared),
+        inner=inner,
     )
 
 
@@ -91,15 +122,24 @@ def _transformed(q: np.ndarray, g: np.ndarray, qa: np.ndarray, aqa: np.ndarray) 
     return q - mixed - np.swapaxes(mixed, 1, 2) + np.einsum("nia,ab,njb->nij", g, aqa, g)
 
 
-def orientation_cofactors(unknowns: Unknowns, state: State, q_images: np.ndarray) -> np.ndarray:
-    """(n, 6, 6) cofactors of X0, Y0, Z0, ω, φ, κ; NaN in the angles where the middle angle is ±90°."""
+def to_angles(unknowns: Unknowns, state: State) -> np.ndarray:
+    """(n, 3, 3) partials of ω, φ, κ by the three rotation unknowns; NaN where the middle angle is ±90°."""
     angles = angles_from_rotation(state.rotation, unknowns.block.rotation)
     per_angle = small_rotation_per_angle(angles, unknowns.block.rotation)
     singular = np.abs(np.linalg.det(per_angle)) < 1e-9
     per_angle[singular] = np.eye(3)
-    jacobian = np.zeros((len(angles), 6, 6))
+    partials = np.linalg.solve(per_angle, unknowns.turn(state))
+    partials[singular] = np.nan
+    return partials
+
+
+def orientation_cofactors(unknowns: Unknowns, state: State, q_images: np.ndarray) -> np.ndarray:
+    """(n, 6, 6) cofactors of X0, Y0, Z0, ω, φ, κ; NaN in the angles where the middle angle is ±90°."""
+    partials = to_angles(unknowns, state)
+    jacobian = np.zeros((len(partials), 6, 6))
     jacobian[:, :3, :3] = np.eye(3)
-    jacobian[:, 3:, 3:] = np.linalg.solve(per_angle, unknowns.turn(state))
+    singular = np.isnan(partials[:, 0, 0])
+    jacobian[:, 3:, 3:] = np.where(singular[:, None, None], np.eye(3), partials)
     q = jacobian @ q_images @ np.swapaxes(jacobian, 1, 2)
     q[singular, 3:] = np.nan
     q[singular, :, 3:] = np.nan

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import fdtri
 
+from aerotri.conventions import InputError
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import AdjustedBlock
@@ -30,7 +31,6 @@ SAME_SCALE = 0.01
 """σ̂0 of the free block nearer to 1 than this needs no adjustment with other weights."""
 NAMED_SUSPECTS = 10
 
-
 Adjust = Callable[[Block], AdjustedBlock]
 
 
@@ -43,18 +43,21 @@ def check_free(block: Block, adjust: Adjust, full: AdjustedBlock | None = None) 
     full : the adjustment of `block` where it is known already.
     """
     sigma0_full = np.nan if full is None else full.outcome.sigma0
-    block, changed = _comparable(block)
+    block, changed = _comparable(block, full)
     full = None if changed else full
     robust = block.settings.adjustment.robust != "off"
     try:
-        free = adjust(free_block(block))
-    except AdjustmentFailedError as failure:
+        judged = free = adjust(free_block(block))
+        if robust:
+            block, full = _with_frozen_weights(block, judged), None
+            free = adjust(free_block(block))
+    except (AdjustmentFailedError, InputError) as failure:
         stage = _failed(FREE, failure)
         nothing = np.zeros(0, dtype=str)
         return FreeCheck((stage,), sigma0_full, np.nan, 0, nothing, None, None, robust)
     o = free.outcome
-    tests = judge_rays(free)
-    first = Stage(FREE, o.status, o.message, o.sigma0, o.vtpv, o.redundancy, suspects=_ray_suspects(free, tests))
+    tests = judge_rays(judged)
+    first = Stage(FREE, o.status, o.message, o.sigma0, o.vtpv, o.redundancy, suspects=_ray_suspects(judged, tests))
     added, by_control = _stages(block, adjust, free, full)
     return FreeCheck(
         stages=(first, *added),
@@ -68,12 +71,31 @@ def check_free(block: Block, adjust: Adjust, full: AdjustedBlock | None = None) 
     )
 
 
-def _comparable(block: Block) -> tuple[Block, bool]:
-    """The block with the same observations, weights and unknowns in every stage, and whether that changed a setting."""
+def _comparable(block: Block, full: AdjustedBlock | None) -> tuple[Block, bool]:
+    """The block with the same observations, weights and unknowns in every stage, and whether that changed a setting.
+
+    All stages start from the orientation of the full adjustment where there is one.
+    """
     given = block.settings.adjustment
     robust = given.robust if given.robust == "off" else "huber"
     settings = replace(given, robust=robust, variance_components="off", parameter_selection="off")
+    if full is not None:
+        centre, angles = block.images.centre.copy(), block.images.angles.copy()
+        found = np.isfinite(full.images.centre).all(axis=1)
+        centre[found], angles[found] = full.images.centre[found], full.images.angles[found]
+        block = replace(block, images=replace(block.images, centre=centre, angles=angles))
     return replace(block, settings=replace(block.settings, adjustment=settings)), settings != given
+
+
+def _with_frozen_weights(block: Block, free: AdjustedBlock) -> Block:
+    """The block with the robust weights of the free adjustment as weights a priori, for least squares.
+
+    Weights that every stage finds anew would change vᵀPv as much as what is tested does.
+    """
+    rays, weight = block.image_points, np.nan_to_num(free.rays.weight)
+    factor = np.where(weight > 0.0, np.sqrt(np.where(weight > 0.0, weight, 1.0)), 1.0)
+    settings = replace(block.settings, adjustment=replace(block.settings.adjustment, robust="off"))
+    return replace(block, image_points=replace(rays, sigma=rays.sigma / factor[:, None]), settings=settings)
 
 
 def free_block(block: Block) -> Block:
@@ -102,7 +124,7 @@ def _stages(block: Block, adjust: Adjust, free: AdjustedBlock, full: AdjustedBlo
         same = scale == 1.0 and full is not None and name == todo[-1][0]
         try:
             after = full if same and full is not None else adjust(chosen)
-        except AdjustmentFailedError as failure:
+        except (AdjustmentFailedError, InputError) as failure:
             if name == todo[-1][0]:
                 stages.append(_failed(name, failure))
             continue
@@ -152,7 +174,9 @@ def _tested(name: str, before: AdjustedBlock, after: AdjustedBlock, free: Adjust
     )
 
 
-def _failed(name: str, failure: AdjustmentFailedError) -> Stage:
+def _failed(name: str, failure: AdjustmentFailedError | InputError) -> Stage:
+    if isinstance(failure, InputError):
+        return Stage(name, "not adjusted", str(failure), np.nan, np.nan, 0)
     o = failure.outcome
     return Stage(name, o.status, o.message, np.nan, np.nan, o.redundancy)
 

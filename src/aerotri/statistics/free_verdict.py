@@ -125,7 +125,7 @@ class FreeCheck:
             )
         parts = [_tie_points(self), *(_added(self, stage) for stage in self.stages[1:])]
         if self.robust:
-            parts.append("Weights are robust: the limits hold approximately.")
+            parts.append("Robust weights are those of the free block: the limits hold approximately.")
         return " ".join(parts)
 
 
@@ -196,15 +196,30 @@ def _subjects(check: FreeCheck, stage: Stage) -> tuple[str, str, bool]:
 
 
 def _where_to_look(check: FreeCheck, stage: Stage) -> str:
-    first = f"Look first at {suspect_text(stage.suspects[0])}." if stage.suspects else "No single value stands out."
+    first = _first_suspect(check, stage)
     if stage.name == CONTROL or check.position_offset is None:
-        return first if stage.suspects else f"{first} Look at σ, coordinate system and heights."
+        return first
     x, y, z = (f"{value:+.{DECIMALS}f}" for value in check.position_offset)
     offset = f"On average they lie {x}, {y}, {z} m (X, Y, Z) from where the control alone puts the photographs."
     control = next(other for other in check.stages if other.name == CONTROL)
     # control that fitted the tie points and now complains is outvoted by a common error of the positions
     outvoted = control.fits and stage.suspects and stage.suspects[0].kind == "control"
     return offset if outvoted else f"{offset} {first}"
+
+
+def _first_suspect(check: FreeCheck, stage: Stage) -> str:
+    """The value to look at, or where to look when no single one explains the contradiction."""
+    if stage.suspects and stage.largest_w > stage.w_limit:
+        return f"Look first at {suspect_text(stage.suspects[0])}."
+    largest = f" (the largest: {suspect_text(stage.suspects[0])})" if stage.suspects else ""
+    shape = ""
+    if check.similarity is not None:
+        x, y, z = (f"{value:.{DECIMALS}f}" for value in check.similarity.rms)
+        shape = f" Moved onto the control the free block is off by {x}, {y}, {z} m (RMS X, Y, Z)."
+    return (
+        f"No single value explains it{largest}.{shape} Look at σ, coordinate system and heights, and at systematic "
+        "image errors that bend the free block."
+    )
 
 
 def _capital(text: str) -> str:

@@ -100,7 +100,8 @@ def _control_fits(adjusted: AdjustedBlock) -> list[GroupFit]:
     given = {int(point): k for k, point in enumerate(block.control.point)}
     sigma = block.control.sigma[[given[int(point)] for point in control.point]]
     known = np.isfinite(control.r) & np.isfinite(control.difference)
-    return _fits_by_name(control_groups(known.shape)[known], "m", control.difference[known], sigma[known], control.r[known])
+    names = control_groups(known.shape)[known]
+    return _fits_by_name(names, "m", control.difference[known], sigma[known], control.r[known])
 
 
 def _extra_fits(adjusted: AdjustedBlock) -> list[GroupFit]:
@@ -108,11 +109,9 @@ def _extra_fits(adjusted: AdjustedBlock) -> list[GroupFit]:
     if o is None:
         return []
     names = np.array([EXTRA_GROUPS.get(key, "") for key in zip(o.group, o.component, strict=True)], dtype=object)
-    in_radians = np.isin(names, INS_GROUPS)
-    parts = [(unit, (names != "") & (in_radians == (unit == "rad"))) for unit in ("m", "rad")]
-    return [
-        fit for unit, own in parts for fit in _fits_by_name(names[own], unit, o.v[own], o.sigma[own], o.r[own])
-    ]  # fmt: skip
+    in_radians, known = np.isin(names, INS_GROUPS), (names != "") & np.isfinite(o.v) & np.isfinite(o.r)
+    parts = [(unit, known & (in_radians == (unit == "rad"))) for unit in ("m", "rad")]
+    return [fit for unit, own in parts for fit in _fits_by_name(names[own], unit, o.v[own], o.sigma[own], o.r[own])]
 
 
 def _fits_by_name(names: np.ndarray, unit: str, v: np.ndarray, sigma: np.ndarray, r: np.ndarray) -> list[GroupFit]:

@@ -24,7 +24,8 @@ from aerotri.statistics.adjusted_block import (
     SharedParameters,
 )
 from aerotri.statistics.covariance import Cofactors, cofactors, correlations, orientation_cofactors, total_correlations
-from aerotri.statistics.reliability import normalised_residuals, suspected_blunders
+from aerotri.statistics.external_reliability import ray_effects, row_effects
+from aerotri.statistics.reliability import detectable_share, normalised_residuals, suspected_blunders
 
 OF_POINTS = ("point", "constraint")
 """Kinds of shared parameters that belong to object points and not to cameras or flights."""
@@ -102,7 +103,8 @@ def summarise(
         check=check,
         groups=tuple(_groups(system, solution, q, rays, control) + extra_groups),
         observations=observations,
-        blunders=suspected_blunders(block, rays),
+        blunders=suspected_blunders(block, rays, control),
+        effects=ray_effects(system, solution, q),
     )
 
 
@@ -275,7 +277,7 @@ def _extra_results(system: NormalSystem, solution: Solution, q: Cofactors) -> tu
     """Groups of the observations beside the image points, and their residuals one by one."""
     groups, parts = [], []
     for rows in system.whitened_rows(solution.state):
-        cofactor = _row_cofactors(rows, q)
+        cofactor = row_cofactors(rows, q)
         known = rows.inv_sigma > 0.0
         sigma = np.where(known, 1.0 / np.where(known, rows.inv_sigma, 1.0), np.nan)
         v, r = -rows.gap * sigma, np.where(known, 1.0 - cofactor, np.nan)
@@ -288,14 +290,17 @@ def _extra_results(system: NormalSystem, solution: Solution, q: Cofactors) -> tu
         labels = np.repeat(rows.labels[:, None], known.shape[1], axis=1)[known]
         components = np.broadcast_to(np.array(rows.components, dtype=object), known.shape)[known]
         names = np.full(len(labels), rows.name, dtype=object)
-        parts.append((names, labels, components, v[known], sigma[known], r[known]))
+        size, on = row_effects(system, solution, q, rows)
+        parts.append((names, labels, components, v[known], sigma[known], r[known], size[known], on[known]))
     if not parts:
         return groups, None
-    names, labels, components, v, sigma, r = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    return groups, ObservationResults(names, labels, components, v, sigma, r, normalised_residuals(v, sigma, r))
+    names, labels, components, v, sigma, r, size, on = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    settings, w = system.unknowns.block.settings.adjustment, normalised_residuals(v, sigma, r)
+    size = size * detectable_share(r, settings.alpha, settings.power)
+    return groups, ObservationResults(names, labels, components, v, sigma, r, w, size, on)
 
 
-def _row_cofactors(rows: Rows, q: Cofactors) -> np.ndarray:
+def row_cofactors(rows: Rows, q: Cofactors) -> np.ndarray:
     """(g, k) cofactors of the whitened predictions."""
     cofactor = np.zeros(rows.gap.shape)
     own = rows.image >= 0

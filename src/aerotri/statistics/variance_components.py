@@ -58,7 +58,8 @@ class ChiSquareTest:
 
     Parameters
     ----------
-    ratio : σ a posteriori / σ a priori. statistic : freedom·ratio², distributed as χ² of `freedom` where the σ is right.
+    ratio : σ a posteriori / σ a priori.
+    statistic : freedom·ratio², distributed as χ² of `freedom` degrees of freedom where the σ is right.
     low, high : what the statistic may be at the level `alpha` of the block.
     verdict : 'agrees', 'σ given too small', 'σ given too large' or 'not testable'.
     """
@@ -122,8 +123,11 @@ class VarianceComponents:
     def from_json(cls, text: str) -> VarianceComponents:
         """The inverse of `to_json`."""
         content = json.loads(text)
-        components = [_with_nan(c) | {"test": ChiSquareTest(**_with_nan(c["test"]))} for c in content["components"]]
-        return cls(tuple(VarianceComponent(**c) for c in components), content["rounds"], content["settled"])
+        components = []
+        for c in content["components"]:
+            test = ChiSquareTest(**_with_nan(c.pop("test")))
+            components.append(VarianceComponent(**_with_nan(c), test=test))
+        return cls(tuple(components), content["rounds"], content["settled"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +163,8 @@ def estimate_components(
         if not information.serves(factors):
             information = _Information.at(fitted, factors)
         changes = _changes(fitted, information, held)
-        settled = all(abs(change - 1.0) < SETTLED for change in changes.values())
+        # a σ that shrinks although its group says nothing of it any more goes to zero: it will be held
+        settled = all(abs(c - 1.0) < SETTLED or (c < 1.0 and information.of(name) < 1.0) for name, c in changes.items())
         if settled or rounds >= last_round:
             freedom = _freedom(fitted, held)
             weak = [name for name, f in freedom.items() if name not in held and not f >= LEAST_FREEDOM]
@@ -187,6 +192,11 @@ class _Information:
         names = tuple(fit.name for fit in group_fits(fitted.adjusted))
         s = cross_redundancy(ResidualResponse(fitted.system, fitted.solution), names, probes)
         return cls(names, s, dict(factors))
+
+    def of(self, name: str) -> float:
+        """S_gg."""
+        k = self.names.index(name)
+        return float(self.s[k, k])
 
     def serves(self, factors: Mapping[str, float]) -> bool:
         return all(abs(np.log(factors[name] / self.factors[name])) < FRESH for name in self.names)
@@ -289,10 +299,8 @@ def with_components(adjusted: AdjustedBlock, components: VarianceComponents) -> 
     """
     factors, groups = components.factors, []
     for fit in group_fits(adjusted):
-        given = fit.sigma / factors[fit.name]
-        groups.append(
-            ObservationGroup(fit.name, fit.count, given, fit.rms, fit.redundancy, given * factors[fit.name] * _ratio(fit))
-        )
+        given, found = fit.sigma / factors[fit.name], fit.sigma * _ratio(fit)
+        groups.append(ObservationGroup(fit.name, fit.count, given, fit.rms, fit.redundancy, found))
     replaced = {"control plan", "control height", *(name for name, _ in EXTRA_GROUPS)}
     others = [g for g in adjusted.groups if g.name not in replaced and not g.name.startswith("image points")]
     return replace(adjusted, groups=(*groups, *others), components=components)

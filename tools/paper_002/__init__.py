@@ -1,0 +1,1 @@
+"""The strip of paper 002: what is simulated, the table, the plot."""
