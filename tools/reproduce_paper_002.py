@@ -1,7 +1,7 @@
 """Paper 002 reproduced: its strip of 50 photographs by its three methods, theoretical and practical precision.
 
 Prints a Markdown table with the differences explained; with --out also writes paper_002.md and paper_002.png there.
-The last answer with 20 simulations stands in tools/results/paper_002.md.
+The last answer with 40 simulations stands in tools/results/paper_002.md.
 
 Example: python tools/reproduce_paper_002.py --out results
 """

@@ -59,7 +59,7 @@ def adjust(
     parameters: Annotated[
         str | None, typer.Option(help="Additional parameters, such as bluh:1-8+12,ultracam_d:42-73, brown:K1+K2, none.")
     ] = None,
-    robust: Annotated[str | None, typer.Option(help="off or huber.")] = None,
+    robust: Annotated[str | None, typer.Option(help="off, huber, danish, cauchy, adaptive or data-snooping.")] = None,
     geoid: Annotated[
         Path | None, typer.Option(help="Geoid grid (PROJ GeoTIFF) for heights that the CRS does not bring along.")
     ] = None,
@@ -105,12 +105,22 @@ def simulate(
     spec: Annotated[Path, typer.Argument(help="Flight plan (TOML).")],
     out: Annotated[Path, typer.Option(help="Block folder to write; its truth/ stands inside.")],
     seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same block.")] = 1,
+    render: Annotated[bool, typer.Option("--render", help="Photographs of it too, 16 bit TIFF.")] = False,
+    only: Annotated[list[str] | None, typer.Option(help="Photograph to render; may repeat. Default: all.")] = None,
+    targets: Annotated[bool, typer.Option("--targets", help="Render discs at control and check points.")] = False,
+    blur_px: Annotated[float, typer.Option(min=0.0, max=20.0, help="σ of the point spread rendered, px.")] = 0.5,
+    noise: Annotated[float, typer.Option(min=0.0, max=20000.0, help="σ of the grey values rendered.")] = 50.0,
     json_: Json = False,
 ) -> None:
-    """Make a block with known truth from a flight plan."""
+    """Make a block with known truth from a flight plan, and photographs of it."""
     from aerotri.commands.simulate import run_simulate
 
-    run_simulate(spec, out, seed, json_)
+    options = None
+    if render:
+        from aerotri.simulation.rendering import RenderOptions
+
+        options = RenderOptions(blur_px=blur_px, noise=noise, targets=targets)
+    run_simulate(spec, out, seed, json_, options, tuple(only or ()))
 
 
 @app.command(epilog="Example: aerotri convert bingo.txt block --positions rtk.csv --control gcp.csv --camera p1.toml")
@@ -206,6 +216,26 @@ def crosscheck(
     from aerotri.commands.crosscheck import run_crosscheck
 
     raise typer.Exit(run_crosscheck(source, out, json_))
+
+
+@app.command(epilog="Example: aerotri imgeo saar_result photographs/*.tif --out ideal")
+def imgeo(
+    result: Annotated[Path, typer.Argument(help="Result folder of `aerotri adjust`.")],
+    photographs: Annotated[
+        list[Path] | None, typer.Argument(help="TIFF or JPEG files, named as in the block; none: the exports alone.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("ideal"),
+    resampling: Annotated[str, typer.Option(help="bicubic or lanczos.")] = "bicubic",
+    compression: Annotated[str, typer.Option(help="keep, deflate, lzw, zstd or none.")] = "keep",
+    group: Annotated[
+        str | None, typer.Option(help="Parameter group (camera, day) of photographs that are not in the block.")
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Photographs without systematic image errors, their camera, and the errors for other programs."""
+    from aerotri.commands.imgeo import ImgeoOptions, run_imgeo
+
+    run_imgeo(result, photographs or [], out, ImgeoOptions(resampling, compression, group), json_)
 
 
 if __name__ == "__main__":

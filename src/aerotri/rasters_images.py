@@ -23,7 +23,8 @@ from rasterio.windows import Window
 
 from aerotri.conventions import InputError
 
-DRIVERS = ["GTiff", "JPEG"]
+DRIVERS = {b"II*\0": "GTiff", b"MM\0*": "GTiff", b"II+\0": "GTiff", b"MM\0+": "GTiff", b"\xff\xd8\xff": "JPEG"}
+"""By the first bytes of a file, TIFF and BigTIFF in both byte orders, and JPEG."""
 LOSSLESS = {"lzw", "deflate", "zstd", "lzma", "packbits", "none"}
 PREDICTED = {"lzw", "deflate", "zstd"}
 COMPRESSIONS = ("keep", "deflate", "lzw", "zstd", "none")
@@ -112,9 +113,18 @@ def open_photograph(path: str | os.PathLike) -> Iterator[Photograph]:
     if not path.is_file():
         raise InputError("there is no such file", "give a photograph, TIFF or JPEG", path)
     with _told(path), rasterio.Env(**SETTINGS):
-        dataset = rasterio.open(path.resolve(), driver=DRIVERS)
+        dataset = rasterio.open(path.resolve(), driver=_driver(path))
     with dataset:
         yield Photograph(path, dataset, _bits(path, dataset))
+
+
+def _driver(path: Path) -> str:
+    with path.open("rb") as file:
+        begins = file.read(4)
+    for magic, driver in DRIVERS.items():
+        if begins.startswith(magic):
+            return driver
+    raise InputError("is no TIFF and no JPEG", "convert it", path)
 
 
 def _bits(path: Path, dataset: Any) -> int:

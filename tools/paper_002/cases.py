@@ -31,11 +31,13 @@ def roll_cases() -> list[Case]:
 
 def control_cases(photographs: int) -> list[Case]:
     """Other layouts of full control, and the other flying height."""
+    pairs = _layout(2)
     spaced = [Case("", _layout(bases), control=pairs_every(bases, photographs)) for bases in (1, 2, 4, 7, 10)]
     return [
         *spaced,
-        Case("", "pairs every 2 bases, 40 m beside the axis", control=pairs_every(2, photographs, across=0.05)),
-        Case("", "pairs every 2 bases, 900 m above ground", control=pairs_every(2, photographs), above_ground_m=900.0),
+        *(Case("", f"{pairs}, heights every {k}", control=pairs_every(2, photographs), heights_every=k) for k in (10, 12)),
+        Case("", f"{pairs}, 40 m beside the axis", control=pairs_every(2, photographs, across=0.05)),
+        Case("", f"{pairs}, 900 m above ground", control=pairs_every(2, photographs), above_ground_m=900.0),
     ]
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -11,7 +13,11 @@ from matplotlib.lines import Line2D
 from paper_002.cases import PAPER_MM
 from paper_002.strip import Case, Precision
 
-LOOKS = (("X", "#1c242c", "o", "-"), ("Y", "#0b5cad", "s", "--"), ("Z", "#b04a00", "^", ":"))
+LOOKS: tuple[tuple[str, str, str, Any], ...] = (
+    ("X", "#1c242c", "o", "-"),
+    ("Y", "#0b5cad", "s", "--"),
+    ("Z", "#b04a00", "^", ":"),
+)
 """Coordinate, colour, marker, line: readable without the colour."""
 
 TITLES = {
@@ -42,26 +48,37 @@ def precision_plot(rows: Sequence[tuple[Case, Precision]]) -> Figure:
 
 
 def _lines(panel: Axes, rows: Sequence[tuple[Case, Precision]]) -> None:
-    gnss = [case.gnss_m or 0.0 for case, _ in rows]
+    gnss = np.array([case.gnss_m or 0.0 for case, _ in rows])
     for axis, (_, colour, marker, line) in enumerate(LOOKS):
         panel.plot(gnss, [1e3 * found.theoretical[axis] for _, found in rows], color=colour, linestyle=line, zorder=2)
-        practical = [1e3 * found.practical[axis] for _, found in rows]
-        panel.plot(gnss, practical, color=colour, marker=marker, linestyle="none", markersize=6, zorder=3)
+        # moved apart a little, so that none hides another
+        for at, (_, found) in zip(gnss + 0.02 * (axis - 1), rows, strict=True):
+            _practical(panel, at, found, axis, colour, marker)
     panel.set_xlabel("σ of the projection centres, m")
     panel.set_xticks(gnss)
-    panel.set_xlim(0.0, 1.1 * max(gnss))
+    panel.set_xlim(0.0, 1.1 * float(gnss.max()))
 
 
 def _bars(panel: Axes, found: Precision) -> None:
     for axis, (_, colour, marker, line) in enumerate(LOOKS):
-        at = [axis - 0.3, axis + 0.3]
+        at = [axis - 0.32, axis + 0.32]
         panel.plot(at, [1e3 * found.theoretical[axis]] * 2, color=colour, linestyle=line, zorder=2)
-        panel.plot(axis, 1e3 * found.practical[axis], color=colour, marker=marker, markersize=6, zorder=3)
+        _practical(panel, axis - 0.16, found, axis, colour, marker)
         panel.plot(
-            axis, PAPER_MM["3"][axis], color=colour, marker=marker, markersize=9, markerfacecolor="white", zorder=3
-        )
+            axis + 0.16, PAPER_MM["3"][axis], color=colour, marker=marker, markersize=8, markerfacecolor="white",
+            zorder=4,
+        )  # fmt: skip
     panel.set_xticks(range(3), [name for name, *_ in LOOKS])
     panel.set_xlim(-0.7, 2.7)
+
+
+def _practical(panel: Axes, at: float, found: Precision, axis: int, colour: str, marker: str) -> None:
+    """RMS with the standard deviation that it has as a mean over the simulations."""
+    uncertain = 1e3 * found.spread[axis] / np.sqrt(max(len(found.z_roll), 1))
+    panel.errorbar(
+        at, 1e3 * found.practical[axis], yerr=uncertain, color=colour, marker=marker, markersize=5.5, linewidth=1.0,
+        zorder=3,
+    )  # fmt: skip
 
 
 def _keys() -> list[Line2D]:
@@ -72,7 +89,7 @@ def _keys() -> list[Line2D]:
     return [
         *coordinates,
         Line2D([], [], color=grey, label="line: theoretical μ"),
-        Line2D([], [], color=grey, marker="o", linestyle="none", label="marker: practical RMS"),
+        Line2D([], [], color=grey, marker="o", linestyle="none", label="filled: practical RMS ± σ"),
         Line2D(
             [], [], color=grey, marker="o", markersize=9, markerfacecolor="white", linestyle="none",
             label="hollow: the paper's RMS",

@@ -38,8 +38,8 @@ class Case:
     ----------
     method : of the paper, '1' to '3', or '' for a case of ours. name : in words.
     gnss_m : σ of observed projection centres, None without. towers : with plumb lines.
-    control : positions along and across the strip, 0 to 1. above_ground_m : flying height. wander_m : σ of the flight
-        about its straight line.
+    control : positions along and across the strip, 0 to 1. heights_every : bases between control points with a height,
+        None where all have one. above_ground_m : flying height. wander_m : σ of the flight about its straight line.
     exact : observations without errors, so that σ are those at the true geometry.
     """
 
@@ -48,6 +48,7 @@ class Case:
     gnss_m: float | None = None
     towers: bool = False
     control: Positions = ()
+    heights_every: int | None = None
     above_ground_m: float = ABOVE_GROUND_M
     wander_m: float = 5.0
     exact: bool = False
@@ -132,6 +133,19 @@ def strip_spec(case: Case, photographs: int = PHOTOGRAPHS) -> SimulationSpec:
     return parse_spec(tables)
 
 
+def with_fewer_heights(block: Block, case: Case, photographs: int) -> Block:
+    """The block with the heights of its control left out but for the first and last and every so many bases between."""
+    if case.heights_every is None:
+        return block
+    # control points are numbered in the order of their positions
+    number = np.array([int(str(name)[1:]) - 1 for name in block.points[block.control.point]])
+    base = np.round(np.array(case.control)[number, 0] * (photographs - 1)).astype(int)
+    without = (base % case.heights_every != 0) & (base != photographs - 1)
+    xyz, sigma = block.control.xyz.copy(), block.control.sigma.copy()
+    xyz[without, 2] = sigma[without, 2] = np.nan
+    return replace(block, control=replace(block.control, xyz=xyz, sigma=sigma))
+
+
 def without_errors(block: Block, truth: Truth, spec: SimulationSpec) -> Block:
     """The block with true projection centres and true image coordinates in place of the observed ones."""
     exact = spec.tie_points.model_copy(update={"sigma_um": 0.0, "stated_sigma_um": spec.tie_points.sigma_um})
@@ -174,6 +188,7 @@ def run(case: Case, seeds: Iterable[int], photographs: int = PHOTOGRAPHS) -> Pre
 def _run(case: Case, seed: int, photographs: int) -> _Run:
     spec = strip_spec(case, photographs)
     block, truth = simulate(spec, seed)
+    block = with_fewer_heights(block, case, photographs)
     result = adjust(without_errors(block, truth, spec) if case.exact else block)
     # where there are no errors σ̂0 says nothing, and the σ are those of the weights
     scale = result.outcome.sigma0 if case.exact else 1.0

@@ -18,30 +18,32 @@ HEADER = (
 
 EXPLANATION = """\
 μ is the theoretical precision √(tr Q/3n)·σ̂0 of the pass points, RMS the practical one against the simulated truth, both
-over all simulations; ± is the scatter of the RMS of single simulations. All in mm.
+over all simulations; ± is the scatter of the RMS of single simulations. All in mm. Figures below are those of 50
+photographs.
 
 Where ours and the paper's differ, and where the paper differs from itself:
 
 1. **Scale and height.** 1:5000 with f = 152 mm is flown 760 m above the ground, not 900 m. Both hold where 900 m counts
    from the sea and the ground lies at 140 m ± 75 m. We fly 760 m above ground: the scale settles what 5 µm are on the
-   ground (25 mm). At 900 m above ground X and Y grow with the scale, by 18 %, and Z little more; it explains no difference.
+   ground (25 mm). At 900 m above ground everything grows by some 8 % (the image part by 18 %, the part of the control
+   not at all): it explains no difference.
 2. **Full control.** The paper prints 45, 57 and 197 mm and not where its control lies. Pairs left and right at every
-   base or every second come to its X and Y. Its Z does not go with them: with h/b = 1.65 two rays of 5 µm give σZ/σX of
-   1.6 to 2.2, which is what every layout here has; the paper has 4.4. Control beside the axis only, where towers stand,
-   loosens the roll and raises Z alone, but not to 197 mm. Where Z is 197 mm here, at some 8 bases between pairs, X and Y
-   are twice the paper's. A height control sparser than the plan control, or a misprint of 97, would fit; the page does
-   not say.
-3. **Figures 1 and 2** show RMS of X, Y and Z for methods 1 and 2 without legible numbers. What the text says of them
-   holds here: without towers and without control across the strip the system is "if not singular" useless; with towers
-   it is as good as with two control points.
+   base or every second come to its X and Y. Its Z does not go with them: with h/b = 1.65 rays of 5 µm give μZ/μX of 1.5
+   to 1.8 in every layout of full control points; the paper has 4.4. Control close to the axis loosens the roll and
+   raises Z alone, but to 124 mm only, and where full points ever farther apart bring Z to 197 mm, X and Y are twice the
+   paper's. What gives all three is plan control at every second base with heights at every 10th to 12th only: 50, 53
+   and 177 to 217 mm. The page does not say whether that was it, or whether 197 is a misprint.
+3. **Figures 1 and 2** show the RMS of methods 1 and 2 without legible numbers. What the text says of them holds here:
+   GNSS alone leaves an "if not singular system", and towers stand in for control: μ of method 2 is within 15 % of that
+   with two control points.
 4. **What holds the roll.** The centres of a straight flight lie on a line and leave the roll about it free: with exact
    observations the adjustment is rank deficient and says so. Errors of the GNSS bend that line by decimetres, so that
    the equations seem regular while σ of the roll is tens of degrees; a flight that wanders by 5 m brings it to a third
-   of a degree, metres in Y. Towers bring it to 0.015°, whatever the GNSS is worth: 50 towers of 15 m, top against foot
-   to some 20 mm each. That makes 0.2 m in Y across 760 m and is the floor of Y in method 2, while X and Z follow the σ
-   of GNSS.
-5. **Practical against theoretical.** The errors of one strip move together, so the RMS of one simulation scatters by
-   a third about μ; over all simulations they agree.\
+   of a degree, metres in Y. Towers bring it to 0.015°, whatever the GNSS is worth: 50 of 15 m, each top known against
+   its foot to some 28 mm. That is 0.2 m in Y at the distance of the ground, the floor of Y in method 2, while X and Z
+   follow the σ of GNSS.
+5. **Practical against theoretical.** The errors of a strip move together, so the RMS of one simulation scatters by a
+   fifth to a third about μ; over all simulations they agree.\
 """
 
 

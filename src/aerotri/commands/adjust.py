@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 RESULT_NAMES = (
     "adjustment.json", "images.csv", "points.csv", "residuals.parquet", "parameters.csv", "control.csv", "check.csv",
-    "block", "solution.npz", "plots", "report.html", "check_free.json", "variance_components.json",
+    "block", "solution.npz", "plots", "report.html", "observations.csv", "check_free.json", "variance_components.json",
 )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from aerotri.pipeline import Adjustment
     from aerotri.statistics.adjusted_block import AdjustedBlock
 
-OWN_NAMES = ("crosscheck.json", "crosscheck.csv", "plots")
+OWN_NAMES = ("crosscheck.json", "crosscheck.csv", "plots", "report.html")
 
 
 def run_crosscheck(source: Path, out: Path | None, as_json: bool) -> int:
@@ -36,7 +36,7 @@ def run_crosscheck(source: Path, out: Path | None, as_json: bool) -> int:
 
     result = crosscheck(adjusted, adjust, console.progress)
     console.progress("drawing")
-    _write(result, target)
+    _write(result, adjusted, target)
     _tell(result, target, console, as_json)
     return 0 if result.verdict == "agrees" else 1
 
@@ -75,14 +75,16 @@ def _adjustment(source: Path, console: Console) -> Adjustment:
     return adjust_keeping_system(block, console.iteration, points)
 
 
-def _write(result: CrosscheckResult, target: Path) -> None:
+def _write(result: CrosscheckResult, adjusted: AdjustedBlock, target: Path) -> None:
     from aerotri.crosscheck.outcome_json import crosscheck_json
     from aerotri.formats.atomic import atomic_folder
-    from aerotri.report.plots import save_plots
+    from aerotri.report.html import Findings, write_report
+    from aerotri.report.plots import all_plots, save_plots
     from aerotri.report.plots_crosscheck import plot_crosscheck
 
     with atomic_folder(target, own=OWN_NAMES) as folder:
-        save_plots({"crosscheck": plot_crosscheck(result)}, folder / "plots")
+        drawn = save_plots({"crosscheck": plot_crosscheck(result)}, folder / "plots")
+        write_report(adjusted, {**all_plots(adjusted), **drawn}, folder / "report.html", Findings(crosscheck=result))
         _write_table(result, folder / "crosscheck.csv")
         text = json.dumps(crosscheck_json(result), indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "crosscheck.json").write_text(text + "\n", encoding="utf-8")

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.compiled import kernel
+from aerotri.compiled import inlined, kernel
 
 SMALLEST_PATCH = 4
 MIXED, ONE_TILE, OFF = 0, 1, 2
@@ -27,6 +27,7 @@ STEPS = 8
 LAST_STEP_M = 5e-3
 """A step of the intersection after which the next one is below 0.01 mm: steps shrink a thousandfold."""
 FIXED_POINTS = 30
+RUN, SHORT_RUN, RUN_STEPS = 128, 16, 3
 N_SUMS = 14
 """Of `resample`: cells corrected, without data, outside the models, shifted beyond the halo; Σ and Σ² of dZ, smallest
 and largest dZ; Σ of Z before and after; smallest and largest Z before, and after."""
@@ -379,6 +380,134 @@ def slope_of_corrected(z, dz, i, j, down, right):
     return 0.0
 
 
+@inlined
+def blend(low, low_next, high, high_next, s, t, out):
+    """out (n,): bilinear values at the places s, t of each cell, between two rows and the same one column on.
+
+    An index other than the running one would keep the processor from doing many at a time.
+    """
+    for j in range(len(out)):
+        below = low[j] + s[j] * (low_next[j] - low[j])
+        above = high[j] + s[j] * (high_next[j] - high[j])
+        out[j] = below + t[j] * (above - below)
+
+
+@inlined
+def blend_rows(values, row, column, s, t, out):
+    """`blend` of an array from a row and column on."""
+    end = column + len(out)
+    low, low_next = values[row, column:end], values[row, column + 1 : end + 1]
+    high, high_next = values[row + 1, column:end], values[row + 1, column + 1 : end + 1]
+    blend(low, low_next, high, high_next, s, t, out)
+
+
+@inlined
+def within(s, t):
+    """Whether all places lie between their four neighbours; NaN does not."""
+    good, zero, one = True, np.float32(0.0), np.float32(1.0)
+    for j in range(len(s)):
+        good &= (s[j] >= zero) & (s[j] < one) & (t[j] >= zero) & (t[j] < one)
+    return good
+
+
+@inlined
+def near(one, other, limit):
+    """Whether no value is farther from its counterpart than a limit."""
+    good = True
+    for j in range(len(one)):
+        good &= abs(one[j] - other[j]) <= limit
+    return good
+
+
+@inlined
+def resample_run(z, du, dv, dz, r, c, tolerance, work, out, out_dz):
+    """`resample` of the n cells of a row from (r, c) on, many at a time; False where they differ too much for that.
+
+    It goes where all of them lie between the same rows and columns relative to their own, next to no missing data, and
+    some steps of the fixed point are enough. work : four times (n,) float32.
+    """
+    s, t, u, v = work[0][: len(out)], work[1][: len(out)], work[2][: len(out)], work[3][: len(out)]
+    n = len(out)
+    if not dz[r, c] == dz[r, c]:
+        return False
+    iu, iv = np.floor(du[r, c]), np.floor(dv[r, c])
+    row, column = r + int(iv), c + int(iu)
+    if row < 0 or row + 1 >= z.shape[0] or column < 0 or column + n >= z.shape[1]:
+        return False
+    own_u, own_v = du[r, c : c + n], dv[r, c : c + n]
+    for j in range(n):
+        s[j] = own_u[j] - iu
+    for j in range(n):
+        t[j] = own_v[j] - iv
+    limit_u, limit_v, still = np.float32(tolerance[0]), np.float32(tolerance[1]), False
+    for _ in range(RUN_STEPS):
+        if not within(s, t):
+            return False
+        blend_rows(du, row, column, s, t, u)
+        blend_rows(dv, row, column, s, t, v)
+        for j in range(n):
+            u[j] -= iu
+        for j in range(n):
+            v[j] -= iv
+        still = near(s, u, limit_u) and near(t, v, limit_v)
+        s, t, u, v = u, v, s, t
+        if still:
+            break
+    if not (still and within(s, t)):
+        return False
+    blend_rows(dz, row, column, s, t, out_dz)
+    blend_rows(z, row, column, s, t, out)
+    for j in range(n):
+        out[j] -= out_dz[j]
+    return True
+
+
+@inlined
+def resample_cell(z, du, dv, dz, r, c, tolerance):
+    """Corrected height and dZ of a cell, and whether it is shifted beyond the window."""
+    rows, columns = z.shape
+    a, b = float(du[r, c]), float(dv[r, c])
+    for _ in range(FIXED_POINTS):
+        ku, kv = int(np.floor(c + a)), int(np.floor(r + b))
+        if not (0 <= ku < columns - 1 and 0 <= kv < rows - 1):
+            return np.nan, np.nan, True
+        s, t = c + a - ku, r + b - kv
+        w00, w01, w10, w11 = (1.0 - t) * (1.0 - s), (1.0 - t) * s, t * (1.0 - s), t * s
+        a_new = w00 * du[kv, ku] + w01 * du[kv, ku + 1] + w10 * du[kv + 1, ku] + w11 * du[kv + 1, ku + 1]
+        b_new = w00 * dv[kv, ku] + w01 * dv[kv, ku + 1] + w10 * dv[kv + 1, ku] + w11 * dv[kv + 1, ku + 1]
+        if a_new != a_new:
+            break
+        if abs(a_new - a) <= tolerance[0] and abs(b_new - b) <= tolerance[1]:
+            d = w00 * dz[kv, ku] + w01 * dz[kv, ku + 1] + w10 * dz[kv + 1, ku] + w11 * dz[kv + 1, ku + 1]
+            height = w00 * z[kv, ku] + w01 * z[kv, ku + 1] + w10 * z[kv + 1, ku] + w11 * z[kv + 1, ku + 1]
+            return height - d, d, False
+        a, b = a_new, b_new
+    height = z[r, c] - dz[r, c] + du[r, c] * slope_of_corrected(z, dz, r, c, 0, 1)
+    return height + dv[r, c] * slope_of_corrected(z, dz, r, c, 1, 0), float(dz[r, c]), False
+
+
+@inlined
+def tally(values, total, least, most):
+    """Add values (n,) that are none NaN to sums, smallest and largest ones, place by place."""
+    for j in range(len(values)):
+        value = float(values[j])
+        total[j] += value if value == value else 0.0
+        least[j] = value if value < least[j] else least[j]
+        most[j] = value if value > most[j] else most[j]
+
+
+@inlined
+def resample_cells(z, du, dv, dz, r, c, tolerance, out, out_dz, sums):
+    """`resample` of the cells of a row from (r, c) on, one by one."""
+    for j in range(len(out)):
+        if dz[r, c + j] == dz[r, c + j]:
+            out[j], out_dz[j], escaped = resample_cell(z, du, dv, dz, r, c + j, tolerance)
+            sums[3] += escaped
+        else:
+            out[j], out_dz[j] = np.nan, np.nan
+            sums[1 if z[r, c + j] != z[r, c + j] else 2] += 1.0
+
+
 @kernel
 def resample(z, du, dv, dz, halo, tolerance, out, out_dz, sums):
     """The corrected surface on the cells of a window.
@@ -392,70 +521,37 @@ def resample(z, du, dv, dz, halo, tolerance, out, out_dz, sums):
     z, du, dv, dz : (h, w) with `halo` cells around the window.
     tolerance : (2,) columns and rows, of the fixed point.
     out, out_dz : (h − 2·halo, w − 2·halo) out, corrected height and dZ.
-    sums : (N_SUMS,) added to.
+    sums : (N_SUMS,) zero, ±∞ for extremes; out.
     """
-    rows, columns = z.shape
-    limit_u, limit_v = tolerance[0], tolerance[1]
-    n = no_data = outside = escaped = 0
-    sum_d = sum_d2 = sum_before = sum_after = 0.0
-    least_d = least_before = least_after = np.inf
-    most_d = most_before = most_after = -np.inf
+    work = (np.empty(RUN, np.float32), np.empty(RUN, np.float32), np.empty(RUN, np.float32), np.empty(RUN, np.float32))
+    heights, squares = np.empty(RUN, z.dtype), np.zeros(RUN)
+    sum_d, sum_before, sum_after = np.zeros((3, RUN)), np.zeros((3, RUN)), np.zeros((3, RUN))
+    for kept in (sum_d, sum_before, sum_after):
+        kept[1], kept[2] = np.inf, -np.inf
     for i in range(out.shape[0]):
         r = i + halo
-        for j in range(out.shape[1]):
-            c = j + halo
-            before, d = z[r, c], dz[r, c]
-            if d != d:
-                out[i, j] = out_dz[i, j] = np.nan
-                if before != before:
-                    no_data += 1
-                else:
-                    outside += 1
-                continue
-            a, b = du[r, c], dv[r, c]
-            after, found, inside = 0.0, False, True
-            for _ in range(FIXED_POINTS):
-                u, v = c + a, r + b
-                ku, kv = int(np.floor(u)), int(np.floor(v))
-                inside = 0 <= ku < columns - 1 and 0 <= kv < rows - 1
-                if not inside:
-                    break
-                s, t = u - ku, v - kv
-                w00, w01, w10, w11 = (1.0 - t) * (1.0 - s), (1.0 - t) * s, t * (1.0 - s), t * s
-                a_new = w00 * du[kv, ku] + w01 * du[kv, ku + 1] + w10 * du[kv + 1, ku] + w11 * du[kv + 1, ku + 1]
-                b_new = w00 * dv[kv, ku] + w01 * dv[kv, ku + 1] + w10 * dv[kv + 1, ku] + w11 * dv[kv + 1, ku + 1]
-                change_u, change_v = abs(a_new - a), abs(b_new - b)
-                if change_u <= limit_u and change_v <= limit_v:
-                    d = w00 * dz[kv, ku] + w01 * dz[kv, ku + 1] + w10 * dz[kv + 1, ku] + w11 * dz[kv + 1, ku + 1]
-                    after = w00 * z[kv, ku] + w01 * z[kv, ku + 1] + w10 * z[kv + 1, ku] + w11 * z[kv + 1, ku + 1] - d
-                    found = True
-                    break
-                if a_new != a_new:
-                    break
-                a, b = a_new, b_new
-            if not inside:
-                escaped += 1
-            if not found:
-                d = dz[r, c]
-                after = before - d + du[r, c] * slope_of_corrected(z, dz, r, c, 0, 1)
-                after += dv[r, c] * slope_of_corrected(z, dz, r, c, 1, 0)
-            out[i, j], out_dz[i, j] = after, d
-            n += 1
-            sum_d += d
-            sum_d2 += d * d
-            sum_before += before
-            sum_after += after
-            least_d, most_d = min(least_d, d), max(most_d, d)
-            least_before, most_before = min(least_before, before), max(most_before, before)
-            least_after, most_after = min(least_after, after), max(most_after, after)
-    sums[0] += n
-    sums[1] += no_data
-    sums[2] += outside
-    sums[3] += escaped
-    sums[4] += sum_d
-    sums[5] += sum_d2
-    sums[6], sums[7] = min(sums[6], least_d), max(sums[7], most_d)
-    sums[8] += sum_before
-    sums[9] += sum_after
-    sums[10], sums[11] = min(sums[10], least_before), max(sums[11], most_before)
-    sums[12], sums[13] = min(sums[12], least_after), max(sums[13], most_after)
+        for first in range(0, out.shape[1], RUN):
+            n = min(RUN, out.shape[1] - first)
+            c = first + halo
+            done, done_dz, before = out[i, first : first + n], out_dz[i, first : first + n], heights[:n]
+            if not resample_run(z, du, dv, dz, r, c, tolerance, work, done, done_dz):
+                for k in range(0, n, SHORT_RUN):
+                    part, part_dz = done[k : k + SHORT_RUN], done_dz[k : k + SHORT_RUN]
+                    if not resample_run(z, du, dv, dz, r, c + k, tolerance, work, part, part_dz):
+                        resample_cells(z, du, dv, dz, r, c + k, tolerance, part, part_dz, sums)
+            cells = z[r, c : c + n]
+            for j in range(n):
+                before[j] = cells[j] if done_dz[j] == done_dz[j] else np.nan
+            for j in range(n):
+                squares[j] += float(done_dz[j]) * float(done_dz[j]) if done_dz[j] == done_dz[j] else 0.0
+            tally(done_dz, sum_d[0], sum_d[1], sum_d[2])
+            tally(before, sum_before[0], sum_before[1], sum_before[2])
+            tally(done, sum_after[0], sum_after[1], sum_after[2])
+    sums[0] += out.size - sums[1] - sums[2]
+    sums[4] += sum_d[0].sum()
+    sums[5] += squares.sum()
+    sums[8] += sum_before[0].sum()
+    sums[9] += sum_after[0].sum()
+    sums[6], sums[7] = min(sums[6], sum_d[1].min()), max(sums[7], sum_d[2].max())
+    sums[10], sums[11] = min(sums[10], sum_before[1].min()), max(sums[11], sum_before[2].max())
+    sums[12], sums[13] = min(sums[12], sum_after[1].min()), max(sums[13], sum_after[2].max())

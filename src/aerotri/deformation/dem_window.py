@@ -17,7 +17,8 @@ from aerotri.rasters import Grid
 FIT_TOLERANCE_M = 2e-4
 TABLE_TOLERANCE_M = 1e-4
 FIXED_POINT_TOLERANCE_M = 1e-4
-LARGEST_PATCH = 32
+LARGEST_PATCH = 64
+PART = 256
 PARTIALS_STEP_M = 50.0
 
 
@@ -114,14 +115,34 @@ class DemModels:
             sums[1], sums[2] = window[0] * window[1] - known, known
             return CorrectedWindow(np.full(window, np.nan, z.dtype), np.full(window, np.nan, np.float32), sums, 0)
         x, y = float(grid.x(column + z.shape[1] // 2)), float(grid.y(row + z.shape[0] // 2))
-        place = np.array([float(grid.x(column)) - x, grid.cell_x, float(grid.y(row)) - y, -grid.cell_y])
+        number, photos = _renumbered(number, chosen), self.photos(x, y, chosen)
+        out, out_dz, exact = np.empty(window, z.dtype), np.empty(window, np.float32), 0
+        for i in range(0, window[0], PART):
+            for j in range(0, window[1], PART):
+                rows, columns = min(PART, window[0] - i), min(PART, window[1] - j)
+                around = np.s_[i : i + rows + 2 * halo, j : j + columns + 2 * halo]
+                place = np.array(
+                    [grid.x(column + j) - x, grid.cell_x, grid.y(row + i) - y, -grid.cell_y], dtype=float
+                )  # fmt: skip
+                part = self._part(z[around], number[around], photos, self.source[chosen], place, halo)
+                inner = np.s_[i : i + rows, j : j + columns]
+                out[inner], out_dz[inner] = part.z, part.dz
+                sums, exact = added_sums(sums, part.sums), exact + part.exact
+        return CorrectedWindow(out, out_dz, sums, exact)
+
+    def _part(
+        self, z: np.ndarray, number: np.ndarray, photos: np.ndarray, source: np.ndarray, place: np.ndarray, halo: int
+    ) -> CorrectedWindow:
+        """Correct a part of a window that stays in the processor's cache; `number`, `photos`, `source` go together."""
+        z, number = np.ascontiguousarray(z), np.ascontiguousarray(number)
         du, dv, dz = (np.empty(z.shape, np.float32) for _ in range(3))
+        cameras, sums = self.tables.as_tuple(), no_sums()
         exact = _kernels.deform_window(
-            z, _renumbered(number, chosen), self.photos(x, y, chosen), self.source[chosen], self.tables.as_tuple(),
-            place, FIT_TOLERANCE_M, LARGEST_PATCH, du, dv, dz,
-        )  # fmt: skip
-        out, out_dz = np.empty(window, z.dtype), np.empty(window, np.float32)
-        tolerance = FIXED_POINT_TOLERANCE_M / np.array([grid.cell_x, grid.cell_y])
+            z, number, photos, source, cameras, place, FIT_TOLERANCE_M, LARGEST_PATCH, du, dv, dz
+        )
+        shape = z.shape[0] - 2 * halo, z.shape[1] - 2 * halo
+        out, out_dz = np.empty(shape, z.dtype), np.empty(shape, np.float32)
+        tolerance = FIXED_POINT_TOLERANCE_M / np.abs(place[[1, 3]])
         _kernels.resample(z, du, dv, dz, halo, tolerance, out, out_dz, sums)
         return CorrectedWindow(out, out_dz, sums, exact)
 

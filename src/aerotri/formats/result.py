@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import MGON_PER_RADIAN
+from aerotri.formats.reliability_columns import control_columns, observation_columns, ray_columns
 from aerotri.image_errors import interior_elements
 from aerotri.observations import Block
 from aerotri.observations.block import INTERIOR_ELEMENTS
@@ -33,6 +34,8 @@ PARAMETER_KEYS = (
 def write_result(adjusted: AdjustedBlock, folder: str | Path) -> None:
     """Write adjustment.json, images, points, parameters, control and check as CSV, and residuals.parquet.
 
+    observations.csv is written besides where positions, attitudes or conditions were observed.
+
     Beside them variance_components.json where they were estimated. The files are written one after the other,
     adjustment.json last: who needs all or nothing passes a temporary folder and renames it.
 
@@ -46,8 +49,11 @@ def write_result(adjusted: AdjustedBlock, folder: str | Path) -> None:
     _write_csv(folder / "images.csv", image_columns(adjusted))
     _write_csv(folder / "points.csv", point_columns(adjusted))
     _write_csv(folder / "parameters.csv", parameter_columns(adjusted))
-    _write_csv(folder / "control.csv", ground_point_columns(adjusted, adjusted.control))
+    control = ground_point_columns(adjusted, adjusted.control) | control_columns(adjusted)
+    _write_csv(folder / "control.csv", control)
     _write_csv(folder / "check.csv", ground_point_columns(adjusted, adjusted.check))
+    if adjusted.observations is not None:
+        _write_csv(folder / "observations.csv", observation_columns(adjusted))
     _write_residuals(folder / "residuals.parquet", adjusted)
     if adjusted.components is not None:
         (folder / "variance_components.json").write_text(adjusted.components.to_json() + "\n", encoding="utf-8")
@@ -155,6 +161,7 @@ def _write_residuals(path: Path, adjusted: AdjustedBlock) -> None:
     arrays |= {name: pa.array(values, from_pandas=True) for name, values in numbers.items()}
     arrays["weight"] = pa.array(np.asarray(rays.weight, dtype=float), from_pandas=True)
     arrays["status"] = _text_by_index(np.array(RAY_STATUS), rays.status)
+    arrays |= ray_columns(adjusted)
     pq.write_table(pa.table(arrays), path, compression="zstd")
 
 

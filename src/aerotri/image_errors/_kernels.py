@@ -70,29 +70,29 @@ def cubic_run(source, first, out, to, n, x, dx, y, dy, low, high, is_integer):
 
 
 @kernel
-def lanczos_weights(t, weights):
-    """(6,) out: Lanczos' windowed sinc of three lobes at the place t between the inner two of six neighbours, sum 1."""
+def lanczos_weights(t, weights, row):
+    """A row of six out: Lanczos' windowed sinc of three lobes at the place t between the inner two of six neighbours, sum 1."""
     sine, sine_3, cosine_3 = np.sin(np.pi * t), np.sin(np.pi * t / 3.0), np.cos(np.pi * t / 3.0)
     total = 0.0
     for j in range(6):
         u, sign = t + 2.0 - j, 1.0 - 2.0 * (j % 2)
         turned = sine_3 * COSINES[j] + cosine_3 * SINES[j]
-        weights[j] = 1.0 if abs(u) < 1e-6 else 3.0 * sign * sine * turned / (np.pi * u) ** 2
-        total += weights[j]
+        weights[row, j] = 1.0 if abs(u) < 1e-6 else 3.0 * sign * sine * turned / (np.pi * u) ** 2
+        total += weights[row, j]
     for j in range(6):
-        weights[j] /= total
+        weights[row, j] /= total
 
 
 @kernel
-def lanczos_parabola(place, drift, n, scratch, weights):
-    """(3, 6) out: weights of pixel k of a run of n are w0 + k·(w1 + k·w2); scratch : (3, 6)."""
+def lanczos_parabola(place, drift, n, scratch, weights, row):
+    """Rows `row` to `row` + 2 out: weights of pixel k of a run of n are w0 + k·(w1 + k·w2); scratch : (3, 6)."""
     for j in range(3):
-        lanczos_weights(place + 0.5 * j * n * drift, scratch[j])
+        lanczos_weights(place + 0.5 * j * n * drift, scratch, j)
     for j in range(6):
         start, middle, end = scratch[0, j], scratch[1, j], scratch[2, j]
-        weights[0, j] = start
-        weights[1, j] = (4.0 * middle - 3.0 * start - end) / n
-        weights[2, j] = 2.0 * (start - 2.0 * middle + end) / n**2
+        weights[row, j] = start
+        weights[row + 1, j] = (4.0 * middle - 3.0 * start - end) / n
+        weights[row + 2, j] = 2.0 * (start - 2.0 * middle + end) / n**2
 
 
 @inlined
@@ -138,6 +138,27 @@ def lanczos_run(source, first, out, to, n, weights, low, high, is_integer):
         out[row, column + i] = _pixel(v, low, high, is_integer)
 
 
+@kernel
+def simple_run(source, source_row, out, r, first, n, x, dx, y, dy, size, limits, weights, is_integer):
+    """A bicubic run that stays between the same rows and columns well inside the image, as most do; else False.
+
+    Arguments as in `resample_run`.
+    """
+    column, row = int(np.floor(x)), int(np.floor(y))
+    if int(np.floor(x + (n - 1) * (1.0 + dx))) != column + n - 1 or int(np.floor(y + (n - 1) * dy)) != row:
+        return False
+    if column < 0 or row < 0 or column + n >= size[1] or row >= size[0] - 1:
+        return False
+    # through the table, since that makes them numbers of the type of the sums
+    weights[6, 0], weights[6, 1], weights[6, 2], weights[6, 3] = x - column, dx, y - row, dy
+    at = np.uintp(row - 1 - source_row), np.uintp(column - 1 + PAD)
+    cubic_run(
+        source, at, out, (np.uintp(r), np.uintp(first)), np.uintp(n), weights[6, 0], weights[6, 1], weights[6, 2],
+        weights[6, 3], limits[0], limits[1], is_integer,
+    )  # fmt: skip
+    return True
+
+
 @inlined
 def _stay(place, change):
     """Pixels for which a place that changes by `change` stays within 0 … 1."""
@@ -170,17 +191,17 @@ def resample_run(
         column, row = int(np.floor(x)), int(np.floor(y))
         many = min(n - done, longest, _stay(x - column, dx), _stay(y - row, dy))
         if column < -1 or row < -1 or column >= size[1] or row >= size[0]:
-            out[r, first + done : first + done + many] = limits[2]
+            for k in range(many):
+                out[r, first + done + k] = limits[2]
         else:
             taps = 2 if lanczos else 1
             at = np.uintp(row - taps - source_row), np.uintp(column - taps + PAD)
             to = np.uintp(r), np.uintp(first + done)
             if lanczos:
-                lanczos_parabola(x - column, dx, many, scratch, weights[:3])
-                lanczos_parabola(y - row, dy, many, scratch, weights[3:6])
+                lanczos_parabola(x - column, dx, many, scratch, weights, 0)
+                lanczos_parabola(y - row, dy, many, scratch, weights, 3)
                 lanczos_run(source, at, out, to, np.uintp(many), weights, limits[0], limits[1], is_integer)
             else:
-                # through the table, since that makes them numbers of the type of the sums
                 weights[6, 0], weights[6, 1], weights[6, 2], weights[6, 3] = x - column, dx, y - row, dy
                 cubic_run(
                     source, at, out, to, np.uintp(many), weights[6, 0], weights[6, 1], weights[6, 2], weights[6, 3],
@@ -213,32 +234,39 @@ def resample_tile(
     top, bottom : (columns,) first row of the tile and the one after its last.
     """
     highest, lowest = top.max(), bottom.min()
+    cells = nodes.shape[1] - 1
+    line = np.empty((cells + 1, 2))
     for r in range(len(out)):
         row = out_row + r
         i = min(max((row - origin[0]) // step, 0), nodes.shape[0] - 2)
         t = (row - origin[0]) / step - i
+        for k in range(cells + 1):
+            line[k, 0] = (1.0 - t) * nodes[i, k, 0] + t * nodes[i + 1, k, 0]
+            line[k, 1] = (1.0 - t) * nodes[i, k, 1] + t * nodes[i + 1, k, 1]
         whole = highest <= row < lowest
         column, last = begin[r], end[r]
+        j = min(max((column - origin[1]) // step, 0), cells - 1)
         while column < last:
-            if not whole and (row < top[column] or row >= bottom[column]):
-                column += 1
-                continue
-            j = min(max((column - origin[1]) // step, 0), nodes.shape[1] - 2)
             first = origin[1] + j * step
-            stop = last if j == nodes.shape[1] - 2 else min(last, first + step)
+            stop = last if j == cells - 1 else min(last, first + step)
             if not whole:
-                until = column + 1
+                while column < stop and (row < top[column] or row >= bottom[column]):
+                    column += 1
+                until = column
                 while until < stop and top[until] <= row < bottom[until]:
                     until += 1
                 stop = until
-            x = (1.0 - t) * nodes[i, j, 0] + t * nodes[i + 1, j, 0]
-            y = (1.0 - t) * nodes[i, j, 1] + t * nodes[i + 1, j, 1]
-            dx = ((1.0 - t) * nodes[i, j + 1, 0] + t * nodes[i + 1, j + 1, 0] - x) / step
-            dy = ((1.0 - t) * nodes[i, j + 1, 1] + t * nodes[i + 1, j + 1, 1] - y) / step
-            x += column + (column - first) * dx
-            y += row + (column - first) * dy
-            resample_run(
-                source, source_row, out, r, column, stop - column, x, dx, y, dy, size, limits, weights, scratch,
-                is_integer, lanczos,
-            )  # fmt: skip
+            dx, dy = (line[j + 1, 0] - line[j, 0]) / step, (line[j + 1, 1] - line[j, 1]) / step
+            x = column + line[j, 0] + (column - first) * dx
+            y = row + line[j, 1] + (column - first) * dy
+            n = stop - column
+            if lanczos or not simple_run(
+                source, source_row, out, r, column, n, x, dx, y, dy, size, limits, weights, is_integer
+            ):
+                resample_run(
+                    source, source_row, out, r, column, n, x, dx, y, dy, size, limits, weights, scratch, is_integer,
+                    lanczos,
+                )  # fmt: skip
             column = stop
+            if column >= first + step and j < cells - 1:
+                j += 1

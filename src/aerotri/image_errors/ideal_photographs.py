@@ -171,7 +171,15 @@ def _switch(one: TileGrid, other: TileGrid, seam: float, position: np.ndarray, a
     return np.where(begins <= ends, np.clip(seam, begins, ends), (begins + ends) / 2.0)
 
 
-def resample(source: np.ndarray, source_row: int, rows: tuple[int, int], ideal: IdealMap, kind: PixelType, method: str):
+def resample(
+    source: np.ndarray,
+    source_row: int,
+    rows: tuple[int, int],
+    ideal: IdealMap,
+    kind: PixelType,
+    method: str = "bicubic",
+    pool: ThreadPoolExecutor | None = None,
+) -> np.ndarray:
     """Rows of the ideal photograph.
 
     Parameters
@@ -180,14 +188,14 @@ def resample(source: np.ndarray, source_row: int, rows: tuple[int, int], ideal: 
         `IdealMap.source_rows` names within the image.
     rows : first and one after the last.
     method : of `RESAMPLINGS`.
+    pool : threads to work in; the pixels do not depend on it.
 
     Returns
     -------
     (bands, rows, columns) of the type of the source.
     """
     tasks = _Tasks(source, source_row, rows, ideal, kind, method)
-    for k in range(tasks.count):
-        tasks(k)
+    list((map if pool is None else pool.map)(tasks, range(tasks.count)))
     return tasks.out
 
 
@@ -313,9 +321,7 @@ def _stream(photograph: Photograph, write, ideal: IdealMap, method: str, report:
             if number + 1 < len(bands):
                 coming = reader.submit(read, bands[number + 1])
             if not ideal.is_identity:
-                tasks = _Tasks(pixels, first, rows, ideal, kind, method)
-                list(pool.map(tasks, range(tasks.count)))
-                pixels = tasks.out
+                pixels = resample(pixels, first, rows, ideal, kind, method, pool)
             if going is not None:
                 going.result()
             going = writer.submit(write, rows[0], pixels)

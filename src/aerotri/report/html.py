@@ -12,7 +12,9 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
+from aerotri.crosscheck import CrosscheckResult
 from aerotri.report import quality, tables, work_tables
+from aerotri.report.plots_crosscheck import crosscheck_table
 from aerotri.report.rendering import RenderedPlot, render_plots
 from aerotri.statistics.adjusted_block import AdjustedBlock
 from aerotri.statistics.free_verdict import FreeCheck
@@ -34,6 +36,11 @@ CAPTIONS = {
     ),
     "correlations": "Correlations of the shared parameters; darkness is size, a dash marks negative ones.",
     "residual_histogram": "Residuals of the image coordinates against the normal curve they should follow.",
+    "reliability": (
+        "What the tests may overlook: the height error that the largest undetected error of a ray can cause at its "
+        "point, and how well the rays of every photograph control each other."
+    ),
+    "crosscheck": "How far other programs' results lie from this one, in standard deviations.",
     "rays_per_point": "In how many photographs the points were measured.",
 }
 
@@ -46,10 +53,13 @@ class Findings:
     ----------
     work : the work list; None: made from the result, which must then be in metres.
     free_check : None where no free adjustment was asked for.
+    crosscheck : the same block through other programs; None where that was not asked for. Its plot comes with the
+        others, as 'crosscheck'.
     """
 
     work: WorkList | None = None
     free_check: FreeCheck | None = None
+    crosscheck: CrosscheckResult | None = None
 
 
 NOTHING_BESIDE = Findings()
@@ -96,6 +106,7 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         "tables": _tables(adjusted) | {"work": work_tables.work_table(work)},
         "work_counts": work_tables.work_counts(work),
         "free": None if beside.free_check is None else _free_check(beside.free_check),
+        "crosscheck": None if beside.crosscheck is None else _crosscheck(beside.crosscheck),
     }
 
 
@@ -111,6 +122,16 @@ def _free_check(check: FreeCheck) -> dict[str, Any]:
     }
 
 
+def _crosscheck(result: CrosscheckResult) -> dict[str, Any]:
+    """The section on the cross-check."""
+    return {
+        "agrees": result.verdict == "agrees",
+        "sentence": quality.printable(result.sentence, 2000),
+        "table": crosscheck_table(result),
+        "notes": [f"{check.peer}: {quality.printable(note, 600)}" for check in result.checks for note in check.notes],
+    }
+
+
 def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
     control, check = adjusted.control, adjusted.check
     return {
@@ -122,6 +143,7 @@ def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
         "check": tables.ground_points(adjusted, check, "Check points, one by one"),
         "control_rays": work_tables.control_rays_table(adjusted),
         "cameras": tables.cameras(adjusted),
+        "film": tables.film(adjusted),
         "parameters": tables.parameters(adjusted),
         "largest": tables.largest_residuals(adjusted),
         "blunders": tables.blunders(adjusted),

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from aerotri.image_errors import averaged_residuals, field_on_grid, image_groups
 from aerotri.report.plots_block import plot_block_plan, plot_ground_points, plot_rays_per_point
 from aerotri.report.plots_camera import plot_averaged_residuals, plot_systematic_errors
+from aerotri.report.plots_reliability import plot_reliability
 from aerotri.report.plots_residuals import correlated_parameters, plot_correlations, plot_residual_histogram
 from aerotri.report.rendering import save_plots
 from aerotri.statistics.adjusted_block import AdjustedBlock
@@ -18,6 +19,7 @@ __all__ = [
     "plot_correlations",
     "plot_ground_points",
     "plot_rays_per_point",
+    "plot_reliability",
     "plot_residual_histogram",
     "plot_systematic_errors",
     "save_plots",
@@ -46,4 +48,6 @@ def all_plots(adjusted: AdjustedBlock) -> dict[str, Figure]:
         figures["correlations"] = plot_correlations(adjusted)
     figures["residual_histogram"] = plot_residual_histogram(adjusted)
     figures["rays_per_point"] = plot_rays_per_point(adjusted)
+    if adjusted.effects is not None:
+        figures["reliability"] = plot_reliability(adjusted)
     return figures

@@ -165,6 +165,23 @@ def cameras(adjusted: AdjustedBlock) -> Table:
     return Table("Interior orientation", columns, tuple(rows))
 
 
+def film(adjusted: AdjustedBlock) -> Table:
+    """Interior orientation of scanned photographs: how well the fiducial marks fit, one row a photograph."""
+    rows = []
+    block = adjusted.block
+    for image, fit in sorted(block.interior_fits.items()):
+        length = 1e3 * np.hypot(*fit.residuals.T)
+        rows.append(
+            (
+                printable(block.images.names[image]), fit.kind, len(length), int(fit.redundancy),
+                1e3 * float(fit.sigma0_mm), float(np.sqrt(np.mean(length**2))), float(length.max()),
+            )
+        )  # fmt: skip
+    columns = (Column("photograph"), Column("transformation"), Column("marks"), Column("redundancy"),
+               Column("σ0", "µm", ".1f"), Column("RMS of a mark", "µm", ".1f"), Column("largest", "µm", ".1f"))  # fmt: skip
+    return Table("Interior orientation of the scans", columns, tuple(rows))
+
+
 def parameters(adjusted: AdjustedBlock) -> Table:
     """Additional and GNSS parameters with their tests; interior elements stand in their own table."""
     p = adjusted.parameters

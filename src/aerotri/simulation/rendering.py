@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.special import ndtr
 
 from aerotri.adjustment.parallel import thread_count
 from aerotri.conventions import InputError, mm_from_px, px_from_mm
@@ -34,7 +35,8 @@ from aerotri.simulation.truth import Truth
 BAND_ROWS, CHUNK_COLUMNS = 256, 1024
 WHITE = 65535.0
 BLUR_REACH = 4.0
-TARGET_EDGE_PX = 1.0
+TARGET_EDGE_PX = 0.7
+"""σ of the edge of a disc, so that its sampling by pixels leaves its centroid alone."""
 RAY_TOLERANCE_M, RAY_ITERATIONS = 1e-5, 100
 Report = Callable[[float], None]
 
@@ -210,8 +212,8 @@ class _View:
             if view.size:
                 i, j = np.indices(view.shape).reshape(2, -1)
                 ground = grid.at((i + part[0].start + row).astype(float), (j + part[1].start + column).astype(float))
-                inside = (radius - np.hypot(*(ground - target[:2]).T)) / (TARGET_EDGE_PX * gsd) + 0.5
-                share = np.clip(inside, 0.0, 1.0).reshape(view.shape).astype(np.float32)
+                inside = (radius - np.hypot(*(ground - target[:2]).T)) / (TARGET_EDGE_PX * gsd)
+                share = ndtr(inside).reshape(view.shape).astype(np.float32)
                 view += share * (np.float32(options.target_level) - view)
 
 

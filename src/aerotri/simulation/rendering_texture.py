@@ -1,8 +1,9 @@
 """A texture on the ground, the same from wherever it is seen: noise of many octaves, without end and without storage.
 
 [C] Every octave is a cubic B-spline surface whose coefficients are hashed from the place of their node, the octaves a
-factor 2 apart. A B-spline surface is one on a lattice twice as fine as well, so that all octaves are added up into the
-coefficients of the finest, and every pixel costs one evaluation. Beyond one cycle in two nodes it holds nearly nothing.
+factor 2 apart and of equal variance, as in natural images [L: Field 1987]. A B-spline surface is one on a lattice twice
+as fine as well, so that all octaves are added up into the coefficients of the finest, and every pixel costs one
+evaluation. Beyond one cycle in two nodes it holds nearly nothing.
 """
 
 from __future__ import annotations
@@ -15,8 +16,6 @@ from aerotri.simulation import _rendering_kernels as kernels
 from aerotri.simulation.random_streams import stream
 
 COARSEST_M = 400.0
-DECAY = 0.7
-"""Amplitude of an octave over that of the one twice as coarse: fine detail is weaker, as on the ground."""
 RMS_OF_NODES = 151.0 / 315.0 / np.sqrt(3.0)
 """RMS of a B-spline surface over the amplitude of its uniform coefficients: (Σ w²) averaged, along both axes."""
 MARGIN = 4
@@ -49,10 +48,10 @@ class Texture:
     def octaves(self) -> int:
         return max(int(np.ceil(np.log2(COARSEST_M / self.spacing))), 1)
 
-    def amplitudes(self) -> np.ndarray:
-        """(octaves,) from the finest on."""
-        plain = DECAY ** -np.arange(self.octaves, dtype=float)
-        return plain / np.sqrt(np.sum(plain**2)) / RMS_OF_NODES
+    @property
+    def amplitude(self) -> float:
+        """Of the coefficients of every octave."""
+        return 1.0 / np.sqrt(self.octaves) / RMS_OF_NODES
 
     def lattice(self, low: np.ndarray, high: np.ndarray) -> Lattice:
         """Coefficients for the ground between two corners (2,) X, Y in m."""
@@ -63,12 +62,12 @@ class Texture:
             r, c, last_r, last_c = ranges[-1]
             ranges.append((r // 2 - 1, c // 2 - 1, last_r // 2 + 2, last_c // 2 + 2))
         keys = stream(self.seed, "texture").integers(2**63, size=self.octaves, dtype=np.uint64)
-        values, amplitudes = None, self.amplitudes()
+        values = None
         for k in reversed(range(self.octaves)):
             r, c, last_r, last_c = ranges[k]
             fine = np.zeros((last_r - r + 1, last_c - c + 1), np.float32)
             if values is not None:
                 kernels.refine(values, ranges[k + 1][0], ranges[k + 1][1], fine, r, c)
-            kernels.add_noise(fine, r, c, keys[k], amplitudes[k])
+            kernels.add_noise(fine, r, c, keys[k], self.amplitude)
             values = fine
         return Lattice(row, column, self.spacing, np.zeros((0, 0), np.float32) if values is None else values)

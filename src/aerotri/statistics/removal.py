@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.prepare import ONE_RAY, REMOVED, Prepared, build_system, with_edits
 from aerotri.adjustment.unknowns import StartValues, State, Unknowns
 from aerotri.functional_model.observed_unknowns import CentreObservations
-from aerotri.observations import Block
+from aerotri.observations import Block, GnssIns
 from aerotri.statistics.adjusted_block import Blunder
 from aerotri.statistics.switched_tests import AllTests, Switches, participants, photographs_of, ray_points
 
@@ -74,13 +74,25 @@ def without_removed(prepared: Prepared, state: State, switches: Switches) -> Pre
 
 def with_datum_of(block: Block, used: Block) -> Block:
     """A block with the control points, positions and attitudes left out that were removed from another form of it."""
+    if block.settings.adjustment.robust != "data-snooping":
+        return block
     was_check, is_check = (with_edits(b)[0].control.is_check for b in (block, used))
     block = _as_checks(block, block.control.point[is_check & ~was_check])
-    if block.gnss_ins is None or used.gnss_ins is None:
+    gnss = block.gnss_ins
+    if gnss is None:
         return block
-    xyz = np.where(np.isnan(used.gnss_ins.xyz), np.nan, block.gnss_ins.xyz)
-    angles = np.where(np.isnan(used.gnss_ins.angles), np.nan, block.gnss_ins.angles)
-    return replace(block, gnss_ins=replace(block.gnss_ins, xyz=xyz, angles=angles))
+    xyz_known, angles_known = (np.zeros((len(block.images), 3), dtype=bool) for _ in range(2))
+    if used.gnss_ins is not None:
+        xyz_known[used.gnss_ins.image] = np.isfinite(used.gnss_ins.xyz)
+        angles_known[used.gnss_ins.image] = np.isfinite(used.gnss_ins.angles)
+    xyz = np.where(xyz_known[gnss.image], gnss.xyz, np.nan)
+    angles = np.where(angles_known[gnss.image], gnss.angles, np.nan)
+    # a row that observes nothing is none
+    rows = np.isfinite(np.concatenate([xyz, angles], axis=1)).any(axis=1)
+    if not rows.any():
+        return replace(block, gnss_ins=None)
+    parts = {field.name: getattr(replace(gnss, xyz=xyz, angles=angles), field.name) for field in fields(gnss)}
+    return replace(block, gnss_ins=GnssIns(**{name: part[rows] for name, part in parts.items()}))
 
 
 def _as_checks(block: Block, points: np.ndarray) -> Block:

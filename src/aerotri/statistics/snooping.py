@@ -113,7 +113,7 @@ def _start(prepared: Prepared, solution: Solution, options: SolveOptions) -> _St
     """The first solution with its tests, or a robust one where errors are too gross for it."""
     system = prepared.system
     switches, none = Switches.all_on(system), Switches.none_of(system)
-    tests = test_all(system, solution.state, switches)
+    tests = test_all(system, system, solution, switches)
     stand = _Stand(switches, solution.state, tests, solution.iterations, none, none, {})
     if solution.status == "converged" and tests.rays.joint.max(initial=0.0) <= GROSS:
         return stand
@@ -149,11 +149,12 @@ def _switched(
     gone = 2 * int((~participants(system.unknowns, switches).rays).sum())
     redundancy = max(count_observations(system).redundancy - gone, 1)
     counting = replace(_counting(options, stand.iterations), max_iterations=options.max_iterations if whole else 1)
+    switched = switched_system(system, switches)
     try:
-        solution = minimise(switched_system(system, switches), stand.state, redundancy, counting)
+        solution = minimise(switched, stand.state, redundancy, counting)
         if solution.defects:
             raise NotPositiveDefiniteError
-        tests = test_all(system, solution.state, switches)
+        tests = test_all(system, switched, solution, switches)
         if tests.smallest_pivot < WEAKENED * stand.tests.smallest_pivot:
             raise NotPositiveDefiniteError
     except NotPositiveDefiniteError:
@@ -205,7 +206,7 @@ def _in_words(prepared: Prepared, stand: _Stand, blunders: tuple[Blunder, ...]) 
     accused = u.points[stand.switches.control & (stand.tests.control.largest > limits.datum)]
     if len(accused):
         names = ", ".join(str(name) for name in u.block.points[accused])
-        said.append(f"control points {names} contradict the block, and there is too little control to tell which is wrong")
+        said.append(f"control points {names} contradict the block, and too little control tells which is wrong")
     if limits.spread > WORTH_SAYING:
         said.append(f"the residuals are {limits.spread:.2f} times what the a-priori σ say: the tests allow for that")
     return said

@@ -150,7 +150,7 @@ def _worst_of_datum(
     options = [np.where(control, sizes.control, 0.0)]
     for extra, joint, test in zip(system.extras, sizes.extras, tests.extras, strict=True):
         image = photographs_of(extra)
-        may_go = (test.largest > limits.datum)[: len(image)] & (joint >= sizes.in_image[image])
+        may_go = (test.largest > limits.datum) & (joint >= sizes.in_image[image])
         options.append(np.where(may_go, joint, 0.0))
     largest = [option.max(initial=0.0) for option in options]
     number = int(np.argmax(largest))

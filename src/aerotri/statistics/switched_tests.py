@@ -17,7 +17,7 @@ import numpy as np
 
 from aerotri.adjustment import _reliability_kernels
 from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
-from aerotri.adjustment.robust import LEAST_SQUARES
+from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import InverseOnPattern
 from aerotri.adjustment.unknowns import State, Unknowns
 from aerotri.functional_model.observed_unknowns import AttitudeObservations, CentreObservations, Rows
@@ -140,25 +140,26 @@ def _with(extra: ExtraObservations, on: np.ndarray) -> ExtraObservations:
     return extra
 
 
-def test_all(system: NormalSystem, state: State, switches: Switches) -> AllTests:
-    """Tests of all observations of `system` at a solution with some of them switched off.
+def test_all(system: NormalSystem, switched: NormalSystem, solution: Solution, switches: Switches) -> AllTests:
+    """Tests of all observations at a solution with some of them switched off.
+
+    Parameters
+    ----------
+    system : with all on. switched : of `switched_system`. solution : of `switched`, not robust.
 
     Raises
     ------
     NotPositiveDefiniteError
         When what is switched on does not determine the unknowns.
     """
-    switched, taking_part = switched_system(system, switches), participants(system.unknowns, switches)
-    equations = switched.assemble(state, 0.0, LEAST_SQUARES)
-    factor = switched.factorise(equations)
+    u, state, taking_part = system.unknowns, solution.state, participants(system.unknowns, switches)
+    factor = switched.factorise(solution.equations)
     inverse = factor.inverse_on_pattern()
     points, predicted = _predictions(system, switched, state, inverse)
-    rays = _ray_tests(system.unknowns, equations.residual, predicted, taking_part)
-    control = _control_tests(system.unknowns, state, points, switches, taking_part)
-    q = Cofactors(
-        inverse.blocks[: len(system.unknowns.images)], inverse.corner, points, np.swapaxes(inverse.border, 1, 2),
-        predicted, inverse,
-    )  # fmt: skip
+    rays = _ray_tests(u, solution.equations.residual, predicted, taking_part)
+    control = _control_tests(u, state, points, switches, taking_part)
+    border = np.swapaxes(inverse.border, 1, 2)
+    q = Cofactors(inverse.blocks[: len(u.images)], inverse.corner, points, border, predicted, inverse)
     rows = system.whitened_rows(state)
     extras = tuple(_row_tests(r, row_cofactors(r, q), on) for r, on in zip(rows, switches.extras, strict=True))
     return AllTests(rays, control, extras, factor.smallest_pivot)
@@ -210,10 +211,10 @@ def _control_tests(
 
 def _row_tests(rows: Rows, cofactor: np.ndarray, on: np.ndarray) -> Tests:
     """Of observations beside the image points; their joint test leaves the correlation of the components aside."""
-    known = rows.inv_sigma > 0.0
     if not len(on):
-        none = np.zeros((len(rows.gap), rows.gap.shape[1]))
-        return Tests(none, none, np.zeros(len(rows.gap)))
+        none = np.zeros((0, rows.gap.shape[1]))
+        return Tests(none, none, np.zeros(0))
+    known = rows.inv_sigma > 0.0
     spread = 1.0 + np.where(on, -1.0, 1.0)[:, None] * cofactor
     w, r, _ = _tested(rows.gap[..., None].reshape(-1, 1), spread.reshape(-1, 1, 1), np.repeat(on, known.shape[1]))
     w = np.where(known, w.reshape(known.shape), 0.0)
@@ -233,8 +234,21 @@ def _tested(gap: np.ndarray, spread: np.ndarray, on: np.ndarray) -> tuple[np.nda
     variance = np.maximum(np.diagonal(spread, axis1=1, axis2=2), 1e-12)
     r = np.where(on[:, None], variance, 1.0 / variance)
     w = np.where(r > LEAST_CONTROLLED, gap / np.sqrt(variance), 0.0)
-    values, vectors = np.linalg.eigh(spread)
+    values, along = _principal_parts(gap, spread)
     values = np.maximum(values, 1e-12)
     controlled = np.where(on[:, None], values, 1.0 / values) > LEAST_CONTROLLED
-    squares = np.einsum("kij,ki->kj", vectors, gap) ** 2 / values
-    return w, r, np.sqrt(np.sum(np.where(controlled, squares, 0.0), axis=1))
+    return w, r, np.sqrt(np.sum(np.where(controlled, along**2 / values, 0.0), axis=1))
+
+
+def _principal_parts(gap: np.ndarray, spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues (k, c) of the cofactors and the gaps (k, c) along their directions; in closed form for pairs."""
+    if gap.shape[1] != 2:
+        values, vectors = np.linalg.eigh(spread)
+        return values, np.einsum("kij,ki->kj", vectors, gap)
+    x, y, xy = spread[:, 0, 0], spread[:, 1, 1], spread[:, 0, 1]
+    middle, half = (x + y) / 2.0, np.hypot((x - y) / 2.0, xy)
+    angle = 0.5 * np.arctan2(2.0 * xy, x - y)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    values = np.stack([middle + half, middle - half], axis=1)
+    along = np.stack([cosine * gap[:, 0] + sine * gap[:, 1], cosine * gap[:, 1] - sine * gap[:, 0]], axis=1)
+    return values, along
