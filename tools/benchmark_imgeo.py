@@ -157,8 +157,9 @@ def _ours_with_files(photograph: Path, target: Path, arguments: argparse.Namespa
 
 def _theirs_with_files(photograph: Path, target: Path, arguments: argparse.Namespace, maps) -> None:
     import rasterio
+    from rasterio.errors import NotGeoreferencedWarning
 
-    warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+    warnings.simplefilter("ignore", NotGeoreferencedWarning)
     with rasterio.open(photograph) as source:
         pixels, profile = source.read(1), source.profile
     with rasterio.open(target, "w", **profile) as written:

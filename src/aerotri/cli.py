@@ -120,6 +120,8 @@ def simulate(
         from aerotri.simulation.rendering import RenderOptions
 
         options = RenderOptions(blur_px=blur_px, noise=noise, targets=targets)
+    elif only or targets:
+        raise InputError("--only and --targets are about photographs", "add --render")
     run_simulate(spec, out, seed, json_, options, tuple(only or ()))
 
 
@@ -137,7 +139,7 @@ def convert(
         str,
         typer.Option(
             help="block, bal, colmap, colmap-text, bundler, opensfm, metashape (opk), pix4d-eo, ign, patb, bingo, "
-            "pix4d-gcp, pix4d-geo, odm-gcp."
+            "pix4d-gcp, pix4d-geo, pix4d-offset, odm-gcp, odm-geo, ign-mes, ign-app."
         ),
     ] = "block",
     image_points: Annotated[list[str] | None, typer.Option(help="More image points; may be repeated.")] = None,

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerotri.formats.reliability_columns import effect_names
 from aerotri.functional_model.rotation import small_rotation_per_angle
 from aerotri.observations import Prior
+from aerotri.observations.block import Constraints
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.statistics.reliability import noncentrality, ray_reliability
 from small_blocks import small_block, with_adjustment
@@ -39,6 +41,7 @@ def compare(adjustment, inner=False):
     share = DELTA / np.sqrt(adjustment.result.rays.r[u.rays.source])
     tested = np.isfinite(effects.size[u.rays.source])
     assert tested.mean() > 0.8
+    compared = 0
     for k, axis in zip(*np.nonzero(tested), strict=True):
         row, point = 2 * k + axis, 6 * n + s + 3 * ray_point[k]
         image = 6 * u.rays.image[k]
@@ -54,8 +57,12 @@ def compare(adjustment, inner=False):
             assert 6 * n + code - 9 in shared
         assert got >= expected - 1e-9
         np.testing.assert_allclose(effects.size[source, axis], got * share[k, axis], rtol=1e-9, atol=1e-9)
-        height = abs(changes[point + 2, row]) * share[k, axis]
+        kept = u.kept[ray_point[k]]
+        up = point + 2 if kept < 0 else 6 * n + kept + 2
+        height = abs(changes[up, row]) * share[k, axis]
         np.testing.assert_allclose(effects.height[source, axis], height, rtol=1e-9, atol=1e-9)
+        compared += 1
+    assert compared > 100
     external = ray_reliability(adjustment.result).external
     assert (effects.size[np.isfinite(effects.size)] <= external[np.isfinite(effects.size)] * (1 + 1e-9) + 1e-9).all()
 
@@ -73,6 +80,22 @@ def test_control_datum_with_all_kinds_of_shared_parameters():
 def test_minimal_datum():
     block = with_adjustment(small_block(5, "bluh:1-2", **TINY)[0], datum="minimal")
     compare(adjust_keeping_system(block))
+
+
+def test_points_that_conditions_tie_together():
+    """They are shared parameters: their coordinates are found there, by name."""
+    block, truth = small_block(10, "bluh:1-2", **TINY)
+    often = np.setdiff1d(np.argsort(-np.bincount(block.image_points.point)), block.control.point, assume_unique=True)
+    members = (often[:5], np.array([often[7], block.control.point[0]]))
+    length = np.linalg.norm(np.diff(truth.points[members[1]], axis=0))
+    given = Constraints(
+        np.array(["plane", "distance"], object), members, np.array([np.nan, length]), np.array([40.0, 0.05])
+    )
+    adjustment = adjust_keeping_system(replace(block, constraints=given))
+    compare(adjustment)
+    names = [effect_names(adjustment.result, adjustment.result.effects, axis).to_pylist() for axis in (0, 1)]
+    tied = np.flatnonzero(block.image_points.point == often[0])
+    assert all(f"of point {block.points[often[0]]}" in names[0][k] or "photo" in names[0][k] for k in tied)
 
 
 def test_inner_datum():

@@ -183,7 +183,7 @@ def test_a_group_without_redundancy_keeps_its_sigma():
     by_name = {c.group: c for c in result.components.components}
     for name in ("control plan", "control height"):
         assert by_name[name].factor == 1.0
-        assert "too few" in by_name[name].held
+        assert "too little" in by_name[name].held
         assert any(f"the σ of {name} is held as given" in w for w in result.outcome.warnings)
     assert not by_name["image points"].held
     np.testing.assert_array_equal(result.block.control.sigma, block.control.sigma)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from paper_002.strip import TWO_POINTS, Case, pairs_every
 
 GNSS_M = (0.25, 0.5, 1.0)
@@ -32,12 +34,13 @@ def roll_cases() -> list[Case]:
 def control_cases(photographs: int) -> list[Case]:
     """Other layouts of full control, and the other flying height."""
     pairs = _layout(2)
+    every_second = Case("", pairs, control=pairs_every(2, photographs))
     spaced = [Case("", _layout(bases), control=pairs_every(bases, photographs)) for bases in (1, 2, 4, 7, 10)]
     return [
         *spaced,
-        *(Case("", f"{pairs}, heights every {k}", control=pairs_every(2, photographs), heights_every=k) for k in (10, 12)),
+        *(replace(every_second, name=f"{pairs}, heights every {k}", heights_every=k) for k in (10, 12)),
         Case("", f"{pairs}, 40 m beside the axis", control=pairs_every(2, photographs, across=0.05)),
-        Case("", f"{pairs}, 900 m above ground", control=pairs_every(2, photographs), above_ground_m=900.0),
+        replace(every_second, name=f"{pairs}, 900 m above ground", above_ground_m=900.0),
     ]
 
 

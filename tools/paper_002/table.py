@@ -32,7 +32,7 @@ Where ours and the paper's differ, and where the paper differs from itself:
    to 1.8 in every layout of full control points; the paper has 4.4. Control close to the axis loosens the roll and
    raises Z alone, but to 124 mm only, and where full points ever farther apart bring Z to 197 mm, X and Y are twice the
    paper's. What gives all three is plan control at every second base with heights at every 10th to 12th only: 50, 53
-   and 177 to 217 mm. The page does not say whether that was it, or whether 197 is a misprint.
+   and 176 to 216 mm. The page does not say whether that was it, or whether 197 is a misprint.
 3. **Figures 1 and 2** show the RMS of methods 1 and 2 without legible numbers. What the text says of them holds here:
    GNSS alone leaves an "if not singular system", and towers stand in for control: μ of method 2 is within 15 % of that
    with two control points.

@@ -19,15 +19,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.compiled import inlined, kernel
+from aerotri.compiled import kernel
 
-SMALLEST_PATCH = 4
+SMALLEST_PATCH, NODES, CHECKS = 4, 9, 6
 MIXED, ONE_TILE, OFF = 0, 1, 2
 STEPS = 8
 LAST_STEP_M = 5e-3
 """A step of the intersection after which the next one is below 0.01 mm: steps shrink a thousandfold."""
 FIXED_POINTS = 30
-RUN, SHORT_RUN, RUN_STEPS = 128, 16, 3
 N_SUMS = 14
 """Of `resample`: cells corrected, without data, outside the models, shifted beyond the halo; Σ and Σ² of dZ, smallest
 and largest dZ; Σ of Z before and after; smallest and largest Z before, and after."""
@@ -163,15 +162,23 @@ def tile_case(photos, source, cameras, m, place, box, low, high):
 
 
 @kernel
-def quadratic(node, f, k):
-    """Coefficients f[k, p, q] of t^p·s^q from the values node[k] (3, 3) at t, s = −1, 0, 1."""
-    for q in range(3):
-        f[k, 0, q] = node[k, 1, q]
-        f[k, 1, q] = 0.5 * (node[k, 2, q] - node[k, 0, q])
-        f[k, 2, q] = 0.5 * (node[k, 2, q] + node[k, 0, q]) - node[k, 1, q]
-    for p in range(3):
-        low, middle, high = f[k, p, 0], f[k, p, 1], f[k, p, 2]
-        f[k, p, 0], f[k, p, 1], f[k, p, 2] = middle, 0.5 * (high - low), 0.5 * (high + low) - middle
+def fit_coefficients(node, span, f, slope):
+    """Coefficients f[k, p, q] of t^p·s^q from node[k] (3, 3) at t, s = −1, 0, 1, and slopes by height.
+
+    slope : (2, 3) in, values above and below the middle node by `span`; out, linear and quadratic.
+    """
+    for k in range(4):
+        for q in range(3):
+            f[k, 0, q] = node[k, 1, q]
+            f[k, 1, q] = 0.5 * (node[k, 2, q] - node[k, 0, q])
+            f[k, 2, q] = 0.5 * (node[k, 2, q] + node[k, 0, q]) - node[k, 1, q]
+        for p in range(3):
+            low, middle, high = f[k, p, 0], f[k, p, 1], f[k, p, 2]
+            f[k, p, 0], f[k, p, 1], f[k, p, 2] = middle, 0.5 * (high - low), 0.5 * (high + low) - middle
+    for k in range(3):
+        above, below = slope[0, k], slope[1, k]
+        slope[0, k] = (above - below) / (2.0 * span)
+        slope[1, k] = (above + below - 2.0 * node[k, 1, 1]) / (2.0 * span * span)
 
 
 @kernel
@@ -204,45 +211,44 @@ def fit_patch(z, photos, source, cameras, m, place, box, heights, tolerance, fit
     f, slope, node = fit
     x0, dx, y0, dy = place[0], place[1], place[2], place[3]
     half_rows, half_columns = 0.5 * (box[1] - box[0]), 0.5 * (box[3] - box[2])
-    for p in range(3):
-        r = box[0] + p * half_rows
-        for q in range(3):
-            c = box[2] + q * half_columns
+    middle, span = 0.5 * (heights[0] + heights[1]), max(1.0, 0.5 * (heights[1] - heights[0]))
+    for k in range(NODES + 2 + CHECKS):
+        if k < NODES:
+            r, c = box[0] + (k // 3) * half_rows, box[2] + (k % 3) * half_columns
             height = float(z[int(r + 0.5), int(c + 0.5)])
             if height != height:
-                height = 0.5 * (heights[0] + heights[1])
-            d = deformation(photos, source, cameras, m, x0 + dx * c, y0 + dy * r, height)
-            if d[2] != d[2]:
-                return False
-            node[0, p, q], node[1, p, q], node[2, p, q], node[3, p, q] = d[0], d[1], d[2], height
-    for k in range(4):
-        quadratic(node, f, k)
-    span = max(1.0, 0.5 * (heights[1] - heights[0]))
-    x, y, middle = x0 + dx * (box[2] + half_columns), y0 + dy * (box[0] + half_rows), node[3, 1, 1]
-    above = deformation(photos, source, cameras, m, x, y, middle + span)
-    below = deformation(photos, source, cameras, m, x, y, middle - span)
-    slope[0, 0], slope[0, 1], slope[0, 2] = above[0] - below[0], above[1] - below[1], above[2] - below[2]
-    slope[1, 0], slope[1, 1], slope[1, 2] = above[0] + below[0], above[1] + below[1], above[2] + below[2]
-    for k in range(3):
-        slope[0, k] = slope[0, k] / (2.0 * span)
-        slope[1, k] = (slope[1, k] - 2.0 * node[k, 1, 1]) / (2.0 * span * span)
-    for check in range(6):
-        if check < 4:
-            i = int(box[0] + half_rows * (0.5 if check & 1 else 1.5))
-            j = int(box[2] + half_columns * (0.5 if check & 2 else 1.5))
+                height = middle
+        elif k < NODES + 2:
+            r, c = box[0] + half_rows, box[2] + half_columns
+            height = node[3, 1, 1] + (span if k == NODES else -span)
         else:
-            i, j = find_height(z, box, heights[check - 4])
-        height = float(z[i, j])
-        if height != height:
-            continue
-        d = deformation(photos, source, cameras, m, x0 + dx * j, y0 + dy * i, height)
-        t, s = (i - box[0]) / half_rows - 1.0, (j - box[2]) / half_columns - 1.0
-        up = height - value_at(f, 3, t, s)
-        off_x = value_at(f, 0, t, s) + up * (slope[0, 0] + up * slope[1, 0]) - d[0]
-        off_y = value_at(f, 1, t, s) + up * (slope[0, 1] + up * slope[1, 1]) - d[1]
-        off_z = value_at(f, 2, t, s) + up * (slope[0, 2] + up * slope[1, 2]) - d[2]
-        if not (abs(off_x) <= tolerance and abs(off_y) <= tolerance and abs(off_z) <= tolerance):
-            return False
+            check = k - NODES - 2
+            if check < 4:
+                i = int(box[0] + half_rows * (0.5 if check & 1 else 1.5))
+                j = int(box[2] + half_columns * (0.5 if check & 2 else 1.5))
+            else:
+                i, j = find_height(z, box, heights[check - 4])
+            r, c, height = float(i), float(j), float(z[i, j])
+            if height != height:
+                continue
+        d = deformation(photos, source, cameras, m, x0 + dx * c, y0 + dy * r, height)
+        if k < NODES:
+            p, q = k // 3, k % 3
+            node[0, p, q], node[1, p, q], node[2, p, q], node[3, p, q] = d[0], d[1], d[2], height
+        elif k == NODES:
+            slope[0, 0], slope[0, 1], slope[0, 2] = d[0], d[1], d[2]
+        elif k == NODES + 1:
+            slope[1, 0], slope[1, 1], slope[1, 2] = d[0], d[1], d[2]
+            fit_coefficients(node, span, f, slope)
+        else:
+            t, s = (r - box[0]) / half_rows - 1.0, (c - box[2]) / half_columns - 1.0
+            up = height - value_at(f, 3, t, s)
+            off_x = value_at(f, 0, t, s) + up * (slope[0, 0] + up * slope[1, 0]) - d[0]
+            off_y = value_at(f, 1, t, s) + up * (slope[0, 1] + up * slope[1, 1]) - d[1]
+            off_z = value_at(f, 2, t, s) + up * (slope[0, 2] + up * slope[1, 2]) - d[2]
+            # a comparison with NaN, of a node off the format, is false
+            if not (abs(off_x) <= tolerance and abs(off_y) <= tolerance and abs(off_z) <= tolerance):
+                return False
     return True
 
 
@@ -380,134 +386,6 @@ def slope_of_corrected(z, dz, i, j, down, right):
     return 0.0
 
 
-@inlined
-def blend(low, low_next, high, high_next, s, t, out):
-    """out (n,): bilinear values at the places s, t of each cell, between two rows and the same one column on.
-
-    An index other than the running one would keep the processor from doing many at a time.
-    """
-    for j in range(len(out)):
-        below = low[j] + s[j] * (low_next[j] - low[j])
-        above = high[j] + s[j] * (high_next[j] - high[j])
-        out[j] = below + t[j] * (above - below)
-
-
-@inlined
-def blend_rows(values, row, column, s, t, out):
-    """`blend` of an array from a row and column on."""
-    end = column + len(out)
-    low, low_next = values[row, column:end], values[row, column + 1 : end + 1]
-    high, high_next = values[row + 1, column:end], values[row + 1, column + 1 : end + 1]
-    blend(low, low_next, high, high_next, s, t, out)
-
-
-@inlined
-def within(s, t):
-    """Whether all places lie between their four neighbours; NaN does not."""
-    good, zero, one = True, np.float32(0.0), np.float32(1.0)
-    for j in range(len(s)):
-        good &= (s[j] >= zero) & (s[j] < one) & (t[j] >= zero) & (t[j] < one)
-    return good
-
-
-@inlined
-def near(one, other, limit):
-    """Whether no value is farther from its counterpart than a limit."""
-    good = True
-    for j in range(len(one)):
-        good &= abs(one[j] - other[j]) <= limit
-    return good
-
-
-@inlined
-def resample_run(z, du, dv, dz, r, c, tolerance, work, out, out_dz):
-    """`resample` of the n cells of a row from (r, c) on, many at a time; False where they differ too much for that.
-
-    It goes where all of them lie between the same rows and columns relative to their own, next to no missing data, and
-    some steps of the fixed point are enough. work : four times (n,) float32.
-    """
-    s, t, u, v = work[0][: len(out)], work[1][: len(out)], work[2][: len(out)], work[3][: len(out)]
-    n = len(out)
-    if not dz[r, c] == dz[r, c]:
-        return False
-    iu, iv = np.floor(du[r, c]), np.floor(dv[r, c])
-    row, column = r + int(iv), c + int(iu)
-    if row < 0 or row + 1 >= z.shape[0] or column < 0 or column + n >= z.shape[1]:
-        return False
-    own_u, own_v = du[r, c : c + n], dv[r, c : c + n]
-    for j in range(n):
-        s[j] = own_u[j] - iu
-    for j in range(n):
-        t[j] = own_v[j] - iv
-    limit_u, limit_v, still = np.float32(tolerance[0]), np.float32(tolerance[1]), False
-    for _ in range(RUN_STEPS):
-        if not within(s, t):
-            return False
-        blend_rows(du, row, column, s, t, u)
-        blend_rows(dv, row, column, s, t, v)
-        for j in range(n):
-            u[j] -= iu
-        for j in range(n):
-            v[j] -= iv
-        still = near(s, u, limit_u) and near(t, v, limit_v)
-        s, t, u, v = u, v, s, t
-        if still:
-            break
-    if not (still and within(s, t)):
-        return False
-    blend_rows(dz, row, column, s, t, out_dz)
-    blend_rows(z, row, column, s, t, out)
-    for j in range(n):
-        out[j] -= out_dz[j]
-    return True
-
-
-@inlined
-def resample_cell(z, du, dv, dz, r, c, tolerance):
-    """Corrected height and dZ of a cell, and whether it is shifted beyond the window."""
-    rows, columns = z.shape
-    a, b = float(du[r, c]), float(dv[r, c])
-    for _ in range(FIXED_POINTS):
-        ku, kv = int(np.floor(c + a)), int(np.floor(r + b))
-        if not (0 <= ku < columns - 1 and 0 <= kv < rows - 1):
-            return np.nan, np.nan, True
-        s, t = c + a - ku, r + b - kv
-        w00, w01, w10, w11 = (1.0 - t) * (1.0 - s), (1.0 - t) * s, t * (1.0 - s), t * s
-        a_new = w00 * du[kv, ku] + w01 * du[kv, ku + 1] + w10 * du[kv + 1, ku] + w11 * du[kv + 1, ku + 1]
-        b_new = w00 * dv[kv, ku] + w01 * dv[kv, ku + 1] + w10 * dv[kv + 1, ku] + w11 * dv[kv + 1, ku + 1]
-        if a_new != a_new:
-            break
-        if abs(a_new - a) <= tolerance[0] and abs(b_new - b) <= tolerance[1]:
-            d = w00 * dz[kv, ku] + w01 * dz[kv, ku + 1] + w10 * dz[kv + 1, ku] + w11 * dz[kv + 1, ku + 1]
-            height = w00 * z[kv, ku] + w01 * z[kv, ku + 1] + w10 * z[kv + 1, ku] + w11 * z[kv + 1, ku + 1]
-            return height - d, d, False
-        a, b = a_new, b_new
-    height = z[r, c] - dz[r, c] + du[r, c] * slope_of_corrected(z, dz, r, c, 0, 1)
-    return height + dv[r, c] * slope_of_corrected(z, dz, r, c, 1, 0), float(dz[r, c]), False
-
-
-@inlined
-def tally(values, total, least, most):
-    """Add values (n,) that are none NaN to sums, smallest and largest ones, place by place."""
-    for j in range(len(values)):
-        value = float(values[j])
-        total[j] += value if value == value else 0.0
-        least[j] = value if value < least[j] else least[j]
-        most[j] = value if value > most[j] else most[j]
-
-
-@inlined
-def resample_cells(z, du, dv, dz, r, c, tolerance, out, out_dz, sums):
-    """`resample` of the cells of a row from (r, c) on, one by one."""
-    for j in range(len(out)):
-        if dz[r, c + j] == dz[r, c + j]:
-            out[j], out_dz[j], escaped = resample_cell(z, du, dv, dz, r, c + j, tolerance)
-            sums[3] += escaped
-        else:
-            out[j], out_dz[j] = np.nan, np.nan
-            sums[1 if z[r, c + j] != z[r, c + j] else 2] += 1.0
-
-
 @kernel
 def resample(z, du, dv, dz, halo, tolerance, out, out_dz, sums):
     """The corrected surface on the cells of a window.
@@ -523,35 +401,61 @@ def resample(z, du, dv, dz, halo, tolerance, out, out_dz, sums):
     out, out_dz : (h − 2·halo, w − 2·halo) out, corrected height and dZ.
     sums : (N_SUMS,) zero, ±∞ for extremes; out.
     """
-    work = (np.empty(RUN, np.float32), np.empty(RUN, np.float32), np.empty(RUN, np.float32), np.empty(RUN, np.float32))
-    heights, squares = np.empty(RUN, z.dtype), np.zeros(RUN)
-    sum_d, sum_before, sum_after = np.zeros((3, RUN)), np.zeros((3, RUN)), np.zeros((3, RUN))
-    for kept in (sum_d, sum_before, sum_after):
-        kept[1], kept[2] = np.inf, -np.inf
+    rows, columns = z.shape
+    limit_u, limit_v = tolerance[0], tolerance[1]
+    no_data = outside = escaped = 0
+    sum_d = sum_d2 = sum_before = sum_after = 0.0
+    least_d = least_before = least_after = np.inf
+    most_d = most_before = most_after = -np.inf
     for i in range(out.shape[0]):
         r = i + halo
-        for first in range(0, out.shape[1], RUN):
-            n = min(RUN, out.shape[1] - first)
-            c = first + halo
-            done, done_dz, before = out[i, first : first + n], out_dz[i, first : first + n], heights[:n]
-            if not resample_run(z, du, dv, dz, r, c, tolerance, work, done, done_dz):
-                for k in range(0, n, SHORT_RUN):
-                    part, part_dz = done[k : k + SHORT_RUN], done_dz[k : k + SHORT_RUN]
-                    if not resample_run(z, du, dv, dz, r, c + k, tolerance, work, part, part_dz):
-                        resample_cells(z, du, dv, dz, r, c + k, tolerance, part, part_dz, sums)
-            cells = z[r, c : c + n]
-            for j in range(n):
-                before[j] = cells[j] if done_dz[j] == done_dz[j] else np.nan
-            for j in range(n):
-                squares[j] += float(done_dz[j]) * float(done_dz[j]) if done_dz[j] == done_dz[j] else 0.0
-            tally(done_dz, sum_d[0], sum_d[1], sum_d[2])
-            tally(before, sum_before[0], sum_before[1], sum_before[2])
-            tally(done, sum_after[0], sum_after[1], sum_after[2])
-    sums[0] += out.size - sums[1] - sums[2]
-    sums[4] += sum_d[0].sum()
-    sums[5] += squares.sum()
-    sums[8] += sum_before[0].sum()
-    sums[9] += sum_after[0].sum()
-    sums[6], sums[7] = min(sums[6], sum_d[1].min()), max(sums[7], sum_d[2].max())
-    sums[10], sums[11] = min(sums[10], sum_before[1].min()), max(sums[11], sum_before[2].max())
-    sums[12], sums[13] = min(sums[12], sum_after[1].min()), max(sums[13], sum_after[2].max())
+        for j in range(out.shape[1]):
+            c = j + halo
+            before, d = float(z[r, c]), float(dz[r, c])
+            if d != d:
+                out[i, j] = out_dz[i, j] = np.nan
+                no_data += before != before
+                outside += before == before
+                continue
+            a, b = float(du[r, c]), float(dv[r, c])
+            after, found = 0.0, False
+            for _ in range(FIXED_POINTS):
+                u, v = c + a, r + b
+                ku, kv = int(np.floor(u)), int(np.floor(v))
+                if not (0 <= ku < columns - 1 and 0 <= kv < rows - 1):
+                    escaped += 1
+                    break
+                s, t = u - ku, v - kv
+                w00, w01, w10, w11 = (1.0 - t) * (1.0 - s), (1.0 - t) * s, t * (1.0 - s), t * s
+                a_new = w00 * du[kv, ku] + w01 * du[kv, ku + 1] + w10 * du[kv + 1, ku] + w11 * du[kv + 1, ku + 1]
+                b_new = w00 * dv[kv, ku] + w01 * dv[kv, ku + 1] + w10 * dv[kv + 1, ku] + w11 * dv[kv + 1, ku + 1]
+                if abs(a_new - a) <= limit_u and abs(b_new - b) <= limit_v:
+                    d = w00 * dz[kv, ku] + w01 * dz[kv, ku + 1] + w10 * dz[kv + 1, ku] + w11 * dz[kv + 1, ku + 1]
+                    after = w00 * z[kv, ku] + w01 * z[kv, ku + 1] + w10 * z[kv + 1, ku] + w11 * z[kv + 1, ku + 1] - d
+                    found = True
+                    break
+                if a_new != a_new:
+                    break
+                a, b = a_new, b_new
+            if not found:
+                after = before - d + du[r, c] * slope_of_corrected(z, dz, r, c, 0, 1)
+                after += dv[r, c] * slope_of_corrected(z, dz, r, c, 1, 0)
+            out[i, j], out_dz[i, j] = after, d
+            sum_d += d
+            sum_d2 += d * d
+            sum_before += before
+            sum_after += after
+            least_d, most_d = min(least_d, d), max(most_d, d)
+            least_before, most_before = min(least_before, before), max(most_before, before)
+            least_after, most_after = min(least_after, after), max(most_after, after)
+    sums[0] += out.size - no_data - outside
+    sums[1] += no_data
+    sums[2] += outside
+    sums[3] += escaped
+    sums[4] += sum_d
+    sums[5] += sum_d2
+    sums[6], sums[7] = min(sums[6], least_d), max(sums[7], most_d)
+    sums[8] += sum_before
+    sums[9] += sum_after
+    sums[10], sums[11] = min(sums[10], least_before), max(sums[11], most_before)
+    sums[12], sums[13] = min(sums[12], least_after), max(sums[13], most_after)

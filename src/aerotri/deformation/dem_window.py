@@ -49,6 +49,7 @@ class DemModels:
     of : all photographs. tables : the image errors. source : (M, 2) which table each photograph has.
     places : between the CRS of the DEM and the frame of the orientations.
     ground : m, mean height in the CRS, where the frame's axes are taken.
+    table_accuracy_m : m, what the tables of the image errors cost in height.
     """
 
     names: tuple[tuple[str, str], ...]
@@ -58,6 +59,7 @@ class DemModels:
     source: np.ndarray
     places: Places
     ground: float
+    table_accuracy_m: float
 
     def photos(self, x: float, y: float, chosen: np.ndarray | None = None) -> np.ndarray:
         """(M, 4, 15) photographs of models for coordinates X − x, Y − y, Z of the DEM.
@@ -168,7 +170,8 @@ def dem_models(
     # both photographs may be off
     tables = error_tables(of.errors, 0.5 * TABLE_TOLERANCE_M * min(per_metre))
     return DemModels(
-        names, np.array(rows), of, tables, of.group[np.array(rows)], places, mean_ground(calibration)
+        names, np.array(rows), of, tables, of.group[np.array(rows)], places, mean_ground(calibration),
+        2.0 * tables.accuracy / min(per_metre),
     )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from aerotri.deformation.stereo_model import (
     covariance_of,
     deform_points,
     pair_model,
+    regions,
     seen_by_both,
 )
 from aerotri.rasters import RasterReader
@@ -84,6 +85,7 @@ class Deformation:
     x : (nx,) rising, y : (ny,) falling, z : (ny, nx) m.
     d : (ny, nx, 3) m, wrong − true; NaN off the model. sigma : (ny, nx, 3) m.
     parallax : (ny, nx) mm, remaining y-parallax without sign.
+    region : (ny, nx) number of the pair of tiles that show a node, −1 off the model: dZ may jump between regions.
     base : (2, 2) m, plan positions of the projection centres.
     seams : lines (2, 2) m on which the tiles of the photographs meet, on the mean height of the ground.
     """
@@ -101,6 +103,7 @@ class Deformation:
     d: np.ndarray
     sigma: np.ndarray
     parallax: np.ndarray
+    region: np.ndarray
     base: np.ndarray
     seams: tuple[np.ndarray, ...]
 
@@ -266,9 +269,12 @@ def _on_nodes(model: StereoModel, places: Places, x, y, z, **described) -> Defor
     d, sigma, parallax = deform_places(model, places, grid_points(x, y, z))
     if not np.isfinite(d).any():
         raise InputError("no node of the grid lies in the model", "give a smaller spacing, or a DEM that covers it")
+    known = np.isfinite(z.ravel())
+    region = np.full(z.size, -1)
+    region[known] = regions(model, places.to_local(grid_points(x, y, z)[known]))
     return Deformation(
         x=x, y=y, z=z, d=d.reshape(*z.shape, 3), sigma=sigma.reshape(*z.shape, 3), parallax=parallax.reshape(z.shape),
-        group=model.errors[0].function.group, **described,
+        region=region.reshape(z.shape), group=model.errors[0].function.group, **described,
     )  # fmt: skip
 
 

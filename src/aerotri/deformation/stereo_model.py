@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.deformation.orientation import Orientation
-from aerotri.deformation.photo_errors import PhotoErrors
+from aerotri.deformation.photo_errors import PhotoErrors, seams_mm
 from aerotri.deformation.restitution import Restitution
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, RayPartials, linearise, predict
 
@@ -85,6 +85,20 @@ def project(orientation: Orientation, k: int, points: np.ndarray) -> np.ndarray:
     rotation, centre, interior = _tables(orientation)
     one = np.full(n, k, dtype=np.int64)
     return predict(rotation, centre, points, interior, one, np.arange(n), one, np.zeros((n, 2)))
+
+
+def regions(model: StereoModel, points: np.ndarray) -> np.ndarray:
+    """(n,) number of the pair of tiles that show each point (n, 3) m, −1 where not both photographs do.
+
+    Within a region the deformation is smooth; it may jump from one to the next.
+    """
+    seen = seen_by_both(model, points)
+    number = np.zeros(len(points), dtype=np.int64)
+    for k, errors in enumerate(model.errors):
+        xy = project(model.true, k, points[seen])
+        for axis, seams in enumerate(seams_mm(errors.camera)):
+            number[seen] = (len(seams) + 1) * number[seen] + np.searchsorted(seams, xy[:, axis], side="right")
+    return np.where(seen, number, -1)
 
 
 def deform_points(model: StereoModel, points: np.ndarray) -> PointDeformation:

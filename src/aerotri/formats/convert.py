@@ -20,6 +20,7 @@ from aerotri.formats.colmap import is_colmap, read_colmap, write_colmap
 from aerotri.formats.dbat import read_dbat
 from aerotri.formats.dbat_script import is_dbat
 from aerotri.formats.ign import write_ign_opk
+from aerotri.formats.measured_lists import write_ign_app, write_ign_mes, write_odm_geo, write_pix4d_offset
 from aerotri.formats.metashape import write_metashape
 from aerotri.formats.odm import write_odm_gcp
 from aerotri.formats.opensfm import is_opensfm, read_opensfm, write_opensfm
@@ -78,7 +79,11 @@ BLOCK_WRITERS: Mapping[str, Callable[[Block, Path], tuple[str, ...]]] = {
     "bingo": write_bingo,
     "pix4d-gcp": write_pix4d_gcp,
     "pix4d-geo": write_pix4d_geo,
+    "pix4d-offset": write_pix4d_offset,
     "odm-gcp": write_odm_gcp,
+    "odm-geo": write_odm_geo,
+    "ign-mes": write_ign_mes,
+    "ign-app": write_ign_app,
 }
 """Formats of what was measured."""
 TARGETS = ("block", *WRITERS, *ORIENTATION_WRITERS, *BLOCK_WRITERS)

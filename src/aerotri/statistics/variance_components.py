@@ -172,7 +172,7 @@ def estimate_components(
                 return _components(fitted, factors, freedom, held, rounds, settled), fitted
             # the weakest alone: without it the others may be told apart
             name = min(weak, key=lambda weak_name: freedom[weak_name])
-            held[name] = f"{freedom[name]:.1f} degrees of freedom are too few"
+            held[name] = f"its residuals say too little of it ({freedom[name]:.1f} degrees of freedom)"
             factors, last_round = {**factors, name: 1.0}, max(last_round, rounds + MAX_ROUNDS // 2)
         else:
             factors = {name: factor * changes.get(name, 1.0) for name, factor in factors.items()}
