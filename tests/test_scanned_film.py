@@ -26,7 +26,9 @@ def test_scanned_film_end_to_end(tmp_path):
         turn = rng.normal(0, 0.002)
         matrix = np.array([[1.0003 * np.cos(turn), -np.sin(turn)], [np.sin(turn), 0.9998 * np.cos(turn)]]) / pixel
 
-        def scanned(xy, matrix=matrix, shift=rng.uniform(50, 90, 2)):
+        shift = rng.uniform(50, 90, 2)
+
+        def scanned(xy, matrix=matrix, shift=shift):
             column_row = xy @ matrix.T * [1.0, -1.0] + [5750.0, 3750.0] + shift
             return column_row
 
@@ -45,7 +47,10 @@ def test_scanned_film_end_to_end(tmp_path):
     (folder / "block.toml").write_text(text)
     film = read_block(folder)
     # marks measured to 0.05 px leave the image points within a fraction of that
-    order = {(i, p): k for k, (i, p) in enumerate(zip(block.image_points.image, block.points[block.image_points.point], strict=True))}
+    order = {
+        (i, p): k
+        for k, (i, p) in enumerate(zip(block.image_points.image, block.points[block.image_points.point], strict=True))
+    }
     rows = [order[i, p] for i, p in zip(film.image_points.image, film.points[film.image_points.point], strict=True)]
     np.testing.assert_allclose(film.image_points.xy, block.image_points.xy[rows], atol=0.2 * pixel)
     result = adjust(film)

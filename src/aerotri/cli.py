@@ -34,6 +34,8 @@ def main() -> None:
     except InputError as error:
         print(f"aerotri: {error}", file=sys.stderr)
         raise SystemExit(2) from None
+    except BrokenPipeError:
+        raise SystemExit(0) from None
     except Exception as error:
         if os.environ.get("AEROTRI_DEBUG"):
             raise

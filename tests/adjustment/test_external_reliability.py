@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from test_against_dense import TINY, dense_cofactors
 
 from aerotri.formats.reliability_columns import effect_names
 from aerotri.functional_model.rotation import small_rotation_per_angle
@@ -11,7 +12,6 @@ from aerotri.observations.block import Constraints
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.statistics.reliability import noncentrality, ray_reliability
 from small_blocks import small_block, with_adjustment
-from test_against_dense import TINY, dense_cofactors
 
 DELTA = noncentrality(0.001, 0.80)
 

@@ -1,4 +1,4 @@
-"""Reliability by experiment: observations get an error of their own ∇0, the block is adjusted anew, effects compared."""
+"""Reliability by experiment: observations get an error of their own ∇0, the block is adjusted anew."""
 
 from dataclasses import replace
 
@@ -73,7 +73,8 @@ def test_effect_of_an_undetected_error_in_a_ray(block, adjusted):
     """The unknown named changes by the effect stated, and no other that the ray depends on by more."""
     rays, mde = block.image_points, ray_reliability(adjusted).detectable
     names = [effect_names(adjusted, adjusted.effects, axis).to_pylist() for axis in (0, 1)]
-    chosen = [int(np.nanargmax(np.where(mde[:, axis] < 0.03, adjusted.effects.size[:, axis], np.nan))) for axis in (0, 1)]
+    size = adjusted.effects.size
+    chosen = [int(np.nanargmax(np.where(mde[:, axis] < 0.03, size[:, axis], np.nan))) for axis in (0, 1)]
     for axis, k in enumerate(chosen):
         xy = rays.xy.copy()
         xy[k, axis] += mde[k, axis]

@@ -186,7 +186,7 @@ def test_a_wrong_control_point_is_told_from_wrong_rays(point):
 
 
 def test_demo_block():
-    """The sample block's simulation, whose camera leaves systematic errors of a µm, by the same bounds, 10 m included."""
+    """The sample block's simulation, whose camera leaves systematic errors of a µm, by the same bounds."""
     folder = Path(__file__).parents[2] / "blocks" / "frederiksstad_ultracam"
     spec = read_spec(folder / "simulation.toml")
     gross = spec.model_validate(

@@ -56,8 +56,8 @@ def minimal_coordinates(unknowns: Unknowns, state: State) -> list[tuple[int, int
     rows = np.array(spread_points(state.points, rays))
     moved = (motions_of_points(state.points[rows]) @ unknowns.motions.basis).reshape(9, -1)
     moved = moved / np.maximum(np.linalg.norm(moved, axis=0), 1e-300)
-    order = qr(moved.T, pivoting=True, mode="r")[1][: unknowns.motions.count]
-    return [(int(rows[k // 3]), int(k % 3)) for k in sorted(order)]
+    pivots = np.asarray(qr(moved.T, pivoting=True, mode="r")[-1], dtype=np.int64)
+    return [(int(rows[k // 3]), int(k % 3)) for k in sorted(pivots[: unknowns.motions.count].tolist())]
 
 
 def free_motions(unknowns: Unknowns, extras: Sequence[ExtraObservations], state: State) -> FreeMotions:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from aerotri.conventions import InputError
 
-
 MOST = 16
 """Parameters of a family listed when all families are."""
 

@@ -71,7 +71,7 @@ def cubic_run(source, first, out, to, n, x, dx, y, dy, low, high, is_integer):
 
 @kernel
 def lanczos_weights(t, weights, row):
-    """A row of six out: Lanczos' windowed sinc of three lobes at the place t between the inner two of six neighbours, sum 1."""
+    """A row of six out: Lanczos' windowed sinc of three lobes at t between the inner two of six neighbours, sum 1."""
     sine, sine_3, cosine_3 = np.sin(np.pi * t), np.sin(np.pi * t / 3.0), np.cos(np.pi * t / 3.0)
     total = 0.0
     for j in range(6):

@@ -177,8 +177,10 @@ def film(adjusted: AdjustedBlock) -> Table:
                 1e3 * float(fit.sigma0_mm), float(np.sqrt(np.mean(length**2))), float(length.max()),
             )
         )  # fmt: skip
-    columns = (Column("photograph"), Column("transformation"), Column("marks"), Column("redundancy"),
-               Column("σ0", "µm", ".1f"), Column("RMS of a mark", "µm", ".1f"), Column("largest", "µm", ".1f"))  # fmt: skip
+    columns = (
+        Column("photograph"), Column("transformation"), Column("marks"), Column("redundancy"),
+        Column("σ0", "µm", ".1f"), Column("RMS of a mark", "µm", ".1f"), Column("largest", "µm", ".1f"),
+    )  # fmt: skip
     return Table("Interior orientation of the scans", columns, tuple(rows))
 
 
