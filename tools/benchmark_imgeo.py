@@ -86,7 +86,7 @@ def _make_photograph(path: Path, scale: int) -> None:
 
 def _remap_maps(scale: int) -> tuple[np.ndarray, np.ndarray]:
     """The same displacements, a float32 for every pixel: what cv2.remap is given."""
-    from aerotri.image_errors.ideal_photographs import ideal_map
+    from aerotri.image_errors.ideal_map import ideal_map
 
     ideal = ideal_map(_errors(scale))
     rows, columns = ideal.size
@@ -124,7 +124,8 @@ def _in_turn(name: str, works: tuple[Callable[[], object], Callable[[], object]]
 
 
 def _in_memory(photograph: Path, arguments: argparse.Namespace) -> list:
-    from aerotri.image_errors.ideal_photographs import PixelType, ideal_map, resample
+    from aerotri.image_errors.ideal_map import ideal_map
+    from aerotri.image_errors.ideal_photographs import PixelType, resample
     from aerotri.rasters_images import open_photograph
 
     with open_photograph(photograph) as opened:
@@ -150,7 +151,8 @@ def _in_memory(photograph: Path, arguments: argparse.Namespace) -> list:
 
 
 def _ours_with_files(photograph: Path, target: Path, arguments: argparse.Namespace) -> None:
-    from aerotri.image_errors.ideal_photographs import ideal_map, ideal_photograph
+    from aerotri.image_errors.ideal_map import ideal_map
+    from aerotri.image_errors.ideal_photographs import ideal_photograph
 
     ideal_photograph(photograph, target, ideal_map(_errors(arguments.scale)), arguments.method)
 

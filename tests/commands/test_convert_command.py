@@ -129,7 +129,7 @@ def test_every_target_of_a_result(folders):
     with pytest.raises(InputError, match="has no observed positions"):
         _messages(Request(str(folders / "result"), ""), folders / "none", "pix4d-geo")
     block = read_block(folders / "block")
-    for to in (name for name in TARGETS if name not in ("pix4d-geo", "odm-gcp")):
+    for to in (name for name in TARGETS if name not in ("pix4d-geo", "odm-gcp", "odm-geo")):
         target = folders / f"r_{to}"
         _messages(Request(str(folders / "result"), ""), target, to)
         assert target.exists()

@@ -32,7 +32,7 @@ DENSE = {
 }  # fmt: skip
 BULK = {"gross_errors": {"fraction": 0.10, "range_sigma": [10.0, 100.0]}}
 CONTROL = {"distance_bases": 3.0, "sigma_m": [0.03, 0.03, 0.05], "check_points": 5}
-SINGLE_SEEDS, BULK_SEEDS = range(300, 325), range(1, 13)
+SINGLE_SEEDS, BULK_SEEDS = range(300, 320), range(1, 9)
 BLUNDERS_A_BLOCK = 8
 ALPHA = 0.001
 
@@ -186,7 +186,7 @@ def test_a_wrong_control_point_is_told_from_wrong_rays(point):
 
 
 def test_demo_block():
-    """The sample block's simulation, whose camera leaves systematic errors of a µm, by the same bounds."""
+    """The sample block, whose camera leaves systematic errors of a µm, by the same bounds, a control point 10 m off."""
     folder = Path(__file__).parents[2] / "blocks" / "frederiksstad_ultracam"
     spec = read_spec(folder / "simulation.toml")
     gross = spec.model_validate(

@@ -311,12 +311,15 @@ class NormalSystem:
     def without(self, rays_off: np.ndarray, control_off: np.ndarray) -> NormalSystem:
         """The same system with rays (m,) bool and the given coordinates of points (P,) bool switched off.
 
-        They keep their places with weight 0, so that nothing is sorted or ordered anew; the counts are not theirs.
+        They keep their places with weight 0, so that nothing is sorted or ordered anew; the counts are not theirs. A
+        photograph that loses all its rays is held where it is.
         """
         u, other = self.unknowns, copy(self)
+        empty = np.bincount(u.rays.image[~rays_off], minlength=len(u.images)) == 0
         inv_sigma = np.where(rays_off[:, None], 0.0, u.rays.inv_sigma)
         weight = np.where(control_off[:, None], 0.0, u.prior_weight)
-        other.unknowns = replace(u, rays=replace(u.rays, inv_sigma=inv_sigma), prior_weight=weight)
+        rays, eo_free = replace(u.rays, inv_sigma=inv_sigma), u.eo_free & ~empty[:, None]
+        other.unknowns = replace(u, rays=rays, prior_weight=weight, eo_free=eo_free)
         other._point_prior = np.where((u.kept < 0)[:, None], weight, 0.0)
         other._prior_weight = self._prior_weight.copy()
         off = control_off[u.kept_rows]

@@ -15,7 +15,7 @@ from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for, normalised_lengths
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
-from aerotri.adjustment.unknowns import State
+from aerotri.adjustment.unknowns import State, Step
 
 COST_TOLERANCE = 1e-9
 STEP_TOLERANCE = 1e-5
@@ -23,6 +23,7 @@ SURE_CONTRACTION = 1e-2
 ROBUST_COST_TOLERANCE, ROBUST_STEP_TOLERANCE, EARLY_STEP_TOLERANCE = 1e-4, 1e-2, 0.3
 FIRST_DAMPING, LAST_DAMPING, NO_DAMPING = 1e-5, 1e12, 1e-11
 MAX_SCALE_CHANGES = 20
+LEAST_RATIO, LONGEST_STRETCH = 0.5, 5.0
 
 
 @dataclass(frozen=True)
@@ -114,6 +115,8 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
                 return Solution("not converged", state, equations, estimator, iteration, tuple(costs))
             step = _step(system, state, equations, estimator, damping.value)
         plain = damping.value == 0.0 and not step.points_settled
+        if stage.is_robust and plain:
+            step = _stretched(system, state, step, estimator, last_decrement)
         settled = plain and _settled(equations, step, redundancy, stage, last_decrement)
         last_decrement = step.decrement if plain else np.inf
         damping = damping.lowered(step.gain_ratio(equations))
@@ -159,6 +162,7 @@ class _Trial:
     equations: NormalEquations
     decrement: float
     smallest_pivot: float
+    move: Step
     points_settled: bool = False
 
     def improves(self, before: NormalEquations) -> bool:
@@ -184,7 +188,22 @@ def _step(system: NormalSystem, state: State, equations: NormalEquations, estima
     if not all(np.isfinite(part).all() for part in (step.images, step.shared, step.points)):
         return None
     there = system.unknowns.advance(state, step)
-    return _Trial(there, system.assemble(there, 0.0, estimator), decrement, factor.smallest_pivot)
+    return _Trial(there, system.assemble(there, 0.0, estimator), decrement, factor.smallest_pivot, step)
+
+
+def _stretched(system: NormalSystem, state: State, step: _Trial, estimator: Estimator, last_decrement: float) -> _Trial:
+    """A step of re-weighting, lengthened to where its slow contraction would lead it, if that is further down.
+
+    Steps that shrink by a factor ρ each sum up to 1/(1 − ρ) of the first (Aitken).
+    """
+    ratio = np.sqrt(abs(step.decrement) / last_decrement) if 0.0 < last_decrement < np.inf else 0.0
+    if not LEAST_RATIO < ratio < 1.0:
+        return step
+    factor = min(1.0 / (1.0 - ratio), LONGEST_STRETCH)
+    move = Step(factor * step.move.images, factor * step.move.shared, factor * step.move.points)
+    there = system.unknowns.advance(state, move)
+    equations = system.assemble(there, 0.0, estimator)
+    return replace(step, state=there, equations=equations) if equations.cost < step.equations.cost else step
 
 
 def _with_settled_points(system: NormalSystem, step: _Trial, estimator: Estimator) -> _Trial:

@@ -17,7 +17,7 @@ from aerotri.conventions import InputError
 if TYPE_CHECKING:
     from aerotri.image_errors import ImageGroup
     from aerotri.image_errors.error_function import ErrorFunction
-    from aerotri.image_errors.ideal_photographs import IdealMap
+    from aerotri.image_errors.ideal_map import IdealMap
     from aerotri.statistics.adjusted_block import AdjustedBlock
 
 
@@ -112,20 +112,21 @@ def _jobs(
 ) -> list[Job]:
     """Which group every file belongs to, by its name; nothing is written before all are known."""
     from aerotri.formats.names_match import match_photographs
-    from aerotri.image_errors.ideal_photographs import name_of
+    from aerotri.image_errors.ideal_photographs import check_photograph, name_of
 
     block = adjusted.block
-    names = np.array([path.name for path in photographs], dtype=str)
-    rows, _ = match_photographs(names, block.images.names) if len(names) else (np.zeros(0, np.int64), 0)
+    # every name once: to the matching, two of one name mean none
+    names = np.array(list(dict.fromkeys(path.name for path in photographs)), dtype=str)
+    found = dict(zip(names.tolist(), match_photographs(names, block.images.names)[0].tolist(), strict=True))
     jobs, taken = [], {}
-    for path, row in zip(photographs, rows.tolist(), strict=True):
-        if not path.is_file():
-            raise InputError("there is no such file", "give a photograph, TIFF or JPEG", path)
+    for path in photographs:
+        row = found[path.name]
         if row in block.interior_fits:
             raise InputError(
                 "is scanned film, whose interior orientation imgeo does not resample", "use the correction grid", path
             )
         group = _named_group(groups, options.group, path) if row < 0 else _group_of(groups, row)
+        check_photograph(path, groups[group].camera)
         name = name_of(path)
         if name in taken:
             raise InputError(f"'{name}' would be written twice, for {taken[name]} too", "give other names", path)
@@ -158,7 +159,8 @@ def _resample_all(
 ) -> list[dict[str, Any]]:
     from aerotri.compiled import compilation_notice
     from aerotri.formats.atomic import atomic_file
-    from aerotri.image_errors.ideal_photographs import ideal_map, ideal_photograph
+    from aerotri.image_errors.ideal_map import ideal_map
+    from aerotri.image_errors.ideal_photographs import ideal_photograph
 
     if jobs:
         console.progress(compilation_notice())

@@ -71,7 +71,7 @@ def cubic_run(source, first, out, to, n, x, dx, y, dy, low, high, is_integer):
 
 @kernel
 def lanczos_weights(t, weights, row):
-    """A row of six out: Lanczos' windowed sinc of three lobes at t between the inner two of six neighbours, sum 1."""
+    """A row out: Lanczos' windowed sinc of three lobes, t the place between the inner two of six neighbours; sum 1."""
     sine, sine_3, cosine_3 = np.sin(np.pi * t), np.sin(np.pi * t / 3.0), np.cos(np.pi * t / 3.0)
     total = 0.0
     for j in range(6):
@@ -190,10 +190,14 @@ def resample_run(
     while done < n:
         column, row = int(np.floor(x)), int(np.floor(y))
         many = min(n - done, longest, _stay(x - column, dx), _stay(y - row, dy))
-        if column < -1 or row < -1 or column >= size[1] or row >= size[0]:
+        # pixel k of the run lies between source columns column + k and column + k + 1
+        if row < -1 or row >= size[0] or column < -1 or column >= size[1]:
+            if -1 <= row < size[0] and column < -1:
+                many = min(many, -1 - column)
             for k in range(many):
                 out[r, first + done + k] = limits[2]
         else:
+            many = min(many, size[1] - column)
             taps = 2 if lanczos else 1
             at = np.uintp(row - taps - source_row), np.uintp(column - taps + PAD)
             to = np.uintp(r), np.uintp(first + done)
@@ -207,7 +211,7 @@ def resample_run(
                     source, at, out, to, np.uintp(many), weights[6, 0], weights[6, 1], weights[6, 2], weights[6, 3],
                     limits[0], limits[1], is_integer,
                 )  # fmt: skip
-        if column < 0 or row < 0 or column >= size[1] - 1 or row >= size[0] - 1:
+        if column < 0 or row < 0 or column + many >= size[1] or row >= size[0] - 1:
             for k in range(many):
                 u, v = x + k * (1.0 + dx), y + k * dy
                 if u < -0.5 or v < -0.5 or u > size[1] - 0.5 or v > size[0] - 0.5:

@@ -22,6 +22,7 @@ PIECE = 16384
 """Positions evaluated at a time, so that the patterns stay in the cache."""
 ITERATIONS = 100
 TOLERANCE_MM = 1e-9
+FARTHEST_MM = 1e4
 Bounds = tuple[np.ndarray, np.ndarray]
 
 
@@ -79,10 +80,11 @@ class ErrorFunction:
             new = start[active] + self._by_position(at if within is None else np.clip(at, *within))
             change = np.abs(new - at).max(axis=1, initial=0.0)
             measured[active] = new
-            # NaN, from values that overflow, stays active and is refused below
-            active = active[~(change <= TOLERANCE_MM)]
+            active = active[change > TOLERANCE_MM]
             if not len(active):
                 return measured
+            if not change.max() < FARTHEST_MM:
+                break
         raise InputError(
             f"the image errors of group '{self.group}' fold the image over", "adjust with fewer additional parameters"
         )
@@ -113,8 +115,11 @@ class ErrorFunction:
         for _ in range(ITERATIONS):
             step = distorted - self._with_lens(ideal)
             ideal = ideal + step
-            if np.abs(step).max(initial=0.0) <= TOLERANCE_MM:
+            largest = np.abs(step).max(initial=0.0)
+            if largest <= TOLERANCE_MM:
                 return ideal
+            if not largest < FARTHEST_MM:
+                break
         raise InputError(
             f"the lens of group '{self.group}' folds the image over", "adjust with fewer additional parameters"
         )

@@ -1,9 +1,7 @@
 """Photographs without systematic image errors: every pixel of the ideal photograph is fetched where it was measured.
 
-[D] An ideal position is found at m = ideal + d(m), the fixed point within one tile. Which tile records an ideal
-position follows from where m lies: in an overlap, where two do, the tile of the ideal position; in a gap, where none
-does, the nearer one. Between the tiles nothing is interpolated but the grey values under the kernel. The displacement
-is sampled on a grid inside each tile (see `tile_grid`), every pixel has its own exact weights.
+Where that is says the map (see `ideal_map`). Every pixel has the weights of its own exact position; between the tiles
+nothing is interpolated but the grey values under the kernel.
 """
 
 from __future__ import annotations
@@ -12,16 +10,14 @@ import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from aerotri.adjustment.parallel import thread_count
-from aerotri.conventions import InputError, mm_from_px, px_from_mm
+from aerotri.conventions import InputError
 from aerotri.image_errors import _kernels
-from aerotri.image_errors.error_function import ErrorFunction
-from aerotri.image_errors.tile_grid import TileGrid, sample, seams_px, tiles_of
+from aerotri.image_errors.ideal_map import IdealMap
 from aerotri.observations import Camera
 from aerotri.rasters_images import Photograph, create_like, open_photograph
 
@@ -29,49 +25,9 @@ RESAMPLINGS = ("bicubic", "lanczos")
 BAND_BYTES = 24 * 2**20
 """Size of the rows, all bands, resampled at a time."""
 TASK_ROWS = 32
-REACH_GRID = (33, 25)
-SWITCH_ITERATIONS = 12
+COMPILED_FOR = (np.uint8, np.uint16, np.float32, np.float64)
+"""Types of pixel that kernels write; others come from the type of the sums, so that less is compiled."""
 Report = Callable[[float], None]
-Read = Callable[[int, int], np.ndarray]
-
-
-@dataclass(frozen=True, eq=False)
-class IdealMap:
-    """Where the pixels of an ideal photograph lie in the measured one.
-
-    Parameters
-    ----------
-    camera : its size_px is that of both photographs.
-    tiles : by tile row and column, the displacement (column, row) in px, source less ideal position.
-    columns : (tile columns + 1, rows) first column of every tile, and the end of the last one, by row.
-    rows : (tile rows + 1, columns) first row of every tile, and the end of the last one, by column.
-    is_identity : whether nothing moves.
-    """
-
-    camera: Camera
-    tiles: tuple[tuple[TileGrid, ...], ...]
-    columns: np.ndarray
-    rows: np.ndarray
-    is_identity: bool
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Rows and columns."""
-        return self.camera.size_px[1], self.camera.size_px[0]
-
-    def source_rows(self, first: int, last: int) -> tuple[int, int]:
-        """Rows of the source, first and one after the last, that the output rows first … last − 1 may touch.
-
-        They reach beyond the image where the kernel does.
-        """
-        least, most = 0.0, 0.0
-        for row in self.tiles:
-            for grid in row:
-                low, high = grid.bounds((first, last), (0, self.size[1]))
-                least, most = min(least, float(low[1])), max(most, float(high[1]))
-        low = min(max(int(np.floor(first + least)), -1), self.size[0])
-        high = max(min(int(np.floor(last - 1 + most)), self.size[0] - 1), -1)
-        return low - _kernels.PAD + 1, max(high, low) + _kernels.PAD + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,93 +38,6 @@ class PixelType:
     high: float
     fill: float
     nodata: float | None = None
-
-
-def ideal_map(errors: ErrorFunction) -> IdealMap:
-    """The map of a group of photographs.
-
-    Raises
-    ------
-    InputError
-        When the image errors fold the image over.
-    """
-    camera = errors.camera
-    tiles = tiles_of(camera)
-    seam_columns, seam_rows = (seams - 0.5 for seams in seams_px(camera))
-    margin = _margin(errors)
-    column_ranges = _ranges(seam_columns, camera.size_px[0], margin)
-    row_ranges = _ranges(seam_rows, camera.size_px[1], margin)
-    grids = []
-    for tile_row, rows in zip(tiles, row_ranges, strict=True):
-        line = []
-        for tile, columns in zip(tile_row, column_ranges, strict=True):
-            line.append(sample(_displacement(errors, tile.bounds_mm(camera)), rows, columns))
-        grids.append(tuple(line))
-    turned = tuple(zip(*grids, strict=True))
-    columns, rows = camera.size_px
-    return IdealMap(
-        camera=camera,
-        tiles=tuple(grids),
-        columns=_switches(grids, seam_columns, seam_rows, rows, columns, 0),
-        rows=_switches(turned, seam_rows, seam_columns, columns, rows, 1),
-        is_identity=errors.is_zero,
-    )
-
-
-def _margin(errors: ErrorFunction) -> int:
-    """Pixels by which a tile may record what ideally lies beyond its seams."""
-    half = np.array(errors.camera.half_format_mm)
-    x, y = (np.linspace(-1.0, 1.0, n) * h for n, h in zip(REACH_GRID, half, strict=True))
-    nodes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    return int(np.ceil(1.5 * np.abs(errors.measured(nodes) - nodes).max() / errors.camera.pixel_mm)) + 2
-
-
-def _ranges(seams: np.ndarray, count: int, margin: int) -> list[tuple[int, int]]:
-    """First and last pixel of the tiles between seams, and the margin beyond them, within the format."""
-    edges = [-np.inf, *seams.tolist(), np.inf]
-    return [(int(max(low - margin, 0)), int(min(high + margin, count - 1))) for low, high in pairwise(edges)]
-
-
-def _displacement(errors: ErrorFunction, within: tuple[np.ndarray, np.ndarray]):
-    size, pixel = errors.camera.size_px, errors.camera.pixel_mm
-
-    def of_pixels(column_row: np.ndarray) -> np.ndarray:
-        measured = errors.measured(mm_from_px(column_row, size, pixel), within)
-        return px_from_mm(measured, size, pixel) - column_row
-
-    return of_pixels
-
-
-def _switches(grids, seams: np.ndarray, cross_seams: np.ndarray, count: int, last: int, axis: int) -> np.ndarray:
-    """(tiles + 1, count) where one tile ends and the next begins, for every row (axis 0: columns) or column (axis 1).
-
-    Parameters
-    ----------
-    grids : [tile across the seams' direction][tile along]. last : end of the last tile.
-    """
-    position = np.arange(count)
-    across = np.searchsorted(cross_seams, position, side="right")
-    places = np.zeros((len(seams) + 2, count), dtype=np.int64)
-    places[-1] = last
-    for k, seam in enumerate(seams, start=1):
-        for line in np.unique(across):
-            own = across == line
-            place = _switch(grids[line][k - 1], grids[line][k], seam, position[own], axis)
-            places[k, own] = np.clip(np.ceil(place), 0, last)
-    return np.maximum.accumulate(places, axis=0)
-
-
-def _switch(one: TileGrid, other: TileGrid, seam: float, position: np.ndarray, axis: int) -> np.ndarray:
-    """(n,) ideal place at which the source passes from one tile to the other."""
-    reached = []
-    for grid in (one, other):
-        place = np.full(len(position), seam)
-        for _ in range(SWITCH_ITERATIONS):
-            at = (position, place) if axis == 0 else (place, position)
-            place = seam - grid.at(*at)[:, axis]
-        reached.append(place)
-    ends, begins = reached
-    return np.where(begins <= ends, np.clip(seam, begins, ends), (begins + ends) / 2.0)
 
 
 def resample(
@@ -214,12 +83,18 @@ class _Tasks:
         out = self.out[band, piece * TASK_ROWS : (piece + 1) * TASK_ROWS]
         first = self.first + piece * TASK_ROWS
         source = self._padded(band, self.ideal.source_rows(first, first + len(out)))
-        self._fill(source, out, first, (self.kind.low, self.kind.high, self.kind.fill))
+        limits = self.kind.low, self.kind.high, self.kind.fill
+        if out.dtype in COMPILED_FOR:
+            self._fill(source, out, first, limits)
+        else:
+            numbers = np.empty(out.shape, source.dtype)
+            self._fill(source, numbers, first, limits)
+            out[:] = numbers
         if self.kind.nodata is not None:
             invalid = _is(source, self.kind.nodata)
             if invalid.any():
                 weight = np.zeros(out.shape, source.dtype)
-                self._fill(invalid.astype(source.dtype), weight, first, (0.0, 1.0, 0.0))
+                self._fill(invalid.astype(source.dtype), weight, first, (-1e9, 1e9, 0.0), whole_numbers=False)
                 out[np.abs(weight) > 1e-6] = self.kind.nodata
 
     def _padded(self, band: int, rows: tuple[int, int]) -> np.ndarray:
@@ -234,7 +109,15 @@ class _Tasks:
         padded[:, :pad], padded[:, -pad:] = padded[:, pad, None], padded[:, -pad - 1, None]
         return padded
 
-    def _fill(self, source: np.ndarray, out: np.ndarray, first: int, limits: tuple[float, float, float]) -> None:
+    def _fill(
+        self,
+        source: np.ndarray,
+        out: np.ndarray,
+        first: int,
+        limits: tuple[float, float, float],
+        whole_numbers: bool | None = None,
+    ) -> None:
+        whole_numbers = self.out.dtype.kind in "iu" if whole_numbers is None else whole_numbers
         ideal, rows = self.ideal, slice(first, first + len(out))
         limit, weights, scratch = np.array(limits, source.dtype), np.empty((7, 6), source.dtype), np.empty((3, 6))
         low, _ = ideal.source_rows(first, rows.stop)
@@ -245,7 +128,7 @@ class _Tasks:
                 _kernels.resample_tile(
                     source, low, out, first, grid.nodes, np.array([grid.row, grid.column]), grid.step,
                     ideal.columns[j, rows], ideal.columns[j + 1, rows], ideal.rows[i], ideal.rows[i + 1],
-                    np.array(ideal.size), limit, weights, scratch, out.dtype.kind in "iu", self.lanczos,
+                    np.array(ideal.size), limit, weights, scratch, whole_numbers, self.lanczos,
                 )  # fmt: skip
 
 
@@ -283,17 +166,28 @@ def ideal_photograph(
     if method not in RESAMPLINGS:
         raise InputError(f"'{method}' is no resampling", f"choose {' or '.join(RESAMPLINGS)}")
     with open_photograph(source) as photograph:
-        _check_size(photograph, ideal)
+        _check_size(photograph, ideal.camera)
         with create_like(target, photograph, compression) as writer:
             _stream(photograph, writer.write, ideal, method, report)
         return photograph.left_out()
 
 
-def _check_size(photograph: Photograph, ideal: IdealMap) -> None:
-    if (photograph.rows, photograph.columns) != ideal.size:
+def check_photograph(path: str | os.PathLike, camera: Camera) -> None:
+    """Whether a file can be opened and is a photograph of a camera.
+
+    Raises
+    ------
+    InputError
+    """
+    with open_photograph(path) as photograph:
+        _check_size(photograph, camera)
+
+
+def _check_size(photograph: Photograph, camera: Camera) -> None:
+    if (photograph.columns, photograph.rows) != tuple(camera.size_px):
+        columns, rows = camera.size_px
         raise InputError(
-            f"is {photograph.columns} × {photograph.rows} pixels large, camera '{ideal.camera.name}' has "
-            f"{ideal.size[1]} × {ideal.size[0]}",
+            f"is {photograph.columns} × {photograph.rows} pixels large, camera '{camera.name}' has {columns} × {rows}",
             "give the photographs as they were measured",
             photograph.path,
         )

@@ -13,7 +13,7 @@ single one, and only when it is the largest in all photographs that see it: a wr
 from wrong rays, and its rays, each tested on its own, stay.
 
 **Nothing is final**: what is switched off is predicted by the others and tested like them (`switched_tests`). When no
-test is beyond its limit any more, what has become inconspicuous is switched on again, once.
+test is beyond its limit any more, what has become inconspicuous is switched on again: a ray once, control for good.
 
 **Not separable** [D]: when vᵀPv decides between two rays of a point by less than 3 (odds of 4.5 to 1), both go; in a
 point of two rays it always is so. A point left without enough rays drops out, its last ray with the status 'one ray'.
@@ -22,7 +22,8 @@ point of two rays it always is so. A point left without enough rays drops out, i
 this is above 1: a σ given too small does not make gross errors of good rays. Where the camera leaves systematic errors,
 the spread is that of the cell of the format, if it is significantly larger still. What holds the datum (control,
 positions, attitudes) is listed beyond the limit, but switched off only beyond δ0: when the error is larger than its own
-∇0l. Control points between which vᵀPv does not decide all stay, and are named. A photograph keeps its last six rays.
+∇0l. Control points between which vᵀPv does not decide all stay, and are named. A photograph with few rays keeps its
+last six; one with more, of which no more than six are left, is left out.
 
 Errors far beyond what is linear (T above 1000) would spoil the start: then a Huber adjustment goes first, and rays
 beyond ten times its robust σ are switched off to begin with.
@@ -71,7 +72,8 @@ class Snooped:
 class _Stand:
     """Where the search stands: switches, the state adjusted with them, the tests there, iterations so far.
 
-    frozen : what must stay, since without it something is not determined. returned : what was switched on again.
+    frozen : what must stay: without it something is not determined, or it was judged without itself and taken back.
+    returned : what was switched on again.
     found : the last tests of what was taken out.
     """
 
@@ -94,7 +96,11 @@ def snoop(prepared: Prepared, solution: Solution, options: SolveOptions, one_at_
     one_at_a_time : take out a single observation in every round, be the others ever so far away from it.
     """
     system = prepared.system
-    stand = _start(prepared, solution, options)
+    try:
+        stand = _start(prepared, solution, options)
+    except NotPositiveDefiniteError:
+        # what is not determined is named where the result is factorised
+        return Snooped(prepared, solution, ())
     for _ in range(10 * len(system.unknowns.rays.image) if one_at_a_time else MOST_ROUNDS):
         off = to_remove(system, stand.tests, stand.switches, stand.frozen, one_at_a_time)
         if off.any():
@@ -144,8 +150,12 @@ def _switched(
     """Switched on or off, adjusted by one iteration (`whole`: to the end) and tested; what cannot go stays as it is."""
     system = prepared.system
     switches = stand.switches.with_again(which) if on else stand.switches.without(which)
-    found = stand.found if on else remembered(stand.found, which, stand.tests)
-    returned = stand.returned.with_again(which) if on else stand.returned
+    found, returned, frozen = stand.found, stand.returned, stand.frozen
+    if on:
+        returned = returned.with_again(which)
+        frozen = frozen.with_again(replace(which, rays=np.zeros_like(which.rays)))
+    else:
+        found = remembered(found, which, stand.tests)
     gone = 2 * int((~participants(system.unknowns, switches).rays).sum())
     redundancy = max(count_observations(system).redundancy - gone, 1)
     counting = replace(_counting(options, stand.iterations), max_iterations=options.max_iterations if whole else 1)
@@ -158,9 +168,9 @@ def _switched(
         if tests.smallest_pivot < WEAKENED * stand.tests.smallest_pivot:
             raise NotPositiveDefiniteError
     except NotPositiveDefiniteError:
-        return replace(stand, frozen=stand.frozen.with_again(which), returned=returned)
+        return replace(stand, frozen=frozen.with_again(which), returned=returned)
     iterations = stand.iterations + solution.iterations
-    return _Stand(switches, solution.state, tests, iterations, stand.frozen, returned, found)
+    return _Stand(switches, solution.state, tests, iterations, frozen, returned, found)
 
 
 def _counting(options: SolveOptions, done: int) -> SolveOptions:
@@ -202,6 +212,9 @@ def _in_words(prepared: Prepared, stand: _Stand, blunders: tuple[Blunder, ...]) 
             what = blunder.action.removesuffix(" removed")
             said.append(f"the {what} of photograph {blunder.image} contradicts the block (w {blunder.w:+.1f}), removed")
     u = prepared.system.unknowns
+    lost = u.images[~participants(u, stand.switches).images]
+    for name in u.block.images.names[lost]:
+        said.append(f"nearly all rays of photograph {name} contradict the block: it was left out")
     limits = limits_of(u, stand.tests, stand.switches)
     accused = u.points[stand.switches.control & (stand.tests.control.largest > limits.datum)]
     if len(accused):

@@ -21,7 +21,8 @@ NOT_SEPARABLE = 3.0
 apart."""
 
 FEWEST_RAYS = 6
-"""Rays that a photograph keeps: its orientation needs three."""
+"""Rays that a photograph keeps, for its orientation needs three; one that had more than twice as many loses all rather
+than be oriented by so few."""
 
 RAYS_PER_CELL, MOST_CELLS = 100, 9
 SIGNIFICANT = 2.0
@@ -30,10 +31,9 @@ SIGNIFICANT = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Limits of |w|: of the rays (m,); for control and the like to be suspected, and to be switched off; the spread."""
+    """Limits of |w|: of the rays (m,), and of control, positions and attitudes, to be switched off; the spread of w."""
 
     rays: np.ndarray
-    suspected: float
     datum: float
     spread: float
 
@@ -44,7 +44,7 @@ def limits_of(unknowns: Unknowns, tests: AllTests, switches: Switches) -> Limits
     rays = participants(unknowns, switches).rays
     scale = max(1.0, spread(tests.rays.w[rays & (tests.rays.joint > 0.0)]))
     z, datum = critical_value(settings.alpha), noncentrality(settings.alpha, settings.power)
-    return Limits(z * _spread_by_cells(unknowns, tests.rays.w, rays, scale), z * scale, datum * scale, scale)
+    return Limits(z * _spread_by_cells(unknowns, tests.rays.w, rays, scale), datum * scale, scale)
 
 
 def _spread_by_cells(unknowns: Unknowns, w: np.ndarray, taking_part: np.ndarray, scale: float) -> np.ndarray:
@@ -100,6 +100,7 @@ def to_remove(system: NormalSystem, tests: AllTests, switches: Switches, frozen:
     hit[point[chosen]] = True
     near = sizes.rays**2 >= sizes.in_point[point] ** 2 - NOT_SEPARABLE * limits.spread**2
     chosen |= hit[point] & near & may_go
+    chosen |= taking_part & _lost(u, taking_part, chosen)[image]
     around = _largest(point[taking_part], sizes.in_image[image[taking_part]], len(u.points))
     tied = np.sum(sizes.control**2 >= sizes.control.max() ** 2 - NOT_SEPARABLE * limits.spread**2) > 1
     datum = _worst_of_datum(system, tests, sizes, blamed & (sizes.control >= around) & ~tied, limits)
@@ -112,8 +113,8 @@ def to_return(system: NormalSystem, tests: AllTests, switches: Switches, returne
     off = switches.combined(returned, lambda on, before: ~on & ~before)
     return Switches(
         off.rays & (tests.rays.largest <= limits.rays) & (tests.rays.joint > 0.0),
-        off.control & (tests.control.largest <= limits.suspected) & (tests.control.joint > 0.0),
-        tuple(gone & (t.largest <= limits.suspected) for gone, t in zip(off.extras, tests.extras, strict=True)),
+        off.control & (tests.control.largest <= limits.datum) & (tests.control.joint > 0.0),
+        tuple(gone & (t.largest <= limits.datum) for gone, t in zip(off.extras, tests.extras, strict=True)),
     )
 
 
@@ -139,7 +140,19 @@ def _may_go(unknowns: Unknowns, taking_part: np.ndarray) -> np.ndarray:
     per_image = np.bincount(image[taking_part], minlength=len(unknowns.images))
     per_point = np.bincount(point[taking_part], minlength=len(unknowns.points))
     enough = (unknowns.kept < 0) | (per_point > 2)
-    return taking_part & (per_image[image] > FEWEST_RAYS) & enough[point]
+    return taking_part & ((per_image > FEWEST_RAYS) | _expendable(unknowns))[image] & enough[point]
+
+
+def _expendable(unknowns: Unknowns) -> np.ndarray:
+    """(n,) photographs that had rays enough to be left out altogether when most of them are wrong."""
+    return np.bincount(unknowns.rays.image, minlength=len(unknowns.images)) > 2 * FEWEST_RAYS
+
+
+def _lost(unknowns: Unknowns, taking_part: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """(n,) photographs that the removal of the rays chosen leaves with too few."""
+    image, n = unknowns.rays.image, len(unknowns.images)
+    gone, left = np.bincount(image[chosen], minlength=n), np.bincount(image[taking_part & ~chosen], minlength=n)
+    return _expendable(unknowns) & (gone > 0) & (left <= FEWEST_RAYS)
 
 
 def _worst_of_datum(

@@ -67,10 +67,14 @@ class Switches:
 
 @dataclass(frozen=True, eq=False)
 class Participants:
-    """Which rays (m,) take part and which points (P,) are determined: a point needs two rays, or a known place."""
+    """Which rays (m,) take part, which points (P,) are determined, which photographs (n,) have rays.
+
+    A point needs two rays, or a known place.
+    """
 
     rays: np.ndarray
     points: np.ndarray
+    images: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +127,8 @@ def participants(unknowns: Unknowns, switches: Switches) -> Participants:
     count = np.bincount(point[switches.rays], minlength=len(unknowns.points))
     known = np.where(switches.control, (unknowns.prior_weight > 0.0).sum(axis=1), 0)
     weak = (2 * count + known < 4) | ((count == 1) & (known < 3))
-    return Participants(switches.rays & ~weak[point], ~weak)
+    rays = switches.rays & ~weak[point]
+    return Participants(rays, ~weak, np.bincount(unknowns.rays.image[rays], minlength=len(unknowns.images)) > 0)
 
 
 def switched_system(system: NormalSystem, switches: Switches) -> NormalSystem:
@@ -188,7 +193,7 @@ def _ray_tests(unknowns: Unknowns, residual: np.ndarray, predicted: np.ndarray, 
     sign = np.where(taking_part.rays, -1.0, 1.0)[:, None, None]
     spread = np.eye(2) + sign * predicted[:, [[0, 1], [1, 2]]]
     w, r, joint = _tested(gap, spread, taking_part.rays)
-    known = taking_part.points[ray_points(unknowns)]
+    known = taking_part.points[ray_points(unknowns)] & taking_part.images[unknowns.rays.image]
     error = np.where(taking_part.rays[:, None], gap / r, gap) / unknowns.rays.inv_sigma
     return Tests(np.where(known[:, None], w, 0.0), error, np.where(known, joint, 0.0))
 

@@ -160,7 +160,7 @@ def estimate_components(
     rounds, last_round = 0, MAX_ROUNDS
     information = _Information.at(fitted, factors)
     while True:
-        if not information.serves(factors):
+        if not information.serves(fitted, factors):
             information = _Information.at(fitted, factors)
         changes = _changes(fitted, information, held)
         # a σ that shrinks although its group says nothing of it any more goes to zero: it will be held
@@ -198,8 +198,12 @@ class _Information:
         k = self.names.index(name)
         return float(self.s[k, k])
 
-    def serves(self, factors: Mapping[str, float]) -> bool:
-        return all(abs(np.log(factors[name] / self.factors[name])) < FRESH for name in self.names)
+    def serves(self, fitted: Fitted, factors: Mapping[str, float]) -> bool:
+        """Whether it is still of use for an adjustment with these factors."""
+        # data snooping may have taken out the last observation of a group
+        same = self.names == tuple(fit.name for fit in group_fits(fitted.adjusted))
+        changes = [factors.get(name, 1.0) / self.factors.get(name, 1.0) for name in self.names]
+        return same and all(abs(np.log(change)) < FRESH for change in changes)
 
 
 def _changes(fitted: Fitted, information: _Information, held: Mapping[str, str]) -> dict[str, float]:
@@ -240,7 +244,7 @@ def _components(
     alpha = fitted.adjusted.block.settings.adjustment.alpha
     out = []
     for fit in group_fits(fitted.adjusted):
-        name, factor = fit.name, factors[fit.name]
+        name, factor = fit.name, factors.get(fit.name, 1.0)
         f = freedom[name]
         test = _test(name, factor * _ratio(fit), f, alpha)
         out.append(

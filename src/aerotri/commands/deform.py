@@ -1,0 +1,257 @@
+"""`aerotri deform`: what the image errors of a self-calibrated block do to its stereo models."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aerotri.commands.console import Console
+from aerotri.conventions import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from aerotri.deformation.block_models import BlockDeformation
+    from aerotri.deformation.model_grid import Deformation, Ground
+    from aerotri.deformation.restitution import Restitution
+    from aerotri.pipeline import Adjustment
+
+OWN_NAMES = (
+    "deform.json", "dX.tif", "dY.tif", "dZ.tif", "sigma_dZ.tif", "model.tif", "models.csv", "seams.csv", "plots",
+)  # fmt: skip
+TEXTS = ("dX, wrong − true, m", "dY, wrong − true, m", "dZ, wrong − true, m")
+
+
+@dataclass(frozen=True)
+class DeformOptions:
+    """What to compute, as on the command line; the whole block where nothing else is chosen."""
+
+    pair: tuple[str, str] | None = None
+    end_lap: float | None = None
+    block: bool = False
+    step: int = 1
+    variant: str = "free"
+    dem: Path | None = None
+    spacing: float | None = None
+    gsd: float | None = None
+    group: str | None = None
+
+    def check(self) -> None:
+        """Refuse what does not go together.
+
+        Raises
+        ------
+        InputError
+        """
+        from aerotri.deformation.restitution import VARIANTS
+
+        chosen = [name for name, given in (("--pair", self.pair), ("--end-lap", self.end_lap), ("--block", self.block))
+                  if given not in (None, False)]  # fmt: skip
+        if len(chosen) > 1:
+            raise InputError(f"{' and '.join(chosen)} are both given", "choose one of them")
+        if self.variant not in VARIANTS:
+            raise InputError(f"there is no variant '{self.variant}'", f"choose {' or '.join(VARIANTS)}")
+        if self.end_lap is not None and self.dem is not None:
+            raise InputError("a model at a stated end lap has flat ground", "give --dem with --pair or --block")
+        if self.end_lap is None and (self.gsd is not None or self.group is not None):
+            raise InputError("--gsd and --group belong to --end-lap", "leave them out")
+
+
+def run_deform(source: Path, options: DeformOptions, out: Path | None, plots: bool, as_json: bool) -> int:
+    """Exit code of the command; arguments as on the command line."""
+    console = Console(quiet=as_json)
+    options.check()
+    target = out or Path(f"{source.resolve().name.removesuffix('_result')}_deformation")
+    refuse_foreign(target)
+    calibration = reopened(source, console)
+    from aerotri.deformation.absorbed import AbsorptionFailedError
+    from aerotri.deformation.restitution import restitution
+
+    console.progress("orientation")
+    try:
+        of = restitution(calibration, options.variant)
+    except AbsorptionFailedError as failure:
+        console.failure(str(failure))
+        return 1
+    content = _computed(calibration, of, options, target, plots, console)
+    if as_json:
+        print(json.dumps(content, indent=2, ensure_ascii=False))
+    else:
+        console.lines([*_summary(content), f"Written to {target}"])
+    return 0
+
+
+def reopened(source: Path, console: Console) -> Adjustment:
+    """The adjustment of a result folder, linearised and factorised once.
+
+    Raises
+    ------
+    InputError
+        When the folder is no result.
+    """
+    from aerotri.compiled import compilation_notice
+    from aerotri.formats.block_folder import read_block
+    from aerotri.formats.solution import read_solution
+    from aerotri.pipeline import reopen
+
+    if not (source / "solution.npz").is_file():
+        raise InputError("is no result", "give the folder that `aerotri adjust` wrote", source)
+    console.progress(compilation_notice())
+    return reopen(read_block(source / "block"), read_solution(source / "solution.npz"))
+
+
+def refuse_foreign(target: Path) -> None:
+    """A deformation replaces an older one or an empty folder, nothing else.
+
+    Raises
+    ------
+    InputError
+    """
+    if target.is_dir() and any(target.iterdir()) and not (target / "deform.json").exists():
+        raise InputError(f"'{target}' holds other files", "choose another --out, or an empty folder")
+
+
+def _computed(
+    calibration: Adjustment, of: Restitution, options: DeformOptions, target: Path, plots: bool, console: Console
+) -> dict[str, Any]:
+    """Compute and write; returns the content of deform.json."""
+    from aerotri.deformation.model_grid import deform_normal_case, deform_pair
+    from aerotri.deformation.outcome_json import block_deformation_json, deformation_json
+
+    name = str(calibration.result.block.name)
+    console.progress("deformation")
+    with ExitStack() as stack:
+        if options.end_lap is not None:
+            one = deform_normal_case(
+                calibration, of, options.end_lap, options.spacing, options.group, options.gsd
+            )  # fmt: skip
+        elif options.pair is not None:
+            one = deform_pair(calibration, of, options.pair, _ground(calibration, options, stack), options.spacing)
+        else:
+            whole = _of_block(calibration, of, options, _ground(calibration, options, stack), console)
+            content = block_deformation_json(whole, name)
+            _write(target, content, whole, _block_figures(whole, name) if plots else {})
+            return content
+    content = deformation_json(one, name)
+    _write(target, content, one, _figures(one, name) if plots else {})
+    return content
+
+
+def _ground(calibration: Adjustment, options: DeformOptions, stack: ExitStack) -> Ground:
+    """The DEM, open as long as the stack, or the level of the object points."""
+    from aerotri.deformation.model_grid import DemGround, FlatGround, mean_ground
+    from aerotri.rasters import RasterReader
+
+    if options.dem is None:
+        return FlatGround(mean_ground(calibration))
+    reader = stack.enter_context(RasterReader(options.dem))
+    check_crs(calibration, reader.epsg, options.dem)
+    return DemGround(reader)
+
+
+def check_crs(calibration: Adjustment, epsg: int | None, dem: Path) -> None:
+    """Refuse a DEM in another CRS than the block's; one without a CRS is taken for one in the block's.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.rasters import horizontal_crs
+
+    own = horizontal_crs(calibration.result.block.crs)
+    if own is not None and epsg is not None and own.upper() != f"EPSG:{epsg}":
+        raise InputError(f"is in EPSG:{epsg}, the block in {own}", "bring the DEM into the CRS of the block", dem)
+
+
+def _of_block(
+    calibration: Adjustment, of: Restitution, options: DeformOptions, ground: Ground, console: Console
+) -> BlockDeformation:
+    from aerotri.deformation.block_models import deform_block
+
+    return deform_block(
+        calibration, of, ground, options.spacing, options.step,
+        lambda done, count: console.progress(f"model {done} of {count}"),
+    )  # fmt: skip
+
+
+def _figures(deformation: Deformation, name: str) -> dict[str, Figure]:
+    from aerotri.report.plots_deformation import plot_deformation, plot_deformation_profile
+
+    return {"contours": plot_deformation(deformation, name), "profiles": plot_deformation_profile(deformation, name)}
+
+
+def _block_figures(deformation: BlockDeformation, name: str) -> dict[str, Figure]:
+    from aerotri.report.plots_deformation import plot_block_deformation
+
+    return {"block": plot_block_deformation(deformation, name)}
+
+
+def _write(
+    target: Path, content: dict[str, Any], deformation: Deformation | BlockDeformation, figures: dict[str, Figure]
+) -> None:
+    from aerotri.deformation.block_models import BlockDeformation
+    from aerotri.formats.atomic import atomic_folder
+    from aerotri.rasters import Grid, horizontal_crs, write_raster
+
+    d = deformation
+    crs = None if d.crs == "model" else horizontal_crs(d.crs)
+    grid = Grid.of_nodes(d.x, d.y)
+    with atomic_folder(target, own=OWN_NAMES) as folder:
+        for k, text in enumerate(TEXTS):
+            write_raster(folder / f"d{'XYZ'[k]}.tif", d.d[..., k], grid, crs, text)
+        write_raster(folder / "sigma_dZ.tif", d.sigma[..., 2], grid, crs, "σ of dZ, m")
+        if isinstance(d, BlockDeformation):
+            write_raster(folder / "model.tif", d.number.astype(np.int32), grid, crs, "number of the model")
+            _write_tables(folder, d)
+        if figures:
+            from aerotri.report.rendering import save_plots
+
+            save_plots(figures, folder / "plots")
+        text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+        (folder / "deform.json").write_text(text + "\n", encoding="utf-8")
+
+
+def _write_tables(folder: Path, d: BlockDeformation) -> None:
+    """models.csv, which `demcor --models model.tif` takes, and seams.csv."""
+    import csv
+
+    with (folder / "models.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["number", "left", "right"])
+        writer.writerows([k, *one.model.names] for k, one in enumerate(d.models))
+    with (folder / "seams.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["first_left", "first_right", "second_left", "second_right", "nodes", "mean", "rms", "max"])
+        for seam in d.seams:
+            names = (*d.models[seam.first].model.names, *d.models[seam.second].model.names)
+            writer.writerow([*names, seam.count, seam.mean, seam.rms, seam.max])
+
+
+def _summary(content: dict[str, Any]) -> list[str]:
+    from aerotri.report.quality import printable
+
+    c = content
+    lines = [f"{printable(c['title'])}, {c['variant']}, {c['nodes']} nodes every {c['spacing_m']:g} m"]
+    if "h_over_b" in c:
+        lines.append(
+            f"end lap {100 * c['end_lap']:.1f} %, h/b {c['h_over_b']:.2f}, base {c['base_mm']:.2f} mm, GSD "
+            f"{c['gsd_m']:.3f} m, 1 µm of x-parallax {c['cm_per_um']:.2f} cm"
+        )
+    for axis in ("dX", "dY", "dZ"):
+        s = c[axis]
+        lines.append(f"{axis}  {s['min']:+.3f} … {s['max']:+.3f} m, mean {s['mean']:+.3f}, RMS {s['rms']:.3f}")
+    s = c["sigma_dZ"]
+    lines.append(f"σ of dZ  {s['min']:.4f} … {s['max']:.4f} m, mean {s['mean']:.4f}: {c['sigma_includes']}")
+    if "seams" in c and c["seams"]["count"]:
+        seams = c["seams"]
+        lines.append(f"steps between neighbouring models: RMS {seams['rms']:.3f} m at {seams['count']} seams; worst:")
+        for seam in seams["worst"][:5]:
+            first, second = (printable(", ".join(seam[key])) for key in ("first", "second"))
+            step = f"RMS {seam['rms']:.3f} m, mean {seam['mean']:+.3f}, {seam['nodes']} nodes"
+            lines.append(f"  {first} | {second}: {step}")
+    return lines

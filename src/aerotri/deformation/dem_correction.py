@@ -1,0 +1,213 @@
+"""A DEM freed of the deformation of the models it was made of, window by window.
+
+What is held at a time does not depend on the size of the DEM: some windows, and GDAL's blocks. Reading and writing
+stay in one thread, kernels run in others; windows are finished in their order, so that the outcome repeats.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.adjustment.parallel import thread_count
+from aerotri.deformation.dem_window import CorrectedWindow, DemModels, added_sums, no_sums
+from aerotri.deformation.model_map import ModelMap
+from aerotri.deformation.seam_steps import SeamSteps, added_steps, window_steps
+from aerotri.deformation.stereo_model import covariance_of, pair_model
+from aerotri.rasters import Grid, RasterReader, RasterWriter
+
+WINDOW = 1024
+LARGEST_WINDOW_M = 2000.0
+"""Of a DEM in a CRS, within which the CRS counts as an affine image of the local frame."""
+SIGMA_CELLS = 256
+"""Cells of the σ raster along its longer side, at most: σ is smooth within a model."""
+FEWEST_HALO, MOST_HALO = 3, 512
+SAMPLE_POINTS = 200
+DZ_STEP_M = 2.0**-14
+"""dZ is written in whole multiples of this: 0.06 mm, and its file becomes smaller."""
+
+
+@dataclass(frozen=True, eq=False)
+class DemOutcome:
+    """What became of a DEM.
+
+    Parameters
+    ----------
+    sums : (N_SUMS,) over all cells, see `_resample_kernels`. exact : cells computed one by one.
+    steps : at the seams between models. halo : cells that windows overlapped by, at most.
+    sigma : (rows, columns) m, σ of dZ on `sigma_grid`; NaN where there is none.
+    seconds : by stage.
+    """
+
+    sums: np.ndarray
+    exact: int
+    steps: SeamSteps
+    halo: int
+    sigma: np.ndarray
+    sigma_grid: Grid
+    seconds: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """A window being corrected: first row, first column, rows, columns; its halo; what comes of it."""
+
+    window: tuple[int, int, int, int]
+    halo: int
+    future: Future[tuple[CorrectedWindow, SeamSteps]]
+
+
+def correct_dem(
+    models: DemModels,
+    numbers: ModelMap,
+    reader: RasterReader,
+    writer: RasterWriter,
+    dz_writer: RasterWriter,
+    report: Callable[[float], None] | None = None,
+) -> DemOutcome:
+    """Correct a DEM.
+
+    Parameters
+    ----------
+    numbers : model of every cell, numbered as in `models`.
+    writer, dz_writer : of the corrected DEM and of dZ, on the grid of the reader.
+    report : called with the share that is done.
+    """
+    return _Correction(models, numbers, reader, writer, dz_writer).run(report)
+
+
+class _Correction:
+    """One run over a DEM: what is on its way and what has been summed up."""
+
+    def __init__(
+        self, models: DemModels, numbers: ModelMap, reader: RasterReader, writer: RasterWriter, dz_writer: RasterWriter
+    ):
+        self._models, self._numbers, self._reader = models, numbers, reader
+        self._writer, self._dz_writer = writer, dz_writer
+        self._halo = self._widest = halo_for(models, reader.grid)
+        self._sums, self._steps, self._exact = no_sums(), SeamSteps.none(), 0
+        self._seconds = {"read": 0.0, "write": 0.0, "total": 0.0}
+        grid = reader.grid
+        cells = max(1, -(-max(grid.rows, grid.columns) // SIGMA_CELLS))
+        self._sigma_grid = grid.coarser(cells)
+        shape = self._sigma_grid.rows, self._sigma_grid.columns
+        self._sigma_at = [
+            np.minimum(np.arange(n) * cells + cells // 2, most - 1)
+            for n, most in zip(shape, (grid.rows, grid.columns), strict=True)
+        ]
+        self._heights, self._models_at = np.full(shape, np.nan), np.full(shape, -1, np.int64)
+
+    def run(self, report: Callable[[float], None] | None) -> DemOutcome:
+        begun, grid, threads = time.perf_counter(), self._reader.grid, thread_count()
+        waiting: deque[_Task] = deque()
+        done = 0
+        with ThreadPoolExecutor(threads) as pool:
+            for row, column, rows, columns in windows_of(grid, self._models.places.frame is not None):
+                waiting.append(self._begin(pool, (row, column, rows, columns), self._halo))
+                while len(waiting) > threads:
+                    done += self._finish(pool, waiting.popleft())
+                    if report is not None:
+                        report(done / (grid.rows * grid.columns))
+            while waiting:
+                done += self._finish(pool, waiting.popleft())
+        sigma = self._sigma()
+        self._seconds["total"] = time.perf_counter() - begun
+        return DemOutcome(
+            self._sums, self._exact, self._steps, self._widest, sigma, self._sigma_grid, dict(self._seconds)
+        )  # fmt: skip
+
+    def _begin(self, pool: ThreadPoolExecutor, window: tuple[int, int, int, int], halo: int) -> _Task:
+        """Read a window (first row, first column, rows, columns) with its halo and have it corrected."""
+        begun = time.perf_counter()
+        row, column, rows, columns = window
+        around = (row - halo, column - halo, rows + 2 * halo, columns + 2 * halo)
+        z = self._reader.read(*around)
+        number = self._numbers.numbers(self._reader.grid, *around)
+        self._seconds["read"] += time.perf_counter() - begun
+        inner = np.s_[halo : halo + rows, halo : halo + columns]
+        self._note(row, column, z[inner], number[inner])
+
+        def correct() -> tuple[CorrectedWindow, SeamSteps]:
+            found = self._models.correct(z, number, self._reader.grid, around[0], around[1], halo)
+            several = len(self._models.names) > 1
+            steps = window_steps(z[inner], found.z, number[inner]) if several else SeamSteps.none()
+            np.multiply(np.round(found.dz / DZ_STEP_M), DZ_STEP_M, out=found.dz)
+            return found, steps
+
+        return _Task(window, halo, pool.submit(correct))
+
+    def _finish(self, pool: ThreadPoolExecutor, task: _Task) -> int:
+        """Write a window; once more with a wider halo where cells are shifted beyond it. Returns its cells.
+
+        The halo of the others stays as it is: how many are on their way depends on the threads, the outcome must not.
+        """
+        found, steps = task.future.result()
+        while found.sums[3] and task.halo < MOST_HALO:
+            task = self._begin(pool, task.window, min(2 * task.halo, MOST_HALO))
+            found, steps = task.future.result()
+        self._widest = max(self._widest, task.halo)
+        self._sums, self._steps = added_sums(self._sums, found.sums), added_steps(self._steps, steps)
+        self._exact += found.exact
+        begun = time.perf_counter()
+        row, column, rows, columns = task.window
+        self._writer.write(row, column, found.z)
+        self._dz_writer.write(row, column, found.dz)
+        self._seconds["write"] += time.perf_counter() - begun
+        return rows * columns
+
+    def _note(self, row: int, column: int, z: np.ndarray, number: np.ndarray) -> None:
+        """Keep height and model where σ will be computed: in the middle of every cell of the coarse grid."""
+        inside = [
+            np.flatnonzero((at >= first) & (at < first + size))
+            for at, first, size in zip(self._sigma_at, (row, column), z.shape, strict=True)
+        ]
+        coarse = np.ix_(*inside)
+        here = np.ix_(self._sigma_at[0][inside[0]] - row, self._sigma_at[1][inside[1]] - column)
+        self._heights[coarse], self._models_at[coarse] = z[here], number[here]
+
+    def _sigma(self) -> np.ndarray:
+        """(rows, columns) m, σ of dZ on the coarse grid."""
+        models, grid = self._models, self._reader.grid
+        x, y = np.meshgrid(grid.x(self._sigma_at[1]), grid.y(self._sigma_at[0]))
+        sigma = np.full(self._heights.shape, np.nan)
+        known = np.isfinite(self._heights)
+        for k in np.unique(self._models_at[known & (self._models_at >= 0)]).tolist():
+            own = known & (self._models_at == k)
+            local = models.places.to_local(np.column_stack([x[own], y[own], self._heights[own]]))
+            left, right = models.rows[k].tolist()
+            model = pair_model(models.of, models.names[k], (left, right))
+            variance = models.places.variances(local, covariance_of(model, local))
+            sigma[own] = np.sqrt(np.maximum(variance[:, 2], 0.0))
+        return sigma
+
+
+def windows_of(grid: Grid, in_crs: bool) -> Iterator[tuple[int, int, int, int]]:
+    """First row, first column, rows and columns of the windows of a DEM."""
+    size = WINDOW
+    if in_crs:
+        size = int(np.clip(LARGEST_WINDOW_M / max(grid.cell_x, grid.cell_y), 64, WINDOW))
+    for row in range(0, grid.rows, size):
+        for column in range(0, grid.columns, size):
+            yield row, column, min(size, grid.rows - row), min(size, grid.columns - column)
+
+
+def halo_for(models: DemModels, grid: Grid) -> int:
+    """Cells by which windows overlap: a good deal more than the shifts seen at some places of every model."""
+    x = np.linspace(grid.left, grid.left + grid.columns * grid.cell_x, int(np.sqrt(SAMPLE_POINTS)))
+    y = np.linspace(grid.top, grid.top - grid.rows * grid.cell_y, int(np.sqrt(SAMPLE_POINTS)))
+    grid_x, grid_y = np.meshgrid(x, y)
+    largest = 0.0
+    for k in range(len(models.names)):
+        centre = models.places.from_local(models.of.true.centre[models.rows[k]]).mean(axis=0)
+        around = np.column_stack([grid_x.ravel(), grid_y.ravel(), np.full(grid_x.size, models.ground)])
+        # a large DEM may have no sample within a small model, whose middle always is
+        xyz = np.vstack([around, [[centre[0], centre[1], models.ground]]])
+        shift = models.deformation_at(np.full(len(xyz), k, np.int32), xyz)[:, :2]
+        cells = np.abs(shift) / np.array([grid.cell_x, grid.cell_y])
+        largest = max(largest, float(np.nanmax(cells, initial=0.0)))
+    return int(np.clip(np.ceil(1.5 * largest) + 2, FEWEST_HALO, MOST_HALO))

@@ -1,0 +1,202 @@
+"""The correction of one window of a DEM: from a restitution and its models to what the kernels take, and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.deformation import _kernels, _resample_kernels
+from aerotri.deformation.error_tables import ErrorTables, error_tables
+from aerotri.deformation.model_geometry import geometry_of
+from aerotri.deformation.model_grid import Places, mean_ground, pair_of, places_of
+from aerotri.deformation.orientation import Calibration, Orientation, row_of_image
+from aerotri.deformation.restitution import Restitution
+from aerotri.rasters import Grid
+
+FIT_TOLERANCE_M = 2e-4
+TABLE_TOLERANCE_M = 1e-4
+FIXED_POINT_TOLERANCE_M = 1e-4
+LARGEST_PATCH = 64
+PART = 256
+PARTIALS_STEP_M = 50.0
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectedWindow:
+    """A window after the correction.
+
+    Parameters
+    ----------
+    z, dz : (h, w) m, corrected heights and deformation; NaN where there are none.
+    sums : (N_SUMS,) see `_resample_kernels`.
+    exact : cells computed one by one.
+    """
+
+    z: np.ndarray
+    dz: np.ndarray
+    sums: np.ndarray
+    exact: int
+
+
+@dataclass(frozen=True, eq=False)
+class DemModels:
+    """The M models a DEM was made of.
+
+    Parameters
+    ----------
+    names : (left, right) of each. rows : (M, 2) photographs of the block.
+    of : all photographs. tables : the image errors. source : (M, 2) which table each photograph has.
+    places : between the CRS of the DEM and the frame of the orientations.
+    ground : m, mean height in the CRS, where the frame's axes are taken.
+    table_accuracy_m : m, what the tables of the image errors cost in height.
+    """
+
+    names: tuple[tuple[str, str], ...]
+    rows: np.ndarray
+    of: Restitution
+    tables: ErrorTables
+    source: np.ndarray
+    places: Places
+    ground: float
+    table_accuracy_m: float
+
+    def photos(self, x: float, y: float, chosen: np.ndarray | None = None) -> np.ndarray:
+        """(M, 4, 15) photographs of models for coordinates X − x, Y − y, Z of the DEM.
+
+        Around a place the CRS is an affine image of the frame, exact enough for the deformation over some kilometres:
+        it changes by millimetres where the place is wrong by metres.
+        """
+        rows = self.rows if chosen is None else self.rows[chosen]
+        local, axes = self._axes_at(np.array([x, y, self.ground]))
+        local = local - self.ground * axes[:, 2]
+        sides = [(of, rows[:, k]) for of in (self.of.used, self.of.true) for k in range(2)]
+        return np.ascontiguousarray(np.stack([_photos(of, r, local, axes) for of, r in sides], axis=1))
+
+    def _axes_at(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(3,) a place of the CRS in the frame, and (3, 3) frame coordinates per CRS coordinates there."""
+        if self.places.frame is None:
+            return place, np.eye(3)
+        steps = PARTIALS_STEP_M * np.eye(3)
+        around = self.places.to_local(np.concatenate([place[None], place + steps, place - steps]))
+        return around[0], ((around[1:4] - around[4:]) / (2.0 * PARTIALS_STEP_M)).T
+
+    def deformation_at(self, number: np.ndarray, xyz: np.ndarray) -> np.ndarray:
+        """(n, 3) m, the deformation at points (n, 3) of the DEM in models (n,); NaN where they are not seen."""
+        out = np.full(xyz.shape, np.nan)
+        known = np.flatnonzero((number >= 0) & np.isfinite(xyz).all(axis=1))
+        if not len(known):
+            return out
+        x, y = xyz[known, :2].mean(axis=0)
+        chosen, local = np.unique(number[known], return_inverse=True)
+        found = np.empty((len(known), 3))
+        _kernels.deform_points(
+            local, self.photos(x, y, chosen), self.source[chosen], self.tables.as_tuple(), xyz[known] - (x, y, 0.0),
+            found,
+        )  # fmt: skip
+        out[known] = found
+        return out
+
+    def correct(
+        self, z: np.ndarray, number: np.ndarray, grid: Grid, row: int, column: int, halo: int
+    ) -> CorrectedWindow:
+        """Correct a window.
+
+        Parameters
+        ----------
+        z : (h, w) m with `halo` cells around the window; NaN where the DEM has no data.
+        number : (h, w) int32, model of every cell, −1 for none.
+        row, column : of the first cell of `z` in the DEM.
+        """
+        window = (z.shape[0] - 2 * halo, z.shape[1] - 2 * halo)
+        sums = no_sums()
+        chosen = np.unique(number)
+        chosen = chosen[chosen >= 0]
+        if not len(chosen):
+            known = np.isfinite(z[halo : halo + window[0], halo : halo + window[1]]).sum()
+            sums[1], sums[2] = window[0] * window[1] - known, known
+            return CorrectedWindow(np.full(window, np.nan, z.dtype), np.full(window, np.nan, np.float32), sums, 0)
+        x, y = float(grid.x(column + z.shape[1] // 2)), float(grid.y(row + z.shape[0] // 2))
+        number, photos = _renumbered(number, chosen), self.photos(x, y, chosen)
+        out, out_dz, exact = np.empty(window, z.dtype), np.empty(window, np.float32), 0
+        for i in range(0, window[0], PART):
+            for j in range(0, window[1], PART):
+                rows, columns = min(PART, window[0] - i), min(PART, window[1] - j)
+                around = np.s_[i : i + rows + 2 * halo, j : j + columns + 2 * halo]
+                place = np.array(
+                    [grid.x(column + j) - x, grid.cell_x, grid.y(row + i) - y, -grid.cell_y], dtype=float
+                )  # fmt: skip
+                part = self._part(z[around], number[around], photos, self.source[chosen], place, halo)
+                inner = np.s_[i : i + rows, j : j + columns]
+                out[inner], out_dz[inner] = part.z, part.dz
+                sums, exact = added_sums(sums, part.sums), exact + part.exact
+        return CorrectedWindow(out, out_dz, sums, exact)
+
+    def _part(
+        self, z: np.ndarray, number: np.ndarray, photos: np.ndarray, source: np.ndarray, place: np.ndarray, halo: int
+    ) -> CorrectedWindow:
+        """Correct a part of a window that stays in the processor's cache; `number`, `photos`, `source` go together."""
+        z, number = np.ascontiguousarray(z), np.ascontiguousarray(number)
+        du, dv, dz = (np.empty(z.shape, np.float32) for _ in range(3))
+        cameras, sums = self.tables.as_tuple(), no_sums()
+        exact = _kernels.deform_window(
+            z, number, photos, source, cameras, place, FIT_TOLERANCE_M, LARGEST_PATCH, du, dv, dz
+        )
+        shape = z.shape[0] - 2 * halo, z.shape[1] - 2 * halo
+        out, out_dz = np.empty(shape, z.dtype), np.empty(shape, np.float32)
+        tolerance = FIXED_POINT_TOLERANCE_M / np.abs(place[[1, 3]])
+        _resample_kernels.resample(z, du, dv, dz, halo, tolerance, out, out_dz, sums)
+        return CorrectedWindow(out, out_dz, sums, exact)
+
+
+def dem_models(calibration: Calibration, of: Restitution, names: tuple[tuple[str, str], ...]) -> DemModels:
+    """The models of a DEM, by the names of their photographs (left, right).
+
+    Raises
+    ------
+    InputError
+        For a photograph that the block does not have, or that is not oriented.
+    """
+    places, block = places_of(calibration), calibration.local.block
+    ground = float(np.nanmedian(calibration.local.points.xyz[:, 2]))
+    rows, per_metre = [], []
+    for left, right in names:
+        model = pair_of(of, calibration, left, right)
+        geometry = geometry_of(model, ground)
+        per_metre.append(geometry.base_mm / geometry.height_m)
+        rows.append([row_of_image(block, name) for name in (left, right)])
+    # both photographs may be off
+    tables = error_tables(of.errors, 0.5 * TABLE_TOLERANCE_M * min(per_metre))
+    return DemModels(
+        names, np.array(rows), of, tables, of.group[np.array(rows)], places, mean_ground(calibration),
+        2.0 * tables.accuracy / min(per_metre),
+    )  # fmt: skip
+
+
+def no_sums() -> np.ndarray:
+    """(N_SUMS,) of no cells at all."""
+    sums = np.zeros(_resample_kernels.N_SUMS)
+    sums[[6, 10, 12]], sums[[7, 11, 13]] = np.inf, -np.inf
+    return sums
+
+
+def added_sums(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Sums over two sets of cells."""
+    both = one + other
+    both[[6, 10, 12]] = np.minimum(one, other)[[6, 10, 12]]
+    both[[7, 11, 13]] = np.maximum(one, other)[[7, 11, 13]]
+    return both
+
+
+def _renumbered(number: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Numbers counted within the chosen ones."""
+    if len(chosen) == 1 and chosen[0] == 0:
+        return number
+    return np.where(number >= 0, np.searchsorted(chosen, number), -1).astype(np.int32)
+
+
+def _photos(of: Orientation, rows: np.ndarray, local: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """(M, 15) photographs for coordinates Δ of which local + axes·Δ is the place in the frame."""
+    to_camera = np.swapaxes(of.rotation[rows], 1, 2)
+    u = np.concatenate([to_camera @ axes, to_camera @ (local - of.centre[rows])[:, :, None]], axis=2)
+    return np.concatenate([u.reshape(-1, 12), of.interior[rows]], axis=1)

@@ -1,0 +1,107 @@
+"""Orientation of photographs as a stereo model needs it, and what this package takes of an adjustment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.solve import Solution
+from aerotri.coordinates import LocalFrame
+from aerotri.functional_model.rotation import rotation_from_angles
+from aerotri.image_errors import interior_elements
+from aerotri.observations import Block
+from aerotri.statistics.adjusted_block import AdjustedBlock
+
+
+class Calibration(Protocol):
+    """A self-calibrated block with its equations: `pipeline.Adjustment`, seen from below.
+
+    result : in the block's CRS. local : in the local frame, where `system` and `solution` live. frame : that frame,
+    None for a block in local coordinates.
+    """
+
+    @property
+    def result(self) -> AdjustedBlock: ...
+    @property
+    def local(self) -> AdjustedBlock: ...
+    @property
+    def system(self) -> NormalSystem: ...
+    @property
+    def solution(self) -> Solution: ...
+    @property
+    def frame(self) -> LocalFrame | None: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Orientation:
+    """Exterior and interior orientation of n photographs; NaN where there is none.
+
+    Parameters
+    ----------
+    centre : (n, 3) m, in the local frame of the block.
+    rotation : (n, 3, 3) camera → object.
+    interior : (n, 3) mm, c, x0, y0.
+    """
+
+    centre: np.ndarray
+    rotation: np.ndarray
+    interior: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.centre)
+
+    @property
+    def known(self) -> np.ndarray:
+        """(n,) bool."""
+        return np.all(np.isfinite(np.concatenate([self.centre[:, None], self.rotation], axis=1)), axis=(1, 2))
+
+    def take(self, rows: np.ndarray | list[int]) -> Orientation:
+        """The orientation of some photographs."""
+        return Orientation(self.centre[rows], self.rotation[rows], self.interior[rows])
+
+
+def calibrated_orientation(calibration: Calibration) -> Orientation:
+    """The orientation of all photographs of the block after its adjustment."""
+    adjusted = calibration.local
+    rotation = rotation_from_angles(adjusted.images.angles, adjusted.block.rotation)
+    return Orientation(adjusted.images.centre, rotation, interior_of_images(adjusted))
+
+
+def interior_of_images(adjusted: AdjustedBlock) -> np.ndarray:
+    """(n, 3) mm, c, x0, y0 of every photograph's camera after the adjustment."""
+    of_camera = np.array([interior_elements(adjusted, camera)[0] for camera in adjusted.block.cameras])
+    return of_camera[adjusted.block.images.camera]
+
+
+def given_orientation(calibration: Calibration, other: Block, angles: np.ndarray, centre: np.ndarray) -> Orientation:
+    """Orientation from elsewhere, by the names of the photographs, in the local frame.
+
+    The interior orientation is that of the calibrated block.
+
+    Parameters
+    ----------
+    other : gives the names, as its images have them, and the order of the angles.
+    angles, centre : (k, 3) rad, and m in the CRS of the calibrated block.
+    """
+    frame, block = calibration.frame, calibration.local.block
+    rotation = rotation_from_angles(angles, other.rotation)
+    if frame is not None:
+        rotation = frame.axes_at(centre) @ rotation
+        centre = frame.to_local(centre)
+    row = {str(name): k for k, name in enumerate(other.images.names)}
+    rows = np.array([row.get(str(name), -1) for name in block.images.names])
+    there = rows >= 0
+    out = Orientation(
+        np.full((len(rows), 3), np.nan), np.full((len(rows), 3, 3), np.nan), interior_of_images(calibration.local)
+    )
+    out.centre[there], out.rotation[there] = centre[rows[there]], rotation[rows[there]]
+    return out
+
+
+def row_of_image(block: Block, name: str) -> int:
+    """The row of a photograph; −1 when the block has none of that name."""
+    found = np.flatnonzero(block.images.names == name)
+    return int(found[0]) if len(found) else -1

@@ -1,0 +1,78 @@
+"""With what a block's photographs are restituted: their true orientation, the one in use, and their image errors.
+
+Two variants, always labelled. `free`: the orientation of the self-calibrated block, the photographs used uncorrected.
+`absorbed`: the orientation of an adjustment without additional parameters, which swallows part of the image errors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials, additional_rows
+from aerotri.deformation.orientation import Calibration, Orientation, calibrated_orientation
+from aerotri.deformation.photo_errors import PhotoErrors, errors_by_image
+
+FREE, ABSORBED, GIVEN = "free", "absorbed", "given"
+VARIANTS = (FREE, ABSORBED)
+
+SIGMA_INCLUDES = {
+    FREE: (
+        "covariance of the additional parameters; the orientation cancels to first order; neither noise of matching "
+        "nor of measuring"
+    ),
+    ABSORBED: (
+        "covariance of the additional parameters, with what the orientation without parameters swallows of them; "
+        "neither noise of matching nor of measuring"
+    ),
+}
+SIGMA_INCLUDES[GIVEN] = SIGMA_INCLUDES[ABSORBED] + "; the given orientation is taken for one of the same observations"
+
+
+@dataclass(frozen=True, eq=False)
+class Restitution:
+    """All n photographs of a block, in its local frame.
+
+    Parameters
+    ----------
+    variant : 'free', 'absorbed', or 'given' for an orientation from elsewhere.
+    true, used : the orientation after the self-calibration, and the one the models are restituted with.
+    errors : image errors of the groups of photographs. group : (n,) which of them each photograph has.
+    follows : (n, 9, p) partials of the used orientation by the additional parameters, as `absorbed_partials`.
+    covariance : (p, p) of the additional parameters, σ̂0² included.
+    """
+
+    variant: str
+    true: Orientation
+    used: Orientation
+    errors: tuple[PhotoErrors, ...]
+    group: np.ndarray
+    follows: np.ndarray
+    covariance: np.ndarray
+
+
+def restitution(calibration: Calibration, variant: str = FREE, used: Orientation | None = None) -> Restitution:
+    """The restitution of a block.
+
+    Parameters
+    ----------
+    variant : 'free' or 'absorbed'; of no meaning where `used` is given.
+    used : orientation from elsewhere, (n,) photographs of the block.
+
+    Raises
+    ------
+    AbsorptionFailedError
+    """
+    rows = additional_rows(calibration)
+    errors, group = errors_by_image(calibration, rows)
+    true = calibrated_orientation(calibration)
+    follows = np.zeros((len(true), 9, len(rows)))
+    if used is not None:
+        variant, follows = GIVEN, absorbed_partials(calibration)
+    elif variant == ABSORBED:
+        used, follows = absorbed_orientation(calibration).orientation, absorbed_partials(calibration)
+    else:
+        used = true
+    covariance = calibration.local.parameters.covariance[np.ix_(rows, rows)]
+    return Restitution(variant, true, used, errors, group, follows, covariance)

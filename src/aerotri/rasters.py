@@ -1,0 +1,284 @@
+"""Reading and writing of rasters window by window; nothing else knows rasterio, which is imported when it is needed.
+
+Rasters are north-up: columns to the right, rows down. A value belongs to the centre of its cell. What is not known is
+NaN inside the program and the no-data value in a file.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from aerotri.conventions import InputError
+
+NO_DATA = -9999.0
+"""Stands for what is not known in the files of this program."""
+CACHE_MB = 256
+"""Blocks that GDAL keeps: it would take a share of the machine's memory otherwise."""
+TILE = 512
+KEPT_OPTIONS = ("compress", "predictor")
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The cells of a north-up raster.
+
+    Parameters
+    ----------
+    rows, columns : size.
+    left, top : outer edges of the first cell, in the unit of the coordinates.
+    cell_x, cell_y : size of a cell, both positive.
+    """
+
+    rows: int
+    columns: int
+    left: float
+    top: float
+    cell_x: float
+    cell_y: float
+
+    def x(self, column: ArrayLike) -> np.ndarray:
+        """Coordinate of the centres of columns; whole and broken numbers alike."""
+        return self.left + (np.asarray(column) + 0.5) * self.cell_x
+
+    def y(self, row: ArrayLike) -> np.ndarray:
+        """Coordinate of the centres of rows."""
+        return self.top - (np.asarray(row) + 0.5) * self.cell_y
+
+    def column(self, x: ArrayLike) -> np.ndarray:
+        """Broken number of the column whose centre is at x; the inverse of `x`."""
+        return (np.asarray(x) - self.left) / self.cell_x - 0.5
+
+    def row(self, y: ArrayLike) -> np.ndarray:
+        """The inverse of `y`."""
+        return (self.top - np.asarray(y)) / self.cell_y - 0.5
+
+    def coarser(self, cells: int) -> Grid:
+        """The grid with `cells` × `cells` cells made one; the last ones reach beyond the edge."""
+        rows, columns = -(-self.rows // cells), -(-self.columns // cells)
+        return Grid(rows, columns, self.left, self.top, self.cell_x * cells, self.cell_y * cells)
+
+    @classmethod
+    def of_nodes(cls, x: np.ndarray, y: np.ndarray) -> Grid:
+        """The grid whose cells have their centres at equally spaced nodes, x rising, y falling."""
+        cell_x, cell_y = float(x[-1] - x[0]) / (len(x) - 1), float(y[0] - y[-1]) / (len(y) - 1)
+        return cls(len(y), len(x), float(x[0]) - cell_x / 2.0, float(y[0]) + cell_y / 2.0, cell_x, cell_y)
+
+
+class RasterReader:
+    """A raster of one band, open for reading; used as a context manager, from one thread.
+
+    Attributes
+    ----------
+    grid : its cells. dtype : float type in which it is delivered. no_data : its no-data value, None if it has none.
+    crs : rasterio's CRS or None. options : how the file is written, for a copy of the same kind.
+    """
+
+    def __init__(self, path: str | os.PathLike):
+        import rasterio
+        from rasterio.errors import RasterioError
+
+        self.path = Path(path)
+        try:
+            with _quietly():
+                self._file = rasterio.open(self.path)
+        except RasterioError as error:
+            raise InputError(f"is no raster: {error}", "give a GeoTIFF", self.path) from error
+        try:
+            self._check()
+        except InputError:
+            self._file.close()
+            raise
+        t = self._file.transform
+        self.grid = Grid(self._file.height, self._file.width, t.c, t.f, t.a, -t.e)
+        given = np.dtype(self._file.dtypes[0])
+        self.dtype = given if given.kind == "f" and given.itemsize >= 4 else np.dtype(np.float32)
+        if given.kind in "iu" and given.itemsize > 2:
+            self.dtype = np.dtype(np.float64)
+        self.no_data: float | None = self._file.nodata
+        self.crs: Any = self._file.crs
+        self.options = {key: self._file.profile[key] for key in KEPT_OPTIONS if key in self._file.profile}
+        self._masked = self.no_data is None and "all_valid" not in {f.name for f in self._file.mask_flag_enums[0]}
+
+    def _check(self) -> None:
+        file = self._file
+        if file.count != 1:
+            raise InputError(f"has {file.count} bands", "give a raster with one band", self.path)
+        t = file.transform
+        if t.b or t.d or t.a <= 0.0 or t.e >= 0.0:
+            raise InputError("is turned, mirrored or without georeference", "give a north-up GeoTIFF", self.path)
+        if np.dtype(file.dtypes[0]).kind not in "iuf":
+            raise InputError(f"has values of type {file.dtypes[0]}", "give numbers", self.path)
+        if file.scales[0] != 1.0 or file.offsets[0] != 0.0:
+            raise InputError("has a scale or an offset", "write the values out (gdal_translate -unscale)", self.path)
+
+    @property
+    def epsg(self) -> int | None:
+        """Code of the CRS, None where it has none."""
+        return None if self.crs is None else self.crs.to_epsg()
+
+    def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
+        """A window, (rows, columns) of `dtype`; NaN where nothing is known and beyond the edges."""
+        from rasterio.windows import Window
+
+        top, left = max(row, 0), max(column, 0)
+        bottom, right = min(row + rows, self.grid.rows), min(column + columns, self.grid.columns)
+        inside = bottom > top and right > left
+        whole = inside and (bottom - top, right - left) == (rows, columns)
+        window = Window(left, top, right - left, bottom - top)  # pyright: ignore[reportCallIssue]
+        if whole:
+            return self._values(window)
+        out = np.full((rows, columns), np.nan, self.dtype)
+        if inside:
+            out[top - row : bottom - row, left - column : right - column] = self._values(window)
+        return out
+
+    def _values(self, window) -> np.ndarray:
+        raw = self._file.read(1, window=window)
+        values = raw.astype(self.dtype, copy=False)
+        if self._masked:
+            values[self._file.read_masks(1, window=window) == 0] = np.nan
+        elif self.no_data is not None and not np.isnan(self.no_data):
+            values[raw == float(self.no_data)] = np.nan
+        return values
+
+    def sample(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """(n,) bilinear values at places (n,); NaN where one of the four cells is not known.
+
+        The window around all places is read at once: call it for places near one another.
+        """
+        column, row = self.grid.column(x), self.grid.row(y)
+        out = np.full(len(column), np.nan)
+        there = (column >= 0.0) & (row >= 0.0) & (column <= self.grid.columns - 1) & (row <= self.grid.rows - 1)
+        if not there.any():
+            return out
+        first_row, first_column = int(row[there].min()), int(column[there].min())
+        size = int(row[there].max()) - first_row + 2, int(column[there].max()) - first_column + 2
+        window = self.read(first_row, first_column, *size).astype(float)
+        i, j = np.floor(row[there]).astype(int) - first_row, np.floor(column[there]).astype(int) - first_column
+        t, s = row[there] % 1.0, column[there] % 1.0
+        corners = (window[i, j], window[i, j + 1], window[i + 1, j], window[i + 1, j + 1])
+        weights = ((1.0 - t) * (1.0 - s), (1.0 - t) * s, t * (1.0 - s), t * s)
+        # a cell of no weight may be unknown: places on the last column have nothing to their right
+        out[there] = sum(np.where(w > 0.0, w * c, 0.0) for w, c in zip(weights, corners, strict=True))
+        return out
+
+    def __enter__(self) -> RasterReader:
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._file.close()
+
+
+class RasterWriter:
+    """A raster of one band being written; used as a context manager, from one thread.
+
+    Parameters
+    ----------
+    crs : rasterio's CRS, a text such as 'EPSG:25832', or None.
+    options : creation options, such as those of a `RasterReader`. threads : for compression.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike,
+        grid: Grid,
+        dtype: np.dtype | type = np.float32,
+        crs: Any = None,
+        no_data: float | None = NO_DATA,
+        options: Mapping[str, Any] | None = None,
+        threads: int = 1,
+    ):
+        import rasterio
+
+        made: dict[str, Any] = {"tiled": True, "blockxsize": TILE, "blockysize": TILE, "bigtiff": "IF_SAFER"}
+        made |= dict(options or {})
+        if "compress" in made and threads > 1:
+            made["num_threads"] = threads
+        self.no_data = no_data
+        with _quietly():
+            self._file = rasterio.open(
+                path, "w", driver="GTiff", height=grid.rows, width=grid.columns, count=1, dtype=np.dtype(dtype),
+                crs=crs, transform=_transform(grid), nodata=no_data, **made,
+            )  # fmt: skip
+
+    def write(self, row: int, column: int, values: np.ndarray) -> None:
+        """Write a window from its upper left cell on; NaN becomes the no-data value, in `values` too."""
+        from rasterio.windows import Window
+
+        if self.no_data is not None and not np.isnan(self.no_data) and values.dtype.kind == "f":
+            np.copyto(values, self.no_data, where=np.isnan(values))
+        window = Window(column, row, values.shape[1], values.shape[0])  # pyright: ignore[reportCallIssue]
+        self._file.write(values, 1, window=window)
+
+    def describe(self, text: str) -> None:
+        """What the values are, for those who open the file."""
+        self._file.set_band_description(1, text)
+
+    def __enter__(self) -> RasterWriter:
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._file.close()
+
+
+def write_raster(path: str | os.PathLike, values: np.ndarray, grid: Grid, crs: Any = None, text: str = "") -> None:
+    """Write a whole raster (rows, columns); whole numbers as they are, others as float32 with no-data for NaN."""
+    whole = values.dtype.kind in "iu"
+    with RasterWriter(path, grid, values.dtype if whole else np.float32, crs, -1 if whole else NO_DATA) as writer:
+        if text:
+            writer.describe(text)
+        writer.write(0, 0, values if whole else values.astype(np.float32))
+
+
+def horizontal_crs(crs: str) -> str | None:
+    """The CRS of a raster of a block: 'EPSG:25832' of 'EPSG:25832+7837', None for 'local'."""
+    return None if crs == "local" else crs.partition("+")[0]
+
+
+def cache_limited() -> Any:
+    """A context in which GDAL keeps `CACHE_MB` of blocks and no more."""
+    import rasterio
+
+    return rasterio.Env(GDAL_CACHEMAX=CACHE_MB)
+
+
+def rasterise(shapes: Iterable[tuple[Mapping[str, Any], int]], grid: Grid, background: int = -1) -> np.ndarray:
+    """(rows, columns) int32: the number of the last polygon that holds the centre of a cell.
+
+    Parameters
+    ----------
+    shapes : pairs of a GeoJSON geometry and its number.
+    """
+    from rasterio.features import rasterize
+
+    shapes = list(shapes)
+    if not shapes:
+        return np.full((grid.rows, grid.columns), background, np.int32)
+    shape = grid.rows, grid.columns
+    return rasterize(shapes, out_shape=shape, fill=background, dtype=np.int32, transform=_transform(grid))
+
+
+def _transform(grid: Grid) -> Any:
+    from rasterio import Affine
+
+    return Affine(grid.cell_x, 0.0, grid.left, 0.0, -grid.cell_y, grid.top)
+
+
+@contextmanager
+def _quietly() -> Iterator[None]:
+    """Without a warning for rasters of local blocks, which have no CRS, and for those that are refused anyway."""
+    from rasterio.errors import NotGeoreferencedWarning
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        yield
