@@ -271,3 +271,52 @@ def check_points_and_shared(adjustment, q, design, tolerance=2e-9):
     np.testing.assert_allclose(result.rays.r[u.rays.source].ravel(), redundancy[: 2 * m], atol=tolerance)
     np.testing.assert_allclose(result.observations.r, redundancy[-len(result.observations) :], atol=tolerance)
     assert abs(sum(g.redundancy for g in result.groups) - result.outcome.redundancy) < 1e-6 * result.outcome.redundancy
+
+
+@pytest.fixture(scope="module")
+def of_132_photographs():
+    flight = TINY["flight"] | {"strips": 6, "images_per_strip": 22, "end_lap": 0.8}
+    gnss = {"sigma_m": [0.05, 0.05, 0.08], "shift_sigma_m": [0.2, 0.2, 0.2]}
+    tie_points = {"per_image": 40, "probability": 0.9, "sigma_um": 2.0}
+    adjustment = adjust_keeping_system(small_block(1, "bluh:1-12", flight=flight, tie_points=tie_points, gnss=gnss)[0])
+    assert len(adjustment.result.block.images) == 132
+    return adjustment
+
+
+def test_right_side_is_that_of_the_whole_equations(of_132_photographs):
+    system, solution = of_132_photographs.system, of_132_photographs.solution
+    off = replace(solution.state, centre=solution.state.centre + [0.3, -0.2, 0.5])
+    whole, side = system.assemble(off, 0.0, solution.estimator), system.right_side(off, solution.estimator)
+    size = np.sqrt(np.abs(whole.right).max() * np.abs(whole.right) + 1.0)
+    np.testing.assert_allclose(side.right / size, whole.right / size, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(side.cost, whole.cost, rtol=1e-13)
+    np.testing.assert_allclose(side.point_decrement, whole.point_decrement, rtol=1e-12)
+    np.testing.assert_array_equal(side.residual, whole.residual)
+
+
+def test_inverse_on_the_pattern_of_132_photographs(of_132_photographs):
+    """Every block of the sparse inverse, against the dense inverse of the same reduced normal matrix."""
+    system, matrix = of_132_photographs.system, of_132_photographs.solution.equations.matrix
+    symbolic = system.symbolic
+    n, s = symbolic.n, symbolic.n_border
+    dense = np.zeros((symbolic.size, symbolic.size))
+    for b, (i, j) in enumerate(zip(symbolic.block_row, symbolic.block_col, strict=True)):
+        dense[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] = matrix.blocks[b]
+        dense[6 * j : 6 * j + 6, 6 * i : 6 * i + 6] = matrix.blocks[b].T
+    dense[6 * n :, : 6 * n] = np.swapaxes(matrix.border, 0, 1).reshape(s, 6 * n)
+    dense[: 6 * n, 6 * n :] = dense[6 * n :, : 6 * n].T
+    dense[6 * n :, 6 * n :] = matrix.corner
+    unit = 1.0 / np.sqrt(np.diagonal(dense))
+    inverse = np.linalg.inv(dense * np.outer(unit, unit)) * np.outer(unit, unit)
+    sigma = np.sqrt(np.diagonal(inverse))
+    normed = inverse / np.outer(sigma, sigma)
+    found = system.factorise(of_132_photographs.solution.equations).inverse_on_pattern()
+    for b, (i, j) in enumerate(zip(symbolic.block_row, symbolic.block_col, strict=True)):
+        own, other = slice(6 * i, 6 * i + 6), slice(6 * j, 6 * j + 6)
+        got = found.blocks[b] / np.outer(sigma[own], sigma[other])
+        np.testing.assert_allclose(got, normed[own, other], rtol=0, atol=1e-10)
+    border = np.swapaxes(found.border, 1, 2).reshape(6 * n, s) / np.outer(sigma[: 6 * n], sigma[6 * n :])
+    np.testing.assert_allclose(border, normed[: 6 * n, 6 * n :], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(
+        found.corner / np.outer(sigma[6 * n :], sigma[6 * n :]), normed[6 * n :, 6 * n :], rtol=0, atol=1e-10
+    )

@@ -205,6 +205,15 @@ def point_normals(p, n_rays, table, points, damping, work, lower, misclosure):
     return cost, ok
 
 
+@inlined
+def solve_transposed(lower, d):
+    """d := L⁻ᵀ·d; lower (3, 3), d (3)."""
+    for a in range(2, -1, -1):
+        for c in range(a + 1, 3):
+            d[a] -= lower[c, a] * d[c]
+        d[a] /= lower[a, a]
+
+
 @kernel
 def reduce_point(p, n_rays, n_union, table, points, damping, work, lower, misclosure):
     """Eliminate point p: `point_normals`, and the couplings L⁻¹·N_pe and L⁻¹·N_ps into `work`."""
@@ -347,6 +356,39 @@ def assemble(
 
 
 @kernel
+def reduce_right_side(
+    first, last, rays, table, state, damping, estimator, limit, first_image, right, right_shared, residual, weight, work
+):
+    """The right side alone of `assemble`: what is left of every misclosure when the point has taken its own step.
+
+    right (ni, 6), right_shared (s) are added to. Returns as `assemble` does.
+    """
+    start, image = rays[0], rays[1]
+    by_eo, by_pt, by_sh, whitened, columns, n_columns, union = work[:7]
+    lower, d = np.zeros((3, 3)), np.zeros(3)
+    cost, decrement, undetermined = 0.0, 0.0, -1
+    for p in range(first, last):
+        n_rays = start[p + 1] - start[p]
+        ray_cost, _ = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
+        prior_cost, ok = point_normals(p, n_rays, table, state[2], damping, work, lower, d)
+        if not ok:
+            undetermined = p
+        cost += ray_cost + prior_cost
+        decrement += d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+        solve_transposed(lower, d)
+        for q in range(n_rays):
+            i = image[start[p] + q] - first_image
+            for row in range(2):
+                own = by_pt[q, row, 0] * d[0] + by_pt[q, row, 1] * d[1] + by_pt[q, row, 2] * d[2]
+                left = whitened[q, row] - own
+                for a in range(E):
+                    right[i, a] += by_eo[q, row, a] * left
+                for t in range(n_columns[q]):
+                    right_shared[union[columns[q, t]]] += by_sh[q, row, t] * left
+    return cost, decrement, undetermined
+
+
+@kernel
 def back_substitute(
     first, last, rays, table, state, damping, estimator, limit, step, step_shared, step_points, residual, weight, work
 ):
@@ -371,10 +413,8 @@ def back_substitute(
                     explained += by_sh[q, row, t] * step_shared[union[columns[q, t]]]
                 whitened[q, row] -= explained
         point_normals(p, n_rays, table, state[2], damping, work, lower, d)
-        for a in range(2, -1, -1):
-            for c in range(a + 1, 3):
-                d[a] -= lower[c, a] * d[c]
-            d[a] /= lower[a, a]
+        solve_transposed(lower, d)
+        for a in range(3):
             step_points[p, a] = d[a]
 
 
@@ -394,10 +434,7 @@ def settle_points(first, last, rays, table, state, estimator, limit, rounds, res
         damping = 1e-4
         for _ in range(rounds):
             point_normals(p, n_rays, table, points, damping, work, lower, d)
-            for a in range(2, -1, -1):
-                for c in range(a + 1, 3):
-                    d[a] -= lower[c, a] * d[c]
-                d[a] /= lower[a, a]
+            solve_transposed(lower, d)
             for a in range(3):
                 old[a] = points[p, a]
                 points[p, a] += d[a]
