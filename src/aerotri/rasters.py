@@ -132,14 +132,13 @@ class RasterReader:
 
         top, left = max(row, 0), max(column, 0)
         bottom, right = min(row + rows, self.grid.rows), min(column + columns, self.grid.columns)
-        inside = bottom > top and right > left
-        whole = inside and (bottom - top, right - left) == (rows, columns)
-        window = Window(left, top, right - left, bottom - top)  # pyright: ignore[reportCallIssue]
-        if whole:
-            return self._values(window)
+        if bottom <= top or right <= left:
+            return np.full((rows, columns), np.nan, self.dtype)
+        values = self._values(Window(left, top, right - left, bottom - top))  # pyright: ignore[reportCallIssue]
+        if values.shape == (rows, columns):
+            return values
         out = np.full((rows, columns), np.nan, self.dtype)
-        if inside:
-            out[top - row : bottom - row, left - column : right - column] = self._values(window)
+        out[top - row : bottom - row, left - column : right - column] = values
         return out
 
     def _values(self, window) -> np.ndarray:
