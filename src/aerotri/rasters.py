@@ -62,6 +62,23 @@ class Grid:
         """The inverse of `y`."""
         return (self.top - np.asarray(y)) / self.cell_y - 0.5
 
+    def window(self, row: int, column: int, rows: int, columns: int) -> Grid:
+        """The grid of some rows and columns."""
+        left, top = self.left + column * self.cell_x, self.top - row * self.cell_y
+        return Grid(rows, columns, left, top, self.cell_x, self.cell_y)
+
+    def between_centres(self) -> Grid:
+        """The grid whose cells have their corners at the centres of this one's."""
+        left, top = self.left + self.cell_x / 2.0, self.top - self.cell_y / 2.0
+        return Grid(self.rows - 1, self.columns - 1, left, top, self.cell_x, self.cell_y)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Outer edges: left, bottom, right, top."""
+        return (
+            self.left, self.top - self.rows * self.cell_y, self.left + self.columns * self.cell_x, self.top,
+        )  # fmt: skip
+
     def coarser(self, cells: int) -> Grid:
         """The grid with `cells` × `cells` cells made one; the last ones reach beyond the edge."""
         rows, columns = -(-self.rows // cells), -(-self.columns // cells)
@@ -251,12 +268,15 @@ def cache_limited() -> Any:
     return rasterio.Env(GDAL_CACHEMAX=CACHE_MB)
 
 
-def rasterise(shapes: Iterable[tuple[Mapping[str, Any], int]], grid: Grid, background: int = -1) -> np.ndarray:
+def rasterise(
+    shapes: Iterable[tuple[Mapping[str, Any], int]], grid: Grid, background: int = -1, touched: bool = False
+) -> np.ndarray:
     """(rows, columns) int32: the number of the last polygon that holds the centre of a cell.
 
     Parameters
     ----------
     shapes : pairs of a GeoJSON geometry and its number.
+    touched : every cell that a geometry touches counts, not only its centre.
     """
     from rasterio.features import rasterize
 
@@ -264,7 +284,9 @@ def rasterise(shapes: Iterable[tuple[Mapping[str, Any], int]], grid: Grid, backg
     if not shapes:
         return np.full((grid.rows, grid.columns), background, np.int32)
     shape = grid.rows, grid.columns
-    return rasterize(shapes, out_shape=shape, fill=background, dtype=np.int32, transform=_transform(grid))
+    return rasterize(
+        shapes, out_shape=shape, fill=background, dtype=np.int32, transform=_transform(grid), all_touched=touched
+    )
 
 
 def _transform(grid: Grid) -> Any:

@@ -375,7 +375,17 @@ class NormalSystem:
         right[6 * n + u.kept_columns] += sides[u.kept_rows]
         x = factor.solve(right)
         images, shared = np.ascontiguousarray(x[: 6 * n].reshape(n, 6, k)), np.ascontiguousarray(x[6 * n :])
-        points = np.empty((len(u.points), 3, k))
+        return images, shared, self.expand_sides(state, images, shared, sides, estimator)
+
+    def expand_sides(
+        self, state: State, images: np.ndarray, shared: np.ndarray, sides: np.ndarray, estimator: Estimator
+    ) -> np.ndarray:
+        """Solutions of the points (P, 3, k) from those of photographs (n, 6, k) and shared parameters (s, k)."""
+        u = self.unknowns
+        points = np.empty((len(u.points), 3, sides.shape[2]))
+        free = np.ascontiguousarray(sides * u.point_free[:, :, None])
+        residual, weight = np.empty((len(u.rays.image), 2)), np.empty(len(u.rays.image))
+        common = (u.rays.as_tuple(), self._table(state), self._state(state), estimator.code, estimator.limit, free)
 
         def expand(c: int):
             _covariance_kernels.expand_point_sides(
@@ -385,7 +395,7 @@ class NormalSystem:
         run_chunks(expand, len(self._bounds))
         points *= u.point_free[:, :, None]
         points[u.kept_rows] = shared[u.kept_columns]
-        return images, shared, points
+        return points
 
 
 def _add_squares(rows: Rows, blocks: np.ndarray, border: np.ndarray, corner: np.ndarray) -> None:

@@ -69,13 +69,8 @@ def beside(out: Path, what: str) -> Path:
 def _model_map(
     pair: tuple[str, str] | None, models: Path | None, table: Path | None, reader: RasterReader, stack: ExitStack
 ) -> ModelMap:
-    from aerotri.deformation.model_map import (
-        VECTOR_ENDINGS,
-        OneModel,
-        number_map,
-        read_number_table,
-        read_polygons,
-    )
+    from aerotri.deformation.model_map import OneModel, number_map, read_number_table, read_polygons
+    from aerotri.polygons import VECTOR_ENDINGS
     from aerotri.rasters import RasterReader
 
     if pair is not None:

@@ -102,7 +102,7 @@ def absorbed_partials(calibration: Calibration) -> np.ndarray:
     """
     system, solution = calibration.system, calibration.solution
     u = system.unknowns
-    columns = _shared_columns(calibration)
+    columns = shared_columns(calibration)
     out = np.zeros((len(u.block.images), 6 + N_INTERIOR, len(columns)))
     if not len(columns):
         return out
@@ -129,7 +129,7 @@ def additional_rows(calibration: Calibration) -> np.ndarray:
     return np.flatnonzero((p.kinds == "additional") & np.isin(p.status, ("estimated", "weighted")))
 
 
-def _shared_columns(calibration: Calibration) -> np.ndarray:
+def shared_columns(calibration: Calibration) -> np.ndarray:
     """The shared unknowns of the system that `additional_rows` are."""
     shared, p = calibration.system.unknowns.shared, calibration.local.parameters
     place = {key: column for column, key in enumerate(zip(shared.names, shared.groups, strict=True))}

@@ -7,24 +7,17 @@ overlap the last one counts. A raster of numbers goes with a table `number,left,
 from __future__ import annotations
 
 import csv
-import json
-import sqlite3
-import struct
-from collections.abc import Iterator, Mapping
-from contextlib import closing
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from shapely.geometry import mapping
 
 from aerotri.conventions import InputError
+from aerotri.polygons import polygon_features
 from aerotri.rasters import Grid, RasterReader, rasterise
-
-VECTOR_ENDINGS = (".geojson", ".json", ".gpkg")
-POLYGON, MULTIPOLYGON = 3, 6
-ENVELOPE_BYTES = (0, 32, 48, 48, 64)
-"""Of a GeoPackage geometry, by the kind of envelope its header has."""
 
 
 class ModelMap(Protocol):
@@ -61,9 +54,8 @@ class PolygonMap:
 
     def numbers(self, grid: Grid, row: int, column: int, rows: int, columns: int) -> np.ndarray:
         """(rows, columns); −1 where no polygon holds the centre of the cell."""
-        left, top = grid.left + column * grid.cell_x, grid.top - row * grid.cell_y
-        window = Grid(rows, columns, left, top, grid.cell_x, grid.cell_y)
-        right, bottom = left + columns * grid.cell_x, top - rows * grid.cell_y
+        window = grid.window(row, column, rows, columns)
+        left, bottom, right, top = window.bounds
         b = self.bounds
         near = (b[:, 0] <= right) & (b[:, 2] >= left) & (b[:, 1] <= top) & (b[:, 3] >= bottom)
         return rasterise([self.shapes[k] for k in np.flatnonzero(near)], window)
@@ -101,23 +93,16 @@ def read_polygons(path: Path, epsg: int | None = None) -> PolygonMap:
     InputError
         When the file cannot be read, has another CRS, or a polygon lacks its photographs.
     """
-    read = _gpkg_features if path.suffix.lower() == ".gpkg" else _geojson_features
     found: dict[tuple[str, str], int] = {}
     shapes, bounds = [], []
-    try:
-        for number, (properties, geometry) in enumerate(read(path, epsg), start=1):
-            corners = _corners(geometry)
-            if corners is None:
-                raise InputError(f"feature {number} is no polygon", "give polygons only", path)
-            names = str(properties.get("left") or ""), str(properties.get("right") or "")
-            if not all(names):
-                raise InputError(
-                    f"feature {number} has no attribute 'left' or 'right'", "name the photographs of its model", path
-                )
-            shapes.append((geometry, found.setdefault(names, len(found))))
-            bounds.append([*corners.min(axis=0), *corners.max(axis=0)])
-    except (OSError, ValueError, KeyError, TypeError, IndexError, struct.error, sqlite3.Error) as error:
-        raise InputError(f"cannot be read: {error}", "give polygons as GeoJSON or GeoPackage", path) from error
+    for number, (properties, polygon) in enumerate(polygon_features(path, epsg), start=1):
+        names = str(properties.get("left") or ""), str(properties.get("right") or "")
+        if not all(names):
+            raise InputError(
+                f"feature {number} has no attribute 'left' or 'right'", "name the photographs of its model", path
+            )
+        shapes.append((mapping(polygon), found.setdefault(names, len(found))))
+        bounds.append(polygon.bounds)
     if not shapes:
         raise InputError("has no polygons", "give a polygon for every model", path)
     return PolygonMap(tuple(found), tuple(shapes), np.array(bounds))
@@ -155,76 +140,3 @@ def number_map(reader: RasterReader, table: Mapping[int, tuple[str, str]]) -> Nu
     """The map of a raster of numbers and its table."""
     known = sorted(table)
     return NumberMap(tuple(table[number] for number in known), np.array(known), reader)
-
-
-def _geojson_features(path: Path, epsg: int | None) -> Iterator[tuple[Mapping[str, Any], Mapping[str, Any]]]:
-    content = json.loads(path.read_text(encoding="utf-8-sig"))
-    name = str(((content.get("crs") or {}).get("properties") or {}).get("name", ""))
-    code = name.rpartition(":")[2]
-    _check_crs(path, int(code) if "EPSG" in name.upper() and code.isdigit() else None, epsg)
-    for feature in content["features"]:
-        yield feature.get("properties") or {}, feature["geometry"]
-
-
-def _check_crs(path: Path, own: int | None, epsg: int | None) -> None:
-    if own is not None and epsg is not None and own != epsg:
-        raise InputError(f"is in EPSG:{own}, the DEM in EPSG:{epsg}", "bring it into the CRS of the DEM", path)
-
-
-def _gpkg_features(path: Path, epsg: int | None) -> Iterator[tuple[Mapping[str, Any], Mapping[str, Any]]]:
-    if not path.is_file():
-        raise InputError("there is no such file", "give a GeoPackage", path)
-    with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as database:
-        database.row_factory = sqlite3.Row
-        layers = database.execute("SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns").fetchall()
-        if len(layers) != 1:
-            raise InputError(f"has {len(layers)} layers", "give a GeoPackage with one layer of polygons", path)
-        table, column, srs = layers[0]
-        _check_crs(path, int(srs) if srs > 0 else None, epsg)
-        quoted = '"' + str(table).replace('"', '""') + '"'
-        for row in database.execute(f"SELECT * FROM {quoted}"):
-            properties = {key.lower(): row[key] for key in row.keys() if key != column}  # noqa: SIM118
-            yield properties, _gpkg_geometry(row[column])
-
-
-def _gpkg_geometry(blob: bytes) -> Mapping[str, Any]:
-    """The GeoJSON geometry of a GeoPackage blob: its header, then WKB [L: OGC 12-128, 06-103]."""
-    if blob[:2] != b"GP":
-        raise ValueError("a geometry is none of GeoPackage")
-    kind = (blob[3] >> 1) & 7
-    geometry, _ = _wkb(blob, 8 + ENVELOPE_BYTES[kind])
-    return geometry
-
-
-def _wkb(blob: bytes, at: int) -> tuple[Mapping[str, Any], int]:
-    """A polygon or polygons from a place on, and the place behind; heights are left out."""
-    order = "<" if blob[at] == 1 else ">"
-    (code,) = struct.unpack_from(order + "I", blob, at + 1)
-    kind, plain = code & 0x1FFFFFFF, code & 0x1FFFFFFF
-    dimensions = 2 + bool(code & 0x80000000) + bool(code & 0x40000000)
-    if plain > 1000:
-        kind, dimensions = plain % 1000, 2 + (1, 1, 2)[plain // 1000 - 1]
-    (count,) = struct.unpack_from(order + "I", blob, at + 5)
-    at += 9
-    parts: list[Any] = []
-    for _ in range(count):
-        if kind == MULTIPOLYGON:
-            part, at = _wkb(blob, at)
-            parts.append(part["coordinates"])
-        elif kind == POLYGON:
-            (points,) = struct.unpack_from(order + "I", blob, at)
-            ring = np.frombuffer(blob, order + "f8", points * dimensions, at + 4).reshape(points, dimensions)
-            parts.append(ring[:, :2].tolist())
-            at += 4 + 8 * points * dimensions
-        else:
-            return {"type": f"WKB {kind}", "coordinates": []}, at
-    return {"type": "MultiPolygon" if kind == MULTIPOLYGON else "Polygon", "coordinates": parts}, at
-
-
-def _corners(geometry: Mapping[str, Any] | None) -> np.ndarray | None:
-    """(n, 2) all corners of a polygon or of several; None of anything else."""
-    if not geometry or geometry.get("type") not in ("Polygon", "MultiPolygon"):
-        return None
-    polygons = geometry["coordinates"] if geometry["type"] == "MultiPolygon" else [geometry["coordinates"]]
-    corners = [point[:2] for polygon in polygons for ring in polygon for point in ring]
-    return np.array(corners, dtype=float) if corners else None

@@ -1,0 +1,1 @@
+"""Volumes between a surface and a base, and how sure they are."""

@@ -1,0 +1,130 @@
+"""Kernels of the response of a height functional to the orientation: scalar functions without checks or objects.
+
+photos   : rotation (n, 3, 3), centre (n, 3), interior (L, 15), lens_row (n), source (n) group of image errors
+tiles    : edges (S, 2, 2) mm, x and y of the seams, rising, ∞ where there is none; meta (S, 3, 3, 7) of every tile
+           (column, row from below): offset into nodes, nodes along x and y, x and y of the first node, nodes per mm
+out      : by_eo (n, 6), by_interior (L, 15), nodes (·, 2), noise (1,)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerotri.compiled import kernel
+from aerotri.functional_model._kernels import linearise_ray, predict_ray
+
+
+@kernel
+def deposit(s, x, y, f0, f1, edges, meta, nodes):
+    """Spread (f0, f1) over the four nodes around an image position, never across a seam."""
+    i = int(x >= edges[s, 0, 0]) + int(x >= edges[s, 0, 1])
+    j = int(y >= edges[s, 1, 0]) + int(y >= edges[s, 1, 1])
+    nx, ny = int(meta[s, i, j, 1]), int(meta[s, i, j, 2])
+    fx, fy = (x - meta[s, i, j, 3]) * meta[s, i, j, 5], (y - meta[s, i, j, 4]) * meta[s, i, j, 6]
+    kx, ky = min(max(int(fx), 0), nx - 2), min(max(int(fy), 0), ny - 2)
+    fx, fy = fx - kx, fy - ky
+    low = int(meta[s, i, j, 0]) + ky * nx + kx
+    for at, weight in (
+        (low, (1.0 - fx) * (1.0 - fy)), (low + 1, fx * (1.0 - fy)), (low + nx, (1.0 - fx) * fy), (low + nx + 1, fx * fy)
+    ):  # fmt: skip
+        nodes[at, 0] += weight * f0
+        nodes[at, 1] += weight * f1
+
+
+@kernel
+def respond(first, last, start, image, inv_sigma, points, gradient, noise_share, photos, tiles, out):
+    """Add pickets first..last: f = W·A·N⁻¹·g of every ray; by_eo −= Bᵀf, nodes += f, noise += share·gᵀN⁻¹g.
+
+    start (k + 1), image (r), inv_sigma (r) 1/mm, points and gradient (k, 3). Returns the row of a picket whose rays do
+    not determine it, −1 if there is none.
+    """
+    rotation, centre, interior, lens_row, source = photos
+    edges, meta = tiles
+    by_eo_sum, by_interior_sum, nodes, noise = out
+    most = 1
+    for p in range(first, last):
+        most = max(most, start[p + 1] - start[p])
+    by_eo, by_pt, by_in = np.empty((most, 2, 6)), np.empty((most, 2, 3)), np.empty((most, 2, 15))
+    at, normal, q = np.empty((most, 2)), np.empty((3, 3)), np.empty(3)
+    for p in range(first, last):
+        normal[:] = 0.0
+        count = start[p + 1] - start[p]
+        for r in range(count):
+            i = image[start[p] + r]
+            row = interior[lens_row[i]]
+            x, y = row[1], row[2]
+            brown = False
+            for t in range(3, 10):
+                brown |= row[t] != 0.0
+            if brown:
+                for _ in range(3):
+                    predict_ray(rotation[i], centre[i], points[p], row, x, y, at[r])
+                    x, y = at[r, 0], at[r, 1]
+            linearise_ray(rotation[i], centre[i], points[p], row, x, y, at[r], by_eo[r], by_pt[r], by_in[r])
+            weight = inv_sigma[start[p] + r] ** 2
+            for a in range(3):
+                for b in range(3):
+                    normal[a, b] += weight * (by_pt[r, 0, a] * by_pt[r, 0, b] + by_pt[r, 1, a] * by_pt[r, 1, b])
+        c00 = normal[1, 1] * normal[2, 2] - normal[1, 2] * normal[1, 2]
+        c01 = normal[0, 2] * normal[1, 2] - normal[0, 1] * normal[2, 2]
+        c02 = normal[0, 1] * normal[1, 2] - normal[0, 2] * normal[1, 1]
+        c11 = normal[0, 0] * normal[2, 2] - normal[0, 2] * normal[0, 2]
+        c12 = normal[0, 1] * normal[0, 2] - normal[0, 0] * normal[1, 2]
+        c22 = normal[0, 0] * normal[1, 1] - normal[0, 1] * normal[0, 1]
+        det = normal[0, 0] * c00 + normal[0, 1] * c01 + normal[0, 2] * c02
+        if count < 2 or not det > 1e-12 * normal[0, 0] * normal[1, 1] * normal[2, 2]:
+            return p
+        g0, g1, g2 = gradient[p, 0], gradient[p, 1], gradient[p, 2]
+        q[0] = (c00 * g0 + c01 * g1 + c02 * g2) / det
+        q[1] = (c01 * g0 + c11 * g1 + c12 * g2) / det
+        q[2] = (c02 * g0 + c12 * g1 + c22 * g2) / det
+        noise[0] += noise_share[p] * (g0 * q[0] + g1 * q[1] + g2 * q[2])
+        for r in range(count):
+            i = image[start[p] + r]
+            weight = inv_sigma[start[p] + r] ** 2
+            f0 = weight * (by_pt[r, 0, 0] * q[0] + by_pt[r, 0, 1] * q[1] + by_pt[r, 0, 2] * q[2])
+            f1 = weight * (by_pt[r, 1, 0] * q[0] + by_pt[r, 1, 1] * q[1] + by_pt[r, 1, 2] * q[2])
+            for t in range(6):
+                by_eo_sum[i, t] -= by_eo[r, 0, t] * f0 + by_eo[r, 1, t] * f1
+            for t in range(15):
+                by_interior_sum[lens_row[i], t] -= by_in[r, 0, t] * f0 + by_in[r, 1, t] * f1
+            deposit(source[i], at[r, 0], at[r, 1], f0, f1, edges, meta, nodes)
+    return -1
+
+
+@kernel
+def nearest_photographs(points, block, first, candidate, rotation, centre, interior, half, chosen):
+    """The photographs that see each point and whose centres are nearest to it in plan; −1 where there are fewer.
+
+    points (k, 3); block (k) of candidates: candidate[first[b] : first[b + 1]]. interior (n, 3) c, x0, y0 and half
+    (n, 2) mm of every photograph; chosen (k, m) out.
+    """
+    m = chosen.shape[1]
+    distance = np.empty(m)
+    for p in range(len(points)):
+        found = 0
+        for c in range(first[block[p]], first[block[p] + 1]):
+            i = candidate[c]
+            dx, dy, dz = points[p, 0] - centre[i, 0], points[p, 1] - centre[i, 1], points[p, 2] - centre[i, 2]
+            away = dx * dx + dy * dy
+            if found == m and away >= distance[m - 1]:
+                continue
+            u = -(rotation[i, 0, 2] * dx + rotation[i, 1, 2] * dy + rotation[i, 2, 2] * dz)
+            if u <= 0.0:
+                continue
+            scale = interior[i, 0] / u
+            across = rotation[i, 0, 0] * dx + rotation[i, 1, 0] * dy + rotation[i, 2, 0] * dz
+            along = rotation[i, 0, 1] * dx + rotation[i, 1, 1] * dy + rotation[i, 2, 1] * dz
+            x, y = interior[i, 1] + scale * across, interior[i, 2] + scale * along
+            if abs(x) > half[i, 0] or abs(y) > half[i, 1]:
+                continue
+            at = min(found, m - 1)
+            while at > 0 and distance[at - 1] > away:
+                distance[at] = distance[at - 1]
+                chosen[p, at] = chosen[p, at - 1]
+                at -= 1
+            distance[at] = away
+            chosen[p, at] = i
+            found = min(found + 1, m)
+        for at in range(found, m):
+            chosen[p, at] = -1

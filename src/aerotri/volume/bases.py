@@ -1,0 +1,249 @@
+"""What a surface is compared with: a level, a plane, another surface, or a base interpolated from the boundary."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.interpolate import RectBivariateSpline
+
+from aerotri.conventions import InputError
+from aerotri.rasters import Grid
+from aerotri.volume.boundary import Boundary
+
+MOST_NODES = 400
+"""Places along the boundary a spline goes through."""
+LATTICE = 129
+"""Nodes a side of the lattice on which a spline is kept for evaluation at any number of cells."""
+PANELS = 24
+"""Quadrature points across the boundary's extent for the integral of a spline."""
+
+
+class Surface(Protocol):
+    """Heights on a grid, NaN where not known; `RasterReader` is one."""
+
+    @property
+    def grid(self) -> Grid: ...
+    def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray: ...
+    def sample(self, x: np.ndarray, y: np.ndarray) -> np.ndarray: ...
+
+
+class Base(Protocol):
+    """name : in words. heights : (n,) m at places (n,). on_grid : (rows, columns) at the centres of cells."""
+
+    @property
+    def name(self) -> str: ...
+    def heights(self, x: np.ndarray, y: np.ndarray) -> np.ndarray: ...
+    def on_grid(self, grid: Grid) -> np.ndarray: ...
+
+
+@dataclass(frozen=True)
+class PlaneBase:
+    """Z = z0 + slope_x·(X − x0) + slope_y·(Y − y0); a level where both slopes are 0."""
+
+    name: str
+    z0: float
+    slope_x: float = 0.0
+    slope_y: float = 0.0
+    x0: float = 0.0
+    y0: float = 0.0
+
+    def heights(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.z0 + self.slope_x * (np.asarray(x) - self.x0) + self.slope_y * (np.asarray(y) - self.y0)
+
+    def on_grid(self, grid: Grid) -> np.ndarray:
+        x, y = grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows))
+        return self.heights(x[None, :], y[:, None]) + np.zeros((grid.rows, grid.columns))
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceBase:
+    """Another surface; bilinear where its cells are not those of the first."""
+
+    name: str
+    surface: Surface
+
+    def heights(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.surface.sample(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+
+    def on_grid(self, grid: Grid) -> np.ndarray:
+        own = self.surface.grid
+        row, column = own.row(grid.y(0)), own.column(grid.x(0))
+        same = np.isclose([own.cell_x, own.cell_y], [grid.cell_x, grid.cell_y], rtol=1e-9, atol=0.0).all()
+        if same and abs(row - np.rint(row)) < 1e-6 and abs(column - np.rint(column)) < 1e-6:
+            return self.surface.read(int(np.rint(row)), int(np.rint(column)), grid.rows, grid.columns).astype(float)
+        x, y = np.meshgrid(grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows)))
+        return self.heights(x.ravel(), y.ravel()).reshape(grid.rows, grid.columns)
+
+
+@dataclass(frozen=True, eq=False)
+class SplineBase:
+    """A thin plate spline through heights of the surface along the boundary.
+
+    Parameters
+    ----------
+    xy : (k, 2) m, z : (k,) m, the places and heights it goes through.
+    integral : (k,) m², ∫ of the spline over the boundary = integral·z.
+    """
+
+    name: str
+    xy: np.ndarray
+    z: np.ndarray
+    integral: np.ndarray
+    lattice: RectBivariateSpline
+
+    def heights(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.lattice.ev(np.asarray(x), np.asarray(y))
+
+    def on_grid(self, grid: Grid) -> np.ndarray:
+        x, y = grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows))[::-1]
+        return np.ascontiguousarray(self.lattice(x, y).T[::-1])
+
+
+def level(height: float) -> PlaneBase:
+    """A level."""
+    return PlaneBase(f"level {height:g} m", height)
+
+
+def plane_through(points: np.ndarray, name: str = "plane") -> PlaneBase:
+    """The plane through three points, or nearest in height to more: (n, 3) m.
+
+    Raises
+    ------
+    InputError
+        When they lie on a line.
+    """
+    middle = points.mean(axis=0)
+    design = np.column_stack([np.ones(len(points)), points[:, :2] - middle[:2]])
+    size = np.abs(design[:, 1:]).max(initial=0.0)
+    if len(points) < 3 or np.linalg.svd(design[:, 1:], compute_uv=False)[-1] < 1e-9 * max(size, 1e-300):
+        raise InputError("the points of the plane lie on a line", "give three points that span it")
+    z0, slope_x, slope_y = np.linalg.lstsq(design, points[:, 2], rcond=None)[0]
+    return PlaneBase(name, float(z0), float(slope_x), float(slope_y), float(middle[0]), float(middle[1]))
+
+
+def boundary_heights(surface: Surface, boundary: Boundary, most: int = MOST_NODES) -> np.ndarray:
+    """(k, 3) m, the surface along the boundary, evenly spaced, at most `most` places; where it is not known, none.
+
+    Raises
+    ------
+    InputError
+        When hardly any is known.
+    """
+    spacing = max(boundary.polygon.length / most, min(surface.grid.cell_x, surface.grid.cell_y))
+    xy = np.concatenate([_along(ring, spacing) for ring in boundary.rings])
+    z = sampled(surface, xy[:, 0], xy[:, 1])
+    known = np.isfinite(z)
+    if known.sum() < 3:
+        raise InputError("the surface is not known along the boundary", "choose another boundary or base")
+    return np.column_stack([xy[known], z[known]])
+
+
+def spline_through(surface: Surface, boundary: Boundary) -> SplineBase:
+    """The spline through the boundary [L: Duchon 1977], φ = ρ²·ln ρ with a plane."""
+    nodes = boundary_heights(surface, boundary)
+    middle = nodes[:, :2].mean(axis=0)
+    size = float(np.abs(nodes[:, :2] - middle).max())
+    at = (nodes[:, :2] - middle) / size
+    system = np.zeros((len(at) + 3, len(at) + 3))
+    system[: len(at)] = _spline_terms(at, at)
+    system[len(at) :, : len(at)] = system[: len(at), len(at) :].T
+    right = np.concatenate([nodes[:, 2] - nodes[:, 2].mean(), np.zeros(3)])
+    coefficients = np.linalg.lstsq(system, right, rcond=1e-14)[0]
+
+    left, bottom, right_edge, top = boundary.polygon.bounds
+    x, y = np.linspace(left, right_edge, LATTICE), np.linspace(bottom, top, LATTICE)
+    places = (np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2) - middle) / size
+    values = nodes[:, 2].mean() + _spline_terms(places, at) @ coefficients
+    quadrature, weight = quadrature_of(boundary)
+    terms = weight @ _spline_terms((quadrature - middle) / size, at)
+    # the spline takes the mean of z out first: it gives a constant back as it is, so the weights are the same
+    integral = np.linalg.lstsq(system.T, terms, rcond=1e-14)[0][: len(at)]
+    return SplineBase(
+        f"spline through {len(at)} places of the boundary", nodes[:, :2], nodes[:, 2], integral,
+        RectBivariateSpline(x, y, values.reshape(LATTICE, LATTICE)),
+    )  # fmt: skip
+
+
+def quadrature_of(boundary: Boundary, panels: int = PANELS) -> tuple[np.ndarray, np.ndarray]:
+    """Places (q, 2) and weights (q,) m² for integrals over the boundary: cells of a lattice and what they hold."""
+    left, bottom, right, top = boundary.polygon.bounds
+    cell = max(right - left, top - bottom) / panels
+    rows, columns = max(1, int(np.ceil((top - bottom) / cell))), max(1, int(np.ceil((right - left) / cell)))
+    grid = Grid(rows, columns, left, top, cell, cell)
+    weight = boundary.coverage(grid) * cell * cell
+    row, column = np.nonzero(weight > 0.0)
+    return np.column_stack([grid.x(column), grid.y(row)]), weight[row, column]
+
+
+def sampled(surface: Surface, x: np.ndarray, y: np.ndarray, piece: int = 256) -> np.ndarray:
+    """(n,) heights at places that may lie far apart, neighbours in the list near one another: read piece by piece."""
+    parts = [surface.sample(x[k : k + piece], y[k : k + piece]) for k in range(0, len(x), piece)]
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def parse_base(text: str, surface: Surface, boundary: Boundary, open_raster) -> Base:
+    """The base of a command line: a height, 'level:H', 'plane:X,Y,Z;X,Y,Z;X,Y,Z', 'plane', 'boundary', or a raster.
+
+    'lowest' is the lowest height along the boundary [C]; 'plane' is fitted to the boundary.
+
+    Parameters
+    ----------
+    open_raster : opens the file of another surface.
+
+    Raises
+    ------
+    InputError
+    """
+    kind, _, rest = text.partition(":")
+    try:
+        if kind == "level" or not _is_word(text):
+            return level(float(rest if kind == "level" else text))
+        if kind == "plane" and rest:
+            points = np.array([[float(v) for v in point.split(",")] for point in rest.split(";")])
+            if points.ndim != 2 or points.shape[1] != 3:
+                raise ValueError
+            return plane_through(points, "plane through given points")
+    except ValueError:
+        raise InputError(
+            f"--base '{text}' is not understood", "give level:HEIGHT or plane:X,Y,Z;X,Y,Z;X,Y,Z"
+        ) from None
+    if text == "plane":
+        return plane_through(boundary_heights(surface, boundary), "plane fitted to the boundary")
+    if text == "boundary":
+        return spline_through(surface, boundary)
+    if text == "lowest":
+        return level(float(boundary_heights(surface, boundary)[:, 2].min()))
+    return SurfaceBase(text.rsplit("/", 1)[-1], open_raster(text))
+
+
+def is_surface(base: Base) -> bool:
+    """Whether the base is a surface of its own, with an accuracy of its own."""
+    return isinstance(base, SurfaceBase)
+
+
+def _is_word(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return True
+    return False
+
+
+def _along(ring: np.ndarray, spacing: float) -> np.ndarray:
+    """(n, 2) places along a closed ring, about `spacing` apart."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
+    count = max(3, int(np.ceil(length[-1] / spacing)))
+    at = np.arange(count) * length[-1] / count
+    return np.column_stack([np.interp(at, length, ring[:, axis]) for axis in range(2)])
+
+
+def _spline_terms(at: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """(n, k + 3): ρ²·ln ρ to every node, then 1, x, y."""
+    squared = np.maximum(
+        np.sum(at**2, axis=1)[:, None] - 2.0 * at @ nodes.T + np.sum(nodes**2, axis=1)[None, :], 0.0
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radial = np.where(squared > 1e-28, 0.5 * squared * np.log(squared), 0.0)
+    return np.column_stack([radial, np.ones(len(at)), at])

@@ -1,0 +1,119 @@
+"""The boundary of a volume: which part of every cell and triangle it holds, exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely.geometry import mapping
+from shapely.geometry.base import BaseGeometry
+
+from aerotri.conventions import InputError
+from aerotri.polygons import VECTOR_ENDINGS, polygon_features, polygon_of_wkt
+from aerotri.rasters import Grid, rasterise
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """A polygon or several, holes included, in the CRS of the surface.
+
+    Parameters
+    ----------
+    polygon : valid shapely geometry. name : where it came from.
+    """
+
+    polygon: BaseGeometry
+    name: str
+
+    @property
+    def area(self) -> float:
+        """m²."""
+        return float(self.polygon.area)
+
+    @property
+    def rings(self) -> list[np.ndarray]:
+        """Corners (n, 2) of every ring, the first one repeated at the end; outer rings run counter-clockwise."""
+        oriented = shapely.orient_polygons(self.polygon) if hasattr(shapely, "orient_polygons") else self.polygon
+        parts = shapely.get_parts(oriented)
+        return [np.asarray(ring.coords)[:, :2] for part in parts for ring in (part.exterior, *part.interiors)]
+
+    def coverage(self, grid: Grid) -> np.ndarray:
+        """(rows, columns), which part of every cell lies inside, 0 … 1."""
+        near = self.within(grid.bounds)
+        inside = rasterise([(mapping(near), 1)] if not near.is_empty else [], grid, 0).astype(float)
+        edges = self.polygon.boundary.intersection(shapely.box(*_widened(grid)))
+        if edges.is_empty:
+            return inside
+        row, column = np.nonzero(_dilated(rasterise([(mapping(edges), 1)], grid, 0, touched=True) == 1))
+        left, top = grid.left + column * grid.cell_x, grid.top - row * grid.cell_y
+        boxes = shapely.box(left, top - grid.cell_y, left + grid.cell_x, top)
+        inside[row, column] = shapely.area(shapely.intersection(boxes, near)) / (grid.cell_x * grid.cell_y)
+        return inside
+
+    def within(self, bounds: tuple[float, float, float, float]) -> BaseGeometry:
+        """The part of the polygon inside a rectangle (left, bottom, right, top)."""
+        part = shapely.intersection(self.polygon, shapely.box(*bounds))
+        shapely.prepare(part)
+        return part
+
+
+def boundary_of(polygon: BaseGeometry, name: str) -> Boundary:
+    """A boundary, made valid.
+
+    Raises
+    ------
+    InputError
+        When it has no area, or crosses itself.
+    """
+    if not polygon.is_valid:
+        raise InputError(
+            f"the boundary '{name}' is not valid: {shapely.is_valid_reason(polygon)}", "correct the polygon"
+        )
+    if not polygon.area > 0.0:
+        raise InputError(f"the boundary '{name}' has no area", "give a polygon")
+    return Boundary(polygon, name)
+
+
+def read_boundary(source: str, epsg: int | None = None) -> Boundary:
+    """The boundary of a file (GeoPackage, GeoJSON, WKT) or of a WKT text; several polygons count together.
+
+    Parameters
+    ----------
+    epsg : CRS of the surface; a file in another one is refused.
+    """
+    if source.lstrip().upper().startswith(("POLYGON", "MULTIPOLYGON", "SRID=")):
+        return boundary_of(polygon_of_wkt(source), "WKT")
+    path = Path(source)
+    if path.suffix.lower() in VECTOR_ENDINGS:
+        polygons = [polygon for _, polygon in polygon_features(path, epsg)]
+        if not polygons:
+            raise InputError("has no polygons", "give the boundary of the volume", path)
+        return boundary_of(polygons[0] if len(polygons) == 1 else shapely.union_all(polygons), path.name)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot be read: {error}", "give GeoJSON, GeoPackage or WKT", path) from error
+    return boundary_of(polygon_of_wkt(text, path), path.name)
+
+
+def boundary_of_grid(grid: Grid) -> Boundary:
+    """All between the centres of the outermost cells: where a surface is known without extrapolation."""
+    return Boundary(shapely.box(*grid.between_centres().bounds), "the whole surface")
+
+
+def _widened(grid: Grid) -> tuple[float, float, float, float]:
+    left, bottom, right, top = grid.bounds
+    return left - grid.cell_x, bottom - grid.cell_y, right + grid.cell_x, top + grid.cell_y
+
+
+def _dilated(mask: np.ndarray) -> np.ndarray:
+    """With all eight neighbours: an edge along the border of cells is rounded to one of its sides."""
+    padded = np.pad(mask, 1)
+    rows, columns = mask.shape
+    out = np.zeros_like(mask)
+    for i in range(3):
+        for j in range(3):
+            out |= padded[i : i + rows, j : j + columns]
+    return out

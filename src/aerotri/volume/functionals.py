@@ -1,0 +1,174 @@
+"""Linear functionals of heights: how a volume, a mean height or a profile depends on pickets, all three coordinates.
+
+[D] Over a TIN V = Σ_t ∫_{t∩B} Σ_k λ_k·z_k, so ∂V/∂Z_k = Σ_t ∫ λ_k. Moving a corner along the plane of its triangle does
+not change that plane, so a move in plan is a change of height by −slope: ∂V/∂X_k = −Σ_t slope_x(t)·∫ λ_k, Y alike. For
+a surface of cells the same holds with the slope of the surface at the cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import Delaunay
+
+from aerotri.rasters import Grid
+from aerotri.volume.bases import Base, SplineBase, Surface
+from aerotri.volume.boundary import Boundary
+from aerotri.volume.sums import cells_within, windows
+from aerotri.volume.triangles import corner_weights
+
+MOST_CELLS = 1_000_000
+"""Cells that are carried one by one; neighbours are put together where there are more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Functional:
+    """V = constant + Σ gradient·ΔP over places of a surface.
+
+    Parameters
+    ----------
+    xyz : (k, 3) m. gradient : (k, 3) ∂V/∂(X, Y, Z).
+    noise_share : (k,) Σw²/(Σw)² of the heights that a place stands for, 1 where it is one.
+    """
+
+    xyz: np.ndarray
+    gradient: np.ndarray
+    noise_share: np.ndarray
+
+
+def triangulated(xyz: np.ndarray) -> np.ndarray:
+    """(t, 3) corners of the Delaunay triangles over pickets (k, 3)."""
+    return Delaunay(xyz[:, :2] - xyz[:, :2].mean(axis=0)).simplices
+
+
+def triangle_slopes(xyz: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(t, 2) slopes of the planes of triangles along X and Y."""
+    a, b = xyz[triangles[:, 1]] - xyz[triangles[:, 0]], xyz[triangles[:, 2]] - xyz[triangles[:, 0]]
+    det = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = np.column_stack(
+            [(a[:, 2] * b[:, 1] - b[:, 2] * a[:, 1]) / det, (b[:, 2] * a[:, 0] - a[:, 2] * b[:, 0]) / det]
+        )
+    return np.where(np.isfinite(slopes), slopes, 0.0)
+
+
+def tin_volume(
+    xyz: np.ndarray, triangles: np.ndarray, boundary: Boundary, base: Base | None = None
+) -> tuple[float, Functional]:
+    """Volume under a TIN over the height 0 (less that of the base's own nodes), and its gradient.
+
+    Parameters
+    ----------
+    xyz : (k, 3) m. triangles : (t, 3).
+    base : matters only where it hangs on the surface itself: a spline through the boundary.
+    """
+    inside, weight = corner_weights(boundary, xyz[triangles][:, :, :2])
+    value, gradient = _of_weights(xyz, triangles[inside], weight)
+    if isinstance(base, SplineBase):
+        of_base, base_weight = barycentric_weights(xyz, triangles, base.xy, -base.integral)
+        more, moved = _of_weights(xyz, triangles[of_base], base_weight)
+        value, gradient = value + more, gradient + moved
+    return value, Functional(xyz, gradient, np.ones(len(xyz)))
+
+
+def tin_heights(xyz: np.ndarray, triangles: np.ndarray, at: np.ndarray, weight: np.ndarray) -> tuple[float, Functional]:
+    """Σ weight·z at places (n, 2) on a TIN: a mean height, a profile, the area of a section; and its gradient."""
+    own, weights = barycentric_weights(xyz, triangles, at, weight)
+    value, gradient = _of_weights(xyz, triangles[own], weights)
+    return value, Functional(xyz, gradient, np.ones(len(xyz)))
+
+
+def barycentric_weights(
+    xyz: np.ndarray, triangles: np.ndarray, at: np.ndarray, weight: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (n,) that hold places, and weight times their barycentric coordinates (n, 3); places outside are left
+    out."""
+    import shapely
+
+    from aerotri.volume.triangles import barycentric
+
+    corners = xyz[triangles][:, :, :2]
+    tree = shapely.STRtree(np.asarray(shapely.polygons(np.concatenate([corners, corners[:, :1]], axis=1))))
+    place, found = tree.query(shapely.points(at), predicate="intersects")
+    place, first = np.unique(place, return_index=True)
+    found = found[first]
+    return found, weight[place][:, None] * barycentric(corners[found], at[place])
+
+
+def _of_weights(xyz: np.ndarray, corners: np.ndarray, weight: np.ndarray) -> tuple[float, np.ndarray]:
+    """Value and gradient of Σ weight·z over corners (n, 3) of triangles."""
+    slopes = triangle_slopes(xyz, corners)
+    gradient = np.zeros((len(xyz), 3))
+    for k in range(3):
+        np.add.at(gradient[:, 2], corners[:, k], weight[:, k])
+        for axis in range(2):
+            np.add.at(gradient[:, axis], corners[:, k], -slopes[:, axis] * weight[:, k])
+    return float(np.sum(weight * xyz[corners, 2])), gradient
+
+
+def cell_volume(surface: Surface, boundary: Boundary, base: Base | None = None) -> Functional:
+    """The gradient of a volume by the cells of a surface, every cell a picket; many cells are put together.
+
+    Cells put together keep the sum of their weights at their mean place, and the noise of the single ones.
+    """
+    rows, columns = cells_within(surface.grid, boundary)[2:]
+    factor = max(1, int(np.ceil(np.sqrt(rows * columns / MOST_CELLS))))
+    size = max(factor, 1024 // factor * factor)
+    extra = _spline_cells(surface.grid, base)
+    parts = [
+        _window_cells(surface, boundary, extra, window, factor)
+        for window in windows(surface.grid, boundary, size)
+    ]
+    xyz, gradient, share = (np.concatenate([part[k] for part in parts]) for k in range(3))
+    return Functional(xyz, gradient, share)
+
+
+def _window_cells(surface: Surface, boundary: Boundary, extra: dict, window: tuple[int, int, int, int], factor: int):
+    """Places, gradient and noise share of the cells of a window, `factor` × `factor` of them together."""
+    row, column, rows, columns = window
+    grid = surface.grid.window(row, column, rows, columns)
+    z = surface.read(row - 1, column - 1, rows + 2, columns + 2).astype(float)
+    slope_x = (z[1:-1, 2:] - z[1:-1, :-2]) / (2.0 * grid.cell_x)
+    slope_y = (z[:-2, 1:-1] - z[2:, 1:-1]) / (2.0 * grid.cell_y)
+    z = z[1:-1, 1:-1]
+    weight = boundary.coverage(grid) * grid.cell_x * grid.cell_y
+    for (i, j), value in extra.items():
+        if row <= i < row + rows and column <= j < column + columns:
+            weight[i - row, j - column] += value
+    weight[~np.isfinite(z)] = 0.0
+    z, slope_x, slope_y = (np.where(np.isfinite(v), v, 0.0) for v in (z, slope_x, slope_y))
+    x, y = np.meshgrid(grid.x(np.arange(columns)), grid.y(np.arange(rows)))
+    size = np.abs(weight)
+    total, squares = _together(size, factor), _together(weight**2, factor)
+    used = total > 0.0
+    places = np.stack([_together(size * v, factor)[used] / total[used] for v in (x, y, z)], axis=-1)
+    sums = [_together(v, factor)[used] for v in (-slope_x * weight, -slope_y * weight, weight)]
+    gradient = np.stack(sums, axis=-1)
+    with np.errstate(divide="ignore"):
+        share = np.where(gradient[:, 2] != 0.0, squares[used] / gradient[:, 2] ** 2, 1.0)
+    return places, gradient, share
+
+
+def _together(values: np.ndarray, factor: int) -> np.ndarray:
+    """Sums over factor × factor cells."""
+    if factor == 1:
+        return values
+    rows, columns = (-(-n // factor) * factor for n in values.shape)
+    padded = np.zeros((rows, columns))
+    padded[: values.shape[0], : values.shape[1]] = values
+    return padded.reshape(rows // factor, factor, columns // factor, factor).sum(axis=(1, 3))
+
+
+def _spline_cells(grid: Grid, base: Base | None) -> dict[tuple[int, int], float]:
+    """Weights that a spline through the boundary gives to single cells, negative: its heights are bilinear in them."""
+    out: dict[tuple[int, int], float] = {}
+    if not isinstance(base, SplineBase):
+        return out
+    row, column = grid.row(base.xy[:, 1]), grid.column(base.xy[:, 0])
+    i, j = np.floor(row).astype(int), np.floor(column).astype(int)
+    t, s = row - i, column - j
+    for di, dj, share in ((0, 0, (1 - t) * (1 - s)), (0, 1, (1 - t) * s), (1, 0, t * (1 - s)), (1, 1, t * s)):
+        for a, b, value in zip(i + di, j + dj, -base.integral * share, strict=True):
+            out[int(a), int(b)] = out.get((int(a), int(b)), 0.0) + float(value)
+    return out

@@ -1,0 +1,121 @@
+"""Pickets: points of a surface measured in oriented photographs after the adjustment, not in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.deformation.orientation import Calibration, calibrated_orientation
+from aerotri.observations import Block
+from aerotri.volume import _response_kernels as _kernels
+
+CANDIDATES_EVERY = 64
+"""Points of a row that share one list of photographs to look into."""
+PER_POINT = 2
+"""Photographs a point of a surface is taken to be measured in where its own are not known: the nearest model [C]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pickets:
+    """Points and the photographs they were intersected from.
+
+    Parameters
+    ----------
+    xyz : (k, 3) m in the CRS of the block.
+    start : (k + 1,) first ray of every picket; image : (r,) rows of the block's photographs.
+    sigma_mm : (r,) of an image coordinate, the matching.
+    noise_share : (k,) 1 for a picket measured on its own; 1/n where one stands for n of equal weight, and more than 1
+        where neighbours share their matching windows.
+    """
+
+    xyz: np.ndarray
+    start: np.ndarray
+    image: np.ndarray
+    sigma_mm: np.ndarray
+    noise_share: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    def take(self, rows: np.ndarray) -> Pickets:
+        """Some of them."""
+        count = np.diff(self.start)[rows]
+        start = np.concatenate([[0], np.cumsum(count)])
+        rays = np.repeat(self.start[rows] - start[:-1], count) + np.arange(start[-1])
+        return Pickets(self.xyz[rows], start, self.image[rays], self.sigma_mm[rays], self.noise_share[rows])
+
+
+def pickets_of_names(block: Block, xyz: np.ndarray, names: list[list[str]], sigma_mm: np.ndarray | float) -> Pickets:
+    """Pickets with the names of their photographs.
+
+    Parameters
+    ----------
+    names : photographs of every picket. sigma_mm : (k,) of their image coordinates, or one for all.
+
+    Raises
+    ------
+    InputError
+        When a photograph is not in the block.
+    """
+    row = {str(name): k for k, name in enumerate(block.images.names)}
+    unknown = {name for own in names for name in own} - row.keys()
+    if unknown:
+        raise InputError(f"pickets name the photograph '{min(unknown)}', which is not in the block", "correct them")
+    start = np.concatenate([[0], np.cumsum([len(own) for own in names])]).astype(np.int64)
+    image = np.array([row[name] for own in names for name in own], dtype=np.int64)
+    sigma = np.repeat(np.broadcast_to(np.asarray(sigma_mm, dtype=float), (len(xyz),)), np.diff(start))
+    return Pickets(np.asarray(xyz, dtype=float), start, image, sigma, np.ones(len(xyz)))
+
+
+def pickets_where_seen(
+    calibration: Calibration, xyz: np.ndarray, sigma_mm: float, per_point: int = PER_POINT,
+    noise_share: np.ndarray | None = None,
+) -> tuple[Pickets, np.ndarray]:  # fmt: skip
+    """Pickets at places of a surface, in the photographs nearest to them that see them.
+
+    Parameters
+    ----------
+    xyz : (k, 3) m in the CRS of the block, neighbours in the list near one another.
+
+    Returns
+    -------
+    Pickets, and (k,) bool which places are seen by `per_point` photographs.
+    """
+    local = xyz if calibration.frame is None else calibration.frame.to_local(xyz)
+    orientation = calibrated_orientation(calibration)
+    block = calibration.local.block
+    half = np.array([block.cameras[camera].half_format_mm for camera in block.images.camera])
+    known = np.flatnonzero(orientation.known)
+    number = np.arange(len(local)) // CANDIDATES_EVERY
+    first, candidate = _candidates(local, number, orientation, half, known)
+    chosen = np.empty((len(local), per_point), np.int64)
+    _kernels.nearest_photographs(
+        local, number, first, candidate, np.ascontiguousarray(orientation.rotation),
+        np.ascontiguousarray(orientation.centre), np.ascontiguousarray(orientation.interior), half, chosen,
+    )  # fmt: skip
+    seen = chosen[:, -1] >= 0
+    image = chosen[seen].ravel()
+    start = per_point * np.arange(int(seen.sum()) + 1, dtype=np.int64)
+    share = np.ones(len(local)) if noise_share is None else noise_share
+    return Pickets(xyz[seen], start, image, np.full(len(image), sigma_mm), share[seen]), seen
+
+
+def _candidates(local, number, orientation, half, known) -> tuple[np.ndarray, np.ndarray]:
+    """Photographs whose footprint may hold a point of a run of points: by distance in plan."""
+    runs = int(number[-1]) + 1 if len(number) else 0
+    edges = np.searchsorted(number, np.arange(runs + 1))
+    low = np.minimum.reduceat(local, edges[:-1]) if runs else np.zeros((0, 3))
+    high = np.maximum.reduceat(local, edges[:-1]) if runs else np.zeros((0, 3))
+    middle, size = (low + high)[:, :2] / 2.0, np.linalg.norm((high - low)[:, :2], axis=1) / 2.0
+    bottom = float(local[:, 2].min()) if len(local) else 0.0
+    tilt = np.arccos(np.clip(orientation.rotation[known, 2, 2], -1.0, 1.0))
+    angle = np.minimum(np.arctan(np.hypot(*half[known].T) / orientation.interior[known, 0]) + tilt, 1.4)
+    reach = np.tan(angle) * np.maximum(orientation.centre[known, 2] - bottom, 0.0)
+    lists = [
+        known[np.linalg.norm(orientation.centre[known, :2] - middle[k], axis=1) <= reach + size[k]]
+        for k in range(runs)
+    ]
+    first = np.concatenate([[0], np.cumsum([len(own) for own in lists])]).astype(np.int64)
+    return first, np.concatenate([*lists, np.zeros(0, np.int64)]).astype(np.int64)

@@ -1,0 +1,263 @@
+"""The variance of any linear functional of heights through the covariance of the adjustment.
+
+[D, checked by Monte Carlo] Pickets P_k are intersected with the adjusted orientation; they were not in the adjustment.
+With g_k = ∂V/∂P_k, A_k = ∂rays/∂P_k, B_k = ∂rays/∂θ (θ orientation, interior orientation, additional parameters) and
+N_k = A_kᵀW_kA_k, a change of θ moves P_k by −N_k⁻¹A_kᵀW_kB_k, so that c = ∂V/∂θ = −Σ B_kᵀW_kA_kN_k⁻¹g_k and
+
+    Var V = σ̂0²·cᵀQc + Σ g_kᵀN_k⁻¹g_k,   Qc by one solution with the reduced factor of the final normal equations.
+
+The first part holds every correlation between pickets. An image error d that is not corrected moves V by
+Σ g_kᵀN_k⁻¹A_kᵀW_k·d, and where the orientation was adjusted without parameters by c times its change besides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.adjustment.parallel import chunk_bounds, run_chunks
+from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.conventions import InputError
+from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials, additional_rows, shared_columns
+from aerotri.deformation.orientation import Calibration, calibrated_orientation
+from aerotri.deformation.photo_errors import PhotoErrors, errors_by_image, seams_mm
+from aerotri.functional_model.rotation import logarithm
+from aerotri.image_errors.tile_grid import Tile, tiles_of
+from aerotri.observations import Camera
+from aerotri.statistics.covariance import inner_datum
+from aerotri.volume import _response_kernels as _kernels
+from aerotri.volume.pickets import Pickets
+
+TILE_NODES, FRAME_NODES = 65, 193
+"""Nodes a side of a tile, and of a format without tiles, over which additional parameters are taken as bilinear."""
+LENS_FAMILIES = ("brown", "lens")
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """How a functional V of heights responds to the adjustment, and what its pickets bring along.
+
+    Parameters
+    ----------
+    unknowns : (6n + s,) c = ∂V/∂θ in the unknowns of the reduced system, zero where held. solved : Q·c.
+    variance : σ̂0²·cᵀQc, the part of the adjustment. noise : Σ gᵀN⁻¹g, the part of matching.
+    by_orientation : (n, 6) ∂V by projection centre and small rotation of the photographs of the system, held or not.
+    by_interior : (L, 15) ∂V by the interior elements of the system's rows.
+    by_parameters : (p,) change of V by an additional parameter that is left uncorrected, as `additional_rows`.
+    error : change of V by the image errors in force, left uncorrected.
+    """
+
+    unknowns: np.ndarray
+    solved: np.ndarray
+    variance: float
+    noise: float
+    by_orientation: np.ndarray
+    by_interior: np.ndarray
+    by_parameters: np.ndarray
+    error: float
+
+
+@dataclass(frozen=True)
+class Systematic:
+    """What uncorrected image errors do to a functional: wrong − true, and σ of that.
+
+    Parameters
+    ----------
+    variant : 'free' (orientation of the self-calibrated block) or 'absorbed' (adjusted without parameters).
+    """
+
+    variant: str
+    value: float
+    sigma: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Nodes:
+    """Nodes over the tiles of every group of image errors; see `_response_kernels`.
+
+    tables : edges and meta. xy : (·, 2) mm, just inside their tiles. of_group : nodes of every group.
+    """
+
+    tables: tuple[np.ndarray, np.ndarray]
+    xy: np.ndarray
+    of_group: list[slice]
+
+
+def respond(calibration: Calibration, pickets: Pickets, gradient: np.ndarray, corrected: bool = True) -> Response:
+    """The response of a linear functional of pickets.
+
+    Parameters
+    ----------
+    gradient : (k, 3) ∂V/∂(X, Y, Z) of every picket in the CRS of the block.
+    corrected : the rays were corrected for the additional parameters; else these have no part in V.
+
+    Raises
+    ------
+    InputError
+        When a photograph is not oriented, or the rays of a picket do not determine it.
+    """
+    system, state = calibration.system, calibration.solution.state
+    u = system.unknowns
+    rows = additional_rows(calibration)
+    errors, number = errors_by_image(calibration, rows)
+    nodes = _nodes_of(errors)
+    photos = (
+        np.ascontiguousarray(state.rotation), state.centre, u.interior(state), u.lens.of_image, number[u.images],
+    )  # fmt: skip
+    by_eo, by_interior, deposits, noise = _summed(calibration, pickets, gradient, photos, nodes)
+    by_parameters, error = np.zeros(len(rows)), 0.0
+    for of, own in zip(errors, nodes.of_group, strict=True):
+        used = np.flatnonzero(deposits[own].any(axis=1))
+        xy, f = nodes.xy[own][used], deposits[own][used]
+        by_parameters += np.einsum("na,nap->p", f, of.partials(xy))
+        error += float(np.sum(f * of.function.of_measured(xy)))
+    c = _in_unknowns(calibration, by_eo, by_interior, by_parameters, corrected)
+    factor = system.factorise(calibration.solution.equations)
+    solved = factor.solve(c)
+    cofactor = float(c @ solved)
+    if u.block.settings.adjustment.datum == "inner" and u.motions.count:
+        cofactor += _inner_correction(calibration, factor, c)
+    variance = calibration.local.outcome.sigma0**2 * cofactor
+    return Response(c, solved, variance, noise, by_eo, by_interior, by_parameters, error)
+
+
+def covariance(calibration: Calibration, first: Response, second: Response) -> float:
+    """Covariance that the adjustment brings to two functionals of one block."""
+    return calibration.local.outcome.sigma0**2 * float(first.unknowns @ second.solved)
+
+
+def control_response(calibration: Calibration, response: Response) -> np.ndarray:
+    """(P, 3) ∂V by the given coordinates of the control points, in the order of the system's points."""
+    system = calibration.system
+    u = system.unknowns
+    n = 6 * len(u.images)
+    points = system.expand_sides(
+        calibration.solution.state, response.solved[:n].reshape(-1, 6, 1).copy(), response.solved[n:, None].copy(),
+        np.zeros((len(u.points), 3, 1)), calibration.solution.estimator,
+    )  # fmt: skip
+    return u.prior_weight * points[:, :, 0]
+
+
+def systematic(calibration: Calibration, response: Response, variant: str = "free") -> Systematic:
+    """What the image errors in force do to the functional when the photographs were used uncorrected.
+
+    Raises
+    ------
+    AbsorptionFailedError
+    """
+    value, by_parameters = response.error, response.by_parameters.copy()
+    if variant == "absorbed":
+        u = calibration.system.unknowns
+        true, used = calibrated_orientation(calibration), absorbed_orientation(calibration).orientation
+        follows = absorbed_partials(calibration)[u.images]
+        true, used = true.take(u.images), used.take(u.images)
+        turned = logarithm(used.rotation @ np.swapaxes(true.rotation, 1, 2))
+        moved = np.column_stack([used.centre - true.centre, turned])
+        first = np.array([int(np.argmax(u.lens.of_image == row)) for row in range(len(response.by_interior))])
+        interior = (used.interior - true.interior)[first]
+        value += float(np.sum(response.by_orientation * moved) + np.sum(response.by_interior[:, :3] * interior))
+        by_parameters += np.einsum("na,nap->p", response.by_orientation, follows[:, :6])
+        by_parameters += np.einsum("na,nap->p", response.by_interior[:, :3], follows[first, 6:])
+    rows = additional_rows(calibration)
+    q = calibration.local.parameters.covariance[np.ix_(rows, rows)]
+    return Systematic(variant, value, float(np.sqrt(max(by_parameters @ q @ by_parameters, 0.0))))
+
+
+def _summed(calibration: Calibration, pickets: Pickets, gradient: np.ndarray, photos, nodes: _Nodes):
+    """Sums over the pickets, in threads: by orientation, by interior elements, at the nodes, and the noise."""
+    u = calibration.system.unknowns
+    row_of = np.full(len(u.block.images), -1, np.int64)
+    row_of[u.images] = np.arange(len(u.images))
+    image = row_of[pickets.image]
+    if (image < 0).any():
+        name = u.block.images.names[pickets.image[int(np.argmax(image < 0))]]
+        raise InputError(f"a picket was measured in '{name}', which was not adjusted", "leave it out")
+    points, along = _in_frame(calibration, pickets.xyz, np.asarray(gradient, dtype=float))
+    bounds = chunk_bounds(np.diff(pickets.start).astype(float))
+    outs = [
+        (np.zeros((len(u.images), 6)), np.zeros((len(u.lens.base), 15)), np.zeros((len(nodes.xy), 2)), np.zeros(1))
+        for _ in bounds
+    ]
+
+    def chunk(k: int) -> int:
+        return _kernels.respond(
+            *bounds[k], pickets.start, image, 1.0 / pickets.sigma_mm, points, along, pickets.noise_share, photos,
+            nodes.tables, outs[k],
+        )  # fmt: skip
+
+    worst = max(run_chunks(chunk, len(bounds)), default=-1)
+    if worst >= 0:
+        raise InputError(f"the rays of picket {worst + 1} do not determine it", "leave it out")
+    by_eo, by_interior, deposits = (np.sum([out[part] for out in outs], axis=0) for part in range(3))
+    return by_eo, by_interior, deposits, float(sum(out[3][0] for out in outs))
+
+
+def _in_frame(calibration: Calibration, xyz: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places counted from the local origin, and the gradient along the axes there.
+
+    The partials of the CRS are those in the middle of the pickets: they change by 1e-4 in a kilometre.
+    """
+    frame, origin = calibration.frame, calibration.system.unknowns.origin
+    if frame is None:
+        return np.ascontiguousarray(xyz - origin), np.ascontiguousarray(gradient)
+    local = frame.to_local(xyz)
+    partials = frame.crs_per_local(local.mean(axis=0)[None])[0]
+    return np.ascontiguousarray(local - origin), np.ascontiguousarray(gradient @ partials)
+
+
+def _in_unknowns(calibration: Calibration, by_eo, by_interior, by_parameters, corrected: bool) -> np.ndarray:
+    """c in the order of the reduced system; a parameter that is corrected for moves V against what its error does."""
+    u, state = calibration.system.unknowns, calibration.solution.state
+    turned = by_eo.copy()
+    turned[:, 3:] = np.einsum("nij,ni->nj", u.turn(state), by_eo[:, 3:])
+    shared = np.zeros(len(u.shared))
+    kinds = np.array(u.shared.kinds)
+    rows, columns = np.nonzero(u.lens.columns >= 0)
+    np.add.at(shared, u.lens.columns[rows, columns], by_interior[rows, columns])
+    names = calibration.local.parameters.names[additional_rows(calibration)]
+    linear = np.array([str(name).partition(".")[0] not in LENS_FAMILIES for name in names], dtype=bool)
+    shared[shared_columns(calibration)[linear]] = -by_parameters[linear]
+    if not corrected:
+        shared[kinds == "additional"] = 0.0
+    return np.concatenate([(turned * u.eo_free).ravel(), shared])
+
+
+def _inner_correction(calibration: Calibration, factor: Factor, c: np.ndarray) -> float:
+    """What leads from the cofactor in the minimal datum to that in the inner one, see `statistics.covariance`."""
+    system, solution = calibration.system, calibration.solution
+    inner = inner_datum(system, solution.state, factor, solution.estimator)
+    n = 6 * len(system.unknowns.images)
+    images, shared = c[:n].reshape(-1, 6), c[n:]
+    moved = np.einsum("nid,ni->d", inner.images, images) + inner.shared.T @ shared
+    known = np.einsum("nid,ni->d", inner.q_images, images) + inner.q_shared.T @ shared
+    return float(moved @ inner.both @ moved - 2.0 * moved @ known)
+
+
+def _nodes_of(errors: tuple[PhotoErrors, ...]) -> _Nodes:
+    """Nodes over every tile of every group."""
+    edges, meta = np.full((len(errors), 2, 2), np.inf), np.zeros((len(errors), 3, 3, 7))
+    parts: list[np.ndarray] = []
+    of_group, count = [], 0
+    for s, of in enumerate(errors):
+        camera, begun = of.camera, count
+        for axis, seams in enumerate(seams_mm(camera)):
+            edges[s, axis, : len(seams)] = seams
+        tiles = tiles_of(camera)
+        nodes = TILE_NODES if len(tiles) > 1 else FRAME_NODES
+        for i, row in enumerate(reversed(tiles)):
+            for j, tile in enumerate(row):
+                x, y = _nodes_over(tile, camera, nodes)
+                meta[s, j, i] = count, nodes, nodes, x[0], y[0], 1.0 / (x[1] - x[0]), 1.0 / (y[1] - y[0])
+                parts.append(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
+                count += nodes * nodes
+        of_group.append(slice(begun, count))
+    return _Nodes((edges, meta), np.concatenate(parts), of_group)
+
+
+def _nodes_over(tile: Tile, camera: Camera, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """x and y of evenly spaced nodes over a tile, mm."""
+    half = np.array(camera.half_format_mm)
+    low, high = tile.bounds_mm(camera)
+    low, high = np.maximum(low, -half), np.minimum(high, half)
+    return np.linspace(low[0], high[0], count), np.linspace(low[1], high[1], count)
