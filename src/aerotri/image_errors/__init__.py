@@ -2,15 +2,18 @@
 
 from aerotri.image_errors.averaged_residuals import AveragedResiduals, averaged_residuals
 from aerotri.image_errors.field import ErrorField, field_difference, field_on_grid, largest_effects, systematic_errors
+from aerotri.image_errors.group_change import GroupChange, group_change
 from aerotri.image_errors.groups import ImageGroup, image_group, image_groups, interior_elements
 
 __all__ = [
     "AveragedResiduals",
     "ErrorField",
+    "GroupChange",
     "ImageGroup",
     "averaged_residuals",
     "field_difference",
     "field_on_grid",
+    "group_change",
     "image_group",
     "image_groups",
     "interior_elements",
