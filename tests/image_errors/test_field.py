@@ -9,6 +9,7 @@ from aerotri.functional_model.additional_parameters import brown, lens, paramete
 from aerotri.image_errors import (
     field_difference,
     field_on_grid,
+    field_without_orientation,
     image_groups,
     interior_elements,
     largest_effects,
@@ -206,3 +207,27 @@ def test_largest_effect_is_that_of_the_parameter_alone(adjusted):
     x, y = field_on_grid(adjusted, "ucd2").x.ravel(), field_on_grid(adjusted, "ucd2").y.ravel()
     basis = parameter_set("bluh", ["4"], adjusted.block.cameras[0]).basis(x, y)[:, :, 0]
     assert effects[row] == pytest.approx(abs(p.value[row]) * np.hypot(*basis.T).max())
+
+
+def test_without_orientation(adjusted):
+    """Orthogonal to shifts, scale, rotation and tilts; unchanged but for these; σ by the dense projection."""
+    camera = adjusted.block.cameras[0]
+    field, whole = field_without_orientation(adjusted, "ucd2", nx=7), field_on_grid(adjusted, "ucd2", nx=7)
+    x, y = field.x.ravel(), field.y.ravel()
+    c, one, zero = camera.focal_length_mm, np.ones_like(x), np.zeros_like(x)
+    pairs = [(one, zero), (zero, one), (x, y), (-y, x), (c + x * x / c, x * y / c), (x * y / c, c + y * y / c)]
+    patterns = np.stack([np.stack(pair, axis=1).ravel() for pair in pairs], axis=1)
+    left, taken = field.d.ravel(), (whole.d - field.d).ravel()
+    assert np.abs(patterns.T @ left).max() < 1e-9 * np.abs(patterns).sum()
+    assert np.abs(taken).max() > 1e-4
+    assert np.linalg.matrix_rank(np.column_stack([patterns, taken / np.abs(taken).max()]), tol=1e-6) == 6
+    p = adjusted.parameters
+    rows = np.flatnonzero(p.kinds == "additional")
+    sets = [parameter_set(f, [n.split(".")[1] for n in p.names[rows] if n.startswith(f)], camera) for f in
+            dict.fromkeys(n.split(".")[0] for n in p.names[rows])]  # fmt: skip
+    names = [name for chosen in sets for name in chosen.names]
+    basis = np.concatenate([chosen.basis(x, y) for chosen in sets], axis=2).reshape(len(left), -1)
+    order = [names.index(name) for name in p.names[rows]]
+    projected = (np.eye(len(left)) - patterns @ np.linalg.pinv(patterns)) @ basis[:, order]
+    covariance = projected @ p.covariance[np.ix_(rows, rows)] @ projected.T
+    np.testing.assert_allclose(field.sigma.ravel(), np.sqrt(np.diagonal(covariance)), rtol=1e-6)

@@ -11,9 +11,9 @@ import scipy.linalg
 from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import parameter_set
 from aerotri.functional_model.additional_parameters.ultracam_d import tile_of
+from aerotri.functional_model.orientation_patterns import orientation_patterns
 from aerotri.simulation import read_spec, simulate, true_image_errors
 from aerotri.simulation.camera_errors import dmc, rms_mm, ultracam_d
-from aerotri.simulation.camera_errors.fields import orientation_patterns
 from aerotri.simulation.camera_errors.lens import random_lens
 from aerotri.simulation.cameras import block_camera
 from aerotri.simulation.spec import CameraSpec

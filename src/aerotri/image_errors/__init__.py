@@ -1,7 +1,14 @@
 """What the camera does wrong: systematic image errors from the parameters, and what the residuals still show."""
 
 from aerotri.image_errors.averaged_residuals import AveragedResiduals, averaged_residuals
-from aerotri.image_errors.field import ErrorField, field_difference, field_on_grid, largest_effects, systematic_errors
+from aerotri.image_errors.field import (
+    ErrorField,
+    field_difference,
+    field_on_grid,
+    field_without_orientation,
+    largest_effects,
+    systematic_errors,
+)
 from aerotri.image_errors.group_change import GroupChange, group_change
 from aerotri.image_errors.groups import ImageGroup, image_group, image_groups, interior_elements
 
@@ -13,6 +20,7 @@ __all__ = [
     "averaged_residuals",
     "field_difference",
     "field_on_grid",
+    "field_without_orientation",
     "group_change",
     "image_group",
     "image_groups",

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.functional_model.additional_parameters import brown, lens, parameter_sets
+from aerotri.functional_model.orientation_patterns import orientation_patterns
 from aerotri.image_errors.groups import (
     ImageGroup,
     image_group,
@@ -93,6 +94,24 @@ def field_on_grid(adjusted: AdjustedBlock, group: str, nx: int | None = None, ca
     x, y = grid_nodes(images.camera, nx)
     d, covariance = systematic_errors(adjusted, group, x.ravel(), y.ravel(), images.camera.name)
     return _field(images.camera, group, x, y, d, covariance)
+
+
+def field_without_orientation(
+    adjusted: AdjustedBlock, group: str, nx: int | None = None, camera: str | None = None
+) -> ErrorField:
+    """As `field_on_grid`, less what the orientation of a photograph over flat ground can take of it.
+
+    Shifts, scale, rotation and two tilts say alike what sets of parameters give to the image or leave to the
+    orientation, each in its own way; what remains can be compared between sets.
+    """
+    images = image_group(adjusted.block, group, camera)
+    x, y = grid_nodes(images.camera, nx)
+    d, jacobian, rows = _errors_with_jacobian(adjusted, images, x.ravel(), y.ravel())
+    patterns = orientation_patterns(x.ravel(), y.ravel(), images.camera.focal_length_mm).reshape(d.size, -1)
+    both = np.column_stack([d.ravel(), jacobian.reshape(d.size, -1)])
+    both -= patterns @ np.linalg.lstsq(patterns, both, rcond=None)[0]
+    d, jacobian = both[:, 0].reshape(d.shape), both[:, 1:].reshape(jacobian.shape)
+    return _field(images.camera, group, x, y, d, _propagated(jacobian, _covariance_of(adjusted, rows)))
 
 
 def field_difference(

@@ -39,14 +39,14 @@ def plot_systematic_errors(field: ErrorField, block_name: str) -> Figure:
     """Systematic image errors measured − ideal over the format; what is significant at 95 % is darker."""
     camera = field.camera
     subtitle = (
-        f"{_owner(field.group, camera)}: measured − ideal;  largest {_micron(field.max, camera)},  "
-        f"RMS {_micron(field.rms, camera)}"
+        f"{_owner(field.group, camera)}: measured − ideal;  largest {micron(field.max, camera)},  "
+        f"RMS {micron(field.rms, camera)}"
     )
     axes, figure, cell = _format_figure(
         f"Systematic image errors – {plain(block_name)}", subtitle, camera, field.x.shape
     )
     _draw_vectors(axes, field.x, field.y, field.d, field.significant, cell, camera)
-    _legend(figure, camera, ("significant at 95 %", "not significant"))
+    vector_legend(figure, camera, ("significant at 95 %", "not significant"))
     return figure
 
 
@@ -56,8 +56,8 @@ def plot_averaged_residuals(averaged: AveragedResiduals, block_name: str) -> Fig
     camera = averaged.camera
     shown = averaged.shown
     subtitle = (
-        f"{_owner(averaged.group, camera)}: measured − adjusted;  largest {_micron(averaged.max, camera)},  "
-        f"RMS {_micron(averaged.rms, camera)} where noise alone would leave {1e3 * averaged.rms_of_noise:.2f} µm\n"
+        f"{_owner(averaged.group, camera)}: measured − adjusted;  largest {micron(averaged.max, camera)},  "
+        f"RMS {micron(averaged.rms, camera)} where noise alone would leave {1e3 * averaged.rms_of_noise:.2f} µm\n"
         f"cells with at least {averaged.n_min} rays: {shown.sum()} of {shown.size}, "
         f"median {np.median(averaged.count):.0f} rays a cell"
     )
@@ -65,7 +65,7 @@ def plot_averaged_residuals(averaged: AveragedResiduals, block_name: str) -> Fig
     axes, figure, cell = _format_figure(title, subtitle, camera, averaged.x.shape)
     mean = np.where(shown[..., None], averaged.mean, np.nan)
     _draw_vectors(axes, averaged.x, averaged.y, mean, averaged.significant, cell, camera)
-    _legend(figure, camera, ("beyond noise at 95 %", "within noise"))
+    vector_legend(figure, camera, ("beyond noise at 95 %", "within noise"))
     return figure
 
 
@@ -73,7 +73,8 @@ def _owner(group: str, camera: Camera) -> str:
     return plain(group) if group == camera.name else f"{plain(group)}, camera {plain(camera.name)}"
 
 
-def _micron(value_mm: float, camera: Camera) -> str:
+def micron(value_mm: float, camera: Camera) -> str:
+    """'2.31 µm (0.26 px)'."""
     if not np.isfinite(value_mm):
         return "–"
     return f"{1e3 * value_mm:.2f} µm ({value_mm / camera.pixel_mm:.2f} px)"
@@ -96,12 +97,17 @@ def _format_figure(title: str, subtitle: str, camera: Camera, shape) -> tuple[Ax
     for axis, side, reach in ((axes.xaxis, "bottom", half[0]), (axes.yaxis, "left", half[1])):
         axes.spines[side].set_bounds(-reach, reach)
         axis.set_major_locator(FixedLocator(MaxNLocator(8, steps=[1, 2, 5, 10]).tick_values(-reach, reach)[1:-1]))
-    frame = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * half
+    draw_format(axes, camera)
+    flight_arrow(figure, camera, 0.8 + width + 0.3, 0.92 + height / 2)
+    return axes, figure, 2 * half[0] / mm_per_inch / shape[1]
+
+
+def draw_format(axes: Axes, camera: Camera) -> None:
+    """The edge of the format, the seams of its parts and its centre."""
+    frame = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * np.array(camera.half_format_mm)
     axes.plot(*frame.T, color=GREY, lw=0.8, zorder=1)
     axes.add_collection(LineCollection(seams(camera), colors=GREY, linewidths=0.5, linestyles=(0, (5, 3)), zorder=1))
     axes.plot(0, 0, "+", color=GREY, ms=7, mew=0.7, zorder=1)
-    _flight_arrow(figure, camera, 0.8 + width + 0.3, 0.92 + height / 2)
-    return axes, figure, 2 * half[0] / mm_per_inch / shape[1]
 
 
 def seams(camera: Camera) -> list[np.ndarray]:
@@ -120,18 +126,27 @@ def seams(camera: Camera) -> list[np.ndarray]:
 
 
 def _draw_vectors(axes: Axes, x, y, d, strong, cell: float, camera: Camera) -> None:
-    lengths = np.hypot(d[..., 0], d[..., 1])
-    per_inch, size = per_inch_for(lengths, min(LONGEST_IN_CELLS * cell, LONGEST_INCH))
-    finite = np.isfinite(lengths)
+    per_inch, size = per_inch_for(np.hypot(d[..., 0], d[..., 1]), min(LONGEST_IN_CELLS * cell, LONGEST_INCH))
+    quiver = draw_vectors(axes, x, y, d, strong, per_inch)
+    scale_vector(axes, quiver, size, size_text(size, camera), 0.85, 0.28)
+
+
+def draw_vectors(axes: Axes, x: np.ndarray, y: np.ndarray, d: np.ndarray, strong: np.ndarray, per_inch: float):
+    """Vectors d (ny, nx, 2) mm at (ny, nx) mm, `per_inch` mm drawn as one inch; those not strong are fainter."""
+    finite = np.isfinite(d).all(axis=-1)
     faint, dark = finite & ~strong, finite & strong
     at = np.stack([x, y], axis=-1)
     vectors(axes, at[faint], d[faint], per_inch, FAINT, zorder=3)
-    quiver = vectors(axes, at[dark], d[dark], per_inch, INK, width=0.013, zorder=4)
-    label = f"{length_text(1e-3 * size)} ({size / camera.pixel_mm:.2g} px)"
-    scale_vector(axes, quiver, size, label, 0.85, 0.28)
+    return vectors(axes, at[dark], d[dark], per_inch, INK, width=0.013, zorder=4)
 
 
-def _legend(figure: Figure, camera: Camera, labels: tuple[str, str]) -> None:
+def size_text(size_mm: float, camera: Camera) -> str:
+    """'5 µm (0.56 px)'."""
+    return f"{length_text(1e-3 * size_mm)} ({size_mm / camera.pixel_mm:.2g} px)"
+
+
+def vector_legend(figure: Figure, camera: Camera, labels: tuple[str, str]) -> None:
+    """What dark and faint vectors mean, at the lower right."""
     handles = [
         Line2D([], [], color=INK, lw=1.6, label=labels[0]),
         Line2D([], [], color=FAINT, lw=1.3, label=labels[1]),
@@ -143,7 +158,7 @@ def _legend(figure: Figure, camera: Camera, labels: tuple[str, str]) -> None:
                   borderaxespad=0.0, handletextpad=0.6, columnspacing=1.6)  # fmt: skip
 
 
-def _flight_arrow(figure: Figure, camera: Camera, x: float, y: float) -> None:
+def flight_arrow(figure: Figure, camera: Camera, x: float, y: float) -> None:
     """The flight direction beside the format, where the camera says it."""
     if camera.flight_axis is None:
         return

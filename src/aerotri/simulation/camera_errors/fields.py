@@ -11,6 +11,7 @@ from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import brown, is_item, parameter_set
 from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES, ParameterSet
 from aerotri.functional_model.additional_parameters.ultracam_d import native_from_image
+from aerotri.functional_model.orientation_patterns import orientation_patterns
 from aerotri.observations import Camera
 from aerotri.observations.block import BROWN_NAMES
 from aerotri.simulation.camera_errors import dmc, frame, ultracam_d
@@ -98,14 +99,6 @@ class ImageError:
             for part in self.parts:
                 error[piece] += part(x[piece], y[piece])
         return error
-
-
-def orientation_patterns(x: np.ndarray, y: np.ndarray, f: float) -> np.ndarray:
-    """(n, 2, 6) what the orientation of a photograph over flat ground takes: shifts, scale, rotation, two tilts."""
-    one, zero = np.ones_like(x), np.zeros_like(x)
-    dx = [one, zero, x, -y, f + x * x / f, x * y / f]
-    dy = [zero, one, y, x, x * y / f, f + y * y / f]
-    return np.stack([np.stack(dx, axis=1), np.stack(dy, axis=1)], axis=1)
 
 
 def rms_mm(field: Field, camera: Camera) -> float:
