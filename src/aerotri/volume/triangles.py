@@ -71,7 +71,7 @@ def prism_sums(polygon: BaseGeometry, corners: np.ndarray, d: np.ndarray) -> np.
         return sums
     pieces = cut_to(polygon, corners)
     own = d[pieces.triangle]
-    whole = np.equal(pieces.geometry, None)
+    whole = np.array([part is None for part in pieces.geometry])
     _kernels.add_triangles(np.ascontiguousarray(own[whole]), pieces.area[whole], sums)
     mixed = ~whole & (own.min(axis=1) < 0.0) & (own.max(axis=1) > 0.0)
     plain = ~whole & ~mixed
