@@ -1,6 +1,7 @@
 """Threads and memory, in one place.
 
-Kernels run over a fixed number of chunks, whatever the machine, so that sums repeat.
+Kernels run over a fixed number of chunks, whatever the machine, so that sums repeat. BLAS gets one thread where more
+would gain little: its threads wait for one another at every call, on a busy machine for a long time.
 """
 
 from __future__ import annotations
@@ -8,14 +9,20 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from aerotri.conventions import InputError
 
 CHUNKS = 4
 """Pieces of every parallel sum. A constant of the program, never the number of threads: it decides the rounding."""
+
+SMALL_WORK = 5e9
+"""Multiplications of a factorisation below which two threads of BLAS gain less than a fifth: a tenth of a second."""
 
 
 def thread_count() -> int:
@@ -24,6 +31,16 @@ def thread_count() -> int:
     if asked.isdigit() and int(asked) > 0:
         return int(asked)
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
+def blas_threads(multiplications: float) -> AbstractContextManager:
+    """A context in which BLAS takes one thread for work of fewer than SMALL_WORK multiplications."""
+    return nullcontext() if multiplications >= SMALL_WORK else _blas().limit(limits=1, user_api="blas")
 
 
 def chunk_bounds(work: np.ndarray, chunks: int = CHUNKS) -> list[tuple[int, int]]:

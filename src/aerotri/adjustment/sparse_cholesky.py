@@ -9,6 +9,7 @@ a `Factor` is therefore valid until the next one of the same `Symbolic`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg.blas import dgemm, dsymm, dsyrk, dtrsm  # pyright: ignore[reportAttributeAccessIssue]
@@ -16,7 +17,7 @@ from scipy.linalg.lapack import dpotrf, dpotri  # pyright: ignore[reportAttribut
 
 from aerotri.adjustment import _factor_kernels as _kernels
 from aerotri.adjustment.dissection import Tree, dissect
-from aerotri.adjustment.parallel import refuse_more_than_there_is
+from aerotri.adjustment.parallel import blas_threads, refuse_more_than_there_is
 
 B = 6
 """Unknowns of a photograph."""
@@ -97,7 +98,7 @@ class Symbolic:
         """Numbers stored in the factor."""
         return len(self._panels)
 
-    @property
+    @cached_property
     def flops(self) -> float:
         """Multiplications of one factorisation."""
         total = 0.0
@@ -213,6 +214,14 @@ class Symbolic:
         by_border = scale[B * self.n :]
         corner = self._corner
         corner[:] = matrix.corner * by_border[:, None] * by_border[None, :]
+        with blas_threads(self.flops):
+            smallest = self._factorise_fronts(matrix, by_image, by_border, corner)
+            if self.n_border:
+                smallest = min(smallest, _factor_triangle(corner))
+        return Factor(self, scale, smallest)
+
+    def _factorise_fronts(self, matrix: BorderedMatrix, by_image, by_border, corner: np.ndarray) -> float:
+        """All fronts from the leaves up, what they leave of the border added to `corner`; the smallest pivot."""
         children: list[list[int]] = [[] for _ in self.fronts]
         smallest = 1.0
         for k, front in enumerate(self.fronts):
@@ -237,9 +246,7 @@ class Symbolic:
                 children[front.parent].append(k)
             elif self.n_border:
                 corner += rest
-        if self.n_border:
-            smallest = min(smallest, _factor_triangle(corner))
-        return Factor(self, scale, smallest)
+        return smallest
 
     def _scale(self, matrix: BorderedMatrix) -> np.ndarray:
         diagonal = np.concatenate(
@@ -296,6 +303,10 @@ class Factor:
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """x with matrix·x = rhs; rhs (size,) or (size, k), the photographs' unknowns first, then the border's."""
+        with blas_threads(self._symbolic.factor_entries * (rhs.size / len(rhs))):
+            return self._solve(rhs)
+
+    def _solve(self, rhs: np.ndarray) -> np.ndarray:
         s = self._symbolic
         permutation = self._permutation()
         flat = rhs.reshape(len(permutation), -1)
@@ -332,6 +343,10 @@ class Factor:
 
     def inverse_on_pattern(self) -> InverseOnPattern:
         """The inverse on the pattern of the matrix, by the Takahashi recursion from the root down."""
+        with blas_threads(self._symbolic.flops):
+            return self._inverse_on_pattern()
+
+    def _inverse_on_pattern(self) -> InverseOnPattern:
         s = self._symbolic
         out = InverseOnPattern(
             np.zeros((len(s.block_row), B, B)), np.zeros((s.n, s.n_border, B)), np.zeros((s.n_border, s.n_border))
