@@ -6,13 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.prepare import build_system, ray_status
-from aerotri.adjustment.solve import SolveOptions, minimise
+from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.start_values import local_origin
 from aerotri.adjustment.unknowns import StartValues
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.observations import Block
 from aerotri.simulation import parse_spec, simulate
+from aerotri.statistics.covariance import cofactors
 from aerotri.statistics.summarise import count_observations, summarise
 from benchmark.blocks import Start, common_start, load_block, spec_of
 from benchmark.child import Memory, Timer
@@ -42,6 +44,10 @@ def run(block: Block, start: Start, timer: Timer) -> dict[str, Any]:
     redundancy = count_observations(system).redundancy
     with timer.phase("iterations"):
         solution = minimise(system, state, redundancy, SolveOptions())
+    with timer.phase("iteration"):
+        _gauss_newton(system, solution)
+    with timer.phase("sigmas"):
+        cofactors(system, solution.state, system.factorise(solution.equations), solution.estimator)
     with timer.phase("statistics"):
         factor = system.factorise(solution.equations)
         result = summarise(system, solution, factor, status, ())
@@ -53,6 +59,14 @@ def run(block: Block, start: Start, timer: Timer) -> dict[str, Any]:
         "redundancy": redundancy,
         "unknowns": result.outcome.unknowns,
     }
+
+
+def _gauss_newton(system: NormalSystem, solution: Solution) -> None:
+    """One whole iteration, with a factor of its own."""
+    equations = system.assemble(solution.state, 0.0, solution.estimator)
+    x = system.factorise(equations).solve(equations.right)
+    step = system.back_substitute(solution.state, x, 0.0, equations, solution.estimator)
+    system.unknowns.advance(solution.state, step)
 
 
 def measure(folder: Path, job: dict[str, Any]) -> dict[str, Any]:

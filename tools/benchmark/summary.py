@@ -23,7 +23,8 @@ class Row:
     Parameters
     ----------
     prepare : s, equations and symbolic factor, or Ceres' problem built. solve : s, from the start to convergence.
-    statistics : s, all σ and redundancy numbers; NaN for peers.
+    iteration : s, one whole Gauss-Newton iteration. sigmas : s, all σ and redundancy numbers. statistics : s, these and
+        the external reliability of every ray; all NaN for peers.
     ratio : peer's solve over our prepare and solve without parameters, run by run: median, smallest, largest.
     vtpv_difference : relative, against ours with the same parameters. peak : bytes above the program without a block.
     failure : why there are no numbers.
@@ -35,6 +36,8 @@ class Row:
     prepare: float
     iterations: float
     solve: float
+    iteration: float
+    sigmas: float
     statistics: float
     ratio: tuple[float, float, float]
     vtpv_difference: float
@@ -75,7 +78,7 @@ def _row(own: list[Run], everything: list[Run]) -> Row:
     first = own[0]
     nan = float("nan")
     if not good:
-        return Row(first.photographs, 0, first.program, nan, nan, nan, nan, UNKNOWN, nan, nan, first.failure)
+        return Row(first.photographs, 0, first.program, nan, nan, nan, nan, nan, nan, UNKNOWN, nan, nan, first.failure)
     ours = {run.repeat: run for run in everything if run.photographs == first.photographs and run.program == OURS.name}
     ratios = [
         _compared(run) / _compared(ours[run.repeat])
@@ -92,6 +95,8 @@ def _row(own: list[Run], everything: list[Run]) -> Row:
         prepare=statistics.median(seconds(run, "prepare", "build") for run in good),
         iterations=statistics.median(iterations) if iterations else nan,
         solve=statistics.median(seconds(run, "iterations", "solve") for run in good),
+        iteration=statistics.median(seconds(run, "iteration") for run in good),
+        sigmas=statistics.median(seconds(run, "sigmas") for run in good),
         statistics=statistics.median(seconds(run, "statistics") for run in good),
         ratio=_spread(ratios),
         vtpv_difference=(good[0].outcome["vtpv"] - reference) / reference if same_model else nan,

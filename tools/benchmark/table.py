@@ -16,7 +16,9 @@ control. Every program starts 1 m and 1 mrad off with object points intersected 
 programs in turn, each in a process of its own, {threads} threads. Reading is excluded. *prepare* is our set-up with the
 symbolic factor, or Ceres' problem built by pycolmap in C++; *solve* runs to convergence; *× ours* is a program's solve
 alone over our prepare and solve without parameters, run by run (smallest to largest). *Σ* is the relative difference of
-½Σr². *statistics* is every σ and every redundancy number. Memory is the peak above the program without a block."""
+½Σr². *iteration* is one whole Gauss-Newton iteration; *σ* every σ and every redundancy number, also in such iterations;
+*statistics* these and tests and external reliability of every ray. Memory is the peak above the program without a
+block."""
 
 
 def markdown(runs: Sequence[Run], threads: int) -> str:
@@ -43,15 +45,14 @@ def _machine() -> str:
 
 
 def _adjustments(rows: Sequence[Row]) -> str:
-    head = ("photographs", "rays", "program", "prepare [s]", "iterations", "solve [s]", "× ours", "Σ", "statistics [s]",
-            "in iterations", "peak [MB]", "bytes/ray")  # fmt: skip
+    head = ("photographs", "rays", "program", "prepare [s]", "iterations", "solve [s]", "× ours", "Σ", "iteration [s]",
+            "σ [s]", "in iterations", "statistics [s]", "peak [MB]", "bytes/ray")  # fmt: skip
     return _table(head, [_cells(row) for row in rows])
 
 
 def _cells(row: Row) -> list[str]:
     if not np.isfinite(row.solve):
-        return [str(row.photographs), "", row.program, row.failure, *[""] * 8]
-    per_iteration = row.solve / max(row.iterations, 1.0)
+        return [str(row.photographs), "", row.program, row.failure, *[""] * 10]
     optimum = "" if not np.isfinite(row.vtpv_difference) else f"{row.vtpv_difference:+.0e}"
     if optimum and abs(row.vtpv_difference) > OPTIMUM:
         optimum += " (not the optimum)"
@@ -64,8 +65,10 @@ def _cells(row: Row) -> list[str]:
         _seconds(row.solve),
         _ratio(row.ratio),
         optimum,
+        _seconds(row.iteration),
+        _seconds(row.sigmas),
+        f"{row.sigmas / row.iteration:.1f}" if np.isfinite(row.sigmas) else "",
         _seconds(row.statistics),
-        f"{row.statistics / per_iteration:.1f}" if np.isfinite(row.statistics) else "",
         f"{row.peak / 1e6:.0f}",
         f"{row.peak / row.rays:.0f}",
     ]
