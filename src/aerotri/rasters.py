@@ -159,10 +159,16 @@ class RasterReader:
         return out
 
     def _values(self, window) -> np.ndarray:
-        raw = self._file.read(1, window=window)
+        from rasterio.errors import RasterioError
+
+        try:
+            raw = self._file.read(1, window=window)
+            mask = self._file.read_masks(1, window=window) if self._masked else None
+        except RasterioError as error:
+            raise InputError(f"cannot be read: {error}", "write the file anew, it is damaged", self.path) from error
         values = raw.astype(self.dtype, copy=False)
-        if self._masked:
-            values[self._file.read_masks(1, window=window) == 0] = np.nan
+        if mask is not None:
+            values[mask == 0] = np.nan
         elif self.no_data is not None and not np.isnan(self.no_data):
             values[raw == float(self.no_data)] = np.nan
         return values

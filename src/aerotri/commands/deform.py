@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
+from aerotri.commands.results import refuse_foreign_folder, reopened
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
@@ -21,10 +22,11 @@ if TYPE_CHECKING:
     from aerotri.deformation.restitution import Restitution
     from aerotri.pipeline import Adjustment
 
+RECORD = "deform.json"
 OWN_NAMES = (
-    "deform.json", "dX.tif", "dY.tif", "dZ.tif", "sigma_dZ.tif", "model.tif", "models.csv", "seams.csv", "plots",
+    RECORD, "dX.tif", "dY.tif", "dZ.tif", "sigma_dX.tif", "sigma_dY.tif", "sigma_dZ.tif", "model.tif", "models.csv",
+    "seams.csv", "plots",
 )  # fmt: skip
-TEXTS = ("dX, wrong − true, m", "dY, wrong − true, m", "dZ, wrong − true, m")
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ def run_deform(source: Path, options: DeformOptions, out: Path | None, plots: bo
     console = Console(quiet=as_json)
     options.check()
     target = out or Path(f"{source.resolve().name.removesuffix('_result')}_deformation")
-    refuse_foreign(target)
+    refuse_foreign_folder(target, RECORD)
     calibration = reopened(source, console)
     from aerotri.deformation.absorbed import AbsorptionFailedError
     from aerotri.deformation.restitution import restitution
@@ -78,6 +80,7 @@ def run_deform(source: Path, options: DeformOptions, out: Path | None, plots: bo
     except AbsorptionFailedError as failure:
         console.failure(str(failure))
         return 1
+    refuse_without_errors(of, source)
     content = _computed(calibration, of, options, target, plots, console)
     if as_json:
         print(json.dumps(content, indent=2, ensure_ascii=False))
@@ -86,34 +89,16 @@ def run_deform(source: Path, options: DeformOptions, out: Path | None, plots: bo
     return 0
 
 
-def reopened(source: Path, console: Console) -> Adjustment:
-    """The adjustment of a result folder, linearised and factorised once.
-
-    Raises
-    ------
-    InputError
-        When the folder is no result.
-    """
-    from aerotri.compiled import compilation_notice
-    from aerotri.formats.block_folder import read_block
-    from aerotri.formats.solution import read_solution
-    from aerotri.pipeline import reopen
-
-    if not (source / "solution.npz").is_file():
-        raise InputError("is no result", "give the folder that `aerotri adjust` wrote", source)
-    console.progress(compilation_notice())
-    return reopen(read_block(source / "block"), read_solution(source / "solution.npz"))
-
-
-def refuse_foreign(target: Path) -> None:
-    """A deformation replaces an older one or an empty folder, nothing else.
+def refuse_without_errors(of: Restitution, source: Path) -> None:
+    """Without image errors nothing is deformed.
 
     Raises
     ------
     InputError
     """
-    if target.is_dir() and any(target.iterdir()) and not (target / "deform.json").exists():
-        raise InputError(f"'{target}' holds other files", "choose another --out, or an empty folder")
+    if all(errors.function.is_zero for errors in of.errors):
+        remedy = "adjust with additional parameters, such as --parameters bluh:1-12"
+        raise InputError("has no image errors, so its models are not deformed", remedy, source)
 
 
 def _computed(
@@ -202,9 +187,9 @@ def _write(
     crs = None if d.crs == "model" else horizontal_crs(d.crs)
     grid = Grid.of_nodes(d.x, d.y)
     with atomic_folder(target, own=OWN_NAMES) as folder:
-        for k, text in enumerate(TEXTS):
-            write_raster(folder / f"d{'XYZ'[k]}.tif", d.d[..., k], grid, crs, text)
-        write_raster(folder / "sigma_dZ.tif", d.sigma[..., 2], grid, crs, "σ of dZ, m")
+        for k, axis in enumerate("XYZ"):
+            write_raster(folder / f"d{axis}.tif", d.d[..., k], grid, crs, f"d{axis}, wrong − true, m")
+            write_raster(folder / f"sigma_d{axis}.tif", d.sigma[..., k], grid, crs, f"σ of d{axis}, m")
         if isinstance(d, BlockDeformation):
             write_raster(folder / "model.tif", d.number.astype(np.int32), grid, crs, "number of the model")
             _write_tables(folder, d)
@@ -213,7 +198,7 @@ def _write(
 
             save_plots(figures, folder / "plots")
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-        (folder / "deform.json").write_text(text + "\n", encoding="utf-8")
+        (folder / RECORD).write_text(text + "\n", encoding="utf-8")
 
 
 def _write_tables(folder: Path, d: BlockDeformation) -> None:

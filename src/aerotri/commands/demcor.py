@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
-from aerotri.commands.deform import check_crs, reopened
+from aerotri.commands.deform import check_crs, refuse_without_errors
+from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ def run_demcor(
     except AbsorptionFailedError as failure:
         console.failure(str(failure))
         return 1
+    if used is None:
+        refuse_without_errors(of, source)
     with ExitStack() as stack:
         stack.enter_context(cache_limited())
         reader = stack.enter_context(RasterReader(dem))

@@ -12,6 +12,7 @@ import numpy as np
 
 from aerotri.commands.console import Console
 from aerotri.commands.imgeo_exports import RECORD, export, plain, write_record
+from aerotri.commands.results import refuse_foreign_folder, reopened
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
@@ -54,12 +55,12 @@ def run_imgeo(result: Path, photographs: list[Path], out: Path, options: ImgeoOp
     InputError
     """
     console = Console(quiet=as_json)
-    refuse_foreign_folder(out)
+    refuse_foreign_folder(out, RECORD)
     _check_options(options)
     from aerotri.image_errors import image_groups
     from aerotri.image_errors.error_function import error_function
 
-    adjusted = _read_result(result, console)
+    adjusted = reopened(result, console).result
     groups = image_groups(adjusted.block)
     jobs = _jobs(adjusted, groups, photographs, out, options)
     used = sorted({job.group for job in jobs}) if jobs else range(len(groups))
@@ -68,17 +69,6 @@ def run_imgeo(result: Path, photographs: list[Path], out: Path, options: ImgeoOp
     record["photographs"] = _resample_all(jobs, errors, out, options, console)
     write_record(record, out)
     _tell(record, out, console, as_json)
-
-
-def refuse_foreign_folder(out: Path) -> None:
-    """Results stand beside older ones of this command, or in an empty folder.
-
-    Raises
-    ------
-    InputError
-    """
-    if out.is_dir() and any(out.iterdir()) and not (out / RECORD).exists():
-        raise InputError(f"'{out}' holds other files", "choose another --out, or an empty folder")
 
 
 def _check_options(options: ImgeoOptions) -> None:
@@ -90,21 +80,6 @@ def _check_options(options: ImgeoOptions) -> None:
     ):  # fmt: skip
         if value not in known:
             raise InputError(f"--{name} '{value}' is not known", f"choose one of {', '.join(known)}")
-
-
-def _read_result(result: Path, console: Console) -> AdjustedBlock:
-    from aerotri.compiled import compilation_notice
-    from aerotri.formats.block_folder import read_block
-    from aerotri.formats.solution import read_solution
-    from aerotri.pipeline import reopen
-
-    if not (result / "solution.npz").is_file():
-        raise InputError("holds no adjustment", "give the folder that `aerotri adjust` wrote", result)
-    console.progress(compilation_notice())
-    saved = read_solution(result / "solution.npz")
-    if saved.status != "converged":
-        raise InputError(f"the adjustment ended '{saved.status}'", "correct photographs by a converged one", result)
-    return reopen(read_block(result / "block"), saved).result
 
 
 def _jobs(

@@ -110,14 +110,15 @@ class DemModels:
         """
         window = (z.shape[0] - 2 * halo, z.shape[1] - 2 * halo)
         sums = no_sums()
-        chosen = np.unique(number)
-        chosen = chosen[chosen >= 0]
+        present = np.zeros(len(self.names) + 1, bool)
+        present[number] = True  # -1, no model, is the last one
+        chosen = np.flatnonzero(present[:-1])
         if not len(chosen):
             known = np.isfinite(z[halo : halo + window[0], halo : halo + window[1]]).sum()
             sums[1], sums[2] = window[0] * window[1] - known, known
             return CorrectedWindow(np.full(window, np.nan, z.dtype), np.full(window, np.nan, np.float32), sums, 0)
         x, y = float(grid.x(column + z.shape[1] // 2)), float(grid.y(row + z.shape[0] // 2))
-        number, photos = _renumbered(number, chosen), self.photos(x, y, chosen)
+        number, photos = _renumbered(number, chosen, present), self.photos(x, y, chosen)
         out, out_dz, exact = np.empty(window, z.dtype), np.empty(window, np.float32), 0
         for i in range(0, window[0], PART):
             for j in range(0, window[1], PART):
@@ -188,11 +189,13 @@ def added_sums(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return both
 
 
-def _renumbered(number: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Numbers counted within the chosen ones."""
-    if len(chosen) == 1 and chosen[0] == 0:
+def _renumbered(number: np.ndarray, chosen: np.ndarray, present: np.ndarray) -> np.ndarray:
+    """Numbers counted within the chosen ones, which are `present`."""
+    if len(chosen) == len(present) - 1:
         return number
-    return np.where(number >= 0, np.searchsorted(chosen, number), -1).astype(np.int32)
+    of_chosen = np.full(len(present), -1, np.int32)
+    of_chosen[chosen] = np.arange(len(chosen))
+    return of_chosen[number]
 
 
 def _photos(of: Orientation, rows: np.ndarray, local: np.ndarray, axes: np.ndarray) -> np.ndarray:

@@ -76,9 +76,9 @@ class NumberMap:
         at_column = np.floor(own.column(grid.x(column + np.arange(columns))) + 0.5).astype(np.int64)
         size = at_row[-1] - at_row[0] + 1, at_column[-1] - at_column[0] + 1
         window = self.reader.read(int(at_row[0]), int(at_column[0]), int(size[0]), int(size[1]))
-        number = window[np.ix_(at_row - at_row[0], at_column - at_column[0])]
-        place = np.minimum(np.searchsorted(self.known, number), len(self.known) - 1)
-        return np.where(self.known[place] == number, place, -1).astype(np.int32)
+        place = np.minimum(np.searchsorted(self.known, window), len(self.known) - 1)
+        number = np.where(self.known[place] == window, place, -1).astype(np.int32)
+        return number[np.ix_(at_row - at_row[0], at_column - at_column[0])]
 
 
 def read_polygons(path: Path, epsg: int | None = None) -> PolygonMap:

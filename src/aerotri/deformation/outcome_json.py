@@ -9,7 +9,7 @@ deform.json of one model::
       "cm_per_um": 0,                                                // dZ for 1 µm of x-parallax
       "spacing_m": 0, "nodes": 0,
       "dX": {"min": 0, "max": 0, "mean": 0, "rms": 0}, "dY": {}, "dZ": {},          // m, wrong − true
-      "sigma_dZ": {"min": 0, "max": 0, "mean": 0, "rms": 0}, "sigma_includes": "",
+      "sigma_dX": {"min": 0, "max": 0, "mean": 0, "rms": 0}, "sigma_dY": {}, "sigma_dZ": {}, "sigma_includes": "",
       "y_parallax_um": {"max": 0, "rms": 0}, "contour_interval_m": 0.05 }
 
 of a block: "kind": "block", no pair, group, base, end lap and parallax, but::
@@ -48,7 +48,7 @@ WORST_SEAMS = 10
 FEWEST_ON_SEAM = 4
 """Nodes or places of a seam that is named among the worst: a corner where models touch is none."""
 CONTOUR_INTERVALS_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-MOST_CONTOURS = 20
+MOST_CONTOURS = 25
 
 
 def contour_interval(low: float, high: float) -> float:
@@ -153,7 +153,8 @@ def correction_json(outcome: DemOutcome, models: DemModels, grid: Grid, block: s
 
 def _components(d: np.ndarray, sigma: np.ndarray, variant: str) -> dict[str, Any]:
     out: dict[str, Any] = {f"d{axis}": _statistics(d[..., k]) for k, axis in enumerate("XYZ")}
-    return out | {"sigma_dZ": _statistics(sigma[..., 2]), "sigma_includes": SIGMA_INCLUDES[variant]}
+    out |= {f"sigma_d{axis}": _statistics(sigma[..., k]) for k, axis in enumerate("XYZ")}
+    return out | {"sigma_includes": SIGMA_INCLUDES[variant]}
 
 
 def _statistics(values: np.ndarray) -> dict[str, float | None]:

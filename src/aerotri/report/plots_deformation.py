@@ -19,7 +19,7 @@ from aerotri.report.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, leng
 
 MEANING = {"free": "orientation of the self-calibrated block", "absorbed": "orientation adjusted without parameters"}
 HIGHEST = 6.6
-SEAM_STYLE: dict[str, Any] = {"colors": GREY, "linewidths": 0.5, "linestyles": (0, (5, 3))}
+SEAM_STYLE: dict[str, Any] = {"colors": GREY, "linewidths": 0.9, "linestyles": (0, (1, 2))}
 PROFILE_STYLES: tuple[dict[str, Any], ...] = (
     {"color": GREY, "lw": 1.0, "ls": (0, (1, 1.2))},
     {"color": GREY, "lw": 1.0, "ls": (0, (5, 2))},
@@ -174,7 +174,7 @@ def _contour_symbols(seams: bool) -> list[Line2D]:
         Line2D([], [], ls="none", label="projection centres", **BASE_STYLE),
     ]
     if seams:
-        symbols.append(Line2D([], [], color=GREY, lw=0.6, ls=(0, (5, 3)), label="seams of the images' parts"))
+        symbols.append(Line2D([], [], color=GREY, lw=0.9, ls=(0, (1, 2)), label="seams of the images' parts"))
     return symbols
 
 
