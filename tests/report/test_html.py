@@ -1,6 +1,7 @@
 """The report: self-contained, every name escaped, the numbers in it those of the result."""
 
 import base64
+import hashlib
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -9,8 +10,12 @@ import numpy as np
 import pytest
 
 from aerotri.report.html import LARGEST_SVG, report_html, write_report
+from aerotri.report.interactive_plan import interactive_plan
 from aerotri.report.plots import all_plots, save_plots
+from aerotri.report.quality import findings
 from aerotri.report.rendering import RenderedPlot, render_plots
+from aerotri.report.tables import observation_groups
+from aerotri.statistics.adjusted_block import ObservationGroup
 from synthetic import make_adjusted_block
 
 HOSTILE = "<script>alert(1)</script>"
@@ -78,9 +83,16 @@ def hostile_block():
 
 
 def test_self_contained(page):
-    """Nothing to load and nothing to run: all sources are data, links stay in the page."""
+    """Nothing to load, and nothing to run but the page's own script: all sources are data, links stay in the page."""
     parsed = Page(page)
-    assert not {"script", "link", "iframe", "object", "embed", "base", "form", "svg"} & set(parsed.tags)
+    assert not {"link", "iframe", "object", "embed", "base", "form"} & set(parsed.tags)
+    assert parsed.tags.count("script") == 2
+    scripts = re.findall(r"<script([^>]*)>(.*?)</script>", page, re.S)
+    assert scripts[0][0] == ' type="application/json" id="plan-data"'
+    assert scripts[1][0] == ""
+    digest = base64.b64encode(hashlib.sha256(scripts[1][1].encode()).digest()).decode()
+    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
+    assert dict(parsed.attributes[: parsed.attributes.index(("name", "viewport"))])["content"] == policy
     for name, value in parsed.attributes:
         assert not name.startswith("on")
         if name == "src":
@@ -93,12 +105,14 @@ def test_self_contained(page):
 
 def test_embedded_plots_are_the_plots(page, plots):
     sources = dict(enumerate(re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', page)))
-    assert {base64.b64decode(s) for s in sources.values()} == {plot.svg for plot in plots.values()}
+    # the block plan is drawn in the page itself
+    shown = {plot.svg for name, plot in plots.items() if name != "block_plan"}
+    assert {base64.b64decode(s) for s in sources.values()} == shown
 
 
 def test_heavy_vector_plots_become_png(adjusted, plots):
-    heavy = RenderedPlot(b"<svg>" + b" " * LARGEST_SVG + b"</svg>", plots["block_plan"].png)
-    text = report_html(adjusted, {"block_plan": heavy})
+    heavy = RenderedPlot(b"<svg>" + b" " * LARGEST_SVG + b"</svg>", plots["ground_points"].png)
+    text = report_html(adjusted, {"ground_points": heavy})
     assert base64.b64encode(heavy.png).decode() in text
     assert "svg+xml" not in text
 
@@ -107,8 +121,7 @@ def test_hostile_names_stay_text():
     adjusted = hostile_block()
     text = report_html(adjusted, all_plots(adjusted))
     parsed = Page(text)
-    assert "script" not in parsed.tags
-    assert "<script" not in text
+    assert parsed.tags.count("script") == text.count("<script") == 2
     assert not any(name.startswith("on") for name, _ in parsed.attributes)
     # and they are there, as text
     assert parsed.text.count(HOSTILE) > 40
@@ -131,9 +144,9 @@ def test_numbers_of_the_result(adjusted, page):
 def test_reads_top_to_bottom(page):
     headings = re.findall(r"<h2[^>]*>(.*?)</h2>", page)
     assert headings == [
-        "What was adjusted", "Is it good?", "What to look at first", "Control and check points",
-        "What the camera does wrong", "Residuals",
-        "Gross errors and weak places", "Exterior orientation", "Warnings",
+        "What was adjusted", "Is it good?", "Control and check points", "What the camera does wrong",
+        "Which parameters matter", "What they change at check points", "Residuals",
+        "The work list: what to look at first",
     ]  # fmt: skip
 
 
@@ -146,6 +159,7 @@ def test_tables_scroll_and_long_ones_are_folded(page):
 
 def test_dark_and_paper(page):
     assert "@media (prefers-color-scheme: dark)" in page
+    assert ':root[data-theme="dark"]' in page
     assert "@media print" in page
 
 
@@ -175,3 +189,70 @@ def test_written_once_rendered_once(adjusted, tmp_path):
     write_report(adjusted, rendered, tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert base64.b64encode((tmp_path / "plots" / "rays_per_point.svg").read_bytes()).decode() in text
+
+
+def test_links_lead_somewhere(page):
+    places = set(re.findall(r' id="([^"]+)"', page))
+    assert set(re.findall(r'href="#([^"]+)"', page)) <= places
+    assert len(re.findall(r"<nav>(.*?)</nav>", page, re.S)[0].split("</a>")) == 9
+
+
+def test_lights_are_words_and_shapes(page, adjusted):
+    """Colour alone says nothing on paper: every light has its word, every number its threshold beside it."""
+    rows = re.findall(r'<tr><td class="lamp">(.*?)</td>(.*?)</tr>', page, re.S)
+    expected = findings(adjusted)
+    assert len(rows) == len(expected)
+    for (lamp, rest), finding in zip(rows, expected, strict=True):
+        assert f'light {finding.level}"' in lamp
+        assert f">{finding.level}<" in lamp
+        cells = Page(rest.replace("&lt;", "below")).text
+        assert finding.value.split()[0] in cells
+        assert finding.expected.split()[0].replace("<", "below") in cells
+
+
+def test_plan_has_every_photograph_and_ground_point(adjusted):
+    drawn = interactive_plan(adjusted)
+    block = adjusted.block
+    assert [spot.name for spot in drawn.of_kind("photograph")] == block.images.names.tolist()
+    assert [spot.name for spot in drawn.of_kind("control")] == block.points[adjusted.control.point].tolist()
+    assert [spot.name for spot in drawn.of_kind("check")] == block.points[adjusted.check.point].tolist()
+    # metres from the middle, y down
+    spot = drawn.of_kind("photograph")[5]
+    x, y = adjusted.images.centre[5, :2]
+    assert spot.x + drawn.origin[0] == pytest.approx(x, abs=2 * drawn.unit)
+    assert drawn.origin[1] - spot.y == pytest.approx(y, abs=2 * drawn.unit)
+    assert len(spot.outline) == 8
+    corners = np.array(spot.outline).reshape(4, 2)
+    np.testing.assert_allclose(corners.mean(axis=0), (spot.x, spot.y), atol=40.0)
+    left, top, width, height = drawn.view
+    for one in drawn.spots:
+        assert left < one.x < left + width
+        assert top < one.y < top + height
+    critical = 3.29
+    assert {s.name for s in drawn.of_kind("point")} <= set(block.points[adjusted.points.max_abs_w > critical])
+
+
+def test_groups_stand_in_their_units(adjusted):
+    groups = [ObservationGroup(name, 10, 2e-4, 2e-4, 5.0, 3e-4) for name in
+              ("image points", "image points day 1", "control height", "projection centres", "attitudes", "INS kappa",
+               "weighted parameters")]  # fmt: skip
+    shown = observation_groups(replace(adjusted, groups=tuple(groups)))
+    assert [row[1] for row in shown.rows] == ["µm", "µm", "m", "m", "mgon", "mgon", "σ"]
+    assert shown.rows[4][4] == pytest.approx(2e-4 * 200000 / np.pi)
+    assert shown.rows[0][4] == 2e-4
+
+
+def test_removed_parameters_are_listed_with_their_reason(adjusted):
+    p = adjusted.parameters
+    status, reason = p.status.astype(object), p.reason.astype(object)
+    status[3], reason[3] = "removed", "t 0.4 below 1"
+    text = Page(report_html(replace(adjusted, parameters=replace(p, status=status, reason=reason)), {})).text
+    after = text[text.index("Removed parameters") :]
+    assert after.index(str(p.names[3])) < after.index("t 0.4 below 1") < after.index("What they change")
+
+
+def test_two_groups_are_compared():
+    adjusted = make_adjusted_block(2, 4, 60, groups="day")
+    text = Page(report_html(adjusted, all_plots(adjusted))).text
+    assert "day 1 − day 2: the camera has changed between them; χ²" in text
+    assert "The systematic image errors of two groups and their difference" in text

@@ -345,12 +345,15 @@ class NormalSystem:
         """Factor of the reduced matrix; valid until the next one."""
         return self.symbolic.factorise(equations.matrix)
 
-    def solve_sides(self, state: State, factor: Factor, sides: np.ndarray, estimator: Estimator):
-        """Columns Q·b for right sides b that act on the points.
+    def solve_sides(
+        self, state: State, factor: Factor, sides: np.ndarray, estimator: Estimator,
+        shared_sides: np.ndarray | None = None,
+    ):  # fmt: skip
+        """Columns Q·b for right sides b that act on the points, and on the shared parameters where given.
 
         Parameters
         ----------
-        sides : (P, 3, k).
+        sides : (P, 3, k). shared_sides : (s, k).
 
         Returns
         -------
@@ -373,6 +376,8 @@ class NormalSystem:
             [np.sum([r[0] for r in rights], axis=0).reshape(6 * n, k), np.sum([r[1] for r in rights], axis=0)]
         )
         right[6 * n + u.kept_columns] += sides[u.kept_rows]
+        if shared_sides is not None:
+            right[6 * n :] += shared_sides
         x = factor.solve(right)
         images, shared = np.ascontiguousarray(x[: 6 * n].reshape(n, 6, k)), np.ascontiguousarray(x[6 * n :])
         return images, shared, self.expand_sides(state, images, shared, sides, estimator)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from aerotri.pipeline import Adjustment
     from aerotri.statistics.adjusted_block import AdjustedBlock
     from aerotri.statistics.free_verdict import FreeCheck
+    from aerotri.statistics.parameter_effects import ParameterEffects
 
 RESULT_NAMES = (
     "adjustment.json", "images.csv", "points.csv", "residuals.parquet", "parameters.csv", "control.csv", "check.csv",
@@ -173,8 +174,17 @@ def _draw(adjustment: Adjustment, folder: Path, checked: FreeCheck | None) -> No
     from aerotri.statistics.work_list import work_list
 
     plots = save_plots(all_plots(adjustment.result), folder / "plots")
-    findings = Findings(work_list(adjustment.local), checked)
+    findings = Findings(work_list(adjustment.local), checked, effects=_effects(adjustment))
     write_report(adjustment.result, plots, folder / "report.html", findings)
+
+
+def _effects(adjustment: Adjustment) -> ParameterEffects | None:
+    """What leaving additional parameters out would change at the check points."""
+    from aerotri.statistics.parameter_effects import parameter_effects
+
+    system, solution = adjustment.system, adjustment.solution
+    factor = system.factorise(solution.equations)
+    return parameter_effects(adjustment.local, system, solution, factor)
 
 
 def _folder_name(path: Path) -> str:

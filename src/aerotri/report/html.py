@@ -1,8 +1,13 @@
-"""One self-contained page about an adjustment: no network, no scripts, every name escaped."""
+"""One self-contained page about an adjustment: no network, every name escaped.
+
+Its one script sorts and filters tables and moves the block plan; the page's policy lets nothing else run or load, and
+without the script everything can still be read.
+"""
 
 from __future__ import annotations
 
 import base64
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -10,21 +15,39 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from aerotri.crosscheck import CrosscheckResult
-from aerotri.report import quality, tables, work_tables
+from aerotri.image_errors import GroupChange, group_change, image_groups
+from aerotri.report import precision_tables, quality, tables, work_tables
+from aerotri.report.interactive_plan import interactive_plan
 from aerotri.report.plots_crosscheck import crosscheck_table
 from aerotri.report.rendering import RenderedPlot, render_plots
 from aerotri.statistics.adjusted_block import AdjustedBlock
 from aerotri.statistics.free_verdict import FreeCheck
+from aerotri.statistics.parameter_effects import ParameterEffects
 from aerotri.statistics.work_list import WorkList, work_list
 
 LARGEST_SVG = 450_000
 """Bytes above which a plot is embedded as PNG: thousands of photographs as vectors weigh more than they say."""
 
+MOST_CHANGES = 3
+
+CONTENTS = (
+    ("adjusted", "What was adjusted"),
+    ("good", "Is it good?"),
+    ("ground", "Control and check points"),
+    ("camera", "What the camera does wrong"),
+    ("parameters", "Which parameters matter"),
+    ("effects", "What they change"),
+    ("residuals", "Residuals"),
+    ("work", "Work list"),
+)
+
 CAPTIONS = {
     "block_plan": "Projection centres, strips, footprints on the mean height of the ground, control and check points.",
+    "group_change": "The systematic image errors of two groups and their difference, on one scale.",
     "ground_points": "Differences adjusted − given: horizontal vectors, and heights as arrows up (too high) or down.",
     "systematic_errors": (
         "Systematic image errors d of the additional parameters: measured = ideal + d. Dark arrows differ from zero at "
@@ -55,11 +78,13 @@ class Findings:
     free_check : None where no free adjustment was asked for.
     crosscheck : the same block through other programs; None where that was not asked for. Its plot comes with the
         others, as 'crosscheck'.
+    effects : what leaving parameters out changes at the check points; None where there are none, or it was not asked.
     """
 
     work: WorkList | None = None
     free_check: FreeCheck | None = None
     crosscheck: CrosscheckResult | None = None
+    effects: ParameterEffects | None = None
 
 
 NOTHING_BESIDE = Findings()
@@ -79,7 +104,11 @@ def report_html(
         loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    return environment.get_template("report.html.j2").render(_content(adjusted, render_plots(plots), findings))
+    script = (environment.loader or PackageLoader("aerotri.report")).get_source(environment, "report.js")[0]
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    content = _content(adjusted, render_plots(plots), findings)
+    content |= {"script": Markup(script), "script_hash": Markup(f"sha256-{digest}")}
+    return environment.get_template("report.html.j2").render(content)
 
 
 def write_report(
@@ -103,11 +132,48 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         "warnings": [quality.printable(text, 1000) for text in adjusted.outcome.warnings],
         "asprs": quality.asprs_warning(adjusted),
         "plots": {name: _embedded(name, plot) for name, plot in plots.items()},
-        "tables": _tables(adjusted) | {"work": work_tables.work_table(work)},
+        "contents": CONTENTS,
+        "plan": interactive_plan(adjusted),
+        "tables": _tables(adjusted) | {"work": work_tables.work_table(work), "effects": _effects(adjusted, beside)},
+        "effects_missing": _why_no_effects(adjusted),
+        "selection": adjusted.block.settings.adjustment.parameter_selection == "on",
+        "changes": [_change(change) for change in group_changes(adjusted)],
         "work_counts": work_tables.work_counts(work),
         "free": None if beside.free_check is None else _free_check(beside.free_check),
         "crosscheck": None if beside.crosscheck is None else _crosscheck(beside.crosscheck),
     }
+
+
+def _effects(adjusted: AdjustedBlock, beside: Findings) -> tables.Table | None:
+    if beside.effects is None:
+        return None
+    return precision_tables.check_effects(beside.effects, quality.metre_digits(adjusted.check.sigma))
+
+
+def _why_no_effects(adjusted: AdjustedBlock) -> str:
+    if not len(adjusted.check):
+        return "There are no check points: what the parameters do to the ground cannot be seen."
+    return "Not computed." if "additional" in adjusted.parameters.kinds else "No parameters were estimated."
+
+
+def group_changes(adjusted: AdjustedBlock) -> list[GroupChange]:
+    """The first group of photographs against the others of its camera that have parameters, at most three."""
+    if "additional" not in adjusted.parameters.kinds:
+        return []
+    first, *others = image_groups(adjusted.block)
+    same = [group for group in others if group.camera is first.camera]
+    return [group_change(adjusted, first.name, group.name, first.camera.name) for group in same[:MOST_CHANGES]]
+
+
+def _change(change: GroupChange) -> dict[str, str]:
+    same = change.chi2 <= change.limit()
+    verdict = "the camera has not changed, as far as can be seen" if same else "the camera has changed between them"
+    sentence = (
+        f"{quality.printable(change.field.group, 400)}: {verdict}; χ² {change.chi2:.1f} with {change.freedom} degrees "
+        f"of freedom, at most {change.limit():.1f} by chance (95 %); RMS of the difference "
+        f"{1e3 * change.field.rms:.2f} µm."
+    )
+    return {"level": "good" if same else "note", "sentence": sentence}
 
 
 def _free_check(check: FreeCheck) -> dict[str, Any]:
@@ -145,6 +211,11 @@ def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
         "cameras": tables.cameras(adjusted),
         "film": tables.film(adjusted),
         "parameters": tables.parameters(adjusted),
+        "removed": tables.removed_parameters(adjusted),
+        "correlations": precision_tables.correlations(adjusted),
+        "precision": precision_tables.precision(adjusted),
+        "ellipsoids": precision_tables.ellipsoids(adjusted),
+        "orientation_correlations": precision_tables.orientation_correlations(adjusted),
         "largest": tables.largest_residuals(adjusted),
         "blunders": tables.blunders(adjusted),
         "weak_points": tables.weak_points(adjusted),

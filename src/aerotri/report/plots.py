@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from aerotri.image_errors import averaged_residuals, field_on_grid, image_groups
+from aerotri.image_errors import averaged_residuals, field_difference, field_on_grid, image_groups
 from aerotri.report.plots_block import plot_block_plan, plot_ground_points, plot_rays_per_point
 from aerotri.report.plots_camera import plot_averaged_residuals, plot_systematic_errors
+from aerotri.report.plots_panels import Panel, plot_panels
 from aerotri.report.plots_reliability import plot_reliability
 from aerotri.report.plots_residuals import correlated_parameters, plot_correlations, plot_residual_histogram
 from aerotri.report.rendering import save_plots
@@ -44,6 +45,9 @@ def all_plots(adjusted: AdjustedBlock) -> dict[str, Figure]:
             figures[f"systematic_errors{suffix}"] = plot_systematic_errors(field, name)
         averaged = averaged_residuals(adjusted, group.name, camera=group.camera.name)
         figures[f"averaged_residuals{suffix}"] = plot_averaged_residuals(averaged, name)
+    groups = image_groups(adjusted.block)
+    if len(groups) > 1 and groups[0].camera is groups[1].camera and "additional" in adjusted.parameters.kinds:
+        figures["group_change"] = _plot_change(adjusted, groups[0].name, groups[1].name, groups[0].camera.name)
     if len(correlated_parameters(adjusted)) >= 2:
         figures["correlations"] = plot_correlations(adjusted)
     figures["residual_histogram"] = plot_residual_histogram(adjusted)
@@ -51,3 +55,10 @@ def all_plots(adjusted: AdjustedBlock) -> dict[str, Figure]:
     if adjusted.effects is not None:
         figures["reliability"] = plot_reliability(adjusted)
     return figures
+
+
+def _plot_change(adjusted: AdjustedBlock, first: str, second: str, camera: str) -> Figure:
+    """Two groups and their difference, on one scale."""
+    fields = [field_on_grid(adjusted, group, camera=camera) for group in (first, second)]
+    fields.append(field_difference(adjusted, first, second, camera=camera))
+    return plot_panels([Panel(field.group, field) for field in fields], f"Two groups – {adjusted.block.name}")

@@ -135,18 +135,30 @@ def unit_of(name: str) -> str:
     return next((unit for pattern, unit in UNITS if re.fullmatch(pattern, name)), "–")
 
 
+def unit_of_group(name: str) -> tuple[str, float]:
+    """Unit in which a group of observations is shown, and the factor from the unit of its record."""
+    if name.startswith("image points"):
+        return "µm", 1.0
+    if name == "attitudes" or name.startswith("INS"):
+        return "mgon", MGON_PER_RADIAN
+    # weighted parameters of many units are recorded in units of their own σ
+    return ("σ", 1.0) if name == "weighted parameters" else ("m", 1.0)
+
+
 def observation_groups(adjusted: AdjustedBlock) -> Table:
-    """The groups of observations, their σ before and after; image points in µm, everything else as its name says."""
+    """The groups of observations and their σ before and after, each in its unit."""
     groups = adjusted.groups
+    units = [unit_of_group(group.name) for group in groups]
+    factor = np.array([factor for _, factor in units])
     return table(
         "Groups of observations",
         (Column("group"), [g.name for g in groups]),
-        (Column("unit"), ["µm" if g.name == "image points" else "m" for g in groups]),
+        (Column("unit"), [unit for unit, _ in units]),
         (Column("observations", "", "d"), [g.count for g in groups]),
         (Column("redundancy", "", ".1f"), [g.redundancy for g in groups]),
-        (Column("σ a priori", "", ".4g"), [g.sigma_apriori for g in groups]),
-        (Column("RMS of residuals", "", ".4g"), [g.rms for g in groups]),
-        (Column("σ a posteriori", "", ".4g"), [g.sigma_aposteriori for g in groups]),
+        (Column("σ a priori", "", ".4g"), factor * [g.sigma_apriori for g in groups]),
+        (Column("RMS of residuals", "", ".4g"), factor * [g.rms for g in groups]),
+        (Column("σ a posteriori", "", ".4g"), factor * [g.sigma_aposteriori for g in groups]),
     )
 
 
@@ -204,6 +216,18 @@ def parameters(adjusted: AdjustedBlock) -> Table:
         (Column("B", "", ".2f"), p.total_correlation[rows]),
         (Column("status"), p.status[rows]),
         *reason,
+    )
+
+
+def removed_parameters(adjusted: AdjustedBlock) -> Table:
+    """Additional parameters that the selection removed, and why."""
+    p = adjusted.parameters
+    rows = (p.kinds == "additional") & (p.status == "removed")
+    return table(
+        "Removed parameters",
+        (Column("parameter"), p.names[rows]),
+        (Column("group"), p.groups[rows]),
+        (Column("reason"), p.reason[rows]),
     )
 
 
