@@ -308,5 +308,58 @@ def demcor(
     raise typer.Exit(run_demcor(result, dem, out, pair, models, model_table, dem_orientation, json_))
 
 
+@app.command(epilog="Example: aerotri volume dtm.tif --boundary pile.gpkg --base boundary --adjustment saar_result")
+def volume(
+    dtm: Annotated[Path, typer.Argument(help="Surface (GeoTIFF).")],
+    base: Annotated[
+        str,
+        typer.Option(
+            help="level:HEIGHT, plane:X,Y,Z;X,Y,Z;X,Y,Z, plane (fitted to the boundary), boundary (spline through it), "
+            "lowest (level of its lowest point), or another raster."
+        ),
+    ] = "boundary",
+    boundary: Annotated[
+        str | None, typer.Option(help="GeoPackage, GeoJSON, WKT file or WKT text; the whole surface without.")
+    ] = None,
+    method: Annotated[
+        str, typer.Option(help="The one that counts: prisms, grid, trapezoidal, simpson, simpson38.")
+    ] = "prisms",
+    section_spacing: Annotated[float | None, typer.Option(min=1e-6, help="Metres between sections.")] = None,
+    azimuth: Annotated[float, typer.Option(help="Degrees from north, in which sections follow one another.")] = 0.0,
+    adjustment: Annotated[
+        Path | None, typer.Option(help="Result folder the surface was measured with; gives the volume its σ.")
+    ] = None,
+    pickets: Annotated[
+        Path | None, typer.Option(help="pickets.parquet of `aerotri dtm`; without, every cell is taken for one.")
+    ] = None,
+    base_adjustment: Annotated[Path | None, typer.Option(help="Result folder of a base that is a surface.")] = None,
+    matching_sigma_um: Annotated[
+        float | None, typer.Option(min=1e-6, help="σ of an image coordinate of a picket; default that of the block.")
+    ] = None,
+    matching_window: Annotated[
+        float, typer.Option(min=0.0, help="Side of the matching window on the ground, m; its cells share noise.")
+    ] = 0.0,
+    base_sigma: Annotated[float, typer.Option(min=0.0, help="σ of the base's height, m, common to all of it.")] = 0.0,
+    boundary_sigma: Annotated[float, typer.Option(min=0.0, help="σ of a corner of the boundary, m.")] = 0.0,
+    uncorrected: Annotated[
+        bool, typer.Option("--uncorrected", help="The photographs were measured with their image errors in them.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder to write; default NAME_volume here.")] = None,
+    plots: Annotated[bool, typer.Option(help="Draw the plots and the page.")] = True,
+    json_: Json = False,
+) -> None:
+    """A volume, cut and fill, and how sure it is: σ with every part named."""
+    from aerotri.commands.volume import VolumeInput, run_volume
+    from aerotri.volume.accuracy import SigmaOptions
+    from aerotri.volume.compute import SectionPlan
+
+    given = VolumeInput(dtm, base, boundary, method, adjustment, pickets, base_adjustment)
+    options = SigmaOptions(
+        matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma,
+        corrected=not uncorrected,
+    )  # fmt: skip
+    raise typer.Exit(run_volume(given, SectionPlan(section_spacing, azimuth), options, out, plots, json_))
+
+
 if __name__ == "__main__":
     main()

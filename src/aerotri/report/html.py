@@ -239,11 +239,16 @@ def _cards(adjusted: AdjustedBlock) -> list[tuple[str, str, str]]:
 
 
 def _embedded(name: str, plot: RenderedPlot) -> dict[str, str]:
-    """Source and description of an image; as a data address it can neither load nor run anything."""
+    """Source and description of an image."""
+    caption = next(text for start, text in CAPTIONS.items() if name.startswith(start))
+    return {"source": data_address(plot), "caption": caption}
+
+
+def data_address(plot: RenderedPlot) -> str:
+    """An image inside a page; as a data address it can neither load nor run anything."""
     small = len(plot.svg) <= LARGEST_SVG
     kind, content = ("svg+xml", plot.svg) if small else ("png", plot.png)
-    caption = next(text for start, text in CAPTIONS.items() if name.startswith(start))
-    return {"source": f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}", "caption": caption}
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
 def _version() -> str:

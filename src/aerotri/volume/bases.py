@@ -79,7 +79,7 @@ class SurfaceBase:
 
 @dataclass(frozen=True, eq=False)
 class SplineBase:
-    """A thin plate spline through heights of the surface along the boundary.
+    """A spline through heights of the surface along the boundary.
 
     Parameters
     ----------
@@ -141,7 +141,11 @@ def boundary_heights(surface: Surface, boundary: Boundary, most: int = MOST_NODE
 
 
 def spline_through(surface: Surface, boundary: Boundary) -> SplineBase:
-    """The spline through the boundary [L: Duchon 1977], φ = ρ²·ln ρ with a plane."""
+    """The spline through the boundary: φ = −ρ with a plane [L: Duchon 1977; kriging with a linear variogram].
+
+    A thin plate, φ = ρ²·ln ρ, would take slopes at the boundary from differences of neighbours and carry them inwards:
+    its integral has 5 to 25 times the noise of this one [D: a boundary of 57 600 m², 60 and 400 nodes].
+    """
     nodes = boundary_heights(surface, boundary)
     middle = nodes[:, :2].mean(axis=0)
     size = float(np.abs(nodes[:, :2] - middle).max())
@@ -240,10 +244,8 @@ def _along(ring: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def _spline_terms(at: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """(n, k + 3): ρ²·ln ρ to every node, then 1, x, y."""
+    """(n, k + 3): −ρ to every node, then 1, x, y."""
     squared = np.maximum(
         np.sum(at**2, axis=1)[:, None] - 2.0 * at @ nodes.T + np.sum(nodes**2, axis=1)[None, :], 0.0
     )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        radial = np.where(squared > 1e-28, 0.5 * squared * np.log(squared), 0.0)
-    return np.column_stack([radial, np.ones(len(at)), at])
+    return np.column_stack([-np.sqrt(squared), np.ones(len(at)), at])

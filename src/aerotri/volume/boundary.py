@@ -35,8 +35,7 @@ class Boundary:
     @property
     def rings(self) -> list[np.ndarray]:
         """Corners (n, 2) of every ring, the first one repeated at the end; outer rings run counter-clockwise."""
-        oriented = shapely.orient_polygons(self.polygon) if hasattr(shapely, "orient_polygons") else self.polygon
-        parts = shapely.get_parts(oriented)
+        parts = shapely.get_parts(shapely.orient_polygons(self.polygon))
         return [np.asarray(ring.coords)[:, :2] for part in parts for ring in (part.exterior, *part.interiors)]
 
     def coverage(self, grid: Grid) -> np.ndarray:

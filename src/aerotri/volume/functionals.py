@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from scipy.spatial import Delaunay
 
 from aerotri.rasters import Grid
 from aerotri.volume.bases import Base, SplineBase, Surface
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.sums import cells_within, windows
-from aerotri.volume.triangles import corner_weights
+from aerotri.volume.triangles import barycentric, corner_weights
 
 MOST_CELLS = 1_000_000
 """Cells that are carried one by one; neighbours are put together where there are more."""
@@ -84,10 +85,6 @@ def barycentric_weights(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (n,) that hold places, and weight times their barycentric coordinates (n, 3); places outside are left
     out."""
-    import shapely
-
-    from aerotri.volume.triangles import barycentric
-
     corners = xyz[triangles][:, :, :2]
     tree = shapely.STRtree(np.asarray(shapely.polygons(np.concatenate([corners, corners[:, :1]], axis=1))))
     place, found = tree.query(shapely.points(at), predicate="intersects")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.deformation.orientation import Calibration, calibrated_orientation
+from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.observations import Block
 from aerotri.volume import _response_kernels as _kernels
 
@@ -119,3 +120,26 @@ def _candidates(local, number, orientation, half, known) -> tuple[np.ndarray, np
     ]
     first = np.concatenate([[0], np.cumsum([len(own) for own in lists])]).astype(np.int64)
     return first, np.concatenate([*lists, np.zeros(0, np.int64)]).astype(np.int64)
+
+
+def height_cofactors(calibration: Calibration, pickets: Pickets) -> np.ndarray:
+    """(k,) m², variance of the height of every picket from the σ of its rays, its orientation known."""
+    local = pickets.xyz if calibration.frame is None else calibration.frame.to_local(pickets.xyz)
+    orientation = calibrated_orientation(calibration)
+    interior = np.zeros((len(orientation), len(INTERIOR_COLUMNS)))
+    interior[:, :3] = orientation.interior
+    point = np.repeat(np.arange(len(pickets)), np.diff(pickets.start))
+    rays = linearise(
+        np.ascontiguousarray(orientation.rotation), np.ascontiguousarray(orientation.centre), local, interior,
+        pickets.image, point, pickets.image, np.zeros((len(point), 2)),
+    )  # fmt: skip
+    a = rays.by_point / pickets.sigma_mm[:, None, None]
+    normal = np.zeros((len(pickets), 3, 3))
+    np.add.at(normal, point, np.einsum("rai,raj->rij", a, a))
+    return np.linalg.inv(normal)[:, 2, 2]
+
+
+def with_height_sigmas(calibration: Calibration, pickets: Pickets, sigma: np.ndarray) -> Pickets:
+    """The pickets with the noise that their own σ of height state, (k,) m; NaN keeps what their rays give."""
+    stated = sigma**2 / height_cofactors(calibration, pickets)
+    return replace(pickets, noise_share=np.where(np.isfinite(sigma), stated, pickets.noise_share))

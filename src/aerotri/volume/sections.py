@@ -98,12 +98,42 @@ def cross_sections(
     return Sections(azimuth, origin, station, sums)
 
 
-def section_profile(surface: Surface, base: Base, start: np.ndarray, end: np.ndarray, count: int = 400) -> np.ndarray:
-    """(count, 3): distance from the start, height of the surface, height of the base along a line, m."""
-    t = np.linspace(0.0, 1.0, count)
-    at = start + t[:, None] * (end - start)
-    z = sampled(surface, at[:, 0], at[:, 1])
-    return np.column_stack([t * np.linalg.norm(end - start), z, base.heights(at[:, 0], at[:, 1])])
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A section as it is drawn: heights along it, m; NaN where not known.
+
+    Parameters
+    ----------
+    station : m. ends : (2, 2) m, where it begins and ends. distance, surface, base : (n,) m.
+    inside : (n,) bool, within the boundary.
+    """
+
+    station: float
+    ends: np.ndarray
+    distance: np.ndarray
+    surface: np.ndarray
+    base: np.ndarray
+    inside: np.ndarray
+
+
+def chosen_profiles(
+    surface: Surface, base: Base, boundary: Boundary, sections: Sections, count: int = 3, places: int = 400
+) -> list[Profile]:
+    """Some sections evenly spread between the first and the last one."""
+    along = direction_of(sections.azimuth)
+    across = np.array([along[1], -along[0]])
+    reach = (np.concatenate(boundary.rings) - sections.origin) @ across
+    wanted = sections.station[-1] * (np.arange(count) + 1.0) / (count + 1.0)
+    chosen = sections.station[np.unique(np.argmin(np.abs(sections.station[:, None] - wanted), axis=0))]
+    out = []
+    for station in chosen:
+        ends = sections.origin + station * along + np.array([reach.min(), reach.max()])[:, None] * across
+        at = ends[0] + np.linspace(0.0, 1.0, places)[:, None] * (ends[1] - ends[0])
+        z = sampled(surface, at[:, 0], at[:, 1])
+        inside = np.asarray(shapely.contains_xy(boundary.polygon, at[:, 0], at[:, 1]))
+        distance = np.linalg.norm(at - ends[0], axis=1)
+        out.append(Profile(float(station), ends, distance, z, base.heights(at[:, 0], at[:, 1]), inside))
+    return out
 
 
 def _spans(boundary: Boundary, line: shapely.LineString) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -19,12 +19,13 @@ class Pieces:
     Parameters
     ----------
     triangle : (n,) which triangle. area : (n,) m². weights : (n, 3) mean barycentric coordinates over the part.
-    geometry : (n,) the parts, None for triangles that lie inside as a whole.
+    whole : (n,) bool, inside as a whole. geometry : (n,) the parts, None where whole.
     """
 
     triangle: np.ndarray
     area: np.ndarray
     weights: np.ndarray
+    whole: np.ndarray
     geometry: np.ndarray
 
 
@@ -50,6 +51,7 @@ def cut_to(polygon: BaseGeometry, corners: np.ndarray) -> Pieces:
         np.concatenate([inside, rest]),
         np.concatenate([areas(corners[inside]), part_area]),
         np.concatenate([np.full((len(inside), 3), 1.0 / 3.0), barycentric(corners[rest], middle)]),
+        np.arange(len(geometry)) < len(inside),
         geometry,
     )
 
@@ -71,10 +73,9 @@ def prism_sums(polygon: BaseGeometry, corners: np.ndarray, d: np.ndarray) -> np.
         return sums
     pieces = cut_to(polygon, corners)
     own = d[pieces.triangle]
-    whole = np.array([part is None for part in pieces.geometry])
-    _kernels.add_triangles(np.ascontiguousarray(own[whole]), pieces.area[whole], sums)
-    mixed = ~whole & (own.min(axis=1) < 0.0) & (own.max(axis=1) > 0.0)
-    plain = ~whole & ~mixed
+    _kernels.add_triangles(np.ascontiguousarray(own[pieces.whole]), pieces.area[pieces.whole], sums)
+    mixed = ~pieces.whole & (own.min(axis=1) < 0.0) & (own.max(axis=1) > 0.0)
+    plain = ~pieces.whole & ~mixed
     # over a part without a change of sign the mean counts; its area stands for a triangle of that height
     mean = np.sum(own[plain] * pieces.weights[plain], axis=1)
     _kernels.add_triangles(np.ascontiguousarray(np.column_stack([mean] * 3)), pieces.area[plain], sums)

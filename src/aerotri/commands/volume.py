@@ -1,0 +1,255 @@
+"""`aerotri volume`: a volume, how sure it is, and the page about it."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aerotri.commands.console import Console
+from aerotri.conventions import InputError
+
+if TYPE_CHECKING:
+    from aerotri.pipeline import Adjustment
+    from aerotri.rasters import Grid, RasterReader
+    from aerotri.report.plots_volume import ThicknessMap
+    from aerotri.volume.accuracy import Part, SigmaOptions, VolumeSigma
+    from aerotri.volume.bases import Base
+    from aerotri.volume.boundary import Boundary
+    from aerotri.volume.compute import SectionPlan, Volumes
+
+OWN_NAMES = ("volume.json", "thickness.tif", "sections.csv", "plots", "volume.html")
+MOST_MAP_CELLS = 500
+
+
+@dataclass(frozen=True)
+class VolumeInput:
+    """What to compute, as on the command line."""
+
+    dtm: Path
+    base: str
+    boundary: str | None
+    method: str
+    adjustment: Path | None
+    pickets: Path | None
+    base_adjustment: Path | None
+
+
+def run_volume(
+    given: VolumeInput, plan: SectionPlan, sigma_options: SigmaOptions, out: Path | None, plots: bool, as_json: bool
+) -> int:
+    """Exit code of the command; arguments as on the command line."""
+    from aerotri.deformation.absorbed import AbsorptionFailedError
+
+    console = Console(quiet=as_json)
+    _check(given)
+    target = out or Path(f"{given.dtm.stem}_volume")
+    if target.is_dir() and any(target.iterdir()) and not (target / "volume.json").exists():
+        raise InputError(f"'{target}' holds other files", "choose another --out, or an empty folder")
+    try:
+        content = _computed(given, plan, sigma_options, target, plots, console)
+    except AbsorptionFailedError as failure:
+        console.failure(str(failure))
+        return 1
+    if as_json:
+        print(json.dumps(content, indent=2, ensure_ascii=False))
+    else:
+        console.lines([*summary(content), f"Written to {target}"])
+    return 0
+
+
+def summary(content: dict[str, Any]) -> list[str]:
+    """The outcome in lines."""
+    c, s = content, content["sigma"]
+    sure = "" if s is None else f" ± {s['sigma_m3']:.4g} (1 σ)"
+    lines = [
+        f"net {c['net_m3']:.6g} m³{sure}: cut {c['cut_m3']:.6g}, fill {c['fill_m3']:.6g}; {c['method']}, over "
+        f"{c['base']['name']}, {c['boundary']['area_m2']:.6g} m² inside {c['boundary']['name']}"
+    ]
+    if s is not None:
+        lines.append("σ by part, m³: " + ", ".join(f"{name} {v:.4g}" for name, v in s["parts_m3"].items()))
+        where = "in the volume" if s["systematic"]["in_the_volume"] else "corrected for, would be"
+        for one in s["systematic"]["variants"]:
+            lines.append(
+                f"systematic, {one['variant']} orientation: {where} {one['value_m3']:+.4g} ± {one['sigma_m3']:.2g} m³"
+            )
+    lines += [f"  {one['method']:<24} net {one['net_m3']:.6g} m³" for one in c["methods"]]
+    return lines + [f"note: {text}" for text in c["warnings"]]
+
+
+def _check(given: VolumeInput) -> None:
+    if given.adjustment is None and (given.pickets or given.base_adjustment):
+        raise InputError("--pickets and --base-adjustment belong to --adjustment", "give the adjustment")
+
+
+def _computed(
+    given: VolumeInput, plan: SectionPlan, sigma_options: SigmaOptions, target: Path, plots: bool, console: Console
+) -> dict[str, Any]:
+    """Compute and write; returns the content of volume.json."""
+    from aerotri.formats.atomic import atomic_folder
+    from aerotri.rasters import RasterReader, RasterWriter, cache_limited
+    from aerotri.volume.bases import parse_base
+    from aerotri.volume.boundary import boundary_of_grid, read_boundary
+    from aerotri.volume.compute import compute_volumes
+    from aerotri.volume.outcome_json import Sources, volume_json
+    from aerotri.volume.sums import cells_within
+
+    with cache_limited(), ExitStack() as stack:
+        reader = stack.enter_context(RasterReader(given.dtm))
+        boundary = boundary_of_grid(reader.grid) if given.boundary is None else read_boundary(
+            given.boundary, reader.epsg)  # fmt: skip
+        base = parse_base(given.base, reader, boundary, lambda path: stack.enter_context(_other(path, reader)))
+        row, column, rows, columns = cells_within(reader.grid, boundary)
+        if not rows or not columns:
+            raise InputError("the boundary does not meet the surface", "check the CRS of both", given.dtm)
+        part = reader.grid.window(row, column, rows, columns)
+        with atomic_folder(target, own=OWN_NAMES) as folder:
+            thumbnail = _Thumbnail(part)
+            with RasterWriter(folder / "thickness.tif", part, crs=reader.crs,
+                              options={"compress": "deflate"}) as writer:  # fmt: skip
+                writer.describe("surface − base, m")
+
+                def keep(window) -> None:
+                    inside = np.where(window.part > 0.0, window.thickness, np.nan)
+                    thumbnail.add(window.row - row, window.column - column, inside)
+                    writer.write(window.row - row, window.column - column, inside.astype(np.float32))
+
+                volumes = compute_volumes(reader, base, boundary, given.method, plan, keep,
+                                          lambda what, k, n: console.progress(f"{what} {k} of {n}"))  # fmt: skip
+            sigma = _sigma(given, reader, base, boundary, sigma_options, console)
+            sources = Sources(given.dtm.name, "" if reader.epsg is None else f"EPSG:{reader.epsg}",
+                              *("" if p is None else p.name for p in (given.adjustment, given.pickets)))  # fmt: skip
+            content = volume_json(volumes, base, boundary, sources, sigma)
+            _write_sections(folder / "sections.csv", volumes)
+            if plots:
+                console.progress("plots")
+                _draw(folder, content, volumes, reader, base, boundary, thumbnail.map())
+            text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+            (folder / "volume.json").write_text(text + "\n", encoding="utf-8")
+    return content
+
+
+def _other(path: str, reader: RasterReader) -> RasterReader:
+    """The raster of a base, in the CRS of the surface."""
+    from aerotri.rasters import RasterReader
+
+    other = RasterReader(path)
+    if other.epsg is not None and reader.epsg is not None and other.epsg != reader.epsg:
+        raise InputError(f"is in EPSG:{other.epsg}, the surface in EPSG:{reader.epsg}", "bring it into one CRS", path)
+    return other
+
+
+def _sigma(
+    given: VolumeInput, reader: RasterReader, base: Base, boundary: Boundary, options: SigmaOptions, console: Console
+) -> VolumeSigma | None:
+    from aerotri.commands.deform import check_crs, reopened
+    from aerotri.volume.accuracy import part_of_cells, volume_sigma
+    from aerotri.volume.bases import SurfaceBase
+
+    if given.adjustment is None:
+        return None
+    calibration = reopened(given.adjustment, console)
+    check_crs(calibration, reader.epsg, given.dtm)
+    console.progress("σ of the volume")
+    if given.pickets is not None:
+        part = _part_of_file(calibration, given.pickets, boundary, base, options)
+    else:
+        part = part_of_cells(calibration, reader, boundary, base, options)
+    below = None
+    if given.base_adjustment is not None:
+        if not isinstance(base, SurfaceBase):
+            raise InputError("--base-adjustment needs a surface as base", "give its raster as --base")
+        other = reopened(given.base_adjustment, console)
+        below = part_of_cells(other, base.surface, boundary, None, options)
+    return volume_sigma(reader, base, boundary, part, below, options)
+
+
+def _part_of_file(
+    calibration: Adjustment, path: Path, boundary: Boundary, base: Base, options: SigmaOptions
+) -> Part:
+    """The share of pickets.parquet as `aerotri dtm` writes it: X, Y, Z, photographs, status, sZ_matching."""
+    import pyarrow as pa
+
+    from aerotri.formats.parquet import load_parquet
+    from aerotri.volume.accuracy import matching_sigma_mm, part_of_pickets
+    from aerotri.volume.functionals import triangulated
+    from aerotri.volume.pickets import pickets_of_names, with_height_sigmas
+
+    table = load_parquet(path)
+    for name in ("X", "Y", "Z", "photographs"):
+        if name not in table.column_names:
+            raise InputError(f"has no column '{name}'", "give pickets.parquet of `aerotri dtm`", path)
+    xyz = np.column_stack([table.column(axis).cast(pa.float64()).to_numpy() for axis in "XYZ"])
+    names = table.column("photographs").to_pylist()
+    used = np.isfinite(xyz).all(axis=1) & (np.array([len(own or ()) for own in names]) >= 2)
+    if "status" in table.column_names:
+        used &= np.array(table.column("status").to_pylist(), dtype=str) == "accepted"
+    if used.sum() < 3:
+        raise InputError("has hardly a picket that was accepted", "measure again", path)
+    rows = np.flatnonzero(used)
+    pickets = pickets_of_names(
+        calibration.result.block, xyz[rows], [[str(n) for n in names[k]] for k in rows],
+        matching_sigma_mm(calibration, options),
+    )  # fmt: skip
+    if options.matching_sigma_um is None and "sZ_matching" in table.column_names:
+        stated = table.column("sZ_matching").cast(pa.float64()).to_numpy()[rows]
+        pickets = with_height_sigmas(calibration, pickets, stated)
+    return part_of_pickets(calibration, pickets, triangulated(pickets.xyz), boundary, base, options)
+
+
+def _write_sections(path: Path, volumes: Volumes) -> None:
+    import csv
+
+    s = volumes.sections
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["station_m", "cut_area_m2", "fill_area_m2", "cut_length_m", "fill_length_m",
+                         "no_data_length_m"])  # fmt: skip
+        writer.writerows([float(at), *map(float, row)] for at, row in zip(s.station, s.sums, strict=True))
+
+
+class _Thumbnail:
+    """Means of the thickness over so many cells that a map has a few hundred a side."""
+
+    def __init__(self, grid: Grid):
+        self._factor = max(1, -(-max(grid.rows, grid.columns) // MOST_MAP_CELLS))
+        self._grid = grid.coarser(self._factor)
+        self._sum = np.zeros((self._grid.rows, self._grid.columns))
+        self._count = np.zeros_like(self._sum)
+
+    def add(self, row: int, column: int, values: np.ndarray) -> None:
+        known = np.isfinite(values)
+        i, j = np.nonzero(known)
+        at = (row + i) // self._factor, (column + j) // self._factor
+        np.add.at(self._sum, at, values[known])
+        np.add.at(self._count, at, 1.0)
+
+    def map(self) -> ThicknessMap:
+        from aerotri.report.plots_volume import ThicknessMap
+
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return ThicknessMap(self._grid, self._sum / self._count)
+
+
+def _draw(
+    folder: Path, content: dict[str, Any], volumes: Volumes, reader: RasterReader, base: Base, boundary: Boundary,
+    thickness: ThicknessMap,
+) -> None:  # fmt: skip
+    from aerotri.report.plots_volume import plot_budget, plot_section_areas, plot_section_profiles, plot_thickness
+    from aerotri.report.rendering import save_plots
+    from aerotri.report.volume_page import write_volume_page
+    from aerotri.volume.sections import chosen_profiles
+
+    figures = {"thickness": plot_thickness(thickness, boundary, volumes, content)}
+    if content["sigma"] is not None:
+        figures["budget"] = plot_budget(content)
+    figures["section_areas"] = plot_section_areas(volumes.sections, content["dtm"])
+    figures["section_profiles"] = plot_section_profiles(
+        chosen_profiles(reader, base, boundary, volumes.sections), content["dtm"]
+    )
+    rendered = save_plots(figures, folder / "plots")
+    write_volume_page(content, rendered, folder / "volume.html")

@@ -1,0 +1,78 @@
+"""A volume for machines: volume.json."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from aerotri import __version__
+from aerotri.volume.accuracy import PARTS, VolumeSigma
+from aerotri.volume.bases import Base, PlaneBase
+from aerotri.volume.boundary import Boundary
+from aerotri.volume.compute import Volumes
+from aerotri.volume.quantity import Volume
+
+SYSTEMATIC = "change of the volume by image errors, wrong − true, were the photographs used uncorrected"
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Where a volume comes from, as the user named it."""
+
+    dtm: str
+    crs: str
+    adjustment: str = ""
+    pickets: str = ""
+
+
+def volume_json(
+    volumes: Volumes, base: Base, boundary: Boundary, sources: Sources, sigma: VolumeSigma | None
+) -> dict[str, Any]:
+    """The content of volume.json; m, m², m³."""
+    v, s = volumes.chosen, volumes.sections
+    warnings = list(volumes.warnings) + ([] if sigma is None else list(sigma.notes))
+    return {
+        "aerotri": __version__, "dtm": sources.dtm, "crs": sources.crs,
+        "base": _base(base), "boundary": {"name": boundary.name, "area_m2": boundary.area},
+        "method": v.method, **_numbers(v),
+        "mean_thickness_m": v.net / v.area,
+        "lowest_m": _finite(volumes.lowest), "highest_m": _finite(volumes.highest),
+        "methods": [{"method": one.method, **_numbers(one), "note": one.note} for one in volumes.by_method],
+        "sections": {"spacing_m": s.spacing, "azimuth_deg": s.azimuth, "count": len(s.station)},
+        "sigma": None if sigma is None else _sigma(sigma, v, sources), "warnings": warnings,
+    }  # fmt: skip
+
+
+def _numbers(v: Volume) -> dict[str, float]:
+    return {
+        "cut_m3": v.cut, "fill_m3": v.fill, "net_m3": v.net, "cut_area_m2": v.cut_area, "fill_area_m2": v.fill_area,
+        "no_data_area_m2": v.no_data_area,
+    }  # fmt: skip
+
+
+def _base(base: Base) -> dict[str, Any]:
+    content: dict[str, Any] = {"name": base.name}
+    if isinstance(base, PlaneBase):
+        content |= {"z0_m": base.z0, "x0_m": base.x0, "y0_m": base.y0, "slope_x": base.slope_x,
+                    "slope_y": base.slope_y}  # fmt: skip
+    return content
+
+
+def _sigma(sigma: VolumeSigma, volume: Volume, sources: Sources) -> dict[str, Any]:
+    return {
+        "sigma_m3": sigma.total,
+        "sigma_mean_height_m": sigma.total / volume.area,
+        "parts_m3": {name: sigma.parts[name] for name in PARTS},
+        "systematic": {
+            "meaning": SYSTEMATIC, "in_the_volume": not sigma.corrected,
+            "variants": [{"variant": s.variant, "value_m3": s.value, "sigma_m3": s.sigma} for s in sigma.systematic],
+        },
+        "pickets": sigma.pickets, "rays": sigma.rays, "adjustment": sources.adjustment,
+        "picket_file": sources.pickets,
+    }  # fmt: skip
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

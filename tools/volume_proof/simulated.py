@@ -1,0 +1,222 @@
+"""One run: a block is simulated and adjusted, pickets are measured in it, and their volume is compared with the truth.
+
+The camera errs by BLUH's parameters, which the adjustment estimates. The ground between the pickets is rough: a
+fractional Brownian surface over a hill. Every source of error can be switched on alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import shapely
+from scipy.linalg import cholesky
+
+from aerotri.functional_model.additional_parameters import parse_parameters
+from aerotri.functional_model.collinearity import linearise, predict
+from aerotri.functional_model.rotation import rotation_from_angles
+from aerotri.image_errors import image_groups
+from aerotri.image_errors.error_function import ErrorFunction, error_function
+from aerotri.pipeline import Adjustment, adjust_keeping_system
+from aerotri.simulation import Truth, parse_spec, simulate
+from aerotri.volume.accuracy import PARTS, SigmaOptions, boundary_variance, part_of_pickets
+from aerotri.volume.bases import level
+from aerotri.volume.boundary import Boundary, boundary_of
+from aerotri.volume.functionals import tin_volume, triangulated
+from aerotri.volume.pickets import Pickets, pickets_where_seen
+
+SPEC = {
+    "name": "volume",
+    "camera": {
+        "ucd": {
+            "preset": "ultracam_d",
+            "errors": {"parameters": {"bluh.1": 4e-6, "bluh.2": -6e-6, "bluh.9": 3e-10, "bluh.10": 2e-5}},
+        }
+    },
+    "flight": {
+        "gsd_m": 0.1, "strips": 3, "images_per_strip": 6, "end_lap": 0.6, "side_lap": 0.4,
+        "attitude_sigma_deg": [1.0, 1.0, 2.0], "position_sigma_m": [5.0, 5.0, 3.0],
+    },
+    "terrain": {"kind": "undulating", "height_m": 100.0, "relief_rms_m": 15.0, "wavelength_m": 900.0},
+    "tie_points": {"per_image": 40, "probability": 0.9, "sigma_um": 2.0},
+    "control": {"distance_bases": 3.0, "sigma_m": [0.03, 0.03, 0.05]},
+    "start_values": {"kind": "perturbed", "position_sigma_m": 0.5, "angle_sigma_deg": 0.02},
+}  # fmt: skip
+PARAMETERS = "bluh:1-12"
+MATCHING_UM = 3.0
+BASE_SIGMA, BOUNDARY_SIGMA, LEVEL = 0.03, 0.5, 85.0
+RADIUS, HILL, EXPONENT, ROUGH = 120.0, 25.0, 0.6, 0.08
+SPACING, DENSE = 14.0, 4.0
+ALL = frozenset(PARTS)
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """The ground: places of the pickets and of a dense lattice, and the root of the covariance of its roughness."""
+
+    xy: np.ndarray
+    dense: np.ndarray
+    dense_weight: np.ndarray
+    root: np.ndarray
+    boundary: Boundary
+
+    def heights(self, rng: np.random.Generator, rough: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Heights of the pickets, and of the dense lattice."""
+        both = np.concatenate([self.xy, self.dense])
+        z = 100.0 + HILL * np.exp(-np.sum(both**2, axis=1) / (2.0 * 60.0**2))
+        if rough:
+            z = z + self.root @ rng.normal(size=len(both))
+        return z[: len(self.xy)], z[len(self.xy) :]
+
+
+@dataclass(frozen=True)
+class Run:
+    """Error of the volume and its σ, m³, and the σ of every part."""
+
+    error: float
+    sigma: float
+    parts: dict[str, float]
+
+
+def make_site(seed: int = 1) -> Site:
+    """A circle of 16 corners over a hill, pickets in a jittered grid reaching beyond it."""
+    rng = np.random.default_rng(seed)
+    reach = RADIUS + 2.0 * SPACING
+    x, y = np.meshgrid(np.arange(-reach, reach, SPACING), np.arange(-reach, reach, SPACING))
+    xy = np.column_stack([x.ravel(), y.ravel()]) + rng.uniform(-0.25, 0.25, (x.size, 2)) * SPACING
+    angle = np.arange(16) * np.pi / 8.0
+    boundary = boundary_of(shapely.Polygon(RADIUS * np.column_stack([np.cos(angle), np.sin(angle)])), "circle")
+    x, y = np.meshgrid(np.arange(-RADIUS, RADIUS, DENSE), np.arange(-RADIUS, RADIUS, DENSE))
+    cells = shapely.intersection(shapely.box(x.ravel(), y.ravel(), x.ravel() + DENSE, y.ravel() + DENSE),
+                                 boundary.polygon)  # fmt: skip
+    area = shapely.area(cells)
+    dense = shapely.get_coordinates(shapely.centroid(cells[area > 0.0]))
+    at = 1e4 + np.concatenate([xy, dense])
+    length = np.linalg.norm(at, axis=1) ** (2.0 * EXPONENT)
+    squares = np.sum((at - at.mean(axis=0)) ** 2, axis=1)
+    near = at - at.mean(axis=0)
+    gap = np.maximum(squares[:, None] + squares - 2.0 * near @ near.T, 0.0) ** EXPONENT
+    covariance = ROUGH**2 * (length[:, None] + length - gap)
+    # a constant that the volume would see belongs to no part: heights count from the first picket
+    covariance = covariance - covariance[:1] - covariance[:, :1] + covariance[0, 0]
+    root = cholesky(covariance + 1e-9 * np.eye(len(at)), lower=True)
+    return Site(xy, dense, area[area > 0.0], root, boundary)
+
+
+def run(site: Site, seed: int, on: frozenset[str] = ALL) -> Run:
+    """One simulation with some sources of error on."""
+    rng = np.random.default_rng([seed, 77])
+    calibration, truth = adjusted_block(seed) if "adjustment" in on else free_of_error()
+    z, dense = site.heights(rng, "interpolation" in on)
+    true = np.column_stack([site.xy, z])
+    triangles = triangulated(true)
+    chosen, seen = pickets_where_seen(calibration, true, 1e-3 * MATCHING_UM)
+    assert seen.all(), "the block is too small for the site"
+    found = replace(chosen, xyz=measured_pickets(calibration, truth, chosen, rng, on))
+    part = part_of_pickets(calibration, found, triangles, site.boundary, level(LEVEL), SigmaOptions())
+    value, _ = tin_volume(found.xyz, triangles, site.boundary)
+    wanted = tin_volume(true, triangles, site.boundary)[0]
+    if "interpolation" in on:
+        wanted = float(site.dense_weight @ dense)
+    error = value - wanted
+    if "base" in on:
+        error += float(rng.normal(0.0, BASE_SIGMA)) * site.boundary.area
+    surface = _TinSurface(found.xyz)
+    if "boundary" in on:
+        error += _boundary_error(site.boundary, found.xyz, triangles, value, rng)
+    parts = {
+        "adjustment": np.sqrt(part.response.variance),
+        "matching": np.sqrt(part.response.noise),
+        "interpolation": np.sqrt(part.interpolation),
+        "base": BASE_SIGMA * site.boundary.area,
+        "boundary": np.sqrt(boundary_variance(surface, level(LEVEL), site.boundary, BOUNDARY_SIGMA)),
+    }  # fmt: skip
+    sigma = np.sqrt(sum(parts[name] ** 2 for name in on))
+    return Run(float(error), float(sigma), {name: float(v) for name, v in parts.items()})
+
+
+@cache
+def free_of_error() -> tuple[Adjustment, Truth]:
+    """The block adjusted from observations without error: its orientation is the true one."""
+    return adjusted_block(1, False)
+
+
+def adjusted_block(seed: int, noisy: bool = True, spec: dict = SPEC) -> tuple[Adjustment, Truth]:
+    """A simulated block and its adjustment; without noise its σ stay those of the noise it states."""
+    used = spec
+    if not noisy:
+        used = spec | {
+            "tie_points": spec["tie_points"] | {"sigma_um": 0.0, "stated_sigma_um": 2.0},
+            "control": spec["control"] | {"sigma_m": [0.0, 0.0, 0.0], "stated_sigma_m": [0.03, 0.03, 0.05]},
+        }
+    block, truth = simulate(parse_spec(used), seed)
+    settings = replace(block.settings.adjustment, additional_parameters=parse_parameters(PARAMETERS))
+    return adjust_keeping_system(replace(block, settings=replace(block.settings, adjustment=settings))), truth
+
+
+def measured_pickets(
+    calibration: Adjustment, truth: Truth, pickets: Pickets, rng: np.random.Generator, on: frozenset[str]
+) -> np.ndarray:
+    """(k, 3) m, pickets measured in the true photographs and intersected with the adjusted orientation."""
+    block = calibration.result.block
+    true = rotation_from_angles(truth.angles, block.rotation)
+    xy = true_image_points(calibration, truth, true, pickets)
+    if "matching" in on:
+        xy = xy + rng.normal(0.0, 1e-3 * MATCHING_UM, xy.shape)
+    images = calibration.result.images
+    function = error_function(calibration.local, image_groups(block)[0])
+    rotation = rotation_from_angles(images.angles, block.rotation)
+    return intersected(rotation, images.centre, function.interior, xy - function.of_measured(xy), pickets)
+
+
+def true_image_points(calibration: Adjustment, truth: Truth, rotation: np.ndarray, pickets: Pickets) -> np.ndarray:
+    """(r, 2) mm, where the erring camera shows the pickets, without noise."""
+    function = error_function(calibration.local, image_groups(calibration.result.block)[0])
+    values = dict(zip(truth.parameter_names, truth.parameter_values, strict=True))
+    sets = tuple((chosen, np.array([values.get(name, 0.0) for name in chosen.names])) for chosen, _ in function.linear)
+    erring = ErrorFunction(function.camera, function.group, truth.interior[0], sets, np.zeros(7), np.zeros(5))
+    point = np.repeat(np.arange(len(pickets)), np.diff(pickets.start))
+    zero = np.zeros(len(point), np.int64)
+    ideal = predict(rotation, truth.centre, pickets.xyz, _interior(truth.interior[0]), pickets.image, point, zero,
+                    np.zeros((len(point), 2)))  # fmt: skip
+    return erring.measured(ideal)
+
+
+def intersected(rotation, centre, interior, xy: np.ndarray, pickets: Pickets) -> np.ndarray:
+    """(k, 3) m, by least squares on the collinearity equations, rays of equal weight."""
+    points, count = pickets.xyz.copy(), np.diff(pickets.start)
+    point = np.repeat(np.arange(len(points)), count)
+    zero = np.zeros(len(point), np.int64)
+    for _ in range(5):
+        lin = linearise(rotation, centre, points, _interior(interior), pickets.image, point, zero, np.zeros_like(xy))
+        normal, right = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3))
+        np.add.at(normal, point, np.einsum("rai,raj->rij", lin.by_point, lin.by_point))
+        np.add.at(right, point, np.einsum("rai,ra->ri", lin.by_point, xy - lin.prediction))
+        points += np.linalg.solve(normal, right[..., None])[..., 0]
+    return points
+
+
+def _interior(values: np.ndarray) -> np.ndarray:
+    table = np.zeros((1, 15))
+    table[0, :3] = values[:3]
+    return table
+
+
+def _boundary_error(boundary: Boundary, xyz, triangles, value: float, rng: np.random.Generator) -> float:
+    """Volume with corners off by their σ, less the volume; over the level."""
+    corners = boundary.rings[0][:-1]
+    moved = boundary_of(shapely.Polygon(corners + rng.normal(0.0, BOUNDARY_SIGMA, corners.shape)), "moved")
+    return tin_volume(xyz, triangles, moved)[0] - LEVEL * moved.area - (value - LEVEL * boundary.area)
+
+
+class _TinSurface:
+    """A TIN, sampled."""
+
+    def __init__(self, xyz: np.ndarray):
+        from scipy.interpolate import LinearNDInterpolator
+
+        self._of = LinearNDInterpolator(xyz[:, :2], xyz[:, 2])
+
+    def sample(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self._of(x, y)
