@@ -361,5 +361,48 @@ def volume(
     raise typer.Exit(run_volume(given, SectionPlan(section_spacing, azimuth), options, out, plots, json_))
 
 
+predict = typer.Typer(help="What a flight will give, before it is flown.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(predict, name="predict")
+
+
+@predict.command(
+    "volume", epilog="Example: aerotri predict volume --height 1500 --length 9000 --width 3600 --bridging 3600"
+)
+def predict_volume(
+    height: Annotated[float, typer.Option(help="Flying height over the ground, m.")],
+    length: Annotated[float, typer.Option(help="Of the area, along the strips, m.")],
+    width: Annotated[float, typer.Option(help="Of the area, across the strips, m.")],
+    bridging: Annotated[float, typer.Option(help="Distance between control points along the strips, m.")],
+    sigma0_share: Annotated[float, typer.Option(help="σ of a height from one model over the flying height.")] = 2e-4,
+    simulate: Annotated[bool, typer.Option("--simulate", help="Adjust a simulated flight of this design too.")] = False,
+    seed: Annotated[int, typer.Option(help="Of the simulation.")] = 1,
+    json_: Json = False,
+) -> None:
+    """The accuracy of a volume: Kubik's theory, repaired, and the adjustment of a simulated flight."""
+    from aerotri.commands.predict import VolumeDesign, run_predict_volume
+
+    run_predict_volume(VolumeDesign(height, length, width, bridging, sigma0_share), simulate, seed, json_)
+
+
+@predict.command("attitude", epilog="Example: aerotri predict attitude --tolerance 1 --thickness 5")
+def predict_attitude(
+    tolerance: Annotated[float, typer.Option(min=1e-9, help="Of the volume, per cent, 1 σ.")],
+    thickness: Annotated[float, typer.Option(help="Mean thickness of the volume, m.")],
+    height: Annotated[float, typer.Option(help="Flying height over the ground, m.")] = 1500.0,
+    base: Annotated[float, typer.Option(help="Between the photographs, m.")] = 900.0,
+    focal_length: Annotated[float, typer.Option(help="mm.")] = 153.0,
+    site: Annotated[tuple[float, float], typer.Option(help="Size along and across the base, m.")] = (400.0, 400.0),
+    offset: Annotated[
+        tuple[float, float], typer.Option(help="Of the site from the middle of the base, along and across it, m.")
+    ] = (0.0, 0.0),
+    json_: Json = False,
+) -> None:
+    """Which σ of ω, φ, κ the tolerance of a volume allows."""
+    from aerotri.commands.predict import AttitudeDesign, run_predict_attitude
+
+    design = AttitudeDesign(height, base, focal_length, site, offset, thickness, tolerance)
+    run_predict_attitude(design, json_)
+
+
 if __name__ == "__main__":
     main()
