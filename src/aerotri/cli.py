@@ -59,7 +59,7 @@ def adjust(
     block: Annotated[Path, typer.Argument(help="Block folder, or its block.toml.")],
     out: Annotated[Path | None, typer.Option(help="Result folder; default NAME_result in the current folder.")] = None,
     parameters: Annotated[
-        str | None, typer.Option(help="Additional parameters, such as bluh:1-8+12,ultracam_d:42-73, brown:K1+K2, none.")
+        str | None, typer.Option(help="Additional parameters: bluh:1-8+12,ultracam_d:42-73, brown:K1+K2, none, auto.")
     ] = None,
     robust: Annotated[str | None, typer.Option(help="off, huber, danish, cauchy, adaptive or data-snooping.")] = None,
     geoid: Annotated[
@@ -402,6 +402,29 @@ def predict_attitude(
 
     design = AttitudeDesign(height, base, focal_length, site, offset, thickness, tolerance)
     run_predict_attitude(design, json_)
+
+
+@app.command("compare-parameters", epilog="Example: aerotri compare-parameters saar --set none --set bluh:1-12")
+def compare_parameters(
+    block: Annotated[Path, typer.Argument(help="Block folder, or its block.toml.")],
+    sets: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="A set, as adjust --parameters takes it; may repeat. Default: one of each family."),
+    ] = None,
+    folds: Annotated[
+        int, typer.Option(min=2, max=1000, help="Parts in which control points are left out and predicted.")
+    ] = 10,
+    robust: Annotated[str | None, typer.Option(help="off, huber, danish, cauchy or adaptive.")] = None,
+    geoid: Annotated[
+        Path | None, typer.Option(help="Geoid grid (PROJ GeoTIFF) for heights that the CRS does not bring along.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder to write; default NAME_compare here.")] = None,
+    json_: Json = False,
+) -> None:
+    """Sets of additional parameters side by side: fit, check points, cross-validation over control points."""
+    from aerotri.commands.compare_parameters import run_compare_parameters
+
+    raise typer.Exit(run_compare_parameters(block, sets or (), folds, robust, geoid, out, json_))
 
 
 if __name__ == "__main__":

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,12 +21,18 @@ from aerotri.adjustment.unknowns import StartValues, State
 from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block, transform_result
 from aerotri.formats.solution import SavedSolution
+from aerotri.functional_model.additional_parameters import AUTO
 from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import AdjustedBlock, Blunder
 from aerotri.statistics.common_height import common_height
 from aerotri.statistics.doubts import AdjustmentFailedError, defects_in_words, doubts, failure, refuse_runaway
+from aerotri.statistics.field_estimation import with_estimated_fields
 from aerotri.statistics.observation_groups import with_scaled_sigmas
+from aerotri.statistics.parameter_choice import candidate_sets, choose
+from aerotri.statistics.parameter_comparison import Choice, ParameterComparison, Progress, compare_sets
 from aerotri.statistics.removal import with_datum_of
+from aerotri.statistics.selection import select, with_findings_of, with_removed, without_parameters
+from aerotri.statistics.significance import Removal
 from aerotri.statistics.snooping import snoop
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
 from aerotri.statistics.variance_components import (
@@ -39,6 +46,7 @@ from aerotri.statistics.variance_components import (
 __all__ = ["Adjustment", "AdjustmentFailedError", "adjust", "adjust_keeping_system", "reopen"]
 
 Report = Callable[[int, float, float], None]
+FOLDS = 10
 FRAME_ROUNDS = 2
 """Adjustments after the first one where a coordinate's place in the local frame depends on the adjusted position."""
 
@@ -51,6 +59,7 @@ class Adjustment:
     ----------
     result : in the block's CRS. local : the same in the local frame, where `system` and `solution` live.
     frame : the local frame, None for a block in local coordinates.
+    compared : the sets of additional parameters that were compared where the choice was left to the program.
     """
 
     result: AdjustedBlock
@@ -58,6 +67,7 @@ class Adjustment:
     system: NormalSystem
     solution: Solution
     frame: LocalFrame | None = None
+    compared: ParameterComparison | None = None
 
 
 def adjust(block: Block, report: Report | None = None, given_points: np.ndarray | None = None) -> AdjustedBlock:
@@ -94,10 +104,54 @@ def adjust_keeping_system(
     ----------
     geoid : grid of geoid undulations for a block whose CRS has none of its own.
     """
+    if block.settings.adjustment.additional_parameters == AUTO:
+        return _adjust_with_chosen_parameters(block, report, given_points, geoid)
     found = _adjust_in_frame(block, report, given_points, geoid)
     if block.settings.adjustment.variance_components == "on":
         return _with_variance_components(block, found, report, geoid)
     return found
+
+
+def _adjust_with_chosen_parameters(
+    block: Block, report: Report | None, given_points: np.ndarray | None, geoid: str | os.PathLike | None
+) -> Adjustment:
+    compared = compare_parameters(block, candidate_sets(block), geoid=geoid)
+    chosen = choose(compared)
+    adjustment = replace(block.settings.adjustment, additional_parameters=chosen.choice)
+    block = replace(block, settings=replace(block.settings, adjustment=adjustment))
+    found = adjust_keeping_system(block, report, given_points, geoid)
+    outcome = found.result.outcome
+    result = replace(found.result, outcome=replace(outcome, warnings=(chosen.reason, *outcome.warnings)))
+    local = replace(found.local, outcome=result.outcome) if found.frame is not None else result
+    return replace(found, result=result, local=local, compared=compared)
+
+
+def compare_parameters(
+    block: Block,
+    choices: Sequence[Choice],
+    folds: int = FOLDS,
+    geoid: str | os.PathLike | None = None,
+    progress: Progress | None = None,
+) -> ParameterComparison:
+    """Adjust a block with several sets of additional parameters, in the frame of the adjustment.
+
+    Data snooping would take different rays out under each set: Huber's estimator stands in for it.
+
+    Parameters
+    ----------
+    choices : as `parse_parameters` returns them. folds : parts in which control points are left out, one by one where
+        there are no more points than that.
+    """
+    settings = block.settings.adjustment
+    robust = "huber" if settings.robust == "data-snooping" else settings.robust
+    plain = replace(settings, additional_parameters=(), parameter_selection="off", robust=robust)
+    block = replace(block, settings=replace(block.settings, adjustment=plain))
+    if block.crs != "local":
+        block = transform_block(block, frame_of_block(block, geoid))
+    prepared = prepare(block)
+    if nothing_holds(prepared.system):
+        raise failure(prepared.system, "rank deficient", f"the datum is free in {', '.join(FREEDOMS)}")
+    return compare_sets(prepared, choices, folds, SolveOptions(settings.max_iterations, robust), progress)
 
 
 def _adjust_in_frame(
@@ -111,7 +165,7 @@ def _adjust_in_frame(
     for _ in range(FRAME_ROUNDS if needs_positions(block) else 0):
         local = transform_block(block, frame, found.local.points.xyz, found.local.images.centre)
         found = _adjust_local(local, report, found.local.points.xyz)
-    used = with_datum_of(block, found.local.block)
+    used = with_findings_of(with_datum_of(block, found.local.block), found.local.block)
     return replace(found, result=transform_result(found.local, used, frame), frame=frame)
 
 
@@ -137,8 +191,8 @@ def _with_variance_components(
     said = (*latest.result.outcome.warnings, *in_words(components))
     outcome = replace(latest.result.outcome, warnings=said, timings_s=seconds)
     local = replace(with_components(latest.local, components), outcome=outcome)
-    result = replace(latest.result, groups=local.groups, components=components, outcome=outcome,
-                     block=with_datum_of(used, latest.result.block))  # fmt: skip
+    delivered = with_findings_of(with_datum_of(used, latest.result.block), latest.result.block)
+    result = replace(latest.result, groups=local.groups, components=components, outcome=outcome, block=delivered)
     return replace(latest, result=result, local=local if latest.frame is not None else result)
 
 
@@ -157,6 +211,8 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     ----------
     block : as it was adjusted (the result's block/). saved : its solution.npz.
     """
+    removals = tuple(Removal(**removal) for removal in json.loads(saved.removals or "[]"))
+    block = without_parameters(block, [(removal.name, removal.group) for removal in removals])
     frame, local = None, block
     if block.crs != "local":
         frame = frame_of_block(block, saved.geoid or None, saved.frame_origin)
@@ -172,6 +228,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     solution = Solution(saved.status, state, equations, estimator, saved.iterations)
     factor = _factor(system, state, equations)
     result = replace(summarise(system, solution, factor, saved.ray_status, saved.warnings), block=local)
+    result = replace(result, parameters=with_removed(result.parameters, removals), removals=removals)
     if saved.components:
         result = with_components(result, VarianceComponents.from_json(saved.components))
     delivered = result if frame is None else transform_result(result, block, frame)
@@ -198,6 +255,13 @@ def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray 
         prepared, solution, removed = snooped.prepared, snooped.solution, snooped.blunders
         system, state = prepared.system, prepared.state
         block = with_datum_of(block, system.unknowns.block)
+    system, solution = with_estimated_fields(system, solution, options)
+    removals: tuple[Removal, ...] = ()
+    if settings.parameter_selection == "on":
+        selected = select(replace(prepared, system=system), solution, options)
+        prepared, solution, removals = selected.prepared, selected.solution, selected.removals
+        system, state = prepared.system, prepared.state
+    block = with_findings_of(block, system.unknowns.block)
     if settings.datum in ("minimal", "inner"):
         system.refresh_motions(solution.state)
         moved = restore_datum(system.unknowns, solution.state, state.points)
@@ -207,6 +271,7 @@ def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray 
     solved = time.perf_counter()
     warnings = prepared.warnings + doubts(system, solution.state)
     result = summarise(system, solution, factor, prepared.ray_status, warnings)
+    result = replace(result, parameters=with_removed(result.parameters, removals), removals=removals)
     timings = {
         "start_values": started - begun,
         "solve": solved - started,

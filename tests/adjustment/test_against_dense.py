@@ -6,62 +6,12 @@ import numpy as np
 import pytest
 
 from aerotri.adjustment.datum import datum_rows, motions_of_points
-from aerotri.functional_model.collinearity import linearise
 from aerotri.functional_model.rotation import small_rotation_per_angle
-from aerotri.observations import Prior
+from aerotri.observations import CollocationSettings, Prior
 from aerotri.observations.block import Constraints
 from aerotri.pipeline import adjust_keeping_system
+from dense_algebra import TINY, dense_design
 from small_blocks import small_block, with_adjustment
-
-
-def dense_design(adjustment):
-    """Whitened design matrix over (photographs, shared parameters, points), written out from the linearised rays."""
-    system, state = adjustment.system, adjustment.solution.state
-    u = system.unknowns
-    rays, n, s, count = u.rays, len(u.images), len(u.shared), len(u.points)
-    ray_point = np.repeat(np.arange(count), np.diff(rays.start))
-    partials = linearise(
-        state.rotation, state.centre, state.points, u.interior(state), rays.image, ray_point, rays.lens_row, rays.xy
-    )
-    rows = []
-    for k in range(len(rays.image)):
-        block = np.zeros((2, 6 * n + s + 3 * count))
-        by_eo = partials.by_orientation[k].copy()
-        by_eo[:, 3:] = by_eo[:, 3:] @ u.turn(state)[rays.image[k]]
-        block[:, 6 * rays.image[k] : 6 * rays.image[k] + 6] = by_eo * u.eo_free[rays.image[k]]
-        for t, column in enumerate(u.lens.columns[rays.lens_row[k]]):
-            if column >= 0:
-                block[:, 6 * n + column] += partials.by_interior[k, :, t]
-        for t in range(rays.ap_index.shape[1]):
-            block[:, 6 * n + rays.ap_index[k, t]] += rays.ap_value[k, :, t]
-        p = ray_point[k]
-        if u.kept[p] >= 0:
-            block[:, 6 * n + u.kept[p] : 6 * n + u.kept[p] + 3] = partials.by_point[k]
-        at = 6 * n + s + 3 * p
-        block[:, at : at + 3] = partials.by_point[k] * u.point_free[p]
-        rows.append(block * (rays.inv_sigma[k] * np.sqrt(adjustment.solution.equations.weight[k]))[:, None])
-    design = np.concatenate(rows)
-    extra = []
-    for point, axis in zip(*np.nonzero(u.prior_weight * (u.kept < 0)[:, None]), strict=True):
-        row = np.zeros(design.shape[1])
-        row[6 * n + s + 3 * point + axis] = np.sqrt(u.prior_weight[point, axis])
-        extra.append(row)
-    for column, sigma in enumerate(u.shared.sigma):
-        if np.isfinite(sigma):
-            row = np.zeros(design.shape[1])
-            row[6 * n + column] = 1.0 / sigma
-            extra.append(row)
-    for kind in system.extras:
-        rows = kind.rows(state.centre, state.rotation, state.shared)
-        for g, axis in zip(*np.nonzero(rows.inv_sigma), strict=True):
-            row = np.zeros(design.shape[1])
-            if rows.image[g] >= 0:
-                row[6 * rows.image[g] : 6 * rows.image[g] + 6] = rows.by_image[g, axis]
-            for column, partial in zip(rows.columns[g], rows.by_shared[g, axis], strict=True):
-                if column >= 0:
-                    row[6 * n + column] += partial
-            extra.append(row * rows.inv_sigma[g, axis])
-    return np.concatenate([design, np.array(extra)]) if extra else design
 
 
 def dense_cofactors(adjustment, inner=False):
@@ -129,15 +79,6 @@ def check(adjustment, q, design, tolerance=1e-9):
     assert abs(sum(g.redundancy for g in result.groups) - result.outcome.redundancy) < 1e-6 * result.outcome.redundancy
 
 
-TINY = {
-    "flight": {
-        "gsd_m": 0.1, "strips": 2, "images_per_strip": 4, "end_lap": 0.6, "side_lap": 0.3, "heading_deg": 20.0,
-        "attitude_sigma_deg": [1.0, 1.0, 2.0], "position_sigma_m": [5.0, 5.0, 3.0],
-    },
-    "tie_points": {"per_image": 25, "probability": 1.0, "sigma_um": 2.0},
-}  # fmt: skip
-
-
 @pytest.mark.parametrize("parameters", ["none", "bluh:1-4+9", "brown:K1+P1+P2"])
 def test_control_datum(parameters):
     adjustment = adjust_keeping_system(small_block(3, parameters, **TINY)[0])
@@ -151,6 +92,22 @@ def test_control_datum(parameters):
     given = adjustment.result.block.control
     weight = 1.0 / given.sigma[list(given.point).index(control.point[0])] ** 2
     np.testing.assert_allclose(control.r[0], 1.0 - weight * np.diagonal(q)[at : at + 3], atol=1e-9)
+
+
+@pytest.mark.parametrize("datum", ["control", "minimal"])
+def test_nodes_of_a_random_field(datum):
+    """Observed together, with a full weight matrix; two groups, each with a field of its own."""
+    flight = TINY["flight"] | {"days": 2}
+    block = small_block(11, "bluh:9,collocation:4x3", **(TINY | {"flight": flight}))[0]
+    block = with_adjustment(block, parameter_groups="day", datum=datum)
+    known = CollocationSettings(sigma_um=3.0, length_mm=40.0)
+    adjustment = adjust_keeping_system(replace(block, settings=replace(block.settings, collocation=known)))
+    assert len(adjustment.system.fields) == 2
+    design, q = dense_cofactors(adjustment)
+    check(adjustment, q, design)
+    names = adjustment.result.parameters.names.astype(str)
+    status = adjustment.result.parameters.status
+    assert set(status[np.char.startswith(names, "collocation")]) == {"weighted"}
 
 
 def test_interior_orientation_weighted_and_gnss():

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from test_additional_parameters import DMC_INTERIOR, camera_for, orientation_columns
+from test_additional_parameters import orientation_columns
 
 from aerotri.functional_model.additional_parameters import dmc, dmc_heads, parameter_set
 from aerotri.functional_model.additional_parameters.native_frame import native_from_image
 from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Camera
+from family_cameras import DMC_INTERIOR, camera_for
 
 CAMERA = camera_for("dmc")
 HALF = CAMERA.half_format_mm

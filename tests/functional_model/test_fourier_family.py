@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from test_additional_parameters import INTERIOR
 
 from aerotri.functional_model.additional_parameters import parameter_set, parse_parameters, text_of
 from aerotri.functional_model.additional_parameters.registry import default_items
 from aerotri.observations import Camera
+from family_cameras import INTERIOR
 
 CAMERA = Camera("c", "frame", (11500, 7500), 9.0, INTERIOR)
 HALF = CAMERA.half_format_mm

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from test_additional_parameters import INTERIOR, orientation_columns
+from test_additional_parameters import orientation_columns
 
 from aerotri.functional_model.additional_parameters import collocation, grid, parameter_set, parse_parameters
 from aerotri.observations import Camera
+from family_cameras import INTERIOR
 
 CAMERA = Camera("c", "frame", (11500, 7500), 9.0, INTERIOR)
 HALF = np.array(CAMERA.half_format_mm)
@@ -94,16 +95,12 @@ def test_prior_covariance():
     assert covariance[0, 5] == pytest.approx(sigma**2 * np.exp(-np.hypot(34.5, 33.75) / 30.0))
 
 
-def test_prior_factor_whitens():
-    """L·Lᵀ = C at full size, and L⁻¹·p is white for fields drawn from C."""
-    items = nodes_of("19x13", "collocation").items
+def test_prior_weight_is_the_inverse():
+    items = collocation.SIZES.items((7, 5))
     covariance = collocation.prior_covariance(CAMERA, items, 0.004, 30.0)
-    factor = collocation.prior_factor(CAMERA, items, 0.004, 30.0)
-    np.testing.assert_allclose(factor @ factor.T, covariance, atol=1e-18)
-    np.testing.assert_array_equal(factor, np.tril(factor))
-    fields = factor @ np.random.default_rng(0).normal(size=(len(items), 50))
-    quadratic = np.sum(np.linalg.solve(factor, fields) ** 2, axis=0)
-    assert quadratic.mean() == pytest.approx(len(items), abs=4 * np.sqrt(2 * len(items) / 50))
+    weight, log_determinant = collocation.prior_weight(CAMERA, items, 0.004, 30.0)
+    np.testing.assert_allclose(weight @ covariance, np.eye(len(items)), atol=1e-10)
+    assert log_determinant == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-12)
 
 
 def test_items_of_one_node_set_may_be_in_any_order_for_the_covariance():

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from numpy.polynomial import chebyshev as chebyshev_series
 from numpy.polynomial import legendre as legendre_series
-from test_additional_parameters import INTERIOR, orientation_columns
+from test_additional_parameters import orientation_columns
 
 from aerotri.functional_model.additional_parameters import parameter_set, parse_parameters
 from aerotri.functional_model.additional_parameters.registry import default_items
 from aerotri.observations import Camera
+from family_cameras import INTERIOR
 
 SIZES = [(23000, 23000), (11500, 7500), (7680, 13824)]
 F = 101.4

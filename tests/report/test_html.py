@@ -9,13 +9,15 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from aerotri.report.html import LARGEST_SVG, report_html, write_report
+from aerotri.image_errors import group_changes
+from aerotri.report.html import LARGEST_SVG, Findings, report_html, write_report
 from aerotri.report.interactive_plan import interactive_plan
 from aerotri.report.plots import all_plots, save_plots
 from aerotri.report.quality import findings
 from aerotri.report.rendering import RenderedPlot, render_plots
 from aerotri.report.tables import observation_groups
 from aerotri.statistics.adjusted_block import ObservationGroup
+from aerotri.statistics.significance import Removal
 from synthetic import make_adjusted_block
 
 HOSTILE = "<script>alert(1)</script>"
@@ -243,16 +245,15 @@ def test_groups_stand_in_their_units(adjusted):
 
 
 def test_removed_parameters_are_listed_with_their_reason(adjusted):
-    p = adjusted.parameters
-    status, reason = p.status.astype(object), p.reason.astype(object)
-    status[3], reason[3] = "removed", "t 0.4 below 1"
-    text = Page(report_html(replace(adjusted, parameters=replace(p, status=status, reason=reason)), {})).text
-    after = text[text.index("Removed parameters") :]
-    assert after.index(str(p.names[3])) < after.index("t 0.4 below 1") < after.index("What they change")
+    removal = Removal("bluh.4", "ucd2", "P", 2e-6, 5e-6, 0.3, "bluh.2", 0.4, 1.0, "t 0.4 below 1")
+    text = Page(report_html(replace(adjusted, removals=(removal,)), {})).text
+    after = text[text.index("Parameters removed") :]
+    assert after.index("bluh.4") < after.index("t 0.4 below 1") < after.index("What they change")
 
 
 def test_two_groups_are_compared():
     adjusted = make_adjusted_block(2, 4, 60, groups="day")
-    text = Page(report_html(adjusted, all_plots(adjusted))).text
-    assert "day 1 − day 2: the camera has changed between them; χ²" in text
+    changes = group_changes(adjusted)
+    text = Page(report_html(adjusted, all_plots(adjusted, changes), Findings(changes=changes))).text
+    assert "the image errors of day 1 and day 2 differ: RMS" in text
     assert "The systematic image errors of two groups and their difference" in text

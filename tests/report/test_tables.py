@@ -180,17 +180,6 @@ def test_cameras_table(adjusted):
     assert table.texts[1] == ("ucd2", "x0", "0.0000", "held", "0.0000")
 
 
-@pytest.mark.parametrize(
-    ("items", "text"),
-    [
-        (("1", "2", "3"), "1-3"), (("1", "2", "4"), "1-2+4"), (("7",), "7"), (("K1", "P1"), "K1+P1"),
-        (("1", "K1", "2", "3"), "1+K1+2-3"),
-    ],
-)  # fmt: skip
-def test_items_as_on_the_command_line(items, text):
-    assert tables.item_ranges(items) == text
-
-
 def test_metre_digits():
     assert quality.metre_digits(np.array([0.05])) == 3
     assert quality.metre_digits(np.array([2e-4])) == 5

@@ -9,7 +9,7 @@ import pytest
 import scipy.linalg
 
 from aerotri.conventions import InputError
-from aerotri.functional_model.additional_parameters import parameter_set
+from aerotri.functional_model.additional_parameters import dmc_heads, parameter_set
 from aerotri.functional_model.additional_parameters.ultracam_d import tile_of
 from aerotri.functional_model.orientation_patterns import orientation_patterns
 from aerotri.simulation import read_spec, simulate, true_image_errors
@@ -137,11 +137,11 @@ def test_dmc_heads_cover_their_quadrants_and_overlap():
     u, v = (a.ravel() for a in np.meshgrid(np.linspace(0.0, 82.944, 100), np.linspace(0.0, 46.08, 100)))
     for number, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
         xi, eta, _ = dmc.in_head(120.0, np.full(len(u), number), sx * u, sy * v)
-        spare = np.min([dmc.HEAD_HALF_FORMAT_MM[0] - np.abs(xi), dmc.HEAD_HALF_FORMAT_MM[1] - np.abs(eta)])
+        spare = np.min([dmc_heads.HALF_FORMAT_MM[0] - np.abs(xi), dmc_heads.HALF_FORMAT_MM[1] - np.abs(eta)])
         # [D] this order of the tilts covers the quadrant with 1.2 mm to spare, the other with 0.3
         assert spare == pytest.approx(1.2, abs=0.1)
     assert all(len(px) > 100 for _, _, px, _ in dmc.overlap_points(camera("dmc")))
-    axes = dmc.head_rotations()[0] @ np.array([0.0, 0.0, -1.0])
+    axes = dmc_heads.head_rotation() @ np.array([0.0, 0.0, -1.0])
     assert -120.0 * axes[:2] / axes[2] == pytest.approx([34.4, 24.3], abs=0.06)
     x, y = grid(camera("dmc"))
     head = dmc.head_of(x, y)

@@ -11,11 +11,11 @@ from aerotri.functional_model.additional_parameters import parameter_set, parse_
 from aerotri.functional_model.orientation_patterns import orientation_patterns
 from aerotri.image_errors import (
     AveragedResiduals,
+    Change,
     ErrorField,
-    GroupChange,
     averaged_residuals,
+    change,
     field_without_orientation,
-    group_change,
     systematic_errors,
 )
 from aerotri.observations import Block
@@ -196,7 +196,7 @@ class Days:
     """Two days of one camera: the test of no change, and the fields of both days and their difference."""
 
     change_um: float
-    change: GroupChange
+    change: Change
     fields: tuple[ErrorField, ErrorField]
 
 
@@ -206,7 +206,7 @@ def two_days(case: Case, spec: SimulationSpec, change_um: float) -> Days:
     other = changed(spec, {f"camera.{name}.errors.physical": {"day_change_um": change_um}})
     result = adjust(with_parameters(simulate(other, 1)[0], case.sets[3][1], "day"))
     one, two = (field_without_orientation(result, day) for day in ("1", "2"))
-    return Days(change_um, group_change(result, "1", "2"), (one, two))
+    return Days(change_um, change(result, "1", "2"), (one, two))
 
 
 @dataclass(frozen=True)

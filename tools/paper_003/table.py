@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from paper_003.cases import PRINTED, PRINTED_H_B, PRINTED_T80, Case
 from paper_003.runs import Days, Navigation, Row
@@ -200,8 +201,8 @@ def _days(answer: Answer) -> str:
 def _test(days: Days) -> str:
     change = days.change
     return (
-        f"χ² {change.chi2:.1f} with {change.freedom} degrees of freedom (95 %: at most {change.limit():.1f}, "
-        f"probability {change.probability:.2g})"
+        f"χ² {change.statistic * change.freedom:.1f} with {change.freedom} degrees of freedom (95 %: at most "
+        f"{chi2.ppf(0.95, change.freedom):.1f}, probability {change.p:.2g})"
     )
 
 

@@ -11,11 +11,13 @@ import numpy as np
 
 from aerotri.adjustment import _covariance_kernels, _kernels
 from aerotri.adjustment.datum import free_motions
+from aerotri.adjustment.field_prior import FieldPrior, field_prior
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, InverseOnPattern, Symbolic
 from aerotri.adjustment.unknowns import State, Step, Unknowns
 from aerotri.functional_model.observed_unknowns import CentreObservations, Rows
+from aerotri.observations import CollocationSettings
 
 
 class ExtraObservations(Protocol):
@@ -122,14 +124,30 @@ class NormalSystem:
         sigma = np.array(unknowns.shared.sigma).reshape(-1)
         self._prior_weight = np.where(np.isfinite(sigma), 1.0 / sigma**2, 0.0)
         self._prior_value = np.array(unknowns.shared.observed).reshape(-1)
+        self._fields = tuple(field_prior(f, unknowns.block.settings) for f in unknowns.shared.fields)
         # the kernels see no prior of a point that is not eliminated: it stands with the shared parameters
         self._point_prior = np.where((unknowns.kept < 0)[:, None], unknowns.prior_weight, 0.0)
 
     @property
     def n_shared_priors(self) -> int:
-        """Observed shared parameters, coordinates of points apart."""
+        """Observed shared parameters, nodes of random fields among them, coordinates of points apart."""
         of_points = np.array(self.unknowns.shared.kinds) == "point"
-        return int((self._prior_weight[~of_points] > 0.0).sum()) if len(of_points) else 0
+        nodes = sum(len(field.weight) for field in self._fields)
+        return nodes + (int((self._prior_weight[~of_points] > 0.0).sum()) if len(of_points) else 0)
+
+    @property
+    def fields(self) -> tuple[FieldPrior, ...]:
+        """What is known beforehand of the random fields among the shared parameters."""
+        return self._fields
+
+    def with_collocation(self, known: CollocationSettings) -> NormalSystem:
+        """The same system with another covariance of the random fields."""
+        block = self.unknowns.block
+        block = replace(block, settings=replace(block.settings, collocation=known))
+        other = copy(self)
+        other.unknowns = replace(self.unknowns, block=block)
+        other._fields = tuple(field_prior(f, block.settings) for f in self.unknowns.shared.fields)
+        return other
 
     def _work(self):
         u = self.unknowns
@@ -183,6 +201,8 @@ class NormalSystem:
         for observed in rows:
             _add_squares(observed, blocks, border, corner)
         corner[np.diag_indices_from(corner)] += self._prior_weight
+        for field in self._fields:
+            corner[field.columns, field.columns] += field.weight
         held_image, held_column = np.nonzero(~u.eo_free)
         blocks[held_image, held_column, held_column] = 1.0
         diagonal = np.arange(6)
@@ -219,6 +239,10 @@ class NormalSystem:
         gap = self._prior_value - state.shared
         right_shared += self._prior_weight * gap
         cost = sum(o[0] for o in outcomes) + sum(float(np.sum(observed.gap**2)) for observed in rows)
+        for field in self._fields:
+            pull = field.weight @ state.shared[field.columns]
+            right_shared[field.columns] -= pull
+            cost += float(state.shared[field.columns] @ pull)
         return RightSide(
             right=np.concatenate([right.ravel(), right_shared]),
             cost=float(cost + np.sum(self._prior_weight * gap**2)),

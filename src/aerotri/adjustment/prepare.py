@@ -100,7 +100,6 @@ def check_settings(block: Block) -> None:
     s = block.settings
     refused = [
         (s.adjustment.robust not in STAGES, f'robust = "{s.adjustment.robust}"', f"use {', '.join(STAGES)}"),
-        (s.adjustment.parameter_selection != "off", "parameter_selection", 'set it to "off"'),
     ]
     for wrong, what, remedy in refused:
         if wrong:

@@ -5,18 +5,39 @@ The list made here is the border of the normal equations; `Unknowns` is the only
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.functional_model.additional_parameters import FAMILIES, ParameterSet, mark_of, parameter_set
+from aerotri.functional_model.additional_parameters import (
+    FAMILIES,
+    ParameterSet,
+    collocation,
+    mark_of,
+    parameter_set,
+)
 from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, interior_row
 from aerotri.observations import Block, Camera, Prior
 from aerotri.observations.block import INTERIOR_ELEMENTS
 
 FREE = Prior()
+
+
+@dataclass(frozen=True)
+class RandomField:
+    """Shared parameters that are nodes of a random field: known beforehand together, by its covariance.
+
+    Parameters
+    ----------
+    columns : of the nodes in the shared list. items : their names in the family. camera, group : they belong to.
+    """
+
+    columns: slice
+    items: tuple[str, ...]
+    camera: Camera
+    group: str
 
 
 @dataclass
@@ -30,6 +51,7 @@ class SharedList:
     start: list[float] = field(default_factory=list)
     observed: list[float] = field(default_factory=list)
     sigma: list[float] = field(default_factory=list)
+    fields: list[RandomField] = field(default_factory=list)
 
     def add(
         self, name: str, group: str, kind: str, mark: str = "", prior: Prior = FREE, start: float | None = None
@@ -92,6 +114,7 @@ def lens_table(block: Block, images: np.ndarray, shared: SharedList) -> LensTabl
     keys = list(zip(block.images.camera[images].tolist(), groups.tolist(), strict=True))
     rows = {key: row for row, key in enumerate(dict.fromkeys(keys))}
     columns = np.full((len(rows), len(INTERIOR_COLUMNS)), -1, dtype=np.int64)
+    removed = np.zeros(columns.shape, dtype=bool)
     made: dict[tuple[str, str], int] = {}
     for (camera_index, group), row in rows.items():
         camera = block.cameras[camera_index]
@@ -100,12 +123,16 @@ def lens_table(block: Block, images: np.ndarray, shared: SharedList) -> LensTabl
             if prior is None or prior.fixed:
                 continue
             owner = camera.name if name in INTERIOR_ELEMENTS else group
+            if (name, owner) in block.settings.adjustment.parameters_removed:
+                removed[row, column] = True
+                continue
             if (name, owner) not in made:
                 family = name.partition(".")[0]
                 kind, mark = ("interior", "") if name in INTERIOR_ELEMENTS else ("additional", FAMILIES[family].MARK)
                 made[name, owner] = shared.add(name, owner, kind, mark, prior)
             columns[row, column] = made[name, owner]
     base = np.array([interior_row(block.cameras[camera]) for camera, _ in rows]).reshape(-1, len(INTERIOR_COLUMNS))
+    base[removed] = 0.0
     return LensTable(base, columns, np.array([rows[key] for key in keys], dtype=np.int64))
 
 
@@ -137,25 +164,22 @@ def linear_columns(
     images : (n,) photographs used; ray_image : (m,) index into `images`; xy : (m, 2) mm.
     """
     groups = group_of_images(block)[images]
-    cameras = block.images.camera[images]
+    keys = list(zip(block.images.camera[images].tolist(), groups.tolist(), strict=True))
+    number = {key: k for k, key in enumerate(dict.fromkeys(keys))}
+    of_ray = np.array([number[key] for key in keys], dtype=np.int64)[ray_image]
     parts = []
     for family, items in block.settings.adjustment.additional_parameters:
-        if family not in LINEAR_FAMILIES:
-            continue
-        sets = _sets_by_camera(block, family, items)
-        first: dict[str, int] = {}
-        for camera, group in zip(cameras.tolist(), groups.tolist(), strict=True):
-            if camera in sets and group not in first:
-                chosen = sets[camera]
-                added = [
-                    shared.add(name, group, "additional", mark_of(family, item))
-                    for name, item in zip(chosen.names, chosen.items, strict=True)
-                ]
-                first[group] = added[0]
-        offset = np.array(
-            [first[g] if c in sets else 0 for c, g in zip(cameras.tolist(), groups.tolist(), strict=True)]
-        )
-        parts.append(_family_columns(sets, cameras[ray_image], offset[ray_image], xy))
+        if family in LINEAR_FAMILIES:
+            first: dict[str, int] = {}
+            sets: dict[int, tuple[ParameterSet, int]] = {}
+            of_camera = _sets_by_camera(block, family, items)
+            for (camera, group), key in number.items():
+                if camera in of_camera:
+                    chosen = _without_removed(block, of_camera[camera], group)
+                    if group not in first:
+                        first[group] = _add_set(shared, chosen, group)
+                    sets[key] = chosen, first[group]
+            parts.append(_family_columns(sets, of_ray, xy))
     if not parts:
         return LinearColumns(np.zeros((len(xy), 0), np.int64), np.zeros((len(xy), 2, 0)))
     return LinearColumns(
@@ -172,13 +196,31 @@ def _sets_by_camera(block: Block, family: str, items: tuple[str, ...]) -> dict[i
     return {c: parameter_set(family, items, block.cameras[c]) for c in fitting or used}
 
 
-def _family_columns(sets: dict[int, ParameterSet], camera: np.ndarray, offset: np.ndarray, xy: np.ndarray):
-    pieces = {c: parameter_set_.terms(*xy[camera == c].T) for c, parameter_set_ in sets.items()}
+def _without_removed(block: Block, chosen: ParameterSet, group: str) -> ParameterSet:
+    """The set without what the selection took out of a group."""
+    removed = {name for name, where in block.settings.adjustment.parameters_removed if where == group}
+    left = tuple(item for name, item in zip(chosen.names, chosen.items, strict=True) if name not in removed)
+    return replace(chosen, items=left)
+
+
+def _add_set(shared: SharedList, chosen: ParameterSet, group: str) -> int:
+    """The set appended to the shared list; its first column."""
+    first = len(shared)
+    for name, item in zip(chosen.names, chosen.items, strict=True):
+        shared.add(name, group, "additional", mark_of(chosen.family, item))
+    if chosen.family == collocation.FAMILY:
+        shared.fields.append(RandomField(slice(first, len(shared)), chosen.items, chosen.camera, group))
+    return first
+
+
+def _family_columns(sets: dict[int, tuple[ParameterSet, int]], of_ray: np.ndarray, xy: np.ndarray) -> LinearColumns:
+    """Columns of one family; `sets` by the numbers in `of_ray` (m,), each with its first column in the shared list."""
+    pieces = {key: chosen.terms(*xy[of_ray == key].T) for key, (chosen, _) in sets.items()}
     width = max(piece.index.shape[1] for piece in pieces.values())
     index, value = np.zeros((len(xy), width), np.int64), np.zeros((len(xy), 2, width))
-    for c, piece in pieces.items():
-        rays = np.flatnonzero(camera == c)
+    for key, piece in pieces.items():
+        rays = np.flatnonzero(of_ray == key)
         k = piece.index.shape[1]
-        index[rays[:, None], np.arange(k)] = piece.index + offset[rays, None]
+        index[rays[:, None], np.arange(k)] = piece.index + sets[key][1]
         value[rays[:, None, None], np.arange(2)[:, None], np.arange(k)] = piece.value
     return LinearColumns(index, value)

@@ -335,6 +335,19 @@ class Factor:
         out[permutation] = x * self._scale[:, None]
         return out.reshape(rhs.shape)
 
+    def border_normals(self) -> np.ndarray:
+        """(s, s) the normal matrix of the border with the photographs eliminated."""
+        lower = np.tril(self._symbolic._corner) / self._scale[B * self._symbolic.n :, None]
+        return lower @ lower.T
+
+    def border_inverse(self) -> np.ndarray:
+        """(s, s) the inverse over the border alone: cofactors of the shared parameters."""
+        if not self._symbolic.n_border:
+            return np.zeros((0, 0))
+        by_border = self._scale[B * self._symbolic.n :]
+        inverse = _symmetric_from_lower(dpotri(self._symbolic._corner, lower=1)[0])
+        return inverse * by_border[:, None] * by_border[None, :]
+
     def columns(self, indices: np.ndarray) -> np.ndarray:
         """(size, k) columns of the inverse."""
         unit = np.zeros((self._symbolic.size, len(indices)))

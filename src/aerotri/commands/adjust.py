@@ -12,6 +12,7 @@ from aerotri.commands.console import Console
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
+    from aerotri.image_errors import Change
     from aerotri.observations import Block
     from aerotri.pipeline import Adjustment
     from aerotri.statistics.adjusted_block import AdjustedBlock
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 RESULT_NAMES = (
     "adjustment.json", "images.csv", "points.csv", "residuals.parquet", "parameters.csv", "control.csv", "check.csv",
     "block", "solution.npz", "plots", "report.html", "observations.csv", "check_free.json", "variance_components.json",
+    "parameter_changes.json", "parameter_changes.csv", "compare_parameters.json", "compare_parameters.csv",
 )  # fmt: skip
 
 
@@ -43,7 +45,7 @@ def run_adjust(
     if check_free:
         refuse_free_datum(block)
     read_s = time.perf_counter() - begun
-    target = out or Path(f"{_folder_name(path)}_result")
+    target = out or Path(f"{folder_name(path)}_result")
     refuse_foreign_folder(target)
 
     from aerotri.compiled import compilation_notice
@@ -144,9 +146,11 @@ def write_all(
     from aerotri.formats.block_folder import write_block
     from aerotri.formats.result import write_result
     from aerotri.formats.solution import write_solution
+    from aerotri.image_errors import group_changes
 
     result = adjustment.result
     begun = time.perf_counter()
+    changes = group_changes(result)
     with atomic_folder(target, own=RESULT_NAMES) as folder:
         write_block(result.block, folder / "block")
         write_solution(
@@ -156,7 +160,7 @@ def write_all(
         if plots:
             console.progress("drawing")
             begun = time.perf_counter()
-            _draw(adjustment, folder, checked)
+            _draw(adjustment, folder, checked, changes)
             timings["plots"] = time.perf_counter() - begun
         result = replace(result, outcome=replace(result.outcome, timings_s=timings))
         if checked is not None:
@@ -164,17 +168,39 @@ def write_all(
 
             text = json.dumps(free_check_json(checked), indent=2, ensure_ascii=False, allow_nan=False)
             (folder / "check_free.json").write_text(text + "\n", encoding="utf-8")
+        _write_parameter_tables(adjustment, changes, folder)
         write_result(result, folder)
     return result
 
 
-def _draw(adjustment: Adjustment, folder: Path, checked: FreeCheck | None) -> None:
+def _write_parameter_tables(adjustment: Adjustment, changes: tuple[Change, ...], folder: Path) -> None:
+    """The differences between groups, and the sets that were compared, where there are any."""
+    from aerotri.commands.compare_parameters import write_comparison_tables
+    from aerotri.formats.result import write_csv
+    from aerotri.report.parameter_tables import changes_columns, changes_json
+
+    if changes:
+        text = json.dumps(changes_json(changes), indent=2, ensure_ascii=False, allow_nan=False)
+        (folder / "parameter_changes.json").write_text(text + "\n", encoding="utf-8")
+        write_csv(folder / "parameter_changes.csv", changes_columns(changes))
+    if adjustment.compared is not None:
+        write_comparison_tables(adjustment.compared, folder)
+
+
+def _draw(adjustment: Adjustment, folder: Path, checked: FreeCheck | None, changes: tuple[Change, ...]) -> None:
     from aerotri.report.html import Findings, write_report
     from aerotri.report.plots import all_plots, save_plots
+    from aerotri.report.plots_comparison import plot_comparison
     from aerotri.statistics.work_list import work_list
 
-    plots = save_plots(all_plots(adjustment.result), folder / "plots")
-    findings = Findings(work_list(adjustment.local), checked, effects=_effects(adjustment))
+    figures = all_plots(adjustment.result, changes)
+    if adjustment.compared is not None:
+        figures["compare_parameters"] = plot_comparison(adjustment.compared)
+    plots = save_plots(figures, folder / "plots")
+    findings = Findings(
+        work_list(adjustment.local), checked, effects=_effects(adjustment), changes=changes,
+        compared=adjustment.compared,
+    )  # fmt: skip
     write_report(adjustment.result, plots, folder / "report.html", findings)
 
 
@@ -187,7 +213,8 @@ def _effects(adjustment: Adjustment) -> ParameterEffects | None:
     return parameter_effects(adjustment.local, system, solution, factor)
 
 
-def _folder_name(path: Path) -> str:
+def folder_name(path: Path) -> str:
+    """Name of a block's folder, given itself or its block.toml."""
     folder = path.resolve()
     return (folder.parent if folder.is_file() else folder).name
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterable
 
 
@@ -13,6 +14,7 @@ class Console:
         self._quiet = quiet
         self._moving = sys.stderr.isatty() and not quiet
         self._shown = False
+        self._begun = 0.0
 
     def progress(self, text: str) -> None:
         """Replace the moving line; off a terminal only what the user has to wait for is printed, as a line."""
@@ -29,6 +31,13 @@ class Console:
         """Progress of the adjustment."""
         damped = f", damped {damping:.0e}" if damping else ""
         self.progress(f"iteration {number}: vᵀPv {cost:.6g}{damped}")
+
+    def step(self, number: int, count: int, name: str) -> None:
+        """Progress of a piece of work out of several: how far, and the time left as those done let expect."""
+        if number == 1:
+            self._begun = time.monotonic()
+        left = (time.monotonic() - self._begun) / max(number - 1, 1) * (count - number + 1)
+        self.progress(f"{number} of {count}: {name}" + (f", {left:.0f} s left" if number > 1 else ""))
 
     def lines(self, lines: Iterable[str]) -> None:
         """Print the outcome."""

@@ -157,7 +157,7 @@ def _without_parameters(system: NormalSystem, solution: Solution, state: State) 
     # no ray touches these columns any more: observed as zero they stay out of everything
     sigma = np.where(gone, 1.0, np.array(u.shared.sigma, dtype=float))
     values = np.where(gone, 0.0, state.shared)
-    shared = replace(u.shared, sigma=sigma.tolist(), observed=values.tolist())
+    shared = replace(u.shared, sigma=sigma.tolist(), observed=values.tolist(), fields=[])
     unknowns = replace(
         u, rays=rays, lens=replace(u.lens, base=base, columns=columns), shared=shared, prior_xyz=state.points.copy()
     )

@@ -15,7 +15,15 @@ from aerotri.formats.csv_text import BLANKS
 from aerotri.formats.tables import CONTROL_CHARACTERS
 from aerotri.formats.toml_text import line_of_key, read_toml
 from aerotri.functional_model.additional_parameters import parse_parameters
-from aerotri.observations import AdjustmentSettings, Camera, GnssSettings, InsSettings, Prior, Settings
+from aerotri.observations import (
+    AdjustmentSettings,
+    Camera,
+    CollocationSettings,
+    GnssSettings,
+    InsSettings,
+    Prior,
+    Settings,
+)
 from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
 
 Positive = Annotated[float, Field(gt=0)]
@@ -167,6 +175,11 @@ class InsModel(_Section):
     drift: Literal["off", "strip"] = "off"
 
 
+class CollocationModel(_Section):
+    sigma_um: Positive | None = None
+    length_mm: Positive | None = None
+
+
 class BlockModel(_Section):
     """block.toml."""
 
@@ -181,6 +194,7 @@ class BlockModel(_Section):
     corrections: CorrectionsModel = CorrectionsModel()
     gnss: GnssModel = GnssModel()
     ins: InsModel = InsModel()
+    collocation: CollocationModel = CollocationModel()
 
 
 class CamerasModel(_Section):
@@ -231,6 +245,7 @@ class BlockToml:
                 time_offset=model.gnss.time_offset,
             ),
             ins=InsSettings(model.ins.boresight, model.ins.drift),
+            collocation=CollocationSettings(model.collocation.sigma_um, model.collocation.length_mm),
             image_sigma_um=image_sigma_um,
             refraction=model.corrections.refraction,
             earth_curvature=model.corrections.earth_curvature,

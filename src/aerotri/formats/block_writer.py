@@ -13,6 +13,7 @@ from aerotri.formats.atomic import atomic_folder
 from aerotri.formats.scanned_film import measured_px
 from aerotri.formats.table_writer import check_names, write_table
 from aerotri.formats.toml_text import Inline, toml_of
+from aerotri.functional_model.additional_parameters import format_parameters
 from aerotri.observations import Block, Camera, Prior
 from aerotri.observations.block import INTERIOR_ELEMENTS
 
@@ -159,9 +160,7 @@ def _settings(block: Block) -> dict[str, Any]:
         "camera": {camera.name: _camera(camera) for camera in block.cameras},
         "stochastic": {"image_sigma_um": settings.image_sigma_um},
         "adjustment": {
-            "additional_parameters": [
-                f"{family}:{'+'.join(items)}" for family, items in adjustment.additional_parameters
-            ],
+            "additional_parameters": format_parameters(adjustment.additional_parameters),
             "parameter_groups": adjustment.parameter_groups,
             "parameter_selection": adjustment.parameter_selection,
             "t_limit": adjustment.t_limit,
@@ -184,6 +183,9 @@ def _settings(block: Block) -> dict[str, Any]:
         },
         "ins": {"boresight": settings.ins.boresight, "drift": settings.ins.drift},
     }
+    known = {"sigma_um": settings.collocation.sigma_um, "length_mm": settings.collocation.length_mm}
+    if any(value is not None for value in known.values()):
+        content["collocation"] = {key: value for key, value in known.items() if value is not None}
     if settings.gnss.lever_arm_sigma_m is not None:
         content["gnss"]["lever_arm_sigma_m"] = list(settings.gnss.lever_arm_sigma_m)
     return content

@@ -46,14 +46,14 @@ def write_result(adjusted: AdjustedBlock, folder: str | Path) -> None:
     started = time.perf_counter()
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    _write_csv(folder / "images.csv", image_columns(adjusted))
-    _write_csv(folder / "points.csv", point_columns(adjusted))
-    _write_csv(folder / "parameters.csv", parameter_columns(adjusted))
+    write_csv(folder / "images.csv", image_columns(adjusted))
+    write_csv(folder / "points.csv", point_columns(adjusted))
+    write_csv(folder / "parameters.csv", parameter_columns(adjusted))
     control = ground_point_columns(adjusted, adjusted.control) | control_columns(adjusted)
-    _write_csv(folder / "control.csv", control)
-    _write_csv(folder / "check.csv", ground_point_columns(adjusted, adjusted.check))
+    write_csv(folder / "control.csv", control)
+    write_csv(folder / "check.csv", ground_point_columns(adjusted, adjusted.check))
     if adjusted.observations is not None:
-        _write_csv(folder / "observations.csv", observation_columns(adjusted))
+        write_csv(folder / "observations.csv", observation_columns(adjusted))
     _write_residuals(folder / "residuals.parquet", adjusted)
     if adjusted.components is not None:
         (folder / "variance_components.json").write_text(adjusted.components.to_json() + "\n", encoding="utf-8")
@@ -171,7 +171,7 @@ def _text_by_index(names: np.ndarray, index: np.ndarray):
     return pa.array(names.astype(str), pa.string()).take(pa.array(np.asarray(index, dtype=np.int64)))
 
 
-def _write_csv(path: Path, columns: dict[str, np.ndarray]) -> None:
+def write_csv(path: Path, columns: dict[str, np.ndarray]) -> None:
     """A table with a plain header; text is quoted only where a name would break the table or read as a comment."""
     import pyarrow as pa
     from pyarrow import csv

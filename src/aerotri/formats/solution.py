@@ -5,6 +5,7 @@ Coordinates are kept as the adjustment had them, reduced to the local origin, so
 
 from __future__ import annotations
 
+import json
 import os
 import zipfile
 from dataclasses import dataclass
@@ -34,6 +35,7 @@ class SavedSolution:
     held : (k, 2) point and axis of coordinates held for the datum.
     ray_status, weight : (m,).
     components : the variance components as JSON, '' where there are none; the block has the σ they led to.
+    removals : the parameters that the selection took out, as JSON, '' where there are none.
     """
 
     origin: np.ndarray
@@ -57,6 +59,7 @@ class SavedSolution:
     iterations: int
     warnings: tuple[str, ...]
     components: str = ""
+    removals: str = ""
 
 
 def write_solution(
@@ -77,6 +80,7 @@ def write_solution(
     centre, rotation, points = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((count, 3), np.nan)
     centre[u.images], rotation[u.images], points[u.points] = state.centre, state.rotation, state.points
     row, axis = np.nonzero(~u.point_free)
+    there = np.flatnonzero(result.parameters.status != "removed")
     np.savez_compressed(
         path,
         schema=SCHEMA,
@@ -87,7 +91,7 @@ def write_solution(
         shared=state.shared,
         shared_names=np.array(u.shared.names, dtype=str),
         shared_groups=np.array(u.shared.groups, dtype=str),
-        shared_cofactor=result.parameters.covariance / result.outcome.sigma0**2,
+        shared_cofactor=result.parameters.covariance[np.ix_(there, there)] / result.outcome.sigma0**2,
         xy=u.block.image_points.xy,
         frame_origin=np.full(3, np.nan) if frame is None else frame.origin,
         geoid=np.array("" if frame is None or frame.geoid is None else os.fspath(frame.geoid)),
@@ -100,6 +104,7 @@ def write_solution(
         status=np.array(solution.status),
         iterations=solution.iterations,
         warnings=np.array(result.outcome.warnings, dtype=str),
+        removals=np.array(json.dumps([removal.as_dict() for removal in result.removals])),
         components=np.array("" if result.components is None else result.components.to_json()),
     )
 
@@ -119,7 +124,7 @@ def read_solution(path: str | os.PathLike) -> SavedSolution:
         if int(arrays.pop("schema")) != SCHEMA:
             raise InputError("was written by another version", "adjust the block again", path)
         scalars = {"estimator_code": int, "estimator_limit": float, "sigma0": float, "iterations": int}
-        scalars |= {"status": str, "geoid": str, "components": str}
+        scalars |= {"status": str, "geoid": str, "components": str, "removals": str}
         values = {name: scalars[name](array) if name in scalars else array for name, array in arrays.items()}
         values["warnings"] = tuple(str(w) for w in arrays["warnings"])
         return SavedSolution(**values)

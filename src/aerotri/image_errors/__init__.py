@@ -1,6 +1,7 @@
 """What the camera does wrong: systematic image errors from the parameters, and what the residuals still show."""
 
 from aerotri.image_errors.averaged_residuals import AveragedResiduals, averaged_residuals
+from aerotri.image_errors.change import Change, change, group_changes
 from aerotri.image_errors.field import (
     ErrorField,
     field_difference,
@@ -9,19 +10,19 @@ from aerotri.image_errors.field import (
     largest_effects,
     systematic_errors,
 )
-from aerotri.image_errors.group_change import GroupChange, group_change
 from aerotri.image_errors.groups import ImageGroup, image_group, image_groups, interior_elements
 
 __all__ = [
     "AveragedResiduals",
+    "Change",
     "ErrorField",
-    "GroupChange",
     "ImageGroup",
     "averaged_residuals",
+    "change",
     "field_difference",
     "field_on_grid",
     "field_without_orientation",
-    "group_change",
+    "group_changes",
     "image_group",
     "image_groups",
     "interior_elements",

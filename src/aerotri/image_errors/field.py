@@ -120,28 +120,16 @@ def field_difference(
     """First group minus second group, with the covariance of the difference: correlations between the two count."""
     one = image_group(adjusted.block, first, camera)
     x, y = grid_nodes(one.camera, nx)
-    d, jacobian, covariance = difference_with_jacobian(adjusted, first, second, x.ravel(), y.ravel(), camera)
-    return _field(one.camera, f"{first} − {second}", x, y, d, _propagated(jacobian, covariance))
-
-
-def difference_with_jacobian(
-    adjusted: AdjustedBlock, first: str, second: str, x: np.ndarray, y: np.ndarray, camera: str | None = None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """First group minus second group at positions (n,) mm.
-
-    Returns
-    -------
-    d (n, 2) mm, its partials (n, 2, k) by the parameters of both groups, and the covariance (k, k) of these.
-    """
-    one, two = (image_group(adjusted.block, name, camera) for name in (first, second))
-    d_one, jacobian_one, rows_one = _errors_with_jacobian(adjusted, one, x, y)
-    d_two, jacobian_two, rows_two = _errors_with_jacobian(adjusted, two, x, y)
+    two = image_group(adjusted.block, second, camera)
+    d_one, jacobian_one, rows_one = _errors_with_jacobian(adjusted, one, x.ravel(), y.ravel())
+    d_two, jacobian_two, rows_two = _errors_with_jacobian(adjusted, two, x.ravel(), y.ravel())
     rows, column = np.unique(np.concatenate([rows_one, rows_two]), return_inverse=True)
     jacobian = np.zeros((*d_one.shape, len(rows)))
     # a parameter that both groups share counts once, by the difference of its partials
     jacobian[:, :, column[: len(rows_one)]] += jacobian_one
     jacobian[:, :, column[len(rows_one) :]] -= jacobian_two
-    return d_one - d_two, jacobian, _covariance_of(adjusted, rows)
+    covariance = _propagated(jacobian, _covariance_of(adjusted, rows))
+    return _field(one.camera, f"{first} − {second}", x, y, d_one - d_two, covariance)
 
 
 def largest_effects(adjusted: AdjustedBlock) -> np.ndarray:

@@ -259,6 +259,7 @@ class AdjustmentSettings:
     additional_parameters : (family, items) pairs, for example (('bluh', ('1', '2')), ('ultracam_d', ('42',))).
     parameter_groups : 'camera', 'block' or a grouping column of the images.
     datum_points : names of the points that carry an inner datum; empty = all.
+    parameters_removed : (name, group) pairs of additional parameters that the selection took out.
     datum_fixed : orientation elements held when datum = 'fixed': (image name, element) pairs, element one of
         X0 Y0 Z0 omega phi kappa.
     """
@@ -268,6 +269,7 @@ class AdjustmentSettings:
     parameter_selection: str = "off"
     t_limit: float = 1.0
     correlation_limit: float = 0.85
+    parameters_removed: tuple[tuple[str, str], ...] = ()
     robust: str = "off"
     datum: str = "control"
     datum_points: tuple[str, ...] = ()
@@ -298,12 +300,27 @@ class InsSettings:
 
 
 @dataclass(frozen=True)
+class CollocationSettings:
+    """What `[collocation]` says of the image error as a random field; None: estimated from the block.
+
+    Parameters
+    ----------
+    sigma_um : σ_d of the field, as a weight beside the a-priori σ of the image coordinates.
+    length_mm : correlation length in the image.
+    """
+
+    sigma_um: float | None = None
+    length_mm: float | None = None
+
+
+@dataclass(frozen=True)
 class Settings:
     """All settings of a block that are not measurements."""
 
     adjustment: AdjustmentSettings = AdjustmentSettings()
     gnss: GnssSettings = GnssSettings()
     ins: InsSettings = InsSettings()
+    collocation: CollocationSettings = CollocationSettings()
     image_sigma_um: float = 1.0
     refraction: str = "off"
     earth_curvature: str = "off"

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import MGON_PER_RADIAN
-from aerotri.report.tables import Column, Table, cell_text, item_ranges, table
+from aerotri.functional_model.additional_parameters import format_parameters
+from aerotri.report.tables import Column, Table, cell_text, table
 from aerotri.statistics.comparison import Change, Comparison, Differences, ParameterChange
 
 SIGMA_NOTE = (
@@ -96,7 +97,7 @@ def _changes(title: str, changes: tuple[Change, ...]) -> Table:
 def _readable(name: str, value: Any) -> Any:
     """Additional parameters as the command line takes them; what else is no number or text, as Python writes it."""
     if name.endswith("additional_parameters") and value is not None:
-        return ",".join(f"{family}:{item_ranges(items)}" for family, items in value) or "none"
+        return ",".join(format_parameters(value)) or "none"
     return value
 
 

@@ -19,20 +19,19 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from aerotri.crosscheck import CrosscheckResult
-from aerotri.image_errors import GroupChange, group_change, image_groups
-from aerotri.report import precision_tables, quality, tables, work_tables
+from aerotri.image_errors import Change
+from aerotri.report import parameter_tables, precision_tables, quality, tables, work_tables
 from aerotri.report.interactive_plan import interactive_plan
 from aerotri.report.plots_crosscheck import crosscheck_table
 from aerotri.report.rendering import RenderedPlot, render_plots
 from aerotri.statistics.adjusted_block import AdjustedBlock
 from aerotri.statistics.free_verdict import FreeCheck
+from aerotri.statistics.parameter_comparison import ParameterComparison
 from aerotri.statistics.parameter_effects import ParameterEffects
 from aerotri.statistics.work_list import WorkList, work_list
 
 LARGEST_SVG = 450_000
 """Bytes above which a plot is embedded as PNG: thousands of photographs as vectors weigh more than they say."""
-
-MOST_CHANGES = 3
 
 CONTENTS = (
     ("adjusted", "What was adjusted"),
@@ -47,7 +46,10 @@ CONTENTS = (
 
 CAPTIONS = {
     "block_plan": "Projection centres, strips, footprints on the mean height of the ground, control and check points.",
-    "group_change": "The systematic image errors of two groups and their difference, on one scale.",
+    "change": (
+        "The systematic image errors of two groups and their difference, on one scale. Dark arrows differ from zero at "
+        "95 %."
+    ),
     "ground_points": "Differences adjusted − given: horizontal vectors, and heights as arrows up (too high) or down.",
     "systematic_errors": (
         "Systematic image errors d of the additional parameters: measured = ideal + d. Dark arrows differ from zero at "
@@ -56,6 +58,10 @@ CAPTIONS = {
     "averaged_residuals": (
         "All photographs laid over one another: mean of measured − adjusted by cells, what a remaining systematic "
         "image error looks like. Dark arrows exceed what noise leaves at 95 %."
+    ),
+    "compare_parameters": (
+        "Every set of additional parameters that was compared: dots at check points with 95 % bounds, squares at "
+        "control points predicted by an adjustment without them."
     ),
     "correlations": "Correlations of the shared parameters; darkness is size, a dash marks negative ones.",
     "residual_histogram": "Residuals of the image coordinates against the normal curve they should follow.",
@@ -79,12 +85,15 @@ class Findings:
     crosscheck : the same block through other programs; None where that was not asked for. Its plot comes with the
         others, as 'crosscheck'.
     effects : what leaving parameters out changes at the check points; None where there are none, or it was not asked.
+    changes : of the image errors between groups. compared : the sets of additional parameters that were compared.
     """
 
     work: WorkList | None = None
     free_check: FreeCheck | None = None
     crosscheck: CrosscheckResult | None = None
     effects: ParameterEffects | None = None
+    changes: tuple[Change, ...] = ()
+    compared: ParameterComparison | None = None
 
 
 NOTHING_BESIDE = Findings()
@@ -134,10 +143,12 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         "plots": {name: _embedded(name, plot) for name, plot in plots.items()},
         "contents": CONTENTS,
         "plan": interactive_plan(adjusted),
-        "tables": _tables(adjusted) | {"work": work_tables.work_table(work), "effects": _effects(adjusted, beside)},
+        "tables": _tables(adjusted)
+        | {"work": work_tables.work_table(work), "effects": _effects(adjusted, beside)}
+        | _parameter_tables(adjusted, beside),
         "effects_missing": _why_no_effects(adjusted),
         "selection": adjusted.block.settings.adjustment.parameter_selection == "on",
-        "changes": [_change(change) for change in group_changes(adjusted)],
+        "changes": [_change(change) for change in beside.changes],
         "work_counts": work_tables.work_counts(work),
         "free": None if beside.free_check is None else _free_check(beside.free_check),
         "crosscheck": None if beside.crosscheck is None else _crosscheck(beside.crosscheck),
@@ -156,24 +167,18 @@ def _why_no_effects(adjusted: AdjustedBlock) -> str:
     return "Not computed." if "additional" in adjusted.parameters.kinds else "No parameters were estimated."
 
 
-def group_changes(adjusted: AdjustedBlock) -> list[GroupChange]:
-    """The first group of photographs against the others of its camera that have parameters, at most three."""
-    if "additional" not in adjusted.parameters.kinds:
-        return []
-    first, *others = image_groups(adjusted.block)
-    same = [group for group in others if group.camera is first.camera]
-    return [group_change(adjusted, first.name, group.name, first.camera.name) for group in same[:MOST_CHANGES]]
+def _change(change: Change) -> dict[str, str]:
+    return {"level": "note" if change.changed else "good", "sentence": quality.printable(change.sentence, 1000)}
 
 
-def _change(change: GroupChange) -> dict[str, str]:
-    same = change.chi2 <= change.limit()
-    verdict = "the camera has not changed, as far as can be seen" if same else "the camera has changed between them"
-    sentence = (
-        f"{quality.printable(change.field.group, 400)}: {verdict}; χ² {change.chi2:.1f} with {change.freedom} degrees "
-        f"of freedom, at most {change.limit():.1f} by chance (95 %); RMS of the difference "
-        f"{1e3 * change.field.rms:.2f} µm."
-    )
-    return {"level": "good" if same else "note", "sentence": sentence}
+def _parameter_tables(adjusted: AdjustedBlock, beside: Findings) -> dict[str, tables.Table]:
+    none = tables.Table("", (), ())
+    return {
+        "fields": parameter_tables.fields_table(adjusted),
+        "removals": parameter_tables.removals_table(adjusted),
+        "changes": parameter_tables.changes_table(beside.changes),
+        "compared": none if beside.compared is None else parameter_tables.comparison_table(beside.compared),
+    }
 
 
 def _free_check(check: FreeCheck) -> dict[str, Any]:
@@ -211,7 +216,6 @@ def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
         "cameras": tables.cameras(adjusted),
         "film": tables.film(adjusted),
         "parameters": tables.parameters(adjusted),
-        "removed": tables.removed_parameters(adjusted),
         "correlations": precision_tables.correlations(adjusted),
         "precision": precision_tables.precision(adjusted),
         "ellipsoids": precision_tables.ellipsoids(adjusted),

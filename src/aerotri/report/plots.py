@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from matplotlib.figure import Figure
 
-from aerotri.image_errors import averaged_residuals, field_difference, field_on_grid, image_groups
+from aerotri.image_errors import Change, averaged_residuals, field_on_grid, image_groups
 from aerotri.report.plots_block import plot_block_plan, plot_ground_points, plot_rays_per_point
 from aerotri.report.plots_camera import plot_averaged_residuals, plot_systematic_errors
 from aerotri.report.plots_panels import Panel, plot_panels
@@ -29,10 +31,14 @@ __all__ = [
 MOST_GROUPS = 8
 
 
-def all_plots(adjusted: AdjustedBlock) -> dict[str, Figure]:
+def all_plots(adjusted: AdjustedBlock, changes: Sequence[Change] = ()) -> dict[str, Figure]:
     """The figures of the report by a name fit for a file, in the order of the report.
 
     Plots over the image format are drawn for the first eight image groups and numbered from the second on.
+
+    Parameters
+    ----------
+    changes : of the image errors between groups, as `group_changes` finds them.
     """
     name = adjusted.block.name
     figures = {"block_plan": plot_block_plan(adjusted)}
@@ -45,9 +51,8 @@ def all_plots(adjusted: AdjustedBlock) -> dict[str, Figure]:
             figures[f"systematic_errors{suffix}"] = plot_systematic_errors(field, name)
         averaged = averaged_residuals(adjusted, group.name, camera=group.camera.name)
         figures[f"averaged_residuals{suffix}"] = plot_averaged_residuals(averaged, name)
-    groups = image_groups(adjusted.block)
-    if len(groups) > 1 and groups[0].camera is groups[1].camera and "additional" in adjusted.parameters.kinds:
-        figures["group_change"] = _plot_change(adjusted, groups[0].name, groups[1].name, groups[0].camera.name)
+    for number, change in enumerate(changes, start=1):
+        figures["change" if number == 1 else f"change_{number}"] = _plot_change(adjusted, change)
     if len(correlated_parameters(adjusted)) >= 2:
         figures["correlations"] = plot_correlations(adjusted)
     figures["residual_histogram"] = plot_residual_histogram(adjusted)
@@ -57,8 +62,8 @@ def all_plots(adjusted: AdjustedBlock) -> dict[str, Figure]:
     return figures
 
 
-def _plot_change(adjusted: AdjustedBlock, first: str, second: str, camera: str) -> Figure:
+def _plot_change(adjusted: AdjustedBlock, change: Change) -> Figure:
     """Two groups and their difference, on one scale."""
-    fields = [field_on_grid(adjusted, group, camera=camera) for group in (first, second)]
-    fields.append(field_difference(adjusted, first, second, camera=camera))
-    return plot_panels([Panel(field.group, field) for field in fields], f"Two groups – {adjusted.block.name}")
+    fields = [field_on_grid(adjusted, group, camera=change.camera) for group in (change.first, change.second)]
+    title = f"Two groups – {adjusted.block.name}"
+    return plot_panels([Panel(field.group, field) for field in (*fields, change.field)], title)

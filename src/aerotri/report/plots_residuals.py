@@ -84,10 +84,11 @@ def _histogram_legend(figure: Figure, sigma: float) -> None:
 def correlated_parameters(adjusted: AdjustedBlock) -> np.ndarray:
     """Rows of the shared parameters that have a correlation to show.
 
-    Where there are too many to read, GNSS parameters are left out first, then what exceeds the number.
+    Nodes of a grid have none of interest. Where there are too many to read, GNSS parameters are left out first, then
+    what exceeds the number.
     """
     p = adjusted.parameters
-    free = np.isin(p.status, ("estimated", "weighted")) & (np.diagonal(p.covariance) > 0.0)
+    free = np.isin(p.status, ("estimated", "weighted")) & (np.diagonal(p.covariance) > 0.0) & ~p.is_node
     if free.sum() > MOST_PARAMETERS:
         free &= p.kinds != "gnss"
     return np.flatnonzero(free)[:MOST_PARAMETERS]

@@ -231,7 +231,10 @@ def _parameters(adjusted: AdjustedBlock) -> list[Finding]:
         return [Finding("additional parameters", "none", "self-calibration", verdict, "note")]
     significant = int(np.sum(p.t[rows] > SIGNIFICANT_T))
     limit = adjusted.block.settings.adjustment.correlation_limit
-    r = np.abs(np.nan_to_num(p.max_correlation[rows]))
+    r = np.abs(np.nan_to_num(p.max_correlation[rows & ~p.is_node]))
+    if not len(r):
+        return [Finding("additional parameters", f"{rows.sum()} nodes of a field", "–",
+                        "whether they help, only check points tell", "good")]  # fmt: skip
     strong = int(np.sum(r > limit))
     return [
         Finding("additional parameters", f"{rows.sum()} estimated, {significant} significant",

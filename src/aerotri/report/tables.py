@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import MGON_PER_RADIAN
+from aerotri.functional_model.additional_parameters import format_parameters
 from aerotri.image_errors import interior_elements, largest_effects
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.report.quality import asprs_warning, ground_statistics, metre_digits, pixel_text, printable
@@ -95,7 +96,7 @@ def summary(adjusted: AdjustedBlock) -> Table:
     """What was adjusted, and with which settings."""
     block, o, a = adjusted.block, adjusted.outcome, adjusted.block.settings.adjustment
     used = int(np.sum(adjusted.rays.status == RAY_STATUS.index("used")))
-    families = [f"{family}:{item_ranges(items)}" for family, items in a.additional_parameters]
+    families = format_parameters(a.additional_parameters)
     cameras = ", ".join(f"{c.name} ({c.model})" for c in block.cameras)
     gnss = 0 if block.gnss_ins is None else len(block.gnss_ins)
     rows = [
@@ -117,19 +118,6 @@ def summary(adjusted: AdjustedBlock) -> Table:
     return Table("What was adjusted", (Column("item"), Column("value")), tuple(rows))
 
 
-def item_ranges(items: tuple[str, ...]) -> str:
-    """Items as on the command line: '1-8+12', names joined by +."""
-    numbers = [int(item) if item.isdigit() else None for item in items]
-    runs: list[list[int]] = []
-    for i, number in enumerate(numbers):
-        previous = numbers[runs[-1][1]] if runs else None
-        if runs and number is not None and previous is not None and number == previous + 1:
-            runs[-1][1] = i
-        else:
-            runs.append([i, i])
-    return "+".join(items[a] if a == b else f"{items[a]}-{items[b]}" for a, b in runs)
-
-
 def unit_of(name: str) -> str:
     """Unit of a shared parameter by its name; '–' where it has none."""
     return next((unit for pattern, unit in UNITS if re.fullmatch(pattern, name)), "–")
@@ -142,7 +130,7 @@ def unit_of_group(name: str) -> tuple[str, float]:
     if name == "attitudes" or name.startswith("INS"):
         return "mgon", MGON_PER_RADIAN
     # weighted parameters of many units are recorded in units of their own σ
-    return ("σ", 1.0) if name == "weighted parameters" else ("m", 1.0)
+    return ("σ", 1.0) if name in ("weighted parameters", "collocation field") else ("m", 1.0)
 
 
 def observation_groups(adjusted: AdjustedBlock) -> Table:
@@ -197,9 +185,9 @@ def film(adjusted: AdjustedBlock) -> Table:
 
 
 def parameters(adjusted: AdjustedBlock) -> Table:
-    """Additional and GNSS parameters with their tests; interior elements stand in their own table."""
+    """Additional and GNSS parameters with their tests; interior elements and fields stand in their own tables."""
     p = adjusted.parameters
-    rows = p.kinds != "interior"
+    rows = (p.kinds != "interior") & ~p.is_node
     reason = [(Column("reason"), p.reason[rows])] if np.any(p.reason[rows] != "") else []
     return table(
         "Additional and GNSS parameters" if "gnss" in p.kinds else "Additional parameters",
@@ -216,18 +204,6 @@ def parameters(adjusted: AdjustedBlock) -> Table:
         (Column("B", "", ".2f"), p.total_correlation[rows]),
         (Column("status"), p.status[rows]),
         *reason,
-    )
-
-
-def removed_parameters(adjusted: AdjustedBlock) -> Table:
-    """Additional parameters that the selection removed, and why."""
-    p = adjusted.parameters
-    rows = (p.kinds == "additional") & (p.status == "removed")
-    return table(
-        "Removed parameters",
-        (Column("parameter"), p.names[rows]),
-        (Column("group"), p.groups[rows]),
-        (Column("reason"), p.reason[rows]),
     )
 
 

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from aerotri.functional_model.additional_parameters import is_grid
 from aerotri.observations import Block
 
 if TYPE_CHECKING:
+    from aerotri.statistics.significance import Removal
     from aerotri.statistics.variance_components import VarianceComponents
 
 RAY_STATUS = ("used", "one ray", "off", "no start value", "not finite", "removed")
@@ -168,6 +170,11 @@ class SharedParameters:
         return np.sqrt(np.diagonal(self.covariance))
 
     @property
+    def is_node(self) -> np.ndarray:
+        """(s,) bool, nodes of a grid or random field: none says anything on its own."""
+        return np.array([is_grid(str(name).partition(".")[0]) for name in self.names], dtype=bool)
+
+    @property
     def t(self) -> np.ndarray:
         """(s,) |value|/σ."""
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -255,7 +262,8 @@ class Blunder:
 class AdjustedBlock:
     """A block after its adjustment; what the later stages start from.
 
-    `components` is there where `variance_components = "on"`: `block` then has the σ they led to.
+    `components` is there where `variance_components = "on"`: `block` then has the σ they led to. `removals` are those
+    of the selection of additional parameters, in order; `parameters` has them too, behind the others.
     """
 
     block: Block
@@ -271,3 +279,4 @@ class AdjustedBlock:
     observations: ObservationResults | None = None
     components: VarianceComponents | None = None
     effects: RayEffects | None = None
+    removals: tuple[Removal, ...] = ()

@@ -72,7 +72,8 @@ def parameter_correlations(
         return ()
     r = np.nan_to_num(correlations(parameters.covariance), posinf=0.0, neginf=0.0)
     first, second = np.triu_indices(len(parameters), 1)
-    value = r[first, second]
+    nodes = parameters.is_node
+    value = np.where(nodes[first] & nodes[second], 0.0, r[first, second])
     several = len(set(parameters.groups.tolist())) > 1
     labels = [f"{n} ({g})" if several else str(n) for n, g in zip(parameters.names, parameters.groups, strict=True)]
     high = np.flatnonzero(np.abs(value) >= threshold)

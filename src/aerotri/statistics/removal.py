@@ -69,7 +69,7 @@ def without_removed(prepared: Prepared, state: State, switches: Switches) -> Pre
     still_there = np.isin(rows, ray_points(u)[taking_part]).all()
     held = list(zip(u.points[rows].tolist(), axes.tolist(), strict=True)) if len(rows) and still_there else None
     block = _with_less_datum(prepared.system, switches)
-    return Prepared(*build_system(block, _start_values(u, state), status, held), status, prepared.warnings)
+    return Prepared(*build_system(block, start_values_at(u, state), status, held), status, prepared.warnings)
 
 
 def with_datum_of(block: Block, used: Block) -> Block:
@@ -120,7 +120,8 @@ def _with_less_datum(system: NormalSystem, switches: Switches) -> Block:
     return replace(block, gnss_ins=gnss)
 
 
-def _start_values(unknowns: Unknowns, state: State) -> StartValues:
+def start_values_at(unknowns: Unknowns, state: State) -> StartValues:
+    """The state of an adjustment as start values of another one of the same block."""
     n, count = len(unknowns.block.images), len(unknowns.block.points)
     rotation, centre, points = np.full((n, 3, 3), np.nan), np.full((n, 3), np.nan), np.full((count, 3), np.nan)
     rotation[unknowns.images], centre[unknowns.images] = state.rotation, state.centre

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.adjustment.field_prior import FieldPrior
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.robust import weights_and_costs
 from aerotri.adjustment.solve import Solution
@@ -69,12 +70,10 @@ def summarise(
     """
     block, counts = system.unknowns.block, count_observations(system)
     q = cofactors(system, solution.state, factor, solution.estimator)
-    sigma0 = float(np.sqrt(solution.equations.cost / counts.redundancy)) if counts.redundancy > 0 else np.nan
-    vtpv = solution.equations.cost
+    vtpv, freedom = weighted_sum(system, solution), float(counts.redundancy)
     if solution.estimator.is_robust:
-        vtpv = _weighted_sum(system, solution)
-        freedom = counts.redundancy - _turned_down(solution, q)
-        sigma0 = float(np.sqrt(vtpv / freedom)) if freedom > 0.0 else np.nan
+        freedom -= _turned_down(solution, q)
+    sigma0 = float(np.sqrt(vtpv / freedom)) if freedom > 0.0 else np.nan
     outcome = Outcome(
         status=solution.status,
         message="" if solution.status == "converged" else _message(solution),
@@ -112,8 +111,10 @@ def _message(solution: Solution) -> str:
     return f"no convergence within {solution.iterations} iterations, Σvᵀpv {solution.equations.cost:.6g}"
 
 
-def _weighted_sum(system: NormalSystem, solution: Solution) -> float:
+def weighted_sum(system: NormalSystem, solution: Solution) -> float:
     """vᵀPv with the final weights: what the cost of a robust estimator is not."""
+    if not solution.estimator.is_robust:
+        return solution.equations.cost
     rays, equations = system.unknowns.rays, solution.equations
     squares = np.sum((equations.residual * rays.inv_sigma) ** 2, axis=1)
     robust_cost = weights_and_costs(solution.estimator, np.sqrt(squares))[1]
@@ -128,6 +129,12 @@ def _turned_down(solution: Solution, q: Cofactors) -> float:
     redundancy Cauchy's would be 10 % too small.
     """
     return float(np.sum((1.0 - solution.equations.weight) * q.ray_redundancy.sum(axis=1)))
+
+
+def effective_redundancy(system: NormalSystem, solution: Solution) -> float:
+    """The redundancy less what robust weights take away, as if all rays had the same redundancy numbers."""
+    counts, turned_down = count_observations(system), float(np.sum(1.0 - solution.equations.weight))
+    return counts.redundancy - 2.0 * turned_down * counts.redundancy / max(counts.observations, 1)
 
 
 def _images(system: NormalSystem, solution: Solution, q: Cofactors, sigma0: float) -> ImageResults:
@@ -184,7 +191,10 @@ def _parameters(system: NormalSystem, solution: Solution, q: Cofactors, sigma0: 
     lens = np.isin(kinds.astype(str), ("interior", "additional"))
     total = np.full(s, np.nan)
     total[lens] = total_correlations(cofactor[np.ix_(lens, lens)])
-    weighted = np.isfinite(np.array(shared.sigma).reshape(-1)[rows])
+    weighted = np.isfinite(np.array(shared.sigma).reshape(-1))
+    for field in shared.fields:
+        weighted[field.columns] = True
+    weighted = weighted[rows]
     one_group = len(set(groups.tolist())) <= 1
     labels = np.array([n if one_group else f"{n} ({g})" for n, g in zip(names, groups, strict=True)], dtype=object)
     return SharedParameters(
@@ -203,15 +213,31 @@ def _parameters(system: NormalSystem, solution: Solution, q: Cofactors, sigma0: 
 
 
 def inseparable(parameters: SharedParameters) -> tuple[str, ...]:
-    """Sentences about pairs of shared parameters that the block cannot tell apart."""
-    pairs = {}
-    for k in np.flatnonzero(np.abs(np.nan_to_num(parameters.max_correlation)) > INSEPARABLE):
-        pair = frozenset((str(parameters.names[k]), str(parameters.max_correlation_with[k])))
-        pairs.setdefault(pair, parameters.max_correlation[k])
-    return tuple(
-        f"{' and '.join(sorted(pair))} cannot be told apart (correlation {100.0 * r:.2f} %)"
-        for pair, r in pairs.items()
-    )
+    """Sentences about shared parameters that the block cannot tell apart: pairs, and the nodes of a grid together."""
+    p, nodes = parameters, parameters.is_node
+    pairs: dict[frozenset[str], float] = {}
+    grids: dict[tuple[str, str], list[float]] = {}
+    beyond = np.abs(np.nan_to_num(p.max_correlation)) > INSEPARABLE
+    for k in np.flatnonzero(beyond & (p.status != "removed")):
+        if nodes[k]:
+            family, size = str(p.names[k]).partition("_")[0].split(".")
+            grids.setdefault((f"{family}:{size}", str(p.groups[k])), []).append(float(p.max_correlation[k]))
+        else:
+            pair = frozenset((str(p.names[k]), str(p.max_correlation_with[k])))
+            pairs.setdefault(pair, float(p.max_correlation[k]))
+    said = [
+        f"{' and '.join(sorted(pair))} cannot be told apart (correlation {_percent(r)})" for pair, r in pairs.items()
+    ]
+    for (grid, group), r in grids.items():
+        said.append(
+            f"{len(r)} values of {grid} ({group}) cannot be told from a neighbour (correlations up to "
+            f"{_percent(max(r, key=abs))})"
+        )
+    return tuple(said)
+
+
+def _percent(r: float) -> str:
+    return f"{100.0 * r:.2f} %"
 
 
 def _ground_points(system: NormalSystem, solution: Solution, q: Cofactors, points: PointResults, sigma0: float):
@@ -319,9 +345,19 @@ def _prior_group(system: NormalSystem, solution: Solution, q: Cofactors) -> list
     shared = system.unknowns.shared
     sigma = np.array(shared.sigma).reshape(-1)
     known = np.isfinite(sigma) & (np.array(shared.kinds, dtype=object) != "point").reshape(-1)
+    fields = [_field_group(field, solution, q) for field in system.fields]
     if not known.any():
-        return []
+        return fields
     normed = ((solution.state.shared - np.array(shared.observed)) / sigma)[known]
     redundancy = float((1.0 - np.diagonal(q.shared)[known] / sigma[known] ** 2).sum())
     pvv = float(np.sum(normed**2))
-    return [_group("weighted parameters", int(known.sum()), 1.0, float(np.sqrt(pvv / known.sum())), redundancy, pvv)]
+    rms = float(np.sqrt(pvv / known.sum()))
+    return [_group("weighted parameters", int(known.sum()), 1.0, rms, redundancy, pvv), *fields]
+
+
+def _field_group(field: FieldPrior, solution: Solution, q: Cofactors) -> ObservationGroup:
+    """The observation of a random field's nodes, whitened; its redundancy is the field's effective number."""
+    values = solution.state.shared[field.columns]
+    count, pvv = len(values), float(values @ field.weight @ values)
+    redundancy = count - float(np.sum(q.shared[field.columns, field.columns] * field.weight))
+    return _group("collocation field", count, 1.0, float(np.sqrt(pvv / count)), redundancy, pvv)

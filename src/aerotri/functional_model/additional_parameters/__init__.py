@@ -18,18 +18,21 @@ from aerotri.functional_model.additional_parameters.description import (
 from aerotri.functional_model.additional_parameters.registry import (
     FAMILIES,
     ParameterSet,
+    is_grid,
     is_item,
     parameter_set,
     parameter_sets,
 )
-from aerotri.functional_model.additional_parameters.specification import format_parameters, parse_parameters
+from aerotri.functional_model.additional_parameters.specification import AUTO, format_parameters, parse_parameters
 
 __all__ = [
+    "AUTO",
     "FAMILIES",
     "ParameterDescription",
     "ParameterSet",
     "describe",
     "format_parameters",
+    "is_grid",
     "is_item",
     "mark_of",
     "parameter_set",

@@ -1,8 +1,8 @@
 """Collocation: the image error as a random field, known through the nodes of a bilinear grid. It knows no camera.
 
 [D] dx and dy are independent fields of covariance σ_d²·exp(−ρ/ℓ), ρ the distance in the image; the spacing of the nodes
-has to be well below ℓ. The field enters as one weighted observation of the node vector, L⁻¹·p = 0 with L the Cholesky
-factor of its covariance, so that every node can be estimated however few rays are near it. Items as in `grid`.
+has to be well below ℓ. The field enters as one weighted observation of the node vector, p = 0 with the inverse of its
+covariance as weight, so that every node can be estimated however few rays are near it. Items as in `grid`.
 Between the nodes interpolation makes the field a little smoother than the covariance says.
 """
 
@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg import cholesky, solve_triangular
 
 from aerotri.functional_model.additional_parameters.grid import (
     LARGEST,
@@ -25,7 +26,7 @@ from aerotri.functional_model.additional_parameters.sizes import Sizes
 from aerotri.functional_model.additional_parameters.terms import Terms
 from aerotri.observations import Camera
 
-__all__ = ["check_items", "item_text", "prior_covariance", "prior_factor", "terms"]
+__all__ = ["check_items", "item_text", "prior_covariance", "prior_weight", "terms"]
 
 FAMILY = "collocation"
 MARK = "D"
@@ -76,8 +77,22 @@ def prior_covariance(
     return covariance + nugget**2 * np.eye(len(axis))
 
 
-def prior_factor(
-    camera: Camera, items: Sequence[str], sigma_d: float, length: float, nugget: float = 0.0
-) -> np.ndarray:
-    """(p, p) lower Cholesky factor L of `prior_covariance`; L⁻¹·p = 0 is the observation of the node vector p."""
-    return np.linalg.cholesky(prior_covariance(camera, items, sigma_d, length, nugget))
+def prior_weight(
+    camera: Camera, items: Sequence[str], sigma_d: float, length: float
+) -> tuple[np.ndarray, float]:
+    """Inverse of `prior_covariance` without nugget, and the logarithm of the determinant of the covariance.
+
+    Returns
+    -------
+    (p, p) 1/mm², and a number.
+    """
+    position, axis = node_positions(camera, items)
+    weight, log_determinant = np.zeros((len(axis), len(axis))), 0.0
+    for k in (0, 1):
+        own = np.flatnonzero(axis == k)
+        distance = np.hypot(*(position[own, None, :] - position[None, own, :]).transpose(2, 0, 1))
+        lower = cholesky(sigma_d**2 * np.exp(-distance / length), lower=True)
+        half = solve_triangular(lower, np.eye(len(own)), lower=True)
+        weight[np.ix_(own, own)] = half.T @ half
+        log_determinant += 2.0 * float(np.sum(np.log(np.diagonal(lower))))
+    return weight, log_determinant

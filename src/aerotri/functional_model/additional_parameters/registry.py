@@ -133,6 +133,11 @@ def sizes_of(family: str) -> Sizes | None:
     return getattr(FAMILIES[family], "SIZES", None)
 
 
+def is_grid(family: str) -> bool:
+    """Whether the items of a family are nodes of a grid: one set, of which no single one can be left out."""
+    return family in (grid.FAMILY, collocation.FAMILY)
+
+
 def is_item(family: str, item: str) -> bool:
     """Whether a linear or interior family has an item."""
     try:

@@ -14,6 +14,7 @@ from aerotri.functional_model.additional_parameters.registry import (
     FAMILIES,
     checked_items,
     default_items,
+    items_text,
     joined_items,
     sizes_of,
 )
@@ -22,7 +23,10 @@ from aerotri.functional_model.additional_parameters.sizes import size_of, size_t
 Choice = tuple[tuple[str, tuple[str, ...]], ...]
 """(family, items) pairs; items without repetition in the family's order."""
 
-LONGEST_RANGE = 1000
+AUTO: Choice = (("auto", ()),)
+"""Stands for the set that cross-validation chooses; none of the families."""
+
+LONGEST_RANGE, MOST_DIGITS = 1000, 9
 
 
 def parse_parameters(spec: str | Iterable[str]) -> Choice:
@@ -41,11 +45,14 @@ def parse_parameters(spec: str | Iterable[str]) -> Choice:
     parts = [part.strip() for part in parts if part.strip()]
     if parts == ["none"]:
         return ()
+    if parts == ["auto"]:
+        return AUTO
     chosen: dict[str, list[str]] = {}
     for part in parts:
         family, _, items = part.partition(":")
         if family not in FAMILIES:
-            raise InputError(f"unknown parameter family '{family}'", f"known are {', '.join(FAMILIES)}, or none")
+            known = ", ".join((*FAMILIES, "none", "auto"))
+            raise InputError(f"unknown parameter family '{family}'", f"known are {known}")
         for piece in (items or "all").split("+"):
             chosen.setdefault(family, []).extend(_items(family, piece.strip()))
     return tuple((family, checked_items(family, items)) for family, items in chosen.items())
@@ -61,8 +68,12 @@ def _items(family: str, piece: str) -> Iterable[str]:
     span = re.fullmatch(r"([0-9]+)-([0-9]+)", piece)
     if span is None:
         return (piece,)
-    first, last = int(span[1]), int(span[2])
-    if not first <= last < first + LONGEST_RANGE:
+    longest = max(len(text.lstrip("0")) for text in span.groups())
+    first, last = (int(text) if longest <= MOST_DIGITS else 0 for text in span.groups())
+    if longest > MOST_DIGITS or last - first >= LONGEST_RANGE:
+        shown = piece if len(piece) <= 40 else piece[:37] + "..."
+        raise InputError(f"the range '{shown}' is longer than any set of parameters", items_text(family))
+    if last < first:
         raise InputError(f"'{family}' has no parameters '{piece}'", "a range goes upwards, as in 1-12")
     return (str(i) for i in range(first, last + 1))
 
@@ -72,6 +83,8 @@ def format_parameters(parameters: Choice) -> list[str]:
 
     Items are written by name or number, so that a text keeps its meaning, except where a family's full set is long.
     """
+    if parameters == AUTO:
+        return ["auto"]
     return [f"{family}:{_items_text(family, tuple(items))}" for family, items in parameters if items]
 
 

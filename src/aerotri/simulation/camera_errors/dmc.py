@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.functional_model.rotation import rotation_from_angles
+from aerotri.functional_model.additional_parameters import dmc_heads
+from aerotri.functional_model.additional_parameters.dmc_heads import HALF_FORMAT_MM, turning
 from aerotri.observations import Camera
 from aerotri.simulation.camera_errors.lens import LensError, format_grid, random_lens
 
@@ -23,14 +24,6 @@ and most of the focal length: lens error and focal length, as far as they change
 temperature) and each head's own; attitude; matching noise of the stitching."""
 
 SIGNS = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
-TILT_ACROSS, TILT_ALONG = np.radians(16.0), np.radians(11.0)
-HEAD_HALF_FORMAT_MM = (7168 * 0.012 / 2.0, 4096 * 0.012 / 2.0)
-
-
-def head_rotations() -> np.ndarray:
-    """(4, 3, 3) head → camera: R_H = Ry(−sx·16°)·Rx(+sy·11°)."""
-    angles = [(sy * TILT_ALONG, -sx * TILT_ACROSS, 0.0) for sx, sy in SIGNS]
-    return rotation_from_angles(np.array(angles), "phi-omega-kappa")
 
 
 def head_of(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -76,7 +69,7 @@ class DmcError:
         f = self.focal_length
         xi, eta, jacobian = in_head(f, head, x, y)
         error = self.focal_change[head, None] * np.stack([xi, eta], axis=1)
-        error += np.einsum("nak,nk->na", turning(f, xi, eta), self.attitude[head])
+        error += np.einsum("nak,nk->na", turning(np.stack([xi, eta], axis=1), f), self.attitude[head])
         for k, lens in enumerate(self.lenses):
             own = np.flatnonzero(head == k)
             error[own] += lens(xi[own], eta[own])
@@ -84,21 +77,14 @@ class DmcError:
 
 
 def in_head(f: float, head: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position (ξ, η) in the plane of the head, mm, and J_H = ∂(x, y)/∂(ξ, η), (n, 2, 2)."""
-    rotation = head_rotations()[head]
-    u = np.einsum("nji,nj->ni", rotation, np.stack([x, y, np.full_like(x, -f)], axis=1))
-    xi, eta = -f * u[:, 0] / u[:, 2], -f * u[:, 1] / u[:, 2]
-    w = np.einsum("nij,nj->ni", rotation, np.stack([xi, eta, np.full_like(x, -f)], axis=1))
-    third = w[:, 2, None, None]
-    jacobian = -f * (rotation[:, :2, :2] / third - w[:, :2, None] * rotation[:, 2:, :2] / third**2)
-    return xi, eta, jacobian
+    """Position (ξ, η) in the plane of the head, mm, and J_H = ∂(x, y)/∂(ξ, η), (n, 2, 2).
 
-
-def turning(f: float, xi: np.ndarray, eta: np.ndarray) -> np.ndarray:
-    """(n, 2, 3) displacement in the head's plane per radian of its three rotations."""
-    gx = np.stack([xi * eta / f, xi**2 / f + f, -eta], axis=1)
-    gy = np.stack([eta**2 / f + f, xi * eta / f, xi], axis=1)
-    return np.stack([gx, gy], axis=1)
+    All heads are mirror images of the one that `dmc_heads` describes.
+    """
+    sign = SIGNS[head]
+    mirrored = dmc_heads.in_head(sign[:, 0] * x, sign[:, 1] * y, f)
+    xi, eta = (sign * mirrored).T
+    return xi, eta, sign[:, :, None] * dmc_heads.jacobian(mirrored, f) * sign[:, None, :]
 
 
 def dmc_error(camera: Camera, weights: dict[str, float], rng: np.random.Generator) -> DmcError:
@@ -108,7 +94,7 @@ def dmc_error(camera: Camera, weights: dict[str, float], rng: np.random.Generato
     ----------
     weights : RMS in mm of each cause, the keys of `WEIGHTS`.
     """
-    f, half = camera.focal_length_mm, HEAD_HALF_FORMAT_MM
+    f, half = camera.focal_length_mm, HALF_FORMAT_MM
     common, own = weights["lens"], weights["head_lens"]
     # in all heads alike a lens changes about its axis; what has no symmetry is each head's own
     design = random_lens(half, common, 0.0, 0.0, rng)
@@ -117,7 +103,7 @@ def dmc_error(camera: Camera, weights: dict[str, float], rng: np.random.Generato
     # a uniform sign is drawn, not a size: the scaling of the whole field would undo it
     zoom = weights["focal"] * rng.choice([-1.0, 1.0]) + weights["head_focal"] * rng.normal(size=4)
     focal = zoom / np.sqrt(np.mean(xi**2 + eta**2) / 2.0)
-    per_radian = np.sqrt(np.mean(turning(f, xi, eta) ** 2, axis=(0, 1)))
+    per_radian = np.sqrt(np.mean(turning(np.stack([xi, eta], axis=1), f) ** 2, axis=(0, 1)))
     attitude = rng.normal(size=(4, 3)) * weights["pose"] / per_radian
     plain = DmcError(f, lenses, focal, attitude)
     return DmcError(f, lenses, focal, attitude - _stitch(camera, plain, weights["stitching"], rng))
@@ -130,7 +116,7 @@ def overlap_points(camera: Camera) -> list[tuple[int, int, np.ndarray, np.ndarra
     seen = []
     for head in range(4):
         xi, eta, _ = in_head(camera.focal_length_mm, np.full(len(x), head), x, y)
-        seen.append((np.abs(xi) <= HEAD_HALF_FORMAT_MM[0]) & (np.abs(eta) <= HEAD_HALF_FORMAT_MM[1]))
+        seen.append((np.abs(xi) <= HALF_FORMAT_MM[0]) & (np.abs(eta) <= HALF_FORMAT_MM[1]))
     pairs = ((0, 1), (1, 2), (2, 3), (3, 0))
     return [(a, b, x[seen[a] & seen[b]], y[seen[a] & seen[b]]) for a, b in pairs]
 
@@ -143,7 +129,7 @@ def _stitch(camera: Camera, plain: DmcError, noise_mm: float, rng: np.random.Gen
         design = np.zeros((len(x), 2, 4, 3))
         for head, sign in ((a, 1.0), (b, -1.0)):
             xi, eta, jacobian = in_head(f, np.full(len(x), head), x, y)
-            design[:, :, head] = sign * jacobian @ turning(f, xi, eta)
+            design[:, :, head] = sign * jacobian @ turning(np.stack([xi, eta], axis=1), f)
         gap = plain.of_head(np.full(len(x), a), x, y) - plain.of_head(np.full(len(x), b), x, y)
         designs.append(design.reshape(-1, 12))
         differences.append((gap + noise_mm * rng.normal(size=gap.shape)).ravel())

@@ -8,12 +8,12 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.quiver import Quiver
 from matplotlib.text import Text
-from test_additional_parameters import camera_for, inner_points
 
 from aerotri.functional_model.additional_parameters import FAMILIES, parameter_set, text_of
 from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES, default_items
 from aerotri.report.plots_parameters import number_text, pattern_sheets, plot_pattern_sheet, plot_pattern_sheets
 from aerotri.report.tables import unit_of
+from family_cameras import camera_for, inner_points
 
 
 def any_camera(family):

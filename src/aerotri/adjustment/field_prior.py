@@ -1,0 +1,45 @@
+"""What is known beforehand of a random field: one observation of all its nodes together, 0 [D]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.adjustment.shared_parameters import RandomField
+from aerotri.functional_model.additional_parameters.collocation import prior_weight
+from aerotri.observations import Settings
+
+FIRST_SIGMA = 1.5
+"""σ_d to begin with, in σ of an image coordinate [C]."""
+FIRST_LENGTH = 0.5
+"""Correlation length to begin with, in half diagonals of the format [C]."""
+
+
+@dataclass(frozen=True, eq=False)
+class FieldPrior:
+    """The observation of the p nodes of a random field: 0, with a full weight matrix.
+
+    Parameters
+    ----------
+    columns : of the nodes in the shared list.
+    weight : (p, p) 1/mm², the inverse of their covariance.
+    """
+
+    columns: slice
+    weight: np.ndarray
+
+
+def field_prior(field: RandomField, settings: Settings) -> FieldPrior:
+    """The prior of a field with the covariance that the settings say, or one to begin with."""
+    sigma_um, length_mm = known_or_first(field, settings)
+    weight, _ = prior_weight(field.camera, field.items, 1e-3 * sigma_um, length_mm)
+    return FieldPrior(field.columns, weight)
+
+
+def known_or_first(field: RandomField, settings: Settings) -> tuple[float, float]:
+    """σ_d (µm) and correlation length (mm) as the settings say, or to begin with."""
+    known = settings.collocation
+    sigma = FIRST_SIGMA * settings.image_sigma_um if known.sigma_um is None else known.sigma_um
+    length = FIRST_LENGTH * field.camera.r_max_mm if known.length_mm is None else known.length_mm
+    return sigma, length

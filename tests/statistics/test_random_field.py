@@ -1,0 +1,133 @@
+"""Covariance of the image error as a random field: the likelihood against dense algebra, known fields found again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aerotri.formats.block_folder import read_block, write_block
+from aerotri.formats.solution import read_solution, write_solution
+from aerotri.functional_model.additional_parameters import collocation
+from aerotri.observations import Block, CollocationSettings
+from aerotri.pipeline import adjust_keeping_system, reopen
+from aerotri.simulation import parse_spec, simulate
+from aerotri.statistics.field_estimation import FieldCovariance, ReducedToFields
+from dense_algebra import TINY, dense_design
+from small_blocks import small_block, small_spec, with_adjustment
+
+GRID = (9, 6)
+
+
+def with_collocation(block: Block, *known: float) -> Block:
+    return replace(block, settings=replace(block.settings, collocation=CollocationSettings(*known)))
+
+
+def reduced_and_dense(datum: str = "control"):
+    """What the sparse factor says of a field, and the design matrix with the whitened misclosures at p = 0."""
+    block = with_adjustment(small_block(3, "bluh:9,collocation:4x3", **TINY)[0], datum=datum)
+    adjustment = adjust_keeping_system(with_collocation(block, 4.0, 30.0))
+    system, solution = adjustment.system, adjustment.solution
+    reduced = ReducedToFields.of(system, solution, system.factorise(solution.equations))
+    return adjustment, reduced
+
+
+def test_likelihood_against_dense_algebra():
+    """−2 ln L up to a constant from the covariance of all observations, the other unknowns projected out."""
+    adjustment, reduced = reduced_and_dense()
+    system, state = adjustment.system, adjustment.solution.state
+    u, field = system.unknowns, system.unknowns.shared.fields[0]
+    design = dense_design(adjustment)
+    first = 6 * len(u.images) + field.columns.start
+    nodes = np.arange(first, first + len(field.items))
+    is_prior = (design[:, nodes] != 0.0).any(axis=1) & (np.delete(design, nodes, axis=1) == 0.0).all(axis=1)
+    a, others = design[~is_prior][:, nodes], np.delete(design[~is_prior], nodes, axis=1)
+    others = others[:, (others != 0.0).any(axis=0)]
+    others = others / np.linalg.norm(others, axis=0)
+    left = np.linalg.svd(others, full_matrices=True)[0][:, others.shape[1] :]
+    # misclosures at p = 0: v at the solution, and what the nodes explain, in the order of the design matrix
+    residual = (adjustment.solution.equations.residual * u.rays.inv_sigma).ravel()
+    given = [
+        np.sqrt(u.prior_weight[p, axis]) * (u.prior_xyz[p, axis] - state.points[p, axis])
+        for p, axis in zip(*np.nonzero(u.prior_weight), strict=True)
+    ]
+    y = left.T @ (np.concatenate([residual, given]) + a @ state.shared[field.columns])
+    seen = left.T @ a
+
+    def deviance(known: FieldCovariance) -> float:
+        k = collocation.prior_covariance(field.camera, field.items, 1e-3 * known.sigma_um, known.length_mm)
+        covariance = np.eye(len(y)) + seen @ k @ seen.T
+        omega = y @ np.linalg.solve(covariance, y)
+        return len(y) * np.log(omega) + np.linalg.slogdet(covariance)[1]
+
+    assert reduced.freedom == len(y)
+    cases = [FieldCovariance(s, length) for s, length in ((4.0, 30.0), (1.0, 10.0), (0.05, 100.0), (20.0, 200.0))]
+    ours, dense = (np.array([f(c) for c in cases]) for f in (reduced.deviance, deviance))
+    np.testing.assert_allclose(ours - ours[0], dense - dense[0], atol=1e-5)
+
+
+def test_what_the_nodes_see_does_not_depend_on_the_datum():
+    """And the right side neither: N and b belong to the image points."""
+    several = [reduced_and_dense(datum)[1] for datum in ("minimal", "inner")]
+    scale = np.sqrt(np.diagonal(several[0].normals))
+    np.testing.assert_allclose(
+        several[0].normals / np.outer(scale, scale), several[1].normals / np.outer(scale, scale), atol=1e-6
+    )
+    np.testing.assert_allclose(several[0].right / scale, several[1].right / scale, atol=1e-4)
+
+
+def simulated(seed: int, sigma_um: float, length_mm: float):
+    """A block whose camera errs by a random field of known covariance, sampled at the nodes of the grid."""
+    content = small_spec()
+    content["tie_points"]["per_image"] = 150
+    camera = simulate(parse_spec(content), seed)[0].cameras[0]
+    items = collocation.SIZES.items(GRID)
+    covariance = collocation.prior_covariance(camera, items, 1e-3 * sigma_um, length_mm)
+    values = np.linalg.cholesky(covariance) @ np.random.default_rng(seed).normal(size=len(items))
+    names = [f"collocation.{item}" for item in items]
+    content["camera"]["ucd"]["errors"] = {"parameters": dict(zip(names, values.tolist(), strict=True))}
+    block, _ = simulate(parse_spec(content), seed)
+    return with_adjustment(block, additional_parameters=(("collocation", items),)), values
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_covariance_recovered(seed):
+    """σ_d²/ℓ within what 108 nodes say of it, and the nodes within their covariance."""
+    block, values = simulated(seed, 4.0, 40.0)
+    result = adjust_keeping_system(block).result
+    known = result.block.settings.collocation
+    assert known.sigma_um is not None
+    assert known.length_mm is not None
+    # neighbouring nodes, 20 mm and less apart, tell σ_d²/ℓ to about √(2/108)
+    assert abs(np.log(known.sigma_um**2 / known.length_mm / (16.0 / 40.0))) < 4.0 * np.sqrt(2.0 / 108)
+    p = result.parameters
+    # node by node they are correlated: all see the shifts and tilts of the whole image badly
+    error = p.value - values
+    assert abs(error @ np.linalg.solve(p.covariance, error) / 108 - 1.0) < 4.0 * np.sqrt(2.0 / 108)
+    assert np.abs(error / p.sigma).max() < 4.0
+    assert 0.95 < result.outcome.sigma0 < 1.05
+
+
+def test_no_field_where_there_is_none():
+    block = small_block(4, "collocation:7x5")[0]
+    result = adjust_keeping_system(block).result
+    assert result.block.settings.collocation.sigma_um < 0.6
+    assert result.groups[-1].name == "collocation field"
+    assert result.groups[-1].redundancy < 12.0
+
+
+def test_what_is_given_is_kept_and_a_result_reopens(tmp_path):
+    block = with_collocation(small_block(5, "collocation:5x4")[0], 2.5)
+    a = adjust_keeping_system(block)
+    assert a.result.block.settings.collocation.sigma_um == 2.5
+    assert a.result.block.settings.collocation.length_mm is not None
+    write_block(a.result.block, tmp_path / "block")
+    write_solution(tmp_path / "solution.npz", a.system, a.solution, a.local)
+    again = reopen(read_block(tmp_path / "block"), read_solution(tmp_path / "solution.npz"))
+    scale = np.sqrt(np.diagonal(a.result.parameters.covariance))
+    np.testing.assert_allclose(again.result.parameters.sigma, a.result.parameters.sigma, rtol=1e-9)
+    np.testing.assert_allclose(
+        again.result.parameters.covariance / np.outer(scale, scale),
+        a.result.parameters.covariance / np.outer(scale, scale), atol=1e-9,
+    )  # fmt: skip
