@@ -115,7 +115,7 @@ def adjust_keeping_system(
 def _adjust_with_chosen_parameters(
     block: Block, report: Report | None, given_points: np.ndarray | None, geoid: str | os.PathLike | None
 ) -> Adjustment:
-    compared = compare_parameters(block, candidate_sets(block), geoid=geoid)
+    compared = compare_parameters(block, candidate_sets(block), geoid=geoid, report=report)
     chosen = choose(compared)
     adjustment = replace(block.settings.adjustment, additional_parameters=chosen.choice)
     block = replace(block, settings=replace(block.settings, adjustment=adjustment))
@@ -132,6 +132,7 @@ def compare_parameters(
     folds: int = FOLDS,
     geoid: str | os.PathLike | None = None,
     progress: Progress | None = None,
+    report: Report | None = None,
 ) -> ParameterComparison:
     """Adjust a block with several sets of additional parameters, in the frame of the adjustment.
 
@@ -140,7 +141,7 @@ def compare_parameters(
     Parameters
     ----------
     choices : as `parse_parameters` returns them. folds : parts in which control points are left out, one by one where
-        there are no more points than that.
+        there are no more points than that. progress : called before each set. report : after every iteration.
     """
     settings = block.settings.adjustment
     robust = "huber" if settings.robust == "data-snooping" else settings.robust
@@ -151,7 +152,7 @@ def compare_parameters(
     prepared = prepare(block)
     if nothing_holds(prepared.system):
         raise failure(prepared.system, "rank deficient", f"the datum is free in {', '.join(FREEDOMS)}")
-    return compare_sets(prepared, choices, folds, SolveOptions(settings.max_iterations, robust), progress)
+    return compare_sets(prepared, choices, folds, SolveOptions(settings.max_iterations, robust, report), progress)
 
 
 def _adjust_in_frame(

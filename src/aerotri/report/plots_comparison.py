@@ -43,7 +43,7 @@ def _label(o: SetOutcome) -> str:
 
 def _draw_axis(axes: Axes, outcomes: list[SetOutcome], k: int) -> None:
     axes.set_xscale("log")
-    axes.set_ylim(len(outcomes) - 0.5, -0.5)
+    axes.set_ylim(max(len(outcomes), 1) - 0.5, -0.5)
     axes.spines[["top", "right", "left"]].set_visible(False)
     for row, o in enumerate(outcomes):
         axes.axhline(row, color=LIGHT, lw=0.4, zorder=0)
