@@ -427,5 +427,64 @@ def compare_parameters(
     raise typer.Exit(run_compare_parameters(block, sets or (), folds, robust, geoid, out, json_))
 
 
+@app.command(
+    epilog="Example: aerotri tiepoints photographs --out block --gcp gcp_list.txt --control-sigma-m 0.02 --check GCP7"
+)
+def tiepoints(
+    photographs: Annotated[Path, typer.Argument(help="Folder of photographs, JPEG or TIFF.")],
+    out: Annotated[Path, typer.Option(help="Block folder to write; features and matches are kept in it.")],
+    gcp: Annotated[str, typer.Option(help="Control points with their image points, gcp_list.txt.")] = "",
+    check: Annotated[list[str] | None, typer.Option(help="Control point that is a check point; may repeat.")] = None,
+    positions: Annotated[str, typer.Option(help="Positions of the photographs, in place of EXIF.")] = "",
+    orientation: Annotated[str, typer.Option(help="Orientations of the photographs; no first one is sought.")] = "",
+    camera: Annotated[Path | None, typer.Option(help="Camera: [camera.NAME] tables (.toml), orthority.")] = None,
+    focal_length_mm: Annotated[float | None, typer.Option(min=1e-6, help="In place of EXIF.")] = None,
+    pixel_um: Annotated[float | None, typer.Option(min=1e-6, help="Size of a pixel, µm, in place of EXIF.")] = None,
+    free_interior: Annotated[bool, typer.Option(help="The interior of --camera is unknown.")] = False,
+    crs: Annotated[str, typer.Option(help="Coordinate system; default that of control, else UTM of EXIF.")] = "",
+    geoid: Annotated[Path | None, typer.Option(help="Geoid grid for its heights.")] = None,
+    control_sigma_m: Annotated[str, typer.Option(help="σ of control points without one: X,Y,Z in m.")] = "",
+    mark_sigma_px: Annotated[float, typer.Option(min=1e-3, help="σ of the image points of control.")] = 0.5,
+    positions_sigma_m: Annotated[str, typer.Option(help="σ of positions without one: X,Y,Z in m.")] = "",
+    orientation_sigma_m: Annotated[str, typer.Option(help="Orientations are observations: σ X,Y,Z in m.")] = "",
+    orientation_sigma_deg: Annotated[str, typer.Option(help="The same of omega,phi,kappa in degrees.")] = "",
+    points: Annotated[int, typer.Option(min=10, help="Tie points wanted in a photograph.")] = 1000,
+    features: Annotated[int, typer.Option(min=100, help="Features sought in a photograph.")] = 8000,
+    feature_size: Annotated[int, typer.Option(min=300, help="Features are sought in photographs of this size.")] = 2000,
+    neighbours: Annotated[int, typer.Option(min=1, help="Photographs each is compared with, the nearest.")] = 20,
+    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same block.")] = 1,
+    json_: Json = False,
+) -> None:
+    """From photographs to a block: tie points, first orientation, control."""
+    from aerotri.commands.convert import three_values
+    from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
+    from aerotri.formats.assemble import Statements
+    from aerotri.formats.camera_spec import CameraSpec
+
+    stated = Statements(
+        crs=crs,
+        geoid=geoid,
+        control_sigma_m=three_values(control_sigma_m, "--control-sigma-m"),
+        positions_sigma_m=three_values(positions_sigma_m, "--positions-sigma-m"),
+        orientation_sigma_m=three_values(orientation_sigma_m, "--orientation-sigma-m"),
+        orientation_sigma_deg=three_values(orientation_sigma_deg, "--orientation-sigma-deg"),
+    )
+    options = TiePointOptions(
+        gcp=gcp,
+        check=tuple(check or ()),
+        positions=positions,
+        orientation=orientation,
+        camera=CameraSpec(camera, "", None, pixel_um, focal_length_mm, None, free_interior),
+        stated=stated,
+        mark_sigma_px=mark_sigma_px,
+        points=points,
+        features=features,
+        feature_size_px=feature_size,
+        neighbours=neighbours,
+        seed=seed,
+    )
+    run_tiepoints(photographs, out, options, json_)
+
+
 if __name__ == "__main__":
     main()

@@ -130,6 +130,25 @@ def georeference(crs: str, around: np.ndarray, geoid: str | os.PathLike | None =
     )
 
 
+def utm_crs(lon: np.ndarray, lat: np.ndarray) -> str:
+    """'EPSG:n' of the UTM zone on WGS 84 in which the middle of places lies, (n,) degrees each."""
+    middle_lon = float(np.degrees(np.angle(np.exp(1j * np.radians(lon)).mean())))
+    zone = int((middle_lon + 180.0) // 6.0) % 60 + 1
+    return f"EPSG:{(32600 if np.mean(lat) >= 0.0 else 32700) + zone}"
+
+
+def is_projected(crs: str) -> bool:
+    """Whether a CRS counts in metres of a plane.
+
+    Raises
+    ------
+    InputError
+        When PROJ does not know it.
+    """
+    whole = _read_crs(crs)
+    return bool((whole.sub_crs_list[0] if whole.is_compound else whole).is_projected)
+
+
 def _read_crs(crs: str) -> CRS:
     from pyproj import CRS
     from pyproj.exceptions import CRSError

@@ -1,0 +1,180 @@
+"""Matches between neighbouring photographs: mutual best descriptors that pass the ratio test, verified by geometry.
+
+[L] Descriptors are compared as RootSIFT (Arandjelović and Zisserman 2012); a match has to be the best in both
+directions, and clearly better than the second best in both (Lowe 2004). What one epipolar geometry or one homography
+explains is kept (COLMAP's two-view estimation).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.adjustment.parallel import thread_count
+from aerotri.formats.atomic import atomic_file
+from aerotri.observations import Camera
+from aerotri.tie_points import _kernels
+from aerotri.tie_points.features import Features
+from aerotri.tie_points.first_orientation import pinhole, two_view_inliers
+
+ROWS = 1024
+"""Descriptors compared at a time."""
+FIRST_LOOK, FEWEST_AT_FIRST = 2000, 6
+"""Pairs whose first features, so many of each, have fewer matches than this are taken as apart (Wu 2013)."""
+Report = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class MatchOptions:
+    """How matches are sought.
+
+    Parameters
+    ----------
+    neighbours : photographs nearest to each that it is compared with.
+    ratio : distance of the best over that of the second best descriptor, at most.
+    tolerance_px : of the geometry, in pixels of the photograph features were sought in; what the lens of an unknown
+        camera does has to find room in it.
+    fewest : matches without which two photographs are not tied.
+    seed : of random sampling.
+    """
+
+    neighbours: int = 20
+    ratio: float = 0.8
+    tolerance_px: float = 4.0
+    fewest: int = 15
+    seed: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class PairMatches:
+    """Verified matches of two photographs: (m, 2) features of the first and of the second."""
+
+    first: int
+    second: int
+    matches: np.ndarray
+
+
+def neighbours(position: np.ndarray, count: int) -> list[tuple[int, int]]:
+    """Pairs of photographs to compare, each with the `count` nearest to it in plan.
+
+    Parameters
+    ----------
+    position : (n, 2) or (n, 3) m; NaN where not known: such a photograph is compared with every other.
+    """
+    known = np.isfinite(position[:, :2]).all(axis=1)
+    pairs = {(min(i, j), max(i, j)) for i in np.flatnonzero(~known).tolist() for j in range(len(position)) if i != j}
+    rows = np.flatnonzero(known)
+    if len(rows) > 1:
+        from scipy.spatial import KDTree
+
+        nearest = KDTree(position[rows, :2]).query(position[rows, :2], min(count + 1, len(rows)))[1]
+        for i, near in zip(rows.tolist(), np.atleast_2d(nearest), strict=True):
+            pairs |= {(min(i, j), max(i, j)) for j in rows[near].tolist() if j != i}
+    return sorted(pairs)
+
+
+def match_all(
+    features: Sequence[Features],
+    cameras: Sequence[Camera],
+    names: np.ndarray,
+    pairs: list[tuple[int, int]],
+    options: MatchOptions,
+    cache: Path,
+    report: Report = lambda done, count: None,
+) -> list[PairMatches]:
+    """Verified matches of all pairs, from `cache` where they are there already; those with too few are left out.
+
+    Parameters
+    ----------
+    features, cameras : of every photograph. names : (n,) str. report : called with pairs done and their number.
+    """
+    found, done = [], 0
+    for first in sorted({i for i, _ in pairs}):
+        seconds = [j for i, j in pairs if i == first]
+        kept = cache / f"{names[first]}.npz"
+        known = _kept(kept)
+        keys = {j: _key(features[first], features[j], cameras[first], cameras[j], options) for j in seconds}
+
+        def one(j: int, first: int = first, known: dict = known, keys: dict = keys) -> np.ndarray:
+            old = known.get(keys[j])
+            return _match(features[first], features[j], (cameras[first], cameras[j]), options) if old is None else old
+
+        with ThreadPoolExecutor(thread_count()) as pool:
+            results = []
+            for result in pool.map(one, seconds):
+                results.append(result)
+                done += 1
+                report(done, len(pairs))
+        if any(keys[j] not in known for j in seconds):
+            _keep(kept, {keys[j]: result for j, result in zip(seconds, results, strict=True)})
+        found += [
+            PairMatches(first, j, result)
+            for j, result in zip(seconds, results, strict=True)
+            if len(result) >= options.fewest
+        ]
+    return found
+
+
+def _match(one: Features, other: Features, cameras: tuple[Camera, Camera], options: MatchOptions) -> np.ndarray:
+    look = mutual_matches(one.descriptors[:FIRST_LOOK], other.descriptors[:FIRST_LOOK], options.ratio)
+    if len(look) < FEWEST_AT_FIRST:
+        return np.zeros((0, 2), np.int64)
+    candidates = mutual_matches(one.descriptors, other.descriptors, options.ratio)
+    if len(candidates) < options.fewest:
+        return np.zeros((0, 2), np.int64)
+    tolerance = options.tolerance_px * 2.0 * max(one.sigma_px, other.sigma_px)
+    inliers = two_view_inliers(
+        (pinhole(cameras[0]), pinhole(cameras[1])),
+        (one.xy[candidates[:, 0]], other.xy[candidates[:, 1]]),
+        tolerance,
+        options.fewest,
+        options.seed,
+    )
+    return candidates[inliers]
+
+
+def mutual_matches(one: np.ndarray, other: np.ndarray, ratio: float) -> np.ndarray:
+    """(m, 2) rows of descriptors (n1, 128) and (n2, 128) that are each other's best and pass the ratio test."""
+    a, b = _root(one), _root(other)
+    best, two = np.full(len(a), -1, np.int64), np.full((len(a), 2), -1.0, np.float32)
+    column_best, column_two = np.full(len(b), -1, np.int64), np.full((len(b), 2), -1.0, np.float32)
+    for first in range(0, len(a), ROWS):
+        _kernels.two_best(a[first : first + ROWS] @ b.T, first, best, two, column_best, column_two)
+    rows = np.flatnonzero(_clear(two, ratio) & (best >= 0))
+    rows = rows[_clear(column_two, ratio)[best[rows]] & (column_best[best[rows]] == rows)]
+    return np.column_stack([rows, best[rows]])
+
+
+def _root(descriptors: np.ndarray) -> np.ndarray:
+    """RootSIFT: (n, 128) float32 of length 1."""
+    values = descriptors.astype(np.float32)
+    return np.sqrt(values / np.maximum(values.sum(axis=1, keepdims=True), 1.0))
+
+
+def _clear(two: np.ndarray, ratio: float) -> np.ndarray:
+    """(n,) bool: the distance of the best is less than `ratio` times that of the second best; d² = 2 − 2s."""
+    return (1.0 - two[:, 0]) < ratio**2 * (1.0 - two[:, 1])
+
+
+def _key(one: Features, other: Features, first: Camera, second: Camera, options: MatchOptions) -> str:
+    geometry = [(camera.focal_length_mm / camera.pixel_mm, camera.principal_point_mm) for camera in (first, second)]
+    settings = (options.ratio, options.tolerance_px, options.fewest, options.seed)
+    return "k" + hashlib.sha256(repr((one.key, other.key, geometry, settings)).encode()).hexdigest()
+
+
+def _kept(path: Path) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return {key: file[key] for key in file.files}
+    except (OSError, ValueError, KeyError, EOFError):
+        return {}
+
+
+def _keep(path: Path, found: dict[str, np.ndarray]) -> None:
+    with atomic_file(path) as place, place.open("wb") as file:
+        np.savez(file, **{key: matches.astype(np.int32) for key, matches in found.items()})  # type: ignore[arg-type]

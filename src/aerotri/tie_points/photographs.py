@@ -1,0 +1,139 @@
+"""The photographs of a folder and their cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.formats.exif import PhotographTags, read_exif
+from aerotri.formats.parts import texts
+from aerotri.observations import Camera, Prior
+
+ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff")
+LENS = ("k1", "k2", "p1", "p2", "k3")
+"""Parameters that a camera known from EXIF alone has as unknowns."""
+REMEDY = "state what is missing: --focal-length-mm 8.8 --pixel-um 2.4, or --camera FILE with tables [camera.NAME]"
+
+
+@dataclass(frozen=True, eq=False)
+class PhotographSet:
+    """Photographs, n of them, in the order of their names.
+
+    Parameters
+    ----------
+    paths : of the files; names : (n,) str, their names with ending.
+    cameras : the cameras; camera : (n,) index into them.
+    lon_lat_height : (n, 3) degrees and m; sigma_m : (n, 3) m; NaN where not known.
+    ellipsoidal : (n,) bool, whether the height is said to count from the ellipsoid.
+    """
+
+    paths: tuple[Path, ...]
+    names: np.ndarray
+    cameras: tuple[Camera, ...]
+    camera: np.ndarray
+    lon_lat_height: np.ndarray
+    sigma_m: np.ndarray
+    ellipsoidal: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+
+@dataclass(frozen=True)
+class StatedCamera:
+    """What the user states of the camera; None and () where EXIF is to tell.
+
+    Parameters
+    ----------
+    cameras : whole cameras, told by the size of their photographs.
+    focal_length_mm, pixel_um : start values.
+    """
+
+    cameras: tuple[Camera, ...] = ()
+    focal_length_mm: float | None = None
+    pixel_um: float | None = None
+
+
+def find_photographs(folder: Path, stated: StatedCamera = StatedCamera()) -> PhotographSet:
+    """The photographs of a folder.
+
+    Raises
+    ------
+    InputError
+        When there are fewer than two, or the camera of one is not known.
+    """
+    if not folder.is_dir():
+        raise InputError("is no folder", "give the folder of the photographs", folder)
+    paths = tuple(sorted(p for p in folder.iterdir() if p.suffix.lower() in ENDINGS and not p.name.startswith(".")))
+    if len(paths) < 2:
+        raise InputError(f"holds {len(paths)} photographs", f"give a folder with files {', '.join(ENDINGS)}", folder)
+    tags = [read_exif(path) for path in paths]
+    cameras, camera = _cameras(paths, tags, stated)
+    return PhotographSet(
+        paths=paths,
+        names=texts([path.name for path in paths]),
+        cameras=cameras,
+        camera=camera,
+        lon_lat_height=np.array([tag.lon_lat_height for tag in tags]),
+        sigma_m=np.array([tag.sigma_m for tag in tags]),
+        ellipsoidal=np.array([tag.ellipsoidal for tag in tags]),
+    )
+
+
+def _cameras(
+    paths: Sequence[Path], tags: Sequence[PhotographTags], stated: StatedCamera
+) -> tuple[tuple[Camera, ...], np.ndarray]:
+    """The cameras in use and the one of every photograph: photographs of one model, size and focal length share it."""
+    found: list[Camera] = []
+    place: dict[tuple, int] = {}
+    index = np.empty(len(tags), np.int64)
+    for row, (path, tag) in enumerate(zip(paths, tags, strict=True)):
+        key = (tag.make, tag.model, tag.size_px, tag.focal_length_mm, tag.pixel_um)
+        if key not in place:
+            camera = _stated(path, tag, stated.cameras) if stated.cameras else _from_tags(path, tag, stated)
+            same = [i for i, other in enumerate(found) if other is camera]
+            place[key] = same[0] if same else len(found)
+            if not same:
+                found.append(camera)
+        index[row] = place[key]
+    return _named_apart(found), index
+
+
+def _stated(path: Path, tag: PhotographTags, cameras: tuple[Camera, ...]) -> Camera:
+    fitting = [camera for camera in cameras if camera.size_px == tag.size_px]
+    named = [camera for camera in fitting if camera.name == tag.model]
+    if len(named or fitting) == 1:
+        return (named or fitting)[0]
+    size = "{} × {}".format(*tag.size_px)
+    known = ", ".join("{} {} × {}".format(camera.name, *camera.size_px) for camera in cameras)
+    what = "no camera" if not fitting else f"{len(fitting)} cameras"
+    raise InputError(f"has {size} pixels, {what} of that size stated ({known})", "state one camera of that size", path)
+
+
+def _from_tags(path: Path, tag: PhotographTags, stated: StatedCamera) -> Camera:
+    """A camera all of whose interior is unknown, from EXIF and what is stated."""
+    focal = stated.focal_length_mm or tag.focal_length_mm
+    pixel = stated.pixel_um or tag.pixel_um
+    if focal is None or pixel is None:
+        missing = [what for what, value in (("focal length", focal), ("size of a pixel", pixel)) if value is None]
+        raise InputError(f"does not tell the {' and the '.join(missing)} of its camera", REMEDY, path)
+    return Camera(
+        name=tag.model or "camera",
+        model="frame",
+        size_px=tag.size_px,
+        pixel_um=round(pixel, 6),
+        interior={"focal_length_mm": Prior(focal), "x0_mm": Prior(0.0), "y0_mm": Prior(0.0)},
+        lens={name: Prior(0.0) for name in LENS},
+    )
+
+
+def _named_apart(cameras: list[Camera]) -> tuple[Camera, ...]:
+    names = [camera.name for camera in cameras]
+    return tuple(
+        camera if names.count(camera.name) == 1 else replace(camera, name=f"{camera.name} {number}")
+        for number, camera in enumerate(cameras, 1)
+    )
