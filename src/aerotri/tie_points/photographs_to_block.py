@@ -101,9 +101,10 @@ def tie_photographs(
     ------
     InputError
     """
-    features = _features(photographs, options.features, cache, progress)
     crs = _crs(photographs, given)
     positions, said = _positions(photographs, given, crs)
+    _refuse_bad_lists(photographs, given, crs, positions)
+    features = _features(photographs, options.features, cache, progress)
     tracks, pairs = _tracks(photographs, features, _places(photographs, positions, given), options, cache, progress)
     size = np.array([photographs.cameras[c].size_px for c in photographs.camera], dtype=float)
     tracks = thin(tracks, _xy(tracks, features), size, MORE_TRACKS * options.points)
@@ -147,6 +148,20 @@ class _Oriented:
 
     def kept(self, keep: np.ndarray) -> _Oriented:
         return replace(self, centre=self.centre[keep], rotation=self.rotation[keep])
+
+
+def _refuse_bad_lists(photographs: PhotographSet, given: Given, crs: str, positions: PositionList | None) -> None:
+    """What is wrong with the lists is said before anything is computed.
+
+    Raises
+    ------
+    InputError
+    """
+    nothing = np.zeros(0, np.int64)
+    bare = _bare_block(photographs, photographs.cameras, Tracks(np.zeros(1, np.int64), nothing, nothing), [])
+    reading = _complete(Reading(bare), given, crs, positions)
+    if given.orientation is not None and not _is_observed(given.stated):
+        assemble.with_orientations(reading, given.orientation, given.stated)
 
 
 def _features(photographs: PhotographSet, options: FeatureOptions, cache: Path, progress: Progress) -> list[Features]:
@@ -240,13 +255,14 @@ def _bare_block(
 ) -> Block:
     """Cameras, photographs and tie points; `keep` (n,) bool, the photographs of the block."""
     keep = np.ones(len(photographs), bool) if keep is None else keep
-    xy_px, of_camera = _xy(tracks, features), photographs.camera[tracks.image]
+    xy_px = _xy(tracks, features) if len(tracks) else np.zeros((0, 2))
+    of_camera = photographs.camera[tracks.image]
     xy = np.empty_like(xy_px)
     for number, camera in enumerate(cameras):
         own = of_camera == number
         xy[own] = mm_from_px(xy_px[own], camera.size_px, camera.pixel_mm)
     pixel = np.array([camera.pixel_mm for camera in cameras])
-    sigma = np.array([f.sigma_px for f in features])[tracks.image] * pixel[of_camera]
+    sigma = np.array([features[i].sigma_px for i in tracks.image.tolist()]) * pixel[of_camera]
     index = np.cumsum(keep) - 1
     count = int(keep.sum())
     width = len(str(len(tracks)))
@@ -257,7 +273,7 @@ def _bare_block(
                       no_sigma(count)),
         points=np.array([f"tp{number:0{width}d}" for number in range(len(tracks))], dtype=str),
         image_points=ImagePoints(index[tracks.image], tracks.of_ray, xy, np.repeat(sigma[:, None], 2, axis=1)),
-        settings=_settings(cameras, float(np.median(sigma)) * 1e3),
+        settings=_settings(cameras, 1e3 * float(np.median(sigma)) if len(sigma) else 1.0),
     )  # fmt: skip
 
 

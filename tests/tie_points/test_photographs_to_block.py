@@ -1,0 +1,170 @@
+"""Rendered photographs and a list of control points, files alone: block, adjustment, check points."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from aerotri.commands.adjust import run_adjust
+from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
+from aerotri.conventions import InputError, px_from_mm
+from aerotri.coordinates import local_frame
+from aerotri.formats.assemble import Statements
+from aerotri.formats.block_folder import read_block
+from aerotri.formats.camera_spec import CameraSpec
+from aerotri.rasters_images import create_image
+from aerotri.simulation import parse_spec, simulate
+from aerotri.simulation.rendering import RenderOptions, make_scene, render
+
+SPEC = {
+    "name": "rendered",
+    "camera": {"cam": {"size_px": [480, 360], "pixel_um": 12.0, "focal_length_mm": 6.0,
+                       "errors": {"lens": {"k1": -0.04}, "interior": {"focal_length_mm": 0.05}}}},
+    "flight": {"gsd_m": 0.2, "strips": 2, "images_per_strip": 3, "end_lap": 0.7, "side_lap": 0.5, "heading_deg": 30.0,
+               "attitude_sigma_deg": [2.0, 2.0, 3.0], "position_sigma_m": [2.0, 2.0, 2.0]},
+    "terrain": {"kind": "undulating", "height_m": 50.0, "relief_rms_m": 5.0, "wavelength_m": 120.0},
+    "tie_points": {"per_image": 20, "probability": 0.9, "sigma_um": 1.2},
+    "control": {"distance_bases": 1.0, "sigma_m": [0.02, 0.02, 0.03], "check_points": 15},
+}  # fmt: skip
+MARK_SIGMA_PX = 0.1
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Photographs and gcp_list.txt of a small block, and its check points."""
+    folder = tmp_path_factory.mktemp("rendered")
+    spec = parse_spec(SPEC)
+    block, truth = simulate(spec, 3)
+    scene, rays = make_scene(spec, 3, block, truth, RenderOptions()), block.image_points
+    (folder / "photographs").mkdir()
+    for number, name in enumerate(block.images.names.tolist()):
+        image = render(scene, number)
+        with create_image(folder / "photographs" / f"{name}.tif", 480, 360, 1, "uint16") as writer:
+            writer.write(0, image[None])
+    camera, control = block.cameras[0], dict(zip(block.control.point.tolist(), block.control.xyz, strict=True))
+    lines = ["EPSG:32632"]
+    frame = local_frame("EPSG:32632", np.array([[500000.0, 5.3e6, 0.0]]))
+    for image, point, xy in zip(rays.image.tolist(), rays.point.tolist(), rays.xy, strict=True):
+        if point in control:
+            column, row = px_from_mm(xy[None], camera.size_px, camera.pixel_mm)[0] - 0.5
+            place = " ".join(f"{value:.4f}" for value in frame.from_local(control[point][None])[0])
+            lines.append(f"{place} {column:.3f} {row:.3f} {block.images.names[image]}.tif {block.points[point]}")
+    (folder / "gcp_list.txt").write_text("\n".join(lines) + "\n")
+    check = block.points[block.control.point[block.control.is_check]]
+    return folder, tuple(name for name in check.tolist() if any(line.endswith(f" {name}") for line in lines))
+
+
+def options(files, **changes) -> TiePointOptions:
+    settings = {
+        "gcp": str(files[0] / "gcp_list.txt"),
+        "check": files[1],
+        "camera": CameraSpec(focal_length_mm=6.0, pixel_um=12.0),
+        "stated": Statements(control_sigma_m=(0.02, 0.02, 0.03)),
+        "mark_sigma_px": MARK_SIGMA_PX,
+        "points": 300,
+        "features": 2000,
+    }
+    return TiePointOptions(**(settings | changes))
+
+
+@pytest.fixture(scope="module")
+def tied(files):
+    out = files[0] / "block"
+    run_tiepoints(files[0] / "photographs", out, options(files), True)
+    return out
+
+
+def test_check_points_within_their_standard_deviations(files, tied):
+    """From files alone: normalised differences of check points have an RMS below 1.5."""
+    assert run_adjust(tied, files[0] / "result", None, None, None, False, True) == 0
+    with (files[0] / "result" / "check.csv").open() as file:
+        w = np.array([[float(row[key]) for key in ("wX", "wY", "wZ")] for row in csv.DictReader(file)])
+    assert len(w) >= 10
+    assert np.sqrt((w**2).mean(axis=0)).max() < 1.5
+    assert np.abs(w).max() < 4.0
+    outcome = json.loads((files[0] / "result" / "adjustment.json").read_text())
+    assert 0.7 < outcome["sigma0"] < 1.4
+    (camera,) = outcome["cameras"]
+    assert camera["focal_length_mm"] == pytest.approx(6.05, abs=4.0 * camera["s_focal_length_mm"])
+
+
+def test_block_says_what_was_given(files, tied):
+    block = read_block(tied)
+    assert block.crs == "EPSG:32632"
+    assert len(block.images) == 6
+    assert sorted(block.points[block.control.point[block.control.is_check]]) == sorted(files[1])
+    content = json.loads((tied / "tiepoints.json").read_text())
+    assert content["left_out"] == []
+    assert content["tie_points"] + len(block.control) == len(block.points)
+    assert content["rays_per_point"] > 3.0
+    assert content["median_residual_px"] < 0.3
+
+
+def test_the_same_again_with_and_without_what_is_kept(files, tied, tmp_path):
+    """The same block to the last bit, from nothing and from features and matches on disk."""
+    first = {name: (tied / name).read_bytes() for name in ("images.csv", "image_points.csv", "control.csv")}
+    fresh = tmp_path / "fresh"
+    run_tiepoints(files[0] / "photographs", fresh, options(files), True)
+    kept = fresh / "tie_point_cache" / "features" / "1_001.tif.npz"
+    state = kept.stat().st_mtime_ns
+    assert {name: (fresh / name).read_bytes() for name in first} == first
+    run_tiepoints(files[0] / "photographs", fresh, options(files), True)
+    assert {name: (fresh / name).read_bytes() for name in first} == first
+    assert kept.stat().st_mtime_ns == state
+
+
+def test_control_can_be_marked(files, tied):
+    """Predicted and marked places agree to a pixel; the page brings every piece, and the list it begins with."""
+    with (tied / "control_marks" / "predicted.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    known = [row for row in rows if row["marked_column"]]
+    off = [[float(row[a]) - float(row[f"marked_{a}"]) for a in ("column", "row")] for row in known]
+    assert len(known) > 20
+    assert np.abs(off).max() < 1.0
+    page = (tied / "control_marks" / "marking.html").read_text()
+    assert page.count("<figure>") == len(rows) == len(list((tied / "control_marks" / "pieces").iterdir()))
+    assert re.search(r'const crs = "EPSG:32632"', page)
+    assert "://" not in page
+
+
+def test_points_without_marks_are_predicted_only(files, tied, tmp_path):
+    """A list of coordinates: nothing holds the block but what else there is, and the pieces are there to mark in."""
+    block = read_block(tied)
+    rows = ["point,X,Y,Z,sX,sY,sZ", *(f"{block.points[p]},{x},{y},{z},0.1,0.1,0.1" for p, (x, y, z) in zip(
+        block.control.point, block.control.xyz.tolist(), strict=True))]  # fmt: skip
+    (tmp_path / "control.csv").write_text("\n".join(rows) + "\n")
+    places = [f"{name},{x},{y},{z},1,1,1" for name, (x, y, z) in zip(
+        block.images.names, block.images.centre.tolist(), strict=True)]  # fmt: skip
+    (tmp_path / "positions.csv").write_text("\n".join(["image,X,Y,Z,sX,sY,sZ", *places]) + "\n")
+    given = options(
+        files, gcp=str(tmp_path / "control.csv"), check=(), positions=str(tmp_path / "positions.csv"),
+        stated=Statements(crs="EPSG:32632"),
+    )  # fmt: skip
+    shutil.copytree(tied / "tie_point_cache", tmp_path / "out" / "tie_point_cache")
+    run_tiepoints(files[0] / "photographs", tmp_path / "out", given, True)
+    assert len(read_block(tmp_path / "out").control) == 0
+    with (tmp_path / "out" / "control_marks" / "predicted.csv").open() as file:
+        assert sum(1 for _ in file) > 20
+
+
+def test_bad_input_is_named(files, tmp_path):
+    """Before anything is computed."""
+    with pytest.raises(InputError, match=r"1_001\.tif.*focal length.*--focal-length-mm"):
+        run_tiepoints(files[0] / "photographs", tmp_path / "out", options(files, camera=CameraSpec()), True)
+    with pytest.raises(InputError, match="--check K99"):
+        run_tiepoints(files[0] / "photographs", tmp_path / "out2", options(files, check=("K99",)), True)
+    with pytest.raises(InputError, match="--control-sigma-m"):
+        run_tiepoints(files[0] / "photographs", tmp_path / "out2", options(files, stated=Statements()), True)
+    assert not (tmp_path / "out2").exists()
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="0 photographs"):
+        run_tiepoints(tmp_path / "empty", tmp_path / "out3", options(files), True)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match="holds other files"):
+        run_tiepoints(files[0] / "photographs", tmp_path / "full", options(files), True)
