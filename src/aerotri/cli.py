@@ -486,5 +486,59 @@ def tiepoints(
     run_tiepoints(photographs, out, options, json_)
 
 
+@app.command(epilog="Example: aerotri run photographs --out project --gcp gcp_list.txt --control-sigma-m 0.02")
+def run(
+    source: Annotated[Path, typer.Argument(help="Folder of photographs, or a block.")],
+    out: Annotated[Path, typer.Option(help="Folder to write: block, result, dtm, and one report.")],
+    gcp: Annotated[str, typer.Option(help="Control points with their image points, gcp_list.txt.")] = "",
+    check: Annotated[list[str] | None, typer.Option(help="Control point that is a check point; may repeat.")] = None,
+    control_sigma_m: Annotated[str, typer.Option(help="σ of control points without one: X,Y,Z in m.")] = "",
+    positions: Annotated[str, typer.Option(help="Positions of the photographs, in place of EXIF.")] = "",
+    camera: Annotated[str, typer.Option(help="Camera: [camera.NAME] tables (.toml), orthority.")] = "",
+    focal_length_mm: Annotated[str, typer.Option(help="In place of EXIF.")] = "",
+    pixel_um: Annotated[str, typer.Option(help="Size of a pixel, µm, in place of EXIF.")] = "",
+    crs: Annotated[str, typer.Option(help="Coordinate system; default that of control, else UTM of EXIF.")] = "",
+    geoid: Annotated[str, typer.Option(help="Geoid grid for its heights.")] = "",
+    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same result.")] = 1,
+    parameters: Annotated[str, typer.Option(help="Additional parameters of the adjustment.")] = "",
+    interval: Annotated[str, typer.Option(help="Interval of the pickets of the DTM, or auto.")] = "",
+    plots: Annotated[bool, typer.Option(help="Draw the plots of the adjustment.")] = True,
+    json_: Json = False,
+) -> None:
+    """Everything: photographs to tie points, adjustment and terrain, with one report."""
+    from aerotri.commands.run import run_all
+
+    def given(**values: str) -> tuple[str, ...]:
+        return tuple(
+            word for name, value in values.items() if value for word in (f"--{name.replace('_', '-')}", value)
+        )
+
+    passed_on = {
+        "tiepoints": given(
+            gcp=gcp, control_sigma_m=control_sigma_m, positions=positions, camera=camera,
+            focal_length_mm=focal_length_mm, pixel_um=pixel_um, crs=crs, geoid=geoid, seed=str(seed),
+        ) + tuple(word for name in check or () for word in ("--check", name)),
+        "adjust": given(parameters=parameters, geoid=geoid) + (() if plots else ("--no-plots",)),
+        "dtm": given(interval=interval),
+    }  # fmt: skip
+    raise typer.Exit(run_all(source, out, passed_on, _invoke, _commands(), json_))
+
+
+def _commands() -> set[str]:
+    """Names of the commands there are."""
+    return {info.name or info.callback.__name__ for info in app.registered_commands if info.callback is not None}
+
+
+def _invoke(arguments: list[str]) -> int:
+    """Exit code of a command line of this program.
+
+    Raises
+    ------
+    InputError
+    """
+    ended = typer.main.get_command(app).main(arguments, prog_name="aerotri", standalone_mode=False)
+    return ended if isinstance(ended, int) else 0
+
+
 if __name__ == "__main__":
     main()
