@@ -219,14 +219,17 @@ def _write_database(block: Block, path: Path) -> None:
             _write_pair(database, (i, j), matches, px[order], bounds, block)
 
 
-def _common_points(point: np.ndarray, bounds: np.ndarray):
+def _common_points(point: np.ndarray, bounds: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
     """Pairs of photographs with enough points in common, and where these stand in the lists of the two."""
-    for i in range(len(bounds) - 1):
-        for j in range(i + 1, len(bounds) - 1):
-            own, other = point[bounds[i] : bounds[i + 1]], point[bounds[j] : bounds[j + 1]]
-            _, first, second = np.intersect1d(own, other, assume_unique=True, return_indices=True)
-            if len(first) >= FEWEST_POSE:
-                yield i, j, np.column_stack([first, second]).astype(np.uint32)
+    from scipy.sparse import csr_array
+
+    seen = csr_array((np.ones(len(point), np.int32), point, bounds))
+    both = (seen @ seen.T).tocoo()
+    enough = (both.row < both.col) & (both.data >= FEWEST_POSE)
+    for i, j in sorted(zip(both.row[enough].tolist(), both.col[enough].tolist(), strict=True)):
+        own, other = point[bounds[i] : bounds[i + 1]], point[bounds[j] : bounds[j + 1]]
+        _, first, second = np.intersect1d(own, other, assume_unique=True, return_indices=True)
+        yield i, j, np.column_stack([first, second]).astype(np.uint32)
 
 
 def _write_pair(

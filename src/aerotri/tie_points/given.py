@@ -1,0 +1,127 @@
+"""What is given beside the photographs: coordinate system, positions, control, orientations; the block with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from aerotri.coordinates.georeference import is_projected, utm_crs
+from aerotri.formats import assemble, placing
+from aerotri.formats.assemble_control import with_check_points, with_control
+from aerotri.formats.names_match import match_photographs
+from aerotri.formats.parts import OrientationList, PointList, PositionList, Reading, no_sigma
+from aerotri.observations import Block
+from aerotri.tie_points.photographs import PhotographSet
+
+EXIF_SIGMA_M = (5.0, 5.0, 10.0)
+"""Standard deviations of a position that does not say how good it is: hand-held GNSS [C]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """What the user gives beside the photographs.
+
+    Parameters
+    ----------
+    stated : CRS, geoid, standard deviations. positions : in place of EXIF. control, check : control points and the
+        names of those that are check points. orientation : in place of a first orientation.
+    mark_sigma_px : of the image points of control.
+    """
+
+    stated: assemble.Statements = field(default_factory=assemble.Statements)
+    positions: PositionList | None = None
+    control: PointList | None = None
+    check: tuple[str, ...] = ()
+    orientation: OrientationList | None = None
+    mark_sigma_px: float = 0.5
+
+
+def crs_of(photographs: PhotographSet, given: Given) -> str:
+    """As stated, else of the control, else of the positions; UTM where these are geographic, 'local' without any."""
+    if given.stated.crs:
+        return placing.known_crs(given.stated.crs)
+    lists = [part for part in (given.control, given.positions) if part is not None]
+    for part in lists:
+        if part.crs:
+            return part.crs if is_projected(part.crs) else utm_crs(part.xyz[:, 0], part.xyz[:, 1])
+    known = np.isfinite(photographs.lon_lat_height).all(axis=1)
+    if lists or given.orientation is not None or not known.any():
+        return "local"
+    return utm_crs(*photographs.lon_lat_height[known, :2].T)
+
+
+def positions_in(photographs: PhotographSet, given: Given, crs: str) -> tuple[PositionList | None, tuple[str, ...]]:
+    """Positions in the CRS of the block, from a list or from EXIF."""
+    if given.positions is not None:
+        return given.positions, ()
+    known = np.flatnonzero(np.isfinite(photographs.lon_lat_height).all(axis=1))
+    if not len(known):
+        return None, ()
+    if crs == "local":
+        return None, ("positions of EXIF were left out: the block has no coordinate system; state it with --crs",)
+    xyz = photographs.lon_lat_height[known]
+    flat = placing.to_crs(xyz, "EPSG:4326", placing.horizontal_part(crs), None)
+    said = []
+    if "+" in crs and photographs.ellipsoidal[known].all():
+        flat = placing.from_ellipsoidal_heights(flat, crs, given.stated.geoid)
+    elif not photographs.ellipsoidal[known].any():
+        said.append("heights of EXIF count from sea level; they are taken as those of the block's CRS as they are")
+    stated = given.stated.positions_sigma_m
+    sigma = photographs.sigma_m[known]
+    if stated is None and np.isnan(sigma).any():
+        said.append("positions of EXIF do not say how good they are: σ {:g}, {:g}, {:g} m taken".format(*EXIF_SIGMA_M))
+    sigma = np.where(np.isnan(sigma), np.array(stated or EXIF_SIGMA_M), sigma)
+    path = photographs.paths[0].parent
+    return PositionList(path, photographs.names[known], flat, sigma, no_sigma(len(known))), tuple(said)
+
+
+def approximate_places(photographs: PhotographSet, positions: PositionList | None, given: Given) -> np.ndarray:
+    """(n, 3) where photographs are, for the choice of neighbours alone."""
+    found = no_sigma(len(photographs))
+    for names, xyz in (
+        *(((positions.images, positions.xyz),) if positions is not None else ()),
+        *(((given.orientation.images, given.orientation.centre),) if given.orientation is not None else ()),
+    ):
+        index = match_photographs(names, photographs.names)[0]
+        found[index[index >= 0]] = xyz[index >= 0]
+    return found
+
+
+def complete(reading: Reading, given: Given, crs: str, positions: PositionList | None) -> Reading:
+    """The block with its CRS, positions, and what is marked of the control."""
+    reading = assemble.with_crs(reading, "" if crs == "local" else crs)
+    if given.orientation is not None and is_observed(given.stated):
+        reading = assemble.with_orientations(reading, given.orientation, given.stated)
+    elif positions is not None:
+        reading = assemble.with_positions(reading, positions, given.stated)
+    control = given.control
+    if control is not None and control.rays is not None and len(control.rays.image):
+        reading = assemble.with_rays(reading, control.rays, given.mark_sigma_px)
+        reading = with_control(reading, control, given.stated)
+        reading = with_check_points(reading, given.check)
+    elif control is not None:
+        reading = replace(
+            reading, messages=(*reading.messages, f"{control.path.name}: its points are not marked yet, so not in use")
+        )
+    return _with_datum(reading)
+
+
+def _with_datum(reading: Reading) -> Reading:
+    """Positions may be shifted as a whole where control holds the block; without either the datum is minimal."""
+    block, settings = reading.block, reading.block.settings
+    held = is_held_by_control(block)
+    if block.gnss_ins is not None and held:
+        settings = replace(settings, gnss=replace(settings.gnss, shift="block"))
+    if block.gnss_ins is None and not held:
+        settings = replace(settings, adjustment=replace(settings.adjustment, datum="minimal"))
+    return replace(reading, block=replace(block, settings=settings))
+
+
+def is_held_by_control(block: Block) -> bool:
+    return int(np.isfinite(block.control.xyz[~block.control.is_check]).all(axis=1).sum()) >= 3
+
+
+def is_observed(stated: assemble.Statements) -> bool:
+    """Whether orientations are observations beside start values."""
+    return stated.orientation_sigma_m is not None or stated.orientation_sigma_deg is not None

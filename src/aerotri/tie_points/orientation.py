@@ -1,0 +1,186 @@
+"""Start values of the photographs in the CRS of the block: a first orientation brought there, or one that is given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aerotri.adjustment.track import strips_of_track
+from aerotri.conventions import InputError
+from aerotri.coordinates import LocalFrame
+from aerotri.coordinates.blocks import frame_of_block
+from aerotri.formats import assemble
+from aerotri.formats.parts import OrientationList, PositionList, Reading, no_sigma
+from aerotri.formats.reprojection import reproject
+from aerotri.functional_model.rotation import angles_from_rotation, exponential, rotation_from_angles
+from aerotri.observations import Block, Camera
+from aerotri.tie_points.first_orientation import Mapped, map_incrementally
+from aerotri.tie_points.georeferencing import is_line, place
+from aerotri.tie_points.given import Given, complete, is_held_by_control
+
+SHORTEST_STRIP = 3.0
+"""Photographs a strip has on average, where the track is one."""
+PLAUSIBLE = 0.1
+"""Part by which a principal distance may differ from that of EXIF, which is rounded, before it is not believed."""
+Progress = Callable[[str, int, int], None]
+"""Told what is going on, how many are done and how many there are."""
+
+
+@dataclass(frozen=True, eq=False)
+class Oriented:
+    """Orientation in the local frame of the CRS (None: the block is local), with the cameras that belong to it."""
+
+    centre: np.ndarray
+    rotation: np.ndarray
+    cameras: tuple[Camera, ...]
+    frame: LocalFrame | None
+    messages: tuple[str, ...]
+
+    def block_of(self, block: Block) -> Block:
+        return replace(block, cameras=self.cameras)
+
+    def kept(self, keep: np.ndarray) -> Oriented:
+        return replace(self, centre=self.centre[keep], rotation=self.rotation[keep])
+
+
+def orient(
+    bare: Block, given: Given, crs: str, positions: PositionList | None, seed: int, progress: Progress
+) -> Oriented:
+    """The orientation of the photographs of a block of tie points alone.
+
+    Parameters
+    ----------
+    bare : the block. given, crs, positions : what is known beside it. seed : of random sampling.
+
+    Raises
+    ------
+    InputError
+        When photographs do not hold together, or nothing tells where they are although control should.
+    """
+    reading = complete(Reading(bare), given, crs, positions)
+    if given.orientation is not None:
+        return _given_orientation(reading, given.orientation, given.stated)
+    count = len(bare.images)
+
+    def report(done: int) -> None:
+        progress("first orientation", min(done, count), count)
+
+    mapped, said = map_incrementally(bare, seed, report=report), ()
+    if not is_held_by_control(reading.block):
+        cameras, said = _plausible(bare.cameras, mapped.cameras)
+        mapped = map_incrementally(replace(bare, cameras=cameras), seed, report=report) if said else mapped
+    frame = None if crs == "local" else frame_of_block(reading.block, given.stated.geoid)
+    oriented = _placed(reading.block, mapped, frame, seed)
+    return replace(oriented, messages=(*oriented.messages, *said))
+
+
+def _plausible(stated: tuple[Camera, ...], found: tuple[Camera, ...]) -> tuple[tuple[Camera, ...], tuple[str, ...]]:
+    """The cameras with the interior of those held whose principal distance came out wrong, and what to say of it.
+
+    Vertical photographs from one height do not determine it without control; small changes between them, such as
+    leaves in the wind, then take it far off.
+    """
+    cameras, said = [], []
+    for camera, other in zip(stated, found, strict=True):
+        ratio = other.focal_length_mm / camera.focal_length_mm
+        if abs(ratio - 1.0) > PLAUSIBLE:
+            interior = {name: replace(prior, fixed=True) for name, prior in camera.interior.items()}
+            said.append(
+                f"the photographs make the principal distance of {camera.name} {other.focal_length_mm:.3g} mm, "
+                f"{100 * (ratio - 1):+.0f} % off what is stated: it is held at {camera.focal_length_mm:.4g} mm, "
+                "and heights above the ground hang on that; control points determine it"
+            )
+            camera = replace(camera, interior=interior)
+        cameras.append(camera)
+    return tuple(cameras), tuple(said)
+
+
+def _given_orientation(reading: Reading, given: OrientationList, stated: assemble.Statements) -> Oriented:
+    start_only = replace(stated, orientation_sigma_m=None, orientation_sigma_deg=None)
+    block = assemble.with_orientations(reading, given, start_only).block
+    frame = None if block.crs == "local" else frame_of_block(block, stated.geoid)
+    _, centre, rotation = in_frame(block, frame)
+    return Oriented(centre, rotation, block.cameras, frame, ())
+
+
+def in_frame(block: Block, frame: LocalFrame | None) -> tuple[Block, np.ndarray, np.ndarray]:
+    """The block, and its start values in the frame."""
+    rotation = rotation_from_angles(block.images.angles, block.rotation)
+    if frame is None:
+        return block, block.images.centre, rotation
+    return block, frame.to_local(block.images.centre), frame.axes_at(block.images.centre) @ rotation
+
+
+def _placed(block: Block, mapped: Mapped, frame: LocalFrame | None, seed: int) -> Oriented:
+    """The first orientation brought onto control points, where three of them are marked, else onto positions."""
+    found = reproject(replace(block, cameras=mapped.cameras), mapped.centre, mapped.rotation)
+    looking = -np.nanmean(mapped.rotation[:, :, 2], axis=0)
+    control = block.control
+    usable = ~control.is_check & np.isfinite(control.xyz).all(axis=1)
+    usable &= np.isfinite(found.points[control.point]).all(axis=1)
+    target = control.xyz[usable]
+    if len(target) >= 3 and not is_line(target):
+        source, sigma = found.points[control.point[usable]], control.sigma[usable].max(axis=1)
+        what = "control points"
+    else:
+        source, target, sigma = _positions_of(block, mapped)
+        what, usable = "positions", None
+    if len(source) < 2:
+        return _unplaced(block, mapped, looking)
+    local = target if frame is None else frame.to_local(target)
+    placement = place(source, local, sigma, None if what == "control points" else looking, seed)
+    median = float(np.median(placement.misfit))
+    said = f"the first orientation fits {len(source)} {what} to {median:.3g} m (median)"
+    rotation = placement.rotation @ mapped.rotation
+    return Oriented(placement(mapped.centre), rotation, mapped.cameras, frame, (said,))
+
+
+def _positions_of(block: Block, mapped: Mapped) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    observed = block.gnss_ins
+    if observed is None:
+        return no_sigma(0), no_sigma(0), np.zeros(0)
+    there = np.isfinite(mapped.centre[observed.image, 0]) & np.isfinite(observed.xyz).all(axis=1)
+    rows = observed.image[there]
+    return mapped.centre[rows], observed.xyz[there], observed.sigma[there].max(axis=1)
+
+
+def _unplaced(block: Block, mapped: Mapped, looking: np.ndarray) -> Oriented:
+    """Nothing says where the block is: its own frame, turned so that photographs look down on average."""
+    if len(block.control):
+        raise InputError(
+            "fewer than three control points are marked, and photographs have no positions", "mark more of them"
+        )
+    turn = _rotation_between(looking, np.array([0.0, 0.0, -1.0]))
+    said = "nothing says where the photographs were taken: scale, place and north of the block are arbitrary"
+    return Oriented(mapped.centre @ turn.T, turn @ mapped.rotation, mapped.cameras, None, (said,))
+
+
+def _rotation_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """The shortest rotation that brings a direction onto another (Rodrigues)."""
+    a, b = one / np.linalg.norm(one), other / np.linalg.norm(other)
+    axis = np.cross(a, b)
+    size = float(np.linalg.norm(axis))
+    return exponential(axis / max(size, 1e-300) * np.arctan2(size, a @ b))
+
+
+def with_start_values(reading: Reading, oriented: Oriented) -> Reading:
+    """Start values in the CRS, the cameras found, and strips where the photographs make a track."""
+    block, frame = reading.block, oriented.frame
+    centre, rotation = oriented.centre, oriented.rotation
+    if frame is not None:
+        centre = frame.from_local(centre)
+        rotation = np.swapaxes(frame.axes_at(centre), 1, 2) @ rotation
+    angles = angles_from_rotation(rotation, block.rotation)
+    images = replace(block.images, centre=centre, angles=angles, strip=_strips(centre))
+    return replace(reading, block=replace(block, images=images, cameras=oriented.cameras))
+
+
+def _strips(centre: np.ndarray) -> np.ndarray:
+    if not np.isfinite(centre).all():
+        return np.full(len(centre), "")
+    strip = strips_of_track(centre, np.full(len(centre), ""))
+    if len(centre) < SHORTEST_STRIP * (strip.max() + 1):
+        return np.full(len(centre), "")
+    return np.array([str(number + 1) for number in strip.tolist()], dtype=str)
