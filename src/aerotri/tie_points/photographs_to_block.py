@@ -22,6 +22,7 @@ from aerotri.tie_points.tracks import Tracks, join_matches, thin
 from aerotri.tie_points.verification import rays_that_meet
 
 CACHE = "tie_point_cache"
+ITERATIONS = 100
 MORE_TRACKS = 2
 """Tracks given to the first orientation over those wanted in the end: some do not stand it."""
 
@@ -176,10 +177,12 @@ def _bare_block(
 
 
 def _settings(cameras: tuple[Camera, ...], sigma_um: float) -> Settings:
-    """Unknown lenses are unknowns; tie points of machines need a robust adjustment."""
+    """Unknown lenses are unknowns; tie points of machines need a robust adjustment, whose last digits take long."""
     items = tuple(name for name in LENS if any(name in c.lens and c.lens[name].kind == "free" for c in cameras))
     return Settings(
-        adjustment=AdjustmentSettings(additional_parameters=(("lens", items),) if items else (), robust="huber"),
+        adjustment=AdjustmentSettings(
+            additional_parameters=(("lens", items),) if items else (), robust="huber", max_iterations=ITERATIONS
+        ),
         gnss=GnssSettings(shift="off"),
         image_sigma_um=sigma_um,
     )
