@@ -80,10 +80,9 @@ def simulated() -> list[str]:
     """Flights of the same designs through the bundle adjustment."""
     lines = [
         f"## Simulated flights of the same design, H = {HEIGHT:.0f} m, wide angle, 60 % end lap, 20 % side lap", "",
-        "σ of the mean height, m. The bundle adjustment sees 15 points a photograph, not one nadir point a model, its "
-        "control lies on a grid that reaches over the strip's edges, and its heights bend less freely than a "
-        "double sum "
-        "of transfer errors.", "",
+        "σ of the mean height, m. In every strip two control points at the distance that is bridged. The bundle "
+        "adjustment sees 15 points a photograph, not one nadir point a model, its area ends with the control, and its "
+        "heights do not bend by transfer errors alone: roll between the control points counts as well.", "",
         "| d | n | m | span by span | as a whole | bundle adjustment | bundle / whole |",
         "|---|---|---|---|---|---|---|",
     ]  # fmt: skip
@@ -98,8 +97,9 @@ def simulated() -> list[str]:
 
 def nomograms() -> Figure:
     """Nomograms 1–3, logarithmic: Kubik's in black, adjusted as a whole in grey."""
-    figure = Figure(figsize=(11.5, 4.6), layout="constrained")
+    figure = Figure(figsize=(11.5, 4.4))
     panels = figure.subplots(1, 3)
+    figure.subplots_adjust(left=0.07, right=0.985, bottom=0.13, top=0.92, wspace=0.28)
     n = np.geomspace(2, 100, 60)
     for d in (2, 3, 5, 10, 20):
         there = n >= d
@@ -125,8 +125,7 @@ def nomograms() -> Figure:
     for panel in panels:
         panel.grid(which="both", color="#e3e7ea", lw=0.5)
         panel.spines[["top", "right"]].set_visible(False)
-        panel.set_title(panel.get_title(), loc="left", fontsize=10)
-        panel.title.set_visible(False)
+        panel.set_title(panel.get_title(), fontsize=10)
     panels[0].plot([], [], color="#1c242c", label="as printed, span by span")
     panels[0].plot([], [], color="#8a939b", ls="--", label="adjusted as a whole")
     panels[0].legend(frameon=False, fontsize=8, loc="lower left")

@@ -82,7 +82,8 @@ def simulated_sigma(design: VolumeDesign, seed: int = 1) -> float:
 
 
 def flight_spec(design: VolumeDesign) -> dict[str, Any]:
-    """The spec of a simulated flight: strips along X as the theory has them, control along every strip's ends."""
+    """The spec of a simulated flight: strips along X as the theory has them, in every strip two control points at the
+    distance that is bridged."""
     base, sigma0 = design.base, design.sigma0_share * design.height
     sigma_um = 1e3 * sigma0 / (np.sqrt(2.0) * design.height / base * design.height / FOCAL_MM)
     strips = max(1, round(design.width / (2.0 * base)))
@@ -95,9 +96,17 @@ def flight_spec(design: VolumeDesign) -> dict[str, Any]:
                    "side_lap": 0.2, "heading_deg": 90.0, "attitude_sigma_deg": [0.5, 0.5, 0.5]},
         "terrain": {"kind": "flat", "height_m": 0.0},
         "tie_points": {"per_image": 15.0, "distribution": "nodes", "pattern": [3, 3], "sigma_um": sigma_um},
-        "control": {"distance_bases": design.bridging / base, "sigma_m": [0.001, 0.001, 0.001]},
+        "control": {"positions": _control(images - 1, round(design.bridging / base), strips),
+                    "sigma_m": [0.001, 0.001, 0.001]},
         "start_values": {"kind": "perturbed", "position_sigma_m": 1.0, "angle_sigma_deg": 0.02},
     }  # fmt: skip
+
+
+def _control(models: int, bridged: int, strips: int) -> list[list[float]]:
+    """Places (along, across) in shares of the block."""
+    along = [min(k / models, 1.0) for k in range(0, models + 1, max(bridged, 1))]
+    across = [(strip + 0.5 + side) / strips for strip in range(strips) for side in (-0.4, 0.4)]
+    return [[a, c] for a in along for c in across]
 
 
 def _places() -> np.ndarray:
