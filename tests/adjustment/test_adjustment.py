@@ -208,7 +208,6 @@ def test_damaged_solution_is_refused(tmp_path):
     ("settings", "words"),
     [
         ({"robust": "tukey"}, "robust"),
-        ({"parameter_selection": "on"}, "parameter_selection"),
         ({"datum": "fixed"}, "datum_fixed"),
         ({"datum": "fixed", "datum_fixed": (("nobody", "X0"),)}, "nobody"),
         ({"datum": "inner", "datum_points": ("nowhere",)}, "nowhere"),

@@ -9,11 +9,13 @@ import pytest
 
 from aerotri.formats.block_folder import read_block, write_block
 from aerotri.formats.solution import read_solution, write_solution
-from aerotri.functional_model.additional_parameters import collocation
+from aerotri.functional_model.additional_parameters import collocation, parameter_set
+from aerotri.image_errors import systematic_errors
 from aerotri.observations import Block, CollocationSettings
 from aerotri.pipeline import adjust_keeping_system, reopen
 from aerotri.simulation import parse_spec, simulate
 from aerotri.statistics.field_estimation import FieldCovariance, ReducedToFields
+from aerotri.statistics.summarise import inseparable
 from dense_algebra import TINY, dense_design
 from small_blocks import small_block, small_spec, with_adjustment
 
@@ -106,6 +108,14 @@ def test_covariance_recovered(seed):
     error = p.value - values
     assert abs(error @ np.linalg.solve(p.covariance, error) / 108 - 1.0) < 4.0 * np.sqrt(2.0 / 108)
     assert np.abs(error / p.sigma).max() < 4.0
+    # the covariance goes on into the field, as any set's does
+    camera = result.block.cameras[0]
+    x, y = (a.ravel() for a in np.meshgrid(*(np.linspace(-0.9, 0.9, 12) * half for half in camera.half_format_mm)))
+    d, covariance = systematic_errors(result, "ucd", x, y)
+    truth = parameter_set("collocation", collocation.SIZES.items(GRID), camera).basis(x, y) @ values
+    statistic = np.einsum("ni,nij,nj->n", d - truth, np.linalg.inv(covariance), d - truth)
+    assert 0.5 < statistic.mean() / 2.0 < 1.6
+    assert statistic.max() < 25.0
     assert 0.95 < result.outcome.sigma0 < 1.05
 
 
@@ -115,6 +125,15 @@ def test_no_field_where_there_is_none():
     assert result.block.settings.collocation.sigma_um < 0.6
     assert result.groups[-1].name == "collocation field"
     assert result.groups[-1].redundancy < 12.0
+
+
+def test_doubts_about_nodes_are_one_sentence():
+    """Free nodes of a grid are poorly told from one another; that is one thing to say, not one for each."""
+    parameters = adjust_keeping_system(small_block(6, "grid:5x4")[0]).result.parameters
+    doubtful = replace(parameters, max_correlation=np.full(40, 0.9995))
+    (said,) = inseparable(doubtful)
+    assert said == "40 values of grid:5x4 (ucd) cannot be told from a neighbour (correlations up to 99.95 %)"
+    assert inseparable(replace(parameters, max_correlation=np.zeros(40))) == ()
 
 
 def test_what_is_given_is_kept_and_a_result_reopens(tmp_path):

@@ -117,6 +117,18 @@ def test_groups_lose_parameters_one_by_one():
     assert set(p.status[kept]) == {"weighted"}
 
 
+def test_in_a_free_block():
+    """The coordinates held stay the same ones while parameters go."""
+    result = adjust(selected(datum="inner"))
+    left = result.parameters.status != "removed"
+    items = tuple(str(n).partition(".")[2] for n in result.parameters.names[left])
+    plain = adjust(with_adjustment(result.block, additional_parameters=(("bluh", items),), parameter_selection="off",
+                                   parameters_removed=()))  # fmt: skip
+    assert result.removals
+    np.testing.assert_allclose(result.points.xyz, plain.points.xyz, atol=1e-5)
+    np.testing.assert_allclose(result.points.sigma, plain.points.sigma, rtol=1e-5)
+
+
 def test_free_brown_parameter_removed_counts_as_zero():
     block, _ = small_block(9)
     lens = replace(block.cameras[0], brown={"K1": Prior(1e-7)})
