@@ -9,7 +9,6 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import brown, is_item, parameter_set
-from aerotri.functional_model.additional_parameters.orientation import orientation_patterns
 from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES, ParameterSet
 from aerotri.functional_model.additional_parameters.ultracam_d import native_from_image
 from aerotri.functional_model.orientation_patterns import orientation_patterns
