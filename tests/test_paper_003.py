@@ -12,13 +12,15 @@ from aerotri.report.plots_panels import Panel, plot_panels
 from aerotri.simulation import read_spec
 from test_blocks import scaled_down
 
+MODULES = ("cases", "runs", "table", "figures", "reports")
+
 
 @pytest.fixture(scope="module")
 def tool():
     """The modules of the tool by name."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(Path(__file__).parents[1] / "tools"))
-        yield {name: importlib.import_module(f"paper_003.{name}") for name in ("cases", "runs", "table", "figures")}
+        yield {name: importlib.import_module(f"paper_003.{name}") for name in MODULES}
 
 
 @pytest.fixture(scope="module")
@@ -99,3 +101,26 @@ def test_panels_share_one_scale(answers):
     assert len(scales) == 1
     with pytest.raises(ValueError, match="one to four"):
         plot_panels([Panel("", field)] * 5, "too many")
+
+
+def test_reports_by_one_call(tool, tmp_path, capsys):
+    case = tool["cases"].FREDERIKSSTAD[2]
+    (report,) = tool["reports"].write_reports([(case, scaled_down(read_spec(case.spec_path)))], tmp_path)
+    assert "Written to" in capsys.readouterr().out
+    assert "<h1>frederiksstad_rmk</h1>" in report.read_text(encoding="utf-8")
+    assert (tmp_path / "frederiksstad_rmk" / "truth" / "image_errors.csv").exists()
+
+
+def test_days_and_navigation(tool, answers):
+    """[P] 5.1: two days give the same errors; GNSS and INS hold a block without parameters."""
+    case, spec, rows = answers[0]
+    runs, table = tool["runs"], tool["table"]
+    tests = runs.days_over_seeds(case, spec, [1])
+    assert tests[0].freedom == 44
+    assert tests[0].probability > 1e-4
+    navigation = runs.with_navigation(case, spec)
+    assert [n.heading for n in navigation] == ["none", "1–12", "1–12, 42–73"]
+    assert navigation[0].using[2] < 0.7 * navigation[0].without[2]
+    text = table.markdown([table.Answer(case, rows, day_tests=tests, navigation=navigation)], "a test")
+    assert "1 simulations: χ² over its degrees of freedom" in text
+    assert "**With and without GNSS and INS.**" in text

@@ -1,9 +1,10 @@
 """Paper 003 reproduced: its blocks simulated, adjusted without, with general, with special and with all parameters.
 
 Prints a Markdown table with the paper's figures beside; with --out also writes paper_003.md and figures there. The last
-answer at full size stands in tools/results/paper_003.md.
+answer at full size stands in tools/results/paper_003.md. --reports makes the reports of the four blocks instead.
 
-Example: python tools/reproduce_paper_003.py --out results
+Examples: python tools/reproduce_paper_003.py --out results
+          python tools/reproduce_paper_003.py --reports reports
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from aerotri.simulation import read_spec
-from paper_003.cases import DSK, FREDERIKSSTAD, Case
+from paper_003.cases import DSK, FREDERIKSSTAD, ULTRACAM, Case
 from paper_003.figures import averaged_figure, check_points_figure, days_figure, errors_figure
-from paper_003.runs import over_cameras, rows_of, two_days, with_navigation
+from paper_003.reports import write_reports
+from paper_003.runs import days_over_seeds, over_cameras, rows_of, two_days, with_navigation
 from paper_003.table import Answer, markdown
 
 DAY_CHANGES_UM = (0.0, 0.5)
@@ -27,8 +29,13 @@ DAY_CHANGES_UM = (0.0, 0.5)
 def main() -> None:
     """Run the cases, print the answer, write it where asked."""
     options = _options()
+    cases = (*FREDERIKSSTAD, *(() if options.without_dsk else (DSK,)))
+    if options.reports is not None:
+        for path in write_reports(((case, read_spec(case.spec_path)) for case in cases), options.reports):
+            print(path)
+        return
     answers, figures = [], {}
-    for case in (*FREDERIKSSTAD, *(() if options.without_dsk else (DSK,))):
+    for case in cases:
         answer, drawn = _answer(case, options.seeds, options.cameras)
         answers.append(answer)
         figures |= drawn
@@ -40,7 +47,7 @@ def main() -> None:
         options.out.mkdir(parents=True, exist_ok=True)
         (options.out / "paper_003.md").write_text(text, encoding="utf-8")
         for name, figure in figures.items():
-            figure.savefig(options.out / f"{name}.png", dpi=130)
+            figure.savefig(options.out / f"{name}.png", dpi=100)
 
 
 def _answer(case: Case, seeds: int, cameras: int) -> tuple[Answer, dict[str, Figure]]:
@@ -54,8 +61,10 @@ def _answer(case: Case, seeds: int, cameras: int) -> tuple[Answer, dict[str, Fig
         _say("two days, navigation")
         days = [two_days(case, spec, change_um) for change_um in DAY_CHANGES_UM]
         drawn["paper_003_figure_11"] = days_figure(case, days[0])
-        return Answer(case, rows, None, days, with_navigation(case, spec)), drawn
-    return Answer(case, rows, over_cameras(case, spec, cameras, _say) if case.special and cameras else None), drawn
+        return Answer(case, rows, days=days, navigation=with_navigation(case, spec)), drawn
+    drawn_anew = over_cameras(case, spec, cameras, _say) if case.special and cameras else None
+    day_tests = days_over_seeds(case, spec, range(1, cameras + 1)) if case.special == ULTRACAM else ()
+    return Answer(case, rows, drawn_anew, day_tests=day_tests), drawn
 
 
 def _say(text: str, _begun: float = time.monotonic()) -> None:
@@ -66,8 +75,9 @@ def _say(text: str, _begun: float = time.monotonic()) -> None:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--out", type=Path, help="folder for paper_003.md and the figures")
+    parser.add_argument("--reports", type=Path, help="folder for the blocks and their report.html, nothing else")
     parser.add_argument("--seeds", type=int, default=3, help="simulations of each block of Frederiksstad")
-    parser.add_argument("--cameras", type=int, default=10, help="cameras drawn at random, 0 for none")
+    parser.add_argument("--cameras", type=int, default=10, help="cameras drawn at random, two-day flights; 0: none")
     parser.add_argument("--without-dsk", action="store_true", help="leave the block of 2282 photographs out")
     return parser.parse_args()
 

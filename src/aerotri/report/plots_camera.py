@@ -131,13 +131,15 @@ def _draw_vectors(axes: Axes, x, y, d, strong, cell: float, camera: Camera) -> N
     scale_vector(axes, quiver, size, size_text(size, camera), 0.85, 0.28)
 
 
-def draw_vectors(axes: Axes, x: np.ndarray, y: np.ndarray, d: np.ndarray, strong: np.ndarray, per_inch: float):
+def draw_vectors(
+    axes: Axes, x: np.ndarray, y: np.ndarray, d: np.ndarray, strong: np.ndarray, per_inch: float, **options
+):
     """Vectors d (ny, nx, 2) mm at (ny, nx) mm, `per_inch` mm drawn as one inch; those not strong are fainter."""
     finite = np.isfinite(d).all(axis=-1)
     faint, dark = finite & ~strong, finite & strong
     at = np.stack([x, y], axis=-1)
-    vectors(axes, at[faint], d[faint], per_inch, FAINT, zorder=3)
-    return vectors(axes, at[dark], d[dark], per_inch, INK, width=0.013, zorder=4)
+    vectors(axes, at[faint], d[faint], per_inch, FAINT, zorder=3, **options)
+    return vectors(axes, at[dark], d[dark], per_inch, INK, width=0.013, zorder=4, **options)
 
 
 def size_text(size_mm: float, camera: Camera) -> str:

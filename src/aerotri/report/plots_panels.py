@@ -72,7 +72,8 @@ def plot_panels(panels: Sequence[Panel], title: str, subtitle: str = "") -> Figu
         axes.set_ylim(-limits[1], limits[1])
         axes.set_axis_off()
         draw_format(axes, camera)
-        quiver = draw_vectors(axes, panel.field.x, panel.field.y, panel.vectors, panel.field.significant, per_inch)
+        field = panel.field
+        quiver = draw_vectors(axes, field.x, field.y, panel.vectors, field.significant, per_inch, clip_on=False)
         _caption(figure, panel, left + AROUND, bottom + height)
         if k == 0:
             scale_vector(axes, quiver, size, size_text(size, camera), MARGIN + AROUND, 0.28)
