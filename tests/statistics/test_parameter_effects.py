@@ -64,3 +64,11 @@ def test_none_without_check_points_or_in_an_inner_datum():
     found = adjust_keeping_system(with_adjustment(block, datum="inner"))
     factor = found.system.factorise(found.solution.equations)
     assert parameter_effects(found.local, found.system, found.solution, factor) is None
+
+
+def test_nodes_of_a_grid_are_left_out_together():
+    block, _ = small_block(3, "bluh:1+9,legendre:6x6")
+    found = adjust_keeping_system(block)
+    factor = found.system.factorise(found.solution.equations)
+    effects = parameter_effects(found.local, found.system, found.solution, factor)
+    assert [one.label for one in effects.left_out] == ["all", "bluh", "legendre", "bluh.1", "bluh.9"]

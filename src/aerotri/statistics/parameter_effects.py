@@ -19,6 +19,8 @@ from aerotri.statistics.adjusted_block import AdjustedBlock
 AT_ONCE = 48
 FEWEST_POINTS = 5
 NO_DIFFERENCE = "no difference"
+INDIVIDUALLY = 60
+"""Of a family with more parameters (nodes of a grid) none is left out on its own."""
 CONFIDENCE = 0.99
 """Of the two-sided Student test whether a change at the check points is more than chance [C]."""
 MATERIAL = 0.05
@@ -103,7 +105,9 @@ def parameter_effects(
     if len(set(families)) > 1:
         found += [without(np.flatnonzero(families == family), family) for family in dict.fromkeys(families)]
     found += [
-        without(np.array([k]), str(p.names[row]), str(p.groups[row]), float(p.t[row])) for k, row in enumerate(rows)
+        without(np.array([k]), str(p.names[row]), str(p.groups[row]), float(p.t[row]))
+        for k, row in enumerate(rows)
+        if np.sum(families == families[k]) <= INDIVIDUALLY * len(set(p.groups[rows].tolist()))
     ]
     return ParameterEffects(d, tuple(found))
 
