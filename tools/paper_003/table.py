@@ -51,9 +51,10 @@ third of it). Where they err, and what each set makes of it at check points, is 
 DIFFERENCES = """\
 1. **What the special parameters gain.** The paper says "very limited" (UltraCamD) and "more or less not improved"
    (DMC) and prints no pair of numbers. Ours agree for the DMC. For the UltraCamD the order is the paper's and the
-   size is not: a fifth of the height for the cameras of the two blocks, more for most cameras drawn at random. Our
-   tile errors are as large as the residuals of figures 9 and 12 show them, and our check points are signalised;
-   those of Frederiksstad were "difficult to identify", and an error of identification hides such a gain.
+   size is not: a fifth of the height for the cameras of the two blocks, more for most cameras drawn at random. How
+   large errors of the tiles are beside those of the lens is our choice, for the figures have no scale in the text
+   at hand; and our check points are signalised, while those of Frederiksstad were "difficult to identify", which
+   hides such a gain.
 2. **DSK-Saar at check points.** Without GNSS 1–12 with 42–73 leave more in Z than the printed 5.4 cm; with GNSS and
    INS, which were recorded in 2006, the printed 3.1 and 5.4 cm come out within some millimetres. The paper does not
    say whether BLUH used them. Control every ten bases alone does not hold the heights of an 80 % block as well.
@@ -66,9 +67,9 @@ DIFFERENCES = """\
    parameters 3.3 times, without any 6 times larger.
 6. **Parameter 80.** Its t comes out near the printed 20.3 without having been aimed at: heads of one design,
    changing alike, are what the pattern describes.
-7. **Two days.** The test of no change is a little sharp: the sets leave image errors that are no noise, so that χ²
-   is some tenth too large where nothing has changed. Half a micrometre of change is still seen a hundred times
-   over.\
+7. **Two days.** On DSK-Saar χ² lies at the very limit although nothing has changed, and over several blocks it is
+   some tenth too large: the sets leave image errors that are no noise. Half a micrometre of change is still seen a
+   hundred times over.\
 """
 
 CONTRADICTIONS = """\
