@@ -8,6 +8,9 @@ from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.observations import Block
 from aerotri.simulation import Truth, parse_spec, simulate
 
+ERRING = {"camera": {"ucd": {"preset": "ultracam_d", "errors": {"physical": {"rms_um": 4.0, "seed": 2}}}}}
+"""For `small_spec`: a camera that errs by physics."""
+
 
 def small_spec(**changes) -> dict:
     """An UltraCamD block of 3 × 6 photographs at 60/40 % with a cross strip; `changes` replace whole tables."""

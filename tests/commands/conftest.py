@@ -6,9 +6,7 @@ from aerotri.commands.adjust import run_adjust
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.formats.block_folder import write_block
-from small_blocks import small_block, with_adjustment
-
-ERRING = {"camera": {"ucd": {"preset": "ultracam_d", "errors": {"physical": {"rms_um": 4.0, "seed": 2}}}}}
+from small_blocks import ERRING, small_block, with_adjustment
 
 
 def adjusted_folder(block, folder):

@@ -5,9 +5,7 @@ import pytest
 
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.pipeline import adjust_keeping_system
-from small_blocks import small_block, with_adjustment
-
-ERRING = {"camera": {"ucd": {"preset": "ultracam_d", "errors": {"physical": {"rms_um": 4.0, "seed": 2}}}}}
+from small_blocks import ERRING, small_block, with_adjustment
 
 
 @pytest.fixture(scope="session")

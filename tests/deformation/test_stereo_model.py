@@ -47,6 +47,17 @@ def test_height_over_base_of_the_paper(preset, end_lap, base, h_over_b, printed)
     assert geometry.cm_per_um == pytest.approx(100.0 * geometry.h_over_b * scale * 1e-6)
 
 
+def test_what_a_parallax_does_in_the_paper():
+    """Section 6.1: 0.25 px at 66 % and 9 cm GSD are "9.2 cm"; by its own h/b and flying height (1019 m) 10.1 cm.
+    Section 2: models differ by some 25 cm, which is 5.6 µm.
+    """
+    camera = camera_of("ultracam_d")
+    geometry = normal_geometry(camera, camera.focal_length_mm, 0.663, 1019.0)
+    assert 0.25 * camera.pixel_um * geometry.cm_per_um == pytest.approx(10.1, abs=0.05)
+    assert 25.0 / geometry.cm_per_um == pytest.approx(5.6, abs=0.05)
+    assert geometry.gsd_m == pytest.approx(0.09, abs=0.005)
+
+
 def test_end_lap_that_is_none():
     camera = camera_of("dmc")
     for wrong in (0.0, 1.0, 63.0):

@@ -31,22 +31,31 @@ BASE_STYLE: dict[str, Any] = {"marker": "+", "ms": 9, "mew": 1.3, "color": ACCEN
 @styled
 def plot_deformation(deformation: Deformation, block_name: str) -> Figure:
     """Contour lines of dZ over a model: solid above zero, dashed below, zero bold; broken where the tiles meet."""
-    d, view = deformation, _View(deformation)
-    dz = 100.0 * d.d[..., 2]
+    d, dz = deformation, 100.0 * deformation.d[..., 2]
     interval = 100.0 * contour_interval(float(np.nanmin(dz)) / 100.0, float(np.nanmax(dz)) / 100.0)
     subtitle = (
         f"{_numbers(d)}\n{_range(dz)}, mean σ {100.0 * np.nanmean(d.sigma[..., 2]):.1f} cm; "
         f"contour interval {interval:g} cm"
     )
-    width, height = view.size(WIDTH - 1.4, HIGHEST)
+    width, height = panel_size(d, WIDTH - 1.4, HIGHEST)
     figure = new_figure(height + 2.05, f"Model deformation – {plain(block_name)}", subtitle)
-    axes = axes_at(figure, max(0.95, (WIDTH - width) / 2.0), 0.95, width, height)
+    draw_contours(axes_at(figure, max(0.95, (WIDTH - width) / 2.0), 0.95, width, height), d, interval)
+    _legend(figure, contour_symbols(bool(d.seams)), 4)
+    return figure
+
+
+def panel_size(deformation: Deformation, widest: float, highest: float) -> tuple[float, float]:
+    """Width and height of axes that show a model with equal scales, inches."""
+    return _View(deformation).size(widest, highest)
+
+
+def draw_contours(axes: Axes, deformation: Deformation, interval_cm: float) -> None:
+    """Contour lines of dZ with seams and projection centres in axes of a `panel_size`."""
+    d, view = deformation, _View(deformation)
     view.frame(axes)
-    _contours(axes, view, dz, interval)
+    _contours(axes, view, 100.0 * d.d[..., 2], interval_cm)
     axes.add_collection(LineCollection([view.turned(line) for line in d.seams], zorder=1, **SEAM_STYLE))
     axes.plot(*view.turned(d.base).T, ls="none", zorder=5, **BASE_STYLE)
-    _legend(figure, _contour_symbols(bool(d.seams)), 4)
-    return figure
 
 
 @styled
@@ -148,7 +157,8 @@ class _View:
     def frame(self, axes: Axes) -> None:
         axes.set_xlim(self._low[0], self._high[0])
         axes.set_ylim(self._low[1], self._high[1])
-        _coordinates(axes, *self.size(WIDTH - 1.4, HIGHEST), self._labels)
+        box, dpi = axes.get_window_extent(), axes.figure.dpi
+        _coordinates(axes, box.width / dpi, box.height / dpi, self._labels)
 
 
 def _contours(axes: Axes, view: _View, dz: np.ndarray, interval: float) -> None:
@@ -166,7 +176,8 @@ def _contours(axes: Axes, view: _View, dz: np.ndarray, interval: float) -> None:
         axes.clabel(lines, fmt=lambda value: f"{value:g}".replace("-", "−"), fontsize=7, inline=True, inline_spacing=2)
 
 
-def _contour_symbols(seams: bool) -> list[Line2D]:
+def contour_symbols(seams: bool) -> list[Line2D]:
+    """What the lines of `draw_contours` mean, for a legend."""
     symbols = [
         Line2D([], [], color=INK, lw=0.9, label="dZ above 0 [cm]"),
         Line2D([], [], color=INK, lw=1.5, label="0"),
