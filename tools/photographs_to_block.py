@@ -11,7 +11,9 @@ corners and a wrong interior orientation; control and check points measured in t
 from __future__ import annotations
 
 import argparse
+import contextlib
 import csv
+import io
 import json
 import shutil
 import time
@@ -75,8 +77,9 @@ def rendered(folder: Path, seed: int) -> tuple[dict, np.ndarray, np.ndarray]:
         gcp=str(folder / "gcp_list.txt"), check=check, camera=CameraSpec(focal_length_mm=6.0, pixel_um=6.0),
         stated=Statements(control_sigma_m=(0.01, 0.01, 0.02)), mark_sigma_px=0.1, seed=seed,
     )  # fmt: skip
-    run_tiepoints(folder / "photographs", folder / "block", options, True)
-    run_adjust(folder / "block", folder / "result", None, None, None, False, True)
+    with contextlib.redirect_stdout(io.StringIO()):
+        run_tiepoints(folder / "photographs", folder / "block", options, True)
+        run_adjust(folder / "block", folder / "result", None, None, None, False, True)
     with (folder / "result" / "check.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     d, w = (np.array([[float(row[f"{what}{axis}"]) for axis in AXES] for row in rows]) for what in ("d", "w"))
@@ -88,7 +91,8 @@ def brighton(folder: Path, photographs: Path) -> list[str]:
     from aerotri.cli import _commands, _invoke
 
     begun, cpu = time.perf_counter(), time.process_time()
-    run_all(photographs, folder, {}, _invoke, _commands() & {"tiepoints", "adjust"}, True)
+    with contextlib.redirect_stdout(io.StringIO()):
+        run_all(photographs, folder, {}, _invoke, _commands() & {"tiepoints", "adjust"}, True)
     seconds, cpu = time.perf_counter() - begun, time.process_time() - cpu
     import pyarrow.parquet as pq
 

@@ -165,3 +165,21 @@ def test_single_strip_looks_down():
     assert -down[2] == pytest.approx(np.sqrt(1.0 - slope**2), abs=2e-3)
     with pytest.raises(InputError, match="line"):
         place(source, target, np.full(12, 0.1))
+
+
+def test_two_photographs_are_enough(simulated):
+    """A single model: only points with two rays."""
+    block, truth = simulated
+    rays, keep = block.image_points, np.arange(8) < 2
+    own = keep[rays.image]
+    images = replace(
+        block.images, names=block.images.names[keep], camera=block.images.camera[keep], strip=block.images.strip[keep],
+        centre=block.images.centre[keep], angles=block.images.angles[keep],
+    )  # fmt: skip
+    pair = replace(block, images=images, image_points=ImagePoints(*(a[own] for a in (rays.image, rays.point, rays.xy,
+                                                                                    rays.sigma))))  # fmt: skip
+    mapped = map_incrementally(pair, seed=5)
+    assert np.isfinite(mapped.centre).all()
+    turn = mapped.rotation[0].T @ mapped.rotation[1]
+    given = rotation_from_angles(truth.angles[:2], block.rotation)
+    assert np.abs(turn - given[0].T @ given[1]).max() < 0.02

@@ -9,6 +9,7 @@ import shutil
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from aerotri.commands.adjust import run_adjust
 from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
@@ -168,3 +169,20 @@ def test_bad_input_is_named(files, tmp_path):
     (tmp_path / "full" / "notes.txt").write_text("mine")
     with pytest.raises(InputError, match="holds other files"):
         run_tiepoints(files[0] / "photographs", tmp_path / "full", options(files), True)
+
+
+def test_photographs_that_say_nothing(files, tmp_path):
+    """Without features, and damaged: told with the remedy, or the name of the file."""
+    for name in ("black", "cut"):
+        (tmp_path / name).mkdir()
+    for number in range(2):
+        Image.new("L", (300, 200), 7).save(tmp_path / "black" / f"{number}.jpg")
+        noise = np.random.default_rng(number).integers(0, 255, (200, 300), np.uint8)
+        Image.fromarray(noise).save(tmp_path / "cut" / f"{number}.jpg")
+    whole = (tmp_path / "cut" / "1.jpg").read_bytes()
+    (tmp_path / "cut" / "1.jpg").write_bytes(whole[: len(whole) // 2])
+    alone = options(files, gcp="", check=())
+    with pytest.raises(InputError, match="no two photographs have matches"):
+        run_tiepoints(tmp_path / "black", tmp_path / "out", alone, True)
+    with pytest.raises(InputError, match=r"^1\.jpg: cannot be read"):
+        run_tiepoints(tmp_path / "cut", tmp_path / "out2", alone, True)

@@ -165,6 +165,7 @@ def _mapping_options(block: Block, seed: int, angle_deg: float, tolerance_px: fl
     )
     options.constant_cameras = {n for n, camera in enumerate(block.cameras, 1) if is_held(camera)}
     mapper, triangulation = options.mapper, options.triangulation
+    triangulation.ignore_two_view_tracks = False
     mapper.init_min_num_inliers, mapper.abs_pose_min_num_inliers = FEWEST_INITIAL, FEWEST_POSE
     mapper.init_min_tri_angle = angle_deg
     mapper.init_max_error = mapper.filter_max_reproj_error = tolerance_px

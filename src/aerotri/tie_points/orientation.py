@@ -24,6 +24,8 @@ SHORTEST_STRIP = 3.0
 """Photographs a strip has on average, where the track is one."""
 PLAUSIBLE = 0.1
 """Part by which a principal distance may differ from that of EXIF, which is rounded, before it is not believed."""
+HELD_WITH_IT = ("k3",)
+"""Lens parameters that such photographs do not determine either."""
 Progress = Callable[[str, int, int], None]
 """Told what is going on, how many are done and how many there are."""
 
@@ -92,7 +94,10 @@ def _plausible(stated: tuple[Camera, ...], found: tuple[Camera, ...]) -> tuple[t
                 f"{100 * (ratio - 1):+.0f} % off what is stated: it is held at {camera.focal_length_mm:.4g} mm, "
                 "and heights above the ground hang on that; control points determine it"
             )
-            camera = replace(camera, interior=interior)
+            lens = {
+                name: replace(prior, fixed=prior.fixed or name in HELD_WITH_IT) for name, prior in camera.lens.items()
+            }
+            camera = replace(camera, interior=interior, lens=lens)
         cameras.append(camera)
     return tuple(cameras), tuple(said)
 

@@ -22,7 +22,7 @@ from aerotri.tie_points.tracks import Tracks, join_matches, thin
 from aerotri.tie_points.verification import rays_that_meet
 
 CACHE = "tie_point_cache"
-ITERATIONS = 100
+ITERATIONS = 300
 MORE_TRACKS = 2
 """Tracks given to the first orientation over those wanted in the end: some do not stand it."""
 
@@ -133,7 +133,8 @@ def _tracks(photographs, features, places, options: Options, cache: Path, progre
     )  # fmt: skip
     if not matched:
         raise InputError(
-            "no two photographs have matches", "check that they overlap; more features or a larger --ratio may help"
+            "no two photographs have matches",
+            "check that they overlap; more --features or a larger --feature-size may help",
         )
     tracks = join_matches(matched, np.array([len(f) for f in features]))
     return tracks, (len(pairs), len(matched))

@@ -12,7 +12,7 @@ from aerotri.observations import Block
 ROUNDS = 6
 LIMIT = 4.0
 """Residuals, in robust standard deviations, beyond which a ray belongs to another point."""
-SMALLEST_LIMIT = 3.0
+SMALLEST_LIMIT = 1.0
 """The same at least, in a-priori standard deviations of a coordinate."""
 
 
