@@ -117,7 +117,7 @@ def test_days_and_navigation(tool, answers):
     runs, table = tool["runs"], tool["table"]
     tests = runs.days_over_seeds(case, spec, [1])
     assert tests[0].freedom == 44
-    assert tests[0].probability > 1e-4
+    assert tests[0].p > 1e-4
     navigation = runs.with_navigation(case, spec)
     assert [n.heading for n in navigation] == ["none", "1–12", "1–12, 42–73"]
     assert navigation[0].using[2] < 0.7 * navigation[0].without[2]

@@ -25,6 +25,8 @@ NO_DATA = -9999.0
 CACHE_MB = 256
 """Blocks that GDAL keeps: it would take a share of the machine's memory otherwise."""
 TILE = 512
+SIGMA = "σ"
+"""The description of a band of σ begins with it."""
 KEPT_OPTIONS = ("compress", "predictor")
 
 
@@ -92,7 +94,11 @@ class Grid:
 
 
 class RasterReader:
-    """A raster of one band, open for reading; used as a context manager, from one thread.
+    """A raster of one band, or a surface with its σ, open for reading; used as a context manager, from one thread.
+
+    Parameters
+    ----------
+    band : which is read: 1 the heights, 2 the σ of a file of `write_surface`.
 
     Attributes
     ----------
@@ -100,11 +106,11 @@ class RasterReader:
     crs : rasterio's CRS or None. options : how the file is written, for a copy of the same kind.
     """
 
-    def __init__(self, path: str | os.PathLike):
+    def __init__(self, path: str | os.PathLike, band: int = 1):
         import rasterio
         from rasterio.errors import RasterioError
 
-        self.path = Path(path)
+        self.path, self.band = Path(path), band
         try:
             with _quietly():
                 self._file = rasterio.open(self.path)
@@ -128,8 +134,10 @@ class RasterReader:
 
     def _check(self) -> None:
         file = self._file
-        if file.count != 1:
+        if file.count != 1 and not (file.count == 2 and str(file.descriptions[1]).startswith(SIGMA)):
             raise InputError(f"has {file.count} bands", "give a raster with one band", self.path)
+        if self.band > file.count:
+            raise InputError("has no σ", "give a surface of `aerotri dtm`", self.path)
         t = file.transform
         if t.b or t.d or t.a <= 0.0 or t.e >= 0.0:
             raise InputError("is turned, mirrored or without georeference", "give a north-up GeoTIFF", self.path)
@@ -162,8 +170,8 @@ class RasterReader:
         from rasterio.errors import RasterioError
 
         try:
-            raw = self._file.read(1, window=window)
-            mask = self._file.read_masks(1, window=window) if self._masked else None
+            raw = self._file.read(self.band, window=window)
+            mask = self._file.read_masks(self.band, window=window) if self._masked else None
         except RasterioError as error:
             raise InputError(f"cannot be read: {error}", "write the file anew, it is damaged", self.path) from error
         values = raw.astype(self.dtype, copy=False)
@@ -260,6 +268,27 @@ def write_raster(path: str | os.PathLike, values: np.ndarray, grid: Grid, crs: A
         if text:
             writer.describe(text)
         writer.write(0, 0, values if whole else values.astype(np.float32))
+
+
+def write_surface(path: str | os.PathLike, z: np.ndarray, sigma: np.ndarray, grid: Grid, crs: Any, text: str) -> None:
+    """Write heights and their σ (rows, columns) as the two bands of a cloud-optimised GeoTIFF; NaN is no-data."""
+    import rasterio.shutil
+
+    plain = Path(path).with_name(f"{Path(path).name}.plain")
+    made: dict[str, Any] = {"tiled": True, "blockxsize": TILE, "blockysize": TILE, "bigtiff": "IF_SAFER"}
+    try:
+        with _quietly():
+            with rasterio.open(
+                plain, "w", driver="GTiff", height=grid.rows, width=grid.columns, count=2, dtype=np.float32, crs=crs,
+                transform=_transform(grid), nodata=NO_DATA, **made,
+            ) as file:  # fmt: skip
+                for band, (values, what) in enumerate(((z, text), (sigma, f"{SIGMA} of {text}")), start=1):
+                    known = np.isfinite(z) & np.isfinite(values)
+                    file.write(np.where(known, values, NO_DATA).astype(np.float32), band)
+                    file.set_band_description(band, what)
+            rasterio.shutil.copy(plain, path, driver="COG", compress="DEFLATE", predictor="YES")
+    finally:
+        plain.unlink(missing_ok=True)
 
 
 def horizontal_crs(crs: str) -> str | None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from scipy.stats import chi2
 
 from aerotri.report.plots_panels import Panel, plot_panels
 from aerotri.simulation import SimulationSpec
@@ -40,8 +41,9 @@ def days_figure(case: Case, days: Days) -> Figure:
     """Systematic image errors of both days and their difference."""
     named = zip(("day 1", "day 2", "day 1 − day 2"), (*days.fields, days.change.field), strict=True)
     subtitle = (
-        f"{case.sets[3][0]}; as figure 11 of the paper; χ² of the difference {days.change.chi2:.1f} with "
-        f"{days.change.freedom} degrees of freedom, at most {days.change.limit():.1f} by chance (95 %)"
+        f"{case.sets[3][0]}; as figure 11 of the paper; χ² of the difference "
+        f"{days.change.statistic * days.change.freedom:.1f} with "
+        f"{days.change.freedom} degrees of freedom, at most {chi2.ppf(0.95, days.change.freedom):.1f} by chance (95 %)"
     )
     return plot_panels([Panel(*pair) for pair in named], f"Two days of one camera – {case.title}", subtitle)
 

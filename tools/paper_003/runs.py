@@ -209,13 +209,13 @@ def two_days(case: Case, spec: SimulationSpec, change_um: float) -> Days:
     return Days(change_um, change(result, "1", "2"), (one, two))
 
 
-def days_over_seeds(case: Case, spec: SimulationSpec, seeds: Iterable[int]) -> list[GroupChange]:
+def days_over_seeds(case: Case, spec: SimulationSpec, seeds: Iterable[int]) -> list[Change]:
     """The test of no change between two days of a camera that stays, block after block."""
     flown = changed(spec, {"flight": {"days": 2}})
     found = []
     for seed in seeds:
         result = adjust(with_parameters(simulate(flown, seed)[0], case.sets[3][1], "day"))
-        found.append(group_change(result, "1", "2"))
+        found.append(change(result, "1", "2"))
     return found
 
 

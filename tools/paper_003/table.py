@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from aerotri.image_errors import GroupChange
+from aerotri.image_errors import Change
 from paper_003.cases import PRINTED, PRINTED_H_B, PRINTED_T80, Case
 from paper_003.runs import Days, Navigation, Row
 
@@ -26,7 +26,7 @@ class Answer:
     rows: Sequence[Row]
     cameras: np.ndarray | None = None
     days: Sequence[Days] = ()
-    day_tests: Sequence[GroupChange] = ()
+    day_tests: Sequence[Change] = ()
     navigation: Sequence[Navigation] = ()
 
 
@@ -228,8 +228,8 @@ def _days(answer: Answer) -> str:
 
 def _day_tests(answer: Answer) -> str:
     tests = answer.day_tests
-    beyond = sum(test.chi2 > test.limit() for test in tests)
-    ratio = np.mean([test.chi2 / test.freedom for test in tests])
+    beyond = sum(test.statistic * test.freedom > chi2.ppf(0.95, test.freedom) for test in tests)
+    ratio = np.mean([test.statistic for test in tests])
     return (
         f"Is the test honest? {answer.case.title} flown on two days by a camera that stays, {len(tests)} simulations: "
         f"χ² over its degrees of freedom {ratio:.2f} on average (1 expected), {beyond} beyond the 95 % limit. What the "

@@ -28,10 +28,16 @@ LAST_STEP_M = 5e-3
 
 
 @kernel
-def image_error(s, x, y, edges, meta, values):
-    """(dx, dy) mm at a measured position in a photograph with image errors s."""
+def tile_of(s, x, y, edges):
+    """Column and row from below of the tile that holds a position in a photograph with image errors s."""
     i = int(x >= edges[s, 0, 0]) + int(x >= edges[s, 0, 1])
     j = int(y >= edges[s, 1, 0]) + int(y >= edges[s, 1, 1])
+    return i, j
+
+
+@kernel
+def error_in_tile(s, i, j, x, y, meta, values):
+    """(dx, dy) mm of a tile at a measured position; beyond the tile it goes on straight."""
     nx, ny = int(meta[s, i, j, 1]), int(meta[s, i, j, 2])
     fx, fy = (x - meta[s, i, j, 3]) * meta[s, i, j, 5], (y - meta[s, i, j, 4]) * meta[s, i, j, 6]
     kx, ky = min(max(int(fx), 0), nx - 2), min(max(int(fy), 0), ny - 2)
@@ -43,6 +49,13 @@ def image_error(s, x, y, edges, meta, values):
     high_x = values[high] + fx * (values[high + 2] - values[high])
     high_y = values[high + 1] + fx * (values[high + 3] - values[high + 1])
     return low_x + fy * (high_x - low_x), low_y + fy * (high_y - low_y)
+
+
+@kernel
+def image_error(s, x, y, edges, meta, values):
+    """(dx, dy) mm at a measured position in a photograph with image errors s."""
+    i, j = tile_of(s, x, y, edges)
+    return error_in_tile(s, i, j, x, y, meta, values)
 
 
 @kernel

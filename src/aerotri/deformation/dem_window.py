@@ -10,7 +10,7 @@ from aerotri.deformation import _kernels, _resample_kernels
 from aerotri.deformation.error_tables import ErrorTables, error_tables
 from aerotri.deformation.model_geometry import geometry_of
 from aerotri.deformation.model_grid import Places, mean_ground, pair_of, places_of
-from aerotri.deformation.orientation import Calibration, Orientation, row_of_image
+from aerotri.deformation.orientation import Calibration, photo_rows, row_of_image
 from aerotri.deformation.restitution import Restitution
 from aerotri.rasters import Grid
 
@@ -19,7 +19,6 @@ TABLE_TOLERANCE_M = 1e-4
 FIXED_POINT_TOLERANCE_M = 1e-4
 LARGEST_PATCH = 64
 PART = 256
-PARTIALS_STEP_M = 50.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,18 +67,10 @@ class DemModels:
         it changes by millimetres where the place is wrong by metres.
         """
         rows = self.rows if chosen is None else self.rows[chosen]
-        local, axes = self._axes_at(np.array([x, y, self.ground]))
+        local, axes = self.places.axes_at(np.array([x, y, self.ground]))
         local = local - self.ground * axes[:, 2]
         sides = [(of, rows[:, k]) for of in (self.of.used, self.of.true) for k in range(2)]
-        return np.ascontiguousarray(np.stack([_photos(of, r, local, axes) for of, r in sides], axis=1))
-
-    def _axes_at(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(3,) a place of the CRS in the frame, and (3, 3) frame coordinates per CRS coordinates there."""
-        if self.places.frame is None:
-            return place, np.eye(3)
-        steps = PARTIALS_STEP_M * np.eye(3)
-        around = self.places.to_local(np.concatenate([place[None], place + steps, place - steps]))
-        return around[0], ((around[1:4] - around[4:]) / (2.0 * PARTIALS_STEP_M)).T
+        return np.ascontiguousarray(np.stack([photo_rows(of.take(r), local, axes) for of, r in sides], axis=1))
 
     def deformation_at(self, number: np.ndarray, xyz: np.ndarray) -> np.ndarray:
         """(n, 3) m, the deformation at points (n, 3) of the DEM in models (n,); NaN where they are not seen."""
@@ -196,10 +187,3 @@ def _renumbered(number: np.ndarray, chosen: np.ndarray, present: np.ndarray) -> 
     of_chosen = np.full(len(present), -1, np.int32)
     of_chosen[chosen] = np.arange(len(chosen))
     return of_chosen[number]
-
-
-def _photos(of: Orientation, rows: np.ndarray, local: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """(M, 15) photographs for coordinates Δ of which local + axes·Δ is the place in the frame."""
-    to_camera = np.swapaxes(of.rotation[rows], 1, 2)
-    u = np.concatenate([to_camera @ axes, to_camera @ (local - of.centre[rows])[:, :, None]], axis=2)
-    return np.concatenate([u.reshape(-1, 12), of.interior[rows]], axis=1)

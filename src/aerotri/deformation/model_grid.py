@@ -26,6 +26,7 @@ from aerotri.rasters import RasterReader
 DEFAULT_NODES = 120
 """Nodes along the longer side of a model, about."""
 MOST_NODES = 4_000_000
+PARTIALS_STEP_M = 50.0
 AROUND_FORMAT = 9
 """Points along each side of a format whose images on the ground bound a model."""
 STEEPEST = 0.1
@@ -126,6 +127,14 @@ class Places:
     def from_local(self, xyz: np.ndarray) -> np.ndarray:
         """The inverse of `to_local`."""
         return xyz if self.frame is None else self.frame.from_local(xyz)
+
+    def axes_at(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(3,) a place of the CRS in the frame, and (3, 3) frame coordinates per CRS coordinates there."""
+        if self.frame is None:
+            return place, np.eye(3)
+        steps = PARTIALS_STEP_M * np.eye(3)
+        around = self.to_local(np.concatenate([place[None], place + steps, place - steps]))
+        return around[0], ((around[1:4] - around[4:]) / (2.0 * PARTIALS_STEP_M)).T
 
     def variances(self, xyz: np.ndarray, covariance: np.ndarray) -> np.ndarray:
         """(n, 3) m² in the CRS, at (n, 3) m in the frame, of covariances (n, 3, 3) m² there."""

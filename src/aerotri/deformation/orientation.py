@@ -101,6 +101,13 @@ def given_orientation(calibration: Calibration, other: Block, angles: np.ndarray
     return out
 
 
+def photo_rows(orientation: Orientation, local: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """(n, 15) photographs as kernels take them, for coordinates Δ of which local + axes·Δ is the place in the frame."""
+    to_camera = np.swapaxes(orientation.rotation, 1, 2)
+    u = np.concatenate([to_camera @ axes, to_camera @ (local - orientation.centre)[:, :, None]], axis=2)
+    return np.concatenate([u.reshape(-1, 12), orientation.interior], axis=1)
+
+
 def row_of_image(block: Block, name: str) -> int:
     """The row of a photograph; −1 when the block has none of that name."""
     found = np.flatnonzero(block.images.names == name)

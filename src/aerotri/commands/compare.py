@@ -1,0 +1,130 @@
+"""`aerotri compare`: a surface against a control surface."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aerotri.commands.console import Console
+from aerotri.conventions import InputError
+
+if TYPE_CHECKING:
+    from aerotri.rasters import Grid
+    from aerotri.terrain.compare import Comparison, Heights
+
+OWN_NAMES = ("compare.json", "difference.tif", "plots")
+CELLS = 1000
+CLOUDS, RASTERS = (".las", ".laz"), (".tif", ".tiff", ".asc", ".img", ".vrt")
+
+
+def run_compare(
+    test: Path, control: Path, out: Path | None, method: str, align: str, cell: float | None, plots: bool, as_json: bool
+) -> None:
+    """Compare and write; arguments as on the command line."""
+    from aerotri.terrain.compare import ALIGNMENTS, METHODS, compare
+
+    for name, value, known in (("method", method, METHODS), ("align", align, ALIGNMENTS)):
+        if value not in known:
+            raise InputError(f"--{name} '{value}' is not known", f"choose one of {', '.join(known)}")
+    console = Console(quiet=as_json)
+    target = out or Path(f"{test.resolve().stem}_comparison")
+    if target.is_dir() and any(target.iterdir()) and not (target / "compare.json").exists():
+        raise InputError(f"'{target}' holds other files", "choose another --out, or an empty folder")
+    console.progress("reading")
+    (one, area, cells, crs), (other, control_area, control_cells, control_crs) = (_surface(p) for p in (test, control))
+    if crs is not None and control_crs is not None and crs != control_crs:
+        raise InputError(f"is in EPSG:{crs}, the control in EPSG:{control_crs}", "bring them into one CRS", test)
+    grid = _common_grid(area, control_area, cell or max(cells, control_cells))
+    console.progress("comparing")
+    found = compare(one, other, grid, method, align)
+    content = comparison_json(found, test.name, control.name, method)
+    _write(target, found, content, f"{test.name} − {control.name}", crs or control_crs, plots)
+    if as_json:
+        print(json.dumps(content, indent=2, ensure_ascii=False))
+        return
+    s = found.statistics
+    lines = [
+        f"{s.count} cells of {grid.cell_x:g} m compared, {100 * found.coverage:.1f} % of the control covered; {method}",
+        f"bias {s.bias:+.3f} m, median {s.median:+.3f}, RMSE {s.rmse:.3f}, σ {s.std:.3f}, NMAD {s.nmad:.3f}, "
+        f"LE90 {s.le90:.3f}, largest {s.max:.3f} m",
+    ]
+    console.lines([*lines, *([found.alignment_text] if found.alignment_text else []), f"Written to {target}"])
+
+
+def _surface(path: Path) -> tuple[Heights, np.ndarray, float, int | None]:
+    """A surface, (2, 2) m what it covers, its typical cell in m, and the code of its CRS."""
+    from aerotri.formats.pickets import read_pickets
+    from aerotri.formats.point_cloud import read_point_cloud
+    from aerotri.rasters import RasterReader
+    from aerotri.terrain.compare import PointHeights, RasterHeights
+
+    if path.is_dir():
+        path = path / "dsm.tif"
+    if not path.is_file():
+        raise InputError("there is no such file", "give a GeoTIFF, LAZ, or pickets.parquet", path)
+    if path.suffix.lower() in RASTERS:
+        with RasterReader(path) as reader:
+            g = reader.grid
+            z = reader.read(0, 0, g.rows, g.columns).astype(float)
+            epsg = reader.epsg
+        known_rows, known_columns = np.isfinite(z).any(axis=1), np.isfinite(z).any(axis=0)
+        if not known_rows.any():
+            raise InputError("has no data", "give a raster with heights", path)
+        rows, columns = np.flatnonzero(known_rows)[[0, -1]], np.flatnonzero(known_columns)[[0, -1]]
+        area = np.array([[g.x(columns[0]), g.y(rows[1])], [g.x(columns[1]), g.y(rows[0])]], dtype=float)
+        return RasterHeights(g, z), area, g.cell_x, epsg
+    if path.suffix.lower() in CLOUDS:
+        xyz = read_point_cloud(path)[0]
+    elif path.suffix.lower() == ".parquet":
+        table = read_pickets(path)
+        xyz = table.xyz[table.accepted]
+    else:
+        raise InputError("is of no known kind", "give a GeoTIFF, LAZ, or pickets.parquet", path)
+    surface = PointHeights.of(xyz)
+    area = np.array([xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)])
+    return surface, area, float(np.sqrt(np.prod(area[1] - area[0]) / len(xyz))), None
+
+
+def _common_grid(one: np.ndarray, other: np.ndarray, cell: float) -> Grid:
+    """Cells whose centres are multiples of the cell, where both reach."""
+    from aerotri.terrain.surface import grid_over
+
+    low, high = np.maximum(one[0], other[0]), np.minimum(one[1], other[1])
+    if (low >= high).any():
+        raise InputError("the surfaces have no place in common", "check their coordinate systems")
+    return grid_over(np.array([low, high]), max(cell, float((high - low).max()) / (10 * CELLS)))
+
+
+def comparison_json(found: Comparison, test: str, control: str, method: str) -> dict[str, Any]:
+    """The content of compare.json."""
+    from aerotri import __version__
+
+    a = found.alignment
+    moved = None
+    if a is not None:
+        moved = {"kind": a.kind, "shift_m": a.shift.tolist(), "rotation_rad": a.rotation.tolist(),
+                 "about_m": a.middle.tolist()}  # fmt: skip
+    return {
+        "aerotri": __version__, "test": test, "control": control, "method": method, "cell_m": found.grid.cell_x,
+        "difference_m": asdict(found.statistics), "coverage": found.coverage, "alignment": moved,
+    }  # fmt: skip
+
+
+def _write(target: Path, found: Comparison, content: dict[str, Any], title: str, epsg: int | None, plots: bool) -> None:
+    from aerotri.formats.atomic import atomic_folder
+    from aerotri.rasters import write_raster
+
+    with atomic_folder(target, own=OWN_NAMES) as folder:
+        crs = None if epsg is None else f"EPSG:{epsg}"
+        write_raster(folder / "difference.tif", found.difference, found.grid, crs, "test − control, m")
+        if plots:
+            from aerotri.report.plots_terrain import plot_comparison
+            from aerotri.report.rendering import save_plots
+
+            save_plots({"difference": plot_comparison(found, title)}, folder / "plots")
+        text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+        (folder / "compare.json").write_text(text + "\n", encoding="utf-8")

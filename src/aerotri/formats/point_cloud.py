@@ -1,0 +1,47 @@
+"""Point clouds, LAS and LAZ; nothing else knows laspy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.conventions import InputError
+
+UNCLASSIFIED, GROUND = 1, 2
+SCALE_M = 0.001
+
+
+def write_point_cloud(path: Path, xyz: np.ndarray, sigma: np.ndarray, ground: np.ndarray, crs: str | None) -> None:
+    """Write points (n, 3) m as LAZ 1.4 with `sigma_z` (n,) m; what is ground (n,) bool has class 2."""
+    import laspy
+    from pyproj import CRS
+
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.offsets, header.scales = np.floor(xyz.min(axis=0)), np.full(3, SCALE_M)
+    header.add_extra_dim(laspy.ExtraBytesParams("sigma_z", "f4", "sigma of Z [m]"))
+    if crs is not None:
+        header.add_crs(CRS.from_user_input(crs))
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = xyz.T
+    cloud.classification = np.where(ground, GROUND, UNCLASSIFIED).astype(np.uint8)
+    cloud["sigma_z"] = sigma.astype(np.float32)
+    with path.open("wb") as file:
+        cloud.write(file, do_compress=True)
+
+
+def read_point_cloud(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) m of a LAS or LAZ file and their classes (n,).
+
+    Raises
+    ------
+    InputError
+    """
+    import laspy
+
+    try:
+        cloud = laspy.read(path)
+        xyz = [np.asarray(axis, dtype=float) for axis in (cloud.x, cloud.y, cloud.z)]
+        return np.column_stack(xyz), np.asarray(cloud.classification)
+    except Exception as error:  # laspy and lazrs raise whatever a damaged file leads to
+        raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error

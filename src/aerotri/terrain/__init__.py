@@ -1,0 +1,1 @@
+"""Terrain by image matching: pickets with σ, surfaces, and their comparison."""

@@ -1,0 +1,96 @@
+"""What the adjustment adds to the variance of pickets: they are intersected with an orientation that has its own σ.
+
+[D] The ideal rays l = m − d(m; p) of a picket give dP = −G·(∂π/∂θ·dθ + ∂d/∂p·dp), G = (AᵀA)⁻¹Aᵀ of its intersection.
+With J = dP/dx over all unknowns x of the reduced system its covariance is σ̂0²·J·Q·Jᵀ, by a solution with the factor.
+It changes slowly over the ground: some pickets tell it for all.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+from aerotri.deformation.absorbed import additional_rows, shared_columns
+from aerotri.deformation.model_grid import places_of
+from aerotri.deformation.orientation import Calibration
+from aerotri.deformation.restitution import Restitution
+from aerotri.functional_model.collinearity import linearise
+from aerotri.terrain.pickets import Pickets
+
+MOST_PLACES, AT_A_TIME = 500, 100
+
+
+def adjustment_variances(calibration: Calibration, of: Restitution, rows: np.ndarray, pickets: Pickets) -> np.ndarray:
+    """(n, 3) m², in the CRS, of pickets that were measured; NaN of others.
+
+    Parameters
+    ----------
+    of : the restitution the pickets were measured with. rows : photographs of the block that `pickets.photographs`
+        counts.
+    """
+    measured = np.flatnonzero(np.isfinite(pickets.xyz).all(axis=1))
+    out = np.full(pickets.xyz.shape, np.nan)
+    if len(measured) < 4:
+        return out
+    places, frame = measured[:: max(len(measured) // MOST_PLACES, 1)], places_of(calibration)
+    local = frame.to_local(pickets.xyz[places])
+    photographs = pickets.photographs[places]
+    factor = calibration.system.factorise(calibration.solution.equations)
+    variances = np.empty((len(places), 3))
+    for first in range(0, len(places), AT_A_TIME):
+        part = slice(first, first + AT_A_TIME)
+        j = _by_unknowns(calibration, of, rows, local[part], photographs[part])
+        q = factor.solve(j.reshape(-1, j.shape[2]).T)
+        both = np.einsum("nau,unb->nab", j, q.reshape(j.shape[2], len(j), 3))
+        covariance = calibration.local.outcome.sigma0**2 * both
+        variances[part] = frame.variances(local[part], covariance)
+    at = pickets.xyz[places, :2]
+    values = NearestNDInterpolator(at, variances)(pickets.xyz[measured, :2])
+    linear = LinearNDInterpolator(at, variances)(pickets.xyz[measured, :2])
+    out[measured] = np.where(np.isfinite(linear), linear, values)
+    return out
+
+
+def _by_unknowns(calibration: Calibration, of: Restitution, rows, local: np.ndarray, photographs) -> np.ndarray:
+    """(n, 3, u) partials of intersected points by the unknowns of the reduced system."""
+    u, state = calibration.system.unknowns, calibration.solution.state
+    in_system = np.full(len(of.group), -1)
+    in_system[u.images] = np.arange(len(u.images))
+    picket, column = np.nonzero(photographs >= 0)
+    image = rows[photographs[picket, column]]
+    orientation = of.true
+    interior = np.zeros((len(orientation), u.lens.base.shape[1]))
+    interior[:, :3] = orientation.interior
+    rays = linearise(
+        np.ascontiguousarray(np.nan_to_num(orientation.rotation)), np.ascontiguousarray(orientation.centre), local,
+        interior, image, picket, image, np.zeros((len(image), 2)),
+    )  # fmt: skip
+    normal = np.zeros((len(local), 3, 3))
+    np.add.at(normal, picket, np.einsum("rki,rkj->rij", rays.by_point, rays.by_point))
+    gain = np.linalg.solve(normal[picket], np.swapaxes(rays.by_point, 1, 2))
+    own = in_system[image]
+    by_image = rays.by_orientation.copy()
+    by_image[:, :, 3:] = rays.by_orientation[:, :, 3:] @ u.turn(state)[own]
+    by_image[~np.broadcast_to(u.eo_free[own][:, None, :], by_image.shape)] = 0.0
+    size = 6 * len(u.images) + len(u.shared)
+    j = np.zeros((len(local), 3, size))
+    effect = -gain @ by_image
+    for k in range(6):
+        np.add.at(j, (picket[:, None], np.arange(3), 6 * own[:, None] + k), effect[:, :, k])
+    first_shared = 6 * len(u.images)
+    free = u.lens.columns[u.lens.of_image][own][:, :3]
+    for k in range(3):
+        has = free[:, k] >= 0
+        if has.any():
+            e = -np.einsum("rik,rk->ri", gain[has], rays.by_interior[has][:, :, k])
+            np.add.at(j, (picket[has][:, None], np.arange(3), first_shared + free[has, k][:, None]), e)
+    columns = shared_columns(calibration)
+    if len(additional_rows(calibration)):
+        for g, errors in enumerate(of.errors):
+            has = np.flatnonzero(of.group[image] == g)
+            if len(has):
+                partials = errors.partials(errors.measured(rays.prediction[has]))
+                e = -gain[has] @ partials
+                for k, col in enumerate(columns.tolist()):
+                    np.add.at(j, (picket[has][:, None], np.arange(3), first_shared + col), e[:, :, k])
+    return j

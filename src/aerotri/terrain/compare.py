@@ -1,0 +1,231 @@
+"""A surface against a control surface: both interpolated to the same places in the same way, then their differences.
+
+The method of Tran (2007): two surfaces become two rasters by one algorithm, Δ = test − control cell by cell,
+RMSE = √(mean Δ²). Rasters are sampled at the centres of the cells, points through their triangles, both linearly; or
+both by cubic splines. RMSE counts every cell; median, NMAD = 1.4826·median|Δ − median| and LE90, the 90 % quantile of
+|Δ|, are those of a distribution with gross errors [L: Höhle & Höhle 2009].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator
+from scipy.ndimage import map_coordinates
+
+from aerotri.conventions import InputError
+from aerotri.rasters import Grid
+from aerotri.terrain.tin import Tin, triangulate
+
+METHODS = ("linear", "spline")
+ALIGNMENTS = ("none", "shift", "rigid")
+NMAD = 1.4826
+LARGEST_SIDE = 8.0
+SPLINE_NEIGHBOURS = 24
+ROUNDS, SETTLED_M = 15, 1e-4
+CUT = 3.0
+MOST_ALIGNED = 200_000
+FEWEST = 20
+AXES = np.eye(2)
+
+
+class Heights(Protocol):
+    """A surface that can be asked for its heights (n,) m at places (n, 2); NaN where it has none."""
+
+    def at(self, xy: np.ndarray, method: str) -> np.ndarray: ...
+
+
+@dataclass(frozen=True, eq=False)
+class RasterHeights:
+    """Heights (rows, columns) m on a grid."""
+
+    grid: Grid
+    z: np.ndarray
+
+    def at(self, xy: np.ndarray, method: str) -> np.ndarray:
+        """Bilinear, or by cubic spline with holes filled in first; NaN where one of the four cells around is."""
+        place = np.array([self.grid.row(xy[:, 1]), self.grid.column(xy[:, 0])])
+        linear = map_coordinates(self.z, place, order=1, mode="constant", cval=np.nan)
+        if method == "linear":
+            return linear
+        known = np.isfinite(self.z)
+        filled = np.where(known, self.z, np.nanmean(self.z))
+        return np.where(np.isfinite(linear), map_coordinates(filled, place, order=3, mode="nearest"), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class PointHeights:
+    """Heights of points: linear in their triangles, or by thin-plate splines of the points around."""
+
+    xyz: np.ndarray
+    tin: Tin
+
+    @classmethod
+    def of(cls, xyz: np.ndarray) -> PointHeights:
+        """Of points (n, 3) m; triangles with sides of more than eight typical distances are holes."""
+        xyz = np.unique(xyz[np.isfinite(xyz).all(axis=1)], axis=0)
+        xyz = xyz[np.unique(xyz[:, :2], axis=0, return_index=True)[1]]
+        if len(xyz) < FEWEST:
+            raise InputError(f"{len(xyz)} points make no surface", "give more")
+        area = float(np.prod(np.ptp(xyz[:, :2], axis=0)))
+        return cls(xyz, triangulate(xyz, None, LARGEST_SIDE * np.sqrt(area / len(xyz))))
+
+    def at(self, xy: np.ndarray, method: str) -> np.ndarray:
+        linear = self.tin.interpolate(xy)[0]
+        if method == "linear":
+            return linear
+        known = np.isfinite(linear)
+        spline = RBFInterpolator(self.xyz[:, :2] - self.tin.origin, self.xyz[:, 2], neighbors=SPLINE_NEIGHBOURS)
+        out = np.full(len(xy), np.nan)
+        if known.any():
+            out[known] = spline(xy[known] - self.tin.origin)
+        return out
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Of differences, m: RMSE, mean, median, standard deviation, NMAD, LE90, largest without sign."""
+
+    count: int
+    rmse: float
+    bias: float
+    median: float
+    std: float
+    nmad: float
+    le90: float
+    max: float
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """By what the test surface was moved before the comparison.
+
+    Parameters
+    ----------
+    kind : 'shift' or 'rigid'. shift : (3,) m added to X, Y, Z. rotation : (3,) rad about axes through `middle` (3,).
+    """
+
+    kind: str
+    shift: np.ndarray
+    rotation: np.ndarray
+    middle: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Differences test − control on a grid.
+
+    Parameters
+    ----------
+    difference : (rows, columns) m, NaN where either has no surface.
+    coverage : share of the cells with a control surface that the test surface covers.
+    alignment : None where nothing was moved.
+    """
+
+    grid: Grid
+    difference: np.ndarray
+    statistics: Statistics
+    coverage: float
+    alignment: Alignment | None
+
+    @property
+    def alignment_text(self) -> str:
+        """What was moved, in words; '' for nothing."""
+        a = self.alignment
+        if a is None:
+            return ""
+        text = "test surface moved by " + ", ".join(f"{v:+.3f}" for v in a.shift) + " m in X, Y, Z"
+        if a.kind == "rigid":
+            text += ", turned by " + ", ".join(f"{1e3 * v:+.3f}" for v in a.rotation) + " mrad"
+        return text
+
+
+def statistics_of(difference: np.ndarray) -> Statistics:
+    """Of all that is known.
+
+    Raises
+    ------
+    InputError
+        When nothing is.
+    """
+    d = difference[np.isfinite(difference)]
+    if not len(d):
+        raise InputError("the surfaces have no place in common", "check their coordinate systems")
+    median = float(np.median(d))
+    return Statistics(
+        len(d), float(np.sqrt(np.mean(d**2))), float(d.mean()), median, float(d.std()),
+        float(NMAD * np.median(np.abs(d - median))), float(np.quantile(np.abs(d), 0.9)), float(np.abs(d).max()),
+    )  # fmt: skip
+
+
+def compare(test: Heights, control: Heights, grid: Grid, method: str = "linear", alignment: str = "none") -> Comparison:
+    """Differences of two surfaces on a grid.
+
+    Parameters
+    ----------
+    method : of `METHODS`, the interpolation of both.
+    alignment : of `ALIGNMENTS`; 'shift' in X, Y, Z [L: Nuth & Kääb 2011], 'rigid' with three rotations besides
+        [L: Gruen & Akca 2005, least squares surface matching].
+
+    Raises
+    ------
+    InputError
+    """
+    x, y = grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows))
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    z = control.at(places, method)
+    moved = None if alignment == "none" else align(test, control, places, z, method, alignment, grid.cell_x)
+    heights = test.at(places, method) if moved is None else moved_heights(test, places, z, moved, method)
+    difference = heights - z
+    known = np.isfinite(z)
+    covered = float(np.isfinite(difference[known]).mean()) if known.any() else 0.0
+    return Comparison(grid, difference.reshape(grid.rows, grid.columns), statistics_of(difference), covered, moved)
+
+
+def align(test: Heights, control: Heights, places: np.ndarray, z: np.ndarray, method: str, kind: str,
+          step: float) -> Alignment:  # fmt: skip
+    """The motion of the test surface that brings it onto the control surface, by least squares of the differences.
+
+    [D] Test points P become P + t + ω × (P − M). At a place of the control surface with slopes (zx, zy) the difference
+    test − control grows by tz − zx·tx − zy·ty and by what the rotation adds to t there; the motion makes it vanish.
+    Differences beyond 3 NMAD do not count. What flat ground leaves open is not moved.
+    """
+    known = np.flatnonzero(np.isfinite(z))
+    known = known[:: max(len(known) // MOST_ALIGNED, 1)]
+    at, z = places[known], z[known]
+    by_x = (control.at(at + step * AXES[0], method) - control.at(at - step * AXES[0], method)) / (2.0 * step)
+    by_y = (control.at(at + step * AXES[1], method) - control.at(at - step * AXES[1], method)) / (2.0 * step)
+    if len(z) < FEWEST:
+        raise InputError("the surfaces have too little in common to be aligned", "check their coordinate systems")
+    middle = np.array([*at.mean(axis=0), z.mean()])
+    r = np.column_stack([at, z]) - middle
+    design = np.column_stack([-by_x, -by_y, np.ones(len(z))])
+    if kind == "rigid":
+        # ω × r for unit rotations about X, Y, Z
+        about = [np.cross(axis, r) for axis in np.eye(3)]
+        design = np.column_stack([design, *(np.einsum("ni,ni->n", design, a) for a in about)])
+    moved = Alignment(kind, np.zeros(3), np.zeros(3), middle)
+    for _ in range(ROUNDS):
+        d = moved_heights(test, at, z, moved, method) - z
+        good = np.isfinite(d) & np.isfinite(design).all(axis=1)
+        if good.sum() < FEWEST:
+            raise InputError("the surfaces have too little in common to be aligned", "check their coordinate systems")
+        off = np.abs(d - np.median(d[good]))
+        good &= off <= max(CUT * NMAD * float(np.median(off[good])), 1e-6)
+        scale = np.sqrt(np.mean(design[good] ** 2, axis=0)) + 1e-12
+        found = -np.linalg.lstsq(design[good] / scale, d[good], rcond=1e-6)[0] / scale
+        turn = found[3:] if kind == "rigid" else np.zeros(3)
+        moved = Alignment(kind, moved.shift + found[:3], moved.rotation + turn, middle)
+        reach = float(np.abs(r).max())
+        if np.abs(found[:3]).max() < SETTLED_M and np.abs(turn).max() * reach < SETTLED_M:
+            break
+    return moved
+
+
+def moved_heights(test: Heights, places: np.ndarray, z: np.ndarray, moved: Alignment, method: str) -> np.ndarray:
+    """Heights (n,) of the moved test surface at places (n, 2), near the heights z (n,)."""
+    r = np.column_stack([places, np.where(np.isfinite(z), z, moved.middle[2])]) - moved.middle
+    motion = moved.shift + np.cross(np.broadcast_to(moved.rotation, r.shape), r)
+    return test.at(places - motion[:, :2], method) + motion[:, 2]

@@ -1,0 +1,271 @@
+"""From an adjusted block and its photographs to pickets and surfaces: the chain of stages of `aerotri dtm`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.deformation.block_models import strip_pairs
+from aerotri.deformation.model_geometry import geometry_of
+from aerotri.deformation.orientation import Calibration
+from aerotri.deformation.stereo_model import pair_model
+from aerotri.terrain.adjustment_part import adjustment_variances
+from aerotri.terrain.error_pickets import with_error_pickets
+from aerotri.terrain.interval import interval_of_gsd, k_of_slope
+from aerotri.terrain.photographs import Photographs, photographs_of
+from aerotri.terrain.pickets import FIRST_ERROR, STATUS, Area, MatchOptions, Models, Pickets, measure
+from aerotri.terrain.surface import Surface, grid_over, ground_cells, interpolation_error, surface_of
+
+BEST_END_LAP = 0.6
+CELLS_PER_INTERVAL = 2
+Report = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class TerrainPlan:
+    """What is to be measured.
+
+    Parameters
+    ----------
+    rows : photographs of the block; paths : their files.
+    interval, cell : m, None: computed. pairs : whether the best pair measures a picket, not all photographs.
+    step : photographs from one of a pair to the other along the strip; None: what comes nearest to 60 % end lap.
+    area : None: as far as the photographs reach. breaklines : (k, 3) m each.
+    ideal : whether the photographs have been freed of image errors.
+    """
+
+    rows: np.ndarray
+    paths: tuple[Path, ...]
+    interval: float | None = None
+    cell: float | None = None
+    pairs: bool = False
+    step: int | None = None
+    area: Area | None = None
+    window_px: int = 17
+    threshold: float = 0.90
+    edge: float = 0.10
+    most_photographs: int = 5
+    breaklines: tuple[np.ndarray, ...] = ()
+    ideal: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class TerrainOutcome:
+    """What was measured.
+
+    Parameters
+    ----------
+    pickets : all nodes. adjustment : (n, 3) m², what the adjustment adds to their variances. ground : (n,) bool.
+    dsm, dtm : the surface with objects, and without. models, number : where pairs measured, the pairs and which of
+    them the cells of the surface belong to.
+    interval, cell : m. interval_source : where the interval comes from. interpolation : m, RMS between pickets.
+    photographs : what was matched.
+    """
+
+    pickets: Pickets
+    adjustment: np.ndarray
+    ground: np.ndarray
+    dsm: Surface
+    dtm: Surface
+    models: Models | None
+    number: np.ndarray
+    interval: float
+    interval_source: str
+    cell: float
+    interpolation: float
+    photographs: Photographs
+
+
+def chosen_rows(calibration: Calibration, subset: str) -> np.ndarray:
+    """Oriented photographs of the block: all, or every second one of each strip, from its first or its second on.
+
+    They count along the flight, so that even and odd ones of a flight with 80 % end lap make blocks with 60 %.
+    """
+    images = calibration.local.block.images
+    oriented = np.asarray(np.isfinite(calibration.local.images.centre).all(axis=1))
+    if subset == "all":
+        return np.flatnonzero(oriented)
+    rows = []
+    for strip in dict.fromkeys(images.strip.tolist()):
+        members = np.flatnonzero(images.strip == strip)
+        centre = calibration.local.images.centre[members]
+        if strip and len(members) > 1 and np.isfinite(centre).all():
+            along = np.linalg.svd(centre - centre.mean(axis=0))[2][0]
+            members = members[np.argsort(centre @ along, kind="stable")]
+        rows.append(members[0 if subset == "odd" else 1 :: 2])
+    found = np.sort(np.concatenate(rows))
+    return found[oriented[found]]
+
+
+def make_terrain_model(calibration: Calibration, plan: TerrainPlan, report: Report | None = None) -> TerrainOutcome:
+    """Measure pickets, find those in error, make surfaces.
+
+    Raises
+    ------
+    InputError
+    """
+
+    def tell(stage: str, share: float) -> None:
+        if report is not None:
+            report(stage, share)
+
+    photographs = photographs_of(calibration, plan.rows, plan.paths, plan.ideal)
+    gsd = float(np.median(photographs.gsd))
+    known = calibration.result.points.xyz
+    interval, source = plan.interval, "given"
+    if interval is None:
+        k, ground = k_of_slope(typical_slope(known))
+        interval, source = interval_of_gsd(gsd, k), f"{1000 * k:g}·√GSD, {ground}"
+    options = MatchOptions(
+        interval=interval, window_px=plan.window_px, threshold=plan.threshold, edge=plan.edge,
+        most_photographs=plan.most_photographs,
+    )  # fmt: skip
+    models = models_of(calibration, photographs, plan.step) if plan.pairs else None
+    pickets = measure(photographs, known, options, plan.area, models, lambda share: tell("matching", share))
+    if pickets.accepted.sum() < 3:
+        raise InputError(
+            f"{int(pickets.accepted.sum())} pickets were accepted", "lower --threshold, or look at the photographs"
+        )
+    pickets = with_error_pickets(pickets, gsd / base_ratio(photographs, pickets))
+    tell("statistics", 0.97)
+    adjustment = adjustment_variances(calibration, photographs.of, plan.rows, pickets)
+    outcome = _surfaces(pickets, adjustment, interval, plan)
+    tell("surfaces", 1.0)
+    number = _model_numbers(outcome[0], pickets) if models is not None else np.zeros((0, 0), np.int32)
+    dsm, dtm, ground, interpolation = outcome
+    return TerrainOutcome(
+        pickets, adjustment, ground, dsm, dtm, models, number, interval, source, dsm.grid.cell_x, interpolation,
+        photographs,
+    )  # fmt: skip
+
+
+def typical_slope(xyz: np.ndarray) -> float:
+    """Median slope between neighbouring points (n, 3) of the ground."""
+    from scipy.spatial import KDTree
+
+    xyz = xyz[np.isfinite(xyz).all(axis=1)]
+    if len(xyz) < 4:
+        return 0.0
+    far, near = KDTree(xyz[:, :2]).query(xyz[:, :2], 4)
+    near = np.asarray(near)
+    rise = np.abs(xyz[near[:, 1:], 2] - xyz[:, None, 2])
+    return float(np.median(rise / np.maximum(np.asarray(far)[:, 1:], 1e-9)))
+
+
+def base_ratio(photographs: Photographs, pickets: Pickets) -> float:
+    """Median base over height of the first two photographs of the pickets."""
+    measured = np.flatnonzero(pickets.accepted)
+    a, b = (photographs.centres[pickets.photographs[measured, k]] for k in range(2))
+    height = 0.5 * (a[:, 2] + b[:, 2]) - pickets.xyz[measured, 2]
+    return float(np.median(np.hypot(*(a - b)[:, :2].T) / height))
+
+
+def models_of(calibration: Calibration, photographs: Photographs, step: int | None = None) -> Models:
+    """The pairs that photographs make along their strips, at the step that comes nearest to 60 % end lap.
+
+    Raises
+    ------
+    InputError
+    """
+    row = {int(r): k for k, r in enumerate(photographs.rows)}
+    missing = ~np.isin(np.arange(len(photographs.of.true)), photographs.rows)
+    of = photographs.of
+    # photographs that are not matched are none of a strip, so that steps count those that are
+    centre = np.where(missing[:, None], np.nan, of.true.centre)
+    of = replace(of, true=replace(of.true, centre=centre))
+    best: tuple[float, list[tuple[int, int]]] = (np.inf, [])
+    ground = float(np.nanmedian(calibration.local.points.xyz[:, 2]))
+    for one in range(1, 6) if step is None else (step,):
+        pairs = strip_pairs(calibration, of, one)
+        if not pairs:
+            continue
+        laps = [geometry_of(pair_model(photographs.of, ("", ""), pair), ground).end_lap for pair in pairs]
+        off = abs(float(np.median(laps)) - BEST_END_LAP)
+        if off < best[0]:
+            best = off, pairs
+    if not best[1]:
+        raise InputError("no two photographs that follow one another overlap", "leave out --pairs")
+    pairs = np.array([[row[a], row[b]] for a, b in best[1]])
+    middles = photographs.centres[pairs].mean(axis=1)[:, :2]
+    return Models(pairs, np.ascontiguousarray(middles))
+
+
+def _surfaces(
+    pickets: Pickets, adjustment: np.ndarray, interval: float, plan: TerrainPlan
+) -> tuple[Surface, Surface, np.ndarray, float]:
+    own = np.flatnonzero(pickets.accepted)
+    xyz, matching, shared = pickets.xyz[own], pickets.covariance[own, 2, 2], adjustment[own, 2]
+    between = interpolation_error(xyz, pickets.node[own], interval, matching)
+    cell = interval / CELLS_PER_INTERVAL if plan.cell is None else plan.cell
+    grid = grid_over(xyz[:, :2], cell)
+    dsm = surface_of(xyz, matching, interval, grid, plan.breaklines, between, shared)
+    of_cell = ground_cells(dsm.z, cell)
+    row = np.clip(np.round(grid.row(xyz[:, 1])), 0, grid.rows - 1).astype(int)
+    column = np.clip(np.round(grid.column(xyz[:, 0])), 0, grid.columns - 1).astype(int)
+    is_ground = of_cell[row, column]
+    ground = np.zeros(len(pickets), bool)
+    ground[own] = is_ground
+    if is_ground.all() or is_ground.sum() < 3:
+        return dsm, dsm, ground, between
+    longest = interval * max(1.0, 18.0 / interval)
+    dtm = surface_of(
+        xyz[is_ground], matching[is_ground], longest, grid, plan.breaklines, between, shared[is_ground]
+    )  # fmt: skip
+    known = np.isfinite(dsm.z)
+    dtm = Surface(grid, np.where(known, dtm.z, np.nan), np.where(known, dtm.sigma, np.nan))
+    return dsm, dtm, ground, between
+
+
+def _model_numbers(dsm: Surface, pickets: Pickets) -> np.ndarray:
+    """(rows, columns) int32, the model of the nearest picket; −1 off the surface."""
+    from scipy.spatial import KDTree
+
+    own = np.flatnonzero(pickets.accepted)
+    x, y = dsm.grid.x(np.arange(dsm.grid.columns)), dsm.grid.y(np.arange(dsm.grid.rows))
+    cells = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    nearest = np.asarray(KDTree(pickets.xyz[own, :2]).query(cells)[1])
+    number = pickets.model[own][nearest].reshape(dsm.z.shape).astype(np.int32)
+    return np.where(np.isfinite(dsm.z), number, -1).astype(np.int32)
+
+
+def terrain_json(outcome: TerrainOutcome, block: str, crs: str) -> dict[str, Any]:
+    """The content of dtm.json."""
+    from aerotri import __version__
+
+    o, p = outcome, outcome.pickets
+    count = np.bincount(p.status, minlength=len(STATUS))
+    own = p.accepted
+    matching, adjustment = p.covariance[own, 2, 2], o.adjustment[own, 2]
+    seen = int(len(p) - count[1])
+    pixel = 1.0 / o.photographs.sensor[0, 2]
+    return {
+        "aerotri": __version__, "block": block, "crs": crs, "photographs": len(p.names),
+        "gsd_m": float(np.median(o.photographs.gsd)), "interval_m": o.interval, "interval_source": o.interval_source,
+        "cell_m": o.cell,
+        "pickets": {
+            "nodes": len(p), "seen": seen, "accepted": int(own.sum()), "errors": int(p.errors.sum()),
+            "stepped_aside": int((own & (p.tries > 0)).sum()), "holes": int(count[2:FIRST_ERROR].sum()),
+            "rays_mean": float((p.photographs[own] >= 0).sum(axis=1).mean()),
+        },
+        "status": {name: int(n) for name, n in zip(STATUS, count, strict=True)},
+        "sigma_Z_m": {
+            "median": float(np.median(np.sqrt(matching + adjustment))), "matching": float(np.median(np.sqrt(matching))),
+            "adjustment": float(np.median(np.sqrt(adjustment))), "interpolation": o.interpolation,
+        },
+        "ray_sigma_px": float(_ray_sigma_mm(o) / pixel), "sigma0_rays": float(np.nan_to_num(p.sigma0)),
+        "ground_share": float(o.ground[own].mean()),
+    }  # fmt: skip
+
+
+def _ray_sigma_mm(o: TerrainOutcome) -> float:
+    """Median σ of a matched image coordinate along the base, from σ of the heights: σ_Z·b/h·c/h/√2."""
+    p = o.pickets
+    own = p.accepted
+    height = np.median(o.photographs.centres[:, 2]) - np.median(p.xyz[own, 2])
+    sigma = np.median(np.sqrt(p.covariance[own, 2, 2])) * base_ratio(o.photographs, p)
+    return float(sigma * np.median(o.photographs.orientation.interior[:, 0]) / height / np.sqrt(2.0))

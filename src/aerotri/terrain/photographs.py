@@ -1,0 +1,249 @@
+"""The photographs of a block as matching takes them: image pyramids, and views of a piece of ground.
+
+Grey values are kept in 16 bits, 8-bit photographs times 256, so that means over pixels do not round. A level of the
+pyramid has half the columns and rows of the one below; its pixels are means of four.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from threading import Lock
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.deformation.error_tables import ErrorTables, error_tables
+from aerotri.deformation.model_grid import Places, mean_ground, places_of
+from aerotri.deformation.orientation import Calibration, Orientation, photo_rows
+from aerotri.deformation.photo_errors import PhotoErrors
+from aerotri.deformation.restitution import FREE, Restitution, restitution
+from aerotri.rasters_images import open_photograph
+
+CACHE_BYTES = 3 << 30
+COLOURS = 3
+TABLE_TOLERANCE_PX = 0.01
+CROP_MARGIN_PX = 24
+"""By which crops reach beyond the windows of their nodes, pixels of the level."""
+View = tuple
+
+
+class PyramidStore:
+    """Pyramids of photographs, the ones used last kept in memory.
+
+    Parameters
+    ----------
+    paths : of the photographs; sizes : (columns, rows) that each must have. levels : of every pyramid.
+    """
+
+    def __init__(self, paths: Sequence[Path], sizes: Sequence[tuple[int, int]], levels: int):
+        self._paths, self._sizes, self.levels = paths, sizes, levels
+        self._kept: OrderedDict[int, list[np.ndarray]] = OrderedDict()
+        self._lock, self._bytes = Lock(), 0
+
+    def level(self, k: int, level: int) -> np.ndarray:
+        """(rows, columns) uint16 of photograph k."""
+        with self._lock:
+            if k not in self._kept:
+                self._kept[k] = read_pyramid(self._paths[k], self._sizes[k], self.levels)
+                self._bytes += sum(a.nbytes for a in self._kept[k])
+            self._kept.move_to_end(k)
+            found = self._kept[k][level]
+            while self._bytes > CACHE_BYTES and len(self._kept) > 1:
+                self._bytes -= sum(a.nbytes for a in self._kept.popitem(last=False)[1])
+            return found
+
+
+def read_pyramid(path: Path, size: tuple[int, int], levels: int) -> list[np.ndarray]:
+    """Grey values of a photograph, then of its coarser levels.
+
+    Raises
+    ------
+    InputError
+    """
+    with open_photograph(path) as photograph:
+        if (photograph.columns, photograph.rows) != tuple(size):
+            raise InputError(
+                f"is {photograph.columns} × {photograph.rows} pixels large, its camera has {size[0]} × {size[1]}",
+                "give the photographs as they were measured", path,
+            )  # fmt: skip
+        pixels = photograph.read(0, photograph.rows)
+    found = [_grey(pixels[: COLOURS if len(pixels) >= COLOURS else 1])]
+    for _ in range(levels - 1):
+        found.append(_halved(found[-1]))
+    return found
+
+
+def _grey(bands: np.ndarray) -> np.ndarray:
+    """(rows, columns) uint16, the mean of the bands."""
+    if bands.dtype == np.uint8:
+        return (bands.sum(axis=0, dtype=np.uint32) * np.uint32(256) // len(bands)).astype(np.uint16)
+    if bands.dtype == np.uint16:
+        return bands[0] if len(bands) == 1 else (bands.sum(axis=0, dtype=np.uint32) // len(bands)).astype(np.uint16)
+    grey = bands.mean(axis=0)
+    low, high = float(np.nanmin(grey)), float(np.nanmax(grey))
+    return np.nan_to_num((grey - low) * (65535.0 / (high - low if high > low else 1.0))).astype(np.uint16)
+
+
+def _halved(pixels: np.ndarray) -> np.ndarray:
+    rows, columns = pixels.shape[0] // 2 * 2, pixels.shape[1] // 2 * 2
+    p = pixels[:rows, :columns].astype(np.uint32)
+    return ((p[::2, ::2] + p[1::2, ::2] + p[::2, 1::2] + p[1::2, 1::2] + 2) // 4).astype(np.uint16)
+
+
+@dataclass(frozen=True, eq=False)
+class Photographs:
+    """Oriented photographs with their pixels.
+
+    Parameters
+    ----------
+    rows : (n,) photographs of the block. orientation : theirs. names : (n,).
+    of : all photographs of the block, with their image errors. tables, source : image errors for kernels.
+    sensor : (n, 3) half columns, half rows, pixels per mm.
+    places : between the CRS and the frame of the orientations. ground : m, mean height in the CRS.
+    gsd : (n,) m. centres : (n, 3) m in the CRS. error_px : largest image error.
+    """
+
+    rows: np.ndarray
+    orientation: Orientation
+    names: np.ndarray
+    of: Restitution
+    tables: ErrorTables
+    source: np.ndarray
+    sensor: np.ndarray
+    places: Places
+    ground: float
+    gsd: np.ndarray
+    centres: np.ndarray
+    error_px: float
+    store: PyramidStore
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """Photographs in coordinates Δ about a place of the CRS, in which they are affine images of the frame.
+
+    Parameters
+    ----------
+    place : (3,) in the CRS. local : (3,), axes : (3, 3), local + axes·Δ lies in the frame.
+    photos : (1, n, 15), centres : (n, 3) m, both in Δ.
+    """
+
+    photographs: Photographs
+    place: np.ndarray
+    local: np.ndarray
+    axes: np.ndarray
+    photos: np.ndarray
+    centres: np.ndarray
+
+    def from_delta(self, delta: np.ndarray) -> np.ndarray:
+        """(n, 3) in the CRS."""
+        p = self.photographs.places
+        return self.place + delta if p.frame is None else p.from_local(self.local + delta @ self.axes.T)
+
+    def view(self, level: int, low: np.ndarray, high: np.ndarray, edge: float, reach: float) -> View:
+        """What kernels need to work within a box.
+
+        Parameters
+        ----------
+        low, high : (3,) m, corners of the box in Δ. edge : share of the format that is not used.
+        reach : m by which windows reach beyond the box.
+        """
+        p = self.photographs
+        scale = 0.5**level
+        parts, crops, offset = [], np.zeros((len(p), 5), np.int64), 0
+        for k in range(len(p)):
+            window = self._window(k, low, high, reach, scale)
+            if window is None:
+                continue
+            pixels = p.store.level(k, level)
+            row, column = max(window[0], 0), max(window[1], 0)
+            part = pixels[row : window[2] + 1, column : window[3] + 1]
+            if part.size == 0:
+                continue
+            crops[k] = offset, row, column, *part.shape
+            parts.append(part.ravel())
+            offset += part.size
+        pixels = np.concatenate(parts) if parts else np.zeros(1, np.uint16)
+        return (
+            self.photos, p.source, p.tables.as_tuple(), p.sensor, self.centres, crops, pixels, scale, edge,
+        )  # fmt: skip
+
+    def _window(self, k: int, low, high, reach: float, scale: float) -> tuple[int, int, int, int] | None:
+        """First row and column, last row and column of the level that show the box; None where it is not seen."""
+        x, y = (np.array([low[a] - reach, high[a] + reach]) for a in range(2))
+        corners = np.stack(np.meshgrid(x, y, [low[2], high[2]]), axis=-1).reshape(-1, 3)
+        u = corners @ self.photos[0, k, :12].reshape(3, 4)[:, :3].T + self.photos[0, k, :12].reshape(3, 4)[:, 3]
+        c, x0, y0 = self.photos[0, k, 12:]
+        if not (u[:, 2] < 0.0).all():
+            return None
+        half_c, half_r, per_mm = self.photographs.sensor[k]
+        column = (half_c + per_mm * (x0 - c * u[:, 0] / u[:, 2])) * scale
+        row = (half_r - per_mm * (y0 - c * u[:, 1] / u[:, 2])) * scale
+        margin = CROP_MARGIN_PX + self.photographs.error_px * scale
+        if column.max() < 0 or row.max() < 0 or column.min() > 2 * half_c * scale or row.min() > 2 * half_r * scale:
+            return None
+        return (
+            int(row.min() - margin), int(column.min() - margin), int(row.max() + margin), int(column.max() + margin)
+        )  # fmt: skip
+
+
+def photographs_of(
+    calibration: Calibration, rows: np.ndarray, paths: Sequence[Path], ideal: bool = False
+) -> Photographs:
+    """Photographs of an adjusted block, their image errors being those of its additional parameters.
+
+    Parameters
+    ----------
+    rows : (n,) photographs of the block; paths : their files. ideal : whether they have been freed of image errors.
+
+    Raises
+    ------
+    InputError
+        For scanned film, whose pixels are no image coordinates, and for photographs without orientation.
+    """
+    block, of = calibration.local.block, restitution(calibration, FREE)
+    for row, path in zip(rows.tolist(), paths, strict=True):
+        if row in block.interior_fits:
+            raise InputError("is scanned film, which matching does not read", "resample it to its fiducials", path)
+        if not of.true.known[row]:
+            raise InputError("is not oriented", "leave it out, or adjust it", path)
+    places, orientation = places_of(calibration), of.true.take(rows)
+    cameras = [block.cameras[c] for c in block.images.camera[rows]]
+    pixel = min(camera.pixel_mm for camera in cameras)
+    if ideal:
+        of = replace(of, errors=tuple(_without_errors(e) for e in of.errors))
+    tables = error_tables(of.errors, TABLE_TOLERANCE_PX * pixel)
+    ground = mean_ground(calibration)
+    centres = places.from_local(orientation.centre)
+    height = centres[:, 2] - ground
+    sizes = [camera.size_px for camera in cameras]
+    most = max(int(np.log2(max(min(s) for s in sizes) / 96.0)) + 1, 1)
+    return Photographs(
+        rows=rows, orientation=orientation, names=block.images.names[rows], of=of, tables=tables,
+        source=of.group[rows],
+        sensor=np.array([[s[0] / 2.0, s[1] / 2.0, 1.0 / c.pixel_mm] for s, c in zip(sizes, cameras, strict=True)]),
+        places=places, ground=ground, gsd=height * [c.pixel_mm for c in cameras] / orientation.interior[:, 0],
+        centres=centres, error_px=float(np.abs(tables.values).max(initial=0.0)) / pixel,
+        store=PyramidStore(paths, sizes, most),
+    )  # fmt: skip
+
+
+def _without_errors(errors: PhotoErrors) -> PhotoErrors:
+    """The same camera, its errors taken out of the photographs already."""
+    f = errors.function
+    return replace(errors, function=replace(f, linear=(), brown=np.zeros_like(f.brown), lens=np.zeros_like(f.lens)))
+
+
+def site_at(photographs: Photographs, x: float, y: float) -> Site:
+    """The photographs about a place of the CRS at the mean height of the ground."""
+    place = np.array([x, y, photographs.ground])
+    local, axes = photographs.places.axes_at(place)
+    photos = photo_rows(photographs.orientation, local, axes)
+    centres = np.linalg.solve(axes, (photographs.orientation.centre - local).T).T
+    return Site(photographs, place, local, axes, np.ascontiguousarray(photos[None]), np.ascontiguousarray(centres))

@@ -1,0 +1,123 @@
+"""`aerotri dtm`: from a result folder and photographs to files that later commands read."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from aerotri.cli import app
+from aerotri.conventions import InputError
+from aerotri.formats.pickets import read_pickets
+from aerotri.formats.point_cloud import read_point_cloud
+from aerotri.rasters import RasterReader
+
+PLAN = """
+name = "tiny"
+camera.cam = { preset = "ultracam_d", size_px = [575, 375], pixel_um = 180.0 }
+flight = { gsd_m = 1.0, strips = 1, images_per_strip = 3, end_lap = 0.6, heading_deg = 30.0 }
+terrain = { kind = "undulating", height_m = 100.0, relief_rms_m = 10.0, wavelength_m = 400.0 }
+tie_points = { per_image = 60, probability = 0.9, sigma_um = 9.0 }
+control = { distance_bases = 1.0, sigma_m = [0.05, 0.05, 0.05] }
+"""
+
+
+def run(*arguments: object) -> str:
+    found = CliRunner().invoke(app, [str(a) for a in arguments])
+    if isinstance(found.exception, InputError):
+        raise found.exception
+    assert found.exit_code == 0, found.output + repr(found.exception)
+    return found.output
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The folder with block, result and terrain model, made by commands."""
+    here = tmp_path_factory.mktemp("dtm")
+    (here / "plan.toml").write_text(PLAN, encoding="utf-8")
+    run("simulate", here / "plan.toml", "--out", here / "block", "--seed", 3, "--render")
+    run("adjust", here / "block", "--out", here / "result", "--no-plots")
+    dtm = ("dtm", here / "result", here / "block" / "photographs", "--interval", 20, "--pairs")
+    printed = run(*dtm, "--out", here / "dtm", "--json")
+    return here, json.loads(printed), dtm
+
+
+def test_files_hold_the_same_surface(made):
+    here, content, _ = made
+    table = read_pickets(here / "dtm" / "pickets.parquet")
+    assert content == json.loads((here / "dtm" / "dtm.json").read_text(encoding="utf-8"))
+    assert content["pickets"]["accepted"] == table.accepted.sum() > 150
+    assert content["interval_m"] == 20.0
+    xyz, classes = read_point_cloud(here / "dtm" / "pickets.laz")
+    np.testing.assert_allclose(xyz, table.xyz[table.accepted], atol=6e-4)
+    assert (classes == 2).mean() > 0.9
+    with (
+        RasterReader(here / "dtm" / "dsm.tif") as dsm,
+        RasterReader(here / "dtm" / "dsm.tif", band=2) as sigma,
+        RasterReader(here / "dtm" / "model.tif") as model,
+    ):
+        z = dsm.read(0, 0, dsm.grid.rows, dsm.grid.columns)
+        of_z = sigma.read(0, 0, dsm.grid.rows, dsm.grid.columns)
+        number = model.read(0, 0, dsm.grid.rows, dsm.grid.columns)
+        node = table.xyz[table.accepted]
+        at = dsm.sample(node[:, 0], node[:, 1])
+    np.testing.assert_array_equal(np.isfinite(z), np.isfinite(of_z))
+    assert set(np.unique(number[np.isfinite(z)])) <= {0, 1}
+    known = np.isfinite(at)
+    assert np.median(np.abs(at[known] - node[known, 2])) < 0.05
+    assert (table.sigma[table.accepted, 2] > table.sigma_matching[table.accepted, 2]).all()
+    assert {len(names) for names, own in zip(table.photographs, table.accepted, strict=True) if own} == {2}
+    for name in ("surface", "pickets"):
+        assert (here / "dtm" / "plots" / f"{name}.png").stat().st_size > 10_000
+
+
+def test_demcor_takes_the_models(made):
+    here, _, _ = made
+    out = here / "corrected.tif"
+    printed = json.loads(run("demcor", here / "result", here / "dtm" / "dsm.tif", "--models",
+                             here / "dtm" / "model.tif", "--out", out, "--json"))  # fmt: skip
+    assert printed["corrected"] > 100
+    assert abs(printed["dZ"]["rms"]) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (("--subset", "third"), "there is no subset"),
+        (("--window", "16"), "has no middle"),
+        (("--interval", "wide"), "is no interval"),
+        (("--breaklines", "lines.shp"), "no known kind"),
+    ],
+)
+def test_bad_options(made, more, said):
+    here, _, dtm = made
+    with pytest.raises(InputError, match=said):
+        run(*dtm, "--out", here / "other", *more)
+    assert not (here / "other").exists()
+
+
+def test_photographs_that_are_not_there(made, tmp_path):
+    here, _, _ = made
+    with pytest.raises(InputError, match="0 photographs of the block are in"):
+        run("dtm", here / "result", tmp_path)
+    with pytest.raises(InputError, match="holds other files"):
+        run("dtm", here / "result", here / "block" / "photographs", "--out", here)
+
+
+def test_interval_by_formula():
+    printed = json.loads(run("predict", "picket-interval", "--scan-um", 28, "--scale", 7000, "--json"))
+    np.testing.assert_allclose(printed["interval_m"]["plain"], [42.06, 46.49], atol=0.01)
+    assert "older rule 30·GSD: 5.9 m" in run("predict", "picket-interval", "--gsd", 0.196)
+    with pytest.raises(InputError, match="not stated once"):
+        run("predict", "picket-interval", "--gsd", 0.2, "--scan-um", 28, "--scale", 7000)
+
+
+def test_interval_by_pilot(made):
+    here, _, _ = made
+    printed = json.loads(run("predict", "picket-interval", "--pilot", here / "result", "--photographs",
+                             here / "block" / "photographs", "--tolerance", 0.5, "--json"))  # fmt: skip
+    tried = printed["pilot"]["tried"]
+    known = [t["rmse_m"] for t in tried if t["rmse_m"] is not None]
+    assert known
+    assert known == sorted(known)
+    assert printed["pilot"]["interval_m"] > 0.0
