@@ -17,6 +17,7 @@ from aerotri.terrain.dtm import TerrainOutcome
 from aerotri.terrain.pickets import FIRST_ERROR
 
 HIGHEST = 6.4
+HOLE = "#cfe0f2"
 MOST_CELLS = 1200
 ERROR_MARKS = {5: ("x", "backward"), 6: ("+", "ambiguous"), 7: ("s", "off its neighbours"), 8: ("^", "peak or pit")}
 
@@ -95,7 +96,7 @@ def plot_comparison(comparison: Comparison, title: str) -> Figure:
     s = c.statistics
     subtitle = (
         f"{s.count} cells: bias {s.bias:+.3f} m, median {s.median:+.3f}, RMSE {s.rmse:.3f}, σ {s.std:.3f}, NMAD "
-        f"{s.nmad:.3f}, LE90 {s.le90:.3f} m; covered {100 * c.coverage:.0f} %"
+        f"{s.nmad:.3f}, LE90 {s.le90:.3f} m; covered {100 * c.coverage:.0f} %, blue: not covered"
         + (f"\n{c.alignment_text}" if c.alignment_text else "")
     ).replace("-", "−")
     width, height = _size(c.grid, WIDTH - 4.4)
@@ -103,8 +104,9 @@ def plot_comparison(comparison: Comparison, title: str) -> Figure:
     figure = new_figure(height_all + 1.75, f"Differences – {plain(title, 90)}", subtitle)
     axes = axes_at(figure, 0.75, 0.75, width, height)
     limit = float(np.nanpercentile(np.abs(d), 98)) or 1e-3
+    axes.set_facecolor(HOLE)
     every = _every(d)
-    image = axes.imshow(d[::every, ::every], cmap="RdGy", vmin=-limit, vmax=limit, extent=_extent(c.grid),
+    image = axes.imshow(d[::every, ::every], cmap="Greys_r", vmin=-limit, vmax=limit, extent=_extent(c.grid),
                         interpolation="nearest")  # fmt: skip
     _coordinates(axes, width, height, local=False, labels=("X [m]", "Y [m]"))
     scale = axes_at(figure, 0.75 + width + 0.12, 0.75, 0.14, height)
@@ -113,7 +115,7 @@ def plot_comparison(comparison: Comparison, title: str) -> Figure:
     place = 0.75 + width + 1.35
     histogram = axes_at(figure, place, 0.75, WIDTH - place - 0.25, height_all)
     known = d[np.isfinite(d)]
-    reach = 4.0 * max(s.nmad, 1e-9)
+    reach = 4.0 * max(s.nmad, 0.01 * limit)
     bins = np.linspace(s.median - reach, s.median + reach, 61)
     histogram.hist(np.clip(known, bins[0], bins[-1]), bins=bins.tolist(), color=LIGHT, edgecolor="white", lw=0.3)
     curve = len(known) * (bins[1] - bins[0]) / (s.nmad * np.sqrt(2 * np.pi)) if s.nmad > 0 else 0.0
