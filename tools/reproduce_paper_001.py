@@ -106,8 +106,9 @@ def nomograms() -> Figure:
         panels[0].loglog(n[there], theory.strip(d, 1.0) / np.sqrt(n[there]), color="#1c242c")
         whole = np.unique((d * np.round(np.geomspace(1, 100 / d, 20))).astype(int))
         panels[0].loglog(whole, [theory.joint(d, int(k)) for k in whole], color="#8a939b", ls="--")
-        panels[0].annotate(f"d = {d}", (100, theory.strip(d, 100.0)), fontsize=8, va="bottom", ha="right")
+        panels[0].annotate(f"d = {d}", (108, theory.strip(d, 100.0)), fontsize=8, va="center", ha="left")
     panels[0].set(title="1  strip: d models between control", xlabel="n models", ylabel="σ mean height / σ0")
+    panels[0].set_xlim(1.7, 220)
     length = 20.0
     distance = np.geomspace(1.0, 20.0, 40)
     for height, look in zip((0.5, 1.0, 2.0, 4.0), LOOKS, strict=True):

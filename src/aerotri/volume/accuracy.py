@@ -30,7 +30,9 @@ ALONG_EDGE = 33
 """Places along every edge of the boundary."""
 RING_SHARE = 0.3
 """Width of the ring of ground outside the boundary that a base is judged by, over the root of the boundary's area."""
-RING_STEPS = (1, 2)
+RING_STEPS = 9
+"""Steps across the ring: the wider contrasts reach over eight of them."""
+MOST_RING_CELLS = 4_000_000
 PATCH_CELLS = 512
 """Cells a side of the part of a raster whose roughness is taken."""
 PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")
@@ -163,7 +165,7 @@ def volume_sigma(
                   if len(part.response.by_parameters))  # fmt: skip
     return VolumeSigma(
         {name: float(value) for name, value in parts.items()}, found, options.corrected,
-        sum(one.pickets for one in both), sum(one.rays for one in both), _notes(part, base_part, base, options),
+        sum(one.pickets for one in both), sum(one.rays for one in both), _notes(part, base_part, base, ground, options),
     )  # fmt: skip
 
 
@@ -254,17 +256,19 @@ def _base_variance(base: Base, boundary: Boundary, surface: Surface, options: Si
     stated = (options.base_sigma * boundary.area) ** 2
     if not isinstance(base, SplineBase):
         return stated
-    ring = boundary_of(
-        shapely.difference(boundary.polygon.buffer(RING_SHARE * np.sqrt(boundary.area)), boundary.polygon), "ring"
-    )
+    width = RING_SHARE * np.sqrt(boundary.area)
+    ring = boundary_of(shapely.difference(boundary.polygon.buffer(width), boundary.polygon), "ring")
     row, column, rows, columns = cells_within(surface.grid, ring)
-    coarse = max(1, max(rows, columns) // PATCH_CELLS)
-    steps = (RING_STEPS[0] * coarse, RING_STEPS[1] * coarse)
-    if rows * columns > 4 * PATCH_CELLS**2:
+    if rows * columns > MOST_RING_CELLS:
         return stated
+    # contrasts as wide as the ring allows: the base is interpolated over far more than a cell
+    step = max(1, int(width / (RING_STEPS * min(surface.grid.cell_x, surface.grid.cell_y))))
     z = surface.read(row, column, rows, columns).astype(float)
     z[ring.coverage(surface.grid.window(row, column, rows, columns)) < 0.5] = np.nan
-    roughness = roughness_of_cells(z, surface.grid, steps)
+    roughness = roughness_of_cells(z, surface.grid, (step, 2 * step))
+    while roughness is None and step > 1:
+        step //= 2
+        roughness = roughness_of_cells(z, surface.grid, (step, 2 * step))
     if roughness is None:
         return stated
     places, weight = quadrature_of(boundary)
@@ -274,7 +278,9 @@ def _base_variance(base: Base, boundary: Boundary, surface: Surface, options: Si
     )
 
 
-def _notes(part: Part, base_part: Part | None, base: Base, options: SigmaOptions) -> tuple[str, ...]:
+def _notes(
+    part: Part, base_part: Part | None, base: Base, ground: float, options: SigmaOptions
+) -> tuple[str, ...]:
     notes = []
     if part.unseen > 0.0:
         notes.append(f"{part.unseen:.4g} m² are seen by too few photographs of the block and are in no part of σ")
@@ -282,6 +288,9 @@ def _notes(part: Part, base_part: Part | None, base: Base, options: SigmaOptions
         notes.append("too few heights to tell how rough the ground is: interpolation is left out")
     if base_part is None and not isinstance(base, PlaneBase | SplineBase) and options.base_sigma <= 0.0:
         notes.append("the base is taken for free of error: give --base-adjustment or --base-sigma")
+    if isinstance(base, SplineBase):
+        judged = "the base is judged by how rough the ground outside the boundary is, carried inwards"
+        notes.append(judged if ground > 0.0 else "too little ground outside the boundary to judge the base by")
     if isinstance(base, PlaneBase) and options.base_sigma <= 0.0:
         notes.append(f"the base ({base.name}) is taken for free of error: --base-sigma states one")
     if options.boundary_sigma <= 0.0:
