@@ -10,7 +10,8 @@ import pytest
 from aerotri.formats.block_folder import read_block, write_block
 from aerotri.formats.solution import read_solution, write_solution
 from aerotri.functional_model.additional_parameters import collocation, parameter_set
-from aerotri.image_errors import systematic_errors
+from aerotri.functional_model.orientation_patterns import orientation_patterns
+from aerotri.image_errors import field_on_grid, systematic_errors
 from aerotri.observations import Block, CollocationSettings
 from aerotri.pipeline import adjust_keeping_system, reopen
 from aerotri.simulation import parse_spec, simulate
@@ -116,6 +117,16 @@ def test_covariance_recovered(seed):
     statistic = np.einsum("ni,nij,nj->n", d - truth, np.linalg.inv(covariance), d - truth)
     assert 0.5 < statistic.mean() / 2.0 < 1.6
     assert statistic.max() < 25.0
+    # the picture leaves out what orientation takes: smaller σ, and the truth without it within them
+    field = field_on_grid(result, "ucd")
+    assert field.without_orientation
+    g = orientation_patterns(field.x.ravel(), field.y.ravel(), camera.focal_length_mm).reshape(-1, 6)
+    assert np.abs(g.T @ field.d.ravel()).max() < 1e-9 * np.linalg.norm(g, axis=0).max()
+    truth = parameter_set("collocation", collocation.SIZES.items(GRID), camera).basis(field.x.ravel(), field.y.ravel())
+    truth = (truth @ values).ravel()
+    z = (field.d.ravel() - truth + g @ np.linalg.lstsq(g, truth, rcond=None)[0]) / field.sigma.ravel()
+    assert 0.7 < np.sqrt(np.mean(z**2)) < 1.4
+    assert field.significant.mean() > 0.5
     assert 0.95 < result.outcome.sigma0 < 1.05
 
 

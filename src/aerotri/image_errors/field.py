@@ -37,6 +37,8 @@ class ErrorField:
     d : (ny, nx, 2) mm, measured − ideal.
     sigma : (ny, nx, 2) mm.
     significant : (ny, nx) bool, dᵀQ⁻¹d above the 95 % quantile of χ² with two degrees of freedom.
+    without_orientation : shifts, scale, rotation and tilts of the whole image are left out, as of a random field: the
+        orientation takes them, and their own large σ would hide everything else.
     """
 
     camera: Camera
@@ -46,6 +48,7 @@ class ErrorField:
     d: np.ndarray
     sigma: np.ndarray
     significant: np.ndarray
+    without_orientation: bool = False
 
     @property
     def rms(self) -> float:
@@ -92,8 +95,7 @@ def field_on_grid(adjusted: AdjustedBlock, group: str, nx: int | None = None, ca
     """
     images = image_group(adjusted.block, group, camera)
     x, y = grid_nodes(images.camera, nx)
-    d, covariance = systematic_errors(adjusted, group, x.ravel(), y.ravel(), images.camera.name)
-    return _field(images.camera, group, x, y, d, covariance)
+    return _field(adjusted, images.camera, group, (x, y), _errors_with_jacobian(adjusted, images, x.ravel(), y.ravel()))
 
 
 def field_without_orientation(
@@ -106,12 +108,8 @@ def field_without_orientation(
     """
     images = image_group(adjusted.block, group, camera)
     x, y = grid_nodes(images.camera, nx)
-    d, jacobian, rows = _errors_with_jacobian(adjusted, images, x.ravel(), y.ravel())
-    patterns = orientation_patterns(x.ravel(), y.ravel(), images.camera.focal_length_mm).reshape(d.size, -1)
-    both = np.column_stack([d.ravel(), jacobian.reshape(d.size, -1)])
-    both -= patterns @ np.linalg.lstsq(patterns, both, rcond=None)[0]
-    d, jacobian = both[:, 0].reshape(d.shape), both[:, 1:].reshape(jacobian.shape)
-    return _field(images.camera, group, x, y, d, _propagated(jacobian, _covariance_of(adjusted, rows)))
+    errors = _errors_with_jacobian(adjusted, images, x.ravel(), y.ravel())
+    return _field(adjusted, images.camera, group, (x, y), errors, without_orientation=True)
 
 
 def field_difference(
@@ -128,8 +126,8 @@ def field_difference(
     # a parameter that both groups share counts once, by the difference of its partials
     jacobian[:, :, column[: len(rows_one)]] += jacobian_one
     jacobian[:, :, column[len(rows_one) :]] -= jacobian_two
-    covariance = _propagated(jacobian, _covariance_of(adjusted, rows))
-    return _field(one.camera, f"{first} − {second}", x, y, d_one - d_two, covariance)
+    errors = d_one - d_two, jacobian, rows
+    return _field(adjusted, one.camera, f"{first} − {second}", (x, y), errors)
 
 
 def largest_effects(adjusted: AdjustedBlock) -> np.ndarray:
@@ -158,11 +156,34 @@ def grid_nodes(camera: Camera, nx: int | None = None, longer: int = 25) -> tuple
     return grid_x, grid_y
 
 
-def _field(camera: Camera, group: str, x, y, d: np.ndarray, covariance: np.ndarray) -> ErrorField:
+def _field(
+    adjusted: AdjustedBlock,
+    camera: Camera,
+    group: str,
+    at: tuple[np.ndarray, np.ndarray],
+    errors: tuple[np.ndarray, np.ndarray, np.ndarray],
+    without_orientation: bool = False,
+) -> ErrorField:
+    """The field at nodes x, y (ny, nx) from errors (n, 2), their partials (n, 2, k) and the rows (k,) of these."""
+    (x, y), (d, jacobian, rows) = at, errors
+    without_orientation |= bool(adjusted.parameters.is_node[rows].any())
+    if without_orientation:
+        d, jacobian = _without_orientation(camera, x.ravel(), y.ravel(), d, jacobian)
+    covariance = _propagated(jacobian, _covariance_of(adjusted, rows))
     sigma = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
     grid = (*x.shape, 2)
     mask = significant(d, covariance).reshape(x.shape)
-    return ErrorField(camera, group, x, y, d.reshape(grid), sigma.reshape(grid), mask)
+    return ErrorField(camera, group, x, y, d.reshape(grid), sigma.reshape(grid), mask, without_orientation)
+
+
+def _without_orientation(
+    camera: Camera, x: np.ndarray, y: np.ndarray, d: np.ndarray, jacobian: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """d (n, 2) and its partials (n, 2, k) less the six orientation patterns that fit them best."""
+    basis = np.linalg.qr(orientation_patterns(x, y, camera.focal_length_mm).reshape(-1, 6))[0]
+    both = np.concatenate([d[:, :, None], jacobian], axis=2).reshape(len(basis), -1)
+    both = (both - basis @ (basis.T @ both)).reshape(len(x), 2, -1)
+    return both[:, :, 0], both[:, :, 1:]
 
 
 def significant(d: np.ndarray, covariance: np.ndarray) -> np.ndarray:

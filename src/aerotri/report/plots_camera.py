@@ -40,7 +40,7 @@ def plot_systematic_errors(field: ErrorField, block_name: str) -> Figure:
     camera = field.camera
     subtitle = (
         f"{_owner(field.group, camera)}: measured − ideal;  largest {micron(field.max, camera)},  "
-        f"RMS {micron(field.rms, camera)}"
+        f"RMS {micron(field.rms, camera)}{_left_out(field)}"
     )
     axes, figure, cell = _format_figure(
         f"Systematic image errors – {plain(block_name)}", subtitle, camera, field.x.shape
@@ -48,6 +48,11 @@ def plot_systematic_errors(field: ErrorField, block_name: str) -> Figure:
     _draw_vectors(axes, field.x, field.y, field.d, field.significant, cell, camera)
     vector_legend(figure, camera, ("significant at 95 %", "not significant"))
     return figure
+
+
+def _left_out(field: ErrorField) -> str:
+    """What a field was freed of, as a line of its own."""
+    return "\nwithout shifts, scale, rotation, tilts: orientation takes them" if field.without_orientation else ""
 
 
 @styled

@@ -212,7 +212,10 @@ def _judged(system: NormalSystem, solution: Solution, factor: Factor, choice: Ch
     if system.fields and np.isfinite(bic):
         fixed = len(own) - sum(len(field.weight) for field in system.fields) + HYPERPARAMETERS
         reduced = ReducedToFields.of(system, solution, factor)
-        bic = reduced.deviance(covariance_in_use(system)) - without * np.log(without) + fixed * np.log(without)
+        log_determinant = reduced.deviance(covariance_in_use(system)) - reduced.freedom * np.log(
+            weighted_sum(system, solution)
+        )
+        bic = without * np.log(solution.equations.cost / without) + log_determinant + fixed * np.log(without)
     predicted = predict_control(system, solution, factor, sigma0, folds)
     known = settings.collocation if system.fields else None
     return SetOutcome(

@@ -1,11 +1,10 @@
 """Collocation: the image error as a random field, known through the nodes of a bilinear grid. It knows no camera.
 
 [D] dx and dy are independent fields of covariance σ_d²·exp(−ρ/ℓ), ρ the distance in the image; the spacing of the nodes
-has to be well below ℓ. What the orientation of a photograph over flat ground takes is no error of the camera: shifts,
-scale, rotation and tilts of the whole field are held at zero, with σ_d/1000. The field enters as one observation
-of the node vector, p = 0 with the inverse of its covariance as weight, so that every node can be estimated however few
-rays are near it. Items as in `grid`. Between the nodes interpolation makes the field a little smoother than the
-covariance says.
+has to be well below ℓ. The field enters as one weighted observation of the node vector, p = 0 with the inverse of its
+covariance as weight, so that every node can be estimated however few rays are near it. Items as in `grid`. Between the
+nodes interpolation makes the field a little smoother than the covariance says. Shifts, scale, rotation and tilts of the
+whole field stay nearly unknown, since the orientation takes them over flat ground: pictures leave them out.
 """
 
 from __future__ import annotations
@@ -30,9 +29,6 @@ from aerotri.functional_model.orientation_patterns import orientation_patterns
 from aerotri.observations import Camera
 
 __all__ = ["check_items", "item_text", "prior_covariance", "prior_weight", "terms"]
-
-HELD = 1e-3
-"""σ of the six orientation patterns in the field, in σ_d."""
 
 FAMILY = "collocation"
 MARK = "D"
@@ -62,7 +58,7 @@ def terms(
 
 
 def prior_covariance(camera: Camera, items: Sequence[str], sigma_d: float, length: float) -> np.ndarray:
-    """Covariance of the nodes before anything is measured: σ_d²·exp(−ρ/ℓ) less what orientation takes.
+    """Covariance of the nodes before anything is measured: σ_d²·exp(−ρ/ℓ) within dx and within dy, 0 between them.
 
     Parameters
     ----------
@@ -75,13 +71,10 @@ def prior_covariance(camera: Camera, items: Sequence[str], sigma_d: float, lengt
     (p, p) mm², positive definite.
     """
     position, axis = node_positions(camera, items)
-    whole = np.zeros((len(axis), len(axis)))
+    covariance = np.zeros((len(axis), len(axis)))
     for own in (np.flatnonzero(axis == k) for k in (0, 1)):
-        whole[np.ix_(own, own)] = _exponential(position[own], sigma_d, length)
-    g = _orientation(camera, position, axis)
-    mixed = whole @ g
-    held = g.T @ mixed + (HELD * sigma_d) ** 2 * np.eye(g.shape[1])
-    return whole - mixed @ np.linalg.solve(held, mixed.T)
+        covariance[np.ix_(own, own)] = _exponential(position[own], sigma_d, length)
+    return covariance
 
 
 def prior_weight(camera: Camera, items: Sequence[str], sigma_d: float, length: float) -> tuple[np.ndarray, float]:
@@ -92,25 +85,15 @@ def prior_weight(camera: Camera, items: Sequence[str], sigma_d: float, length: f
     (p, p) 1/mm², and a number.
     """
     position, axis = node_positions(camera, items)
-    g = _orientation(camera, position, axis)
-    scaled = g / (HELD * sigma_d)
-    weight, log_determinant, seen = scaled @ scaled.T, 0.0, np.eye(g.shape[1])
+    weight, log_determinant = np.zeros((len(axis), len(axis))), 0.0
     for own in (np.flatnonzero(axis == k) for k in (0, 1)):
         lower = cholesky(_exponential(position[own], sigma_d, length), lower=True)
         half = solve_triangular(lower, np.eye(len(own)), lower=True)
-        weight[np.ix_(own, own)] += half.T @ half
+        weight[np.ix_(own, own)] = half.T @ half
         log_determinant += 2.0 * float(np.sum(np.log(np.diagonal(lower))))
-        part = lower.T @ scaled[own]
-        seen += part.T @ part
-    return weight, log_determinant - float(np.linalg.slogdet(seen)[1])
+    return weight, log_determinant
 
 
 def _exponential(position: np.ndarray, sigma_d: float, length: float) -> np.ndarray:
     distance = np.hypot(*(position[:, None, :] - position[None, :, :]).transpose(2, 0, 1))
     return sigma_d**2 * np.exp(-distance / length)
-
-
-def _orientation(camera: Camera, position: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """(p, 6) orthonormal columns: the six orientation patterns at the nodes."""
-    patterns = orientation_patterns(position[:, 0], position[:, 1], camera.focal_length_mm)
-    return np.linalg.qr(patterns[np.arange(len(axis)), axis])[0]
