@@ -25,7 +25,6 @@ from aerotri.functional_model.additional_parameters.grid import (
 from aerotri.functional_model.additional_parameters.grid import terms as grid_terms
 from aerotri.functional_model.additional_parameters.sizes import Sizes
 from aerotri.functional_model.additional_parameters.terms import Terms
-from aerotri.functional_model.orientation_patterns import orientation_patterns
 from aerotri.observations import Camera
 
 __all__ = ["check_items", "item_text", "prior_covariance", "prior_weight", "terms"]
