@@ -1,11 +1,21 @@
 """From photographs alone to check points: rendered blocks whose truth is known, and the real photographs beside.
 
-    python tools/photographs_to_block.py --out DIR [--seeds 5] [--data ../shared/data]
+    python tools/photographs_to_block.py --out DIR [--seeds 4] [--data ../shared/data]
 
 Rendered: 12 photographs of 1000 × 750 pixels, 0.1 m a pixel, 70/50 %, a lens that bends by some 10 pixels at the
 corners and a wrong interior orientation; control and check points measured in the photographs with 0.1 px, given with
 σ 0.01, 0.01, 0.02 m. d is adjusted − given at check points, w is d over its σ. Last printed:
 
+| seed | check points | σ0 | RMS d X Y Z m | RMS w X Y Z | largest w |
+|---|---|---|---|---|---|
+| 1 | 20 | 0.93 | 0.010 0.013 0.031 | 0.75 1.06 0.82 | 2.0 |
+| 2 | 20 | 0.82 | 0.012 0.013 0.043 | 0.99 1.07 1.22 | 3.4 |
+| 3 | 20 | 0.87 | 0.012 0.010 0.025 | 1.00 0.86 0.79 | 2.5 |
+| 4 | 20 | 0.88 | 0.011 0.010 0.028 | 0.88 0.85 0.94 | 2.4 |
+all: RMS w 0.94, 5.0% beyond 1.96
+
+brighton, one command: 18 photographs, 5936 points, 19111 rays; median residual 0.45 px, 95 % below 1.42 px; GNSS
+residuals, RMS: 0.16, 0.62, 0.22 m; 80 s, of the processors 66 s (two cores, shared with much other work)
 """
 
 from __future__ import annotations
@@ -113,7 +123,7 @@ def brighton(folder: Path, photographs: Path) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     arguments = parser.parse_args()
     every, lines = [], []
