@@ -47,6 +47,3 @@ def test_point_after_the_adjustment_is_as_sure_as_in_it(parameters):
     assert ratio.min() > 0.999
     assert np.median(ratio) < 1.12
     assert (adjustment > 0.0).all()
-    # where the parameters are unknown the orientation is worth less
-    share = np.median(adjustment[:, 2] / matching[:, 2])
-    assert 0.02 < share < 1.5
