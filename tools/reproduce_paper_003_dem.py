@@ -8,7 +8,7 @@ demcor, and then the photographs by imgeo and matched anew. The same with a came
 The camera is a model of the true one with larger pixels: what counts, image errors and noise in pixels, h/b, tiles and
 windows, is as it is. Heights are given as at a GSD of 9 cm.
 
-    python tools/reproduce_paper_003_dem.py [FOLDER]
+    python tools/reproduce_paper_003_dem.py [FOLDER] [--noise 50]
 
 Last result, even − odd in cm at a GSD of 9 cm, 3633 cells:
 
@@ -28,7 +28,7 @@ the orientation. demcor leaves more, for at the borders of models and of tiles a
 
 from __future__ import annotations
 
-import sys
+import argparse
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,9 +83,14 @@ class Pair:
 
 
 def main() -> None:
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp())
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="?", help="to work in; what it holds is not made again")
+    parser.add_argument("--noise", type=float, default=RenderOptions().noise, help="σ of the grey values, 16 bit")
+    arguments = parser.parse_args()
+    folder = arguments.folder or Path(tempfile.mkdtemp())
     folder.mkdir(parents=True, exist_ok=True)
-    erring, perfect = (prepare(folder, name, error) for name, error in (("erring", ERROR_PX), ("perfect", 0.0)))
+    looks = RenderOptions(noise=arguments.noise)
+    erring, perfect = (prepare(folder, name, error, looks) for name, error in (("erring", ERROR_PX), ("perfect", 0.0)))
     noise = match(perfect, "plain", "plain_dem")
     before = match(erring, "plain", "plain_dem")
     predicted = foretold(erring, before)
@@ -96,7 +101,7 @@ def main() -> None:
     print(f"plots in {folder / 'plots'}")
 
 
-def prepare(folder: Path, name: str, error_px: float) -> Path:
+def prepare(folder: Path, name: str, error_px: float, looks: RenderOptions) -> Path:
     """A rendered block with its two adjustments."""
     errors = f", errors = {{ physical = {{ rms_um = {error_px * PIXEL_UM:g}, seed = 4 }} }}" if error_px else ""
     here = folder / name
@@ -108,7 +113,7 @@ def prepare(folder: Path, name: str, error_px: float) -> Path:
         PLAN.format(name=name, px=PIXELS, pixel=PIXEL_UM, errors=errors, gsd=GSD_M, tie=TIE_SIGMA_PX * PIXEL_UM),
         encoding="utf-8",
     )
-    run_simulate(plan, here / "block", 11, True, RenderOptions())
+    run_simulate(plan, here / "block", 11, True, looks)
     run_adjust(here / "block", here / "plain", "none", None, None, False, False, False)
     run_adjust(here / "block", here / "calibrated", PARAMETERS, None, None, False, False, False)
     return here

@@ -163,7 +163,9 @@ def test_orientation_that_cannot_be_had_is_told(erring_result, tmp_path, monkeyp
     monkeypatch.setattr(sys.modules["aerotri.deformation.restitution"], "absorbed_orientation", failing)
     options = DeformOptions(end_lap=0.6, variant="absorbed")
     assert run_deform(erring_result, options, tmp_path / "out", False, False) == 1
-    assert capsys.readouterr().err == "aerotri: the adjustment without additional parameters is not converged\n"
+    told = "aerotri: the adjustment without additional parameters is not converged"
+    # a first run says before that it compiles
+    assert capsys.readouterr().err.splitlines()[-1] == told
     assert not (tmp_path / "out").exists()
 
 

@@ -73,11 +73,12 @@ def test_files_hold_the_same_surface(made):
 
 def test_demcor_takes_the_models(made):
     here, _, _ = made
+    run("adjust", here / "block", "--parameters", "bluh:1-2", "--out", here / "calibrated", "--no-plots")
     out = here / "corrected.tif"
-    printed = json.loads(run("demcor", here / "result", here / "dtm" / "dsm.tif", "--models",
+    printed = json.loads(run("demcor", here / "calibrated", here / "dtm" / "dsm.tif", "--models",
                              here / "dtm" / "model.tif", "--out", out, "--json"))  # fmt: skip
     assert printed["corrected"] > 100
-    assert abs(printed["dZ"]["rms"]) < 1e-6
+    assert 0.0 < printed["dZ"]["rms"] < 0.5
 
 
 @pytest.mark.parametrize(

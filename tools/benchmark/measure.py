@@ -31,7 +31,7 @@ PROGRAMS = {
     "aerotri-44": OURS_44,
     "ceres": Program("Ceres", "ceres"),
     "ceres-undamped": Program("Ceres, undamped start", "ceres-undamped"),
-    "pycolmap": Program("pycolmap's adjuster", "pycolmap", largest=10_000),
+    "pycolmap": Program("pycolmap's adjuster", "pycolmap", largest=5_000),
     "scipy": Program("SciPy least_squares", "scipy", largest=200),
 }
 FACTORS = (Program("factor", "factors"), Program("factor, 44 parameters", "factors", "44"))
