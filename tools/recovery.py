@@ -4,6 +4,21 @@ Prints, for every case, the unknowns' largest |mean z|·√n and the range of th
 test, and σ0² with its band. Single unknowns are never pooled.
 
 Example: python tools/recovery.py --seeds 200
+
+Last result:
+
+    200 seeds; a bias is below 3.3 in 99.9 % of the cases
+    | case | unknowns | largest bias | mean z² | 99.9 % band | σ0² |
+    |---|---|---|---|---|---|
+    | orientation and points | 9 | 2.07 (photo X0) | 0.92 … 1.06 | 0.70 … 1.36 | 1.0005 in 0.9919 … 1.0082 |
+    | bluh and tiles | 53 | 2.33 (point Y) | 0.72 … 1.27 | 0.70 … 1.36 | 1.0002 in 0.9918 … 1.0083 |
+    | brown | 13 | 1.95 (point Z) | 0.85 … 1.12 | 0.70 … 1.36 | 1.0007 in 0.9919 … 1.0082 |
+    | projection centres | 13 | 3.55 (bluh.3) | 0.88 … 1.16 | 0.70 … 1.36 | 1.0009 in 0.9920 … 1.0080 |
+    | attitudes | 12 | 3.04 (photo omega) | 0.87 … 1.18 | 0.70 … 1.36 | 0.9999 in 0.9922 … 1.0079 |
+    | lever arm | 12 | 2.57 (photo omega) | 0.82 … 1.11 | 0.70 … 1.36 | 1.0002 in 0.9920 … 1.0080 |
+    | conditions | 9 | 2.00 (photo X0) | 0.89 … 1.11 | 0.70 … 1.36 | 1.0004 in 0.9919 … 1.0082 |
+
+One of 121 biases is beyond 3.3: that of bluh.3 with observed projection centres. With 200 other seeds it was −1.17.
 """
 
 from __future__ import annotations

@@ -489,7 +489,7 @@ def tiepoints(
 @app.command(epilog="Example: aerotri run photographs --out project --gcp gcp_list.txt --control-sigma-m 0.02")
 def run(
     source: Annotated[Path, typer.Argument(help="Folder of photographs, or a block.")],
-    out: Annotated[Path, typer.Option(help="Folder to write: block, result, dtm, and one report.")],
+    out: Annotated[Path, typer.Option(help="Folder to write: block, result, dtm, volume, and one report.")],
     gcp: Annotated[str, typer.Option(help="Control points with their image points, gcp_list.txt.")] = "",
     check: Annotated[list[str] | None, typer.Option(help="Control point that is a check point; may repeat.")] = None,
     control_sigma_m: Annotated[str, typer.Option(help="σ of control points without one: X,Y,Z in m.")] = "",
@@ -502,10 +502,12 @@ def run(
     seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same result.")] = 1,
     parameters: Annotated[str, typer.Option(help="Additional parameters of the adjustment.")] = "",
     interval: Annotated[str, typer.Option(help="Interval of the pickets of the DTM, or auto.")] = "",
+    boundary: Annotated[str, typer.Option(help="Of a volume: GeoPackage, GeoJSON or WKT; no volume without.")] = "",
+    base: Annotated[str, typer.Option(help="Of the volume, as aerotri volume takes it.")] = "",
     plots: Annotated[bool, typer.Option(help="Draw the plots of the adjustment.")] = True,
     json_: Json = False,
 ) -> None:
-    """Everything: photographs to tie points, adjustment and terrain, with one report."""
+    """Everything: photographs to tie points, adjustment, terrain and volume, with one report."""
     from aerotri.commands.run import run_all
 
     def given(**values: str) -> tuple[str, ...]:
@@ -520,6 +522,7 @@ def run(
         ) + tuple(word for name in check or () for word in ("--check", name)),
         "adjust": given(parameters=parameters, geoid=geoid) + (() if plots else ("--no-plots",)),
         "dtm": given(interval=interval),
+        "volume": given(boundary=boundary, base=base) if boundary else (),
     }  # fmt: skip
     raise typer.Exit(run_all(source, out, passed_on, _invoke, _commands(), json_))
 

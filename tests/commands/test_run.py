@@ -12,7 +12,7 @@ from aerotri.conventions import InputError
 from aerotri.formats.block_writer import write_block
 from small_blocks import small_block
 
-ALL = ("tiepoints", "adjust", "dtm")
+ALL = ("tiepoints", "adjust", "dtm", "volume")
 
 
 def steps(out):
@@ -53,6 +53,14 @@ def test_steps_follow_one_another(tmp_path, capsys):
         ["adjust", str(out / "block"), "--out", str(out / "result")],
         ["dtm", str(out / "result"), str(tmp_path / "photographs"), "--out", str(out / "dtm"), "--interval", "auto"],
     ]
+    passed_on = {"volume": ("--boundary", "pile.gpkg")}
+    assert run_all(tmp_path / "photographs", out, passed_on, invoke, ALL, True) == 0
+    dtm, result = str(out / "dtm"), str(out / "result")
+    assert called[-1] == [
+        "volume", f"{dtm}/dsm.tif", "--adjustment", result, "--pickets", f"{dtm}/pickets.parquet",
+        "--out", str(out / "volume"), "--boundary", "pile.gpkg",
+    ]  # fmt: skip
+    capsys.readouterr()
     assert run_all(tmp_path / "photographs", out, {}, invoke, ("tiepoints", "adjust"), False) == 0
     assert steps(out)["dtm"] == ("left out", "this installation has no command 'dtm'")
     assert "Terrain left out: this installation has no command 'dtm'" in capsys.readouterr().out
@@ -71,6 +79,7 @@ def test_a_step_that_fails_ends_the_run(tmp_path, capsys):
         "tiepoints": ("done", ""),
         "adjust": ("failed", "aerotri adjust ended with 1"),
         "dtm": ("left out", "adjust is missing"),
+        "volume": ("left out", "no --boundary was given"),
     }
 
     def refuses(arguments):

@@ -18,7 +18,7 @@ from typing import Any
 from aerotri.conventions import InputError
 
 RECORD, REPORT = "run.json", "report.html"
-BLOCK, RESULT, DTM = "block", "result", "dtm"
+BLOCK, RESULT, DTM, VOLUME = "block", "result", "dtm", "volume"
 Invoke = Callable[[list[str]], int]
 
 
@@ -85,11 +85,15 @@ def _steps(source: Path, out: Path, passed_on: dict[str, tuple[str, ...]]) -> li
     adjust = Step("adjust", RESULT, "Adjustment", ("adjust", str(source) if is_block else block, "--out", result))
     begin = Step("tiepoints", BLOCK, "Tie points", ("tiepoints", str(source), "--out", block))
     surface = Step("dtm", DTM, "Terrain", ("dtm", result, str(source), "--out", dtm))
+    on_it = ("volume", f"{dtm}/dsm.tif", "--adjustment", result, "--pickets", f"{dtm}/pickets.parquet")
+    volume = Step("volume", VOLUME, "Volume", (*on_it, "--out", str(out / VOLUME)))
+    if not passed_on.get("volume"):
+        volume = replace(volume, status="left out", reason="no --boundary was given")
     if is_block:
-        without = replace(surface, status="left out", reason="it needs photographs, and a block was given")
-        steps = [adjust, without]
+        reason = "it needs photographs, and a block was given"
+        steps = [adjust, *(replace(step, status="left out", reason=reason) for step in (surface, volume))]
     else:
-        steps = [begin, adjust, surface]
+        steps = [begin, adjust, surface, volume]
     return [replace(step, arguments=step.arguments + passed_on.get(step.name, ())) for step in steps]
 
 

@@ -34,8 +34,8 @@ def run_page(content: dict[str, Any], folder: Path) -> str:
 
 def _step(step: dict[str, Any], folder: Path) -> dict[str, Any]:
     done = step["status"] == "done"
-    report = folder / "report.html"
-    page = report.read_text(encoding="utf-8") if done and report.is_file() else ""
+    pages = [place for place in (folder / "report.html", folder / "volume.html") if done and place.is_file()]
+    page = pages[0].read_text(encoding="utf-8") if pages else ""
     plots = sorted((folder / "plots").glob("*.png"))[:LARGEST_PLOTS] if done and not page else []
     return {
         **step,
