@@ -40,4 +40,4 @@ def compilation_notice() -> str:
     example = _state["example"]
     if example is None or any(Path(example.stats.cache_path).glob("*.nbi")):
         return ""
-    return "compiling kernels, in this first run only (about 15 s)"
+    return "compiling kernels, in this first run only (about 20 s)"
