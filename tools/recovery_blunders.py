@@ -7,6 +7,32 @@ half its weight. A good ray counts as lost where at least two good rays of its p
 good rays stands in brackets. x_clean: least squares without the errors, a wrong control point being a check point.
 
 Example: python tools/recovery_blunders.py --seeds 200 --demo-seeds 20
+
+Last result, of 40 and 3 seeds:
+
+    | single errors | found | expected |
+    |---|---|---|
+    | errors of the size ∇0 with w beyond the limit | 0.772 of 320 | 0.80 (0.725 to 0.869) |
+    | the same, removed by data snooping | 0.762 | the same |
+    | w beyond the limit without an error | 1.066 ‰ of 238171 | 1.000 ‰ |
+    | rays removed without an error | 2.03 ‰ of 120900 | 2.00 ‰ (two tests) |
+
+    | block | method | seeds | above ∇0 flagged | good lost (of all) | max off, σ | control named | s |
+    |---|---|---|---|---|---|---|---|
+    | 29 photographs | data-snooping | 40 | 99.56 % | 0.36 % (0.86 %) | 1.14 | 40 | 0.13 |
+    | 29 photographs | adaptive | 40 | 98.66 % | 0.48 % (0.92 %) | 1.26 | 40 | 0.10 |
+    | 29 photographs | danish | 40 | 98.07 % | 0.35 % (0.75 %) | 1.29 | 40 | 0.10 |
+    | 29 photographs | cauchy | 40 | 96.46 % | 2.54 % (2.80 %) | 1.23 | 40 | 0.18 |
+    | 29 photographs | huber | 40 | 98.86 % | 0.57 % (1.02 %) | 2.46 | 40 | 0.12 |
+    | the same, C03 10 m off | data-snooping | 40 | 98.98 % | 0.37 % (0.81 %) | 1.13 | 40 | 0.26 |
+    | sample block, 132 | data-snooping | 3 | 99.72 % | 0.43 % (0.69 %) | 2.69 | 3 | 1.50 |
+    | sample block, 132 | adaptive | 3 | 99.08 % | 0.54 % (0.74 %) | 2.45 | 3 | 0.98 |
+    | sample block, 132 | danish | 3 | 98.64 % | 0.52 % (0.70 %) | 2.54 | 3 | 1.10 |
+    | sample block, 132 | cauchy | 3 | 98.15 % | 3.10 % (3.20 %) | 2.52 | 3 | 0.86 |
+    | sample block, 132 | huber | 3 | 99.10 % | 0.65 % (0.86 %) | 3.38 | 3 | 0.59 |
+    | the same, C05 10 m off | data-snooping | 3 | 99.64 % | 0.41 % (0.66 %) | 2.68 | 3 | 1.16 |
+
+Data snooping keeps the bounds; with a control point 10 m off beside 10 % of gross errors 98.98 % are flagged.
 """
 
 from __future__ import annotations
