@@ -100,7 +100,7 @@ def test_pickets_of_a_file(place, tmp_path):
     from pyarrow import parquet
 
     from aerotri.commands.console import Console
-    from aerotri.commands.deform import reopened
+    from aerotri.commands.results import reopened
     from aerotri.volume.pickets import pickets_where_seen
 
     calibration = reopened(place / "result", Console(quiet=True))

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.commands.console import Console
+from aerotri.commands.results import refuse_foreign_folder
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def run_adjust(
         refuse_free_datum(block)
     read_s = time.perf_counter() - begun
     target = out or Path(f"{folder_name(path)}_result")
-    refuse_foreign_folder(target)
+    refuse_foreign_folder(target, "adjustment.json")
 
     from aerotri.compiled import compilation_notice
     from aerotri.pipeline import AdjustmentFailedError, adjust_keeping_system
@@ -82,17 +83,6 @@ def with_settings(block: Block, parameters: str | None, robust: str | None) -> B
     if robust is not None:
         settings = replace(settings, robust=robust)
     return replace(block, settings=replace(block.settings, adjustment=settings))
-
-
-def refuse_foreign_folder(target: Path) -> None:
-    """A result replaces an older result or an empty folder, nothing else.
-
-    Raises
-    ------
-    InputError
-    """
-    if target.is_dir() and any(target.iterdir()) and not (target / "adjustment.json").exists():
-        raise InputError(f"'{target}' holds other files", "choose another --out, or an empty folder")
 
 
 def refuse_free_datum(block: Block) -> None:

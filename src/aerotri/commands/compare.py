@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
+from aerotri.commands.results import refuse_foreign_folder
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
@@ -32,8 +33,7 @@ def run_compare(
             raise InputError(f"--{name} '{value}' is not known", f"choose one of {', '.join(known)}")
     console = Console(quiet=as_json)
     target = out or Path(f"{test.resolve().stem}_comparison")
-    if target.is_dir() and any(target.iterdir()) and not (target / "compare.json").exists():
-        raise InputError(f"'{target}' holds other files", "choose another --out, or an empty folder")
+    refuse_foreign_folder(target, "compare.json")
     console.progress("reading")
     (one, area, cells, crs), (other, control_area, control_cells, control_crs) = (_surface(p) for p in (test, control))
     if crs is not None and control_crs is not None and crs != control_crs:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.commands.console import Console
+from aerotri.commands.results import refuse_foreign_folder
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def run_compare_parameters(
         raise InputError("auto is no set to compare with others", "without --set all sets that auto compares are shown")
     block = with_settings(read_block(path), None, robust)
     target = out or Path(f"{folder_name(path)}_compare")
-    refuse_other_files(target)
+    refuse_foreign_folder(target, COMPARISON_NAMES[0])
 
     from aerotri.compiled import compilation_notice
     from aerotri.pipeline import AdjustmentFailedError, compare_parameters
@@ -59,17 +60,6 @@ def run_compare_parameters(
     write_comparison(comparison, target, console)
     _tell(comparison, "" if chosen is None else chosen.reason, target, console, as_json)
     return 0 if there else 1
-
-
-def refuse_other_files(target: Path) -> None:
-    """A comparison replaces an older one or goes into an empty folder, nothing else.
-
-    Raises
-    ------
-    InputError
-    """
-    if target.is_dir() and any(target.iterdir()) and not (target / COMPARISON_NAMES[0]).exists():
-        raise InputError(f"'{target}' holds other files", "choose another --out, or an empty folder")
 
 
 def write_comparison(comparison: ParameterComparison, target: Path, console: Console) -> None:

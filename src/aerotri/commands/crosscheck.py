@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.commands.console import Console
-from aerotri.conventions import InputError
+from aerotri.commands.results import refuse_foreign_folder
 
 if TYPE_CHECKING:
     from aerotri.crosscheck import CrosscheckResult
@@ -21,7 +21,7 @@ def run_crosscheck(source: Path, out: Path | None, as_json: bool) -> int:
     """Exit code of the command: 0 when everything compared agrees, 1 otherwise; arguments as on the command line."""
     console = Console(quiet=as_json)
     target = out or Path(f"{_name(source)}_crosscheck")
-    _refuse_foreign_folder(target)
+    refuse_foreign_folder(target, OWN_NAMES[0])
     from aerotri.pipeline import AdjustmentFailedError, adjust
 
     try:
@@ -44,11 +44,6 @@ def run_crosscheck(source: Path, out: Path | None, as_json: bool) -> int:
 def _name(source: Path) -> str:
     folder = source.resolve()
     return (folder.parent if folder.is_file() and folder.suffix == ".toml" else folder).name
-
-
-def _refuse_foreign_folder(target: Path) -> None:
-    if target.is_dir() and any(target.iterdir()) and not (target / "crosscheck.json").exists():
-        raise InputError(f"'{target}' holds other files", "choose another --out, or an empty folder")
 
 
 def _adjusted(source: Path, console: Console) -> AdjustedBlock:

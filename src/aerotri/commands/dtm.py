@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
-from aerotri.commands.deform import reopened
+from aerotri.commands.results import refuse_foreign_folder, reopened
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def run_dtm(source: Path, photographs: list[Path], out: Path | None, options: Dt
     console = Console(quiet=as_json)
     options.check()
     target = out or Path(f"{source.resolve().name.removesuffix('_result')}_dtm")
-    refuse_foreign(target)
+    refuse_foreign_folder(target, "dtm.json")
     calibration = reopened(source, console)
     plan = make_plan(calibration, photographs, options)
     from aerotri.terrain.dtm import make_terrain_model
@@ -97,17 +97,6 @@ def run_dtm(source: Path, photographs: list[Path], out: Path | None, options: Dt
     else:
         console.lines([*summary(content), f"Written to {target}"])
     return 0
-
-
-def refuse_foreign(target: Path) -> None:
-    """A terrain model replaces an older one or an empty folder, nothing else.
-
-    Raises
-    ------
-    InputError
-    """
-    if target.is_dir() and any(target.iterdir()) and not (target / "dtm.json").exists():
-        raise InputError(f"'{target}' holds other files", "choose another --out, or an empty folder")
 
 
 def make_plan(calibration: Adjustment, given: list[Path], options: DtmOptions) -> TerrainPlan:

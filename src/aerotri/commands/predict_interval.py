@@ -68,8 +68,8 @@ def _by_formula(gsd: float, k: float | None) -> dict[str, Any]:
 
 
 def _by_pilot(question: IntervalQuestion, console: Console) -> dict[str, Any]:
-    from aerotri.commands.deform import reopened
     from aerotri.commands.dtm import DtmOptions, make_plan
+    from aerotri.commands.results import reopened
     from aerotri.terrain.dtm import make_terrain_model, typical_slope
     from aerotri.terrain.interval import interval_of_gsd, k_of_slope
     from aerotri.terrain.photographs import photographs_of

@@ -1,4 +1,4 @@
-"""What commands that begin with a result share."""
+"""What commands share: results reopened, folders that may be written to."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def reopened(result: Path, console: Console) -> Adjustment:
     return reopen(read_block(result / "block"), saved)
 
 
-def refuse_foreign_folder(folder: Path, own: str) -> None:
-    """Results go into an empty folder, or where the same command has written its file `own` before.
+def refuse_foreign_folder(folder: Path, *own: str) -> None:
+    """Results go into an empty folder, or where the same command has written one of its files `own` before.
 
     Raises
     ------
     InputError
     """
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / own).exists():
+    if folder.is_dir() and any(folder.iterdir()) and not any((folder / name).exists() for name in own):
         raise InputError(f"'{folder}' holds other files", "choose another --out, or an empty folder")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
+from aerotri.commands.results import refuse_foreign_folder
 from aerotri.conventions import InputError
 from aerotri.formats.assemble import Statements
 from aerotri.formats.camera_spec import CameraSpec
@@ -53,13 +54,14 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
     """
     console = Console(quiet=as_json)
     begun = time.perf_counter()
-    refuse_foreign_folder(out)
     from aerotri.compiled import compilation_notice
     from aerotri.formats.block_writer import write_block
     from aerotri.tie_points.features import FeatureOptions
     from aerotri.tie_points.matching import MatchOptions
     from aerotri.tie_points.photographs import find_photographs
     from aerotri.tie_points.photographs_to_block import CACHE, Options, tie_photographs
+
+    refuse_foreign_folder(out, RECORD, CACHE)
 
     photographs = find_photographs(folder, _stated_camera(options.camera))
     given = _given(options)
@@ -100,19 +102,6 @@ class Progress:
         worked = done - self._before
         left = f", {(now - self._begun) * (count - done) / worked:.0f} s left" if worked else ""
         self._console.progress(f"{stage}: {done} of {count}{left}")
-
-
-def refuse_foreign_folder(out: Path) -> None:
-    """A block replaces an older block of this command, or goes to an empty folder.
-
-    Raises
-    ------
-    InputError
-    """
-    from aerotri.tie_points.photographs_to_block import CACHE
-
-    if out.is_dir() and any(out.iterdir()) and not any((out / name).exists() for name in (RECORD, CACHE)):
-        raise InputError(f"'{out}' holds other files", "choose another --out, or an empty folder")
 
 
 def _stated_camera(spec: CameraSpec) -> StatedCamera:

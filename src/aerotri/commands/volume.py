@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
+from aerotri.commands.results import refuse_foreign_folder
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
@@ -48,8 +49,7 @@ def run_volume(
     console = Console(quiet=as_json)
     _check(given)
     target = out or Path(f"{given.dtm.stem}_volume")
-    if target.is_dir() and any(target.iterdir()) and not (target / "volume.json").exists():
-        raise InputError(f"'{target}' holds other files", "choose another --out, or an empty folder")
+    refuse_foreign_folder(target, "volume.json")
     try:
         content = _computed(given, plan, sigma_options, target, plots, console)
     except AbsorptionFailedError as failure:

@@ -15,6 +15,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from aerotri.report.quality import printable
 
@@ -130,3 +131,13 @@ def per_inch_for(lengths: np.ndarray, longest_inch: float) -> tuple[float, float
     finite = lengths[np.isfinite(lengths)]
     longest = float(finite.max()) if len(finite) and finite.max() > 0.0 else 1.0
     return longest / longest_inch, nice_number(longest)
+
+
+def coordinate_axes(axes: Axes, width: float, height: float, labels: tuple[str, str]) -> None:
+    """Round, whole coordinates along axes of so many inches, and their labels."""
+    axes.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 1.0)), steps=[1, 2, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(max(2, int(height / 0.7)), steps=[1, 2, 5, 10]))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.10g}".replace("-", "−")))
+    axes.set_xlabel(labels[0])
+    axes.set_ylabel(labels[1])

@@ -9,10 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from aerotri.functional_model.rotation import rotation_from_angles
-from aerotri.report.canvas import GREY, INK, LIGHT, axes_at, plain
+from aerotri.report.canvas import GREY, INK, LIGHT, axes_at, coordinate_axes, plain
 from aerotri.statistics.adjusted_block import AdjustedBlock, GroundPointResults
 
 FARTHEST_FOOTPRINT = 6.0
@@ -76,12 +75,7 @@ def plan_axes(
     x, y = (extent.left + extent.right) / 2, (extent.bottom + extent.top) / 2
     axes.set_xlim(x - metres_per_inch * width / 2, x + metres_per_inch * width / 2)
     axes.set_ylim(y - metres_per_inch * height / 2, y + metres_per_inch * height / 2)
-    axes.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 1.0)), steps=[1, 2, 5, 10]))
-    axes.yaxis.set_major_locator(MaxNLocator(max(2, int(height / 0.7)), steps=[1, 2, 5, 10]))
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.10g}".replace("-", "−")))
-    axes.set_xlabel(labels[0])
-    axes.set_ylabel(labels[1])
+    coordinate_axes(axes, width, height, labels)
     return axes
 
 

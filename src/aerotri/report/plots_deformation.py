@@ -9,13 +9,25 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter
 from scipy.interpolate import RegularGridInterpolator
 
 from aerotri.deformation.block_models import BlockDeformation
 from aerotri.deformation.model_grid import Deformation
 from aerotri.deformation.outcome_json import contour_interval, worst_seams
-from aerotri.report.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, length_text, new_figure, plain, styled
+from aerotri.report.canvas import (
+    ACCENT,
+    GREY,
+    INK,
+    LIGHT,
+    WIDTH,
+    axes_at,
+    coordinate_axes,
+    length_text,
+    new_figure,
+    plain,
+    styled,
+)
 
 MEANING = {"free": "orientation of the self-calibrated block", "absorbed": "orientation adjusted without parameters"}
 HIGHEST = 6.6
@@ -111,7 +123,7 @@ def plot_block_deformation(deformation: BlockDeformation, block_name: str) -> Fi
     axes.add_collection(LineCollection(_borders(d), colors=ACCENT, linewidths=0.7, zorder=2))
     for number, seam in enumerate(worst, start=1):
         _mark_seam(axes, d, seam, number)
-    _coordinates(axes, width, height, ("X (local) [m]", "Y (local) [m]") if d.crs == "local" else ("E [m]", "N [m]"))
+    coordinate_axes(axes, width, height, ("X (local) [m]", "Y (local) [m]") if d.crs == "local" else ("E [m]", "N [m]"))
     scale = axes_at(figure, 0.95 + width + 0.15, bottom, 0.16, height)
     bar = figure.colorbar(image, cax=scale)
     bar.set_label("dZ [cm]")
@@ -158,7 +170,7 @@ class _View:
         axes.set_xlim(self._low[0], self._high[0])
         axes.set_ylim(self._low[1], self._high[1])
         box, dpi = axes.get_window_extent(), axes.figure.dpi
-        _coordinates(axes, box.width / dpi, box.height / dpi, self._labels)
+        coordinate_axes(axes, box.width / dpi, box.height / dpi, self._labels)
 
 
 def _contours(axes: Axes, view: _View, dz: np.ndarray, interval: float) -> None:
@@ -246,14 +258,6 @@ def _mark_seam(axes: Axes, d: BlockDeformation, seam, number: int) -> None:
     axes.text(x, y, str(number), fontsize=8, weight="bold", ha="center", va="center", zorder=6,
               bbox={"boxstyle": "circle,pad=0.25", "fc": "white", "ec": INK, "lw": 0.9})  # fmt: skip
 
-
-def _coordinates(axes: Axes, width: float, height: float, labels: tuple[str, str]) -> None:
-    axes.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 1.0)), steps=[1, 2, 5, 10]))
-    axes.yaxis.set_major_locator(MaxNLocator(max(2, int(height / 0.7)), steps=[1, 2, 5, 10]))
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.10g}".replace("-", "−")))
-    axes.set_xlabel(labels[0])
-    axes.set_ylabel(labels[1])
 
 
 def _minus(axes: Axes) -> None:

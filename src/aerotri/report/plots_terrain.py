@@ -11,7 +11,19 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from aerotri.rasters import Grid
-from aerotri.report.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, length_text, new_figure, plain, styled
+from aerotri.report.canvas import (
+    ACCENT,
+    GREY,
+    INK,
+    LIGHT,
+    WIDTH,
+    axes_at,
+    coordinate_axes,
+    length_text,
+    new_figure,
+    plain,
+    styled,
+)
 from aerotri.terrain.compare import Comparison
 from aerotri.terrain.dtm import TerrainOutcome
 from aerotri.terrain.pickets import FIRST_ERROR
@@ -161,13 +173,8 @@ def _contours(axes: Axes, grid: Grid, z: np.ndarray) -> None:
 
 
 def _coordinates(axes: Axes, width: float, height: float, local: bool, labels: tuple[str, str] | None = None) -> None:
-    axes.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 1.0)), steps=[1, 2, 5, 10]))
-    axes.yaxis.set_major_locator(MaxNLocator(max(2, int(height / 0.7)), steps=[1, 2, 5, 10]))
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.10g}".replace("-", "−")))
     names = labels or (("X (local) [m]", "Y (local) [m]") if local else ("E [m]", "N [m]"))
-    axes.set_xlabel(names[0])
-    axes.set_ylabel(names[1])
+    coordinate_axes(axes, width, height, names)
 
 
 def _signed(axes: Axes) -> None:
