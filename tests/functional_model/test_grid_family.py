@@ -1,11 +1,14 @@
 """Nodes of a bilinear grid: the correction grid and collocation, with the covariance before anything is measured."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_additional_parameters import orientation_columns
 
 from aerotri.functional_model.additional_parameters import collocation, grid, parameter_set, parse_parameters
-from aerotri.observations import Camera
+from aerotri.functional_model.additional_parameters.beside_field import said_by_others
+from aerotri.observations import Camera, Prior
 from family_cameras import INTERIOR
 
 CAMERA = Camera("c", "frame", (11500, 7500), 9.0, INTERIOR)
@@ -101,6 +104,37 @@ def test_prior_weight_is_the_inverse():
     weight, log_determinant = collocation.prior_weight(CAMERA, items, 0.004, 30.0)
     np.testing.assert_allclose(weight @ covariance, np.eye(len(items)), atol=1e-8)
     assert log_determinant == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
+
+
+def test_a_field_is_orthogonal_to_what_others_say():
+    """Free principal point and distance, Brown, BLUH: the covariance has nothing of them; held elements are not among
+    them, nor are other grids."""
+    items = collocation.SIZES.items((7, 5))
+    position, axis = grid.node_positions(CAMERA, items)
+    assert said_by_others(CAMERA, items, [("collocation", items)]).shape == (70, 0)
+    free = replace(CAMERA, interior={name: Prior(prior.value) for name, prior in CAMERA.interior.items()})
+    chosen = [("collocation", items), ("brown", ("K1",)), ("bluh", ("1", "2")), ("grid", nodes_of("4x3").items)]
+    held = said_by_others(free, items, chosen)
+    assert held.shape == (70, 6)
+    np.testing.assert_allclose(held.T @ held, np.eye(6), atol=1e-12)
+    for pattern in (axis == 0, axis == 1, position[np.arange(70), axis]):
+        np.testing.assert_allclose(held @ (held.T @ pattern), pattern, atol=1e-9)
+    covariance = collocation.prior_covariance(CAMERA, items, 0.004, 30.0, held)
+    weight, log_determinant = collocation.prior_weight(CAMERA, items, 0.004, 30.0, held)
+    assert np.abs(held.T @ covariance @ held).max() < 1.01 * collocation.HELD_MM**2
+    np.testing.assert_allclose(weight @ covariance, np.eye(70), atol=1e-6)
+    assert log_determinant == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-6)
+    inside = np.eye(70) - held @ held.T
+    plain = np.linalg.inv(collocation.prior_covariance(CAMERA, items, 0.004, 30.0))
+    np.testing.assert_allclose(inside @ weight @ inside, inside @ plain @ inside, atol=1e-6 * plain.max())
+
+
+def test_the_lens_beside_a_field():
+    items = collocation.SIZES.items((7, 5))
+    held = said_by_others(CAMERA, items, [("lens", ("k1",))])
+    position, axis = grid.node_positions(CAMERA, items)
+    pattern = position[np.arange(70), axis] * np.sum(position**2, axis=1)
+    np.testing.assert_allclose(held[:, 0] * np.linalg.norm(pattern) * np.sign(held[:, 0] @ pattern), pattern, atol=1e-6)
 
 
 def test_items_of_one_node_set_may_be_in_any_order_for_the_covariance():

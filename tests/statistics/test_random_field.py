@@ -9,10 +9,10 @@ import pytest
 
 from aerotri.formats.block_folder import read_block, write_block
 from aerotri.formats.solution import read_solution, write_solution
-from aerotri.functional_model.additional_parameters import collocation, parameter_set
+from aerotri.functional_model.additional_parameters import collocation, parameter_set, parse_parameters
 from aerotri.functional_model.orientation_patterns import orientation_patterns
 from aerotri.image_errors import field_on_grid, systematic_errors
-from aerotri.observations import Block, CollocationSettings
+from aerotri.observations import Block, CollocationSettings, Prior
 from aerotri.pipeline import adjust_keeping_system, reopen
 from aerotri.simulation import parse_spec, simulate
 from aerotri.statistics.field_estimation import FieldCovariance, ReducedToFields
@@ -59,7 +59,7 @@ def test_likelihood_against_dense_algebra():
     seen = left.T @ a
 
     def deviance(known: FieldCovariance) -> float:
-        k = collocation.prior_covariance(field.camera, field.items, 1e-3 * known.sigma_um, known.length_mm)
+        k = field.prior_covariance(known.sigma_um, known.length_mm)
         covariance = np.eye(len(y)) + seen @ k @ seen.T
         omega = y @ np.linalg.solve(covariance, y)
         return len(y) * np.log(omega) + np.linalg.slogdet(covariance)[1]
@@ -129,10 +129,53 @@ def test_covariance_recovered(seed):
     assert 0.95 < result.outcome.sigma0 < 1.05
 
 
+def test_a_field_beside_a_free_interior_orientation_and_lens():
+    """The corrected plane does not shrink: the field has nothing of principal distance, principal point and lens."""
+    content = small_spec(camera={"ucd": {"preset": "ultracam_d", "errors": {"brown": {"K1": 2e-7}}}})
+    content["gnss"] = {"sigma_m": [0.05, 0.05, 0.05]}
+    block, _ = simulate(parse_spec(content), 7)
+    true_c = block.cameras[0].focal_length_mm
+    interior = {name: Prior(prior.value + 0.05) for name, prior in block.cameras[0].interior.items()}
+    block = replace(block, cameras=(replace(block.cameras[0], interior=interior),))
+    chosen = parse_parameters("brown:K1+K2,collocation:9x6")
+    adjustment = adjust_keeping_system(with_adjustment(block, additional_parameters=chosen))
+    p = adjustment.result.parameters
+    rows = {str(name): k for k, name in enumerate(p.names)}
+    truth = {"focal_length_mm": true_c, "x0_mm": 0.0, "y0_mm": 0.0, "brown.K1": 2e-7, "brown.K2": 0.0}
+    for name, true in truth.items():
+        z = (p.value[rows[name]] - true) / p.sigma[rows[name]]
+        assert abs(z) < 3.5, name
+    assert 0.95 < adjustment.result.outcome.sigma0 < 1.05
+    (field,) = adjustment.system.unknowns.shared.fields
+    assert field.held.shape == (108, 5)
+    values = adjustment.solution.state.shared[field.columns]
+    assert np.abs(field.held.T @ values).max() < 1e-7
+
+
+def test_a_large_field_does_not_shrink_the_image_plane():
+    """A lens of half a millimetre and no set for it: the field takes it, c stays the mean scale, and is determined."""
+    content = small_spec(camera={"ucd": {"preset": "ultracam_d", "errors": {"brown": {"K1": 2e-6}}}})
+    content["gnss"] = {"sigma_m": [0.05, 0.05, 0.05]}
+    block, _ = simulate(parse_spec(content), 7)
+    interior = {name: Prior(prior.value) for name, prior in block.cameras[0].interior.items()}
+    block = replace(block, cameras=(replace(block.cameras[0], interior=interior),))
+    p = adjust_keeping_system(with_adjustment(block, additional_parameters=parse_parameters("collocation:9x6"))).result
+    names, value, sigma = p.parameters.names, p.parameters.value, p.parameters.sigma
+    camera, at = p.block.cameras[0], names.tolist().index("focal_length_mm")
+    assert sigma[at] < 0.01
+    # d = −K1·r²·(x, y) has the scale −K1·Σr⁴/Σr² over the nodes, which c takes
+    x, y = (a.ravel() for a in np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 6)))
+    r2 = (x * camera.half_format_mm[0]) ** 2 + (y * camera.half_format_mm[1]) ** 2
+    expected = block.cameras[0].focal_length_mm * (1.0 - 2e-6 * np.sum(r2**2) / np.sum(r2))
+    assert abs(value[at] / expected - 1.0) < 1e-3
+
+
 def test_no_field_where_there_is_none():
     block = small_block(4, "collocation:7x5")[0]
     result = adjust_keeping_system(block).result
-    assert result.block.settings.collocation.sigma_um < 0.6
+    sigma_um = result.block.settings.collocation.sigma_um
+    assert sigma_um is not None
+    assert sigma_um < 0.6
     assert result.groups[-1].name == "collocation field"
     assert result.groups[-1].redundancy < 12.0
 

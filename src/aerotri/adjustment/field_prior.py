@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.adjustment.shared_parameters import RandomField
-from aerotri.functional_model.additional_parameters.collocation import prior_weight
 from aerotri.observations import Settings
 
 FIRST_SIGMA = 1.5
@@ -33,8 +32,7 @@ class FieldPrior:
 def field_prior(field: RandomField, settings: Settings) -> FieldPrior:
     """The prior of a field with the covariance that the settings say, or one to begin with."""
     sigma_um, length_mm = known_or_first(field, settings)
-    weight, _ = prior_weight(field.camera, field.items, 1e-3 * sigma_um, length_mm)
-    return FieldPrior(field.columns, weight)
+    return FieldPrior(field.columns, field.prior_weight(sigma_um, length_mm)[0])
 
 
 def known_or_first(field: RandomField, settings: Settings) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from aerotri.functional_model.additional_parameters import (
     mark_of,
     parameter_set,
 )
+from aerotri.functional_model.additional_parameters.beside_field import said_by_others
 from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, interior_row
 from aerotri.observations import Block, Camera, Prior
@@ -25,19 +26,29 @@ from aerotri.observations.block import INTERIOR_ELEMENTS
 FREE = Prior()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RandomField:
     """Shared parameters that are nodes of a random field: known beforehand together, by its covariance.
 
     Parameters
     ----------
-    columns : of the nodes in the shared list. items : their names in the family. camera, group : they belong to.
+    columns : of the p nodes in the shared list. items : their names in the family. camera, group : they belong to.
+    held : (p, k) patterns that the unknowns beside the field say.
     """
 
     columns: slice
     items: tuple[str, ...]
     camera: Camera
     group: str
+    held: np.ndarray
+
+    def prior_weight(self, sigma_um: float, length_mm: float) -> tuple[np.ndarray, float]:
+        """(p, p) 1/mm², the inverse of the covariance of the nodes, and the logarithm of the determinant of that."""
+        return collocation.prior_weight(self.camera, self.items, 1e-3 * sigma_um, length_mm, self.held)
+
+    def prior_covariance(self, sigma_um: float, length_mm: float) -> np.ndarray:
+        """(p, p) mm², the covariance of the nodes before anything is measured."""
+        return collocation.prior_covariance(self.camera, self.items, 1e-3 * sigma_um, length_mm, self.held)
 
 
 @dataclass
@@ -178,6 +189,8 @@ def linear_columns(
                     chosen = _without_removed(block, of_camera[camera], group)
                     if group not in first:
                         first[group] = _add_set(shared, chosen, group)
+                        if family == collocation.FAMILY:
+                            shared.fields.append(random_field(block, chosen, group, first[group]))
                     sets[key] = chosen, first[group]
             parts.append(_family_columns(sets, of_ray, xy))
     if not parts:
@@ -208,9 +221,13 @@ def _add_set(shared: SharedList, chosen: ParameterSet, group: str) -> int:
     first = len(shared)
     for name, item in zip(chosen.names, chosen.items, strict=True):
         shared.add(name, group, "additional", mark_of(chosen.family, item))
-    if chosen.family == collocation.FAMILY:
-        shared.fields.append(RandomField(slice(first, len(shared)), chosen.items, chosen.camera, group))
     return first
+
+
+def random_field(block: Block, nodes: ParameterSet, group: str, first: int) -> RandomField:
+    """The field whose nodes begin at column `first` of the shared list."""
+    held = said_by_others(nodes.camera, nodes.items, block.settings.adjustment.additional_parameters)
+    return RandomField(slice(first, first + len(nodes.items)), nodes.items, nodes.camera, group, held)
 
 
 def _family_columns(sets: dict[int, tuple[ParameterSet, int]], of_ray: np.ndarray, xy: np.ndarray) -> LinearColumns:

@@ -19,7 +19,8 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.stats import f as f_distribution
 
-from aerotri.functional_model.additional_parameters import collocation
+from aerotri.adjustment.shared_parameters import random_field
+from aerotri.functional_model.additional_parameters import collocation, parameter_set
 from aerotri.image_errors.field import ErrorField, field_difference
 from aerotri.image_errors.groups import ImageGroup, image_groups
 from aerotri.statistics.adjusted_block import AdjustedBlock
@@ -133,11 +134,11 @@ def _differences(adjusted: AdjustedBlock, first: str, second: str) -> tuple[np.n
     field = np.flatnonzero(nodes)
     items = tuple(str(name).partition(".")[2] for name in p.names[both[field[: len(field) // 2]]])
     camera = next(g.camera for g in image_groups(adjusted.block) if g.name == first)
-    where = camera, items, 1e-3 * known.sigma_um, known.length_mm
-    s2 = adjusted.outcome.sigma0**2
-    prior = s2 * collocation.prior_covariance(*where)
+    nodes_of_one = random_field(adjusted.block, parameter_set(collocation.FAMILY, items, camera), first, 0)
+    where, s2 = (known.sigma_um, known.length_mm), adjusted.outcome.sigma0**2
+    prior = s2 * nodes_of_one.prior_covariance(*where)
     weight = np.zeros_like(q)
-    of_one = collocation.prior_weight(*where)[0] / s2
+    of_one = nodes_of_one.prior_weight(*where)[0] / s2
     weight[np.ix_(field, field)] = _twice(of_one)
     shrunk = d @ (np.eye(len(q)) - q @ weight)
     common = shrunk[:, field] @ np.tile(np.eye(len(items)), (2, 1))

@@ -22,7 +22,6 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.shared_parameters import RandomField
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
-from aerotri.functional_model.additional_parameters.collocation import prior_weight
 from aerotri.observations import CollocationSettings
 from aerotri.statistics.summarise import count_observations, effective_redundancy, weighted_sum
 
@@ -79,7 +78,7 @@ class ReducedToFields:
         normals, log_determinant, at = self.normals.copy(), 0.0, 0
         for field in self.fields:
             own = slice(at, at + len(field.items))
-            weight, of_field = prior_weight(field.camera, field.items, 1e-3 * known.sigma_um, known.length_mm)
+            weight, of_field = field.prior_weight(known.sigma_um, known.length_mm)
             normals[own, own] += weight
             log_determinant += of_field
             at = own.stop

@@ -4,7 +4,8 @@
 has to be well below ℓ. The field enters as one weighted observation of the node vector, p = 0 with the inverse of its
 covariance as weight, so that every node can be estimated however few rays are near it. Items as in `grid`. Between the
 nodes interpolation makes the field a little smoother than the covariance says. Shifts, scale, rotation and tilts of the
-whole field stay nearly unknown, since the orientation takes them over flat ground: pictures leave them out.
+whole field stay nearly unknown, since the orientation takes them over flat ground: pictures leave them out. What other
+unknowns say of them the field does not, see `beside_field`.
 """
 
 from __future__ import annotations
@@ -36,6 +37,8 @@ REFERENCE = "Image error as a random field, bilinear between nodes; derived for 
 SIZES = Sizes("nodes along x and along y", (19, 13), SMALLEST, LARGEST, node_items)
 ITEMS = SIZES.items(SIZES.default)
 DESCRIPTION = {item: item_text(item) for item in ITEMS}
+HELD_MM = 1e-6
+"""σ of what a field does not have: far below any measurement, far above rounding."""
 
 
 def terms(
@@ -56,7 +59,9 @@ def terms(
     return grid_terms(camera, x, y, partials, ITEMS if items is None else items)
 
 
-def prior_covariance(camera: Camera, items: Sequence[str], sigma_d: float, length: float) -> np.ndarray:
+def prior_covariance(
+    camera: Camera, items: Sequence[str], sigma_d: float, length: float, held: np.ndarray | None = None
+) -> np.ndarray:
     """Covariance of the nodes before anything is measured: σ_d²·exp(−ρ/ℓ) within dx and within dy, 0 between them.
 
     Parameters
@@ -64,6 +69,7 @@ def prior_covariance(camera: Camera, items: Sequence[str], sigma_d: float, lengt
     items : p nodes of one grid.
     sigma_d : mm, σ of the field.
     length : mm, correlation length ℓ.
+    held : (p, k) orthonormal patterns that the field does not have, within `HELD_MM`.
 
     Returns
     -------
@@ -73,10 +79,15 @@ def prior_covariance(camera: Camera, items: Sequence[str], sigma_d: float, lengt
     covariance = np.zeros((len(axis), len(axis)))
     for own in (np.flatnonzero(axis == k) for k in (0, 1)):
         covariance[np.ix_(own, own)] = _exponential(position[own], sigma_d, length)
-    return covariance
+    if held is None or not held.size:
+        return covariance
+    mixed = covariance @ held
+    return covariance - mixed @ np.linalg.solve(held.T @ mixed + HELD_MM**2 * np.eye(held.shape[1]), mixed.T)
 
 
-def prior_weight(camera: Camera, items: Sequence[str], sigma_d: float, length: float) -> tuple[np.ndarray, float]:
+def prior_weight(
+    camera: Camera, items: Sequence[str], sigma_d: float, length: float, held: np.ndarray | None = None
+) -> tuple[np.ndarray, float]:
     """Inverse of `prior_covariance`, and the logarithm of the determinant of the covariance.
 
     Returns
@@ -84,13 +95,16 @@ def prior_weight(camera: Camera, items: Sequence[str], sigma_d: float, length: f
     (p, p) 1/mm², and a number.
     """
     position, axis = node_positions(camera, items)
-    weight, log_determinant = np.zeros((len(axis), len(axis))), 0.0
+    patterns = np.zeros((len(axis), 0)) if held is None else held / HELD_MM
+    weight, log_determinant, seen = patterns @ patterns.T, 0.0, np.eye(patterns.shape[1])
     for own in (np.flatnonzero(axis == k) for k in (0, 1)):
         lower = cholesky(_exponential(position[own], sigma_d, length), lower=True)
         half = solve_triangular(lower, np.eye(len(own)), lower=True)
-        weight[np.ix_(own, own)] = half.T @ half
+        weight[np.ix_(own, own)] += half.T @ half
         log_determinant += 2.0 * float(np.sum(np.log(np.diagonal(lower))))
-    return weight, log_determinant
+        part = lower.T @ patterns[own]
+        seen += part.T @ part
+    return weight, log_determinant - float(np.linalg.slogdet(seen)[1])
 
 
 def _exponential(position: np.ndarray, sigma_d: float, length: float) -> np.ndarray:
