@@ -106,19 +106,29 @@ def test_prior_weight_is_the_inverse():
     assert log_determinant == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
 
 
+def test_a_field_has_no_scale():
+    """And nothing else is held: the camera's own parts and other grids are no matter."""
+    items = collocation.SIZES.items((5, 4))
+    others = [("collocation", items), ("ultracam_d", ("42",)), ("grid", ("4x3_x_0_0",))]
+    held = said_by_others(CAMERA, items, others)
+    position, axis = grid.node_positions(CAMERA, items)
+    scale = position[np.arange(40), axis]
+    np.testing.assert_allclose(held, (scale / np.linalg.norm(scale))[:, None])
+
+
 def test_a_field_is_orthogonal_to_what_others_say():
-    """Free principal point and distance, Brown, BLUH: the covariance has nothing of them; held elements are not among
-    them, nor are other grids."""
+    """Free principal point, Brown, BLUH: the covariance has nothing of them."""
     items = collocation.SIZES.items((7, 5))
     position, axis = grid.node_positions(CAMERA, items)
-    assert said_by_others(CAMERA, items, [("collocation", items)]).shape == (70, 0)
     free = replace(CAMERA, interior={name: Prior(prior.value) for name, prior in CAMERA.interior.items()})
-    chosen = [("collocation", items), ("brown", ("K1",)), ("bluh", ("1", "2")), ("grid", nodes_of("4x3").items)]
+    chosen = [("collocation", items), ("brown", ("K1",)), ("bluh", ("1", "2"))]
     held = said_by_others(free, items, chosen)
     assert held.shape == (70, 6)
     np.testing.assert_allclose(held.T @ held, np.eye(6), atol=1e-12)
-    for pattern in (axis == 0, axis == 1, position[np.arange(70), axis]):
-        np.testing.assert_allclose(held @ (held.T @ pattern), pattern, atol=1e-9)
+    basis = parameter_set("bluh", ["1", "2"], free).basis(*position.T)[np.arange(70), axis]
+    radial = position[np.arange(70), axis] * np.sum(position**2, axis=1)
+    for pattern in (axis == 0, axis == 1, basis[:, 0], basis[:, 1], radial):
+        np.testing.assert_allclose(held @ (held.T @ pattern), pattern, atol=1e-9 * np.abs(pattern).max())
     covariance = collocation.prior_covariance(CAMERA, items, 0.004, 30.0, held)
     weight, log_determinant = collocation.prior_weight(CAMERA, items, 0.004, 30.0, held)
     assert np.abs(held.T @ covariance @ held).max() < 1.01 * collocation.HELD_MM**2
@@ -134,7 +144,7 @@ def test_the_lens_beside_a_field():
     held = said_by_others(CAMERA, items, [("lens", ("k1",))])
     position, axis = grid.node_positions(CAMERA, items)
     pattern = position[np.arange(70), axis] * np.sum(position**2, axis=1)
-    np.testing.assert_allclose(held[:, 0] * np.linalg.norm(pattern) * np.sign(held[:, 0] @ pattern), pattern, atol=1e-6)
+    np.testing.assert_allclose(held @ (held.T @ pattern), pattern, atol=1e-9 * np.abs(pattern).max())
 
 
 def test_items_of_one_node_set_may_be_in_any_order_for_the_covariance():

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from itertools import combinations, pairwise
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eigh, null_space
 from scipy.stats import f as f_distribution
 
 from aerotri.adjustment.shared_parameters import random_field
@@ -135,18 +135,33 @@ def _differences(adjusted: AdjustedBlock, first: str, second: str) -> tuple[np.n
     items = tuple(str(name).partition(".")[2] for name in p.names[both[field[: len(field) // 2]]])
     camera = next(g.camera for g in image_groups(adjusted.block) if g.name == first)
     nodes_of_one = random_field(adjusted.block, parameter_set(collocation.FAMILY, items, camera), first, 0)
-    where, s2 = (known.sigma_um, known.length_mm), adjusted.outcome.sigma0**2
-    prior = s2 * nodes_of_one.prior_covariance(*where)
-    weight = np.zeros_like(q)
-    of_one = nodes_of_one.prior_weight(*where)[0] / s2
-    weight[np.ix_(field, field)] = _twice(of_one)
-    shrunk = d @ (np.eye(len(q)) - q @ weight)
-    common = shrunk[:, field] @ np.tile(np.eye(len(items)), (2, 1))
-    covariance = d @ (q - q @ weight @ q) @ d.T + common @ prior @ common.T
-    signal = shrunk[:, field] @ _twice(prior) @ shrunk[:, field].T
-    return delta, covariance, signal + 1e6 * np.diag(np.where(free, np.diagonal(covariance), 0.0))
+    # what a field does not have is certain: it is left out
+    seen = null_space(nodes_of_one.held.T)
+    s2 = adjusted.outcome.sigma0**2
+    weight_of_one = seen.T @ nodes_of_one.prior_weight(known.sigma_um, known.length_mm)[0] @ seen / s2
+    combined = np.zeros((int(free.sum()) + seen.shape[1], len(free)))
+    combined[np.arange(free.sum()), np.flatnonzero(free)] = 1.0
+    combined[int(free.sum()) :, np.flatnonzero(~free)] = seen.T
+    across = np.zeros((len(q), 2 * seen.shape[1]))
+    across[field] = np.kron(np.eye(2), seen)
+    covariance, signal = _of_a_common_field(combined @ d, q, weight_of_one, across)
+    is_free = np.arange(len(covariance)) < free.sum()
+    return combined @ delta, covariance, signal + 1e6 * np.diag(np.where(is_free, np.diagonal(covariance), 0.0))
 
 
-def _twice(matrix: np.ndarray) -> np.ndarray:
-    """The matrix for both groups, nothing between them."""
-    return np.kron(np.eye(2), matrix)
+def _of_a_common_field(
+    d: np.ndarray, q: np.ndarray, weight: np.ndarray, across: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance (k, k) of differences D·p̂ (k, p) where both groups have one field, and where each has its own.
+
+    Parameters
+    ----------
+    q : (p, p) posterior covariance of all parameters. weight : (u, u) inverse prior covariance of one group's field.
+    across : (p, 2u) from the fields of the two groups to the parameters.
+    """
+    both = across @ np.kron(np.eye(2), weight) @ across.T
+    shrunk = d @ (across - q @ both @ across)
+    prior = np.linalg.inv(weight)
+    common = shrunk @ np.tile(np.eye(len(weight)), (2, 1))
+    covariance = d @ (q - q @ both @ q) @ d.T + common @ prior @ common.T
+    return covariance, shrunk @ np.kron(np.eye(2), prior) @ shrunk.T

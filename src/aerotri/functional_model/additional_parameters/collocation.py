@@ -3,9 +3,9 @@
 [D] dx and dy are independent fields of covariance σ_d²·exp(−ρ/ℓ), ρ the distance in the image; the spacing of the nodes
 has to be well below ℓ. The field enters as one weighted observation of the node vector, p = 0 with the inverse of its
 covariance as weight, so that every node can be estimated however few rays are near it. Items as in `grid`. Between the
-nodes interpolation makes the field a little smoother than the covariance says. Shifts, scale, rotation and tilts of the
-whole field stay nearly unknown, since the orientation takes them over flat ground: pictures leave them out. What other
-unknowns say of them the field does not, see `beside_field`.
+nodes interpolation makes the field a little smoother than the covariance says. Shifts, rotation and tilts of the whole
+field stay nearly unknown, since the orientation takes them over flat ground: pictures leave them out. Scale and what
+other unknowns say the field does not, see `beside_field`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ REFERENCE = "Image error as a random field, bilinear between nodes; derived for 
 SIZES = Sizes("nodes along x and along y", (19, 13), SMALLEST, LARGEST, node_items)
 ITEMS = SIZES.items(SIZES.default)
 DESCRIPTION = {item: item_text(item) for item in ITEMS}
-HELD_MM = 1e-6
+HELD_MM = 1e-5
 """σ of what a field does not have: far below any measurement, far above rounding."""
 
 
