@@ -98,11 +98,11 @@ def rendered(folder: Path, seed: int) -> tuple[dict, np.ndarray, np.ndarray]:
 
 def brighton(folder: Path, photographs: Path) -> list[str]:
     """One command, and what it says."""
-    from aerotri.cli import _commands, _invoke
+    from aerotri.cli.run import command_names, invoke
 
     begun, cpu = time.perf_counter(), time.process_time()
     with contextlib.redirect_stdout(io.StringIO()):
-        run_all(photographs, folder, {}, _invoke, _commands() & {"tiepoints", "adjust"}, True)
+        run_all(photographs, folder, {}, invoke, command_names() & {"tiepoints", "adjust"}, True)
     seconds, cpu = time.perf_counter() - begun, time.process_time() - cpu
     import pyarrow.parquet as pq
 

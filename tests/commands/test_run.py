@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from aerotri.cli import _commands, _invoke
+from aerotri.cli.run import command_names, invoke
 from aerotri.commands.run import run_all
 from aerotri.conventions import InputError
 from aerotri.formats.block_writer import write_block
@@ -25,7 +25,7 @@ def test_block_is_adjusted_and_terrain_named(tmp_path, capsys):
     """The real adjustment of a small block; its page stands in the one report, unable to run anything."""
     write_block(small_block()[0], tmp_path / "in")
     passed_on = {"adjust": ("--parameters", "none")}
-    assert run_all(tmp_path / "in", tmp_path / "out", passed_on, _invoke, _commands(), True) == 0
+    assert run_all(tmp_path / "in", tmp_path / "out", passed_on, invoke, command_names(), True) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["report"] == str(tmp_path / "out" / "report.html")
     assert steps(tmp_path / "out")["adjust"] == ("done", "")
@@ -90,7 +90,7 @@ def test_a_step_that_fails_ends_the_run(tmp_path, capsys):
     assert run_all(tmp_path / "photographs", out, {}, refuses, ALL, True) == 1
     assert steps(out)["adjust"] == ("failed", "too little ground — give more")
     with pytest.raises(InputError, match="photographs"):
-        run_all(tmp_path / "photographs", tmp_path / "o2", {}, lambda arguments: _invoke(arguments), ALL, True)
+        run_all(tmp_path / "photographs", tmp_path / "o2", {}, lambda arguments: invoke(arguments), ALL, True)
     with pytest.raises(InputError, match="neither"):
         run_all(tmp_path / "nothing", out, {}, refuses, ALL, True)
 

@@ -1,0 +1,5 @@
+"""python -m aerotri.cli"""
+
+from aerotri.cli import main
+
+main()

@@ -1,0 +1,27 @@
+"""The program that command lines are added to."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from aerotri import __version__
+
+app = typer.Typer(
+    name="aerotri",
+    help="Bundle block adjustment with self-calibration for aerial photographs, and how sure it is.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+predict = typer.Typer(help="What a flight will give, before it is flown.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(predict, name="predict")
+
+
+@app.callback(invoke_without_command=True)
+def version(show: Annotated[bool, typer.Option("--version", help="Print the version.")] = False) -> None:
+    if show:
+        print(__version__)
+        raise typer.Exit
