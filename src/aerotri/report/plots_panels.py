@@ -58,15 +58,18 @@ def plot_panels(panels: Sequence[Panel], title: str, subtitle: str = "") -> Figu
     width = min((WIDTH - 2 * MARGIN - room - (columns - 1) * GAP) / columns, WIDEST)
     mm_per_inch = 2 * half[0] / (width - 2 * AROUND)
     height = 2 * half[1] / mm_per_inch + 2 * AROUND
-    total = HEAD + rows * (CAPTION + height) + FOOT + 0.17 * (subtitle.count("\n") + 1)
-    figure = new_figure(total, plain(title, 120), subtitle)
     cell = 2 * half[0] / mm_per_inch / max(panel.field.x.shape[1] for panel in panels)
     lengths = np.concatenate([np.hypot(*panel.vectors.reshape(-1, 2).T) for panel in panels])
-    per_inch, size = per_inch_for(lengths, min(1.4 * LONGEST_IN_CELLS * cell, LARGEST_INCH))
+    longest = min(1.4 * LONGEST_IN_CELLS * cell, LARGEST_INCH)
+    per_inch, size = per_inch_for(lengths, longest)
+    # vectors may reach beyond the format, and not into the text above it
+    caption = CAPTION + max(0.0, longest - AROUND)
+    total = HEAD + rows * (caption + height) + FOOT + 0.17 * (subtitle.count("\n") + 1)
+    figure = new_figure(total, plain(title, 120), subtitle)
     limits = np.array([width, height]) * mm_per_inch / 2
     for k, panel in enumerate(panels):
         row, column = divmod(k, columns)
-        left, bottom = MARGIN + column * (width + GAP), FOOT + (rows - 1 - row) * (CAPTION + height)
+        left, bottom = MARGIN + column * (width + GAP), FOOT + (rows - 1 - row) * (caption + height)
         axes = axes_at(figure, left, bottom, width, height)
         axes.set_xlim(-limits[0], limits[0])
         axes.set_ylim(-limits[1], limits[1])
@@ -74,7 +77,7 @@ def plot_panels(panels: Sequence[Panel], title: str, subtitle: str = "") -> Figu
         draw_format(axes, camera)
         field = panel.field
         quiver = draw_vectors(axes, field.x, field.y, panel.vectors, field.significant, per_inch, clip_on=False)
-        _caption(figure, panel, left + AROUND, bottom + height)
+        _caption(figure, panel, left + AROUND, bottom + height + caption - CAPTION)
         if k == 0:
             scale_vector(axes, quiver, size, size_text(size, camera), MARGIN + AROUND, 0.28)
     flight_arrow(figure, camera, MARGIN + columns * (width + GAP) + 0.2, FOOT + height / 2)
