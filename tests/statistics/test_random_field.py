@@ -172,6 +172,23 @@ def test_a_large_field_does_not_shrink_the_image_plane():
     assert abs(value[at] / expected - 1.0) < 1e-3
 
 
+def test_many_rays_do_not_pay_for_a_shrinking_image():
+    """Residuals are formed in the corrected plane: a field free to shrink it would make them, and σ0, smaller."""
+    content = small_spec()
+    camera = content["camera"]["ucd"] | {"size_px": [575, 375], "pixel_um": 180.0}
+    content["camera"] = {"ucd": camera | {"errors": {"physical": {"rms_um": 80.0, "seed": 4}}}}
+    content["flight"]["gsd_m"] = 1.8
+    content["tie_points"] |= {"per_image": 1000, "sigma_um": 18.0, "margin_px": 5.0}
+    content["control"]["sigma_m"] = [0.1, 0.1, 0.1]
+    content["adjustment"] = {"additional_parameters": ["ultracam_d:42-73", "collocation:10x7"]}
+    result = adjust_keeping_system(simulate(parse_spec(content), 5)[0]).result
+    rms = {group.name: group.rms for group in result.groups}
+    assert max(rms["control plan"], rms["control height"]) < 0.1
+    sigma_um = result.block.settings.collocation.sigma_um
+    assert sigma_um is not None
+    assert sigma_um < 300.0
+
+
 def test_no_field_where_there_is_none():
     block = small_block(4, "collocation:7x5")[0]
     result = adjust_keeping_system(block).result

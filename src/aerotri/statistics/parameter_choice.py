@@ -24,8 +24,8 @@ FEWEST_POINTS = 4
 
 COMMON = ("bluh:1-12", "brown", "ebner", "gruen", "fourier:2x2", "legendre:5x5", "collocation")
 OF_MODEL = {
-    "ultracam_d": ("ultracam_d:42-73", "bluh:1-12,ultracam_d:42-73"),
-    "dmc": ("dmc", "bluh:1-12,dmc:30-41+74-77"),
+    "ultracam_d": ("ultracam_d:42-73", "bluh:1-12,ultracam_d:42-73", "ultracam_d:42-73,collocation"),
+    "dmc": ("dmc", "bluh:1-12,dmc:30-41+74-77", "dmc:30-41+74-77,collocation"),
 }
 
 
