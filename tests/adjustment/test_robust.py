@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aerotri.adjustment import _kernels
+from aerotri.adjustment import _robust_kernels as _kernels
 from aerotri.adjustment.robust import CODES, LIMITS, STAGES, Estimator, estimator_for, weights_and_costs
 from aerotri.pipeline import adjust
 from small_blocks import small_block, with_adjustment

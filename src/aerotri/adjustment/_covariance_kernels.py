@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.adjustment._kernels import E, linearise_point, reduce_point
+from aerotri.adjustment._point_kernels import E, linearise_point, reduce_point
 from aerotri.compiled import kernel
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.adjustment._covariance_kernels import couple_point, coupling_scratch, row_cofactor
-from aerotri.adjustment._kernels import NONE, E, linearise_point, reduce_point
+from aerotri.adjustment._point_kernels import E, linearise_point, reduce_point
+from aerotri.adjustment._robust_kernels import NONE
 from aerotri.compiled import kernel
 
 

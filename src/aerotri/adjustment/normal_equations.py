@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from aerotri.adjustment import _covariance_kernels, _kernels
+from aerotri.adjustment import _covariance_kernels, _kernels, _point_kernels
 from aerotri.adjustment.datum import free_motions
 from aerotri.adjustment.field_prior import FieldPrior, field_prior
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
@@ -152,7 +152,7 @@ class NormalSystem:
     def _work(self):
         u = self.unknowns
         most = int((u.lens.columns >= 0).sum(axis=1).max(initial=0)) + u.rays.ap_index.shape[1] + 3
-        return _kernels.scratch(self._max_rays, max(most, 1), len(u.shared))
+        return _point_kernels.scratch(self._max_rays, max(most, 1), len(u.shared))
 
     def _table(self, state: State):
         u = self.unknowns

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.adjustment import _kernels
+from aerotri.adjustment import _robust_kernels as _kernels
 
 STAGES = {
     "off": ("off",),
