@@ -58,7 +58,7 @@ def table(block: Block) -> list[str]:
             f"| {name} | {number} | {o.sigma0_um:.2f} | {centimetres(o.check)} | {centimetres(o.control)} | "
             f"{o.bic - least:.0f} |"
         )
-    return [*lines, "", f"auto: {chosen.reason}.", ""]
+    return [*lines, "", f"{chosen.reason[:1].upper()}{chosen.reason[1:]}.", ""]
 
 
 def main() -> None:

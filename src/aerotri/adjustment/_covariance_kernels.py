@@ -216,4 +216,7 @@ def expand_point_sides(
                 for t in range(n_union):
                     side[a, k] -= couple_shared[a, t] * x_shared[union[t], k]
         solve_lower_transposed(lower, side)
-        x_points[p] = side
+        # by elements: assigning a slice costs seconds of compilation
+        for a in range(3):
+            for k in range(side.shape[1]):
+                x_points[p, a, k] = side[a, k]

@@ -41,6 +41,18 @@ def solve_three(a, b, x):
 
 
 @kernel
+def median(values, n, ordered):
+    """Of the first n > 0 values; ordered : scratch of that length. np.median costs a second of compilation."""
+    for k in range(n):
+        place = k
+        while place > 0 and ordered[place - 1] > values[k]:
+            ordered[place] = ordered[place - 1]
+            place -= 1
+        ordered[place] = values[k]
+    return 0.5 * (ordered[(n - 1) // 2] + ordered[n // 2])
+
+
+@kernel
 def intersect_points(start, centre, ray, tolerance, limit, xyz):
     """The point nearest to its rays, for rays in point order; NaN where they do not meet under a real angle.
 
@@ -53,7 +65,7 @@ def intersect_points(start, centre, ray, tolerance, limit, xyz):
     most = 1
     for p in range(len(start) - 1):
         most = max(most, start[p + 1] - start[p])
-    weight, angle = np.empty(most), np.empty(most)
+    weight, angle, ordered = np.empty(most), np.empty(most), np.empty(most)
     for p in range(len(start) - 1):
         first, n = start[p], start[p + 1] - start[p]
         xyz[p, 0] = xyz[p, 1] = xyz[p, 2] = np.nan
@@ -94,7 +106,7 @@ def intersect_points(start, centre, ray, tolerance, limit, xyz):
                 if along < 0.0:
                     behind += 1
             if n > 2 and iteration < ITERATIONS - 1:
-                middle = np.median(angle[:n])
+                middle = median(angle, n, ordered)
                 for q in range(n):
                     scale = max(3.0 * tolerance[first + q], middle)
                     weight[q] /= 1.0 + (angle[q] / scale) ** 2
