@@ -1,9 +1,9 @@
 """The deformation of every cell of a DEM, wrong − true: scalar kernels without checks or objects.
 
-P = I(true; m − d(m)), m = π(used, P_w), exact at a point. Patches of cells that lie in one model and in one tile of
-either photograph get it from 3 × 3 exact nodes, biquadratic in plan and quadratic in the height above the surface
-through the nodes; the worst cells of the patch are computed exactly, and where they are off by more than a tolerance
-the patch is quartered, in the end down to exact cells.
+P = I(true; m − d(m)), m = π(used, P_w), exact at a point. Patches of cells that lie in few models and in one tile of
+either photograph of each get it from 3 × 3 exact nodes a model, biquadratic in plan and quadratic in the height above
+the surface through the nodes; the worst cells of the patch are computed exactly, and where they are off by more than a
+tolerance the patch is quartered, in the end down to exact cells.
 
 photo   : (15,) U (3, 4) row by row with u = U·(x, y, z, 1), then c, x0, y0 in mm
 photos  : (M, 4, 15) of every model: used left, used right, true left, true right
@@ -20,7 +20,7 @@ import numpy as np
 
 from aerotri.compiled import kernel
 
-SMALLEST_PATCH, NODES, CHECKS = 4, 9, 6
+SMALLEST_PATCH, NODES, CHECKS, MODELS_IN_PATCH = 4, 9, 6, 3
 MIXED, ONE_TILE, OFF = 0, 1, 2
 STEPS = 8
 LAST_STEP_M = 5e-3
@@ -261,8 +261,11 @@ def fit_patch(z, photos, source, cameras, m, place, box, heights, tolerance, fit
 
 
 @kernel
-def fill_patch(z, place, box, f, slope, du, dv, dz):
-    """The fitted deformation at every cell of a patch; NaN where the DEM has no data."""
+def fill_patch(z, number, m, whole, place, box, f, slope, lines, du, dv, dz):
+    """The fitted deformation at the cells of a patch in model m; NaN where the DEM has no data.
+
+    whole : all cells are in it. lines : three rows of scratch.
+    """
     per_column, per_row = 1.0 / place[1], 1.0 / place[3]
     half_rows, half_columns = 0.5 * (box[1] - box[0]), 0.5 * (box[3] - box[2])
     ax, ay, az, bx, by, bz = slope[0, 0], slope[0, 1], slope[0, 2], slope[1, 0], slope[1, 1], slope[1, 2]
@@ -283,13 +286,19 @@ def fill_patch(z, place, box, f, slope, du, dv, dz):
         h1 = f[3, 0, 1] + t * (f[3, 1, 1] + t * f[3, 2, 1])
         h2 = f[3, 0, 2] + t * (f[3, 1, 2] + t * f[3, 2, 2])
         heights = z[i, first : first + n]
-        out_u, out_v, out_z = du[i, first : first + n], dv[i, first : first + n], dz[i, first : first + n]
+        out_u, out_v, out_z = lines[0][:n], lines[1][:n], lines[2][:n]
+        if whole:
+            out_u, out_v, out_z = du[i, first : first + n], dv[i, first : first + n], dz[i, first : first + n]
         for j in range(n):
             s = j * per_cell - 1.0
             above = heights[j] - (h0 + s * (h1 + s * h2))
             out_u[j] = (x0 + s * (x1 + s * x2) + above * (ax + above * bx)) * per_column
             out_v[j] = (y0 + s * (y1 + s * y2) + above * (ay + above * by)) * per_row
             out_z[j] = z0 + s * (z1 + s * z2) + above * (az + above * bz)
+        if not whole:
+            for j in range(n):
+                if number[i, first + j] == m:
+                    du[i, first + j], dv[i, first + j], dz[i, first + j] = out_u[j], out_v[j], out_z[j]
 
 
 @kernel
@@ -317,6 +326,55 @@ def patch_extremes(z, number, row, last_row, column, last_column, lows, highs, h
 
 
 @kernel
+def find_models(number, row, last_row, column, last_column, present):
+    """The models of a patch into present; how many, or one more than there is room for."""
+    n = 0
+    for i in range(row, last_row):
+        for j in range(column, last_column):
+            m, known = number[i, j], number[i, j] < 0
+            for k in range(n):
+                known |= present[k] == m
+            if not known:
+                if n == len(present):
+                    return n + 1
+                present[n] = m
+                n += 1
+    return n
+
+
+@kernel
+def blank_patch(box, du, dv, dz):
+    """No deformation in a patch: NaN."""
+    for i in range(int(box[0]), int(box[1]) + 1):
+        for j in range(int(box[2]), int(box[3]) + 1):
+            du[i, j] = dv[i, j] = dz[i, j] = np.nan
+
+
+@kernel
+def deform_patch(
+    z, number, photos, source, cameras, place, tolerance, box, heights, present, n, whole, fit, lines, du, dv, dz
+):
+    """The deformation of a patch by a fit for each of its n models; False where one of them does not fit.
+
+    whole : all cells of the patch are in its one model.
+    """
+    wide = min(box[1] - box[0], box[3] - box[2]) >= 2
+    for k in range(n):
+        m = present[k]
+        case = tile_case(photos, source, cameras, m, place, box, heights[0], heights[1])
+        if case == OFF:
+            if whole:
+                blank_patch(box, du, dv, dz)
+            continue
+        if case != ONE_TILE or not wide:
+            return False
+        if not fit_patch(z, photos, source, cameras, m, place, box, heights, tolerance, fit):
+            return False
+        fill_patch(z, number, m, whole, place, box, fit[0], fit[1], lines, du, dv, dz)
+    return True
+
+
+@kernel
 def deform_window(z, number, photos, source, cameras, place, tolerance, largest, du, dv, dz):
     """The deformation of all cells of a window; returns how many of them were computed one by one.
 
@@ -329,8 +387,9 @@ def deform_window(z, number, photos, source, cameras, place, tolerance, largest,
     """
     rows, columns = z.shape
     fit = np.empty((4, 3, 3)), np.empty((2, 3)), np.empty((4, 3, 3))
-    box, heights = np.empty(4), np.empty(2)
+    box, heights, present = np.empty(4), np.empty(2), np.empty(MODELS_IN_PATCH, np.int64)
     lows, highs = np.empty(largest, z.dtype), np.empty(largest, z.dtype)
+    lines = np.empty(largest, du.dtype), np.empty(largest, du.dtype), np.empty(largest, dz.dtype)
     stack = np.empty((256, 3), np.int64)
     exact = 0
     for first_row in range(0, rows, largest):
@@ -342,24 +401,20 @@ def deform_window(z, number, photos, source, cameras, place, tolerance, largest,
                 row, column, size = stack[top, 0], stack[top, 1], stack[top, 2]
                 last_row, last_column = min(row + size, rows), min(column + size, columns)
                 box[0], box[1], box[2], box[3] = row, last_row - 1, column, last_column - 1
-                m = number[row, column]
                 uniform = patch_extremes(z, number, row, last_row, column, last_column, lows, highs, heights)
-                case = MIXED
-                if heights[0] > heights[1] or (uniform and m < 0):
-                    case = OFF
-                elif uniform:
-                    case = tile_case(photos, source, cameras, m, place, box, heights[0], heights[1])
-                if case == OFF:
-                    for i in range(row, last_row):
-                        for j in range(column, last_column):
-                            du[i, j] = dv[i, j] = dz[i, j] = np.nan
+                present[0], n = number[row, column], 1
+                if heights[0] > heights[1] or (uniform and present[0] < 0):
+                    n = 0
+                elif not uniform:
+                    n = find_models(number, row, last_row, column, last_column, present)
+                if n == 0 or not uniform:
+                    blank_patch(box, du, dv, dz)
+                if n == 0:
                     continue
-                wide = min(last_row - row, last_column - column) >= 3
-                fits = False
-                if case == ONE_TILE and wide:
-                    fits = fit_patch(z, photos, source, cameras, m, place, box, heights, tolerance, fit)
-                if fits:
-                    fill_patch(z, place, box, fit[0], fit[1], du, dv, dz)
+                if n <= len(present) and deform_patch(
+                    z, number, photos, source, cameras, place, tolerance, box, heights, present, n, uniform, fit,
+                    lines, du, dv, dz,
+                ):  # fmt: skip
                     continue
                 if size > SMALLEST_PATCH:
                     size //= 2
