@@ -3,7 +3,8 @@
 import pytest
 from rendered_blocks import Rendered, rendered_block
 
-from aerotri.terrain.pickets import MatchOptions, Pickets, measure
+from aerotri.terrain.matching import measure
+from aerotri.terrain.pickets import MatchOptions, Pickets
 
 
 @pytest.fixture(scope="session")

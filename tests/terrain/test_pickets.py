@@ -10,8 +10,9 @@ from aerotri.conventions import InputError
 from aerotri.rasters_images import open_photograph
 from aerotri.terrain.dtm import TerrainPlan, chosen_rows, make_terrain_model, models_of
 from aerotri.terrain.error_pickets import with_error_pickets
+from aerotri.terrain.matching import measure, steps_aside
 from aerotri.terrain.photographs import read_pyramid
-from aerotri.terrain.pickets import Area, MatchOptions, grid_nodes, measure, steps_aside
+from aerotri.terrain.pickets import Area, MatchOptions, grid_nodes
 
 
 def off(rendered: Rendered, pickets, own) -> np.ndarray:

@@ -17,8 +17,9 @@ from aerotri.deformation.stereo_model import pair_model
 from aerotri.terrain.adjustment_part import adjustment_variances
 from aerotri.terrain.error_pickets import with_error_pickets
 from aerotri.terrain.interval import interval_of_gsd, k_of_slope
+from aerotri.terrain.matching import measure
 from aerotri.terrain.photographs import Photographs, photographs_of
-from aerotri.terrain.pickets import FIRST_ERROR, STATUS, Area, MatchOptions, Models, Pickets, measure
+from aerotri.terrain.pickets import FIRST_ERROR, STATUS, Area, MatchOptions, Models, Pickets
 from aerotri.terrain.surface import Surface, grid_over, ground_cells, interpolation_error, surface_of
 
 BEST_END_LAP = 0.6

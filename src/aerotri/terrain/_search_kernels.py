@@ -1,0 +1,113 @@
+"""Correlation along loci in object space: the vertical line of a node, the ray of a photograph."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerotri.compiled import kernel
+from aerotri.terrain._sampling_kernels import normalise, product, sample_linear
+from aerotri.terrain._view_kernels import parallax_per_metre, window_corners
+
+SMALLEST_ANGLE = 0.02
+"""Base over height below which two photographs give no height."""
+
+
+@kernel
+def correlation_at(view, chosen, spot, window, room):
+    """Mean correlation of the first of the photographs with the others that show the window; −1 where none does."""
+    first, second, corner, shift = room[0], room[1], room[2], room[3]
+    reach = 0.5 * (first.shape[0] - 1) * window
+    shift[:] = 0.0
+    if not window_corners(view, chosen[0], spot, reach, shift, corner):
+        return -1.0
+    sample_linear(view, chosen[0], corner, first)
+    if not normalise(first):
+        return -1.0
+    total, count = 0.0, 0
+    for k in range(1, len(chosen)):
+        if chosen[k] < 0 or not window_corners(view, chosen[k], spot, reach, shift, corner):
+            continue
+        sample_linear(view, chosen[k], corner, second)
+        count += 1
+        if normalise(second):
+            total += product(first, second)
+    return total / count if count else -1.0
+
+
+@kernel
+def search(view, chosen, spot, along, low, step, window, room, profile):
+    """Correlation at heights low, low + step … on a locus through the spot; the number of the best.
+
+    Parameters
+    ----------
+    along : (2,) m in x and y per metre of height: 0, 0 on the vertical line. profile : (k,) out.
+    """
+    best, place = 0, np.empty(5)
+    place[3:] = spot[3:]
+    for s in range(len(profile)):
+        z = low + s * step
+        place[0] = spot[0] + along[0] * (z - spot[2])
+        place[1] = spot[1] + along[1] * (z - spot[2])
+        place[2] = z
+        profile[s] = correlation_at(view, chosen, place, window, room)
+        if profile[s] > profile[best]:
+            best = s
+    return best
+
+
+@kernel
+def peak_offset(profile, best):
+    """Place of the top of a parabola through the best and its neighbours, in steps from the best."""
+    if best == 0 or best == len(profile) - 1:
+        return 0.0
+    left, top, right = profile[best - 1], profile[best], profile[best + 1]
+    bend = left - 2.0 * top + right
+    if left < 0.0 or right < 0.0 or not bend < 0.0:
+        return 0.0
+    return 0.5 * (left - right) / bend
+
+
+@kernel
+def second_peak(profile, best, apart):
+    """Largest value of another local maximum at least `apart` steps from the best."""
+    second = -1.0
+    for s in range(1, len(profile) - 1):
+        if abs(s - best) >= apart and profile[s] >= profile[s - 1] and profile[s] >= profile[s + 1]:
+            second = max(second, profile[s])
+    return second
+
+
+@kernel
+def make_room(n, most):
+    """What `correlation_at` and others work in."""
+    first, second = np.empty((n, n), np.float32), np.empty((n, n), np.float32)
+    return first, second, np.empty((4, 2)), np.zeros(6), np.empty(most)
+
+
+@kernel
+def find_heights(view, nodes, slopes, ranges, chosen, posts, window, step_px, most, heights, scores):
+    """Height of best correlation on the vertical line of every node, within a range about its prior height.
+
+    Parameters
+    ----------
+    nodes : (n, 3) m, x, y and the prior height. slopes : (n, 2). ranges : (n, 2) m, lowest and highest height.
+    chosen : (n, m) photographs, the first being the reference, −1 for none.
+    posts, window : posts a side and m between them. step_px : of the heights, posts of parallax. most : steps.
+    heights, scores : (n,) out; NaN and −1 where there is none.
+    """
+    room, spot, along = make_room(posts, most), np.empty(5), np.zeros(2)
+    for p in range(len(nodes)):
+        heights[p], scores[p] = np.nan, -1.0
+        if chosen[p, 1] < 0:
+            continue
+        spot[:3], spot[3:] = nodes[p], slopes[p]
+        per_metre = parallax_per_metre(view, chosen[p], spot)
+        if not per_metre > SMALLEST_ANGLE:
+            continue
+        step = step_px * window / per_metre
+        count = min(int((ranges[p, 1] - ranges[p, 0]) / step) + 2, most)
+        profile = room[4][:count]
+        best = search(view, chosen[p], spot, along, ranges[p, 0], step, window, room, profile)
+        if profile[best] > 0.0 and 0 < best < count - 1:
+            heights[p] = ranges[p, 0] + (best + peak_offset(profile, best)) * step
+            scores[p] = profile[best]

@@ -1,0 +1,154 @@
+"""Where a piece of ground lies in photographs, and which photographs show it: scalar kernels without objects.
+
+A window is a square of posts on a plane piece of ground. Its corners are projected into a photograph with the image
+errors of the tile that shows its middle, its posts lie bilinearly between them.
+
+view   : photos (1, n, 15) u = U·(x, y, z, 1) row by row, then c, x0, y0; source (n,) image errors; cameras as in
+         `deformation._kernels`; sensor (n, 3) half columns, half rows, pixels per mm; centres (n, 3) m;
+         crops (n, 5) offset into pixels, first row, first column, rows, columns, of the level; pixels (·,) uint16;
+         scale, pixels of the level per pixel of the photograph; edge, share of the format at its edge not used
+window : posts a side (odd), m between posts
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerotri.compiled import kernel
+from aerotri.deformation._kernels import error_in_tile, project, tile_of
+
+FIXED_POINT_MM, FIXED_POINT_STEPS = 1e-5, 40
+
+
+@kernel
+def photo_place(view, k, i, j, x, y, z):
+    """(column, row) px in photograph k, with the image errors of its tile (i, j); NaN behind the camera."""
+    photos, source, cameras, sensor = view[0], view[1], view[2], view[3]
+    ideal_x, ideal_y, u3 = project(photos, 0, k, x, y, z)
+    if not u3 < 0.0:
+        return np.nan, np.nan
+    mx, my = ideal_x, ideal_y
+    for _ in range(FIXED_POINT_STEPS):
+        dx, dy = error_in_tile(source[k], i, j, mx, my, cameras[2], cameras[3])
+        change = abs(ideal_x + dx - mx) + abs(ideal_y + dy - my)
+        mx, my = ideal_x + dx, ideal_y + dy
+        if not change > FIXED_POINT_MM:
+            break
+    return sensor[k, 0] + mx * sensor[k, 2], sensor[k, 1] - my * sensor[k, 2]
+
+
+@kernel
+def is_seen(view, k, x, y, z):
+    """Whether a place lies in the usable part of photograph k."""
+    half, edge = view[2][0], view[8]
+    ideal_x, ideal_y, u3 = project(view[0], 0, k, x, y, z)
+    if not u3 < 0.0:
+        return False
+    i, j = tile_of(view[1][k], ideal_x, ideal_y, view[2][1])
+    column, row = photo_place(view, k, i, j, x, y, z)
+    across = abs(column / view[3][k, 0] - 1.0)
+    along = abs(row / view[3][k, 1] - 1.0)
+    beyond = abs(ideal_x) > 3.0 * half[view[1][k], 0] or abs(ideal_y) > 3.0 * half[view[1][k], 1]
+    return not beyond and across <= 1.0 - 2.0 * edge and along <= 1.0 - 2.0 * edge
+
+
+@kernel
+def window_corners(view, k, spot, reach, shift, corner):
+    """Corners of a window in the crop of photograph k, (4, 2) column and row counted from its first pixel centre.
+
+    Parameters
+    ----------
+    spot : (5,) x, y, z of the middle and the slopes of the ground. reach : m from the middle to a side.
+    shift : (6,) m, plan displacement of the middle, and by which it changes along u and v over the reach.
+
+    Returns
+    -------
+    Whether all of it lies in the crop.
+    """
+    sensor, crop, scale = view[3], view[5][k], view[7]
+    ideal_x, ideal_y, u3 = project(view[0], 0, k, spot[0], spot[1], spot[2])
+    if not u3 < 0.0:
+        return False
+    i, j = tile_of(view[1][k], ideal_x, ideal_y, view[2][1])
+    for c in range(4):
+        u, v = (1.0 if c & 1 else -1.0), (1.0 if c & 2 else -1.0)
+        x = spot[0] + u * reach + shift[0] + u * shift[2] + v * shift[4]
+        y = spot[1] + v * reach + shift[1] + u * shift[3] + v * shift[5]
+        z = spot[2] + reach * (u * spot[3] + v * spot[4])
+        column, row = photo_place(view, k, i, j, x, y, z)
+        if not (0.0 <= column <= 2.0 * sensor[k, 0] and 0.0 <= row <= 2.0 * sensor[k, 1]):
+            return False
+        corner[c, 0] = column * scale - 0.5 - crop[2]
+        corner[c, 1] = row * scale - 0.5 - crop[1]
+        if not (1.0 <= corner[c, 0] < crop[4] - 2.0 and 1.0 <= corner[c, 1] < crop[3] - 2.0):
+            return False
+    return True
+
+
+@kernel
+def parallax_per_metre(view, chosen, spot):
+    """m of plan that the widest pair with the first photograph sees a metre of height as."""
+    centres, widest = view[4], 0.0
+    a = chosen[0]
+    ax = (spot[0] - centres[a, 0]) / (centres[a, 2] - spot[2])
+    ay = (spot[1] - centres[a, 1]) / (centres[a, 2] - spot[2])
+    for k in range(1, len(chosen)):
+        b = chosen[k]
+        if b >= 0:
+            bx = (spot[0] - centres[b, 0]) / (centres[b, 2] - spot[2])
+            by = (spot[1] - centres[b, 1]) / (centres[b, 2] - spot[2])
+            widest = max(widest, np.hypot(bx - ax, by - ay))
+    return widest
+
+
+@kernel
+def choose_photographs(view, nodes, candidates, most, chosen):
+    """The photographs that show every node, those most upright over it first; −1 where there are fewer.
+
+    nodes : (n, 3). candidates : (k,) photographs. chosen : (n, ≤ most) out.
+    """
+    centres = view[4]
+    distance = np.empty(chosen.shape[1])
+    for p in range(len(nodes)):
+        count = 0
+        for c in candidates:
+            if not is_seen(view, c, nodes[p, 0], nodes[p, 1], nodes[p, 2]):
+                continue
+            away = np.hypot(nodes[p, 0] - centres[c, 0], nodes[p, 1] - centres[c, 1])
+            at = count
+            while at > 0 and distance[at - 1] > away:
+                at -= 1
+            if at >= most:
+                continue
+            last = min(count, most - 1)
+            for q in range(last, at, -1):
+                chosen[p, q], distance[q] = chosen[p, q - 1], distance[q - 1]
+            chosen[p, at], distance[at] = c, away
+            count = min(count + 1, most)
+        for q in range(count, chosen.shape[1]):
+            chosen[p, q] = -1
+
+
+@kernel
+def choose_models(view, nodes, pairs, middles, chosen, number):
+    """The model nearest to every node of those whose photographs both show it; the nearer photograph comes first.
+
+    pairs : (k, 2) photographs. middles : (k, 2) m, middles of their bases. chosen : (n, 2) out. number : (n,) out.
+    """
+    centres = view[4]
+    for p in range(len(nodes)):
+        number[p], nearest = -1, np.inf
+        for k in range(len(pairs)):
+            away = np.hypot(nodes[p, 0] - middles[k, 0], nodes[p, 1] - middles[k, 1])
+            if (
+                away < nearest
+                and is_seen(view, pairs[k, 0], nodes[p, 0], nodes[p, 1], nodes[p, 2])
+                and is_seen(view, pairs[k, 1], nodes[p, 0], nodes[p, 1], nodes[p, 2])
+            ):
+                number[p], nearest = k, away
+        chosen[p, 0] = chosen[p, 1] = -1
+        if number[p] >= 0:
+            a, b = pairs[number[p], 0], pairs[number[p], 1]
+            to_a = np.hypot(nodes[p, 0] - centres[a, 0], nodes[p, 1] - centres[a, 1])
+            to_b = np.hypot(nodes[p, 0] - centres[b, 0], nodes[p, 1] - centres[b, 1])
+            chosen[p, 0], chosen[p, 1] = (a, b) if to_a <= to_b else (b, a)

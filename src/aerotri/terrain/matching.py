@@ -1,0 +1,192 @@
+"""Pickets measured by matching, from coarse to fine.
+
+The surface is found at every level of the pyramids on nodes of its own, within what the level above leaves open; on
+photographs as they are the pickets are measured: the height of best correlation on the vertical line, then the shift of
+the window in every other photograph by least squares, then the intersection of the rays. Where that fails a picket
+steps aside, as in Tran (2007). What is measured is matched backwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.spatial import KDTree
+
+from aerotri.conventions import InputError
+from aerotri.terrain import _picket_kernels as kernels
+from aerotri.terrain._search_kernels import find_heights
+from aerotri.terrain.photographs import Photographs, Site
+from aerotri.terrain.pickets import FIRST_ERROR, Area, MatchOptions, Models, Pickets, footprint, grid_nodes
+from aerotri.terrain.prior import COARSE_NODES_PX, SPARE_PX, Prior, cleaned, first_prior
+from aerotri.terrain.tiles import Tile, do_tiles
+
+STEP_PX, COARSE_STEP_PX = 0.5, 0.5
+MOST_STEPS = 400
+COARSE_WINDOW = 11
+FINE_START = 0.5
+LONGEST_STEP_ASIDE = 0.4
+NMAD, FEWEST_MISFITS, NEAREST = 1.4826, 20, 40
+Report = Callable[[float], None]
+
+
+def measure(
+    photographs: Photographs, known: np.ndarray, options: MatchOptions, area: Area | None = None,
+    models: Models | None = None, report: Report | None = None,
+) -> Pickets:  # fmt: skip
+    """Measure pickets.
+
+    Parameters
+    ----------
+    known : (k, 3) points of the ground in the CRS, such as the object points of the block: where heights are looked for
+        at first.
+    area : where; as far as photographs reach unless given. models : the pairs to be matched; any photographs without.
+    report : called with the share that is done.
+
+    Raises
+    ------
+    InputError
+    """
+    area = footprint(photographs) if area is None else area
+    gsd = float(np.median(photographs.gsd))
+    nodes = grid_nodes(area, options.interval)
+    if not len(nodes):
+        raise InputError(f"no picket lies in the area at an interval of {options.interval:g} m", "choose a smaller one")
+    levels = photographs.store.levels
+    prior = first_prior(known, area, gsd, levels)
+    work = [4.0**-k for k in range(levels)]
+    done = 0.0
+    for level in range(levels - 1, 0, -1):
+        spacing = max(COARSE_NODES_PX * gsd * 2**level, options.interval / 4.0)
+
+        def partly(share: float, level: int = level, done: float = done) -> None:
+            if report is not None:
+                report((done + share * work[level]) / sum(work))
+
+        prior = _coarse_level(photographs, area, prior, level, spacing, gsd, options, models, partly)
+        done += work[level]
+
+    def last(share: float) -> None:
+        if report is not None:
+            report((done + share * work[0]) / sum(work))
+
+    pickets = _fine_level(photographs, nodes, prior, gsd, options, models, last)
+    return with_sigma0(pickets, options.window_px * gsd)
+
+
+def _coarse_level(photographs, area: Area, prior: Prior, level: int, spacing: float, gsd: float, options, models,
+                  report: Report) -> Prior:  # fmt: skip
+    x, y = (
+        np.linspace(a, b, max(int(np.ceil((b - a) / spacing)) + 1, 3)) for a, b in zip(area.low, area.high, strict=True)
+    )
+    nodes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    heights, scores = np.full(len(nodes), np.nan), np.full(len(nodes), -1.0)
+    ratio = np.full(len(nodes), np.nan)
+    window = gsd * 2**level
+
+    def one(tile: Tile) -> None:
+        h, s = np.empty(len(tile.delta)), np.empty(len(tile.delta))
+        find_heights(
+            tile.view, tile.delta, tile.slopes, tile.ranges, tile.chosen, COARSE_WINDOW, window, COARSE_STEP_PX,
+            MOST_STEPS, h, s,
+        )  # fmt: skip
+        heights[tile.own], scores[tile.own] = tile.site.place[2] + h, s
+        ratio[tile.own] = tile.base_ratios()
+
+    do_tiles(photographs, nodes, prior, level, window * COARSE_WINDOW, options, models, one, report)
+    shape = len(y), len(x)
+    per_post = window / float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else np.nan
+    if not np.isfinite(per_post):
+        raise InputError("no two photographs show the same ground", "check the photographs and the area")
+    z = cleaned(heights.reshape(shape), scores.reshape(shape), per_post, prior.at(nodes)[0].reshape(shape))
+    relief = maximum_filter(z, 3) - minimum_filter(z, 3)
+    return Prior(x, y, z, SPARE_PX * per_post / 2.0 + 0.5 * relief)
+
+
+def _fine_level(photographs, nodes, prior: Prior, gsd: float, options: MatchOptions, models, report) -> Pickets:
+    n, m = len(nodes), 2 if models is not None else options.most_photographs
+    out = Pickets(
+        node=nodes, xyz=np.full((n, 3), np.nan), covariance=np.full((n, 3, 3), np.nan),
+        status=np.ones(n, np.int8), tries=np.zeros(n, np.int16), photographs=np.full((n, m), -1, np.int32),
+        correlation=np.full(n, np.nan), model=np.full(n, -1, np.int32), misfit=np.full(n, np.nan),
+        names=photographs.names, sigma0=np.nan,
+    )  # fmt: skip
+    aside = steps_aside(options, gsd)
+    settings = (STEP_PX, float(MOST_STEPS), options.search_px, options.distinct)
+    limits = np.array([options.threshold, options.largest_sigma_px, min(FINE_START, options.threshold)])
+
+    def one(tile: Tile) -> None:
+        k = len(tile.own)
+        status, tries = np.empty(k, np.int8), np.zeros(k, np.int16)
+        points, covariance = np.full((k, 3), np.nan), np.full((k, 3, 3), np.nan)
+        used, numbers, shifts = np.zeros((k, m), bool), np.full((k, 4), np.nan), np.zeros((k, m, 6))
+        kernels.measure_pickets(
+            tile.view, tile.delta, tile.slopes, prior.curvatures(nodes[tile.own]), tile.ranges, tile.chosen, aside,
+            options.window_px, gsd, settings, limits, (status, tries, points, covariance, used, numbers, shifts),
+        )  # fmt: skip
+        measured = (status == 0) | (status >= FIRST_ERROR)
+        out.status[tile.own], out.tries[tile.own] = status, tries
+        out.correlation[tile.own], out.model[tile.own] = numbers[:, 2], tile.model
+        rows = tile.own[measured]
+        out.xyz[rows], out.covariance[rows] = tile.site.from_delta(points[measured]), covariance[measured]
+        out.photographs[rows], place = _packed(tile.chosen[measured], used[measured])
+        first_shift = shifts[measured][np.arange(len(rows)), place]
+        out.misfit[rows] = _misfit(tile.site, points[measured], out.photographs[rows, :2], first_shift)
+
+    do_tiles(photographs, nodes, prior, 0, gsd * options.window_px + np.abs(aside).max(), options, models, one, report)
+    return out
+
+
+def _packed(chosen: np.ndarray, used: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The used photographs to the front, in their order, and the place (n,) of the second of them before."""
+    order = np.argsort(~used, axis=1, kind="stable")
+    packed = np.take_along_axis(chosen, order, axis=1)
+    return np.where(np.take_along_axis(used, order, axis=1), packed, -1), order[:, 1]
+
+
+def _misfit(site: Site, points: np.ndarray, pair: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    """(n,) what shifts (n, 6) of `kernels.turned_shift` are across the direction of parallax, over its σ."""
+    lean = [(points[:, :2] - c[:, :2]) / (c[:, 2] - points[:, 2])[:, None] for c in (site.centres[p] for p in pair.T)]
+    e = lean[1] - lean[0]
+    e /= np.linalg.norm(e, axis=1)[:, None]
+    across = e[:, 0] * shift[:, 1] - e[:, 1] * shift[:, 0]
+    variance = e[:, 1] ** 2 * shift[:, 2] + e[:, 0] ** 2 * shift[:, 3] - 2.0 * e[:, 0] * e[:, 1] * shift[:, 4]
+    return across / np.sqrt(np.maximum(variance, 1e-30))
+
+
+def steps_aside(options: MatchOptions, gsd: float) -> np.ndarray:
+    """(t, 2) m, offsets tried one after the other, the nearest first, the node itself before all."""
+    step = options.aside_px * gsd
+    reach = int(LONGEST_STEP_ASIDE * options.interval / step)
+    at = step * np.arange(-reach, reach + 1)
+    offsets = np.stack(np.meshgrid(at, at), axis=-1).reshape(-1, 2)
+    away = np.hypot(*offsets.T)
+    order = np.argsort(away, kind="stable")
+    return offsets[order[away[order] <= LONGEST_STEP_ASIDE * options.interval + 1e-9]][: options.most_aside + 1]
+
+
+def with_sigma0(pickets: Pickets, apart: float) -> Pickets:
+    """The pickets with covariances scaled by how large the y-parallaxes are.
+
+    Those of an orientation that is off are the same for neighbours; what differs between pickets near one another of
+    the same two photographs is matching. Medians keep gross errors out.
+
+    Parameters
+    ----------
+    apart : m from which on windows have no pixels in common.
+    """
+    own = np.flatnonzero(pickets.accepted & np.isfinite(pickets.misfit))
+    if len(own) < FEWEST_MISFITS:
+        return pickets
+    pair, plan = pickets.photographs[own, :2], pickets.xyz[own, :2]
+    away, near = (np.asarray(found) for found in KDTree(plan).query(plan, min(NEAREST, len(own))))
+    fits = (away >= apart) & (pair[near] == pair[:, None]).all(axis=2)
+    has = fits.any(axis=1)
+    if has.sum() < FEWEST_MISFITS:
+        return pickets
+    other = near[has, fits[has].argmax(axis=1)]
+    difference = np.abs(pickets.misfit[own][has] - pickets.misfit[own][other])
+    sigma0 = float(NMAD * np.median(difference) / np.sqrt(2.0))
+    return replace(pickets, covariance=pickets.covariance * sigma0**2, sigma0=sigma0)

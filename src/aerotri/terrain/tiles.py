@@ -1,0 +1,90 @@
+"""Nodes near one another with the crops of the photographs that show them, done in threads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.adjustment.parallel import thread_count
+from aerotri.terrain import _view_kernels as kernels
+from aerotri.terrain.photographs import Photographs, Site, site_at
+from aerotri.terrain.pickets import MatchOptions
+from aerotri.terrain.prior import Prior
+
+TILE_NODES = 40
+LARGEST_TILE_PX = 1500
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """Nodes near one another, with all that kernels need: `own` are their numbers, the rest is in Δ of the site."""
+
+    own: np.ndarray
+    site: Site
+    view: tuple
+    delta: np.ndarray
+    slopes: np.ndarray
+    ranges: np.ndarray
+    chosen: np.ndarray
+    model: np.ndarray
+
+    def base_ratios(self) -> np.ndarray:
+        """(n,) base over height of the first two photographs; NaN where there are none."""
+        c, d = self.site.centres, self.delta
+        both = self.chosen[:, 1] >= 0
+        a, b = c[self.chosen[:, 0]], c[self.chosen[:, 1]]
+        plan = np.hypot(*(a[:, :2] - b[:, :2]).T)
+        return np.where(both, plan / np.maximum(0.5 * (a[:, 2] + b[:, 2]) - d[:, 2], 1e-9), np.nan)
+
+
+def _tiles(nodes: np.ndarray, reach: float) -> Iterator[np.ndarray]:
+    """Numbers of the nodes of every square of side `reach`."""
+    cell = np.floor((nodes - nodes.min(axis=0)) / reach).astype(np.int64)
+    key = cell[:, 1] * (cell[:, 0].max() + 1) + cell[:, 0]
+    order = np.argsort(key, kind="stable")
+    yield from np.split(order, np.flatnonzero(np.diff(key[order])) + 1)
+
+
+def do_tiles(photographs: Photographs, nodes, prior: Prior, level: int, reach: float, options: MatchOptions, models,
+         one: Callable[[Tile], None], report: Callable[[float], None]) -> None:  # fmt: skip
+    """Do something to all tiles, in threads."""
+    gsd = float(np.median(photographs.gsd)) * 2**level
+    spacing = np.sqrt(np.ptp(nodes[:, 0]) * np.ptp(nodes[:, 1]) / max(len(nodes), 1)) or gsd
+    parts = list(_tiles(nodes, min(TILE_NODES * max(spacing, gsd), LARGEST_TILE_PX * gsd)))
+
+    def work(own: np.ndarray) -> None:
+        tile = _make_tile(photographs, nodes[own], own, prior, level, reach, options, models)
+        if (tile.chosen[:, 0] >= 0).any():
+            one(tile)
+
+    with ThreadPoolExecutor(thread_count()) as pool:
+        for k, _ in enumerate(pool.map(work, parts)):
+            report((k + 1) / len(parts))
+
+
+def _make_tile(photographs: Photographs, nodes, own, prior: Prior, level: int, reach, options, models) -> Tile:
+    z, slopes, spare = prior.at(nodes)
+    middle = 0.5 * (nodes.min(axis=0) + nodes.max(axis=0))
+    site = site_at(photographs, *middle.tolist())
+    delta = np.column_stack([nodes, z]) - site.place
+    ranges = np.column_stack([delta[:, 2] - spare, delta[:, 2] + spare])
+    low, high = delta.min(axis=0), delta.max(axis=0)
+    low[2], high[2] = ranges[:, 0].min(), ranges[:, 1].max()
+    view = site.view(level, low, high, options.edge, reach)
+    shown = np.flatnonzero(view[5][:, 3] > 0)
+    number = np.full(len(nodes), -1)
+    if models is not None:
+        chosen = np.full((len(nodes), 2), -1)
+        known = np.isin(models.pairs, shown).all(axis=1)
+        kept = np.flatnonzero(known)
+        kernels.choose_models(
+            view, delta, models.pairs[kept], models.middles[kept] - site.place[:2], chosen, number
+        )  # fmt: skip
+        number = np.where(number >= 0, kept[number] if len(kept) else -1, -1)
+    else:
+        chosen = np.full((len(nodes), options.most_photographs), -1)
+        kernels.choose_photographs(view, delta, shown, options.most_photographs, chosen)
+    return Tile(own, site, view, delta, slopes, ranges, chosen, number)
