@@ -24,8 +24,6 @@ SHORTEST_STRIP = 3.0
 """Photographs a strip has on average, where the track is one."""
 PLAUSIBLE = 0.1
 """Part by which a principal distance may differ from that of EXIF, which is rounded, before it is not believed."""
-HELD_WITH_IT = ("k3",)
-"""Lens parameters that such photographs do not determine either."""
 Progress = Callable[[str, int, int], None]
 """Told what is going on, how many are done and how many there are."""
 
@@ -79,25 +77,23 @@ def orient(
 
 
 def _plausible(stated: tuple[Camera, ...], found: tuple[Camera, ...]) -> tuple[tuple[Camera, ...], tuple[str, ...]]:
-    """The cameras with the interior of those held whose principal distance came out wrong, and what to say of it.
+    """The cameras with the principal distances held that came out wrong, and what to say of it.
 
     Vertical photographs from one height do not determine it without control; small changes between them, such as
-    leaves in the wind, then take it far off.
+    leaves in the wind, then take it far off. Principal point and lens stay free: what they do shows in such
+    photographs, and held at zero they bend the block.
     """
     cameras, said = [], []
     for camera, other in zip(stated, found, strict=True):
         ratio = other.focal_length_mm / camera.focal_length_mm
         if abs(ratio - 1.0) > PLAUSIBLE:
-            interior = {name: replace(prior, fixed=True) for name, prior in camera.interior.items()}
             said.append(
                 f"the photographs make the principal distance of {camera.name} {other.focal_length_mm:.3g} mm, "
                 f"{100 * (ratio - 1):+.0f} % off what is stated: it is held at {camera.focal_length_mm:.4g} mm, "
                 "and heights above the ground hang on that; control points determine it"
             )
-            lens = {
-                name: replace(prior, fixed=prior.fixed or name in HELD_WITH_IT) for name, prior in camera.lens.items()
-            }
-            camera = replace(camera, interior=interior, lens=lens)
+            held = {"focal_length_mm": replace(camera.interior["focal_length_mm"], fixed=True)}
+            camera = replace(camera, interior={**camera.interior, **held})
         cameras.append(camera)
     return tuple(cameras), tuple(said)
 
