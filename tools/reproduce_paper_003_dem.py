@@ -40,7 +40,10 @@ models and of tiles a triangle of pickets mixes two of them.
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import tempfile
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,16 +59,23 @@ from aerotri.commands.simulate import run_simulate
 from aerotri.deformation.dem_window import dem_models
 from aerotri.deformation.model_map import read_number_table
 from aerotri.deformation.restitution import ABSORBED, restitution
+from aerotri.functional_model.additional_parameters import parameter_set, parse_parameters
 from aerotri.rasters import Grid, RasterReader
 from aerotri.report.canvas import WIDTH, axes_at, new_figure, styled
 from aerotri.report.rendering import save_plots
+from aerotri.simulation import parse_spec, simulate
+from aerotri.simulation.camera_errors.lens import format_grid
 from aerotri.simulation.rendering import RenderOptions
+from aerotri.simulation.simulate import true_image_errors
 from aerotri.terrain.dtm import make_terrain_model
 
 SUBSETS = ("even", "odd")
 PIXELS, PIXEL_UM, GSD_M, TRUE_GSD_M = (575, 375), 180.0, 1.8, 0.09
-ERROR_PX, TIE_SIGMA_PX, INTERVAL_PX = 0.45, 0.1, 12.0
-PARAMETERS = "bluh:1-12,ultracam_d:42-73"
+ERROR_PX, TIE_SIGMA_PX, INTERVAL_PX, SEED = 0.45, 0.1, 12.0, 11
+SETS = {"1–12, 42–73": "bluh:1-12,ultracam_d:42-73", "42–73, field": "ultracam_d:42-73,collocation"}
+"""The paper's parameters, and the tiles with a random field, which knows no lens."""
+TRUE_SET, EXACT = "1–12, 42–73", 0.02
+NOISES = (50.0, 400.0, 800.0)
 CM = 100.0 * TRUE_GSD_M / GSD_M
 PLAN = """
 name = "{name}"
@@ -74,7 +84,7 @@ flight = {{ gsd_m = {gsd}, strips = 2, images_per_strip = 10, end_lap = 0.8, sid
 [0.5, 0.5, 0.5], position_sigma_m = [10.0, 10.0, 5.0], \
 cross_strips = [{{ position = 0.5, images = 6, end_lap = 0.6 }}] }}
 terrain = {{ kind = "undulating", height_m = 300.0, relief_rms_m = 30.0, wavelength_m = 900.0 }}
-tie_points = {{ per_image = 220, probability = 0.9, sigma_um = {tie} }}
+tie_points = {{ per_image = 220, probability = 0.9, sigma_um = {tie}, margin_px = 3.0 }}
 control = {{ distance_bases = 2.0, sigma_m = [0.1, 0.1, 0.1], check_points = 8 }}
 start_values = {{ kind = "perturbed", position_sigma_m = 5.0, angle_sigma_deg = 0.05 }}
 """
@@ -93,41 +103,69 @@ class Pair:
         return self.even - self.odd
 
 
+@dataclass(frozen=True, eq=False)
+class Corrected:
+    """What a set of parameters makes of the difference: foretold (rows, columns) m, and what corrections leave."""
+
+    foretold: np.ndarray
+    demcor: Pair
+    imgeo: Pair
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?", help="to work in; what it holds is not made again")
-    parser.add_argument("--noise", type=float, default=RenderOptions().noise, help="σ of the grey values, 16 bit")
+    parser.add_argument("--noise", type=float, nargs="*", default=NOISES, help="σ of the grey values, 16 bit")
+    parser.add_argument("--known", action="store_true", help="a camera that errs by the paper's parameters, ties exact")
     arguments = parser.parse_args()
     folder = arguments.folder or Path(tempfile.mkdtemp())
-    folder.mkdir(parents=True, exist_ok=True)
-    looks = RenderOptions(noise=arguments.noise)
-    erring, perfect = (prepare(folder, name, error, looks) for name, error in (("erring", ERROR_PX), ("perfect", 0.0)))
-    noise = match(perfect, "plain", "plain_dem")
-    before = match(erring, "plain", "plain_dem")
-    predicted = foretold(erring, before)
-    corrected = by_demcor(erring)
-    ideal = by_imgeo(erring)
-    tell(before, predicted, corrected, ideal, noise)
-    save_plots({"even_odd": draw(before, predicted, corrected, ideal)}, folder / "plots")
-    print(f"plots in {folder / 'plots'}")
+    for noise in arguments.noise:
+        here, looks = folder / f"grain_{noise:g}", RenderOptions(noise=noise)
+        erring = prepare(here, "known" if arguments.known else "erring", looks)
+        before = match(erring, "plain", "plain_dem")
+        still = match(prepare(here, "perfect", looks), "plain", "plain_dem")
+        sets = [TRUE_SET] if arguments.known else list(SETS)
+        corrected = {name: corrections(erring, name, before) for name in sets}
+        print("\n".join(table(noise, before, corrected, still)), flush=True)
+        figures = {f"even_odd_{k}": draw(name, noise, before, corrected[name]) for k, name in enumerate(sets)}
+        save_plots(figures, here / "plots")
+        print(f"plots in {here / 'plots'}")
 
 
-def prepare(folder: Path, name: str, error_px: float, looks: RenderOptions) -> Path:
-    """A rendered block with its two adjustments."""
-    errors = f", errors = {{ physical = {{ rms_um = {error_px * PIXEL_UM:g}, seed = 4 }} }}" if error_px else ""
-    here = folder / name
-    if (here / "calibrated" / "solution.npz").exists():
-        return here
-    here.mkdir(parents=True, exist_ok=True)
-    plan = here / "plan.toml"
-    plan.write_text(
-        PLAN.format(name=name, px=PIXELS, pixel=PIXEL_UM, errors=errors, gsd=GSD_M, tie=TIE_SIGMA_PX * PIXEL_UM),
-        encoding="utf-8",
-    )
-    run_simulate(plan, here / "block", 11, True, looks)
-    run_adjust(here / "block", here / "plain", "none", None, None, False, False, False)
-    run_adjust(here / "block", here / "calibrated", PARAMETERS, None, None, False, False, False)
+def prepare(folder: Path, name: str, looks: RenderOptions) -> Path:
+    """A rendered block with its adjustments, without additional parameters and with each set."""
+    here, plan = folder / name, folder / name / "plan.toml"
+    if not (here / "block" / "photographs").exists():
+        here.mkdir(parents=True, exist_ok=True)
+        tie = TIE_SIGMA_PX * PIXEL_UM * (EXACT if name == "known" else 1.0)
+        told = PLAN.format(name=name, px=PIXELS, pixel=PIXEL_UM, errors=ERRORS[name](), gsd=GSD_M, tie=tie)
+        plan.write_text(told, encoding="utf-8")
+        run_simulate(plan, here / "block", SEED, True, looks)
+    for result, spec in {"plain": "none", **SETS}.items() if name != "perfect" else (("plain", "none"),):
+        if not (here / result / "solution.npz").exists():
+            run_adjust(here / "block", here / result, spec, None, None, False, True, False)
     return here
+
+
+def by_physics() -> str:
+    return f", errors = {{ physical = {{ rms_um = {ERROR_PX * PIXEL_UM:g}, seed = 4 }} }}"
+
+
+def by_parameters() -> str:
+    """The values of the paper's parameters that come nearest to the camera that errs by physics."""
+    text = PLAN.format(name="known", px=PIXELS, pixel=PIXEL_UM, errors=by_physics(), gsd=GSD_M, tie=1.0)
+    spec = parse_spec(tomllib.loads(text))
+    camera, field = simulate(spec, SEED)[0].cameras[0], next(iter(true_image_errors(spec, SEED).values()))
+    x, y = format_grid(camera.half_format_mm, 115, 75)
+    sets = [parameter_set(family, items, camera) for family, items in parse_parameters(SETS[TRUE_SET])]
+    design = np.concatenate([chosen.basis(x, y) for chosen in sets], axis=2)
+    values = np.linalg.lstsq(design.reshape(-1, design.shape[2]), field(x, y).ravel(), rcond=None)[0]
+    names = [name for chosen in sets for name in chosen.names]
+    pairs = ", ".join(f'"{name}" = {value:.9e}' for name, value in zip(names, values, strict=True))
+    return f", errors = {{ parameters = {{ {pairs} }} }}"
+
+
+ERRORS = {"perfect": str, "erring": by_physics, "known": by_parameters}
 
 
 def match(here: Path, result: str, name: str, photographs: str = "block/photographs", ideal: bool = False) -> Pair:
@@ -163,9 +201,13 @@ def common(paths: list[Path]) -> Pair:
     return Pair(grid, *z)
 
 
-def foretold(here: Path, found: Pair) -> np.ndarray:
+def corrections(here: Path, name: str, before: Pair) -> Corrected:
+    return Corrected(foretold(here, name, before), by_demcor(here, name), by_imgeo(here, name))
+
+
+def foretold(here: Path, name: str, found: Pair) -> np.ndarray:
     """(rows, columns) m, what the deformation of the models lets expect of the difference."""
-    calibration = reopened(here / "calibrated", Console(quiet=True))
+    calibration = reopened(here / name, Console(quiet=True))
     of = restitution(calibration, ABSORBED)
     x, y = np.meshgrid(found.grid.x(np.arange(found.grid.columns)), found.grid.y(np.arange(found.grid.rows)))
     parts = []
@@ -182,20 +224,25 @@ def foretold(here: Path, found: Pair) -> np.ndarray:
     return parts[0] - parts[1]
 
 
-def by_demcor(here: Path) -> Pair:
-    for subset in SUBSETS:
-        source, out = here / f"plain_dem_{subset}", here / f"corrected_{subset}.tif"
+def by_demcor(here: Path, name: str) -> Pair:
+    outs = [here / f"corrected {name} {subset}.tif" for subset in SUBSETS]
+    for subset, out in zip(SUBSETS, outs, strict=True):
+        source = here / f"plain_dem_{subset}"
         if not out.exists():
-            models = source / "model.tif"
-            run_demcor(here / "calibrated", source / "dsm.tif", out, None, models, None, str(here / "plain"), True)
-    return common([here / f"corrected_{subset}.tif" for subset in SUBSETS])
+            with contextlib.redirect_stdout(io.StringIO()):
+                run_demcor(
+                    here / name, source / "dsm.tif", out, None, source / "model.tif", None, str(here / "plain"), True
+                )
+    return common(outs)
 
 
-def by_imgeo(here: Path) -> Pair:
-    if not (here / "ideal").exists():
-        photographs = sorted((here / "block" / "photographs").glob("*.tif"))
-        run_imgeo(here / "calibrated", photographs, here / "ideal", ImgeoOptions("lanczos"), True)
-    return match(here, "calibrated", "ideal_dem", "ideal", ideal=True)
+def by_imgeo(here: Path, name: str) -> Pair:
+    photographs = f"ideal {name}"
+    if not (here / photographs).exists():
+        given = sorted((here / "block" / "photographs").glob("*.tif"))
+        with contextlib.redirect_stdout(io.StringIO()):
+            run_imgeo(here / name, given, here / photographs, ImgeoOptions("lanczos"), True)
+    return match(here, name, f"ideal_dem {name}", photographs, ideal=True)
 
 
 def spread(values: np.ndarray) -> float:
@@ -203,35 +250,44 @@ def spread(values: np.ndarray) -> float:
     return CM * float(np.nanstd(values))
 
 
-def tell(before: Pair, predicted: np.ndarray, corrected: Pair, ideal: Pair, noise: Pair) -> None:
-    both = np.isfinite(before.difference) & np.isfinite(predicted)
-    correlation = np.corrcoef(before.difference[both], predicted[both])[0, 1]
-    n = spread(noise.difference)
-    print(f"\neven − odd, cm at a GSD of 9 cm, {both.sum()} cells")
-    print(f"{'':<34}{'mean':>8}{'σ':>8}{'σ / noise':>11}")
-    rows = (
-        ("found, no self-calibration", before.difference), ("foretold", np.where(both, predicted, np.nan)),
-        ("found less foretold", before.difference - predicted), ("after demcor", corrected.difference),
-        ("after imgeo and new matching", ideal.difference), ("noise: a camera without errors", noise.difference),
-    )  # fmt: skip
-    for text, values in rows:
-        print(f"{text:<34}{CM * np.nanmean(values):>8.2f}{spread(values):>8.2f}{spread(values) / n:>11.2f}")
-    print(f"correlation of the found with the foretold pattern {correlation:.3f}")
+def table(noise: float, before: Pair, corrected: dict[str, Corrected], still: Pair) -> list[str]:
+    """Lines: mean and σ, cm, and σ over the noise; for every set."""
+    n = spread(still.difference)
+    lines = [
+        f"\ngrain {noise:g}: even − odd, cm at a GSD of 9 cm, {np.isfinite(before.difference).sum()} cells",
+        f"{'':<34}{'mean':>8}{'σ':>8}{'σ / noise':>11}",
+    ]
+
+    def line(text: str, values: np.ndarray) -> str:
+        return f"{text:<34}{CM * np.nanmean(values):>8.2f}{spread(values):>8.2f}{spread(values) / n:>11.2f}"
+
+    lines += [line("noise: a camera without errors", still.difference), line("found", before.difference)]
+    for name, c in corrected.items():
+        both = np.isfinite(before.difference) & np.isfinite(c.foretold)
+        correlation = np.corrcoef(before.difference[both], c.foretold[both])[0, 1]
+        lines += [
+            f"{name}: correlation of the found with the foretold {correlation:.3f}",
+            line("  foretold", np.where(both, c.foretold, np.nan)),
+            line("  found less foretold", before.difference - c.foretold),
+            line("  after demcor", c.demcor.difference),
+            line("  after imgeo and new matching", c.imgeo.difference),
+        ]
+    return lines
 
 
 @styled
-def draw(before: Pair, predicted: np.ndarray, corrected: Pair, ideal: Pair):
+def draw(name: str, noise: float, before: Pair, corrected: Corrected):
     """Four maps with one scale."""
     panels = (
-        ("found, no self-calibration", before.grid, before.difference), ("foretold", before.grid, predicted),
-        ("after demcor", corrected.grid, corrected.difference),
-        ("after imgeo and new matching", ideal.grid, ideal.difference),
+        ("found, no self-calibration", before.grid, before.difference), ("foretold", before.grid, corrected.foretold),
+        ("after demcor", corrected.demcor.grid, corrected.demcor.difference),
+        ("after imgeo and new matching", corrected.imgeo.grid, corrected.imgeo.difference),
     )  # fmt: skip
     width = (WIDTH - 2.65) / 2.0
     height = width * before.grid.rows / before.grid.columns
     figure = new_figure(
         2 * height + 2.2, "DEM of even less DEM of odd photographs",
-        "UltraCamD, 80 % flight, 60 % models; cm at a GSD of 9 cm; blue: no common ground",
+        f"UltraCamD, 80 % flight, 60 % models; {name}; grain {noise:g}; cm at a GSD of 9 cm; blue: no common ground",
     )  # fmt: skip
     limit = CM * float(np.nanpercentile(np.abs(before.difference), 98))
     image = None
