@@ -48,6 +48,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from aerotri.commands.adjust import run_adjust
 from aerotri.commands.console import Console
@@ -58,6 +59,7 @@ from aerotri.commands.results import reopened
 from aerotri.commands.simulate import run_simulate
 from aerotri.deformation.dem_window import dem_models
 from aerotri.deformation.model_map import read_number_table
+from aerotri.deformation.photo_errors import seams_mm
 from aerotri.deformation.restitution import ABSORBED, restitution
 from aerotri.functional_model.additional_parameters import parameter_set, parse_parameters
 from aerotri.rasters import Grid, RasterReader
@@ -71,7 +73,8 @@ from aerotri.terrain.dtm import make_terrain_model
 
 SUBSETS = ("even", "odd")
 PIXELS, PIXEL_UM, GSD_M, TRUE_GSD_M = (575, 375), 180.0, 1.8, 0.09
-ERROR_PX, TIE_SIGMA_PX, INTERVAL_PX, SEED = 0.45, 0.1, 12.0, 11
+ERROR_PX, TIE_SIGMA_PX, INTERVAL_PX, TIES, SEED = 0.45, 0.1, 12.0, 1000, 11
+WINDOW_PX = DtmOptions().window
 SETS = {"1–12, 42–73": "bluh:1-12,ultracam_d:42-73", "42–73, field": "ultracam_d:42-73,collocation"}
 """The paper's parameters, and the tiles with a random field, which knows no lens."""
 TRUE_SET, EXACT = "1–12, 42–73", 0.02
@@ -84,7 +87,7 @@ flight = {{ gsd_m = {gsd}, strips = 2, images_per_strip = 10, end_lap = 0.8, sid
 [0.5, 0.5, 0.5], position_sigma_m = [10.0, 10.0, 5.0], \
 cross_strips = [{{ position = 0.5, images = 6, end_lap = 0.6 }}] }}
 terrain = {{ kind = "undulating", height_m = 300.0, relief_rms_m = 30.0, wavelength_m = 900.0 }}
-tie_points = {{ per_image = 220, probability = 0.9, sigma_um = {tie}, margin_px = 3.0 }}
+tie_points = {{ per_image = {ties}, probability = 0.9, sigma_um = {tie}, margin_px = 3.0 }}
 control = {{ distance_bases = 2.0, sigma_m = [0.1, 0.1, 0.1], check_points = 8 }}
 start_values = {{ kind = "perturbed", position_sigma_m = 5.0, angle_sigma_deg = 0.05 }}
 """
@@ -126,7 +129,7 @@ def main() -> None:
         still = match(prepare(here, "perfect", looks), "plain", "plain_dem")
         sets = [TRUE_SET] if arguments.known else list(SETS)
         corrected = {name: corrections(erring, name, before) for name in sets}
-        print("\n".join(table(noise, before, corrected, still)), flush=True)
+        print("\n".join(table(noise, before, corrected, still, clear_cells(erring, before))), flush=True)
         figures = {f"even_odd_{k}": draw(name, noise, before, corrected[name]) for k, name in enumerate(sets)}
         save_plots(figures, here / "plots")
         print(f"plots in {here / 'plots'}")
@@ -138,12 +141,14 @@ def prepare(folder: Path, name: str, looks: RenderOptions) -> Path:
     if not (here / "block" / "photographs").exists():
         here.mkdir(parents=True, exist_ok=True)
         tie = TIE_SIGMA_PX * PIXEL_UM * (EXACT if name == "known" else 1.0)
-        told = PLAN.format(name=name, px=PIXELS, pixel=PIXEL_UM, errors=ERRORS[name](), gsd=GSD_M, tie=tie)
+        told = PLAN.format(name=name, px=PIXELS, pixel=PIXEL_UM, errors=ERRORS[name](), gsd=GSD_M, tie=tie, ties=TIES)
         plan.write_text(told, encoding="utf-8")
-        run_simulate(plan, here / "block", SEED, True, looks)
+        with contextlib.redirect_stdout(io.StringIO()):
+            run_simulate(plan, here / "block", SEED, True, looks)
     for result, spec in {"plain": "none", **SETS}.items() if name != "perfect" else (("plain", "none"),):
         if not (here / result / "solution.npz").exists():
-            run_adjust(here / "block", here / result, spec, None, None, False, True, False)
+            with contextlib.redirect_stdout(io.StringIO()):
+                run_adjust(here / "block", here / result, spec, None, None, False, True, False)
     return here
 
 
@@ -153,7 +158,7 @@ def by_physics() -> str:
 
 def by_parameters() -> str:
     """The values of the paper's parameters that come nearest to the camera that errs by physics."""
-    text = PLAN.format(name="known", px=PIXELS, pixel=PIXEL_UM, errors=by_physics(), gsd=GSD_M, tie=1.0)
+    text = PLAN.format(name="known", px=PIXELS, pixel=PIXEL_UM, errors=by_physics(), gsd=GSD_M, tie=1.0, ties=TIES)
     spec = parse_spec(tomllib.loads(text))
     camera, field = simulate(spec, SEED)[0].cameras[0], next(iter(true_image_errors(spec, SEED).values()))
     x, y = format_grid(camera.half_format_mm, 115, 75)
@@ -205,23 +210,53 @@ def corrections(here: Path, name: str, before: Pair) -> Corrected:
     return Corrected(foretold(here, name, before), by_demcor(here, name), by_imgeo(here, name))
 
 
+def models_of_cells(here: Path, subset: str, grid: Grid) -> tuple[tuple[tuple[str, str], ...], np.ndarray]:
+    """The models of a DEM by number, and the number (rows, columns) that each cell belongs to; −1: none."""
+    source = here / f"plain_dem_{subset}"
+    table = read_number_table(source / "models.csv")
+    x, y = grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows))
+    with RasterReader(source / "model.tif") as reader:
+        row, column = (np.round(v).astype(int) for v in (reader.grid.row(y), reader.grid.column(x)))
+        number = reader.read(int(row[0]), int(column[0]), len(row), len(column))
+    return tuple(table[k] for k in sorted(table)), np.where(np.isfinite(number), number, -1).astype(np.int32)
+
+
+def places(grid: Grid, z: np.ndarray) -> np.ndarray:
+    """(n, 3) m of the cells."""
+    x, y = np.meshgrid(grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows)))
+    return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+
+
 def foretold(here: Path, name: str, found: Pair) -> np.ndarray:
     """(rows, columns) m, what the deformation of the models lets expect of the difference."""
     calibration = reopened(here / name, Console(quiet=True))
-    of = restitution(calibration, ABSORBED)
-    x, y = np.meshgrid(found.grid.x(np.arange(found.grid.columns)), found.grid.y(np.arange(found.grid.rows)))
-    parts = []
+    of, parts = restitution(calibration, ABSORBED), []
     for subset, z in zip(SUBSETS, (found.even, found.odd), strict=True):
-        source = here / f"plain_dem_{subset}"
-        table = read_number_table(source / "models.csv")
-        models = dem_models(calibration, of, tuple(table[k] for k in sorted(table)))
-        with RasterReader(source / "model.tif") as reader:
-            row, column = (np.round(v).astype(int) for v in (reader.grid.row(y[:, 0]), reader.grid.column(x[0])))
-            window = reader.read(int(row[0]), int(column[0]), len(row), len(column))
-        number = np.where(np.isfinite(window), window, -1).astype(np.int32)
-        xyz = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-        parts.append(models.deformation_at(number.ravel(), xyz)[:, 2].reshape(x.shape))
+        names, number = models_of_cells(here, subset, found.grid)
+        models = dem_models(calibration, of, names)
+        parts.append(models.deformation_at(number.ravel(), places(found.grid, z))[:, 2].reshape(z.shape))
     return parts[0] - parts[1]
+
+
+def clear_cells(here: Path, found: Pair) -> np.ndarray:
+    """(rows, columns) bool: cells whose windows lie in one tile of every photograph, and whose neighbours in one model.
+
+    A window of 17 pixels is a tenth of a tile of this camera, and 1/200 of one of the true camera.
+    """
+    calibration = reopened(here / "plain", Console(quiet=True))
+    of, clear = restitution(calibration).true, np.isfinite(found.difference)
+    row = {str(name): k for k, name in enumerate(calibration.local.block.images.names)}
+    for subset, z in zip(SUBSETS, (found.even, found.odd), strict=True):
+        names, number = models_of_cells(here, subset, found.grid)
+        clear &= maximum_filter(number, 3) == minimum_filter(number, 3)
+        for side in (0, 1):
+            photo = np.array([row[pair[side]] for pair in names])[number.ravel()]
+            u = np.einsum("nji,nj->ni", of.rotation[photo], places(found.grid, z) - of.centre[photo])
+            xy = -of.interior[photo, :1] * u[:, :2] / u[:, 2:]
+            for axis, seams in enumerate(seams_mm(calibration.local.block.cameras[0])):
+                away = np.abs(xy[:, axis, None] - seams).min(axis=1) / (1e-3 * PIXEL_UM)
+                clear &= (away > 0.5 * WINDOW_PX + ERROR_PX).reshape(z.shape)
+    return clear
 
 
 def by_demcor(here: Path, name: str) -> Pair:
@@ -250,29 +285,47 @@ def spread(values: np.ndarray) -> float:
     return CM * float(np.nanstd(values))
 
 
-def table(noise: float, before: Pair, corrected: dict[str, Corrected], still: Pair) -> list[str]:
-    """Lines: mean and σ, cm, and σ over the noise; for every set."""
+def table(noise: float, before: Pair, corrected: dict[str, Corrected], still: Pair, clear: np.ndarray) -> list[str]:
+    """Lines: mean and σ, cm, and σ over the noise, of all cells and of those clear of seams; for every set."""
     n = spread(still.difference)
     lines = [
-        f"\ngrain {noise:g}: even − odd, cm at a GSD of 9 cm, {np.isfinite(before.difference).sum()} cells",
-        f"{'':<34}{'mean':>8}{'σ':>8}{'σ / noise':>11}",
+        f"\ngrain {noise:g}: even − odd, cm at a GSD of 9 cm, {np.isfinite(before.difference).sum()} cells, "
+        f"{100.0 * clear.sum() / np.isfinite(before.difference).sum():.0f} % clear of seams",
+        f"{'':<34}{'mean':>8}{'σ':>8}{'σ / noise':>11}{'clear: σ':>11}{'σ / noise':>11}",
     ]
 
-    def line(text: str, values: np.ndarray) -> str:
-        return f"{text:<34}{CM * np.nanmean(values):>8.2f}{spread(values):>8.2f}{spread(values) / n:>11.2f}"
+    def line(text: str, grid: Grid, values: np.ndarray) -> str:
+        own = spread(values[inside(before.grid, clear, grid)])
+        return (
+            f"{text:<34}{CM * np.nanmean(values):>8.2f}{spread(values):>8.2f}{spread(values) / n:>11.2f}"
+            f"{own:>11.2f}{own / n:>11.2f}"
+        )
 
-    lines += [line("noise: a camera without errors", still.difference), line("found", before.difference)]
+    lines += [
+        line("noise: a camera without errors", still.grid, still.difference),
+        line("found", before.grid, before.difference),
+    ]
     for name, c in corrected.items():
         both = np.isfinite(before.difference) & np.isfinite(c.foretold)
         correlation = np.corrcoef(before.difference[both], c.foretold[both])[0, 1]
         lines += [
             f"{name}: correlation of the found with the foretold {correlation:.3f}",
-            line("  foretold", np.where(both, c.foretold, np.nan)),
-            line("  found less foretold", before.difference - c.foretold),
-            line("  after demcor", c.demcor.difference),
-            line("  after imgeo and new matching", c.imgeo.difference),
+            line("  foretold", before.grid, np.where(both, c.foretold, np.nan)),
+            line("  found less foretold", before.grid, before.difference - c.foretold),
+            line("  after demcor", c.demcor.grid, c.demcor.difference),
+            line("  after imgeo and new matching", c.imgeo.grid, c.imgeo.difference),
         ]
     return lines
+
+
+def inside(grid: Grid, chosen: np.ndarray, other: Grid) -> np.ndarray:
+    """The cells chosen on one grid on another grid of the same lattice; False beyond."""
+    row = np.round(grid.row(other.y(np.arange(other.rows)))).astype(int)
+    column = np.round(grid.column(other.x(np.arange(other.columns)))).astype(int)
+    rows, columns = (row >= 0) & (row < grid.rows), (column >= 0) & (column < grid.columns)
+    out = np.zeros((other.rows, other.columns), bool)
+    out[np.ix_(rows, columns)] = chosen[np.ix_(row[rows], column[columns])]
+    return out
 
 
 @styled

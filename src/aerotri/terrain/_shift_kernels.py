@@ -161,8 +161,12 @@ def match_shift(view, k, spot, e, window, bending, template, other, normal, room
 
 @kernel
 def turned_shift(found, e, out):
-    """A displacement along and across e, with its covariance, as x and y."""
-    a, b, va, vb, c = found[0], found[1], found[2], found[3], found[4]
+    """A displacement along and across e, with their variances, as x and y.
+
+    What texture makes common to both is left out: y-parallaxes are those of the orientation and of the image errors
+    rather than of matching, and must not pull the parallax along with them.
+    """
+    a, b, va, vb, c = found[0], found[1], found[2], found[3], 0.0
     out[0], out[1] = a * e[0] - b * e[1], a * e[1] + b * e[0]
     out[2] = e[0] * e[0] * va - 2.0 * e[0] * e[1] * c + e[1] * e[1] * vb
     out[3] = e[1] * e[1] * va + 2.0 * e[0] * e[1] * c + e[0] * e[0] * vb
