@@ -14,6 +14,10 @@ from aerotri.terrain._view_kernels import parallax_per_metre, window_corners
 ACCEPTED, UNSEEN, POOR, AT_END, WEAK = 0, 1, 2, 3, 4
 BACKWARD, AMBIGUOUS = 5, 6
 """Status of a picket; from `BACKWARD` on it was measured and is in error."""
+AGREEING_POSTS = 1.0
+"""Posts by which a ray may miss the intersection of all."""
+FIRST_PHOTOGRAPHS = 3
+"""Photographs that are tried as the one the others are matched to."""
 
 
 @kernel
@@ -101,44 +105,47 @@ def locus_check(view, chosen, one, spot, point_z, rays_px, window, step_px, dist
 
 
 @kernel
-def measure_one(
-    view, chosen, spot, curvature, window, limits, template, other, normal, room, shifts, used, point, covariance,
-    numbers,
-):  # fmt: skip
-    """Shifts of all photographs against the first and their intersection; the status.
-
-    curvature : 1/m, σ of the second derivatives of the ground. limits : correlation threshold, largest σ of a parallax
-    in posts. numbers : (4,) out: vᵀPv, redundancy, lowest
-    correlation of a ray, σ of the parallax in posts.
-    """
-    centres, a = view[4], chosen[0]
-    corner, shift, weights = room[0], room[1], room[2]
-    n, m = other.shape[0], len(chosen)
+def take_template(view, k, spot, window, template, room):
+    """Grey values of photograph k's window, scaled to a deviation of 1; ACCEPTED, or why there are none."""
+    corner, shift, weights, bend = room[0], room[1], room[2], room[6]
+    n = template.shape[0]
     shift[:] = 0.0
-    used[:] = False
-    shifts[:] = 0.0
-    if not window_corners(view, a, spot, 0.5 * (n + 1) * window, shift, corner):
+    if not window_corners(view, k, spot, 0.5 * (n - 1) * window, shift, corner):
         return UNSEEN
-    room[6][:] = 0.0
-    sample_cubic(view, a, corner, room[6], template, weights)
+    bend[:] = 0.0
+    sample_cubic(view, k, corner, bend, template, weights)
     total, squares = 0.0, 0.0
-    for q in range(n + 2):
-        for p in range(n + 2):
+    for q in range(n):
+        for p in range(n):
             total += template[q, p]
             squares += template[q, p] ** 2
-    mean = total / (n + 2) ** 2
-    deviation = np.sqrt(max(squares / (n + 2) ** 2 - mean * mean, 0.0))
+    mean = total / n**2
+    deviation = np.sqrt(max(squares / n**2 - mean * mean, 0.0))
     if not deviation > 0.0:
         return POOR
-    for q in range(n + 2):
-        for p in range(n + 2):
+    for q in range(n):
+        for p in range(n):
             template[q, p] = (template[q, p] - mean) / deviation
-    e, found, kept, seen = np.empty(2), np.empty(6), 0, 0
-    best, sum_x, sum_y, sum_xy = 0.0, 0.0, 0.0, 0.0
-    numbers[2], numbers[3] = 1.0, np.inf
+    return ACCEPTED
+
+
+@kernel
+def all_shifts(view, chosen, spot, curvature, window, least, work, shifts, parallax):
+    """Shifts of all photographs against the first, whose template has been taken; how many there are to be matched.
+
+    Parameters
+    ----------
+    least : correlation below which a shift is none.
+    shifts : (m, 6) of `intersect`, then the correlation, 0 where the photograph does not show the window.
+    parallax : (m,) m, σ of the shifts along the base, ∞ where there is none.
+    """
+    template, other, normal, room, e, found = work
+    centres, a, n, seen = view[4], chosen[0], other.shape[0], 0
+    shifts[:] = 0.0
+    parallax[:] = np.inf
     ax = (spot[0] - centres[a, 0]) / (centres[a, 2] - spot[2])
     ay = (spot[1] - centres[a, 1]) / (centres[a, 2] - spot[2])
-    for k in range(1, m):
+    for k in range(1, len(chosen)):
         b = chosen[k]
         if b < 0:
             continue
@@ -151,97 +158,187 @@ def measure_one(
         e /= length
         bending = 0.5 * curvature * (0.5 * (n - 1) * window) ** 2 * length
         template_normals(template, n, e, window, normal)
-        if not match_shift(view, b, spot, e, window, bending, template, other, normal, room, found):
-            continue
-        best = max(best, found[5])
-        if found[5] < limits[0]:
-            continue
-        turned_shift(found, e, shifts[k])
-        used[k] = True
-        kept += 1
-        numbers[2] = min(numbers[2], found[5])
-        numbers[3] = min(numbers[3], np.sqrt(found[2]) / window)
-        sum_x, sum_y, sum_xy = sum_x + shifts[k, 2], sum_y + shifts[k, 3], sum_xy + shifts[k, 4]
-    if not seen:
+        if match_shift(view, b, spot, e, window, bending, template, other, normal, room, found):
+            turned_shift(found, e, shifts[k])
+            if found[5] >= least:
+                parallax[k] = np.sqrt(found[2])
+    return seen
+
+
+@kernel
+def worst_ray(view, chosen, used, point, ideal, window):
+    """The photograph, of those used but the first, whose ray misses a point most, and by how many posts."""
+    worst, most = -1, 0.0
+    for k in range(1, len(chosen)):
+        if used[k]:
+            x, y, u3 = project(view[0], 0, chosen[k], point[0], point[1], point[2])
+            away = np.hypot(ideal[k, 0] - x, ideal[k, 1] - y) * abs(u3 / view[0][0, chosen[k], 12]) / window
+            if away > most:
+                worst, most = k, away
+    return worst, most
+
+
+@kernel
+def agreeing_rays(view, chosen, shifts, used, spot, window, room, point, covariance):
+    """Intersect the used rays; those that miss the point are left out one by one. vᵀPv, or −1.
+
+    The first photograph has the mean of the variances of the others.
+    """
+    while True:
+        kept = 0
+        shifts[0, 2:5] = 0.0
+        for k in range(1, len(chosen)):
+            if used[k]:
+                kept += 1
+                shifts[0, 2:5] += shifts[k, 2:5]
+        if kept == 0:
+            return -1.0
+        shifts[0, 2:5] /= kept
+        used[0] = True
+        total = intersect(view, chosen, shifts, used, spot, point, covariance, room[4], room[5])
+        if total < 0.0:
+            return -1.0
+        worst, away = worst_ray(view, chosen, used, point, room[4], window)
+        if away <= AGREEING_POSTS:
+            return total
+        used[worst] = False
+
+
+@kernel
+def measure_one(
+    view, chosen, spot, curvature, window, limits, work, shifts, used, parallax, point, covariance, numbers
+):  # fmt: skip
+    """Shifts of all photographs against the first and their intersection; the status.
+
+    Two photographs are enough where their correlation reaches the threshold. Three and more vouch for one another where
+    their rays meet: a lower correlation is enough.
+
+    curvature : 1/m, σ of the second derivatives of the ground. limits : correlation threshold, the same for photographs
+    that agree, largest σ of a parallax in posts. numbers : (4,) out: vᵀPv, redundancy, lowest correlation of a ray, σ
+    of the parallax in posts.
+    """
+    template, room = work[0], work[3]
+    used[:] = False
+    status = take_template(view, chosen[0], spot, window, template, room)
+    if status != ACCEPTED:
+        return status
+    least = min(limits[0], limits[1])
+    if not all_shifts(view, chosen, spot, curvature, window, least, work, shifts, parallax):
         return UNSEEN
-    if not kept:
-        numbers[2] = best
+    best, kept = shifts[1:, 5].max(), 0
+    for k in range(1, len(chosen)):
+        used[k] = np.isfinite(parallax[k])
+        kept += used[k]
+    numbers[2] = best
+    if kept == 0 or (kept == 1 and best < limits[0]):
         return POOR
-    if not numbers[3] < limits[1]:
+    if not parallax.min() < limits[2] * window:
         return WEAK
-    used[0] = True
-    shifts[0, 2], shifts[0, 3], shifts[0, 4] = sum_x / kept, sum_y / kept, sum_xy / kept
-    numbers[0] = intersect(view, chosen, shifts, used, spot, point, covariance, room[4], room[5])
-    numbers[1] = 2.0 * (kept + 1) - 3.0
-    return ACCEPTED if numbers[0] >= 0.0 else WEAK
+    numbers[0] = agreeing_rays(view, chosen, shifts, used, spot, window, room, point, covariance)
+    left = used.sum() - 1
+    if numbers[0] < 0.0 or left < min(kept, 2):
+        return POOR
+    numbers[1], numbers[2], numbers[3] = 2.0 * (left + 1) - 3.0, 1.0, np.inf
+    for k in range(1, len(chosen)):
+        if used[k]:
+            numbers[2] = min(numbers[2], shifts[k, 5])
+            numbers[3] = min(numbers[3], parallax[k] / window)
+    return ACCEPTED
+
+
+@kernel
+def matched_back(view, chosen, shifts, used, spot, point_z, settings, window, room):
+    """ACCEPTED, or in which way matching along the rays of the best pair ends elsewhere."""
+    step_px, _, rays_px, distinct = settings
+    pair, best = np.empty(2, np.int64), 1
+    for k in range(1, len(chosen)):
+        if used[k] and (not used[best] or shifts[k, 5] > shifts[best, 5]):
+            best = k
+    pair[0], pair[1] = chosen[0], chosen[best]
+    status = ACCEPTED
+    for side in range(2):
+        if status == ACCEPTED:
+            status = locus_check(view, pair, pair[1 - side], spot, point_z, rays_px, window, step_px, distinct, room)
+    return status
+
+
+@kernel
+def measure_at(
+    view, chosen, spot, curvature, low, high, window, settings, limits, room, work, shifts, used, parallax, point,
+    covariance, numbers,
+):  # fmt: skip
+    """Search the vertical line of a spot from low to high, measure there, match backwards; the status."""
+    per_metre = parallax_per_metre(view, chosen, spot)
+    if not per_metre > SMALLEST_ANGLE:
+        return UNSEEN
+    along = np.zeros(2)
+    step = settings[0] * window / per_metre
+    count = min(int((high - low) / step) + 2, int(settings[1]))
+    profile = room[4][:count]
+    best = search(view, chosen, spot, along, low, step, window, room, profile)
+    if not profile[best] >= 0.0:
+        return UNSEEN
+    numbers[2] = profile[best]
+    if profile[best] < limits[3]:
+        return POOR
+    if not 0 < best < count - 1:
+        return AT_END
+    spot[2] = low + (best + peak_offset(profile, best)) * step
+    status = measure_one(
+        view, chosen, spot, curvature, window, limits, work, shifts, used, parallax, point, covariance, numbers
+    )  # fmt: skip
+    if status == ACCEPTED:
+        return matched_back(view, chosen, shifts, used, spot, point[2], settings, window, room)
+    return status
 
 
 @kernel
 def measure_pickets(view, nodes, slopes, curvatures, ranges, chosen, aside, posts, window, settings, limits, out):
-    """Pickets at nodes, or a little aside where matching fails.
+    """Pickets at nodes, with another photograph as the first, or a little aside, where matching fails.
 
     Parameters
     ----------
-    nodes, slopes, ranges, chosen, posts, window : as in `find_heights`. curvatures : (n,) 1/m, σ of the second
-        derivatives of the ground.
+    nodes, slopes, ranges, chosen, posts, window : as in `find_heights`; the first of `chosen` may be exchanged with
+        another. curvatures : (n,) 1/m, σ of the second derivatives of the ground.
     aside : (t, 2) m, plan offsets tried one after the other, the first being 0, 0.
     settings : (4,) step of the heights in posts, most steps, posts searched along rays, distinctness.
-    limits : (3,) correlation threshold, largest σ of a parallax in posts, correlation of the search below which
-        nothing is measured.
+    limits : (4,) of `measure_one`, and the correlation of the search below which nothing is measured.
     out : status (n,) int8, tries (n,) int16, point (n, 3), covariance (n, 3, 3), used (n, m) bool, numbers (n, 4),
         shifts (n, m, 6).
     """
     status, tries, points, covariances, used, numbers, shifts = out
-    step_px, most, rays_px, distinct = settings
-    room = make_room(posts, max(int(most), 2 * int(rays_px / step_px) + 1))
     m = chosen.shape[1]
-    work = (
+    room = make_room(posts, max(int(settings[1]), 2 * int(settings[2] / settings[0]) + 1), m)
+    of_shifts = (
         np.empty((4, 2)), np.zeros(6), np.empty((2, 4)), np.empty(UNKNOWNS), np.empty((m, 2)), np.empty((m, 3)),
         np.empty(5), np.empty((UNKNOWNS, UNKNOWNS)),
     )  # fmt: skip
-    template, other = np.empty((posts + 2, posts + 2)), np.empty((posts, posts))
-    normal = np.empty((UNKNOWNS, UNKNOWNS))
-    spot, along, pair = np.empty(5), np.zeros(2), np.empty(2, np.int64)
+    work = (
+        np.empty((posts + 2, posts + 2)), np.empty((posts, posts)), np.empty((UNKNOWNS, UNKNOWNS)), of_shifts,
+        np.empty(2), np.empty(6),
+    )  # fmt: skip
+    spot, parallax = np.empty(5), np.empty(m)
     for p in range(len(nodes)):
         status[p] = UNSEEN
+        if chosen[p, 1] < 0:
+            continue
         for t in range(len(aside)):
             tries[p] = t
-            spot[3:] = slopes[p]
-            spot[0], spot[1] = nodes[p, 0] + aside[t, 0], nodes[p, 1] + aside[t, 1]
             move = aside[t, 0] * slopes[p, 0] + aside[t, 1] * slopes[p, 1]
-            spot[2] = nodes[p, 2] + move
-            per_metre = parallax_per_metre(view, chosen[p], spot) if chosen[p, 1] >= 0 else 0.0
-            if not per_metre > SMALLEST_ANGLE:
-                break
-            step = step_px * window / per_metre
-            low = ranges[p, 0] + move
-            count = min(int((ranges[p, 1] - ranges[p, 0]) / step) + 2, int(most))
-            profile = room[4][:count]
-            best = search(view, chosen[p], spot, along, low, step, window, room, profile)
-            found = UNSEEN
-            if profile[best] >= 0.0:
-                found = POOR
-                numbers[p, 2] = profile[best]
-            if profile[best] >= limits[2]:
-                found = AT_END
-                if 0 < best < count - 1:
-                    spot[2] = low + (best + peak_offset(profile, best)) * step
-                    found = measure_one(
-                        view, chosen[p], spot, curvatures[p], window, limits, template, other, normal, work,
-                        shifts[p], used[p], points[p], covariances[p], numbers[p],
-                    )  # fmt: skip
-            if found == UNSEEN and t > 0:
-                continue
-            status[p] = found
-            if found == ACCEPTED:
-                best_k = 1
-                for k in range(1, m):
-                    if used[p, k] and (not used[p, best_k] or shifts[p, k, 5] > shifts[p, best_k, 5]):
-                        best_k = k
-                pair[0], pair[1] = chosen[p, 0], chosen[p, best_k]
-                for side in range(2):
-                    if status[p] == ACCEPTED:
-                        status[p] = locus_check(
-                            view, pair, pair[1 - side], spot, points[p, 2], rays_px, window, step_px, distinct, room
-                        )  # fmt: skip
+            for first in range(min(m, FIRST_PHOTOGRAPHS) if t == 0 else 1):
+                if chosen[p, first] < 0:
+                    break
+                chosen[p, 0], chosen[p, first] = chosen[p, first], chosen[p, 0]
+                spot[0], spot[1], spot[2] = nodes[p, 0] + aside[t, 0], nodes[p, 1] + aside[t, 1], nodes[p, 2] + move
+                spot[3:] = slopes[p]
+                found = measure_at(
+                    view, chosen[p], spot, curvatures[p], ranges[p, 0] + move, ranges[p, 1] + move, window, settings,
+                    limits, room, work, shifts[p], used[p], parallax, points[p], covariances[p], numbers[p],
+                )  # fmt: skip
+                if found == ACCEPTED or found >= BACKWARD:
+                    break
+                chosen[p, 0], chosen[p, first] = chosen[p, first], chosen[p, 0]
+            if found != UNSEEN or t == 0:
+                status[p] = found
+            if found == ACCEPTED or found >= BACKWARD:
                 break

@@ -13,9 +13,21 @@ SMALLEST_ANGLE = 0.02
 
 
 @kernel
+def mean_of_best(values, count):
+    """Mean of the better half of values, of two at least: photographs from which something hides the place are few."""
+    best = values[:count]
+    best.sort()
+    kept = max(min(count, 2), (count + 1) // 2)
+    total = 0.0
+    for k in range(count - kept, count):
+        total += best[k]
+    return total / kept
+
+
+@kernel
 def correlation_at(view, chosen, spot, window, room):
-    """Mean correlation of the first of the photographs with the others that show the window; −1 where none does."""
-    first, second, corner, shift = room[0], room[1], room[2], room[3]
+    """Correlation of the first of the photographs with others that show the window, `mean_of_best`; −1: none does."""
+    first, second, corner, shift, values = room[0], room[1], room[2], room[3], room[5]
     reach = 0.5 * (first.shape[0] - 1) * window
     shift[:] = 0.0
     if not window_corners(view, chosen[0], spot, reach, shift, corner):
@@ -23,15 +35,14 @@ def correlation_at(view, chosen, spot, window, room):
     sample_linear(view, chosen[0], corner, first)
     if not normalise(first):
         return -1.0
-    total, count = 0.0, 0
+    count = 0
     for k in range(1, len(chosen)):
         if chosen[k] < 0 or not window_corners(view, chosen[k], spot, reach, shift, corner):
             continue
         sample_linear(view, chosen[k], corner, second)
+        values[count] = product(first, second) if normalise(second) else 0.0
         count += 1
-        if normalise(second):
-            total += product(first, second)
-    return total / count if count else -1.0
+    return mean_of_best(values, count) if count else -1.0
 
 
 @kernel
@@ -78,10 +89,10 @@ def second_peak(profile, best, apart):
 
 
 @kernel
-def make_room(n, most):
+def make_room(n, most, photographs):
     """What `correlation_at` and others work in."""
     first, second = np.empty((n, n), np.float32), np.empty((n, n), np.float32)
-    return first, second, np.empty((4, 2)), np.zeros(6), np.empty(most)
+    return first, second, np.empty((4, 2)), np.zeros(6), np.empty(most), np.empty(photographs)
 
 
 @kernel
@@ -95,7 +106,7 @@ def find_heights(view, nodes, slopes, ranges, chosen, posts, window, step_px, mo
     posts, window : posts a side and m between them. step_px : of the heights, posts of parallax. most : steps.
     heights, scores : (n,) out; NaN and −1 where there is none.
     """
-    room, spot, along = make_room(posts, most), np.empty(5), np.zeros(2)
+    room, spot, along = make_room(posts, most, chosen.shape[1]), np.empty(5), np.zeros(2)
     for p in range(len(nodes)):
         heights[p], scores[p] = np.nan, -1.0
         if chosen[p, 1] < 0:

@@ -14,6 +14,7 @@ FIRST_NOISE = 0.05
 """Share of the variance of the grey values that is taken for noise before it is known."""
 CONVERGED_POSTS = 0.005
 LONGEST_SHIFT_POSTS = 3.0
+MOST_EXCESS = 10.0
 
 
 @kernel
@@ -62,6 +63,29 @@ def template_normals(template, n, e, window, normal):
     for a in range(UNKNOWNS):
         for b in range(a):
             normal[b, a] = normal[a, b]
+
+
+@kernel
+def excess_of_slopes(template, other, e, gain):
+    """By how much noise makes the slopes of a template along e larger than what the two windows have in common.
+
+    [D] A shift D makes Σf·g(D) vanish, f the slopes of the template and g the other window, whose slopes are g': the
+    variance of D is σ²·Σf²/(Σf·g')². Least squares takes σ²/(r1²·Σf²), with the noise of the template for information:
+    its σ is too small by r1·Σf²/Σf·g', which is 1 for windows without noise.
+
+    Returns
+    -------
+    ∞ where the slopes have nothing in common.
+    """
+    own, both = 0.0, 0.0
+    n = other.shape[0]
+    for q in range(1, n - 1):
+        for p in range(1, n - 1):
+            fu, fv = template[q + 1, p + 2] - template[q + 1, p], template[q + 2, p + 1] - template[q, p + 1]
+            f = e[0] * fu + e[1] * fv
+            own += f * f
+            both += f * (e[0] * (other[q, p + 1] - other[q, p - 1]) + e[1] * (other[q + 1, p] - other[q - 1, p]))
+    return max(gain * own / both, 1.0) if both > 0.0 else np.inf
 
 
 @kernel
@@ -148,7 +172,10 @@ def match_shift(view, k, spot, e, window, bending, template, other, normal, room
         if step == SHIFT_STEPS - 1:
             return False
     found[0], found[1] = x[0], x[6]
-    scale = noise / (gain * gain)
+    excess = excess_of_slopes(template, other, e, gain)
+    if not excess < MOST_EXCESS:
+        return False
+    scale = noise * excess * excess / (gain * gain)
     found[2], found[3], found[4] = scale * cofactor[0, 0], scale * cofactor[6, 6], scale * cofactor[0, 6]
     # correlation of the windows where they now lie, without what a further step would gain
     spread = squares - n * n * mean * mean

@@ -26,7 +26,7 @@ from aerotri.terrain.tiles import Tile, do_tiles
 STEP_PX, COARSE_STEP_PX = 0.5, 0.5
 MOST_STEPS = 400
 COARSE_WINDOW = 11
-FINE_START = 0.5
+FINE_START = 0.4
 LONGEST_STEP_ASIDE = 0.4
 NMAD, FEWEST_MISFITS, NEAREST = 1.4826, 20, 40
 Report = Callable[[float], None]
@@ -115,7 +115,9 @@ def _fine_level(photographs, nodes, prior: Prior, gsd: float, options: MatchOpti
     )  # fmt: skip
     aside = steps_aside(options, gsd)
     settings = (STEP_PX, float(MOST_STEPS), options.search_px, options.distinct)
-    limits = np.array([options.threshold, options.largest_sigma_px, min(FINE_START, options.threshold)])
+    limits = np.array([
+        options.threshold, options.agreeing, options.largest_sigma_px, min(FINE_START, options.threshold)
+    ])  # fmt: skip
 
     def one(tile: Tile) -> None:
         k = len(tile.own)

@@ -22,7 +22,8 @@ class MatchOptions:
     Parameters
     ----------
     interval : m between pickets.
-    window_px : posts a side of a window, odd. threshold : correlation from which a match counts.
+    window_px : posts a side of a window, odd. threshold : correlation from which two photographs count.
+    agreeing : correlation from which three and more count whose rays meet; 1: only those that reach the threshold.
     edge : share of the format at its edge that is not used.
     most_photographs : that take part in a picket, the most upright ones.
     largest_sigma_px : of a parallax, from the texture of the window.
@@ -34,6 +35,7 @@ class MatchOptions:
     interval: float
     window_px: int = 17
     threshold: float = 0.90
+    agreeing: float = 0.50
     edge: float = 0.10
     most_photographs: int = 5
     largest_sigma_px: float = 0.3
