@@ -39,9 +39,16 @@ def write_photograph(path: Path, pixels: np.ndarray) -> Path:
     return path
 
 
-def rendered_block(folder: Path, errors: dict | None = None, options: RenderOptions | None = None, **terrain):
+def rendered_block(
+    folder: Path,
+    errors: dict | None = None,
+    options: RenderOptions | None = None,
+    flight: dict | None = None,
+    **terrain,
+) -> Rendered:
     tables = small_spec(camera={"cam": CAMERA | ({"errors": errors} if errors else {})})
     tables["flight"] = tables["flight"] | {"gsd_m": 1.0, "strips": 1, "images_per_strip": 4, "cross_strips": []}
+    tables["flight"] |= flight or {}
     ground = {"kind": "undulating", "height_m": 100.0, "relief_rms_m": 15.0, "wavelength_m": 400.0}
     tables["terrain"] = ground | terrain
     tables["tie_points"] = {"per_image": 60, "probability": 0.9, "sigma_um": 0.0, "stated_sigma_um": 0.18}

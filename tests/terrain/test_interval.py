@@ -11,6 +11,7 @@ from aerotri.terrain.interval import (
     interval_by_formula,
     interval_by_rule,
     interval_of_gsd,
+    interval_of_surface,
     k_of_slope,
 )
 
@@ -60,3 +61,11 @@ def test_chosen_interval_is_where_the_error_reaches_the_tolerance():
     assert chosen_interval(interval, rmse, 0.05) == pytest.approx(5.0)
     assert chosen_interval(interval, rmse, 9.0) == pytest.approx(80.0)
     assert chosen_interval(interval, np.full(4, np.nan), 1.0) == 80.0
+
+
+def test_interval_of_a_surface_gives_small_ground_pickets_enough():
+    """Aerial photographs keep the formula; a drone's 100 m × 100 m the older rule, or 50 000 nodes."""
+    assert interval_of_surface(0.2, 0.1, 1e10) == (pytest.approx(44.72, abs=0.01), "100·√GSD")
+    assert interval_of_surface(0.02, 0.1, 1e4) == (pytest.approx(0.6), "30·GSD")
+    interval, source = interval_of_surface(0.02, 0.1, 2e5)
+    assert (interval, source) == (pytest.approx(2.0), "50000 nodes")

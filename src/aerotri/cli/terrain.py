@@ -32,8 +32,13 @@ def dtm(
     ] = None,
     window: Annotated[int, typer.Option(help="Pixels a side of the windows that are matched, odd.")] = 17,
     threshold: Annotated[float, typer.Option(min=0.0, max=1.0, help="Correlation from which a match counts.")] = 0.90,
-    edge: Annotated[float, typer.Option(min=0.0, max=0.4, help="Share of the format at its edge not used.")] = 0.10,
-    most_photographs: Annotated[int, typer.Option(min=2, max=20, help="Photographs of a picket, at most.")] = 5,
+    agreeing: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="The same of three photographs and more whose rays meet; 1: never.")
+    ] = 0.50,
+    edge: Annotated[
+        float | None, typer.Option(min=0.0, max=0.4, help="Share of the format at its edge not used; 0.02, pairs 0.10.")
+    ] = None,
+    most_photographs: Annotated[int, typer.Option(min=2, max=20, help="Photographs of a picket, at most.")] = 8,
     breaklines: Annotated[Path | None, typer.Option(help="Lines with heights: .gpkg, .geojson or .dxf.")] = None,
     ideal: Annotated[
         bool, typer.Option("--ideal", help="The photographs are those of imgeo, free of image errors.")
@@ -45,7 +50,7 @@ def dtm(
     from aerotri.commands.dtm import DtmOptions, metres_or_auto, run_dtm
 
     options = DtmOptions(
-        metres_or_auto(interval), cell, pairs, step, subset, area, window, threshold, edge, most_photographs,
+        metres_or_auto(interval), cell, pairs, step, subset, area, window, threshold, agreeing, edge, most_photographs,
         breaklines, ideal, plots,
     )  # fmt: skip
     raise typer.Exit(run_dtm(result, photographs, out, options, json_))

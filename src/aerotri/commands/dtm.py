@@ -20,12 +20,14 @@ if TYPE_CHECKING:
 
 OWN_NAMES = ("dtm.json", "pickets.parquet", "pickets.laz", "dsm.tif", "dtm.tif", "model.tif", "models.csv", "plots")
 SUBSETS = ("all", "even", "odd")
+EDGE, EDGE_OF_PAIRS = 0.02, 0.10
+"""Share of the format at its edge not used: of pairs as Tran (2007) has it; where more vouch for a picket, less."""
 ENDINGS = (".tif", ".tiff", ".jpg", ".jpeg")
 
 
 @dataclass(frozen=True)
 class DtmOptions:
-    """As on the command line; `interval` and `cell` None: computed."""
+    """As on the command line; `interval` and `cell` None: computed; `edge` None: as `EDGE` has it."""
 
     interval: float | None = None
     cell: float | None = None
@@ -35,8 +37,9 @@ class DtmOptions:
     area: tuple[float, float, float, float] | None = None
     window: int = 17
     threshold: float = 0.90
-    edge: float = 0.10
-    most_photographs: int = 5
+    agreeing: float = 0.50
+    edge: float | None = None
+    most_photographs: int = 8
     breaklines: Path | None = None
     ideal: bool = False
     plots: bool = True
@@ -128,11 +131,13 @@ def make_plan(calibration: Adjustment, given: list[Path], options: DtmOptions) -
     lines = ()
     if options.breaklines is not None:
         lines = read_breaklines(options.breaklines, horizontal_crs(calibration.result.block.crs))
+    pairs = options.pairs or options.step is not None
+    edge = options.edge if options.edge is not None else EDGE_OF_PAIRS if pairs else EDGE
     return TerrainPlan(
         rows=rows, paths=tuple(path_of[int(r)] for r in rows), interval=options.interval, cell=options.cell,
-        pairs=options.pairs or options.step is not None, step=options.step, area=area, window_px=options.window,
-        threshold=options.threshold, edge=options.edge, most_photographs=options.most_photographs, breaklines=lines,
-        ideal=options.ideal,
+        pairs=pairs, step=options.step, area=area, window_px=options.window,
+        threshold=options.threshold, agreeing=options.agreeing, edge=edge,
+        most_photographs=options.most_photographs, breaklines=lines, ideal=options.ideal,
     )  # fmt: skip
 
 

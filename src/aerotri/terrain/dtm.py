@@ -16,10 +16,10 @@ from aerotri.deformation.orientation import Calibration
 from aerotri.deformation.stereo_model import pair_model
 from aerotri.terrain.adjustment_part import adjustment_variances
 from aerotri.terrain.error_pickets import with_error_pickets
-from aerotri.terrain.interval import interval_of_gsd, k_of_slope
+from aerotri.terrain.interval import interval_of_gsd, interval_of_surface, k_of_slope
 from aerotri.terrain.matching import measure
 from aerotri.terrain.photographs import Photographs, photographs_of
-from aerotri.terrain.pickets import FIRST_ERROR, STATUS, Area, MatchOptions, Models, Pickets
+from aerotri.terrain.pickets import FIRST_ERROR, STATUS, Area, MatchOptions, Models, Pickets, footprint
 from aerotri.terrain.surface import Surface, grid_over, ground_cells, interpolation_error, surface_of
 
 BEST_END_LAP = 0.6
@@ -36,6 +36,7 @@ class TerrainPlan:
     rows : photographs of the block; paths : their files.
     interval, cell : m, None: computed. pairs : whether the best pair measures a picket, not all photographs.
     step : photographs from one of a pair to the other along the strip; None: what comes nearest to 60 % end lap.
+    threshold, agreeing : correlations of `MatchOptions`.
     area : None: as far as the photographs reach. breaklines : (k, 3) m each.
     ideal : whether the photographs have been freed of image errors.
     """
@@ -49,6 +50,7 @@ class TerrainPlan:
     area: Area | None = None
     window_px: int = 17
     threshold: float = 0.90
+    agreeing: float = 0.50
     edge: float = 0.10
     most_photographs: int = 5
     breaklines: tuple[np.ndarray, ...] = ()
@@ -120,10 +122,9 @@ def make_terrain_model(calibration: Calibration, plan: TerrainPlan, report: Repo
     known = calibration.result.points.xyz
     interval, source = plan.interval, "given"
     if interval is None:
-        k, ground = k_of_slope(typical_slope(known))
-        interval, source = interval_of_gsd(gsd, k), f"{1000 * k:g}·√GSD, {ground}"
+        interval, source = _own_interval(photographs, known, gsd, plan)
     options = MatchOptions(
-        interval=interval, window_px=plan.window_px, threshold=plan.threshold, edge=plan.edge,
+        interval=interval, window_px=plan.window_px, threshold=plan.threshold, agreeing=plan.agreeing, edge=plan.edge,
         most_photographs=plan.most_photographs,
     )  # fmt: skip
     models = models_of(calibration, photographs, plan.step) if plan.pairs else None
@@ -143,6 +144,15 @@ def make_terrain_model(calibration: Calibration, plan: TerrainPlan, report: Repo
         pickets, adjustment, ground, dsm, dtm, models, number, interval, source, dsm.grid.cell_x, interpolation,
         photographs,
     )  # fmt: skip
+
+
+def _own_interval(photographs: Photographs, known: np.ndarray, gsd: float, plan: TerrainPlan) -> tuple[float, str]:
+    k, ground = k_of_slope(typical_slope(known))
+    if plan.pairs:
+        return interval_of_gsd(gsd, k), f"{1000 * k:g}·√GSD, {ground}"
+    area = footprint(photographs) if plan.area is None else plan.area
+    interval, source = interval_of_surface(gsd, k, float(np.prod(area.high - area.low)))
+    return interval, f"{source}, {ground}"
 
 
 def typical_slope(xyz: np.ndarray) -> float:

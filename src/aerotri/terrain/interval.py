@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 K_MOUNTAINS, K_PLAIN = (0.08, 0.09), (0.095, 0.105)
+FEWEST_NODES = 50_000
+"""Nodes an area has at least where all photographs measure its surface, unless the older rule asks for fewer [C]."""
 ROUGH_SLOPE = 0.15
 """Slope of the ground from which on `k_of_slope` takes it for mountains [C]."""
 
@@ -30,6 +32,20 @@ def interval_of_gsd(gsd_m: float, k: float) -> float:
 def interval_by_rule(gsd_m: float) -> float:
     """m, 30·GSD, the rule that the formula replaces."""
     return 30.0 * gsd_m
+
+
+def interval_of_surface(gsd_m: float, k: float, area_m2: float) -> tuple[float, str]:
+    """m, and what it comes from: the formula, or less where that leaves small ground few pickets [C].
+
+    The formula is one of aerial photographs: at a GSD of 2 cm it asks for 14 m, the whole of what a drone shows in one
+    photograph being 50 m wide. There the interval is the older rule's, or what gives `FEWEST_NODES`.
+    """
+    by_formula = interval_of_gsd(gsd_m, k)
+    closer = max(interval_by_rule(gsd_m), float(np.sqrt(area_m2 / FEWEST_NODES)))
+    if closer < by_formula:
+        by_rule = closer == interval_by_rule(gsd_m)
+        return closer, "30·GSD" if by_rule else f"{FEWEST_NODES} nodes"
+    return by_formula, f"{1000 * k:g}·√GSD"
 
 
 def k_of_slope(slope: float) -> tuple[float, str]:
