@@ -57,9 +57,9 @@ SPEC = {
 AXES = ("X", "Y", "Z")
 
 
-def write_files(folder: Path, seed: int) -> tuple[str, ...]:
+def write_files(folder: Path, seed: int, plan: dict = SPEC) -> tuple[str, ...]:
     """Photographs and gcp_list.txt of a rendered block; the names of its check points."""
-    spec = parse_spec(SPEC)
+    spec = parse_spec(plan)
     block, truth = simulate(spec, seed)
     scene, camera, rays = make_scene(spec, seed, block, truth, RenderOptions()), block.cameras[0], block.image_points
     (folder / "photographs").mkdir(parents=True, exist_ok=True)

@@ -137,7 +137,7 @@ class FlightSpec(Table):
 
 
 class TerrainSpec(Table):
-    """The ground; `height_m` is its mean level."""
+    """The ground; `height_m` is its mean level. A hill may stand on undulating ground too."""
 
     kind: Literal["flat", "undulating", "hill"] = "flat"
     height_m: Number = 0.0

@@ -44,7 +44,7 @@ class Terrain:
 
 
 def make_terrain(spec: TerrainSpec, centre: tuple[float, float], rng: np.random.Generator) -> Terrain:
-    """Terrain of a spec.
+    """Terrain of a spec; a hill stands on either kind of ground.
 
     Undulating ground is a sum of `WAVES` waves in random directions, their lengths within a factor √2 of
     the wavelength asked for, with a common amplitude that gives the RMS asked for.
@@ -53,14 +53,12 @@ def make_terrain(spec: TerrainSpec, centre: tuple[float, float], rng: np.random.
     ----------
     centre : (2,) m of the block: a hill's place counts from there.
     """
-    if spec.kind == "undulating":
-        direction = rng.uniform(0.0, 2.0 * np.pi, WAVES)
-        length = spec.wavelength_m * 2.0 ** rng.uniform(-0.5, 0.5, WAVES)
-        number = (2.0 * np.pi / length)[:, None] * np.stack([np.cos(direction), np.sin(direction)], axis=1)
-        amplitude = np.full(WAVES, spec.relief_rms_m * np.sqrt(2.0 / WAVES))
-        return Terrain(spec.height_m, number, amplitude, rng.uniform(0.0, 2.0 * np.pi, WAVES))
-    none = np.zeros(0)
-    if spec.kind == "hill":
-        place = (centre[0] + spec.hill_centre_m[0], centre[1] + spec.hill_centre_m[1])
-        return Terrain(spec.height_m, np.zeros((0, 2)), none, none, spec.hill_height_m, spec.hill_radius_m, place)
-    return Terrain(spec.height_m, np.zeros((0, 2)), none, none)
+    waves = WAVES if spec.kind == "undulating" else 0
+    direction = rng.uniform(0.0, 2.0 * np.pi, waves)
+    length = spec.wavelength_m * 2.0 ** rng.uniform(-0.5, 0.5, waves)
+    number = (2.0 * np.pi / length)[:, None] * np.stack([np.cos(direction), np.sin(direction)], axis=1)
+    amplitude = np.full(waves, spec.relief_rms_m * np.sqrt(2.0 / WAVES))
+    phase = rng.uniform(0.0, 2.0 * np.pi, waves)
+    height = 0.0 if spec.kind == "flat" else spec.hill_height_m
+    place = (centre[0] + spec.hill_centre_m[0], centre[1] + spec.hill_centre_m[1])
+    return Terrain(spec.height_m, number, amplitude, phase, height, spec.hill_radius_m, place)
