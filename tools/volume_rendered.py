@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from photographs_to_block import SPEC, write_files
 from scipy.stats import chi2
 from shapely import Polygon
 
@@ -36,6 +35,7 @@ from aerotri.volume.accuracy import SigmaOptions
 from aerotri.volume.bases import quadrature_of
 from aerotri.volume.boundary import Boundary, boundary_of
 from aerotri.volume.compute import SectionPlan
+from photographs_to_block import SPEC, write_files
 
 PLAN = SPEC | {
     "name": "stockpile",

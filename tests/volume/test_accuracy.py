@@ -8,20 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from scipy.spatial import KDTree
 from scipy.stats import chi2
 
 from aerotri.rasters import Grid
 from aerotri.volume.accuracy import boundary_variance
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import boundary_of
-from aerotri.volume.functionals import triangulated
+from aerotri.volume.functionals import tin_volume, triangulated
 from aerotri.volume.roughness import (
     Roughness,
-    curvature_of_pickets,
+    ground_between,
     patch_variances,
     roughness_of_cells,
     roughness_of_pickets,
 )
+from aerotri.volume.triangles import areas, cut_to
 
 RUNS = 10
 
@@ -36,7 +38,7 @@ def proof():
 
 @pytest.fixture(scope="module")
 def site(proof):
-    return proof.make_site()
+    return importlib.import_module("volume_proof.sites").make_site("fractal", 14.0, 120.0, 4.0)
 
 
 @pytest.mark.parametrize("source", ["adjustment", "matching", "boundary"])
@@ -92,52 +94,106 @@ def brownian(xy, exponent, s, rng):
 
 @pytest.mark.parametrize("exponent", [0.3, 0.6])
 def test_roughness_is_found_again(exponent):
-    """What decides about the volume is γ at the spacing: within a fifth; H within 0.2."""
+    """What decides about the volume is γ at the spacing: within a fourth; H within 0.2."""
     rng = np.random.default_rng(11)
     x, y = np.meshgrid(np.arange(28.0) * 10.0, np.arange(28.0) * 10.0)
     regular = np.column_stack([x.ravel(), y.ravel()])
     truth = Roughness(0.05, exponent)
     xy = regular + rng.uniform(-2.0, 2.0, regular.shape)
     trend = 0.1 * xy[:, 0] - 0.05 * xy[:, 1] + 2e-4 * xy[:, 0] ** 2
-    found = roughness_of_pickets(np.column_stack([xy, brownian(xy, exponent, 0.05, rng) + trend]), 0.0)
-    assert found.exponent == pytest.approx(exponent, abs=0.2)
-    assert found.semivariogram(10.0) == pytest.approx(truth.semivariogram(10.0), rel=0.25)
+    z = brownian(xy, exponent, 0.05, rng) + trend
+    noise = 0.3 * 0.05 * 10.0**exponent
+    noisy = z + rng.normal(0.0, noise, len(z))
+    for heights, variance in ((z, 0.0), (noisy, noise**2)):
+        found = roughness_of_pickets(np.column_stack([xy, heights]), variance)
+        assert found.exponent == pytest.approx(exponent, abs=0.2)
+        assert found.covariance(10.0) == pytest.approx(truth.covariance(10.0), rel=0.25)
     z = brownian(regular, exponent, 0.05, rng).reshape(28, 28)
     cells = roughness_of_cells(z, Grid(28, 28, 0.0, 280.0, 10.0, 10.0))
     assert cells.exponent == pytest.approx(exponent, abs=0.2)
-    assert cells.semivariogram(10.0) == pytest.approx(truth.semivariogram(10.0), rel=0.25)
+    assert cells.covariance(10.0) == pytest.approx(truth.covariance(10.0), rel=0.25)
 
 
-def test_variance_between_pickets_is_that_of_a_fine_lattice():
-    """The variance of the sum over neighbouring triangles against simulated ground, its mean over 36 places each."""
+@pytest.mark.parametrize("exponent", [0.5, 1.5])
+def test_variance_between_pickets_is_that_of_a_fine_lattice(exponent):
+    """The variance over neighbouring triangles against a contrast over a lattice of 36 places in each."""
     rng = np.random.default_rng(4)
-    x, y = np.meshgrid(np.arange(5.0) * 10.0, np.arange(5.0) * 10.0)
-    xy = np.column_stack([x.ravel(), y.ravel()]) + rng.uniform(-2.0, 2.0, (25, 2))
-    triangles = triangulated(np.column_stack([xy, np.zeros(25)]))
-    corners = xy[triangles]
-    apart, together = patch_variances(Roughness(0.1, 0.5), corners, 4)
-    assert 1.5 < together / apart < 4.0
+    x, y = np.meshgrid(np.arange(9.0) * 10.0, np.arange(9.0) * 10.0)
+    xy = np.column_stack([x.ravel(), y.ravel()]) + rng.uniform(-2.0, 2.0, (81, 2))
+    xyz = np.column_stack([xy, np.zeros(81)])
+    triangles = triangulated(xyz)
+    middle = xy[triangles].mean(axis=1)
+    triangles = triangles[np.abs(middle - 40.0).max(axis=1) < 16.0]
+    truth, tree = Roughness(0.1, exponent), KDTree(xy)
+    apart, together = patch_variances(truth, xyz, triangles, 0.0, tree)
     n = 6
     parts = [((3 * i + 1) / (3 * n), (3 * j + 1) / (3 * n)) for i in range(n) for j in range(n - i)]
     parts += [((3 * i + 2) / (3 * n), (3 * j + 2) / (3 * n)) for i in range(n) for j in range(n - i - 1)]
     weights = np.column_stack([parts, 1.0 - np.sum(parts, axis=1)])
-    dense = (weights @ corners).reshape(-1, 2)
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-    places = np.concatenate([dense, xy])
-    of_place = np.concatenate([np.repeat(area / len(weights), len(weights)), np.zeros(len(xy))])
-    for k in range(3):
-        np.add.at(of_place, len(dense) + triangles[:, k], -area / 3.0)
-    gap = np.linalg.norm(places[:, None] - places[None], axis=2)
-    exact = -of_place @ (0.01 * gap) @ of_place
-    assert together == pytest.approx(exact, rel=0.1)
+    singles, places, of_place = 0.0, [], []
+    for triangle in xy[triangles]:
+        area = float(areas(triangle[None])[0])
+        dense = weights @ triangle
+        near = tree.query(triangle.mean(axis=0), 20)[1]
+        kriging = block_weights(truth, dense, xy[near])
+        own = np.concatenate([dense, xy[near]]), area * np.r_[np.full(len(dense), 1.0 / len(dense)), -kriging]
+        singles += truth.contrast_variance(*own)
+        places.append(own[0])
+        of_place.append(own[1])
+    exact = truth.contrast_variance(np.concatenate(places), np.concatenate(of_place))
+    assert apart == pytest.approx(singles, rel=0.08)
+    assert together == pytest.approx(exact, rel=0.08)
 
 
-def test_curvature_is_what_triangles_cut_off():
-    """A paraboloid over a circle: triangles lie inside it, a smooth surface through the same pickets hardly."""
+def block_weights(truth, dense, near):
+    """Universal kriging of the mean over places, equation by equation."""
+
+    def terms(p):
+        x, y = (p - near.mean(axis=0)).T / 20.0
+        return np.column_stack([np.ones(len(p)), x, y, x * x, x * y, y * y])
+
+    k = truth.covariance(np.linalg.norm(near[:, None] - near, axis=2))
+    f = terms(near)
+    system = np.block([[k, f], [f.T, np.zeros((6, 6))]])
+    to = truth.covariance(np.linalg.norm(near[:, None] - dense, axis=2)).mean(axis=1)
+    return np.linalg.solve(system, np.r_[to, terms(dense).mean(axis=0)])[: len(near)]
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+def test_curvature_is_what_triangles_cut_off(noise):
+    """A paraboloid: the pickets around a triangle give it exactly, whatever noise they are told to have."""
     x, y = np.meshgrid(np.arange(-70.0, 71.0, 10.0), np.arange(-70.0, 71.0, 10.0))
     z = 30.0 - 0.005 * (x**2 + y**2)
-    boundary = boundary_of(shapely.Point(0, 0).buffer(50.0), "circle")
-    found = curvature_of_pickets(np.column_stack([x.ravel(), y.ravel(), z.ravel()]), boundary)
+    xyz = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    triangles = triangulated(xyz)
+    boundary = boundary_of(shapely.box(-50.0, -50.0, 50.0, 50.0), "square")
+    pieces = cut_to(boundary.polygon, xyz[triangles][:, :, :2])
+    used = triangles[pieces.triangle]
+    own = ground_between(Roughness(0.0, 0.6), xyz, used, np.ones(len(used)), noise)
+    truth = 30.0 * 1e4 - 0.005 * 2.0 * 100.0 * 2.0 * 50.0**3 / 3.0
+    assert own.curvature == pytest.approx(truth - tin_volume(xyz, triangles, boundary)[0], rel=1e-9)
+    assert own.variance == 0.0
     # the mean of a quadratic over a right-angled triangle is above its corners' by h²/12·(z_xx + z_yy)
-    assert found == pytest.approx(0.02 * 100.0 / 12.0 * boundary.area, rel=0.05)
+    assert own.curvature == pytest.approx(0.02 * 100.0 / 12.0 * boundary.area, rel=1e-9)
+
+
+def test_ground_between_pickets_lies_within_its_sigma(proof):
+    """Rolling ground and a dump, 8 runs each: what triangles leave out against what is foretold."""
+    sites = importlib.import_module("volume_proof.sites")
+    for kind, spacing, radius, cell in (("rolling", 12.0, 60.0, 2.0), ("dump", 3.0, 25.0, 0.5)):
+        site = sites.make_site(kind, spacing, radius, cell)
+        triangles = triangulated(np.column_stack([site.xy, site.xy[:, 0]]))
+        pieces = cut_to(site.boundary.polygon, site.xy[triangles])
+        used = triangles[pieces.triangle]
+        share = pieces.area / areas(site.xy[used])
+        missed, raw = [], []
+        for seed in range(8):
+            z, dense = site.heights(np.random.default_rng(seed))
+            xyz = np.column_stack([site.xy, z])
+            left = float(site.weight @ dense) - tin_volume(xyz, triangles, site.boundary)[0]
+            own = ground_between(roughness_of_pickets(xyz, 0.0, np.unique(used)), xyz, used, share, 0.0)
+            missed.append((left - own.curvature) / np.sqrt(own.variance))
+            raw.append(left / np.sqrt(own.mean_square))
+        low, high = chi2.ppf([0.0005, 0.9995], 8)
+        assert np.sum(np.square(missed)) < high
+        assert low < np.sum(np.square(raw)) < high

@@ -1,7 +1,7 @@
 """One run: a block is simulated and adjusted, pickets are measured in it, and their volume is compared with the truth.
 
-The camera errs by BLUH's parameters, which the adjustment estimates. The ground between the pickets is rough: a
-fractional Brownian surface over a hill. Every source of error can be switched on alone.
+The camera errs by BLUH's parameters, which the adjustment estimates. The ground between the pickets is that of a site.
+Every source of error can be switched on alone.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from functools import cache
 
 import numpy as np
 import shapely
-from scipy.linalg import cholesky
 
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.functional_model.collinearity import linearise, predict
@@ -25,6 +24,9 @@ from aerotri.volume.bases import level
 from aerotri.volume.boundary import Boundary, boundary_of
 from aerotri.volume.functionals import tin_volume, triangulated
 from aerotri.volume.pickets import Pickets, pickets_where_seen
+from aerotri.volume.response import respond
+from aerotri.volume.roughness import Between
+from volume_proof.sites import LEVEL, Site
 
 SPEC = {
     "name": "volume",
@@ -45,80 +47,40 @@ SPEC = {
 }  # fmt: skip
 PARAMETERS = "bluh:1-12"
 MATCHING_UM = 3.0
-BASE_SIGMA, BOUNDARY_SIGMA, LEVEL = 0.03, 0.5, 85.0
-RADIUS, HILL, EXPONENT, ROUGH = 120.0, 25.0, 0.6, 0.08
-SPACING, DENSE = 14.0, 4.0
+BASE_SIGMA, BOUNDARY_SIGMA = 0.03, 0.5
 ALL = frozenset(PARTS)
-
-
-@dataclass(frozen=True, eq=False)
-class Site:
-    """The ground: places of the pickets and of a dense lattice, and the root of the covariance of its roughness."""
-
-    xy: np.ndarray
-    dense: np.ndarray
-    dense_weight: np.ndarray
-    root: np.ndarray
-    boundary: Boundary
-
-    def heights(self, rng: np.random.Generator, rough: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Heights of the pickets, and of the dense lattice."""
-        both = np.concatenate([self.xy, self.dense])
-        z = 100.0 + HILL * np.exp(-np.sum(both**2, axis=1) / (2.0 * 60.0**2))
-        if rough:
-            z = z + self.root @ rng.normal(size=len(both))
-        return z[: len(self.xy)], z[len(self.xy) :]
 
 
 @dataclass(frozen=True)
 class Run:
-    """Error of the volume and its σ, m³, and the σ of every part."""
+    """Error of the volume and its σ, m³, the σ of every part, and the curvature foretold with its σ."""
 
     error: float
     sigma: float
+    curvature: tuple[float, float]
     parts: dict[str, float]
-
-
-def make_site(seed: int = 1) -> Site:
-    """A circle of 16 corners over a hill, pickets in a jittered grid reaching beyond it."""
-    rng = np.random.default_rng(seed)
-    reach = RADIUS + 2.0 * SPACING
-    x, y = np.meshgrid(np.arange(-reach, reach, SPACING), np.arange(-reach, reach, SPACING))
-    xy = np.column_stack([x.ravel(), y.ravel()]) + rng.uniform(-0.25, 0.25, (x.size, 2)) * SPACING
-    angle = np.arange(16) * np.pi / 8.0
-    boundary = boundary_of(shapely.Polygon(RADIUS * np.column_stack([np.cos(angle), np.sin(angle)])), "circle")
-    x, y = np.meshgrid(np.arange(-RADIUS, RADIUS, DENSE), np.arange(-RADIUS, RADIUS, DENSE))
-    cells = shapely.intersection(shapely.box(x.ravel(), y.ravel(), x.ravel() + DENSE, y.ravel() + DENSE),
-                                 boundary.polygon)  # fmt: skip
-    area = shapely.area(cells)
-    dense = shapely.get_coordinates(shapely.centroid(cells[area > 0.0]))
-    at = 1e4 + np.concatenate([xy, dense])
-    length = np.linalg.norm(at, axis=1) ** (2.0 * EXPONENT)
-    squares = np.sum((at - at.mean(axis=0)) ** 2, axis=1)
-    near = at - at.mean(axis=0)
-    gap = np.maximum(squares[:, None] + squares - 2.0 * near @ near.T, 0.0) ** EXPONENT
-    covariance = ROUGH**2 * (length[:, None] + length - gap)
-    # a constant that the volume would see belongs to no part: heights count from the first picket
-    covariance = covariance - covariance[:1] - covariance[:, :1] + covariance[0, 0]
-    root = cholesky(covariance + 1e-9 * np.eye(len(at)), lower=True)
-    return Site(xy, dense, area[area > 0.0], root, boundary)
 
 
 def run(site: Site, seed: int, on: frozenset[str] = ALL) -> Run:
     """One simulation with some sources of error on."""
     rng = np.random.default_rng([seed, 77])
     calibration, truth = adjusted_block(seed) if "adjustment" in on else free_of_error()
-    z, dense = site.heights(rng, "interpolation" in on)
+    z, dense = site.heights(rng)
     true = np.column_stack([site.xy, z])
     triangles = triangulated(true)
     chosen, seen = pickets_where_seen(calibration, true, 1e-3 * MATCHING_UM)
     assert seen.all(), "the block is too small for the site"
     found = replace(chosen, xyz=measured_pickets(calibration, truth, chosen, rng, on))
-    part = part_of_pickets(calibration, found, triangles, site.boundary, level(LEVEL), SigmaOptions())
-    value, _ = tin_volume(found.xyz, triangles, site.boundary)
+    value, functional = tin_volume(found.xyz, triangles, site.boundary)
+    between = Between()
+    if "interpolation" in on:
+        part = part_of_pickets(calibration, found, triangles, site.boundary, level(LEVEL), SigmaOptions())
+        response, between = part.response, part.between or between
+    else:
+        response = respond(calibration, found, functional.gradient)
     wanted = tin_volume(true, triangles, site.boundary)[0]
     if "interpolation" in on:
-        wanted = float(site.dense_weight @ dense)
+        wanted = float(site.weight @ dense)
     error = value - wanted
     if "base" in on:
         error += float(rng.normal(0.0, BASE_SIGMA)) * site.boundary.area
@@ -126,14 +88,15 @@ def run(site: Site, seed: int, on: frozenset[str] = ALL) -> Run:
     if "boundary" in on:
         error += _boundary_error(site.boundary, found.xyz, triangles, value, rng)
     parts = {
-        "adjustment": np.sqrt(part.response.variance),
-        "matching": np.sqrt(part.response.noise),
-        "interpolation": np.sqrt(part.interpolation),
+        "adjustment": np.sqrt(response.variance),
+        "matching": np.sqrt(response.noise),
+        "interpolation": np.sqrt(between.mean_square),
         "base": BASE_SIGMA * site.boundary.area,
         "boundary": np.sqrt(boundary_variance(surface, level(LEVEL), site.boundary, BOUNDARY_SIGMA)),
     }  # fmt: skip
     sigma = np.sqrt(sum(parts[name] ** 2 for name in on))
-    return Run(float(error), float(sigma), {name: float(v) for name, v in parts.items()})
+    curvature = between.curvature, float(np.sqrt(between.variance))
+    return Run(float(error), float(sigma), curvature, {name: float(v) for name, v in parts.items()})
 
 
 @cache

@@ -72,6 +72,11 @@ def summary(content: dict[str, Any]) -> list[str]:
     ]
     if s is not None:
         lines.append("σ by part, m³: " + ", ".join(f"{name} {v:.4g}" for name, v in s["parts_m3"].items()))
+        if s["curvature"] is not None:
+            lines.append(
+                f"ground expected beyond straight lines between heights: {s['curvature']['value_m3']:+.4g} ± "
+                f"{s['curvature']['sigma_m3']:.2g} m³, not in the volume, counted in σ as interpolation"
+            )
         where = "in the volume" if s["systematic"]["in_the_volume"] else "corrected for, would be"
         for one in s["systematic"]["variants"]:
             lines.append(

@@ -16,6 +16,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from aerotri.rasters import Grid
 from aerotri.report.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, plain, styled
+from aerotri.report.quality import two_digits, with_sigma
 from aerotri.volume.accuracy import PARTS
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.compute import Volumes
@@ -32,6 +33,12 @@ WORDS = {
     "base": "base",
     "boundary": "position of the boundary",
 }
+
+SYSTEMATIC = {
+    "free": "image errors uncorrected, calibrated orientation",
+    "absorbed": "image errors uncorrected, orientation without parameters",
+}
+BAR = 0.36
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,43 +93,54 @@ def plot_thickness(found: ThicknessMap, boundary: Boundary, volumes: Volumes, co
 
 @styled
 def plot_budget(content: Mapping[str, Any]) -> Figure:
-    """The parts of σ as bars, the total below them, the systematic part apart."""
+    """The parts of σ as bars, the total below them; what is no chance apart, with a scale of its own."""
     s = content["sigma"]
-    values = [s["parts_m3"][name] for name in PARTS] + [s["sigma_m3"]]
-    labels = [WORDS[name] for name in PARTS] + ["together (root of the sum of squares)"]
-    bars = [(label, value, "part") for label, value in zip(labels, values, strict=True)]
-    bars[-1] = (bars[-1][0], bars[-1][1], "total")
-    words = {"free": "image errors uncorrected, calibrated orientation",
-             "absorbed": "image errors uncorrected, orientation without parameters"}  # fmt: skip
-    inside = s["systematic"]["in_the_volume"]
-    for one in s["systematic"]["variants"]:
-        bars.append((words[one["variant"]], one["value_m3"], "systematic"))
-    height = 0.36 * len(bars)
+    parts = [(WORDS[name], s["parts_m3"][name]) for name in PARTS]
+    parts.append(("together (root of the sum of squares)", s["sigma_m3"]))
+    apart = [] if s["curvature"] is None else [("ground beyond straight lines between heights", s["curvature"])]
+    apart += [(SYSTEMATIC[one["variant"]], one) for one in s["systematic"]["variants"]]
     share = 100.0 * s["sigma_m3"] / max(abs(content["net_m3"]), 1e-9)
     subtitle = (
-        f"net {_count(content['net_m3'])} ± {_count(s['sigma_m3'])} m³ (1 σ, {share:.2g} %), "
-        f"{1e3 * s['sigma_mean_height_m']:.0f} mm of mean height\n"
-        + ("the systematic parts are in the volume, not in σ" if inside else
-           "hatched: what image errors would have added uncorrected; not in σ")
-    )  # fmt: skip
-    figure = new_figure(height + 1.6, "How sure the volume is", subtitle)
-    axes = axes_at(figure, 4.15, 0.6, WIDTH - 5.35, height)
-    styles = {"part": {"color": LIGHT}, "total": {"color": ACCENT},
-              "systematic": {"color": "white", "edgecolor": INK, "hatch": "////", "lw": 0.8}}  # fmt: skip
-    largest = max(abs(value) for _, value, _ in bars)
-    for k, (_, value, kind) in enumerate(bars):
-        axes.barh(-k, abs(value), height=0.62, zorder=2, **styles[kind])
-        sign = "+" if kind == "systematic" and value > 0 else ""
-        axes.text(abs(value) + 0.015 * largest, -k, sign + _count(value), va="center", fontsize=8)
-    axes.set_yticks([-k for k in range(len(bars))], [label for label, _, _ in bars])
-    axes.set_xlim(0.0, 1.18 * largest)
-    axes.set_ylim(-len(bars) + 0.4, 0.6)
-    axes.set_xlabel("m³")
+        f"net {with_sigma(content['net_m3'], s['sigma_m3'])} m³ (1 σ, {share:.2g} %), "
+        f"{two_digits(1e3 * s['sigma_mean_height_m'])} mm of mean height\n"
+    )
+    if apart:
+        held = "are in the volume, not in σ" if s["systematic"]["in_the_volume"] else "would have been, not in σ"
+        subtitle += f"hatched, on a scale of its own: what uncorrected image errors {held}"
+        subtitle += "" if s["curvature"] is None else "; what lines cut off, in σ"
+    upper, lower = BAR * len(parts), BAR * len(apart)
+    figure = new_figure(upper + 1.6 + (lower + 0.75 if apart else 0.0), "How sure the volume is", subtitle)
+    axes = axes_at(figure, 4.15, 0.6 + (lower + 0.75 if apart else 0.0), WIDTH - 5.35, upper)
+    texts = [_count(value) if value > 0.0 else "none stated" for _, value in parts]
+    if s["curvature"] is None:
+        texts[PARTS.index("interpolation")] = "not known"
+    texts[-1] = _count(s["sigma_m3"])
+    colours = [LIGHT] * len(PARTS) + [ACCENT]
+    _bars(axes, [name for name, _ in parts], [value for _, value in parts], texts, {"color": colours})
+    axes.set_xlabel("σ [m³]")
+    if apart:
+        below = axes_at(figure, 4.15, 0.6, WIDTH - 5.35, lower)
+        texts = [("+" if one["value_m3"] > 0.0 else "") + with_sigma(one["value_m3"], one["sigma_m3"])
+                 for _, one in apart]  # fmt: skip
+        hatched = {"color": "white", "edgecolor": INK, "hatch": "////", "lw": 0.8}
+        _bars(below, [name for name, _ in apart], [one["value_m3"] for _, one in apart], texts, hatched)
+        below.set_xlabel("change of the volume [m³]")
+    return figure
+
+
+def _bars(axes, labels: list[str], values: list[float], texts: list[str], style: dict[str, Any]) -> None:
+    """Bars across, the first on top, each with its number; the size counts, the sign stands in the number."""
+    at, size = -np.arange(len(labels)), np.abs(values)
+    axes.barh(at, size, height=0.62, zorder=2, **style)
+    for y, value, text in zip(at, size, texts, strict=True):
+        axes.text(value + 0.02 * size.max(), y, text, va="center", fontsize=8)
+    axes.set_yticks(at, labels)
+    axes.set_xlim(0.0, 1.35 * max(float(size.max()), 1e-9))
+    axes.set_ylim(-len(labels) + 0.4, 0.6)
     axes.xaxis.set_major_locator(MaxNLocator(4))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: _count(value)))
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(axis="y", length=0)
-    return figure
 
 
 @styled

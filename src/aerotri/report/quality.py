@@ -69,6 +69,18 @@ def metre_digits(sigma: np.ndarray) -> int:
     return int(np.clip(np.ceil(-np.log10(np.median(finite))) + 1, 3, 6)) if len(finite) else 3
 
 
+def with_sigma(value: float, sigma: float) -> str:
+    """'8 308 ± 20': both to two digits of σ, no digits before the point rounded."""
+    digits = 0 if sigma <= 0.0 or not np.isfinite(sigma) else max(0, 1 - int(np.floor(np.log10(sigma))))
+    return f"{value:,.{digits}f} ± {sigma:,.{digits}f}".replace(",", "\u2009").replace("-", "−")
+
+
+def two_digits(value: float) -> str:
+    """1 234 → '1 200', 0.0123 → '0.012'."""
+    rounded = float(f"{value:.2g}")
+    return (f"{rounded:,.0f}" if abs(rounded) >= 10.0 else f"{rounded:g}").replace(",", "\u2009").replace("-", "−")
+
+
 def ground_statistics(adjusted: AdjustedBlock, results: GroundPointResults) -> GroundStatistics:
     """Count, RMS, mean and largest difference by coordinate.
 

@@ -9,7 +9,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from aerotri.report.html import data_address
-from aerotri.report.quality import printable
+from aerotri.report.quality import printable, two_digits, with_sigma
 from aerotri.report.rendering import RenderedPlot
 
 CAPTIONS = {
@@ -56,9 +56,9 @@ def _number(value: float) -> str:
 
 def _cards(c: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     s = c["sigma"]
-    sure = "" if s is None else f" ± {_number(s['sigma_m3'])}"
+    net = _number(c["net_m3"]) if s is None else with_sigma(c["net_m3"], s["sigma_m3"])
     return [
-        ("Net", f"{_number(c['net_m3'])}{sure} m³", "cut less fill" + (", one standard deviation" if sure else "")),
+        ("Net", f"{net} m³", "cut less fill" + ("" if s is None else ", one standard deviation")),
         ("Cut", _number(c["cut_m3"]) + " m³", f"above the base, on {_number(c['cut_area_m2'])} m²"),
         ("Fill", _number(c["fill_m3"]) + " m³", f"below the base, on {_number(c['fill_area_m2'])} m²"),
         ("Area", _number(c["boundary"]["area_m2"]) + " m²", f"{_number(c['no_data_area_m2'])} m² of it not known"),
@@ -71,11 +71,20 @@ def _budget(c: Mapping[str, Any]) -> str:
     if s is None:
         return ""
     largest = max(s["parts_m3"], key=s["parts_m3"].get)
+    known, wide = two_digits(s["sigma_m3"]), two_digits(1.96 * s["sigma_m3"])
     text = (
-        f"The volume is known to {_number(s['sigma_m3'])} m³ (1 σ; 95 %: ± {_number(1.96 * s['sigma_m3'])} m³), as if "
-        f"the mean height were known to {1e3 * s['sigma_mean_height_m']:.0f} mm. The largest part is that of the "
-        f"{largest}. {s['pickets']} heights with {s['rays']} rays went into it."
+        f"The volume is known to {known} m³ (1 σ; 95 %: ± {wide} m³), as if the mean height were known to "
+        f"{two_digits(1e3 * s['sigma_mean_height_m'])} mm. The largest part is that of the {largest}. {s['pickets']} "
+        f"heights with {s['rays']} rays went into it."
     )
+    bent = s["curvature"]
+    if bent is not None:
+        held, side = ("cut hills off", "more") if bent["value_m3"] >= 0.0 else ("fill hollows", "less")
+        text += (
+            f" Straight lines between the heights {held}: the ground is expected to hold "
+            f"{with_sigma(abs(bent['value_m3']), bent['sigma_m3'])} m³ {side}. The volume is that of the surface as "
+            "given, so this is not in it; its σ counts it as ground between the pickets."
+        )
     if not s["systematic"]["variants"]:
         return text + " No image errors were estimated, so what they do to the volume is not known."
     return text

@@ -16,10 +16,10 @@ from aerotri.volume.functionals import Functional, cell_volume, tin_volume
 from aerotri.volume.pickets import PER_POINT, Pickets, pickets_where_seen
 from aerotri.volume.response import Response, Systematic, control_response, respond, systematic
 from aerotri.volume.roughness import (
+    Between,
     Roughness,
     curvature_of_cells,
-    curvature_of_pickets,
-    interpolation_variance,
+    ground_between,
     roughness_of_cells,
     roughness_of_pickets,
 )
@@ -33,6 +33,9 @@ RING_SHARE = 0.3
 RING_STEPS = 9
 """Steps across the ring: the wider contrasts reach over eight of them."""
 MOST_RING_CELLS = 4_000_000
+SMOOTHEST_BELOW = 0.9
+"""Exponent of the ground under a spline at most: what a ring shows as smooth need not be so far inwards."""
+LATTICE_PATCH = 16
 PATCH_CELLS = 512
 """Cells a side of the part of a raster whose roughness is taken."""
 PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")
@@ -64,16 +67,16 @@ class Part:
 
     Parameters
     ----------
-    calibration, response : of its adjustment. interpolation : m⁶. unseen : m², area no photographs were found for.
+    calibration, response : of its adjustment. between : the ground between its heights, None where not known.
+    unseen : m², area no photographs were found for.
     """
 
     calibration: Calibration
     response: Response
-    interpolation: float
+    between: Between | None
     pickets: int
     rays: int
     unseen: float
-    roughness: Roughness | None
 
 
 @dataclass(frozen=True)
@@ -82,12 +85,16 @@ class VolumeSigma:
 
     Parameters
     ----------
-    parts : by the names of `PARTS`, each alone. systematic : what uncorrected image errors add or would add.
+    parts : by the names of `PARTS`, each alone; interpolation holds the curvature too.
+    curvature : ground that straight lines between the heights are expected to leave out, m³ and its σ; not in the
+        volume, None where not known.
+    systematic : what uncorrected image errors add or would add.
     corrected : whether the photographs were corrected, so that the systematic part is none.
     pickets, rays : behind the adjustment's part. notes : how it was found, sentences.
     """
 
     parts: dict[str, float]
+    curvature: tuple[float, float] | None
     systematic: tuple[Systematic, ...]
     corrected: bool
     pickets: int
@@ -113,11 +120,9 @@ def part_of_cells(
     if not seen.any():
         raise InputError("no photograph of the adjustment sees the surface", "check the CRS of surface and block")
     response = respond(calibration, pickets, functional.gradient[seen], options.corrected)
-    roughness, curvature = _cell_roughness(surface, boundary)
     unseen = float(np.abs(functional.gradient[~seen, 2]).sum())
-    between = 0.0 if roughness is None else _between_cells(roughness, surface.grid, boundary)
-    between += (curvature * boundary.area) ** 2
-    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen, roughness)
+    between = _between_cells(surface, boundary)
+    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen)
 
 
 def part_of_pickets(
@@ -131,12 +136,12 @@ def part_of_pickets(
     pieces = cut_to(boundary.polygon, corners)
     own = corners[pieces.triangle]
     noise = _height_noise(response, functional)
-    roughness = roughness_of_pickets(pickets.xyz, noise)
     share = pieces.area / np.maximum(areas(own), 1e-300)
-    between = 0.0 if roughness is None else interpolation_variance(roughness, own, share)
-    between += curvature_of_pickets(pickets.xyz, boundary) ** 2
+    used = triangles[pieces.triangle]
+    roughness = roughness_of_pickets(pickets.xyz, noise, np.unique(used))
+    between = None if roughness is None else ground_between(roughness, pickets.xyz, used, share, noise)
     unseen = max(boundary.area - float(pieces.area.sum()), 0.0)
-    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen, roughness)
+    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen)
 
 
 def volume_sigma(
@@ -154,17 +159,19 @@ def volume_sigma(
     if base_part is not None:
         adjustment -= 2.0 * shared_control_covariance(part, base_part)
     ground = _base_variance(base, boundary, surface, options)
+    between = _difference([one.between for one in both])
     parts = {
         "adjustment": np.sqrt(max(adjustment, 0.0)),
         "matching": np.sqrt(sum(one.response.noise for one in both)),
-        "interpolation": np.sqrt(sum(one.interpolation for one in both)),
+        "interpolation": np.sqrt(0.0 if between is None else between.mean_square),
         "base": np.sqrt(ground),
         "boundary": np.sqrt(boundary_variance(surface, base, boundary, options.boundary_sigma)),
     }
     found = tuple(systematic(part.calibration, part.response, variant) for variant in ("free", "absorbed")
                   if len(part.response.by_parameters))  # fmt: skip
     return VolumeSigma(
-        {name: float(value) for name, value in parts.items()}, found, options.corrected,
+        {name: float(value) for name, value in parts.items()},
+        None if between is None else (between.curvature, float(np.sqrt(between.variance))), found, options.corrected,
         sum(one.pickets for one in both), sum(one.rays for one in both), _notes(part, base_part, base, ground, options),
     )  # fmt: skip
 
@@ -228,27 +235,41 @@ def _height_noise(response: Response, functional: Functional) -> float:
     return response.noise / max(float(np.sum(functional.gradient[:, 2] ** 2)), 1e-300)
 
 
-def _cell_roughness(surface: Surface, boundary: Boundary) -> tuple[Roughness | None, float]:
-    """Of the middle of the boundary, at the spacing of the cells; and m per m² that its curvature takes off."""
-    row, column, rows, columns = cells_within(surface.grid, boundary)
+def _difference(between: list[Between | None]) -> Between | None:
+    """Of the surface less that of the base."""
+    known = [(sign, one) for sign, one in zip((1.0, -1.0), between, strict=False) if one is not None]
+    if not known:
+        return None
+    return Between(sum(sign * one.curvature for sign, one in known), sum(one.variance for _, one in known))
+
+
+def _between_cells(surface: Surface, boundary: Boundary) -> Between | None:
+    """For triangles between the centres of cells, from the middle of the boundary."""
+    grid = surface.grid
+    row, column, rows, columns = cells_within(grid, boundary)
     take_rows, take_columns = min(rows, PATCH_CELLS), min(columns, PATCH_CELLS)
     row, column = row + (rows - take_rows) // 2, column + (columns - take_columns) // 2
     z = surface.read(row, column, take_rows, take_columns).astype(float)
-    z[boundary.coverage(surface.grid.window(row, column, take_rows, take_columns)) < 0.5] = np.nan
-    return roughness_of_cells(z, surface.grid), curvature_of_cells(z, surface.grid)
+    z[boundary.coverage(grid.window(row, column, take_rows, take_columns)) < 0.5] = np.nan
+    roughness = roughness_of_cells(z, grid)
+    if roughness is None:
+        return None
+    patch, area = _lattice_patch(roughness, grid)
+    return Between(curvature_of_cells(z, grid) * boundary.area, patch.variance * boundary.area / area)
 
 
-def _between_cells(roughness: Roughness, grid: Grid, boundary: Boundary) -> float:
-    """m⁶, for triangles between the centres of cells: a patch of them, scaled to the area."""
-    n = 12
+def _lattice_patch(roughness: Roughness, grid: Grid) -> tuple[Between, float]:
+    """A patch of cells amid others, and its area."""
+    n = LATTICE_PATCH
     x, y = np.meshgrid(np.arange(n) * grid.cell_x, np.arange(n) * grid.cell_y)
-    xy = np.column_stack([x.ravel(), y.ravel()])
     first = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
     triangles = np.concatenate([np.column_stack([first, first + 1, first + n + 1]),
                                 np.column_stack([first, first + n, first + n + 1])])  # fmt: skip
-    corners = xy[triangles]
-    patch = interpolation_variance(roughness, corners, np.ones(len(corners)))
-    return patch * boundary.area / ((n - 1) ** 2 * grid.cell_x * grid.cell_y)
+    row, column = np.divmod(first, n)
+    inner = np.tile((np.minimum(row, column) >= 2) & (np.maximum(row, column) < n - 3), 2)
+    xyz = np.column_stack([x.ravel(), y.ravel(), np.zeros(n * n)])
+    between = ground_between(roughness, xyz, triangles, inner.astype(float), 0.0)
+    return between, 0.5 * float(inner.sum()) * grid.cell_x * grid.cell_y
 
 
 def _base_variance(base: Base, boundary: Boundary, surface: Surface, options: SigmaOptions) -> float:
@@ -265,10 +286,10 @@ def _base_variance(base: Base, boundary: Boundary, surface: Surface, options: Si
     step = max(1, int(width / (RING_STEPS * min(surface.grid.cell_x, surface.grid.cell_y))))
     z = surface.read(row, column, rows, columns).astype(float)
     z[ring.coverage(surface.grid.window(row, column, rows, columns)) < 0.5] = np.nan
-    roughness = roughness_of_cells(z, surface.grid, (step, 2 * step))
+    roughness = roughness_of_cells(z, surface.grid, step, SMOOTHEST_BELOW)
     while roughness is None and step > 1:
         step //= 2
-        roughness = roughness_of_cells(z, surface.grid, (step, 2 * step))
+        roughness = roughness_of_cells(z, surface.grid, step, SMOOTHEST_BELOW)
     if roughness is None:
         return stated
     places, weight = quadrature_of(boundary)
@@ -284,7 +305,7 @@ def _notes(
     notes = []
     if part.unseen > 0.0:
         notes.append(f"{part.unseen:.4g} m² are seen by too few photographs of the block and are in no part of σ")
-    if part.roughness is None:
+    if part.between is None:
         notes.append("too few heights to tell how rough the ground is: interpolation is left out")
     if base_part is None and not isinstance(base, PlaneBase | SplineBase) and options.base_sigma <= 0.0:
         notes.append("the base is taken for free of error: give --base-adjustment or --base-sigma")

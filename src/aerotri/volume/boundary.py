@@ -83,7 +83,7 @@ def read_boundary(source: str, epsg: int | None = None) -> Boundary:
     epsg : CRS of the surface; a file in another one is refused.
     """
     if source.lstrip().upper().startswith(("POLYGON", "MULTIPOLYGON", "SRID=")):
-        return boundary_of(polygon_of_wkt(source), "WKT")
+        return boundary_of(polygon_of_wkt(source), "the polygon given")
     path = Path(source)
     if path.suffix.lower() in VECTOR_ENDINGS:
         polygons = [polygon for _, polygon in polygon_features(path, epsg)]

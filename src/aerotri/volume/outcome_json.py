@@ -16,6 +16,8 @@ from aerotri.volume.quantity import Volume
 
 SYSTEMATIC = "change of the volume by image errors, wrong − true, were the photographs used uncorrected"
 
+CURVATURE = "ground expected beyond the straight lines between the heights; part of σ as interpolation"
+
 
 @dataclass(frozen=True)
 class Sources:
@@ -65,6 +67,10 @@ def _sigma(sigma: VolumeSigma, volume: Volume, sources: Sources) -> dict[str, An
         "sigma_m3": sigma.total,
         "sigma_mean_height_m": sigma.total / volume.area,
         "parts_m3": {name: sigma.parts[name] for name in PARTS},
+        "curvature": None if sigma.curvature is None else {
+            "meaning": CURVATURE, "in_the_volume": False, "value_m3": sigma.curvature[0],
+            "sigma_m3": sigma.curvature[1],
+        },
         "systematic": {
             "meaning": SYSTEMATIC, "in_the_volume": not sigma.corrected,
             "variants": [{"variant": s.variant, "value_m3": s.value, "sigma_m3": s.sigma} for s in sigma.systematic],

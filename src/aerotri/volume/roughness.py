@@ -1,11 +1,12 @@
 """How rough the ground is between its pickets, and what that leaves open about integrals.
 
-[C] The ground is taken as an intrinsic random function with the semivariogram γ(h) = s²·h^(2H), 0 < H < 1: rough for
-small H, smooth for H near 1. s and H come from the surface itself: from how far a point lies off the second-order
-surface through its neighbours (contrasts Σλz with Σλ = 0 that no such surface moves), at two spacings. Var Σλz =
-−ΣΣ λ_i·λ_j·γ(d_ij) holds for every contrast; the error of an integral by interpolation is one too. What curves smoothly
-is no chance: straight triangles cut every hill off and fill every hollow. How much, a smooth surface through the same
-pickets tells; that difference counts as a σ besides.
+[C] The ground is an intrinsic random function [L: Matheron 1973] with the generalised covariance ±s²·h^(2H): rough for
+small H, with creases at H about 1.5, smooth above. Σλz that no surface of second order moves has the variance
+ΣΣ λ_i·λ_j·K(d_ij). s and H are the likeliest for all such contrasts of neighbouring heights [L: Patterson & Thompson
+1971, restricted likelihood, here the product over neighbourhoods], the noise of the heights known.
+
+Straight triangles cut hills off and fill hollows. What the ground is expected to hold beyond them the pickets around
+tell (kriging over a second-order surface); how far that is off is the same contrast's variance.
 """
 
 from __future__ import annotations
@@ -13,88 +14,95 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CloughTocher2DInterpolator, LinearNDInterpolator
+from scipy.optimize import minimize_scalar
 from scipy.spatial import KDTree
+from scipy.spatial.distance import cdist
 
 from aerotri.rasters import Grid
-from aerotri.volume.bases import quadrature_of
-from aerotri.volume.boundary import Boundary
 from aerotri.volume.triangles import areas
 
-SMOOTHEST, ROUGHEST = 0.9, 0.05
-NEIGHBOURS = 14
-"""Pickets that the second-order surface goes through by least squares."""
-LONGEST_WEIGHT = 1.5
-"""Contrasts that extrapolate are left out."""
+SMOOTHEST, ROUGHEST = 2.5, 0.05
+NEAR_WHOLE = 0.01
+"""At a whole H the covariance is that of a surface of second order: kept so far away."""
+AROUND = 20
+"""Pickets of a neighbourhood."""
 ENOUGH = 30
-MOST_CONTRASTS = 4000
-THINNED = 4
-"""The wider spacing has a picket in so many."""
-SUBDIVISION = 4
-CURVATURE_PANELS = 60
-MOST_TRIANGLES = 4000
-MEAN_DISTANCE = 0.364
-"""Of two random places in an equilateral triangle, over its side."""
+MOST_NEIGHBOURHOODS = 300
+MOST_TRIANGLES = 20_000
+CHUNK = 2000
+PARTS = 2
+RULES = (2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0), (0.5, 0.5, 0.0)
+"""Two rules for means over a triangle, of second order both and without a place in common, so that a mean over pairs of
+places has none of distance zero [L: Hammer & Stroud 1956]."""
 PATCHES, PATCH_TRIANGLES = 12, 100
-"""Neighbouring triangles share corners, so their errors add up: the variance of a sum is two to three times the sum of
-variances. The factor is taken from so many patches of so many triangles (within 10 % of that of large areas)."""
+"""Neighbouring triangles share pickets, so their errors are correlated. The factor is taken from so many patches of so
+many triangles (within 10 % of that of large areas)."""
 
 
 @dataclass(frozen=True)
 class Roughness:
-    """γ(h) = s²·h^(2H); s in m at a distance of 1 m."""
+    """K(h) = ±s²·h^(2H), minus for H < 1, plus up to 2, minus up to 3; s in m at a distance of 1 m."""
 
     s: float
     exponent: float
 
-    def semivariogram(self, distance: np.ndarray) -> np.ndarray:
-        """m²."""
-        return self.s**2 * np.asarray(distance) ** (2.0 * self.exponent)
+    def covariance(self, distance: np.ndarray) -> np.ndarray:
+        """m², generalised."""
+        sign = -1.0 if int(self.exponent) % 2 == 0 else 1.0
+        return sign * self.s**2 * np.asarray(distance) ** (2.0 * self.exponent)
 
     def contrast_variance(self, xy: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """(…,) m², variance of Σλz at places (…, n, 2) with weights (…, n) that add up to zero."""
+        """(…,) m², variance of Σλz at places (…, n, 2); the weights (…, n) annul what H asks for."""
         gap = np.linalg.norm(xy[..., :, None, :] - xy[..., None, :, :], axis=-1)
-        return -np.einsum("...i,...ij,...j->...", weights, self.semivariogram(gap), weights)
+        return np.einsum("...i,...ij,...j->...", weights, self.covariance(gap), weights)
 
 
-@dataclass(frozen=True, eq=False)
-class _Contrasts:
-    """Places (n or 1, m, 2), weights (n or 1, m), and the contrasts' squares less their noise (n,)."""
+@dataclass(frozen=True)
+class Between:
+    """The ground between pickets less the straight triangles over them: expected m³, and the variance of that, m⁶."""
 
-    xy: np.ndarray
-    weights: np.ndarray
-    square: np.ndarray
+    curvature: float = 0.0
+    variance: float = 0.0
+
+    @property
+    def mean_square(self) -> float:
+        """m⁶, of what a volume by triangles is off."""
+        return self.curvature**2 + self.variance
 
 
-def roughness_of_pickets(xyz: np.ndarray, noise: float, seed: int = 0) -> Roughness | None:
+def roughness_of_pickets(
+    xyz: np.ndarray, noise: float, own: np.ndarray | None = None, seed: int = 0
+) -> Roughness | None:
     """The roughness of the ground between pickets; None where there are too few.
 
     Parameters
     ----------
     xyz : (k, 3) m. noise : m², variance of a height that is its own alone.
+    own : rows where it counts; None: all.
     """
-    if len(xyz) < THINNED * (NEIGHBOURS + ENOUGH):
+    rows = np.arange(len(xyz)) if own is None else own
+    if len(rows) < ENOUGH:
         return None
-    rng = np.random.default_rng(seed)
-    fine = _picket_contrasts(xyz, noise, rng)
-    coarse = _picket_contrasts(xyz[rng.choice(len(xyz), len(xyz) // THINNED, replace=False)], noise, rng)
-    return None if min(len(fine.square), len(coarse.square)) < ENOUGH else _fitted(fine, coarse)
+    if len(rows) > MOST_NEIGHBOURHOODS:
+        rows = np.random.default_rng(seed).choice(rows, MOST_NEIGHBOURHOODS, replace=False)
+    near = xyz[np.asarray(KDTree(xyz[:, :2]).query(xyz[rows, :2], AROUND)[1])]
+    return _likeliest(near[:, :, :2], near[:, :, 2], noise, SMOOTHEST)
 
 
-def roughness_of_cells(z: np.ndarray, grid: Grid, steps: tuple[int, int] = (1, 2)) -> Roughness | None:
-    """The roughness of a surface of cells, (rows, columns) m with NaN where not known; at two spacings in cells."""
-    found = [_cell_contrasts(z, grid, step) for step in steps]
-    return None if min(len(part.square) for part in found) < ENOUGH else _fitted(*found)
-
-
-def curvature_of_pickets(xyz: np.ndarray, boundary: Boundary) -> float:
-    """m³, volume under a smooth surface through the pickets less that under their TIN [L: Clough & Tocher 1965]."""
-    places, weight = quadrature_of(boundary, CURVATURE_PANELS)
-    at = xyz - xyz.mean(axis=0)
-    places = places - xyz[:, :2].mean(axis=0)
-    smooth = CloughTocher2DInterpolator(at[:, :2], at[:, 2])(places)
-    straight = LinearNDInterpolator(at[:, :2], at[:, 2])(places)
-    return float(np.nansum(weight * (smooth - straight)))
+def roughness_of_cells(
+    z: np.ndarray, grid: Grid, step: int = 1, smoothest: float = SMOOTHEST, seed: int = 0
+) -> Roughness | None:
+    """The roughness of a surface of cells, (rows, columns) m with NaN where not known, at a spacing of `step` cells."""
+    j, i = (step * v.ravel() for v in np.meshgrid(np.arange(5), np.arange(5)))
+    rows, columns = (max(n - 4 * step, 0) for n in z.shape)
+    known = np.logical_and.reduce([np.isfinite(z[a:, b:][:rows, :columns]) for a, b in zip(i, j, strict=True)])
+    places = np.argwhere(known)
+    if len(places) < ENOUGH:
+        return None
+    if len(places) > MOST_NEIGHBOURHOODS:
+        places = places[np.random.default_rng(seed).choice(len(places), MOST_NEIGHBOURHOODS, replace=False)]
+    xy = np.column_stack([j * grid.cell_x, i * grid.cell_y])[None].astype(float)
+    return _likeliest(xy, z[places[:, :1] + i, places[:, 1:] + j], 0.0, smoothest)
 
 
 def curvature_of_cells(z: np.ndarray, grid: Grid) -> float:
@@ -103,126 +111,175 @@ def curvature_of_cells(z: np.ndarray, grid: Grid) -> float:
     return -float(np.nanmean(across)) / 12.0 if np.isfinite(across).any() else 0.0
 
 
-def interpolation_variance(roughness: Roughness, corners: np.ndarray, share: np.ndarray, seed: int = 0) -> float:
-    """m⁶, variance of the volume over triangles from the ground between their corners.
+def ground_between(
+    roughness: Roughness, xyz: np.ndarray, triangles: np.ndarray, share: np.ndarray, noise: float, seed: int = 0
+) -> Between:
+    """What straight triangles over pickets leave out.
 
     Parameters
     ----------
-    corners : (t, 3, 2) m. share : (t,) which part of each lies inside the boundary.
+    xyz : (k, 3) m. triangles : (t, 3) corners. share : (t,) which part of each lies inside the boundary.
+    noise : m², variance of a height that is its own alone.
     """
-    if not len(corners):
-        return 0.0
+    own = np.flatnonzero(share > 0.0)
+    if not len(own) or len(xyz) < AROUND:
+        return Between()
     rng = np.random.default_rng(seed)
-    few = np.arange(len(corners)) if len(corners) <= MOST_TRIANGLES else rng.choice(len(corners), MOST_TRIANGLES)
-    single = float(np.mean(triangle_variance(roughness, corners[few]) * share[few])) * len(corners)
-    return single * _neighbours(roughness, corners, rng)
+    few = own if len(own) <= MOST_TRIANGLES else rng.choice(own, MOST_TRIANGLES, replace=False)
+    tree = KDTree(xyz[:, :2])
+    part = [_over(roughness, xyz, triangles[few[k : k + CHUNK]], noise, tree) for k in range(0, len(few), CHUNK)]
+    more = np.concatenate([of.more for of in part]) * share[few]
+    scale = len(own) / len(few)
+    sampling = len(own) ** 2 * (1.0 - 1.0 / scale) * float(np.var(more)) / len(few)
+    single = scale * float(np.concatenate([of.variance for of in part]) @ share[few])
+    factor = _neighbours(roughness, xyz, triangles[own], noise, tree, rng)
+    return Between(scale * float(more.sum()), single * factor + sampling)
 
 
-def _neighbours(roughness: Roughness, corners: np.ndarray, rng: np.random.Generator) -> float:
+@dataclass(frozen=True, eq=False)
+class _Over:
+    """Triangles and the pickets around them.
+
+    Parameters
+    ----------
+    near : (t, m) rows of the pickets. weights : (t, m) their mean over the triangle. area : (t,) m².
+    more : (t,) m³, ground expected beyond the straight triangle. variance : (t,) m⁶.
+    """
+
+    near: np.ndarray
+    weights: np.ndarray
+    area: np.ndarray
+    more: np.ndarray
+    variance: np.ndarray
+
+
+def _over(roughness: Roughness, xyz: np.ndarray, triangles: np.ndarray, noise: float, tree: KDTree) -> _Over:
+    """[L: universal kriging of a block] in coordinates of the size of each neighbourhood."""
+    corners = xyz[triangles]
+    middle = corners.mean(axis=1)
+    near = np.asarray(tree.query(middle[:, :2], AROUND)[1])
+    at = xyz[near][:, :, :2] - middle[:, None, :2]
+    size = np.abs(at).max(axis=(1, 2))
+    at = at / size[:, None, None]
+    inside, other = (_places(PARTS, rule) @ (corners - middle[:, None])[:, :, :2] / size[:, None, None]
+                     for rule in RULES)  # fmt: skip
+    unit = Roughness(1.0, roughness.exponent)
+    gap = np.linalg.norm(at[:, :, None] - at[:, None], axis=-1)
+    to_inside = 0.5 * sum(
+        unit.covariance(np.linalg.norm(at[:, :, None] - of[:, None], axis=-1)).mean(axis=2) for of in (inside, other)
+    )
+    level = roughness.s**2 * size ** (2.0 * roughness.exponent)
+    # without roughness the pickets' noise alone weighs them: a surface of second order by least squares
+    share = level / np.maximum(level + noise, 1e-300)
+    system = np.zeros((len(at), AROUND + 6, AROUND + 6))
+    system[:, :AROUND, :AROUND] = share[:, None, None] * unit.covariance(gap) + (
+        np.where(level > 0.0, 1.0 - share, 1.0)[:, None, None] * np.eye(AROUND)
+    )
+    system[:, :AROUND, AROUND:] = _terms(at)
+    system[:, AROUND:, :AROUND] = np.swapaxes(system[:, :AROUND, AROUND:], 1, 2)
+    right = np.concatenate([share[:, None] * to_inside, _terms(inside).mean(axis=1)], axis=1)
+    weights = np.linalg.solve(system, right[..., None])[:, :AROUND, 0]
+    area = areas(corners[:, :, :2])
+    heights = xyz[near, 2] - middle[:, 2:]
+    between = np.linalg.norm(inside[:, :, None] - other[:, None], axis=-1)
+    variance = unit.covariance(between).mean(axis=(1, 2)) - 2.0 * np.sum(weights * to_inside, axis=1)
+    variance += np.einsum("ti,tij,tj->t", weights, unit.covariance(gap), weights)
+    return _Over(near, weights, area, area * np.sum(weights * heights, axis=1),
+                 np.maximum(level * variance, 0.0) * area**2)  # fmt: skip
+
+
+def _neighbours(
+    roughness: Roughness, xyz: np.ndarray, triangles: np.ndarray, noise: float, tree: KDTree, rng: np.random.Generator
+) -> float:
     """Variance of the sum over neighbouring triangles over the sum of their variances."""
-    tree = KDTree(corners.mean(axis=1))
-    count = min(PATCH_TRIANGLES, len(corners))
+    middles = xyz[triangles].mean(axis=1)[:, :2]
+    of_middles = KDTree(middles)
     together, apart = 0.0, 0.0
-    for middle in corners[rng.choice(len(corners), PATCHES)].mean(axis=1):
-        own = corners[np.atleast_1d(tree.query(middle, count)[1])]
-        one, all_ = patch_variances(roughness, own)
+    for place in middles[rng.choice(len(middles), PATCHES)]:
+        own = triangles[np.atleast_1d(of_middles.query(place, min(PATCH_TRIANGLES, len(middles)))[1])]
+        one, all_ = patch_variances(roughness, xyz, own, noise, tree)
         apart, together = apart + one, together + all_
     return together / apart if apart > 0.0 else 1.0
 
 
-def patch_variances(roughness: Roughness, corners: np.ndarray, subdivision: int = 2) -> tuple[float, float]:
-    """m⁶, the sum of the variances of triangles (t, 3, 2), and the variance of their sum."""
-    weights = _subdivision(subdivision)
-    n, area = len(weights), areas(corners)
-    places = np.concatenate([weights @ corners, corners], axis=1).reshape(-1, 2)
-    of_place = (area[:, None] * np.concatenate([np.full(n, 1.0 / n), np.full(3, -1.0 / 3.0)])).ravel()
-    gap = np.sqrt(np.maximum(_squared_gaps(places), 0.0))
-    within = float(np.sum(_within(roughness, area, n)))
-    together = -float(of_place @ roughness.semivariogram(gap) @ of_place) - within
-    return float(np.sum(triangle_variance(roughness, corners, subdivision))), together
+def patch_variances(
+    roughness: Roughness, xyz: np.ndarray, triangles: np.ndarray, noise: float, tree: KDTree
+) -> tuple[float, float]:
+    """m⁶, the sum of the variances over triangles (t, 3), and the variance of their sum."""
+    over = _over(roughness, xyz, triangles, noise, tree)
+    area = float(over.area.sum())
+    pickets, column = np.unique(over.near, return_inverse=True)
+    of_pickets = np.zeros(len(pickets))
+    np.add.at(of_pickets, column.ravel(), -(over.area[:, None] * over.weights).ravel())
+    at = xyz[pickets, :2]
+    middle = at.mean(axis=0)
+    size = np.abs(at - middle).max()
+    sides = []
+    for rule in RULES:
+        inside = _places(PARTS, rule) @ xyz[triangles][:, :, :2]
+        share = np.repeat(over.area / inside.shape[1], inside.shape[1])
+        sides.append((np.concatenate([inside.reshape(-1, 2), at]), np.concatenate([share, of_pickets]) / area))
+    (first, own), (second, other) = sides
+    gap = cdist((first - middle) / size, (second - middle) / size)
+    sum_ = float(own @ Roughness(1.0, roughness.exponent).covariance(gap) @ other)
+    level = roughness.s**2 * size ** (2.0 * roughness.exponent)
+    return float(over.variance.sum()), max(sum_, 0.0) * level * area**2
 
 
-def triangle_variance(roughness: Roughness, corners: np.ndarray, subdivision: int = SUBDIVISION) -> np.ndarray:
-    """(t,) m⁶, of ∫ z over a triangle by the mean of its corners; corners (t, 3, 2)."""
-    weights = _subdivision(subdivision)
-    places = np.concatenate([weights @ corners, corners], axis=1)
-    n, area = len(weights), areas(corners)
-    of_place = np.concatenate([np.full(n, 1.0 / n), np.full(3, -1.0 / 3.0)])
-    variance = roughness.contrast_variance(places, np.broadcast_to(of_place, places.shape[:2]))
-    return np.maximum(variance * area**2 - _within(roughness, area, n), 0.0)
-
-
-def _within(roughness: Roughness, area: np.ndarray, n: int) -> np.ndarray:
-    """(t,) m⁶, what n places that stand for equal parts of a triangle leave out: the distances within a part."""
-    side = np.sqrt(4.0 / np.sqrt(3.0) * area / n)
-    return roughness.semivariogram(MEAN_DISTANCE * side) * area**2 / n
-
-
-def _squared_gaps(places: np.ndarray) -> np.ndarray:
-    """(n, n) m²."""
-    at = places - places.mean(axis=0)
-    squares = np.sum(at**2, axis=1)
-    return squares[:, None] + squares[None, :] - 2.0 * at @ at.T
-
-
-def _subdivision(n: int) -> np.ndarray:
-    """(n², 3) barycentric coordinates of the middles of n² equal parts of a triangle."""
+def _places(n: int, within: tuple[float, float, float]) -> np.ndarray:
+    """(3n², 3) barycentric coordinates: three places in every one of n² equal parts of a triangle."""
+    own = np.array([np.roll(within, k) for k in range(3)])
     out = []
     for i in range(n):
         for j in range(n - i):
-            out.append(((3 * i + 1) / (3 * n), (3 * j + 1) / (3 * n)))
+            corner = np.array([(i, j), (i + 1, j), (i, j + 1)])
+            out.append(own @ corner / n)
             if i + j < n - 1:
-                out.append(((3 * i + 2) / (3 * n), (3 * j + 2) / (3 * n)))
-    first = np.array(out)
+                out.append(own @ (np.array([(i + 1, j + 1), (i + 1, j), (i, j + 1)])) / n)
+    first = np.concatenate(out)
     return np.column_stack([first, 1.0 - first.sum(axis=1)])
 
 
-def _fitted(fine: _Contrasts, coarse: _Contrasts) -> Roughness:
-    """H from the ratio of both spacings, s from the finer one."""
+def _likeliest(xy: np.ndarray, z: np.ndarray, noise: float, smoothest: float) -> Roughness:
+    """From neighbourhoods: places (n or 1, m, 2), heights (n, m)."""
+    at = xy - xy.mean(axis=1, keepdims=True)
+    size = float(np.median(np.abs(at).max(axis=(1, 2))))
+    at = at / size
+    left = np.linalg.qr(_terms(at), mode="complete").Q[:, :, 6:]
+    contrasts = np.einsum("nmi,nm->ni", np.broadcast_to(left, (len(z), *left.shape[1:])), z - z.mean(axis=1)[:, None])
+    gap = np.linalg.norm(at[:, :, None] - at[:, None], axis=-1)
+    # what rounding leaves of heights is no roughness
+    least = 1e-18 * max(float(np.var(z)), 1e-300)
 
-    def scale(part: _Contrasts, exponent: float) -> float:
-        return max(float(part.square.mean()), 0.0) / float(
-            Roughness(1.0, exponent).contrast_variance(part.xy, part.weights).mean()
-        )
+    def fit(exponent: float) -> tuple[float, float]:
+        """−2·log of the likelihood, and s² at a distance of `size`."""
+        covariance = np.swapaxes(left, 1, 2) @ Roughness(1.0, _not_whole(exponent)).covariance(gap) @ left
+        values, vectors = np.linalg.eigh(covariance)
+        own = np.einsum("nij,ni->nj", np.broadcast_to(vectors, (len(z), *vectors.shape[1:])), contrasts) ** 2
+        values = np.maximum(values, 1e-12 * values[:, -1:])
+        start = max(float(np.mean(own / values)), least)
 
-    low, high = ROUGHEST, SMOOTHEST
-    for _ in range(40):
-        middle = (low + high) / 2.0
-        # a larger exponent explains more of the wider contrasts
-        low, high = (middle, high) if scale(coarse, middle) > scale(fine, middle) else (low, middle)
-    return Roughness(float(np.sqrt(scale(fine, low))), low)
+        def minus(log_level: float) -> float:
+            variance = np.exp(log_level) * values + noise
+            return float(np.mean(np.log(variance) + own / variance))
 
+        if noise == 0.0:
+            return minus(np.log(start)), start
+        best = minimize_scalar(minus, bounds=(np.log(start) - 25.0, np.log(start) + 1.0), method="bounded")
+        return float(best.fun), float(np.exp(best.x))
 
-def _picket_contrasts(xyz: np.ndarray, noise: float, rng: np.random.Generator) -> _Contrasts:
-    """Pickets off the second-order surface through their neighbours."""
-    tree = KDTree(xyz[:, :2])
-    rows = np.arange(len(xyz)) if len(xyz) <= MOST_CONTRASTS else rng.choice(len(xyz), MOST_CONTRASTS, replace=False)
-    near = np.asarray(tree.query(xyz[rows, :2], NEIGHBOURS + 1)[1])
-    xy = xyz[near][:, :, :2]
-    weights = _second_order(xy)
-    good = np.abs(weights[:, 1:]).max(axis=1) <= LONGEST_WEIGHT
-    xy, weights = xy[good], weights[good]
-    value = np.einsum("ni,ni->n", weights, xyz[near[good], 2])
-    return _Contrasts(xy, weights, value**2 - noise * np.sum(weights**2, axis=1))
-
-
-def _second_order(xy: np.ndarray) -> np.ndarray:
-    """(n, m) weights: 1 for the first place, and less what the second-order surface through the others has there."""
-    gap = xy[:, 1:] - xy[:, :1]
-    x, y = np.moveaxis(gap / np.abs(gap).max(axis=(1, 2), keepdims=True), -1, 0)
-    design = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
-    return np.concatenate([np.ones((len(xy), 1)), -np.linalg.pinv(design)[:, 0]], axis=1)
+    exponent = _not_whole(float(minimize_scalar(lambda h: fit(h)[0], bounds=(ROUGHEST, smoothest), method="bounded",
+                                                options={"xatol": 0.01}).x))  # fmt: skip
+    return Roughness(float(np.sqrt(fit(exponent)[1])) / size**exponent, exponent)
 
 
-def _cell_contrasts(z: np.ndarray, grid: Grid, step: int) -> _Contrasts:
-    """Cells off the second-order surface through the 24 around them."""
-    j, i = (v.ravel().astype(float) for v in np.meshgrid(np.arange(-2, 3), np.arange(-2, 3)))
-    order = np.argsort(np.hypot(i, j), kind="stable")
-    i, j = i[order], j[order]
-    xy = step * np.column_stack([j * grid.cell_x, i * grid.cell_y])[None]
-    weights = _second_order(xy)
-    rows, columns = (max(n - 4 * step, 0) for n in z.shape)
-    value = np.zeros((rows, columns))
-    for weight, di, dj in zip(weights[0], i.astype(int), j.astype(int), strict=True):
-        value += weight * z[(2 + di) * step :, (2 + dj) * step :][:rows, :columns]
-    return _Contrasts(xy, weights, value[np.isfinite(value)] ** 2)
+def _not_whole(exponent: float) -> float:
+    whole = round(exponent)
+    off = exponent - whole
+    return exponent if abs(off) >= NEAR_WHOLE else whole + (NEAR_WHOLE if off >= 0.0 else -NEAR_WHOLE)
+
+
+def _terms(xy: np.ndarray) -> np.ndarray:
+    """(…, 6) of a surface of second order at places (…, 2)."""
+    x, y = np.moveaxis(xy, -1, 0)
+    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
