@@ -1,6 +1,10 @@
 """`aerotri dtm`: from a result folder and photographs to files that later commands read."""
 
+import contextlib
 import json
+import sqlite3
+import struct
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -79,6 +83,54 @@ def test_demcor_takes_the_models(made):
                              here / "dtm" / "model.tif", "--out", out, "--json"))  # fmt: skip
     assert printed["corrected"] > 100
     assert 0.0 < printed["dZ"]["rms"] < 0.5
+
+
+WALL = np.array([[-57.0, -44.0, 150.0], [-7.0, 6.0, 152.0], [48.0, 30.0, 155.0]])
+
+
+def write_dxf(path):
+    import ezdxf
+
+    drawing = ezdxf.new("R2010")
+    drawing.modelspace().add_polyline3d(WALL.tolist())
+    drawing.saveas(path)
+
+
+def write_geopackage(path):
+    blob = b"GP\x00\x01" + struct.pack("<i", -1) + struct.pack("<BII", 1, 1002, len(WALL)) + WALL.tobytes()
+    with contextlib.closing(sqlite3.connect(path)) as package:
+        package.execute("CREATE TABLE gpkg_geometry_columns (table_name, column_name, srs_id INTEGER)")
+        package.execute("INSERT INTO gpkg_geometry_columns VALUES ('walls', 'geom', -1)")
+        package.execute("CREATE TABLE walls (geom BLOB)")
+        package.execute("INSERT INTO walls VALUES (?)", (blob,))
+        package.commit()
+
+
+@pytest.mark.parametrize(("name", "write"), [("walls.dxf", write_dxf), ("walls.gpkg", write_geopackage)])
+def test_breaklines_from_a_file_are_edges_of_the_surface(made, tmp_path, name, write):
+    """A wall some 50 m over the ground: cells on it have its height, cells an interval away that of the ground."""
+    _, _, dtm = made
+    write(tmp_path / name)
+    area = ("--area", -100, -80, 100, 80)
+    run(*dtm, "--out", tmp_path / "dtm", "--breaklines", tmp_path / name, *area, "--cell", 2, "--json")
+    run(*dtm, "--out", tmp_path / "without", *area, "--cell", 2, "--json")
+    with RasterReader(tmp_path / "dtm" / "dsm.tif") as one, RasterReader(tmp_path / "without" / "dsm.tif") as other:
+        for a, b in pairwise(WALL):
+            on_it = a + np.linspace(0.05, 0.95, 12)[:, None] * (b - a)
+            # between cells of 2 m on a ridge that falls by 50 m within 5 m where it is nearest to a picket
+            assert np.abs(one.sample(*on_it[:, :2].T) - on_it[:, 2]).max() < 20.0
+            assert (on_it[:, 2] - other.sample(*on_it[:, :2].T)).min() > 25.0
+        x, y = (v.ravel() for v in np.meshgrid(np.arange(-80.0, 81.0, 8.0), np.arange(-60.0, 61.0, 8.0)))
+        difference = one.sample(x, y) - other.sample(x, y)
+    away = np.min([_distance(np.column_stack([x, y]), a[:2], b[:2]) for a, b in pairwise(WALL)], axis=0)
+    known = np.isfinite(difference)
+    assert np.abs(difference[known & (away > 45.0)]).max() < 0.01
+    assert np.median(difference[known & (away < 4.0)]) > 40.0
+
+
+def _distance(xy: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    share = np.clip((xy - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+    return np.hypot(*(xy - a - share[:, None] * (b - a)).T)
 
 
 @pytest.mark.parametrize(

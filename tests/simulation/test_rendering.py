@@ -13,8 +13,9 @@ from aerotri.image_errors.tile_grid import seams_px
 from aerotri.simulation import parse_spec, read_spec, simulate
 from aerotri.simulation.camera_errors import ImageError
 from aerotri.simulation.projection import Photographs
-from aerotri.simulation.rendering import RenderOptions, Scene, make_scene, render, rendered_rows
+from aerotri.simulation.rendering import RenderOptions, Scene, _first_met, make_scene, render, rendered_rows
 from aerotri.simulation.rendering_texture import Texture
+from aerotri.simulation.terrain import Terrain
 from small_blocks import small_spec
 
 PLAIN = RenderOptions(contrast=0.0, noise=0.0, targets=True)
@@ -167,6 +168,21 @@ def test_views_that_meet_no_ground_are_refused():
     wild = replace(scene.terrain, amplitude=scene.terrain.amplitude * 60.0, wave_number=scene.terrain.wave_number * 9.0)
     with pytest.raises(InputError, match="terrain hides itself"):
         render(replace(scene, terrain=wild), 0)
+
+
+def test_rays_end_on_the_first_roof_wall_or_ground():
+    """A house 20 m high, seen from 100 m beside and above it: single rays by hand; ground as without houses."""
+    none = np.zeros(0)
+    house = np.array([[0.0, 0.0, 10.0, 10.0, 20.0]])
+    town = Terrain(0.0, np.zeros((0, 2)), none, none, houses=house)
+    np.testing.assert_array_equal(town.height(np.array([[0.0, 4.0], [5.1, 0.0]])), [20.0, 0.0])
+    np.testing.assert_array_equal(town.ground(np.array([[0.0, 4.0]])), [0.0])
+    centre = np.array([-100.0, 0.0, 100.0])
+    towards = np.array([[-60.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 2.0, 20.0], [22.0, 0.0, 0.0], [40.0, 0.0, 0.0]])
+    slope = (towards - centre)[:, :2] / (towards - centre)[:, 2:]
+    found = _first_met(town, centre, slope)
+    # ground before the house; its wall; its roof; the roof again, for the ground behind it; ground beyond the shadow
+    np.testing.assert_allclose(found, [[-60.0, 0.0], [-5.0, 0.0], [0.0, 2.0], [-2.4, 0.0], [40.0, 0.0]], atol=1e-3)
 
 
 def test_seam_jumps_by_the_difference_of_the_tiles():

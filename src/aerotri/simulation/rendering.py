@@ -38,6 +38,8 @@ BLUR_REACH = 4.0
 TARGET_EDGE_PX = 0.7
 """σ of the edge of a disc, so that its sampling by pixels leaves its centroid alone."""
 RAY_TOLERANCE_M, RAY_ITERATIONS = 1e-5, 100
+STEP_M = 0.5
+"""In plan, by which rays are followed where houses hide what is behind them."""
 Report = Callable[[float], None]
 
 
@@ -293,6 +295,8 @@ def _on_terrain(scene: Scene, image: int, ray: np.ndarray) -> np.ndarray:
     if (ray[:, 2] >= 0.0).any():
         raise InputError(f"photograph '{name}' looks over the horizon", "tilt it less to have it rendered")
     slope = ray[:, :2] / ray[:, 2:]
+    if len(scene.terrain.houses):
+        return _first_met(scene.terrain, centre, slope)
     height = np.full(len(ray), scene.terrain.base)
     active = np.arange(len(ray))
     for _ in range(RAY_ITERATIONS):
@@ -304,3 +308,29 @@ def _on_terrain(scene: Scene, image: int, ray: np.ndarray) -> np.ndarray:
         if not len(active):
             return centre[:2] + (height - centre[2])[:, None] * slope
     raise InputError(f"the terrain hides itself in photograph '{name}'", "render flatter terrain, or tilt less")
+
+
+def _first_met(terrain: Terrain, centre: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """(n, 2) X, Y where rays first meet ground, wall or roof: downwards step by step, then by halving the last step.
+
+    slope : (n, 2) change of X and Y with the height.
+    """
+
+    def plan(height: np.ndarray, which: np.ndarray | slice = np.s_[:]) -> np.ndarray:
+        return centre[:2] + (height - centre[2])[:, None] * slope[which]
+
+    low, high = terrain.reach
+    steps = int((high - low) * float(np.hypot(*slope.T).max(initial=0.0)) / STEP_M) + 1
+    above, below = np.full(len(slope), high), np.full(len(slope), low)
+    active = np.arange(len(slope))
+    for height in np.linspace(high, low, steps + 1)[1:]:
+        at = np.full(len(active), height)
+        met = terrain.height(plan(at, active)) >= height
+        below[active[met]] = height
+        active = active[~met]
+        above[active] = height
+    for _ in range(int(np.log2(max((high - low) / steps, RAY_TOLERANCE_M) / RAY_TOLERANCE_M)) + 1):
+        middle = 0.5 * (above + below)
+        met = terrain.height(plan(middle)) >= middle
+        above, below = np.where(met, above, middle), np.where(met, middle, below)
+    return plan(0.5 * (above + below))

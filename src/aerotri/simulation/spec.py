@@ -137,7 +137,10 @@ class FlightSpec(Table):
 
 
 class TerrainSpec(Table):
-    """The ground; `height_m` is its mean level. A hill may stand on undulating ground too."""
+    """The ground; `height_m` is its mean level. A hill may stand on undulating ground too.
+
+    `houses` have flat roofs: middle X and Y from the middle of the block, size along X and along Y, height, m.
+    """
 
     kind: Literal["flat", "undulating", "hill"] = "flat"
     height_m: Number = 0.0
@@ -146,6 +149,7 @@ class TerrainSpec(Table):
     hill_height_m: Number = 0.0
     hill_radius_m: Positive = 100.0
     hill_centre_m: tuple[Number, Number] = (0.0, 0.0)
+    houses: tuple[tuple[Number, Number, Positive, Positive, Positive], ...] = ()
 
 
 class TiePointSpec(Table):

@@ -1,8 +1,8 @@
-"""The ground: flat, undulating or a hill, as a function of the plan coordinates."""
+"""The ground: flat, undulating or a hill, and houses on it, as a function of the plan coordinates."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,7 +13,7 @@ WAVES = 12
 
 @dataclass(frozen=True, eq=False)
 class Terrain:
-    """Ground height Z = base + Σ a·cos(k·(X, Y) + phase) + hill·exp(−ρ²/2radius²).
+    """Height Z = base + Σ a·cos(k·(X, Y) + phase) + hill·exp(−ρ²/2radius²), and houses over it.
 
     Parameters
     ----------
@@ -21,6 +21,7 @@ class Terrain:
     wave_number : (w, 2) rad/m; amplitude, phase : (w,) m, rad.
     hill_height, hill_radius : m; the hill holds the volume 2π·radius²·height over the base.
     hill_centre : (2,) m.
+    houses : (h, 5) m, middle X and Y, sizes along X and Y, height of the flat roof over the ground in the middle.
     """
 
     base: float
@@ -30,9 +31,28 @@ class Terrain:
     hill_height: float = 0.0
     hill_radius: float = 1.0
     hill_centre: tuple[float, float] = (0.0, 0.0)
+    houses: np.ndarray = field(default_factory=lambda: np.zeros((0, 5)))
 
     def height(self, xy: np.ndarray) -> np.ndarray:
-        """(n,) m at (n, 2) m."""
+        """(n,) m at (n, 2) m, of the ground or of the roof over it."""
+        xy = np.asarray(xy, dtype=float)
+        z = self.ground(xy)
+        roofs = self.ground(self.houses[:, :2]) + self.houses[:, 4]
+        for house, roof in zip(self.houses, roofs, strict=True):
+            on_it = (np.abs(xy - house[:2]) <= 0.5 * house[2:4]).all(axis=1)
+            z[on_it] = np.maximum(z[on_it], roof)
+        return z
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """m, heights that nothing is below and nothing above."""
+        waves = float(np.abs(self.amplitude).sum())
+        low = self.base - waves + min(self.hill_height, 0.0)
+        high = self.base + waves + max(self.hill_height, 0.0) + float(self.houses[:, 4].max(initial=0.0))
+        return low, high
+
+    def ground(self, xy: np.ndarray) -> np.ndarray:
+        """(n,) m at (n, 2) m, of the ground, below houses too."""
         xy = np.asarray(xy, dtype=float)
         z = np.full(len(xy), self.base)
         for k, a, phase in zip(self.wave_number, self.amplitude, self.phase, strict=True):
@@ -44,14 +64,14 @@ class Terrain:
 
 
 def make_terrain(spec: TerrainSpec, centre: tuple[float, float], rng: np.random.Generator) -> Terrain:
-    """Terrain of a spec; a hill stands on either kind of ground.
+    """Terrain of a spec, its houses where the spec puts them; a hill stands on either kind of ground.
 
     Undulating ground is a sum of `WAVES` waves in random directions, their lengths within a factor √2 of
     the wavelength asked for, with a common amplitude that gives the RMS asked for.
 
     Parameters
     ----------
-    centre : (2,) m of the block: a hill's place counts from there.
+    centre : (2,) m of the block: places of a hill and of houses count from there.
     """
     waves = WAVES if spec.kind == "undulating" else 0
     direction = rng.uniform(0.0, 2.0 * np.pi, waves)
@@ -61,4 +81,6 @@ def make_terrain(spec: TerrainSpec, centre: tuple[float, float], rng: np.random.
     phase = rng.uniform(0.0, 2.0 * np.pi, waves)
     height = 0.0 if spec.kind == "flat" else spec.hill_height_m
     place = (centre[0] + spec.hill_centre_m[0], centre[1] + spec.hill_centre_m[1])
-    return Terrain(spec.height_m, number, amplitude, phase, height, spec.hill_radius_m, place)
+    houses = np.array([list(house) for house in spec.houses], dtype=float).reshape(-1, 5)
+    houses[:, :2] += centre
+    return Terrain(spec.height_m, number, amplitude, phase, height, spec.hill_radius_m, place, houses)

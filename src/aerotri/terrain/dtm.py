@@ -136,7 +136,7 @@ def make_terrain_model(calibration: Calibration, plan: TerrainPlan, report: Repo
     pickets = with_error_pickets(pickets, gsd / base_ratio(photographs, pickets))
     tell("statistics", 0.97)
     adjustment = adjustment_variances(calibration, photographs.of, plan.rows, pickets)
-    outcome = _surfaces(pickets, adjustment, interval, plan)
+    outcome = _surfaces(pickets, adjustment, interval, plan, 0.5 * plan.window_px * gsd)
     tell("surfaces", 1.0)
     number = _model_numbers(outcome[0], pickets) if models is not None else np.zeros((0, 0), np.int32)
     dsm, dtm, ground, interpolation = outcome
@@ -207,7 +207,7 @@ def models_of(calibration: Calibration, photographs: Photographs, step: int | No
 
 
 def _surfaces(
-    pickets: Pickets, adjustment: np.ndarray, interval: float, plan: TerrainPlan
+    pickets: Pickets, adjustment: np.ndarray, interval: float, plan: TerrainPlan, blur: float
 ) -> tuple[Surface, Surface, np.ndarray, float]:
     own = np.flatnonzero(pickets.accepted)
     xyz, matching, shared = pickets.xyz[own], pickets.covariance[own, 2, 2], adjustment[own, 2]
@@ -215,7 +215,7 @@ def _surfaces(
     cell = interval / CELLS_PER_INTERVAL if plan.cell is None else plan.cell
     grid = grid_over(xyz[:, :2], cell)
     dsm = surface_of(xyz, matching, interval, grid, plan.breaklines, between, shared)
-    of_cell = ground_cells(dsm.z, cell)
+    of_cell = ground_cells(dsm.z, cell, blur)
     row = np.clip(np.round(grid.row(xyz[:, 1])), 0, grid.rows - 1).astype(int)
     column = np.clip(np.round(grid.column(xyz[:, 0])), 0, grid.columns - 1).astype(int)
     is_ground = of_cell[row, column]

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt, grey_opening
+from scipy.ndimage import binary_dilation, distance_transform_edt, grey_opening
 
 from aerotri.rasters import Grid
 from aerotri.terrain.tin import triangulate
@@ -107,12 +107,17 @@ def interpolation_error(xyz: np.ndarray, node: np.ndarray, interval: float, vari
     return float(two * 2.0 ** -np.clip(power, LEAST_POWER, MOST_POWER))
 
 
-def ground_cells(z: np.ndarray, cell: float) -> np.ndarray:
+def ground_cells(z: np.ndarray, cell: float, blur: float = 0.0) -> np.ndarray:
     """(rows, columns) bool: cells of a surface that are ground and no object on it.
 
     The simple morphological filter [L: Pingel, Clarke, McBride 2013]: the surface is opened by ever wider discs; what
     a disc takes off more than the slope allows is an object; the ground then is what lies near the surface of the
     rest. Openings are those of scipy.ndimage. Widest object 18 m, slope 15 %, threshold 0.5 m + 1.25 · slope.
+
+    Parameters
+    ----------
+    blur : m beside an object that are no ground either: the windows of matching have some of the object in them, so
+        that walls become slopes, whose feet no opening takes off.
     """
     known = np.isfinite(z)
     if not known.any():
@@ -123,17 +128,24 @@ def ground_cells(z: np.ndarray, cell: float) -> np.ndarray:
         opened = grey_opening(last, footprint=_disc(radius))
         objects |= last - opened > SMRF_SLOPE * radius * cell
         last = opened
-    ground = known & ~objects
+    reach = int(np.ceil(blur / cell))
+    ground = known & ~_widened(objects, reach)
     if not ground.any():
         return ground
     surface = _nearest(np.where(ground, z, np.nan), ground)
     slope = np.hypot(*np.gradient(surface, cell)) if min(z.shape) > 1 else np.zeros(z.shape)
-    return known & (np.abs(filled - surface) <= SMRF_HEIGHT_M + SMRF_SCALE * slope * cell)
+    near = known & (np.abs(filled - surface) <= SMRF_HEIGHT_M + SMRF_SCALE * slope * cell)
+    # what stands out after all is an object, and so is what its blur reaches
+    return near & ~_widened(known & ~near, reach)
 
 
 def _nearest(values: np.ndarray, known: np.ndarray) -> np.ndarray:
     place = distance_transform_edt(~known, return_distances=False, return_indices=True)
     return values[tuple(np.asarray(place))]
+
+
+def _widened(cells: np.ndarray, reach: int) -> np.ndarray:
+    return np.asarray(binary_dilation(cells, _disc(reach)), dtype=bool)
 
 
 def _disc(radius: int) -> np.ndarray:
