@@ -7,15 +7,18 @@ import numpy as np
 from aerotri.compiled import kernel
 from aerotri.deformation._kernels import partials, project
 from aerotri.terrain._sampling_kernels import sample_cubic
-from aerotri.terrain._search_kernels import SMALLEST_ANGLE, make_room, peak_offset, search, second_peak
+from aerotri.terrain._search_kernels import AROUND, make_room, peak_offset, search, second_peak
 from aerotri.terrain._shift_kernels import UNKNOWNS, invert, match_shift, template_normals, turned_shift
-from aerotri.terrain._view_kernels import parallax_per_metre, window_corners
+from aerotri.terrain._strip_kernels import make_strips, strip_search
+from aerotri.terrain._view_kernels import SMALLEST_ANGLE, parallax_per_metre, window_corners
 
 ACCEPTED, UNSEEN, POOR, AT_END, WEAK = 0, 1, 2, 3, 4
 BACKWARD, AMBIGUOUS = 5, 6
 """Status of a picket; from `BACKWARD` on it was measured and is in error."""
 AGREEING_POSTS = 1.0
 """Posts by which a ray may miss the intersection of all."""
+SURELY_POOR = 0.8
+"""Share of the least correlation below which, between whole posts, no height is looked for more closely."""
 FIRST_PHOTOGRAPHS = 3
 """Photographs that are tried as the one the others are matched to."""
 
@@ -264,8 +267,8 @@ def matched_back(view, chosen, shifts, used, spot, point_z, settings, window, ro
 
 @kernel
 def measure_at(
-    view, chosen, spot, curvature, low, high, window, settings, limits, room, work, shifts, used, parallax, point,
-    covariance, numbers,
+    view, chosen, spot, curvature, low, high, window, settings, limits, room, strips, work, shifts, used, parallax,
+    point, covariance, numbers,
 ):  # fmt: skip
     """Search the vertical line of a spot from low to high, measure there, match backwards; the status."""
     per_metre = parallax_per_metre(view, chosen, spot)
@@ -275,6 +278,14 @@ def measure_at(
     step = settings[0] * window / per_metre
     count = min(int((high - low) / step) + 2, int(settings[1]))
     profile = room[4][:count]
+    best = strip_search(view, chosen, spot, low, step, window, room, strips, profile)
+    if best >= 0 and profile[best] < SURELY_POOR * limits[3]:
+        numbers[2] = profile[best]
+        return POOR
+    if AROUND < best < count - 1 - AROUND:
+        low += (best - AROUND) * step
+        count = 2 * AROUND + 1
+        profile = room[4][:count]
     best = search(view, chosen, spot, along, low, step, window, room, profile)
     if not profile[best] >= 0.0:
         return UNSEEN
@@ -309,6 +320,7 @@ def measure_pickets(view, nodes, slopes, curvatures, ranges, chosen, aside, post
     status, tries, points, covariances, used, numbers, shifts = out
     m = chosen.shape[1]
     room = make_room(posts, max(int(settings[1]), 2 * int(settings[2] / settings[0]) + 1), m)
+    strips = make_strips(posts, int(settings[1]), m)
     of_shifts = (
         np.empty((4, 2)), np.zeros(6), np.empty((2, 4)), np.empty(UNKNOWNS), np.empty((m, 2)), np.empty((m, 3)),
         np.empty(5), np.empty((UNKNOWNS, UNKNOWNS)),
@@ -333,7 +345,7 @@ def measure_pickets(view, nodes, slopes, curvatures, ranges, chosen, aside, post
                 spot[3:] = slopes[p]
                 found = measure_at(
                     view, chosen[p], spot, curvatures[p], ranges[p, 0] + move, ranges[p, 1] + move, window, settings,
-                    limits, room, work, shifts[p], used[p], parallax, points[p], covariances[p], numbers[p],
+                    limits, room, strips, work, shifts[p], used[p], parallax, points[p], covariances[p], numbers[p],
                 )  # fmt: skip
                 if found == ACCEPTED or found >= BACKWARD:
                     break

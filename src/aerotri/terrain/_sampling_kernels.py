@@ -11,14 +11,14 @@ from aerotri.compiled import kernel
 def sample_linear(view, k, corner, window):
     """Grey values at the posts between corners, bilinear."""
     pixels, offset, columns = view[6], view[5][k, 0], view[5][k, 4]
-    n = window.shape[0]
+    n, m = window.shape
     for q in range(n):
         t = q / (n - 1.0)
         left_c = corner[0, 0] + t * (corner[2, 0] - corner[0, 0])
         left_r = corner[0, 1] + t * (corner[2, 1] - corner[0, 1])
-        step_c = (corner[1, 0] + t * (corner[3, 0] - corner[1, 0]) - left_c) / (n - 1.0)
-        step_r = (corner[1, 1] + t * (corner[3, 1] - corner[1, 1]) - left_r) / (n - 1.0)
-        for p in range(n):
+        step_c = (corner[1, 0] + t * (corner[3, 0] - corner[1, 0]) - left_c) / (m - 1.0)
+        step_r = (corner[1, 1] + t * (corner[3, 1] - corner[1, 1]) - left_r) / (m - 1.0)
+        for p in range(m):
             c, r = left_c + p * step_c, left_r + p * step_r
             ic, ir = int(c), int(r)
             fc, fr = np.float32(c - ic), np.float32(r - ir)
@@ -102,3 +102,15 @@ def product(one, other):
         for p in range(one.shape[1]):
             total += one[q, p] * other[q, p]
     return float(total)
+
+
+@kernel
+def mean_of_best(values, count):
+    """Mean of the better half of values, of two at least: photographs from which something hides the place are few."""
+    best = values[:count]
+    best.sort()
+    kept = max(min(count, 2), (count + 1) // 2)
+    total = 0.0
+    for k in range(count - kept, count):
+        total += best[k]
+    return total / kept

@@ -5,23 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.compiled import kernel
-from aerotri.terrain._sampling_kernels import normalise, product, sample_linear
-from aerotri.terrain._view_kernels import parallax_per_metre, window_corners
+from aerotri.terrain._sampling_kernels import mean_of_best, normalise, product, sample_linear
+from aerotri.terrain._strip_kernels import make_strips, strip_search
+from aerotri.terrain._view_kernels import SMALLEST_ANGLE, parallax_per_metre, window_corners
 
-SMALLEST_ANGLE = 0.02
-"""Base over height below which two photographs give no height."""
-
-
-@kernel
-def mean_of_best(values, count):
-    """Mean of the better half of values, of two at least: photographs from which something hides the place are few."""
-    best = values[:count]
-    best.sort()
-    kept = max(min(count, 2), (count + 1) // 2)
-    total = 0.0
-    for k in range(count - kept, count):
-        total += best[k]
-    return total / kept
+AROUND = 3
+"""Steps to either side of what strips found that are searched again."""
 
 
 @kernel
@@ -107,6 +96,7 @@ def find_heights(view, nodes, slopes, ranges, chosen, posts, window, step_px, mo
     heights, scores : (n,) out; NaN and −1 where there is none.
     """
     room, spot, along = make_room(posts, most, chosen.shape[1]), np.empty(5), np.zeros(2)
+    strips = make_strips(posts, most, chosen.shape[1])
     for p in range(len(nodes)):
         heights[p], scores[p] = np.nan, -1.0
         if chosen[p, 1] < 0:
@@ -118,7 +108,16 @@ def find_heights(view, nodes, slopes, ranges, chosen, posts, window, step_px, mo
         step = step_px * window / per_metre
         count = min(int((ranges[p, 1] - ranges[p, 0]) / step) + 2, most)
         profile = room[4][:count]
-        best = search(view, chosen[p], spot, along, ranges[p, 0], step, window, room, profile)
-        if profile[best] > 0.0 and 0 < best < count - 1:
-            heights[p] = ranges[p, 0] + (best + peak_offset(profile, best)) * step
+        low = ranges[p, 0]
+        best = strip_search(view, chosen[p], spot, low, step, window, room, strips, profile)
+        if best < 0:
+            best = search(view, chosen[p], spot, along, low, step, window, room, profile)
+        elif 0 < best < count - 1:
+            # along the ray of the first photograph so far: once more from the vertical line
+            spot[2] = low + best * step
+            low, profile = spot[2] - AROUND * step, room[4][: 2 * AROUND + 1]
+            again = strip_search(view, chosen[p], spot, low, step, window, room, strips, profile)
+            best = again if again >= 0 else AROUND
+        if profile[best] > 0.0 and 0 < best < len(profile) - 1:
+            heights[p] = low + (best + peak_offset(profile, best)) * step
             scores[p] = profile[best]

@@ -17,6 +17,8 @@ import numpy as np
 from aerotri.compiled import kernel
 from aerotri.deformation._kernels import error_in_tile, project, tile_of
 
+SMALLEST_ANGLE = 0.02
+"""Base over height below which two photographs give no height."""
 FIXED_POINT_MM, FIXED_POINT_STEPS = 1e-5, 40
 
 
@@ -76,6 +78,28 @@ def window_corners(view, k, spot, reach, shift, corner):
         y = spot[1] + v * reach + shift[1] + u * shift[3] + v * shift[5]
         z = spot[2] + reach * (u * spot[3] + v * spot[4])
         column, row = photo_place(view, k, i, j, x, y, z)
+        if not (0.0 <= column <= 2.0 * sensor[k, 0] and 0.0 <= row <= 2.0 * sensor[k, 1]):
+            return False
+        corner[c, 0] = column * scale - 0.5 - crop[2]
+        corner[c, 1] = row * scale - 0.5 - crop[1]
+        if not (1.0 <= corner[c, 0] < crop[4] - 2.0 and 1.0 <= corner[c, 1] < crop[3] - 2.0):
+            return False
+    return True
+
+
+@kernel
+def turned_corners(view, k, spot, e, along, across, corner):
+    """As `window_corners` of a rectangle with sides along e and across it, ± those m from the middle."""
+    sensor, crop, scale = view[3], view[5][k], view[7]
+    ideal_x, ideal_y, u3 = project(view[0], 0, k, spot[0], spot[1], spot[2])
+    if not u3 < 0.0:
+        return False
+    i, j = tile_of(view[1][k], ideal_x, ideal_y, view[2][1])
+    for c in range(4):
+        u, v = (along if c & 1 else -along), (across if c & 2 else -across)
+        dx, dy = u * e[0] - v * e[1], u * e[1] + v * e[0]
+        z = spot[2] + dx * spot[3] + dy * spot[4]
+        column, row = photo_place(view, k, i, j, spot[0] + dx, spot[1] + dy, z)
         if not (0.0 <= column <= 2.0 * sensor[k, 0] and 0.0 <= row <= 2.0 * sensor[k, 1]):
             return False
         corner[c, 0] = column * scale - 0.5 - crop[2]
