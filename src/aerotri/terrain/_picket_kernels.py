@@ -17,7 +17,7 @@ BACKWARD, AMBIGUOUS = 5, 6
 """Status of a picket; from `BACKWARD` on it was measured and is in error."""
 AGREEING_POSTS = 1.0
 """Posts by which a ray may miss the intersection of all."""
-SURELY_POOR = 0.8
+SURELY_POOR = 0.7
 """Share of the least correlation below which, between whole posts, no height is looked for more closely."""
 FIRST_PHOTOGRAPHS = 3
 """Photographs that are tried as the one the others are matched to."""
@@ -282,11 +282,17 @@ def measure_at(
     if best >= 0 and profile[best] < SURELY_POOR * limits[3]:
         numbers[2] = profile[best]
         return POOR
-    if AROUND < best < count - 1 - AROUND:
-        low += (best - AROUND) * step
-        count = 2 * AROUND + 1
+    near = best - AROUND
+    count_near = 2 * AROUND + 1
+    found = 0
+    if 0 < near < count - count_near:
+        profile = room[4][:count_near]
+        found = search(view, chosen, spot, along, low + near * step, step, window, room, profile)
+    if 0 < found < count_near - 1:
+        low, count, best = low + near * step, count_near, found
+    else:
         profile = room[4][:count]
-    best = search(view, chosen, spot, along, low, step, window, room, profile)
+        best = search(view, chosen, spot, along, low, step, window, room, profile)
     if not profile[best] >= 0.0:
         return UNSEEN
     numbers[2] = profile[best]

@@ -78,6 +78,13 @@ def second_peak(profile, best, apart):
 
 
 @kernel
+def off_line(view, k, spot, z):
+    """m of plan between the vertical line and the ray of photograph k through a spot, at a height."""
+    centre = view[4][k]
+    return np.hypot(spot[0] - centre[0], spot[1] - centre[1]) * abs(z - spot[2]) / (centre[2] - spot[2])
+
+
+@kernel
 def make_room(n, most, photographs):
     """What `correlation_at` and others work in."""
     first, second = np.empty((n, n), np.float32), np.empty((n, n), np.float32)
@@ -112,8 +119,8 @@ def find_heights(view, nodes, slopes, ranges, chosen, posts, window, step_px, mo
         best = strip_search(view, chosen[p], spot, low, step, window, room, strips, profile)
         if best < 0:
             best = search(view, chosen[p], spot, along, low, step, window, room, profile)
-        elif 0 < best < count - 1:
-            # along the ray of the first photograph so far: once more from the vertical line
+        elif 0 < best < count - 1 and off_line(view, chosen[p, 0], spot, low + best * step) > window:
+            # along the ray of the first photograph that was: once more from the vertical line
             spot[2] = low + best * step
             low, profile = spot[2] - AROUND * step, room[4][: 2 * AROUND + 1]
             again = strip_search(view, chosen[p], spot, low, step, window, room, strips, profile)

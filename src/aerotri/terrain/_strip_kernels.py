@@ -111,7 +111,7 @@ def strip_search(view, chosen, spot, low, step, window, room, strips, profile):
         # posts along the sloping strip for a metre of height
         rise = 1.0 + (bx * e[0] + by * e[1]) * (spot[3] * e[0] + spot[4] * e[1])
         per_metre = length / (window * max(rise, LEAST_RISE))
-        reach = int(furthest * per_metre) + 2
+        reach = int(furthest * per_metre) + 1
         pair[1] = b
         if 2 * reach + 1 > len(of_pair) or not strip_profile(
             view, pair, spot, e, window, reach, room, strip, sums, of_pair
