@@ -15,13 +15,15 @@ from aerotri.terrain._view_kernels import SMALLEST_ANGLE, turned_corners
 
 LEAST_RISE = 0.2
 MOST_PLACES = 1024
+LANES = 32
+"""Products are formed for so many places at once, some beyond the last: loops of a fixed length are the fastest."""
 
 
 @kernel
 def make_strips(n, most, photographs):
     """What `strip_search` works in, for windows of n posts and profiles of at most `most` heights."""
     return (
-        np.empty(n * (n + MOST_PLACES), np.float32), np.empty((3, n + MOST_PLACES), np.float32),
+        np.empty(n * (n + MOST_PLACES), np.float32), np.zeros((4, n + MOST_PLACES + LANES), np.float32),
         np.empty(MOST_PLACES, np.float32), np.empty((photographs, most)),
     )  # fmt: skip
 
@@ -35,7 +37,7 @@ def strip_profile(view, pair, spot, e, window, reach_posts, room, strip, sums, p
 
     Parameters
     ----------
-    strip : (·,), sums : (3, ≥ n + 2·reach) float32 room. profile : (≥ 2·reach + 1,) out.
+    strip : (·,), sums : (4, ≥ n + 2·reach + LANES) float32 room. profile : (≥ 2·reach + 1,) out.
     """
     first, corner = room[0], room[2]
     n = first.shape[0]
@@ -51,22 +53,21 @@ def strip_profile(view, pair, spot, e, window, reach_posts, room, strip, sums, p
     profile[:places] = 0.0
     if not normalise(first):
         return True
-    product_sum = sums[2, :places]
+    product_sum, line = sums[2, : (places + LANES - 1) // LANES * LANES], sums[3]
     product_sum[:] = 0.0
     total, squares = sums[0, :length], sums[1, :length]
     total[:] = 0.0
     squares[:] = 0.0
     middle = lines[n // 2, length // 2]
     for q in range(n):
-        line = lines[q]
         for p in range(length):
-            value = line[p] - middle
+            value = lines[q, p] - middle
             line[p] = value
             total[p] += value
             squares[p] += value * value
         for p in range(n):
             weight = first[q, p]
-            for s in range(places):
+            for s in range(len(product_sum)):
                 product_sum[s] += weight * line[p + s]
     mean, power = 0.0, 0.0
     for p in range(n):
