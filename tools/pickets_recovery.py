@@ -6,7 +6,18 @@ matching together with that of the adjustment, and so of the datum: relative to 
 
     python tools/pickets_recovery.py [FOLDER] [--seeds 200] [--from-files 0]
 
-PENDING
+Last result:
+
+    200 seeds, tie points simulated; 70593 accepted pickets, grain to 798
+    one picket of every seed, drawn: mean z·√n +2.04 (3.3), mean z² 1.07 (0.70 … 1.36), largest |z| 3.2; RMS 232 mm
+    all pickets of a seed: mean z² median 0.90, 5 to 95 % 0.51 … 1.65 (they share the orientation)
+    matching alone, 34296 disjoint pairs: mean z² 0.898; of a seed 0.61 … 1.27, 169 of 200 seeds within 99.9 %
+      by grain: to 390: 0.807, to 610: 0.929, to 798: 0.970
+    gross errors accepted (over 1 px of parallax and 6 σ): 0 of 70593; error pickets found 103
+
+So the σ of a height lies within the bands. That of matching alone is too large where there is little grain, by 10 % at
+most: it allows for a curvature of the ground within the window that this ground does not have everywhere, which the
+y-parallaxes that scale it do not know of.
 """
 
 from __future__ import annotations
