@@ -12,7 +12,7 @@ from aerotri.terrain.dtm import TerrainPlan, chosen_rows, make_terrain_model, mo
 from aerotri.terrain.error_pickets import with_error_pickets
 from aerotri.terrain.matching import measure, steps_aside
 from aerotri.terrain.photographs import read_pyramid
-from aerotri.terrain.pickets import Area, MatchOptions, grid_nodes
+from aerotri.terrain.pickets import Area, MatchOptions, Models, grid_nodes
 
 
 def off(rendered: Rendered, pickets, own) -> np.ndarray:
@@ -181,6 +181,28 @@ def test_models_of_pairs_and_subsets(rendered):
     for k in np.flatnonzero(own):
         assert set(found.photographs[k]) == set(models.pairs[found.model[k]])
     assert np.abs(off(rendered, found, own)).max() < 0.3
+
+
+def test_y_parallax_does_not_pull_the_height(rendered):
+    """A photograph moved across the base by half a pixel: heights change as a model does, not from window to window."""
+    photographs = rendered.photographs()
+    pair = photographs.centres[:2, :2]
+    base = (pair[1] - pair[0]) / np.hypot(*(pair[1] - pair[0]))
+    moved = photographs.orientation.centre.copy()
+    moved[1, :2] += 0.5 * np.array([-base[1], base[0]])
+    orientation = replace(photographs.orientation, centre=moved)
+    other = replace(photographs, orientation=orientation, centres=photographs.places.from_local(moved))
+    models = Models(np.array([[0, 1]]), pair.mean(axis=0)[None])
+    known, options = rendered.calibration.result.points.xyz, MatchOptions(interval=24.0)
+    found = [measure(p, known, options, None, models) for p in (photographs, other)]
+    own = found[0].accepted & found[1].accepted & (found[0].tries == 0) & (found[1].tries == 0)
+    assert own.sum() > 80
+    change = found[1].xyz[own, 2] - found[0].xyz[own, 2]
+    plan = np.column_stack([np.ones(own.sum()), found[0].node[own] / 100.0])
+    design = np.column_stack([plan, plan[:, 1:] ** 2, plan[:, 1] * plan[:, 2]])
+    change -= design @ np.linalg.lstsq(design, change, rcond=None)[0]
+    # a twentieth of a pixel of parallax is 0.2 m
+    assert change.std() < 0.06
 
 
 def test_grid_nodes_are_the_same_for_overlapping_areas():
