@@ -12,7 +12,7 @@ Of 3 seeds, Z of check points in m and over the best set of parameters:
     parameters, tiles a quarter .561   .0678 (1.25) .0541 (1.00)  .0623 (1.15)  .0556, .0560 (1.03, 1.04) 1.00
     physics                     .493   .114 (1.98)  .0878 (1.52)  .0577 (1.00)  .0557, .0571 (.96, .99)   .99
 
-Of 2 seeds, the scale of the field held and some sets only:
+Of 2 seeds, and with tiles and field together:
 
     parameters, tiles a quarter of the lens: BLUH 1–12 Z .0698 (1.21 of the true model's .0576), collocation 19x13 .0591
     (1.03), tiles with it .0605 (1.05)
