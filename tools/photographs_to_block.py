@@ -96,13 +96,13 @@ def rendered(folder: Path, seed: int) -> tuple[dict, np.ndarray, np.ndarray]:
     return json.loads((folder / "result" / "adjustment.json").read_text(encoding="utf-8")), d, w
 
 
-def brighton(folder: Path, photographs: Path) -> list[str]:
-    """One command, and what it says."""
+def brighton(folder: Path, data: Path) -> list[str]:
+    """One command, and what it says; its surface against that of another program, `model.laz`."""
     from aerotri.cli.run import command_names, invoke
 
     begun, cpu = time.perf_counter(), time.process_time()
     with contextlib.redirect_stdout(io.StringIO()):
-        run_all(photographs, folder, {}, invoke, command_names() & {"tiepoints", "adjust"}, True)
+        run_all(data / "images", folder, {}, invoke, command_names(), True)
     seconds, cpu = time.perf_counter() - begun, time.process_time() - cpu
     import pyarrow.parquet as pq
 
@@ -112,11 +112,19 @@ def brighton(folder: Path, photographs: Path) -> list[str]:
     with (folder / "result" / "images.csv").open(encoding="utf-8") as file:
         centre = np.array([[float(row[name]) for name in ("X0", "Y0", "Z0")] for row in csv.DictReader(file)])
     off = centre[block.gnss_ins.image] - block.gnss_ins.xyz
+    compared = folder / "compared"
+    surfaces = [str(folder / "dtm" / "dsm.tif"), str(data / "model.laz")]
+    with contextlib.redirect_stdout(io.StringIO()):
+        _invoke(["compare", *surfaces, "--align", "rigid", "--out", str(compared), "--no-plots"])
+    surface = json.loads((compared / "compare.json").read_text(encoding="utf-8"))
+    d = surface["difference_m"]
     return [
         f"{len(block.images)} photographs, {len(block.points)} points, {len(size)} rays",
         f"median residual {np.median(size):.2f} px, 95 % below {np.percentile(size, 95):.2f} px",
         "GNSS residuals, RMS: " + ", ".join(f"{v:.2f}" for v in np.sqrt((off**2).mean(axis=0))) + " m",
-        f"{seconds:.0f} s, of the processors {cpu:.0f} s",
+        f"{seconds:.0f} s with the surface, of the processors {cpu:.0f} s",
+        f"surface: {surface['coverage']:.1%} covered, median {d['median']:+.3f}, NMAD {d['nmad']:.3f}, "
+        f"RMSE {d['rmse']:.3f} m, cells of {surface['cell_m']:.2f} m",
     ]
 
 
@@ -145,7 +153,7 @@ def main() -> None:
         print(f"all: RMS w {np.sqrt((whole**2).mean()):.2f}, {(np.abs(whole) > 1.96).mean():.1%} beyond 1.96")
     if (arguments.data / "brighton").is_dir():
         shutil.rmtree(arguments.out / "brighton", ignore_errors=True)
-        said = brighton(arguments.out / "brighton", arguments.data / "brighton" / "images")
+        said = brighton(arguments.out / "brighton", arguments.data / "brighton")
         print("\nbrighton, one command: " + "; ".join(said))
 
 
