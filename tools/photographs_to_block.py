@@ -117,7 +117,7 @@ def brighton(folder: Path, data: Path) -> list[str]:
     compared = folder / "compared"
     surfaces = [str(folder / "dtm" / "dsm.tif"), str(data / "model.laz")]
     with contextlib.redirect_stdout(io.StringIO()):
-        _invoke(["compare", *surfaces, "--align", "rigid", "--out", str(compared), "--no-plots"])
+        invoke(["compare", *surfaces, "--align", "rigid", "--out", str(compared), "--no-plots"])
     surface = json.loads((compared / "compare.json").read_text(encoding="utf-8"))
     d = surface["difference_m"]
     return [
