@@ -15,9 +15,15 @@ Last result:
       by grain: to 390: 0.807, to 610: 0.929, to 798: 0.970
     gross errors accepted (over 1 px of parallax and 6 σ): 0 of 70593; error pickets found 103
 
-So the σ of a height lies within the bands. That of matching alone is too large where there is little grain, by 10 % at
-most: it allows for a curvature of the ground within the window that this ground does not have everywhere, which the
-y-parallaxes that scale it do not know of.
+    6 seeds, tie points found in the photographs; 9728 accepted pickets, grain 50
+    one picket of every seed, drawn: mean z·√n +0.16 (3.3), mean z² 0.44 (0.05 … 4.02), largest |z| 1.0; RMS 9 mm
+    all pickets of a seed: mean z² median 0.94, 5 to 95 % 0.27 … 1.71 (they share the orientation)
+    matching alone, 4154 disjoint pairs: mean z² 1.084; of a seed 0.91 … 1.29, 5 of 6 seeds within 99.9 %
+    gross errors accepted: 0 of 9728; error pickets found 8
+
+Heights of one drawn picket a seed lie within the bands. σ of matching alone does not in every seed: it is too large by
+10 % where there is little grain, and too small by 4 % on the photographs of the second table. A reason could be what it
+allows for the curvature of the ground within a window, which the y-parallaxes that scale it do not know of.
 """
 
 from __future__ import annotations
