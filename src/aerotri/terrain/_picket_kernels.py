@@ -102,7 +102,7 @@ def all_shifts(view, chosen, spot, curvature, window, least, work, shifts, paral
         template_normals(template, n, e, window, normal)
         if match_shift(view, b, spot, e, window, bending, template, other, normal, room, found):
             turned_shift(found, e, shifts[k])
-            if found[5] >= least:
+            if found[4] >= least:
                 parallax[k] = np.sqrt(found[2])
     return seen
 
@@ -233,7 +233,7 @@ def measure_pickets(view, nodes, slopes, curvatures, ranges, chosen, aside, post
     )  # fmt: skip
     work = (
         np.empty((posts + 2, posts + 2)), np.empty((posts, posts)), np.empty((UNKNOWNS, UNKNOWNS)), of_shifts,
-        np.empty(2), np.empty(6),
+        np.empty(2), np.empty(5),
     )  # fmt: skip
     spot, parallax = np.empty(5), np.empty(m)
     for p in range(len(nodes)):

@@ -101,7 +101,7 @@ def match_shift(view, k, spot, e, window, bending, template, other, normal, room
     bending : m, σ of a3 and a5; that of a4 is 2/√3 of it, as on ground that is rough alike in all directions.
     template : (n + 2, n + 2) grey values of the reference, scaled to a deviation of 1. other : (n, n) room.
     normal : of the template.
-    found : (6,) out, a0, b0 m, their variances and covariance m², correlation.
+    found : (5,) out, a0, b0 m, their variances m², correlation.
 
     Returns
     -------
@@ -176,13 +176,13 @@ def match_shift(view, k, spot, e, window, bending, template, other, normal, room
     if not excess < MOST_EXCESS:
         return False
     scale = noise * excess * excess / (gain * gain)
-    found[2], found[3], found[4] = scale * cofactor[0, 0], scale * cofactor[6, 6], scale * cofactor[0, 6]
+    found[2], found[3] = scale * cofactor[0, 0], scale * cofactor[6, 6]
     # correlation of the windows where they now lie, without what a further step would gain
     spread = squares - n * n * mean * mean
     template_mean, template_square = normal[7, 8] / (n * n), normal[8, 8]
     covariance = right[8] - n * n * mean * template_mean
     template_spread = template_square - n * n * template_mean**2
-    found[5] = covariance / np.sqrt(spread * template_spread) if spread > 0.0 and template_spread > 0.0 else 0.0
+    found[4] = covariance / np.sqrt(spread * template_spread) if spread > 0.0 and template_spread > 0.0 else 0.0
     return True
 
 
@@ -193,9 +193,9 @@ def turned_shift(found, e, out):
     What texture makes common to both is left out: y-parallaxes are those of the orientation and of the image errors
     rather than of matching, and must not pull the parallax along with them.
     """
-    a, b, va, vb, c = found[0], found[1], found[2], found[3], 0.0
+    a, b, va, vb = found[0], found[1], found[2], found[3]
     out[0], out[1] = a * e[0] - b * e[1], a * e[1] + b * e[0]
-    out[2] = e[0] * e[0] * va - 2.0 * e[0] * e[1] * c + e[1] * e[1] * vb
-    out[3] = e[1] * e[1] * va + 2.0 * e[0] * e[1] * c + e[0] * e[0] * vb
-    out[4] = e[0] * e[1] * (va - vb) + (e[0] * e[0] - e[1] * e[1]) * c
-    out[5] = found[5]
+    out[2] = e[0] * e[0] * va + e[1] * e[1] * vb
+    out[3] = e[1] * e[1] * va + e[0] * e[0] * vb
+    out[4] = e[0] * e[1] * (va - vb)
+    out[5] = found[4]
