@@ -48,13 +48,14 @@ def rows(name: str, runs: list[Run]) -> list[str]:
     return lines
 
 
-def of_site(name: str, site: Site, seeds: range) -> list[str]:
+def of_site(name: str, site: Site, seeds: range, wanted: str) -> list[str]:
     """The table of a site."""
-    only = name in ONLY_INTERPOLATION
-    sources = [(part, frozenset([part])) for part in ((ALONE,) if only else PARTS)]
+    sources = [(part, frozenset([part])) for part in PARTS] + [("all together", ALL)]
+    if name in ONLY_INTERPOLATION:
+        wanted = ALONE
     lines = ["", f"## {name[0].upper()}{name[1:]}, {site.boundary.area:.0f} m²", "", *HEADER.split("\n")]
     print("\n".join(lines), flush=True)
-    for source, on in sources + ([] if only else [("all together", ALL)]):
+    for source, on in [(source, on) for source, on in sources if wanted in ("", source)]:
         found = rows(source, [run(site, seed, on) for seed in seeds])
         print("\n".join(found), flush=True)
         lines += found
@@ -67,13 +68,14 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--first", type=int, default=1, help="seed of the first run")
     parser.add_argument("--site", default="", help="only those whose name begins so")
+    parser.add_argument("--source", default="", help="only this source of error")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     lines = ["# σ of a volume against its scatter"]
     print(lines[0])
     for name, make in sites().items():
         if name.startswith(options.site):
-            lines += of_site(name, make(), range(options.first, options.first + options.runs))
+            lines += of_site(name, make(), range(options.first, options.first + options.runs), options.source)
     if options.out is not None:
         options.out.mkdir(parents=True, exist_ok=True)
         (options.out / "volume_monte_carlo.md").write_text("\n".join(lines) + "\n", encoding="utf-8")

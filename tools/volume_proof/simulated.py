@@ -46,7 +46,7 @@ SPEC = {
     "start_values": {"kind": "perturbed", "position_sigma_m": 0.5, "angle_sigma_deg": 0.02},
 }  # fmt: skip
 PARAMETERS = "bluh:1-12"
-MATCHING_UM = 3.0
+MATCHING_UM, NOISELESS_UM = 3.0, 1e-3
 BASE_SIGMA, BOUNDARY_SIGMA = 0.03, 0.5
 ALL = frozenset(PARTS)
 
@@ -68,7 +68,8 @@ def run(site: Site, seed: int, on: frozenset[str] = ALL) -> Run:
     z, dense = site.heights(rng)
     true = np.column_stack([site.xy, z])
     triangles = triangulated(true)
-    chosen, seen = pickets_where_seen(calibration, true, 1e-3 * MATCHING_UM)
+    # pickets measured without noise say so
+    chosen, seen = pickets_where_seen(calibration, true, 1e-3 * (MATCHING_UM if "matching" in on else NOISELESS_UM))
     assert seen.all(), "the block is too small for the site"
     found = replace(chosen, xyz=measured_pickets(calibration, truth, chosen, rng, on))
     value, functional = tin_volume(found.xyz, triangles, site.boundary)

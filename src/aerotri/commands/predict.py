@@ -57,10 +57,14 @@ def run_predict_volume(design: VolumeDesign, simulate: bool, seed: int, as_json:
         print(f"  {by:<40} σ of the mean height {v:.4f} m, of the volume {v * p.area:.4g} m³")
 
 
-def simulated_sigma(design: VolumeDesign, seed: int = 1) -> float:
+def simulated_sigma(design: VolumeDesign, seed: int = 1, pointing: float = 1.0) -> float:
     """m, σ of the mean height of the area through the adjustment of a simulated flight of that design.
 
     The image σ is the one that gives σ0 to a height from one model: σ0 = √2·(H/B)·(H/c)·σ.
+
+    Parameters
+    ----------
+    pointing : σ of an image point of a control point over that of a tie point.
     """
     from aerotri.pipeline import adjust_keeping_system
     from aerotri.simulation import parse_spec
@@ -68,7 +72,7 @@ def simulated_sigma(design: VolumeDesign, seed: int = 1) -> float:
     from aerotri.volume.pickets import pickets_where_seen
     from aerotri.volume.response import respond
 
-    block, _ = simulated(parse_spec(flight_spec(design)), seed)
+    block, _ = simulated(parse_spec(flight_spec(design, pointing)), seed)
     calibration = adjust_keeping_system(block)
     x, y = np.meshgrid(design.length * _places(), design.width * _places())
     xyz = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
@@ -81,7 +85,7 @@ def simulated_sigma(design: VolumeDesign, seed: int = 1) -> float:
     return float(np.sqrt(respond(calibration, pickets, gradient).variance)) / calibration.result.outcome.sigma0
 
 
-def flight_spec(design: VolumeDesign) -> dict[str, Any]:
+def flight_spec(design: VolumeDesign, pointing: float = 1.0) -> dict[str, Any]:
     """The spec of a simulated flight: strips along X as the theory has them, in every strip two control points at the
     distance that is bridged."""
     base, sigma0 = design.base, design.sigma0_share * design.height
@@ -97,7 +101,7 @@ def flight_spec(design: VolumeDesign) -> dict[str, Any]:
         "terrain": {"kind": "flat", "height_m": 0.0},
         "tie_points": {"per_image": 15.0, "distribution": "nodes", "pattern": [3, 3], "sigma_um": sigma_um},
         "control": {"positions": _control(images - 1, round(design.bridging / base), strips),
-                    "sigma_m": [0.001, 0.001, 0.001]},
+                    "sigma_m": [0.001, 0.001, 0.001], "image_sigma_um": pointing * sigma_um},
         "start_values": {"kind": "perturbed", "position_sigma_m": 1.0, "angle_sigma_deg": 0.02},
     }  # fmt: skip
 
