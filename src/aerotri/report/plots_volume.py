@@ -101,7 +101,7 @@ def plot_budget(content: Mapping[str, Any]) -> Figure:
     apart += [(SYSTEMATIC[one["variant"]], one) for one in s["systematic"]["variants"]]
     share = 100.0 * s["sigma_m3"] / max(abs(content["net_m3"]), 1e-9)
     subtitle = (
-        f"net {with_sigma(content['net_m3'], s['sigma_m3'])} m³ (1 σ, {share:.2g} %), "
+        f"net {with_sigma(content['net_m3'], s['sigma_m3'])} m³ (1 σ, {two_digits(share)} %), "
         f"{two_digits(1e3 * s['sigma_mean_height_m'])} mm of mean height\n"
     )
     if apart:
@@ -146,7 +146,7 @@ def _bars(axes, labels: list[str], values: list[float], texts: list[str], style:
 @styled
 def plot_section_areas(sections: Sections, name: str) -> Figure:
     """Cut up, fill down over the station."""
-    subtitle = f"{plain(name, 60)}; {len(sections.station)} sections every {sections.spacing:.6g} m, " + (
+    subtitle = f"{plain(name, 60)}; {len(sections.station)} sections every {sections.spacing:.4g} m, " + (
         f"following one another towards {sections.azimuth:g}°"
     )
     figure = new_figure(3.2, "Areas of the cross sections", subtitle)
@@ -181,7 +181,7 @@ def plot_section_profiles(profiles: Sequence[Profile], name: str) -> Figure:
         axes.plot(p.distance, p.surface, color=INK, lw=1.1, zorder=3)
         axes.plot(p.distance, p.base, color=GREY, lw=1.0, ls="--", zorder=2)
         axes.margins(x=0.01)
-        axes.set_title(f"station {p.station:.6g} m", fontsize=8.5, loc="left", pad=2)
+        axes.set_title(f"station {p.station:.4g} m", fontsize=8.5, loc="left", pad=2)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         axes.spines[["top", "right"]].set_visible(False)
         if k == len(profiles) - 1:

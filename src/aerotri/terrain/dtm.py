@@ -150,13 +150,13 @@ def _own_interval(photographs: Photographs, known: np.ndarray, gsd: float, plan:
     """The interval (two digits) and where it comes from."""
     k, ground = k_of_slope(typical_slope(known))
     if plan.pairs:
-        return two_digits(interval_of_gsd(gsd, k)), f"{1000 * k:g}·√GSD, {ground}"
+        return rounded(interval_of_gsd(gsd, k)), f"{1000 * k:g}·√GSD, {ground}"
     area = footprint(photographs) if plan.area is None else plan.area
     interval, source = interval_of_surface(gsd, k, float(np.prod(area.high - area.low)))
-    return two_digits(interval), f"{source}, {ground}"
+    return rounded(interval), f"{source}, {ground}"
 
 
-def two_digits(value: float) -> float:
+def rounded(value: float) -> float:
     """Rounded to two significant digits."""
     return float(f"{value:.2g}")
 

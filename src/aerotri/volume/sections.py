@@ -197,7 +197,7 @@ def _equal_intervals(station: np.ndarray) -> int:
 
 
 def _note(rule: str, used: int, intervals: int, sections: Sections) -> str:
-    text = f"{intervals + 1} sections every {sections.spacing:g} m, azimuth {sections.azimuth:g}°"
+    text = f"{intervals + 1} sections every {sections.spacing:.4g} m, azimuth {sections.azimuth:g}°"
     if rule != "trapezoidal" and used < intervals:
         text += f"; {intervals - used} of {intervals} intervals by the trapezoid"
     return text
