@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -97,7 +97,7 @@ def convert(
     json_: Json = False,
 ) -> None:
     """Convert between formats, or make a block of several files; adjusts first where the target needs it."""
-    from aerotri.commands.convert import camera_spec, run_convert, three_values
+    from aerotri.commands.convert import camera_spec, run_convert
     from aerotri.formats.assemble import Statements
     from aerotri.formats.project import Request
 
@@ -112,10 +112,7 @@ def convert(
         stated=Statements(
             crs=crs,
             geoid=geoid,
-            control_sigma_m=three_values(control_sigma_m, "--control-sigma-m"),
-            positions_sigma_m=three_values(positions_sigma_m, "--positions-sigma-m"),
-            orientation_sigma_m=three_values(orientation_sigma_m, "--orientation-sigma-m"),
-            orientation_sigma_deg=three_values(orientation_sigma_deg, "--orientation-sigma-deg"),
+            **_stated_sigmas(control_sigma_m, positions_sigma_m, orientation_sigma_m, orientation_sigma_deg),
             control_prefix=control_prefix,
             control_heights=control_heights,
             linear_alteration_m=linear_alteration,
@@ -160,7 +157,6 @@ def tiepoints(
     json_: Json = False,
 ) -> None:
     """From photographs to a block: tie points, first orientation, control."""
-    from aerotri.commands.convert import three_values
     from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
     from aerotri.formats.assemble import Statements
     from aerotri.formats.camera_spec import CameraSpec
@@ -168,10 +164,7 @@ def tiepoints(
     stated = Statements(
         crs=crs,
         geoid=geoid,
-        control_sigma_m=three_values(control_sigma_m, "--control-sigma-m"),
-        positions_sigma_m=three_values(positions_sigma_m, "--positions-sigma-m"),
-        orientation_sigma_m=three_values(orientation_sigma_m, "--orientation-sigma-m"),
-        orientation_sigma_deg=three_values(orientation_sigma_deg, "--orientation-sigma-deg"),
+        **_stated_sigmas(control_sigma_m, positions_sigma_m, orientation_sigma_m, orientation_sigma_deg),
     )
     options = TiePointOptions(
         gcp=gcp,
@@ -188,6 +181,18 @@ def tiepoints(
         seed=seed,
     )
     run_tiepoints(photographs, out, options, json_)
+
+
+def _stated_sigmas(control: str, positions: str, orientation: str, angles: str) -> dict[str, Any]:
+    """The σ of the command line as `Statements` takes them."""
+    from aerotri.commands.convert import three_values
+
+    return {
+        "control_sigma_m": three_values(control, "--control-sigma-m"),
+        "positions_sigma_m": three_values(positions, "--positions-sigma-m"),
+        "orientation_sigma_m": three_values(orientation, "--orientation-sigma-m"),
+        "orientation_sigma_deg": three_values(angles, "--orientation-sigma-deg"),
+    }
 
 
 @app.command(epilog="Example: aerotri crosscheck blocks/frederiksstad_ultracam --out check")

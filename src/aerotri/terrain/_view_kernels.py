@@ -55,6 +55,17 @@ def is_seen(view, k, x, y, z):
 
 
 @kernel
+def corner_in_crop(view, k, i, j, x, y, z, c, corner):
+    """Column and row of a point in the crop of photograph k into corner[c]; whether it lies in sensor and crop."""
+    sensor, crop, scale = view[3], view[5][k], view[7]
+    column, row = photo_place(view, k, i, j, x, y, z)
+    if not (0.0 <= column <= 2.0 * sensor[k, 0] and 0.0 <= row <= 2.0 * sensor[k, 1]):
+        return False
+    corner[c, 0], corner[c, 1] = column * scale - 0.5 - crop[2], row * scale - 0.5 - crop[1]
+    return 1.0 <= corner[c, 0] < crop[4] - 2.0 and 1.0 <= corner[c, 1] < crop[3] - 2.0
+
+
+@kernel
 def window_corners(view, k, spot, reach, shift, corner):
     """Corners of a window in the crop of photograph k, (4, 2) column and row counted from its first pixel centre.
 
@@ -67,7 +78,6 @@ def window_corners(view, k, spot, reach, shift, corner):
     -------
     Whether all of it lies in the crop.
     """
-    sensor, crop, scale = view[3], view[5][k], view[7]
     ideal_x, ideal_y, u3 = project(view[0], 0, k, spot[0], spot[1], spot[2])
     if not u3 < 0.0:
         return False
@@ -77,12 +87,7 @@ def window_corners(view, k, spot, reach, shift, corner):
         x = spot[0] + u * reach + shift[0] + u * shift[2] + v * shift[4]
         y = spot[1] + v * reach + shift[1] + u * shift[3] + v * shift[5]
         z = spot[2] + reach * (u * spot[3] + v * spot[4])
-        column, row = photo_place(view, k, i, j, x, y, z)
-        if not (0.0 <= column <= 2.0 * sensor[k, 0] and 0.0 <= row <= 2.0 * sensor[k, 1]):
-            return False
-        corner[c, 0] = column * scale - 0.5 - crop[2]
-        corner[c, 1] = row * scale - 0.5 - crop[1]
-        if not (1.0 <= corner[c, 0] < crop[4] - 2.0 and 1.0 <= corner[c, 1] < crop[3] - 2.0):
+        if not corner_in_crop(view, k, i, j, x, y, z, c, corner):
             return False
     return True
 
@@ -90,7 +95,6 @@ def window_corners(view, k, spot, reach, shift, corner):
 @kernel
 def turned_corners(view, k, spot, e, along, across, corner):
     """As `window_corners` of a rectangle with sides along e and across it, ± those m from the middle."""
-    sensor, crop, scale = view[3], view[5][k], view[7]
     ideal_x, ideal_y, u3 = project(view[0], 0, k, spot[0], spot[1], spot[2])
     if not u3 < 0.0:
         return False
@@ -99,12 +103,7 @@ def turned_corners(view, k, spot, e, along, across, corner):
         u, v = (along if c & 1 else -along), (across if c & 2 else -across)
         dx, dy = u * e[0] - v * e[1], u * e[1] + v * e[0]
         z = spot[2] + dx * spot[3] + dy * spot[4]
-        column, row = photo_place(view, k, i, j, spot[0] + dx, spot[1] + dy, z)
-        if not (0.0 <= column <= 2.0 * sensor[k, 0] and 0.0 <= row <= 2.0 * sensor[k, 1]):
-            return False
-        corner[c, 0] = column * scale - 0.5 - crop[2]
-        corner[c, 1] = row * scale - 0.5 - crop[1]
-        if not (1.0 <= corner[c, 0] < crop[4] - 2.0 and 1.0 <= corner[c, 1] < crop[3] - 2.0):
+        if not corner_in_crop(view, k, i, j, spot[0] + dx, spot[1] + dy, z, c, corner):
             return False
     return True
 
