@@ -10,10 +10,11 @@ Example
     python tools/benchmark_demcor.py
     python tools/benchmark_demcor.py --cells 5000 --repeats 3 --compress none
 
-Measured last on two quiet cores (one run), 20 000 × 20 000 cells, deflate, one model: demcor 39.7 s, reading and
-writing 24.8 s, ratio 1.60 (processor time 1.31), peak memory 450 MiB. With 8000 × 8000 cells 2.06 for
-one model, 3.79 for a map of 118 models (processor time 1.69 and 3.58): cells at the borders of models are computed one
-by one. Peak memory 453 MiB at 2000 × 2000 too.
+Measured last on two quiet cores (one run), 20 000 × 20 000 cells, deflate: one model 39.5 s, reading and writing 25.7 s,
+ratio 1.53 (processor time 1.28), peak memory 454 MiB; a map of 118 models 41.8 s, 17.4 s (a DEM that compresses
+better), 2.40 (2.07), 449 MiB. Of the time with a map, cells at seams of tiles are computed one by one; 3 s are program
+start and reopening of the result, which with 8000 × 8000 cells makes 2.1 and 3.8 of the ratios. Peak memory 451 MiB at
+5000 × 5000 too.
 """
 
 from __future__ import annotations

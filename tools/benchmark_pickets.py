@@ -8,15 +8,15 @@ place (TM_CCOEFF_NORMED, minMaxLoc). aerotri rectifies the template and the stri
 errors, in 16 bits, and goes from places to heights. Beside it stands OpenCV with rectification at every height: two
 remaps to a window, then the coefficient of the two.
 
-Last result, Brighton, two cores shared with others:
+Last result, Brighton, two quiet cores:
 
     9999 nodes, 17 posts a side, 17 places; OpenCV 5.0.0
-    aerotri, a height every post: 12.4 µs a node (12.2–15.2)
-    aerotri, a height every half post: 13.5 µs a node (13.4–15.2)
-    OpenCV matchTemplate, not rectified: 12.4 µs a node (12.1–14.9)
-    OpenCV remap at every height, matchTemplate: 210.1 µs a node (205.2–219.2)
+    aerotri, a height every post: 12.9 µs a node (12.7–13.3)
+    aerotri, a height every half post: 14.1 µs a node (13.9–14.3)
+    OpenCV matchTemplate, not rectified: 12.1 µs a node (11.7–13.2)
+    OpenCV remap at every height, matchTemplate: 212.2 µs a node (209.7–216.5)
 
-With its rectification aerotri takes as long as matchTemplate alone; before strips, with windows rectified at every
+With its rectification aerotri takes 7 % longer than matchTemplate alone; before strips, with windows rectified at every
 height, it took 91.8 and 172.2 µs.
 """
 

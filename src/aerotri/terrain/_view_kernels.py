@@ -55,14 +55,23 @@ def is_seen(view, k, x, y, z):
 
 
 @kernel
-def corner_in_crop(view, k, i, j, x, y, z, c, corner):
-    """Column and row of a point in the crop of photograph k into corner[c]; whether it lies in sensor and crop."""
+def corners_of(view, k, spot, away_x, away_y, ux, uy, uz, vx, vy, vz, corner):
+    """Corners spot + away ± (ux, uy, uz) ± (vx, vy, vz) in the crop of photograph k, as of `window_corners`."""
     sensor, crop, scale = view[3], view[5][k], view[7]
-    column, row = photo_place(view, k, i, j, x, y, z)
-    if not (0.0 <= column <= 2.0 * sensor[k, 0] and 0.0 <= row <= 2.0 * sensor[k, 1]):
+    ideal_x, ideal_y, u3 = project(view[0], 0, k, spot[0], spot[1], spot[2])
+    if not u3 < 0.0:
         return False
-    corner[c, 0], corner[c, 1] = column * scale - 0.5 - crop[2], row * scale - 0.5 - crop[1]
-    return 1.0 <= corner[c, 0] < crop[4] - 2.0 and 1.0 <= corner[c, 1] < crop[3] - 2.0
+    i, j = tile_of(view[1][k], ideal_x, ideal_y, view[2][1])
+    for c in range(4):
+        u, v = (1.0 if c & 1 else -1.0), (1.0 if c & 2 else -1.0)
+        x, y = spot[0] + away_x + u * ux + v * vx, spot[1] + away_y + u * uy + v * vy
+        column, row = photo_place(view, k, i, j, x, y, spot[2] + u * uz + v * vz)
+        if not (0.0 <= column <= 2.0 * sensor[k, 0] and 0.0 <= row <= 2.0 * sensor[k, 1]):
+            return False
+        corner[c, 0], corner[c, 1] = column * scale - 0.5 - crop[2], row * scale - 0.5 - crop[1]
+        if not (1.0 <= corner[c, 0] < crop[4] - 2.0 and 1.0 <= corner[c, 1] < crop[3] - 2.0):
+            return False
+    return True
 
 
 @kernel
@@ -78,34 +87,19 @@ def window_corners(view, k, spot, reach, shift, corner):
     -------
     Whether all of it lies in the crop.
     """
-    ideal_x, ideal_y, u3 = project(view[0], 0, k, spot[0], spot[1], spot[2])
-    if not u3 < 0.0:
-        return False
-    i, j = tile_of(view[1][k], ideal_x, ideal_y, view[2][1])
-    for c in range(4):
-        u, v = (1.0 if c & 1 else -1.0), (1.0 if c & 2 else -1.0)
-        x = spot[0] + u * reach + shift[0] + u * shift[2] + v * shift[4]
-        y = spot[1] + v * reach + shift[1] + u * shift[3] + v * shift[5]
-        z = spot[2] + reach * (u * spot[3] + v * spot[4])
-        if not corner_in_crop(view, k, i, j, x, y, z, c, corner):
-            return False
-    return True
+    return corners_of(
+        view, k, spot, shift[0], shift[1], reach + shift[2], shift[3], reach * spot[3], shift[4], reach + shift[5],
+        reach * spot[4], corner,
+    )  # fmt: skip
 
 
 @kernel
 def turned_corners(view, k, spot, e, along, across, corner):
     """As `window_corners` of a rectangle with sides along e and across it, ± those m from the middle."""
-    ideal_x, ideal_y, u3 = project(view[0], 0, k, spot[0], spot[1], spot[2])
-    if not u3 < 0.0:
-        return False
-    i, j = tile_of(view[1][k], ideal_x, ideal_y, view[2][1])
-    for c in range(4):
-        u, v = (along if c & 1 else -along), (across if c & 2 else -across)
-        dx, dy = u * e[0] - v * e[1], u * e[1] + v * e[0]
-        z = spot[2] + dx * spot[3] + dy * spot[4]
-        if not corner_in_crop(view, k, i, j, spot[0] + dx, spot[1] + dy, z, c, corner):
-            return False
-    return True
+    ux, uy, vx, vy = along * e[0], along * e[1], -across * e[1], across * e[0]
+    return corners_of(
+        view, k, spot, 0.0, 0.0, ux, uy, ux * spot[3] + uy * spot[4], vx, vy, vx * spot[3] + vy * spot[4], corner
+    )
 
 
 @kernel
