@@ -10,8 +10,8 @@ Example
     python tools/benchmark_demcor.py
     python tools/benchmark_demcor.py --cells 5000 --repeats 3 --compress none
 
-Measured last on two quiet cores (one run), 20 000 × 20 000 cells, deflate: one model 39.5 s, reading and writing 25.7 s,
-ratio 1.53 (processor time 1.28), peak memory 454 MiB; a map of 118 models 41.8 s, 17.4 s (a DEM that compresses
+Measured last on two quiet cores (one run), 20 000 × 20 000 cells, deflate: one model 39.5 s, reading and writing
+25.7 s, ratio 1.53 (processor time 1.28), peak memory 454 MiB; a map of 118 models 41.8 s, 17.4 s (a DEM that compresses
 better), 2.40 (2.07), 449 MiB. Of the time with a map, cells at seams of tiles are computed one by one; 3 s are program
 start and reopening of the result, which with 8000 × 8000 cells makes 2.1 and 3.8 of the ratios. Peak memory 451 MiB at
 5000 × 5000 too.
