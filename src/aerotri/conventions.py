@@ -21,10 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-ROTATION_ORDERS = ("omega-phi-kappa", "phi-omega-kappa")
 RADIANS_PER = {"deg": np.pi / 180.0, "gon": np.pi / 200.0, "rad": 1.0}
 MGON_PER_RADIAN = 200.0e3 / np.pi
-IMAGE_UNITS = ("mm", "um", "px")
 FLIGHT_AXES = ("+x", "-x", "+y", "-y")
 
 

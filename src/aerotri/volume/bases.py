@@ -222,11 +222,6 @@ def parse_base(text: str, surface: Surface, boundary: Boundary, open_raster) -> 
     return SurfaceBase(text.rsplit("/", 1)[-1], open_raster(text))
 
 
-def is_surface(base: Base) -> bool:
-    """Whether the base is a surface of its own, with an accuracy of its own."""
-    return isinstance(base, SurfaceBase)
-
-
 def _is_word(text: str) -> bool:
     try:
         float(text)

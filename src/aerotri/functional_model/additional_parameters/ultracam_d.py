@@ -28,7 +28,6 @@ TILE_CENTRE_ROWS = np.array([1336.0, 3750.0, 6164.0])
 SEAM_COLUMNS = np.array([3877.0, 7623.0])
 SEAM_ROWS = np.array([2543.0, 4957.0])
 CENTRE_TILE = 4
-OUTER_TILES = tuple(tile for tile in range(9) if tile != CENTRE_TILE)
 TILE_NAMES = (
     "upper left", "upper", "upper right", "left", "right", "lower left", "lower", "lower right",
 )  # fmt: skip
