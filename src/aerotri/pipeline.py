@@ -20,10 +20,11 @@ from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import StartValues, State
 from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block, transform_result
+from aerotri.diagnosis import judge
 from aerotri.formats.solution import SavedSolution
 from aerotri.functional_model.additional_parameters import AUTO
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock, Blunder
+from aerotri.statistics.adjusted_block import AdjustedBlock, Blunder, Outcome
 from aerotri.statistics.common_height import common_height
 from aerotri.statistics.doubts import AdjustmentFailedError, defects_in_words, doubts, failure, refuse_runaway
 from aerotri.statistics.field_estimation import with_estimated_fields
@@ -108,8 +109,21 @@ def adjust_keeping_system(
         return _adjust_with_chosen_parameters(block, report, given_points, geoid)
     found = _adjust_in_frame(block, report, given_points, geoid)
     if block.settings.adjustment.variance_components == "on":
-        return _with_variance_components(block, found, report, geoid)
-    return found
+        found = _with_variance_components(block, found, report, geoid)
+    return judged(found)
+
+
+def judged(found: Adjustment) -> Adjustment:
+    """The adjustment with the verdict over it."""
+    verdict = judge(found.local)
+    outcome = replace(found.result.outcome, verdict=verdict.level, reasons=verdict.reasons)
+    return _with_outcome(found, outcome)
+
+
+def _with_outcome(found: Adjustment, outcome: Outcome) -> Adjustment:
+    result = replace(found.result, outcome=outcome)
+    local = replace(found.local, outcome=outcome) if found.frame is not None else result
+    return replace(found, result=result, local=local)
 
 
 def _adjust_with_chosen_parameters(
@@ -121,9 +135,8 @@ def _adjust_with_chosen_parameters(
     block = replace(block, settings=replace(block.settings, adjustment=adjustment))
     found = adjust_keeping_system(block, report, given_points, geoid)
     outcome = found.result.outcome
-    result = replace(found.result, outcome=replace(outcome, warnings=(chosen.reason, *outcome.warnings)))
-    local = replace(found.local, outcome=result.outcome) if found.frame is not None else result
-    return replace(found, result=result, local=local, compared=compared)
+    found = _with_outcome(found, replace(outcome, warnings=(chosen.reason, *outcome.warnings)))
+    return replace(found, compared=compared)
 
 
 def compare_parameters(
@@ -191,7 +204,9 @@ def _with_variance_components(
     seconds["statistics"] += time.perf_counter() - started - readjusting
     said = (*latest.result.outcome.warnings, *in_words(components))
     outcome = replace(latest.result.outcome, warnings=said, timings_s=seconds)
-    local = replace(with_components(latest.local, components), outcome=outcome)
+    # the rounds began at what was adjusted; the block keeps the orientations that were given
+    given = replace(latest.local.block, images=first.local.block.images)
+    local = replace(with_components(latest.local, components), outcome=outcome, block=given)
     delivered = with_findings_of(with_datum_of(used, latest.result.block), latest.result.block)
     result = replace(latest.result, groups=local.groups, components=components, outcome=outcome, block=delivered)
     return replace(latest, result=result, local=local if latest.frame is not None else result)
@@ -232,8 +247,11 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     result = replace(result, parameters=with_removed(result.parameters, removals), removals=removals)
     if saved.components:
         result = with_components(result, VarianceComponents.from_json(saved.components))
+    if saved.verdict:
+        result = replace(result, outcome=replace(result.outcome, verdict=saved.verdict, reasons=saved.reasons))
     delivered = result if frame is None else transform_result(result, block, frame)
-    return Adjustment(delivered, result, system, solution, frame)
+    found = Adjustment(delivered, result, system, solution, frame)
+    return found if saved.verdict else judged(found)
 
 
 def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray | None) -> Adjustment:

@@ -37,7 +37,7 @@ def run_adjust(
     as_json: bool,
     check_free: bool = False,
 ) -> int:
-    """Exit code of the command: 0 when converged, 1 when not; arguments as on the command line."""
+    """Exit code of the command: 0 when converged and not rejected, 1 otherwise; arguments as on the command line."""
     console = Console(quiet=as_json)
     begun = time.perf_counter()
     from aerotri.formats.block_folder import read_block
@@ -70,7 +70,7 @@ def run_adjust(
     checked = _checked(adjustment, console) if check_free else None
     result = write_all(replace(adjustment, result=result), target, plots, console, checked)
     _tell(result, target, console, as_json, checked)
-    return 0 if result.outcome.status == "converged" else 1
+    return 1 if result.outcome.status != "converged" or result.outcome.verdict == "rejected" else 0
 
 
 def with_settings(block: Block, parameters: str | None, robust: str | None) -> Block:

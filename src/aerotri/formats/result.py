@@ -84,6 +84,8 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
         "aerotri": _version(),
         "block": str(block.name),
         "status": o.status,
+        "verdict": o.verdict,
+        "reasons": list(o.reasons),
         "message": o.message,
         "iterations": int(o.iterations),
         "sigma0": _number(o.sigma0),

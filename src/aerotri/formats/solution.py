@@ -36,6 +36,7 @@ class SavedSolution:
     ray_status, weight : (m,).
     components : the variance components as JSON, '' where there are none; the block has the σ they led to.
     removals : the parameters that the selection took out, as JSON, '' where there are none.
+    verdict, reasons : of the outcome; '' in results of versions that did not judge.
     """
 
     origin: np.ndarray
@@ -60,6 +61,8 @@ class SavedSolution:
     warnings: tuple[str, ...]
     components: str = ""
     removals: str = ""
+    verdict: str = ""
+    reasons: tuple[str, ...] = ()
 
 
 def write_solution(
@@ -104,6 +107,8 @@ def write_solution(
         status=np.array(solution.status),
         iterations=solution.iterations,
         warnings=np.array(result.outcome.warnings, dtype=str),
+        verdict=np.array(result.outcome.verdict),
+        reasons=np.array(result.outcome.reasons, dtype=str),
         removals=np.array(json.dumps([removal.as_dict() for removal in result.removals])),
         components=np.array("" if result.components is None else result.components.to_json()),
     )
@@ -124,9 +129,10 @@ def read_solution(path: str | os.PathLike) -> SavedSolution:
         if int(arrays.pop("schema")) != SCHEMA:
             raise InputError("was written by another version", "adjust the block again", path)
         scalars = {"estimator_code": int, "estimator_limit": float, "sigma0": float, "iterations": int}
-        scalars |= {"status": str, "geoid": str, "components": str, "removals": str}
+        scalars |= {"status": str, "geoid": str, "components": str, "removals": str, "verdict": str}
         values = {name: scalars[name](array) if name in scalars else array for name, array in arrays.items()}
         values["warnings"] = tuple(str(w) for w in arrays["warnings"])
+        values["reasons"] = tuple(str(reason) for reason in arrays.get("reasons", ()))
         return SavedSolution(**values)
     except FileNotFoundError:
         raise InputError("is missing", "give the folder that `aerotri adjust` wrote", path) from None

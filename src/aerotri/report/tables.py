@@ -13,7 +13,7 @@ from aerotri.functional_model.additional_parameters import format_parameters
 from aerotri.image_errors import interior_elements, largest_effects
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.report.quality import asprs_warning, ground_statistics, metre_digits, pixel_text, printable
-from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock, GroundPointResults
+from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock, GroundPointResults, Outcome
 
 TOP_RESIDUALS = 30
 TOP_WEAK = 15
@@ -335,12 +335,19 @@ def weak_images(adjusted: AdjustedBlock, top: int = TOP_WEAK) -> Table:
     return images(adjusted, rows, f"The {len(rows)} weakest photographs")
 
 
+def verdict_lines(outcome: Outcome) -> list[str]:
+    """What the result is worth, and why: the first that is read."""
+    first = [f"verdict: {outcome.verdict}"] if outcome.verdict else []
+    return first + [f"  because {printable(reason, 500)}" for reason in outcome.reasons]
+
+
 def summary_lines(adjusted: AdjustedBlock) -> list[str]:
     """The result in a few lines of plain text for a terminal; names may hold any printable character, also brackets."""
     o, p = adjusted.outcome, adjusted.parameters
     used = int(np.sum(adjusted.rays.status == RAY_STATUS.index("used")))
     left_out = len(adjusted.rays.status) - used
     lines = [
+        *verdict_lines(o),
         f"{printable(adjusted.block.name)}: {o.status} after {o.iterations} iterations"
         + (f": {o.message}" * bool(o.message)),
         f"sigma0 {o.sigma0:.3f} ({o.sigma0_um:.2f} µm{pixel_text(o.sigma0_um, adjusted)})",

@@ -31,6 +31,7 @@ class Outcome:
     vtpv : vᵀPv with the final weights.
     observations, unknowns, conditions, redundancy : redundancy = observations − unknowns + conditions.
     warnings : sentences the user should read.
+    verdict : 'accepted', 'doubtful' or 'rejected'; '' before it is judged. reasons : sentences, the gravest first.
     timings_s : seconds by stage.
     """
 
@@ -46,6 +47,8 @@ class Outcome:
     redundancy: int
     warnings: tuple[str, ...] = ()
     timings_s: Mapping[str, float] = field(default_factory=dict)
+    verdict: str = ""
+    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,6 +41,8 @@ def failure(system: NormalSystem, status: str, message: str, iterations: int = 0
             unknowns=counts.unknowns,
             conditions=counts.conditions,
             redundancy=counts.redundancy,
+            verdict="rejected",
+            reasons=(message,),
         )
     )
 
