@@ -14,7 +14,7 @@ DMC_INTERIOR = INTERIOR | {"focal_length_mm": Prior(120.0, fixed=True)}
 
 
 def camera_for(family: str, flight_axis: str = "+y", size: tuple[int, int] = (11500, 7500), pixel_um=9.0) -> Camera:
-    model, interior = LINEAR_FAMILIES[family].CAMERA_MODEL or "frame", INTERIOR
+    model, interior = LINEAR_FAMILIES[family].camera_model or "frame", INTERIOR
     if model == "dmc":
         size, pixel_um, interior = (13824, 7680), 12.0, DMC_INTERIOR
     if flight_axis[1] == "x":
@@ -34,7 +34,7 @@ def inner_points(camera: Camera, n=400, seed=1):
     clear = (np.abs(native[:, :1] - seams_x).min(axis=1) > 0.01) & (np.abs(native[:, 1:] - seams_y).min(axis=1) > 0.01)
     clear &= (np.abs(xy) > 0.01).all(axis=1)
     for family in ("grid", "collocation"):
-        spacing = 2.0 * half / (np.array(LINEAR_FAMILIES[family].SIZES.default) - 1.0)
+        spacing = 2.0 * half / (np.array(LINEAR_FAMILIES[family].sizes.default) - 1.0)
         place = (xy + half) / spacing
         clear &= (np.abs(place - np.round(place)) * spacing > 0.01).all(axis=1)
     return xy[clear].T

@@ -67,7 +67,7 @@ def test_linear_patterns_are_the_same(flight_axis):
         (ultracam_d, paper_patterns.ultracam_d(x, y, (2 * camera.half_format_mm[0], 2 * camera.half_format_mm[1]),
                                                flight_axis)),
     ):  # fmt: skip
-        ours = parameter_set(module.FAMILY, module.ITEMS, camera).basis(x, y)
+        ours = parameter_set(module.FAMILY.name, module.FAMILY.items, camera).basis(x, y)
         np.testing.assert_allclose(formula, ours, rtol=1e-12, atol=1e-12 * np.abs(ours).max())
 
 

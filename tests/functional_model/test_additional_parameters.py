@@ -31,8 +31,8 @@ def full_set(family: str, flight_axis: str = "+y"):
 
 def all_sets(family: str, flight_axis: str = "+y"):
     """Sets that hold every item of a family between them; items that exclude each other apart."""
-    camera, items = camera_for(family, flight_axis), LINEAR_FAMILIES[family].ITEMS
-    choices = [items] if family != "dmc" else [dmc.DEFAULT_ITEMS, ("79", "80")]
+    camera, items = camera_for(family, flight_axis), LINEAR_FAMILIES[family].items
+    choices = [items] if family != "dmc" else [dmc.FAMILY.all_items, ("79", "80")]
     return [parameter_set(family, choice, camera) for choice in choices]
 
 
@@ -56,13 +56,13 @@ def test_partials_are_the_derivatives(family, flight_axis):
 
 @pytest.mark.parametrize("family", LINEAR_FAMILIES)
 def test_contract(family):
-    module = LINEAR_FAMILIES[family]
-    assert set(module.MARK) <= set("PLDC")
-    assert len(module.REFERENCE) > 10
-    assert len(set(module.ITEMS)) == len(module.ITEMS)
-    assert set(default_items(family)) <= set(module.ITEMS)
-    assert all(module.DESCRIPTION[item] for item in module.ITEMS)
-    assert {item for chosen in all_sets(family) for item in chosen.items} == set(module.ITEMS)
+    own = LINEAR_FAMILIES[family]
+    assert set(own.mark) <= set("PLDC")
+    assert len(own.reference) > 10
+    assert len(set(own.items)) == len(own.items)
+    assert set(default_items(family)) <= set(own.items)
+    assert all(own.text(item) for item in own.items)
+    assert {item for chosen in all_sets(family) for item in chosen.items} == set(own.items)
     for chosen in all_sets(family):
         x, y = inner_points(chosen.camera, 30)
         basis = chosen.basis(x, y)
@@ -132,7 +132,7 @@ def test_bluh_by_hand():
 def test_bluh_is_normalised_to_the_film_format():
     """The same relative place gives the same relative displacement, whatever the format."""
     film, small = (Camera("c", "frame", (n, n), 10.0, INTERIOR) for n in (23000, 5000))
-    items = LINEAR_FAMILIES["bluh"].ITEMS
+    items = LINEAR_FAMILIES["bluh"].items
     one = parameter_set("bluh", items, film).basis(np.array([46.0]), np.array([23.0])) / 115.0
     other = parameter_set("bluh", items, small).basis(np.array([10.0]), np.array([5.0])) / 25.0
     np.testing.assert_allclose(one, other, rtol=1e-12)
@@ -150,7 +150,7 @@ def test_bluh_is_single_valued_across_the_axes():
 def test_bluh_and_brown_identities():
     """[D, models.md 2] P1 = 3x·(x, y) + pattern 8; P2 = 3y·(x, y) − pattern 7; K1 ↔ −P9 plus a scale (s = 1)."""
     film = Camera("film", "frame", (23000, 23000), 10.0, INTERIOR)
-    chosen = parameter_set("bluh", LINEAR_FAMILIES["bluh"].ITEMS, film)
+    chosen = parameter_set("bluh", LINEAR_FAMILIES["bluh"].items, film)
     x, y = inner_points(film)
     bluh = {item: chosen.basis(x, y)[:, :, k] for k, item in enumerate(chosen.items)}
     correction = dict(zip(brown.ITEMS, np.moveaxis(-brown.basis(x, y), 2, 0), strict=True))
@@ -198,7 +198,7 @@ def test_bluh_correlations(size, pixel_um, f, expected):
     camera = Camera("c", "frame", size, pixel_um, INTERIOR)
     half = camera.half_format_mm
     x, y = (g.ravel() for g in np.meshgrid(np.linspace(-half[0], half[0], 61), np.linspace(-half[1], half[1], 61)))
-    basis = parameter_set("bluh", LINEAR_FAMILIES["bluh"].ITEMS, camera).basis(x, y).reshape(-1, 12)
+    basis = parameter_set("bluh", LINEAR_FAMILIES["bluh"].items, camera).basis(x, y).reshape(-1, 12)
     orientation = orientation_columns(x, y, f).reshape(-1, 6)
     left = basis - orientation @ np.linalg.lstsq(orientation, basis, rcond=None)[0]
     left /= np.linalg.norm(left, axis=0)
@@ -351,7 +351,7 @@ def choices(draw):
     """Any legal choice, items in the family's order."""
     chosen = []
     for family in draw(st.lists(st.sampled_from(sorted(FAMILIES)), max_size=4, unique=True)):
-        known = default_items(family) if family == "dmc" else FAMILIES[family].ITEMS
+        known = default_items(family) if family == "dmc" else FAMILIES[family].items
         sizes = sizes_of(family)
         if sizes is not None and draw(st.booleans()):
             known = sizes.items(draw(st.sampled_from([(2, 2), (3, 2), (2, 5), (6, 6)])))

@@ -114,7 +114,7 @@ def test_butterfly_lies_in_the_general_parameters():
     """96 % of its variance, orientation included."""
     x, y = format_grid(60, 40)
     d = pattern("79", x, y).ravel()
-    general = parameter_set("bluh", LINEAR_FAMILIES["bluh"].ITEMS, CAMERA).basis(x, y).reshape(-1, 12)
+    general = parameter_set("bluh", LINEAR_FAMILIES["bluh"].items, CAMERA).basis(x, y).reshape(-1, 12)
     design = np.hstack([general, orientation_columns(x, y, F).reshape(-1, 6)])
     design /= np.linalg.norm(design, axis=0)
     left = d - design @ np.linalg.lstsq(design, d, rcond=None)[0]
@@ -124,7 +124,7 @@ def test_butterfly_lies_in_the_general_parameters():
 def test_single_points_by_hand():
     """34 x and 35 y in the upper right quadrant, then counter-clockwise; 30–33 along the flight, zero at 32 mm."""
     at = {0: (20.0, 40.0), 1: (-20.0, 40.0), 2: (-20.0, -40.0), 3: (20.0, -40.0)}
-    chosen = parameter_set("dmc", dmc.DEFAULT_ITEMS, CAMERA)
+    chosen = parameter_set("dmc", dmc.FAMILY.all_items, CAMERA)
     for quadrant, (x, y) in at.items():
         basis = dict(zip(chosen.items, chosen.basis(np.array([x]), np.array([y]))[0].T, strict=True))
         np.testing.assert_allclose(basis[str(30 + quadrant)], (0.0, 1600.0 - 1280.0))
@@ -168,8 +168,8 @@ def test_34_to_41_are_continuous_at_the_seams():
 def test_rank_over_flat_ground():
     """30–41, 74–77, 79 with the orientation of a photograph and BLUH 1–12: of full rank."""
     x, y = format_grid(60, 40)
-    special = parameter_set("dmc", dmc.DEFAULT_ITEMS, CAMERA).basis(x, y).reshape(-1, 17)
-    general = parameter_set("bluh", LINEAR_FAMILIES["bluh"].ITEMS, CAMERA).basis(x, y).reshape(-1, 12)
+    special = parameter_set("dmc", dmc.FAMILY.all_items, CAMERA).basis(x, y).reshape(-1, 17)
+    general = parameter_set("bluh", LINEAR_FAMILIES["bluh"].items, CAMERA).basis(x, y).reshape(-1, 12)
     common = pattern("80", x, y).reshape(-1, 1)
     orientation = orientation_columns(x, y, F).reshape(-1, 6)
     for columns, rank in (
@@ -184,8 +184,8 @@ def test_rank_over_flat_ground():
 @pytest.mark.parametrize("flight_axis", ["+x", "-x", "-y"])
 def test_flight_axis_turns_the_heads(flight_axis):
     x, y = format_grid(10, 6)
-    turned = parameter_set("dmc", dmc.DEFAULT_ITEMS, camera_for("dmc", flight_axis))
-    native = parameter_set("dmc", dmc.DEFAULT_ITEMS, CAMERA)
+    turned = parameter_set("dmc", dmc.FAMILY.all_items, camera_for("dmc", flight_axis))
+    native = parameter_set("dmc", dmc.FAMILY.all_items, CAMERA)
     turn = native_from_image(turned.camera)
     image = turn.T @ np.stack([x, y])
     expected = np.einsum("ia,nak->nik", turn.T, native.basis(x, y))
@@ -219,5 +219,5 @@ def test_centre_offset_turns_with_the_flight_axis():
 def test_a_reduced_copy_of_the_image_keeps_the_patterns():
     small = Camera("small", "dmc", (6912, 3840), 24.0, DMC_INTERIOR, flight_axis="+y")
     x, y = format_grid(10, 6)
-    one, other = (parameter_set("dmc", dmc.DEFAULT_ITEMS, camera).basis(x, y) for camera in (CAMERA, small))
+    one, other = (parameter_set("dmc", dmc.FAMILY.all_items, camera).basis(x, y) for camera in (CAMERA, small))
     np.testing.assert_allclose(one, other)

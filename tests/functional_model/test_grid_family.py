@@ -99,7 +99,7 @@ def test_prior_covariance():
 
 
 def test_prior_weight_is_the_inverse():
-    items = collocation.SIZES.items((7, 5))
+    items = collocation.FAMILY.sizes.items((7, 5))
     covariance = collocation.prior_covariance(CAMERA, items, 0.004, 30.0)
     weight, log_determinant = collocation.prior_weight(CAMERA, items, 0.004, 30.0)
     np.testing.assert_allclose(weight @ covariance, np.eye(len(items)), atol=1e-8)
@@ -108,7 +108,7 @@ def test_prior_weight_is_the_inverse():
 
 def test_a_field_has_no_scale():
     """And nothing else is held: the camera's own parts and other grids are no matter."""
-    items = collocation.SIZES.items((5, 4))
+    items = collocation.FAMILY.sizes.items((5, 4))
     others = [("collocation", items), ("ultracam_d", ("42",)), ("grid", ("4x3_x_0_0",))]
     held = said_by_others(CAMERA, items, others)
     position, axis = grid.node_positions(CAMERA, items)
@@ -118,7 +118,7 @@ def test_a_field_has_no_scale():
 
 def test_a_field_is_orthogonal_to_what_others_say():
     """Free principal point, Brown, BLUH: the covariance has nothing of them."""
-    items = collocation.SIZES.items((7, 5))
+    items = collocation.FAMILY.sizes.items((7, 5))
     position, axis = grid.node_positions(CAMERA, items)
     free = replace(CAMERA, interior={name: Prior(prior.value) for name, prior in CAMERA.interior.items()})
     chosen = [("collocation", items), ("brown", ("K1",)), ("bluh", ("1", "2"))]
@@ -140,7 +140,7 @@ def test_a_field_is_orthogonal_to_what_others_say():
 
 
 def test_the_lens_beside_a_field():
-    items = collocation.SIZES.items((7, 5))
+    items = collocation.FAMILY.sizes.items((7, 5))
     held = said_by_others(CAMERA, items, [("lens", ("k1",))])
     position, axis = grid.node_positions(CAMERA, items)
     pattern = position[np.arange(70), axis] * np.sum(position**2, axis=1)

@@ -47,7 +47,7 @@ def test_every_pattern_is_drawn(family):
 
 
 def test_sheets_are_divided():
-    items = LINEAR_FAMILIES["legendre"].ITEMS[:45]
+    items = LINEAR_FAMILIES["legendre"].items[:45]
     with pytest.raises(ValueError, match="1 to 44 patterns"):
         plot_pattern_sheet("legendre", camera_for("legendre"), items)
     assert len(pattern_sheets("gruen")) == 1

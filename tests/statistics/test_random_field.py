@@ -86,7 +86,7 @@ def simulated(seed: int, sigma_um: float, length_mm: float):
     content = small_spec()
     content["tie_points"]["per_image"] = 150
     camera = simulate(parse_spec(content), seed)[0].cameras[0]
-    items = collocation.SIZES.items(GRID)
+    items = collocation.FAMILY.sizes.items(GRID)
     held = said_by_others(camera, items, [])
     covariance = collocation.prior_covariance(camera, items, 1e-3 * sigma_um, length_mm, held)
     values = np.linalg.cholesky(covariance) @ np.random.default_rng(seed).normal(size=len(items))
@@ -115,7 +115,7 @@ def test_covariance_recovered(seed):
     camera = result.block.cameras[0]
     x, y = (a.ravel() for a in np.meshgrid(*(np.linspace(-0.9, 0.9, 12) * half for half in camera.half_format_mm)))
     d, covariance = systematic_errors(result, "ucd", x, y)
-    truth = parameter_set("collocation", collocation.SIZES.items(GRID), camera).basis(x, y) @ values
+    truth = parameter_set("collocation", collocation.FAMILY.sizes.items(GRID), camera).basis(x, y) @ values
     statistic = np.einsum("ni,nij,nj->n", d - truth, np.linalg.inv(covariance), d - truth)
     assert statistic.max() < 25.0
     # the picture leaves out what orientation takes: smaller σ, and the truth without it within them
@@ -123,8 +123,8 @@ def test_covariance_recovered(seed):
     assert field.without_orientation
     g = orientation_patterns(field.x.ravel(), field.y.ravel(), camera.focal_length_mm).reshape(-1, 6)
     assert np.abs(g.T @ field.d.ravel()).max() < 1e-9 * np.linalg.norm(g, axis=0).max()
-    truth = parameter_set("collocation", collocation.SIZES.items(GRID), camera).basis(field.x.ravel(), field.y.ravel())
-    truth = (truth @ values).ravel()
+    nodes = parameter_set("collocation", collocation.FAMILY.sizes.items(GRID), camera)
+    truth = (nodes.basis(field.x.ravel(), field.y.ravel()) @ values).ravel()
     z = (field.d.ravel() - truth + g @ np.linalg.lstsq(g, truth, rcond=None)[0]) / field.sigma.ravel()
     assert 0.7 < np.sqrt(np.mean(z**2)) < 1.4
     assert field.significant.mean() > 0.5

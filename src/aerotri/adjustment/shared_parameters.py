@@ -12,6 +12,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import (
     FAMILIES,
+    Parameter,
     ParameterSet,
     collocation,
     mark_of,
@@ -138,8 +139,9 @@ def lens_table(block: Block, images: np.ndarray, shared: SharedList) -> LensTabl
                 removed[row, column] = True
                 continue
             if (name, owner) not in made:
-                family = name.partition(".")[0]
-                kind, mark = ("interior", "") if name in INTERIOR_ELEMENTS else ("additional", FAMILIES[family].MARK)
+                kind, mark = "interior", ""
+                if name not in INTERIOR_ELEMENTS:
+                    kind, mark = "additional", FAMILIES[Parameter.of(name).family].mark
                 made[name, owner] = shared.add(name, owner, kind, mark, prior)
             columns[row, column] = made[name, owner]
     base = np.array([interior_row(block.cameras[camera]) for camera, _ in rows]).reshape(-1, len(INTERIOR_COLUMNS))
@@ -151,10 +153,10 @@ def _interior_prior(camera: Camera, name: str, chosen: dict[str, tuple[str, ...]
     """What is known of one interior column; None where it is not an unknown."""
     if name in INTERIOR_ELEMENTS:
         return camera.interior[name]
-    family, item = name.split(".")
-    if item not in chosen.get(family, ()):
+    parameter = Parameter.of(name)
+    if parameter.item not in chosen.get(parameter.family, ()):
         return None
-    return (camera.brown if family == "brown" else camera.lens).get(item, FREE)
+    return (camera.brown if parameter.family == "brown" else camera.lens).get(parameter.item, FREE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +191,7 @@ def linear_columns(
                     chosen = _without_removed(block, of_camera[camera], group)
                     if group not in first:
                         first[group] = _add_set(shared, chosen, group)
-                        if family == collocation.FAMILY:
+                        if family == collocation.FAMILY.name:
                             shared.fields.append(random_field(block, chosen, group, first[group]))
                     sets[key] = chosen, first[group]
             parts.append(_family_columns(sets, of_ray, xy))
@@ -202,9 +204,8 @@ def linear_columns(
 
 
 def _sets_by_camera(block: Block, family: str, items: tuple[str, ...]) -> dict[int, ParameterSet]:
-    wanted = LINEAR_FAMILIES[family].CAMERA_MODEL
     used = sorted(set(block.images.camera.tolist()))
-    fitting = [c for c in used if wanted in (None, block.cameras[c].model)]
+    fitting = [c for c in used if LINEAR_FAMILIES[family].fits(block.cameras[c])]
     # without a fitting camera let parameter_set say what is wrong
     return {c: parameter_set(family, items, block.cameras[c]) for c in fitting or used}
 

@@ -45,9 +45,9 @@ def _draw(folder: Path, family: str | None) -> list[str]:
     from aerotri.simulation.spec import CameraSpec
 
     drawn = []
-    for name, module in LINEAR_FAMILIES.items():
+    for name, own in LINEAR_FAMILIES.items():
         if family in (None, name):
-            model = module.CAMERA_MODEL or "ultracam_d"
+            model = own.camera_model or "ultracam_d"
             camera = block_camera(model, CameraSpec.model_validate({"preset": model}))
             sheets = plot_pattern_sheets(name, camera)
             save_plots({f"{name}_{k}" if k else name: sheet for k, sheet in enumerate(sheets)}, folder)

@@ -63,11 +63,11 @@ class PhotoErrors:
         out = np.zeros((len(measured), 2, self.count))
         for chosen, _ in f.linear:
             self._put(out, chosen.names, chosen.basis(x, y))
-        names = tuple(f"{brown.FAMILY}.{item}" for item in brown.ITEMS)
+        names = tuple(f"{brown.FAMILY.name}.{item}" for item in brown.ITEMS)
         if any(name in self.column for name in names):
             self._put(out, names, brown.basis(x - f.interior[1], y - f.interior[2]))
         for k, item in enumerate(lens.ITEMS):
-            name = f"{lens.FAMILY}.{item}"
+            name = f"{lens.FAMILY.name}.{item}"
             if name in self.column:
                 step = LENS_STEP * np.eye(len(lens.ITEMS))[k]
                 ends = [replace(f, lens=f.lens + sign * step).of_measured(measured) for sign in (1.0, -1.0)]

@@ -20,7 +20,7 @@ from scipy.linalg import eigh, null_space
 from scipy.stats import f as f_distribution
 
 from aerotri.adjustment.shared_parameters import random_field
-from aerotri.functional_model.additional_parameters import collocation, parameter_set
+from aerotri.functional_model.additional_parameters import Parameter, collocation, parameter_set
 from aerotri.image_errors.field import ErrorField, field_difference
 from aerotri.image_errors.groups import ImageGroup, image_groups
 from aerotri.statistics.adjusted_block import AdjustedBlock
@@ -126,15 +126,15 @@ def _differences(adjusted: AdjustedBlock, first: str, second: str) -> tuple[np.n
     sign = np.repeat([1.0, -1.0], [len(rows[0]), len(rows[1])])
     d[[place[name] for name in p.names[both]], np.arange(len(both))] = sign
     delta, q = d @ p.value[both], np.asarray(p.covariance[np.ix_(both, both)])
-    nodes = np.array([str(name).partition(".")[0] == collocation.FAMILY for name in p.names[both]], dtype=bool)
+    nodes = np.array([Parameter.of(name).family == collocation.FAMILY.name for name in p.names[both]], dtype=bool)
     free = ~nodes[[int(np.flatnonzero(row)[0]) for row in d]] if len(both) else np.zeros(0, bool)
     if not nodes.any() or known.sigma_um is None or known.length_mm is None:
         covariance = d @ q @ d.T
         return delta, covariance, 1e6 * np.diag(np.diagonal(covariance))
     field = np.flatnonzero(nodes)
-    items = tuple(str(name).partition(".")[2] for name in p.names[both[field[: len(field) // 2]]])
+    items = tuple(Parameter.of(name).item for name in p.names[both[field[: len(field) // 2]]])
     camera = next(g.camera for g in image_groups(adjusted.block) if g.name == first)
-    nodes_of_one = random_field(adjusted.block, parameter_set(collocation.FAMILY, items, camera), first, 0)
+    nodes_of_one = random_field(adjusted.block, parameter_set(collocation.FAMILY.name, items, camera), first, 0)
     # what a field does not have is certain: it is left out
     seen = null_space(nodes_of_one.held.T)
     s2 = adjusted.outcome.sigma0**2

@@ -143,7 +143,7 @@ def error_function(adjusted: AdjustedBlock, group: ImageGroup) -> ErrorFunction:
 
 
 def _of_family(values: Mapping[str, float], module) -> np.ndarray:
-    return np.array([values.get(f"{module.FAMILY}.{item}", 0.0) for item in module.ITEMS])
+    return np.array([values.get(f"{module.FAMILY.name}.{item}", 0.0) for item in module.ITEMS])
 
 
 def _values_in_force(adjusted: AdjustedBlock, group: ImageGroup) -> dict[str, float]:

@@ -235,7 +235,7 @@ def _families(adjusted: AdjustedBlock, group: ImageGroup, rows: np.ndarray, x: n
         yield chosen.names, basis @ np.array([values[name] for name in chosen.names]), basis
     (c, x0, y0), _ = interior_elements(adjusted, camera)
     for module in (brown, lens):
-        names = tuple(f"{module.FAMILY}.{item}" for item in module.ITEMS)
+        names = tuple(f"{module.FAMILY.name}.{item}" for item in module.ITEMS)
         if any(name in values for name in names):
             p = np.array([values.get(name, 0.0) for name in names])
             yield names, *(_brown(x - x0, y - y0, p) if module is brown else _lens((x - x0) / c, (y - y0) / c, c, p))

@@ -122,7 +122,7 @@ def _patterns(family: str, items: Sequence[str], camera: Camera, x: np.ndarray, 
         basis = chosen.basis(x, y)
         return basis[:, :, [chosen.items.index(item) for item in items]]
     x_bar, y_bar = x - camera.principal_point_mm[0], y - camera.principal_point_mm[1]
-    if family == brown.FAMILY:
+    if family == brown.FAMILY.name:
         return brown.basis(x_bar, y_bar)[:, :, [brown.ITEMS.index(item) for item in items]]
     c = camera.focal_length_mm
     a, b, ideal = x_bar / c, y_bar / c, np.column_stack([x_bar, y_bar])

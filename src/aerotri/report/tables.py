@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from aerotri.conventions import MGON_PER_RADIAN
-from aerotri.functional_model.additional_parameters import format_parameters
+from aerotri.functional_model.additional_parameters import Parameter, format_parameters
+from aerotri.functional_model.additional_parameters import unit_of as unit_of_parameter
+from aerotri.functional_model.additional_parameters.family import NO_UNIT
 from aerotri.image_errors import interior_elements, largest_effects
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.report.quality import asprs_warning, ground_statistics, metre_digits, pixel_text, printable
@@ -19,33 +20,7 @@ TOP_RESIDUALS = 30
 TOP_WEAK = 15
 LONGEST_CELL = 1000
 MOST_ROWS = 3000
-UNITS = (
-    (r"bluh\.[78]", "1/mm"),
-    (r"bluh\.9", "1/mm²"),
-    (r"ultracam_d\.(5\d|6[0-5])", "mm"),
-    (r"ultracam_d\.(6[6-9]|7\d)", "rad"),
-    (r"dmc\.29", "m"),
-    (r"dmc\.(3\d|4[01])", "1/mm"),
-    (r"dmc\.(7[4-7]|80)", "1/mm²"),
-    (r"ebner\.[3-6]", "1/mm"),
-    (r"ebner\.([789]|10)", "1/mm²"),
-    (r"ebner\.1[12]", "1/mm³"),
-    (r"gruen\.[ab](22|31|13)", "1/mm"),
-    (r"gruen\.[ab](14|23|32|41)", "1/mm²"),
-    (r"gruen\.[ab](15|24|33|42|51)", "1/mm³"),
-    (r"gruen\.[ab](25|34|43|52)", "1/mm⁴"),
-    (r"gruen\.[ab](35|44|53)", "1/mm⁵"),
-    (r"gruen\.[ab](45|54)", "1/mm⁶"),
-    (r"gruen\.[ab]55", "1/mm⁷"),
-    (r"(fourier|legendre|chebyshev|grid|collocation)\..*", "mm"),
-    (r"brown\.K1", "1/mm²"),
-    (r"brown\.K2", "1/mm⁴"),
-    (r"brown\.K3", "1/mm⁶"),
-    (r"brown\.P\d", "1/mm"),
-    (r"gnss\.shift.*", "m"),
-    (r"gnss\.drift.*", "m/s"),
-)
-"""Units by parameter name; those of BLUH, and of dmc.74-77 and 80, in its normalised image coordinates."""
+GNSS_UNITS = {"shift": "m", "drift": "m/s"}
 
 
 @dataclass(frozen=True)
@@ -120,7 +95,10 @@ def summary(adjusted: AdjustedBlock) -> Table:
 
 def unit_of(name: str) -> str:
     """Unit of a shared parameter by its name; '–' where it has none."""
-    return next((unit for pattern, unit in UNITS if re.fullmatch(pattern, name)), "–")
+    parameter = Parameter.of(name)
+    if parameter.family == "gnss":
+        return GNSS_UNITS.get(parameter.item.partition("_")[0], NO_UNIT)
+    return unit_of_parameter(name)
 
 
 def unit_of_group(name: str) -> tuple[str, float]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aerotri.functional_model.additional_parameters import is_grid
+from aerotri.functional_model.additional_parameters import Parameter, is_grid
 from aerotri.observations import Block
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ class SharedParameters:
     @property
     def is_node(self) -> np.ndarray:
         """(s,) bool, nodes of a grid or random field: none says anything on its own."""
-        return np.array([is_grid(str(name).partition(".")[0]) for name in self.names], dtype=bool)
+        return np.array([is_grid(Parameter.of(name).family) for name in self.names], dtype=bool)
 
     @property
     def t(self) -> np.ndarray:

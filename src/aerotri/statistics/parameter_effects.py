@@ -14,6 +14,7 @@ from scipy.special import stdtrit
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.functional_model.additional_parameters import Parameter
 from aerotri.statistics.adjusted_block import AdjustedBlock
 
 AT_ONCE = 48
@@ -100,7 +101,7 @@ def parameter_effects(
         worse, share = _worse(d, difference, variance), _share(d, difference, variance)
         return LeftOut(label, group, difference, t, worse, limit, share)
 
-    families = np.array([str(name).partition(".")[0] for name in p.names[rows]])
+    families = np.array([Parameter.of(name).family for name in p.names[rows]])
     found = [without(np.arange(len(rows)), "all")]
     if len(set(families)) > 1:
         found += [without(np.flatnonzero(families == family), family) for family in dict.fromkeys(families)]

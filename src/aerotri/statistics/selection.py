@@ -15,7 +15,7 @@ from aerotri.adjustment.prepare import Prepared, build_system
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import Unknowns
-from aerotri.functional_model.additional_parameters import is_grid
+from aerotri.functional_model.additional_parameters import Parameter, is_grid
 from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import SharedParameters
 from aerotri.statistics.removal import reference_state, start_values_at, with_shared
@@ -56,7 +56,7 @@ def candidates(unknowns: Unknowns) -> np.ndarray:
         [
             k
             for k, (name, kind) in enumerate(zip(shared.names, shared.kinds, strict=True))
-            if kind == "additional" and free[k] and not is_grid(name.partition(".")[0])
+            if kind == "additional" and free[k] and not is_grid(Parameter.of(name).family)
         ],
         dtype=np.int64,
     )

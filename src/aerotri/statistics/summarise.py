@@ -11,6 +11,7 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.robust import weights_and_costs
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.functional_model.additional_parameters import Parameter
 from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.statistics.adjusted_block import (
@@ -220,8 +221,9 @@ def inseparable(parameters: SharedParameters) -> tuple[str, ...]:
     beyond = np.abs(np.nan_to_num(p.max_correlation)) > INSEPARABLE
     for k in np.flatnonzero(beyond & (p.status != "removed")):
         if nodes[k]:
-            family, size = str(p.names[k]).partition("_")[0].split(".")
-            grids.setdefault((f"{family}:{size}", str(p.groups[k])), []).append(float(p.max_correlation[k]))
+            node = Parameter.of(p.names[k])
+            size = node.item.partition("_")[0]
+            grids.setdefault((f"{node.family}:{size}", str(p.groups[k])), []).append(float(p.max_correlation[k]))
         else:
             pair = frozenset((str(p.names[k]), str(p.max_correlation_with[k])))
             pairs.setdefault(pair, float(p.max_correlation[k]))

@@ -22,6 +22,8 @@ from aerotri.conventions import InputError
 from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials, additional_rows, shared_columns
 from aerotri.deformation.orientation import Calibration, calibrated_orientation
 from aerotri.deformation.photo_errors import PhotoErrors, errors_by_image, seams_mm
+from aerotri.functional_model.additional_parameters import Parameter
+from aerotri.functional_model.additional_parameters.registry import INTERIOR_FAMILIES
 from aerotri.functional_model.rotation import logarithm
 from aerotri.image_errors.tile_grid import Tile, tiles_of
 from aerotri.observations import Camera
@@ -31,7 +33,6 @@ from aerotri.volume.pickets import Pickets
 
 TILE_NODES, FRAME_NODES = 65, 193
 """Nodes a side of a tile, and of a format without tiles, over which additional parameters are taken as bilinear."""
-LENS_FAMILIES = ("brown", "lens")
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +217,7 @@ def _in_unknowns(calibration: Calibration, by_eo, by_interior, by_parameters, co
     rows, columns = np.nonzero(u.lens.columns >= 0)
     np.add.at(shared, u.lens.columns[rows, columns], by_interior[rows, columns])
     names = calibration.local.parameters.names[additional_rows(calibration)]
-    linear = np.array([str(name).partition(".")[0] not in LENS_FAMILIES for name in names], dtype=bool)
+    linear = np.array([Parameter.of(name).family not in INTERIOR_FAMILIES for name in names], dtype=bool)
     shared[shared_columns(calibration)[linear]] = -by_parameters[linear]
     if not corrected:
         shared[kinds == "additional"] = 0.0

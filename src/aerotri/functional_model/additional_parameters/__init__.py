@@ -1,12 +1,9 @@
 """Families of additional parameters: one file a family, one contract for all.
 
-Every family module offers ``FAMILY`` (its name in block.toml), ``ITEMS`` (the names of its parameters), ``MARK`` ('P'
-printed in a source paper, 'L' literature, 'D' derived, 'C' choice), ``REFERENCE``, ``CAMERA_MODEL`` (the camera model
-it belongs to, or None), ``DESCRIPTION`` (item → a few words) and ``terms(camera, x, y, partials, items)``. Besides,
-where needed: ``DEFAULT_ITEMS`` (what ``all`` means, if not ``ITEMS``), ``MARKS`` (of items unlike the family's),
-``SIZES`` (the family comes in sizes, as in ``legendre:4x4``), ``check_items`` (refuses items that exclude each other)
-and ``NEEDS_HEIGHT`` (items that are no pattern of the image).
-A `ParameterSet` is a choice of items of one family for one camera.
+Every module of a family ends in ``FAMILY``, a `Family` with everything the rest of the program asks of it: names,
+texts, units, marks, sources, and the patterns at image points. `registry.FAMILIES` lists them; a new family is one
+file and one word there. A `ParameterSet` is a choice of items of one family for one camera, a `Parameter` one of them
+by its name.
 """
 
 from aerotri.functional_model.additional_parameters.description import (
@@ -15,6 +12,7 @@ from aerotri.functional_model.additional_parameters.description import (
     mark_of,
     text_of,
 )
+from aerotri.functional_model.additional_parameters.family import Family, Parameter
 from aerotri.functional_model.additional_parameters.registry import (
     FAMILIES,
     ParameterSet,
@@ -22,12 +20,15 @@ from aerotri.functional_model.additional_parameters.registry import (
     is_item,
     parameter_set,
     parameter_sets,
+    unit_of,
 )
 from aerotri.functional_model.additional_parameters.specification import AUTO, format_parameters, parse_parameters
 
 __all__ = [
     "AUTO",
     "FAMILIES",
+    "Family",
+    "Parameter",
     "ParameterDescription",
     "ParameterSet",
     "describe",
@@ -39,4 +40,5 @@ __all__ = [
     "parameter_sets",
     "parse_parameters",
     "text_of",
+    "unit_of",
 ]

@@ -56,9 +56,9 @@ def _patterns(camera: Camera, family: str, items: Sequence[str], x: np.ndarray, 
     """(n, 2, k) of one family; none of grids and of a camera's own parts."""
     x0, y0 = camera.principal_point_mm
     if family in LINEAR_FAMILIES:
-        smooth = LINEAR_FAMILIES[family].CAMERA_MODEL is None and not is_grid(family)
+        smooth = LINEAR_FAMILIES[family].camera_model is None and not is_grid(family)
         return parameter_set(family, items, camera).basis(x, y) if smooth else np.zeros((len(x), 2, 0))
-    if family == brown.FAMILY:
+    if family == brown.FAMILY.name:
         return brown.basis(x - x0, y - y0)[:, :, [brown.ITEMS.index(item) for item in items]]
     c = camera.focal_length_mm
     unit = np.eye(len(lens.ITEMS))[[lens.ITEMS.index(item) for item in items]]

@@ -7,18 +7,12 @@ half diagonal of 115·√2 mm; displacements come out in the same unit and are s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
+from aerotri.functional_model.additional_parameters.family import NO_UNIT, Family, per_mm
 from aerotri.functional_model.additional_parameters.terms import Terms, dense_terms
 from aerotri.observations import Camera
 
-FAMILY = "bluh"
-ITEMS = tuple(str(i) for i in range(1, 13))
-MARK = "P"
-CAMERA_MODEL = None
-REFERENCE = "Spreckels, Schlienkamp, Jacobsen, Model deformation – accuracy of digital frame cameras, Table 1"
 DESCRIPTION = {
     "1": "angular affinity",
     "2": "affinity",
@@ -36,6 +30,8 @@ DESCRIPTION = {
 
 NORMAL_R_MAX = 115.0 * np.sqrt(2.0)
 ZERO_RADIUS_SQUARED = 128.0**2
+UNITS = {"7": per_mm(1), "8": per_mm(1), "9": per_mm(2)}
+"""In normalised image coordinates."""
 FREQUENCY = {"10": np.pi / 64.0, "11": np.pi / 32.0}
 
 
@@ -101,27 +97,14 @@ def _pattern(item: str, u: np.ndarray, v: np.ndarray, polar: _Polar, partials: b
     return (-u * g, -v * g), (-g - u * gradient[0], -u * gradient[1], -v * gradient[0], -g - v * gradient[1])
 
 
-def terms(
-    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
-) -> Terms:
-    """Patterns 1–12 at image points.
-
-    Parameters
-    ----------
-    x, y : (n,) mm from the image centre.
-    partials : whether the derivatives are wanted.
-    items : which items, all unless given.
-
-    Returns
-    -------
-    Terms with a column for every item.
-    """
-    chosen, s = ITEMS if items is None else items, scale(camera)
+def _evaluate(camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool, items: tuple[str, ...]) -> Terms:
+    """Patterns 1–12 at image points."""
+    s = scale(camera)
 
     def fill(x: np.ndarray, y: np.ndarray, value: np.ndarray, partial: np.ndarray | None) -> None:
         u, v = s * x, s * y
         polar = _Polar(u, v)
-        for k, item in enumerate(chosen):
+        for k, item in enumerate(items):
             (du, dv), derivatives = _pattern(item, u, v, polar, partials)
             np.divide(du, s, out=value[:, 0, k])
             np.divide(dv, s, out=value[:, 1, k])
@@ -129,4 +112,15 @@ def terms(
                 for place, derivative in enumerate(derivatives):
                     partial[:, place // 2, k, place % 2] = derivative
 
-    return dense_terms(x, y, len(chosen), partials, fill)
+    return dense_terms(x, y, len(items), partials, fill)
+
+
+FAMILY = Family(
+    name="bluh",
+    items=tuple(DESCRIPTION),
+    mark="P",
+    reference="Spreckels, Schlienkamp, Jacobsen, Model deformation – accuracy of digital frame cameras, Table 1",
+    text=DESCRIPTION.__getitem__,
+    unit=lambda item: UNITS.get(item, NO_UNIT),
+    evaluate=_evaluate,
+)

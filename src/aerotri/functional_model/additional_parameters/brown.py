@@ -9,13 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerotri.functional_model.additional_parameters.family import NO_UNIT, Family, per_mm
 from aerotri.observations.block import BROWN_NAMES
 
-FAMILY = "brown"
 ITEMS = BROWN_NAMES
-MARK = "L"
-CAMERA_MODEL = None
-REFERENCE = "Fraser, Digital camera self-calibration, ISPRS Journal 52 (1997); sign as in DBAT"
 DESCRIPTION = {
     "K1": "radial r³",
     "K2": "radial r⁵",
@@ -25,6 +22,7 @@ DESCRIPTION = {
     "b1": "affinity, scale of x",
     "b2": "affinity, shear of x",
 }
+UNITS = {"K1": per_mm(2), "K2": per_mm(4), "K3": per_mm(6), "P1": per_mm(1), "P2": per_mm(1)}
 
 
 def image_error(x_bar: np.ndarray, y_bar: np.ndarray, parameters: np.ndarray) -> np.ndarray:
@@ -50,3 +48,13 @@ def basis(x_bar: np.ndarray, y_bar: np.ndarray) -> np.ndarray:
     dx = [x * r2, x * r2**2, x * r2**3, r2 + 2 * x * x, 2 * x * y, x, y]
     dy = [y * r2, y * r2**2, y * r2**3, 2 * x * y, r2 + 2 * y * y, zero, zero]
     return -np.stack([np.stack(dx, axis=-1), np.stack(dy, axis=-1)], axis=1)
+
+
+FAMILY = Family(
+    name="brown",
+    items=ITEMS,
+    mark="L",
+    reference="Fraser, Digital camera self-calibration, ISPRS Journal 52 (1997); sign as in DBAT",
+    text=DESCRIPTION.__getitem__,
+    unit=lambda item: UNITS.get(item, NO_UNIT),
+)

@@ -7,33 +7,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
-from aerotri.functional_model.additional_parameters.legendre import PATTERNS, items_of_order, largest_degree
-from aerotri.functional_model.additional_parameters.products import (
-    Polynomials,
-    ProductBasis,
-    pattern_text,
-    product_terms,
-)
-from aerotri.functional_model.additional_parameters.sizes import Sizes
-from aerotri.functional_model.additional_parameters.terms import Terms
-from aerotri.observations import Camera
+from aerotri.functional_model.additional_parameters.legendre import square_family
+from aerotri.functional_model.additional_parameters.products import Polynomials, ProductBasis
 
-FAMILY = "chebyshev"
-MARK = "C"
-CAMERA_MODEL = None
-REFERENCE = "Products of Chebyshev polynomials over the format less the orientation; composition of this project"
-LARGEST = (6, 6)
 Q = 1.0
-ITEMS = tuple(PATTERNS)
-SIZES = Sizes("order in x and in y", (2, 2), (2, 2), LARGEST, items_of_order)
-DEFAULT_ITEMS = SIZES.items(SIZES.default)
-NAMES = [["", *(f"T{k}({axis})" for k in range(1, max(LARGEST) + 1))] for axis in "xy"]
-DESCRIPTION = {item: pattern_text(pattern, "", *NAMES) for item, pattern in PATTERNS.items()}
+"""Of the tilt pairs for T_2 as it is scaled."""
 
 
 def polynomials(degree: int, x: np.ndarray, b: float, partials: bool) -> Polynomials:
@@ -52,21 +34,10 @@ def polynomials(degree: int, x: np.ndarray, b: float, partials: bool) -> Polynom
     return Polynomials(value, slope)
 
 
-def terms(
-    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
-) -> Terms:
-    """Chebyshev patterns at image points.
-
-    Parameters
-    ----------
-    x, y : (n,) mm from the image centre.
-    partials : whether the derivatives are wanted.
-    items : which items, all there are unless given.
-
-    Returns
-    -------
-    Terms with a column for every item.
-    """
-    patterns = [PATTERNS[item] for item in (ITEMS if items is None else items)]
-    basis = ProductBasis(partial(polynomials, largest_degree(patterns)), Q, of_unit_square=True)
-    return product_terms(basis, patterns, camera, x, y, partials)
+FAMILY = square_family(
+    "chebyshev",
+    "Products of Chebyshev polynomials over the format less the orientation; composition of this project",
+    "T",
+    "",
+    lambda degree: ProductBasis(partial(polynomials, degree), Q, of_unit_square=True),
+)

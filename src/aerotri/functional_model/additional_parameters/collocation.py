@@ -15,48 +15,14 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
-from aerotri.functional_model.additional_parameters.grid import (
-    LARGEST,
-    SMALLEST,
-    check_items,
-    item_text,
-    node_items,
-    node_positions,
-)
-from aerotri.functional_model.additional_parameters.grid import terms as grid_terms
-from aerotri.functional_model.additional_parameters.sizes import Sizes
-from aerotri.functional_model.additional_parameters.terms import Terms
+from aerotri.functional_model.additional_parameters.grid import node_family, node_positions
 from aerotri.observations import Camera
 
-__all__ = ["check_items", "item_text", "prior_covariance", "prior_weight", "terms"]
-
-FAMILY = "collocation"
-MARK = "D"
-CAMERA_MODEL = None
-REFERENCE = "Image error as a random field, bilinear between nodes; derived for this project"
-SIZES = Sizes("nodes along x and along y", (19, 13), SMALLEST, LARGEST, node_items)
-ITEMS = SIZES.items(SIZES.default)
-DESCRIPTION = {item: item_text(item) for item in ITEMS}
+FAMILY = node_family(
+    "collocation", "D", "Image error as a random field, bilinear between nodes; derived for this project", (19, 13)
+)
 HELD_MM = 1e-5
 """σ of what a field does not have: far below any measurement, far above rounding."""
-
-
-def terms(
-    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
-) -> Terms:
-    """Weights of the four nodes around each point, for dx and for dy.
-
-    Parameters
-    ----------
-    x, y : (n,) mm from the image centre.
-    partials : whether the derivatives are wanted.
-    items : nodes of one grid, the default grid unless given.
-
-    Returns
-    -------
-    Terms with up to 8 columns.
-    """
-    return grid_terms(camera, x, y, partials, ITEMS if items is None else items)
 
 
 def prior_covariance(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from aerotri.functional_model.additional_parameters.registry import FAMILIES, default_items, sizes_of
+from aerotri.functional_model.additional_parameters.registry import FAMILIES, default_items, is_item, sizes_of
 from aerotri.functional_model.additional_parameters.sizes import size_text
 
 
@@ -29,14 +29,13 @@ class ParameterDescription:
 
 def mark_of(family: str, item: str) -> str:
     """Mark of a parameter, its own where it differs from the family's."""
-    module = FAMILIES[family]
-    return getattr(module, "MARKS", {}).get(item, module.MARK)
+    return FAMILIES[family].mark_of(item)
 
 
 def text_of(family: str, item: str) -> str:
-    """What a parameter is, in a few words; '' where nothing is known."""
-    module = FAMILIES[family]
-    return module.DESCRIPTION.get(item) or (module.item_text(item) if hasattr(module, "item_text") else "")
+    """What a parameter is, in a few words; '' for one that the family does not have."""
+    own = FAMILIES[family]
+    return own.text(item) if item in own.needs_height or is_item(family, item) else ""
 
 
 def describe() -> list[ParameterDescription]:
@@ -45,15 +44,15 @@ def describe() -> list[ParameterDescription]:
 
 
 def _lines(family: str) -> list[ParameterDescription]:
-    module, sizes = FAMILIES[family], sizes_of(family)
-    items, lines = (*getattr(module, "NEEDS_HEIGHT", ()), *module.ITEMS), []
+    own, sizes = FAMILIES[family], sizes_of(family)
+    items, lines = (*own.needs_height, *own.items), []
     if sizes is not None:
         items = default_items(family)
         text = f"{sizes.meaning}, up to {size_text(sizes.largest)}; {len(items)} parameters"
-        lines.append(ParameterDescription(family, size_text(sizes.default), module.MARK, module.REFERENCE, text))
+        lines.append(ParameterDescription(family, size_text(sizes.default), own.mark, own.reference, text))
         if items[0].startswith(size_text(sizes.default)):
             return lines
     return lines + [
-        ParameterDescription(family, item, mark_of(family, item), module.REFERENCE, text_of(family, item))
+        ParameterDescription(family, item, mark_of(family, item), own.reference, text_of(family, item))
         for item in items
     ]

@@ -23,21 +23,18 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import dmc_heads as heads
 from aerotri.functional_model.additional_parameters.bluh import NORMAL_R_MAX, ZERO_RADIUS_SQUARED
+from aerotri.functional_model.additional_parameters.family import NO_UNIT, Family, per_mm
 from aerotri.functional_model.additional_parameters.native_frame import native_from_image, native_half_format_mm
 from aerotri.functional_model.additional_parameters.terms import Terms, only, turned
 from aerotri.observations import Camera
 
-FAMILY = "dmc"
 SYNCHRONISATION = tuple(str(i) for i in range(30, 34))
 ORIENTATION = tuple(str(i) for i in range(34, 42))
 RADIAL = tuple(str(i) for i in range(74, 78))
 ITEMS = (*SYNCHRONISATION, *ORIENTATION, *RADIAL, "79", "80")
 DEFAULT_ITEMS = ITEMS[:-1]
 NEEDS_HEIGHT = ("29",)
-MARK = "PD"
 MARKS = {item: "P" for item in ORIENTATION} | {item: "D" for item in (*RADIAL, "79", "80", *NEEDS_HEIGHT)}
-CAMERA_MODEL = "dmc"
-REFERENCE = "Spreckels, Schlienkamp, Jacobsen, Table 1 (30–41, 74–77, 79, 80); head geometry of this project"
 QUADRANT_NAMES = ("upper right", "upper left", "lower left", "lower right")
 DESCRIPTION = {
     **{item: f"synchronisation, {name} head" for item, name in zip(SYNCHRONISATION, QUADRANT_NAMES, strict=True)},
@@ -51,6 +48,10 @@ DESCRIPTION = {
     "29": "offset of the heads' projection centres, by height",
 }  # fmt: skip
 
+UNITS = {
+    **dict.fromkeys((*SYNCHRONISATION, *ORIENTATION), per_mm(1)), **dict.fromkeys((*RADIAL, "80"), per_mm(2)),
+    **dict.fromkeys(NEEDS_HEIGHT, "m"),
+}  # fmt: skip
 ZERO_ALONG_MM = 32.0
 HEAD_SCALE = NORMAL_R_MAX / float(np.hypot(*heads.HALF_FORMAT_MM))
 SEAM_POINTS = 41
@@ -202,22 +203,8 @@ def _mirrored(sign: np.ndarray, value: np.ndarray, partial: np.ndarray | None) -
     return sign * value, None if partial is None else sign[:, :, None] * sign[:, None, :] * partial
 
 
-def terms(
-    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
-) -> Terms:
-    """Patterns of the head each point lies in, and 79 and 80.
-
-    Parameters
-    ----------
-    x, y : (n,) mm from the image centre, the measured position.
-    partials : whether the derivatives are wanted.
-    items : which items, all unless given.
-
-    Returns
-    -------
-    Terms with up to 6 columns.
-    """
-    items = ITEMS if items is None else items
+def _evaluate(camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool, items: tuple[str, ...]) -> Terms:
+    """Patterns of the head each point lies in, and 79 and 80; up to six columns."""
     turn = native_from_image(camera)
     columns = list(_columns(camera, np.stack([x, y], axis=-1) @ turn.T, items, partials))
     index = np.stack([column[0] for column in columns], axis=1)
@@ -230,7 +217,7 @@ def centre_offset(camera: Camera, x: np.ndarray, y: np.ndarray, height: np.ndarr
     """Pattern of 29, the offset of the heads' projection centres: dx = −f·dX·ΔH/(h0·(h0 − ΔH)), dX = sx; dy alike.
 
     Zero at the mean height of the block, for which the virtual image is made. It needs the heights of the points and
-    stands outside `terms`.
+    stands outside the patterns of the image.
 
     Parameters
     ----------
@@ -246,3 +233,19 @@ def centre_offset(camera: Camera, x: np.ndarray, y: np.ndarray, height: np.ndarr
     native = np.stack([x, y], axis=-1) @ turn.T
     size = -camera.focal_length_mm * above / (height * (height - above))
     return size[:, None] * np.where(native >= 0.0, 1.0, -1.0) @ turn
+
+
+FAMILY = Family(
+    name="dmc",
+    items=ITEMS,
+    mark="PD",
+    reference="Spreckels, Schlienkamp, Jacobsen, Table 1 (30–41, 74–77, 79, 80); head geometry of this project",
+    text=DESCRIPTION.__getitem__,
+    unit=lambda item: UNITS.get(item, NO_UNIT),
+    evaluate=_evaluate,
+    camera_model="dmc",
+    default_items=DEFAULT_ITEMS,
+    marks=MARKS,
+    check_items=check_items,
+    needs_height=NEEDS_HEIGHT,
+)

@@ -7,10 +7,9 @@ format of unequal half widths takes the generalised pairs of `products`, q = 2 [
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
+from aerotri.functional_model.additional_parameters.family import Family
 from aerotri.functional_model.additional_parameters.products import (
     AFFINITY,
     SHEAR,
@@ -19,16 +18,11 @@ from aerotri.functional_model.additional_parameters.products import (
     Pattern,
     Polynomials,
     ProductBasis,
+    evaluation,
     pattern_text,
-    product_terms,
+    unit_of_product,
 )
-from aerotri.functional_model.additional_parameters.terms import Terms
-from aerotri.observations import Camera
 
-FAMILY = "ebner"
-MARK = "L"
-CAMERA_MODEL = None
-REFERENCE = "Ebner, Self calibrating block adjustment, Bildmessung und Luftbildwesen 44 (1976)"
 PATTERNS: dict[str, Pattern] = {
     "1": AFFINITY,
     "2": SHEAR,
@@ -43,7 +37,6 @@ PATTERNS: dict[str, Pattern] = {
     "11": ("x", 2, 2),
     "12": ("y", 2, 2),
 }
-ITEMS = tuple(PATTERNS)
 DESCRIPTION = {item: pattern_text(p, "2", ("", "x", "k"), ("", "y", "l")) for item, p in PATTERNS.items()}
 
 
@@ -55,22 +48,12 @@ def polynomials(x: np.ndarray, b: float, partials: bool) -> Polynomials:
 
 
 BASIS = ProductBasis(polynomials, q=2.0)
-
-
-def terms(
-    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
-) -> Terms:
-    """Ebner's patterns at image points.
-
-    Parameters
-    ----------
-    x, y : (n,) mm from the image centre.
-    partials : whether the derivatives are wanted.
-    items : which items, all unless given.
-
-    Returns
-    -------
-    Terms with a column for every item.
-    """
-    patterns = [PATTERNS[item] for item in (ITEMS if items is None else items)]
-    return product_terms(BASIS, patterns, camera, x, y, partials)
+FAMILY = Family(
+    name="ebner",
+    items=tuple(PATTERNS),
+    mark="L",
+    reference="Ebner, Self calibrating block adjustment, Bildmessung und Luftbildwesen 44 (1976)",
+    text=DESCRIPTION.__getitem__,
+    unit=lambda item: unit_of_product(PATTERNS[item]),
+    evaluate=evaluation(PATTERNS, lambda _: BASIS),
+)

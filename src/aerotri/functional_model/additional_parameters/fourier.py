@@ -7,19 +7,15 @@ axis of the displacement (x or y), cosine or sine (c or s), m, the sign of n (p 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 
+from aerotri.functional_model.additional_parameters.family import Family
 from aerotri.functional_model.additional_parameters.sizes import Sizes
 from aerotri.functional_model.additional_parameters.terms import Terms, dense_terms
 from aerotri.observations import Camera
 
-FAMILY = "fourier"
-MARK = "C"
-CAMERA_MODEL = None
-REFERENCE = "Two-dimensional Fourier series over the format; composition of this project"
 LARGEST = (6, 6)
 
 
@@ -53,9 +49,7 @@ WAVES = {
     for function in "cs"
 }
 """Axis, function and wave numbers of every item."""
-ITEMS = tuple(WAVES)
 SIZES = Sizes("order in x and in y", (1, 1), (1, 1), LARGEST, items_of_order)
-DEFAULT_ITEMS = SIZES.items(SIZES.default)
 DESCRIPTION = {
     item: f"d{axis} = {'cos' if function == 'c' else 'sin'}({_angle_text(m, n)})"
     for item, (axis, function, m, n) in WAVES.items()
@@ -71,22 +65,9 @@ def _powers(angle: np.ndarray, highest: int) -> np.ndarray:
     return power
 
 
-def terms(
-    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
-) -> Terms:
-    """Waves at image points.
-
-    Parameters
-    ----------
-    x, y : (n,) mm from the image centre.
-    partials : whether the derivatives are wanted.
-    items : which items, all there are unless given.
-
-    Returns
-    -------
-    Terms with a column for every item.
-    """
-    chosen = [WAVES[item] for item in (ITEMS if items is None else items)]
+def _evaluate(camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool, items: tuple[str, ...]) -> Terms:
+    """Waves at image points."""
+    chosen = [WAVES[item] for item in items]
     per_mm = np.pi / np.array(camera.half_format_mm)
     highest_m = max((m for _, _, m, _ in chosen), default=0)
     highest_n = max((abs(n) for _, _, _, n in chosen), default=0)
@@ -101,3 +82,16 @@ def terms(
                 partial[:, axis, k] = slope[:, None] * (per_mm * (m, n))
 
     return dense_terms(x, y, len(chosen), partials, fill)
+
+
+FAMILY = Family(
+    name="fourier",
+    items=tuple(WAVES),
+    mark="C",
+    reference="Two-dimensional Fourier series over the format; composition of this project",
+    text=DESCRIPTION.__getitem__,
+    unit=lambda _: "mm",
+    evaluate=_evaluate,
+    default_items=SIZES.items(SIZES.default),
+    sizes=SIZES,
+)

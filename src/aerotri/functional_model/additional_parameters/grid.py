@@ -14,14 +14,11 @@ from functools import cache
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.functional_model.additional_parameters.family import Family
 from aerotri.functional_model.additional_parameters.sizes import Sizes, size_of, size_text
 from aerotri.functional_model.additional_parameters.terms import Terms, only
 from aerotri.observations import Camera
 
-FAMILY = "grid"
-MARK = "C"
-CAMERA_MODEL = None
-REFERENCE = "Bilinear correction grid over the format; composition of this project"
 SMALLEST, LARGEST = (2, 2), (60, 60)
 
 
@@ -32,17 +29,10 @@ def node_items(nx: int, ny: int) -> tuple[str, ...]:
     return tuple(f"{size}_{axis}_{i}_{j}" for axis in "xy" for j in range(ny) for i in range(nx))
 
 
-SIZES = Sizes("nodes along x and along y", (13, 9), SMALLEST, LARGEST, node_items)
-ITEMS = SIZES.items(SIZES.default)
-
-
 def item_text(item: str) -> str:
     """What an item is, in a few words."""
     size, axis, i, j = item.split("_")
     return f"d{axis} at node {i}, {j} of {size}"
-
-
-DESCRIPTION = {item: item_text(item) for item in ITEMS}
 
 
 def grid_size(items: Sequence[str]) -> tuple[int, int]:
@@ -87,22 +77,15 @@ def _along(position: np.ndarray, half: float, count: int) -> tuple[np.ndarray, n
     return first, at - first, per_mm
 
 
-def terms(
-    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
-) -> Terms:
+def node_terms(camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool, items: tuple[str, ...]) -> Terms:
     """Weights of the four nodes around each point, for dx and for dy.
+
+    Up to eight columns: dx at the lower left, lower right, upper left and upper right node, then dy.
 
     Parameters
     ----------
-    x, y : (n,) mm from the image centre.
-    partials : whether the derivatives are wanted.
-    items : nodes of one grid, the default grid unless given.
-
-    Returns
-    -------
-    Terms with up to 8 columns: dx at the lower left, lower right, upper left and upper right node, then dy.
+    x, y : (n,) mm from the image centre. items : nodes of one grid.
     """
-    items = ITEMS if items is None else items
     nx, ny = grid_size(items)
     half_x, half_y = camera.half_format_mm
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
@@ -120,3 +103,23 @@ def terms(
     lower_left = j * nx + i
     index = lower_left[:, None] + np.array([0, 1, nx, nx + 1, *(nx * ny + np.array([0, 1, nx, nx + 1]))])
     return only(Terms(index, value, partial), node_items(nx, ny), items)
+
+
+def node_family(name: str, mark: str, reference: str, default: tuple[int, int]) -> Family:
+    """A family whose parameters are the values of a grid's nodes; `default` nodes along x and y."""
+    sizes = Sizes("nodes along x and along y", default, SMALLEST, LARGEST, node_items)
+    return Family(
+        name=name,
+        items=sizes.items(sizes.default),
+        mark=mark,
+        reference=reference,
+        text=item_text,
+        unit=lambda _: "mm",
+        evaluate=node_terms,
+        sizes=sizes,
+        check_items=check_items,
+        is_grid=True,
+    )
+
+
+FAMILY = node_family("grid", "C", "Bilinear correction grid over the format; composition of this project", (13, 9))

@@ -10,10 +10,9 @@ generalised pairs of `products`, q = 10/7 [D]. Millimetres.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
+from aerotri.functional_model.additional_parameters.family import Family
 from aerotri.functional_model.additional_parameters.products import (
     AFFINITY,
     SHEAR,
@@ -22,16 +21,11 @@ from aerotri.functional_model.additional_parameters.products import (
     Pattern,
     Polynomials,
     ProductBasis,
+    evaluation,
     pattern_text,
-    product_terms,
+    unit_of_product,
 )
-from aerotri.functional_model.additional_parameters.terms import Terms
-from aerotri.observations import Camera
 
-FAMILY = "gruen"
-MARK = "L"
-CAMERA_MODEL = None
-REFERENCE = "Grün, Experiences with self-calibrating bundle adjustment, ACSM-ASP Convention (1978)"
 COMMON = ("14", "23", "32", "41", "15", "24", "33", "42", "51", "25", "34", "43", "52", "35", "44", "53", "45", "54",
           "55")  # fmt: skip
 """Indices of the nineteen products that stand in dx and in dy alike."""
@@ -49,7 +43,6 @@ PATTERNS: dict[str, Pattern] = {
         for ij in COMMON
     },
 }
-ITEMS = tuple(PATTERNS)
 DESCRIPTION = {
     item: pattern_text(pattern, "(10/7)", ("", "x", "k", "x·p", "r"), ("", "y", "l", "y·q", "s"))
     for item, pattern in PATTERNS.items()
@@ -69,22 +62,12 @@ def polynomials(x: np.ndarray, b: float, partials: bool) -> Polynomials:
 
 
 BASIS = ProductBasis(polynomials, q=10.0 / 7.0)
-
-
-def terms(
-    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
-) -> Terms:
-    """Grün's patterns at image points.
-
-    Parameters
-    ----------
-    x, y : (n,) mm from the image centre.
-    partials : whether the derivatives are wanted.
-    items : which items, all unless given.
-
-    Returns
-    -------
-    Terms with a column for every item.
-    """
-    patterns = [PATTERNS[item] for item in (ITEMS if items is None else items)]
-    return product_terms(BASIS, patterns, camera, x, y, partials)
+FAMILY = Family(
+    name="gruen",
+    items=tuple(PATTERNS),
+    mark="L",
+    reference="Grün, Experiences with self-calibrating bundle adjustment, ACSM-ASP Convention (1978)",
+    text=DESCRIPTION.__getitem__,
+    unit=lambda item: unit_of_product(PATTERNS[item]),
+    evaluate=evaluation(PATTERNS, lambda _: BASIS),
+)

@@ -7,29 +7,26 @@ are replaced by affinity, shear and two pairs, q = 5/4 for k = x² − bx²/3 (s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 
 import numpy as np
 
+from aerotri.functional_model.additional_parameters.family import Family
 from aerotri.functional_model.additional_parameters.products import (
     Pattern,
     Polynomials,
     ProductBasis,
+    evaluation,
     pattern_text,
-    product_terms,
     products_up_to,
 )
 from aerotri.functional_model.additional_parameters.sizes import Sizes
-from aerotri.functional_model.additional_parameters.terms import Terms
-from aerotri.observations import Camera
 
-FAMILY = "legendre"
-MARK = "C"
-CAMERA_MODEL = None
-REFERENCE = "Products of Legendre polynomials over the format less the orientation; composition of this project"
 LARGEST = (6, 6)
+OfDegree = Callable[[int], ProductBasis]
 Q = 5.0 / 6.0
+"""Of the tilt pairs for P_2 as it is scaled."""
 
 
 def item_name(pattern: Pattern) -> str:
@@ -47,11 +44,6 @@ def items_of_order(m: int, n: int) -> tuple[str, ...]:
 
 
 PATTERNS: dict[str, Pattern] = {item_name(pattern): pattern for pattern in products_up_to(*LARGEST)}
-ITEMS = tuple(PATTERNS)
-SIZES = Sizes("order in x and in y", (2, 2), (2, 2), LARGEST, items_of_order)
-DEFAULT_ITEMS = SIZES.items(SIZES.default)
-NAMES = [["", *(f"P{k}({axis})" for k in range(1, max(LARGEST) + 1))] for axis in "xy"]
-DESCRIPTION = {item: pattern_text(pattern, "5/6·", *NAMES) for item, pattern in PATTERNS.items()}
 
 
 def largest_degree(patterns: Sequence[Pattern]) -> int:
@@ -75,21 +67,33 @@ def polynomials(degree: int, x: np.ndarray, b: float, partials: bool) -> Polynom
     return Polynomials(value, slope)
 
 
-def terms(
-    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
-) -> Terms:
-    """Legendre patterns at image points.
+def square_family(name: str, reference: str, letter: str, q_text: str, basis: OfDegree) -> Family:
+    """A family of products of polynomials of x/bx and y/by, in orders M × N.
 
     Parameters
     ----------
-    x, y : (n,) mm from the image centre.
-    partials : whether the derivatives are wanted.
-    items : which items, all there are unless given.
-
-    Returns
-    -------
-    Terms with a column for every item.
+    letter : of the polynomials in texts, as P or T. q_text : factor of the tilt pairs in texts.
+    basis : the products with polynomials up to a degree.
     """
-    patterns = [PATTERNS[item] for item in (ITEMS if items is None else items)]
-    basis = ProductBasis(partial(polynomials, largest_degree(patterns)), Q, of_unit_square=True)
-    return product_terms(basis, patterns, camera, x, y, partials)
+    names = [["", *(f"{letter}{k}({axis})" for k in range(1, max(LARGEST) + 1))] for axis in "xy"]
+    sizes = Sizes("order in x and in y", (2, 2), (2, 2), LARGEST, items_of_order)
+    return Family(
+        name=name,
+        items=tuple(PATTERNS),
+        mark="C",
+        reference=reference,
+        text=lambda item: pattern_text(PATTERNS[item], q_text, *names),
+        unit=lambda _: "mm",
+        evaluate=evaluation(PATTERNS, lambda chosen: basis(largest_degree(chosen))),
+        default_items=sizes.items(sizes.default),
+        sizes=sizes,
+    )
+
+
+FAMILY = square_family(
+    "legendre",
+    "Products of Legendre polynomials over the format less the orientation; composition of this project",
+    "P",
+    "5/6·",
+    lambda degree: ProductBasis(partial(polynomials, degree), Q, of_unit_square=True),
+)

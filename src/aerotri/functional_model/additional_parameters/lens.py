@@ -9,13 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerotri.functional_model.additional_parameters.family import NO_UNIT, Family
 from aerotri.observations.block import LENS_NAMES
 
-FAMILY = "lens"
 ITEMS = LENS_NAMES
-MARK = "L"
-CAMERA_MODEL = None
-REFERENCE = "OpenCV calib3d; Agarwal et al., Bundle Adjustment in the Large (2010)"
 DESCRIPTION = {
     "k1": "radial ρ³ of the ideal direction",
     "k2": "radial ρ⁵ of the ideal direction",
@@ -47,3 +44,13 @@ def distort(a: np.ndarray, b: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         ],
         axis=-1,
     )
+
+
+FAMILY = Family(
+    name="lens",
+    items=ITEMS,
+    mark="L",
+    reference="OpenCV calib3d; Agarwal et al., Bundle Adjustment in the Large (2010)",
+    text=DESCRIPTION.__getitem__,
+    unit=lambda _: NO_UNIT,
+)

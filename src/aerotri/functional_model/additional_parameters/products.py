@@ -9,11 +9,12 @@ widths bx, by [D]: affinity (by/bx·x, −bx/by·y), shear (bx/by·y, by/bx·x),
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.functional_model.additional_parameters.family import NO_UNIT, Evaluate, per_mm
 from aerotri.functional_model.additional_parameters.terms import Terms, dense_terms
 from aerotri.observations import Camera
 
@@ -109,3 +110,25 @@ def pattern_text(pattern: Pattern, q: str, along_x: Sequence[str], along_y: Sequ
         return f"pair ({quadratic}, {other})" if tilt_x else f"pair ({other}, {quadratic})"
     axis, m, n = pattern
     return f"d{axis} = " + "·".join(names[k] for names, k in ((along_x, m), (along_y, n)) if k)
+
+
+def evaluation(patterns: Mapping[str, Pattern], basis_of: Callable[[Sequence[Pattern]], ProductBasis]) -> Evaluate:
+    """The evaluation of a family of products.
+
+    Parameters
+    ----------
+    patterns : by item. basis_of : the basis for some patterns, whose polynomials need not reach beyond them.
+    """
+
+    def evaluate(camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool, items: tuple[str, ...]) -> Terms:
+        chosen = [patterns[item] for item in items]
+        return product_terms(basis_of(chosen), chosen, camera, x, y, partials)
+
+    return evaluate
+
+
+def unit_of_product(pattern: Pattern) -> str:
+    """Unit of the parameter of a product in millimetres: one over mm to the degree less one."""
+    if isinstance(pattern, str):
+        return NO_UNIT if pattern in (AFFINITY, SHEAR) else per_mm(1)
+    return per_mm(int(pattern[1]) + int(pattern[2]) - 1)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
-from types import ModuleType
 
 import numpy as np
 
@@ -24,20 +23,21 @@ from aerotri.functional_model.additional_parameters import (
     lens,
     ultracam_d,
 )
+from aerotri.functional_model.additional_parameters.family import NO_UNIT, Family, Parameter
 from aerotri.functional_model.additional_parameters.sizes import Sizes, size_of, size_text
 from aerotri.functional_model.additional_parameters.terms import Terms, dense_terms
 from aerotri.observations import Camera
 
-LINEAR_FAMILIES: dict[str, ModuleType] = {
-    m.FAMILY: m
-    for m in (bluh, ultracam_d, dmc, ebner, gruen, fourier, legendre, chebyshev, grid, collocation)
+FAMILIES: dict[str, Family] = {
+    module.FAMILY.name: module.FAMILY
+    for module in (
+        bluh, ultracam_d, dmc, ebner, gruen, fourier, legendre, chebyshev, grid, collocation, brown, lens,
+    )
 }  # fmt: skip
+LINEAR_FAMILIES = {name: family for name, family in FAMILIES.items() if family.is_linear}
 """Families whose image error is linear in the parameters and a function of the measured position alone."""
-
-INTERIOR_FAMILIES: dict[str, ModuleType] = {m.FAMILY: m for m in (brown, lens)}
+INTERIOR_FAMILIES = {name: family for name, family in FAMILIES.items() if not family.is_linear}
 """Families bound to the interior orientation: they count from the principal point or act on the ideal direction."""
-
-FAMILIES: dict[str, ModuleType] = LINEAR_FAMILIES | INTERIOR_FAMILIES
 
 
 @dataclass(frozen=True)
@@ -99,12 +99,11 @@ def parameter_set(family: str, items: Iterable[str], camera: Camera) -> Paramete
     InputError
         When the family belongs to another camera model, has no such item, or items exclude each other.
     """
-    module = LINEAR_FAMILIES[family]
-    if module.CAMERA_MODEL not in (None, camera.model):
+    wanted = LINEAR_FAMILIES[family].camera_model
+    if not LINEAR_FAMILIES[family].fits(camera):
         raise InputError(
-            f"parameters '{family}' belong to camera model '{module.CAMERA_MODEL}', camera '{camera.name}' is "
-            f"'{camera.model}'",
-            f'set model = "{module.CAMERA_MODEL}" or leave the family out',
+            f"parameters '{family}' belong to camera model '{wanted}', camera '{camera.name}' is '{camera.model}'",
+            f'set model = "{wanted}" or leave the family out',
         )
     return ParameterSet(family, checked_items(family, items), camera)
 
@@ -116,26 +115,31 @@ def parameter_sets(names: Iterable[str], camera: Camera) -> tuple[ParameterSet, 
     """
     items: dict[str, list[str]] = {}
     for name in names:
-        family, _, item = name.partition(".")
-        if family in LINEAR_FAMILIES and LINEAR_FAMILIES[family].CAMERA_MODEL in (None, camera.model):
-            items.setdefault(family, []).append(item)
+        parameter = Parameter.of(name)
+        if parameter.family in LINEAR_FAMILIES and LINEAR_FAMILIES[parameter.family].fits(camera):
+            items.setdefault(parameter.family, []).append(parameter.item)
     return tuple(parameter_set(family, items[family], camera) for family in LINEAR_FAMILIES if family in items)
 
 
 def default_items(family: str) -> tuple[str, ...]:
     """What ``family:all`` means."""
-    module = FAMILIES[family]
-    return getattr(module, "DEFAULT_ITEMS", module.ITEMS)
+    return FAMILIES[family].all_items
 
 
 def sizes_of(family: str) -> Sizes | None:
     """The sizes in which a family comes; None for one with a fixed list of items."""
-    return getattr(FAMILIES[family], "SIZES", None)
+    return FAMILIES[family].sizes
 
 
 def is_grid(family: str) -> bool:
     """Whether the items of a family are nodes of a grid: one set, of which no single one can be left out."""
-    return family in (grid.FAMILY, collocation.FAMILY)
+    return family in FAMILIES and FAMILIES[family].is_grid
+
+
+def unit_of(name: str) -> str:
+    """Unit of an additional parameter by its name; '–' where it has none, or is none."""
+    parameter = Parameter.of(name)
+    return FAMILIES[parameter.family].unit(parameter.item) if parameter.family in FAMILIES else NO_UNIT
 
 
 def is_item(family: str, item: str) -> bool:
@@ -154,16 +158,16 @@ def checked_items(family: str, items: Iterable[str]) -> tuple[str, ...]:
     InputError
         For an item that the family does not have, and for items that exclude each other.
     """
-    module, wanted = FAMILIES[family], dict.fromkeys(items)
+    checked, wanted = FAMILIES[family], dict.fromkeys(items)
     for item in wanted:
-        if item in getattr(module, "NEEDS_HEIGHT", ()):
+        if item in checked.needs_height:
             raise InputError(
                 f"{family}.{item} depends on the heights of the points and is no pattern of the image", "leave it out"
             )
         if item not in _places(family, _size_in_name(family, item)):
             raise InputError(f"'{family}' has no parameter '{item}'", items_text(family))
-    if wanted and hasattr(module, "check_items"):
-        module.check_items(tuple(wanted))
+    if wanted and checked.check_items is not None:
+        checked.check_items(tuple(wanted))
     homes = dict.fromkeys(_size_in_name(family, item) for item in wanted)
     return tuple(item for home in homes for item in _places(family, home) if item in wanted)
 
@@ -177,13 +181,13 @@ def _size_in_name(family: str, item: str) -> tuple[int, int] | None:
 def _places(family: str, size: tuple[int, int] | None) -> dict[str, int]:
     """Place of every item, by its name, in the family or among the items of a size."""
     sizes = sizes_of(family)
-    known = FAMILIES[family].ITEMS if size is None or sizes is None else sizes.items(size)
+    known = FAMILIES[family].items if size is None or sizes is None else sizes.items(size)
     return {item: place for place, item in enumerate(known)}
 
 
 def items_text(family: str) -> str:
     """What a family has to offer, for messages."""
-    known, sizes = FAMILIES[family].ITEMS, sizes_of(family)
+    known, sizes = FAMILIES[family].items, sizes_of(family)
     if sizes is not None:
         return (
             f"it has sizes from {size_text(sizes.smallest)} to {size_text(sizes.largest)}, as in "

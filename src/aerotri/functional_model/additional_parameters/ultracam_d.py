@@ -8,19 +8,14 @@ The tiles live in the sensor's native frame, x across the flight; `flight_axis` 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
+from aerotri.functional_model.additional_parameters.family import NO_UNIT, Family
 from aerotri.functional_model.additional_parameters.native_frame import native_from_image
 from aerotri.functional_model.additional_parameters.terms import Terms, only, turned
 from aerotri.observations import Camera
 
-FAMILY = "ultracam_d"
 ITEMS = tuple(str(i) for i in range(42, 74))
-MARK = "P"
-CAMERA_MODEL = "ultracam_d"
-REFERENCE = "Spreckels, Schlienkamp, Jacobsen, Table 1 (42–73); tile numbering of this project, row by row"
 
 SENSOR_SIZE_PX = (11500, 7500)
 TILE_CENTRE_COLUMNS = np.array([2004.0, 5750.0, 9496.0])
@@ -59,20 +54,10 @@ def tile_of(camera: Camera, x_native: np.ndarray, y_native: np.ndarray) -> np.nd
     return 3 * row + column
 
 
-def terms(
-    camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool = False, items: Sequence[str] | None = None
-) -> Terms:
+def _evaluate(camera: Camera, x: np.ndarray, y: np.ndarray, partials: bool, items: tuple[str, ...]) -> Terms:
     """The four patterns of the tile each point lies in: scale, shift x, shift y, rotation.
 
-    Parameters
-    ----------
-    x, y : (n,) mm from the image centre, the measured position.
-    partials : whether the derivatives are wanted.
-    items : which items, all unless given.
-
-    Returns
-    -------
-    Terms with up to 4 columns; all zero within the centre tile, which is held.
+    Up to four columns; all zero within the centre tile, which is held.
     """
     turn = native_from_image(camera)
     native = np.stack([x, y], axis=-1) @ turn.T
@@ -90,4 +75,16 @@ def terms(
         partial[:, 0, 3, 1], partial[:, 1, 3, 0] = -acts, acts
     number = np.where(tile > CENTRE_TILE, tile - 1, np.minimum(tile, CENTRE_TILE - 1))
     index = number[:, None] + 8 * np.arange(4)
-    return turned(only(Terms(index, value, partial), ITEMS, ITEMS if items is None else items), turn)
+    return turned(only(Terms(index, value, partial), ITEMS, items), turn)
+
+
+FAMILY = Family(
+    name="ultracam_d",
+    items=ITEMS,
+    mark="P",
+    reference="Spreckels, Schlienkamp, Jacobsen, Table 1 (42–73); tile numbering of this project, row by row",
+    text=DESCRIPTION.__getitem__,
+    unit=lambda item: (NO_UNIT, "mm", "mm", "rad")[(int(item) - 42) // 8],
+    evaluate=_evaluate,
+    camera_model="ultracam_d",
+)

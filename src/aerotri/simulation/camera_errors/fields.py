@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.functional_model.additional_parameters import brown, is_item, parameter_set
+from aerotri.functional_model.additional_parameters import Parameter, brown, is_item, parameter_set
 from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES, ParameterSet
 from aerotri.functional_model.additional_parameters.ultracam_d import native_from_image
 from aerotri.functional_model.orientation_patterns import orientation_patterns
@@ -144,11 +144,12 @@ def _parametric_parts(camera: Camera, errors: ErrorSpec) -> list[Field]:
     key = f"camera.{camera.name}.errors.parameters"
     families: dict[str, dict[str, float]] = {}
     for name, value in errors.parameters.items():
-        family, _, item = name.partition(".")
+        parameter = Parameter.of(name)
+        family, item = parameter.family, parameter.item
         if family not in LINEAR_FAMILIES:
             raise InputError(f"'{key}' has the unknown key '{name}'", f"families are {', '.join(LINEAR_FAMILIES)}")
         if not is_item(family, item):
-            items = LINEAR_FAMILIES[family].ITEMS
+            items = LINEAR_FAMILIES[family].items
             raise InputError(f"'{key}' has the unknown key '{name}'", f"'{family}' has {items[0]} to {items[-1]}")
         families.setdefault(family, {})[item] = value
     parts: list[Field] = []
