@@ -21,9 +21,10 @@ from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.observations import Block
 from aerotri.pipeline import Adjustment, adjust_keeping_system
 from aerotri.simulation import Truth, parse_spec, simulate
-from aerotri.volume.accuracy import Part, SigmaOptions, volume_sigma
+from aerotri.volume.accuracy import volume_sigma
 from aerotri.volume.bases import level
 from aerotri.volume.functionals import tin_volume, triangulated
+from aerotri.volume.parts import Part, SigmaOptions
 from aerotri.volume.pickets import pickets_where_seen
 from aerotri.volume.response import respond
 from volume_monte_carlo import HEADER, row

@@ -41,10 +41,10 @@ from aerotri.formats.camera_spec import CameraSpec
 from aerotri.simulation import parse_spec
 from aerotri.simulation.random_streams import stream
 from aerotri.simulation.terrain import make_terrain
-from aerotri.volume.accuracy import SigmaOptions
 from aerotri.volume.bases import quadrature_of
 from aerotri.volume.boundary import Boundary, boundary_of
 from aerotri.volume.compute import SectionPlan
+from aerotri.volume.parts import SigmaOptions
 from photographs_to_block import SPEC, write_files
 
 PLAN = SPEC | {

@@ -15,8 +15,9 @@ from aerotri.commands.volume import VolumeInput, run_volume
 from aerotri.conventions import InputError
 from aerotri.formats.block_folder import write_block
 from aerotri.rasters import Grid, RasterReader, write_raster
-from aerotri.volume.accuracy import PARTS, SigmaOptions
+from aerotri.volume.accuracy import PARTS
 from aerotri.volume.compute import SectionPlan
+from aerotri.volume.parts import SigmaOptions
 from small_blocks import small_block
 
 CELL, COUNT = 4.0, 80
@@ -78,13 +79,49 @@ def test_the_number_its_parts_and_the_page(place, tmp_path):
     assert len(lines) == 1 + content["sections"]["count"]
 
 
-def test_two_epochs_with_the_same_block_cancel_what_they_share(place, tmp_path):
-    """Cells measured in one adjustment twice: only its control is in common; the same control makes them correlated."""
+def test_two_surfaces_of_one_adjustment_cancel_what_they_share(place, tmp_path):
+    """The hill over the ground: what tilts and lifts both is gone, what is left is the height of the hill."""
     one = run(place, tmp_path / "one", given(place))
     both = run(place, tmp_path / "both", given(place, str(place / "before.tif"), base_adjustment=place / "result"))
     assert both["net_m3"] == pytest.approx(one["net_m3"], rel=1e-6)
     single, double = (c["sigma"]["parts_m3"]["adjustment"] for c in (one, both))
-    assert 0.3 * single < double < np.sqrt(2.0) * single
+    assert double < 0.05 * single
+    assert any("come from one adjustment" in text for text in both["warnings"])
+    # two measurements of every place: the noise does not cancel
+    noise = [c["sigma"]["parts_m3"]["matching"] for c in (one, both)]
+    assert noise[1] == pytest.approx(np.sqrt(2.0) * noise[0], rel=0.01)
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_surface_over_itself_has_no_volume_and_no_sigma(place, tmp_path, stated):
+    what = given(place, str(place / "dtm.tif"), base_adjustment=place / "result" if stated else None)
+    content = run(place, tmp_path / "out", what)
+    assert content["net_m3"] == 0.0
+    assert content["sigma"]["sigma_m3"] == pytest.approx(0.0, abs=1e-9)
+    for one in content["sigma"]["systematic"]["variants"]:
+        assert one["value_m3"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_adjustment_of_a_base_is_told_by_the_file_beside_it(place, tmp_path):
+    """As `aerotri dtm` writes it: the same, another, none."""
+    from aerotri.commands.console import Console
+    from aerotri.commands.results import reopened
+    from aerotri.volume.shared import adjustment_key
+
+    key = adjustment_key(reopened(place / "result", Console(quiet=True)))
+    wanted = run(place, tmp_path / "stated", given(place, str(place / "before.tif"), base_adjustment=place / "result"))
+    free = run(place, tmp_path / "free", given(place, str(place / "before.tif")))
+    for name, text, like, says in (
+        ("same", json.dumps({"adjustment": key}), wanted, "with the same adjustment"),
+        ("other", json.dumps({"adjustment": "0"}), free, "with another adjustment"),
+        ("damaged", "[", free, "taken for free of error"),
+    ):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "before.tif").write_bytes((place / "before.tif").read_bytes())
+        (tmp_path / name / "dtm.json").write_text(text)
+        content = run(place, tmp_path / name / "out", given(place, str(tmp_path / name / "before.tif")))
+        assert content["sigma"]["parts_m3"] == pytest.approx(like["sigma"]["parts_m3"], rel=1e-9), name
+        assert any(says in note for note in content["warnings"]), name
 
 
 def test_without_an_adjustment_there_is_no_sigma(place, tmp_path):

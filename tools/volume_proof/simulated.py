@@ -19,10 +19,11 @@ from aerotri.image_errors import image_groups
 from aerotri.image_errors.error_function import ErrorFunction, error_function
 from aerotri.pipeline import Adjustment, adjust_keeping_system
 from aerotri.simulation import Truth, parse_spec, simulate
-from aerotri.volume.accuracy import PARTS, SigmaOptions, boundary_variance, part_of_pickets
+from aerotri.volume.accuracy import PARTS, boundary_variance
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import Boundary, boundary_of
 from aerotri.volume.functionals import tin_volume, triangulated
+from aerotri.volume.parts import SigmaOptions, part_of_pickets
 from aerotri.volume.pickets import Pickets, pickets_where_seen
 from aerotri.volume.response import respond
 from aerotri.volume.roughness import Between

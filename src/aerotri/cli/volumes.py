@@ -36,6 +36,7 @@ def volume(
         Path | None, typer.Option(help="pickets.parquet of `aerotri dtm`; without, every cell is taken for one.")
     ] = None,
     base_adjustment: Annotated[Path | None, typer.Option(help="Result folder of a base that is a surface.")] = None,
+    base_pickets: Annotated[Path | None, typer.Option(help="pickets.parquet of a base that is a surface.")] = None,
     matching_sigma_um: Annotated[
         float | None, typer.Option(min=1e-6, help="σ of an image coordinate of a picket; default that of the block.")
     ] = None,
@@ -53,10 +54,10 @@ def volume(
 ) -> None:
     """A volume, cut and fill, and how sure it is: σ with every part named."""
     from aerotri.commands.volume import VolumeInput, run_volume
-    from aerotri.volume.accuracy import SigmaOptions
     from aerotri.volume.compute import SectionPlan
+    from aerotri.volume.parts import SigmaOptions
 
-    given = VolumeInput(dtm, base, boundary, method, adjustment, pickets, base_adjustment)
+    given = VolumeInput(dtm, base, boundary, method, adjustment, pickets, base_adjustment, base_pickets)
     options = SigmaOptions(
         matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma,
         corrected=not uncorrected,

@@ -148,10 +148,11 @@ def write_terrain(target: Path, outcome: TerrainOutcome, calibration: Adjustment
     from aerotri.formats.point_cloud import write_point_cloud
     from aerotri.rasters import horizontal_crs, write_raster, write_surface
     from aerotri.terrain.dtm import terrain_json
+    from aerotri.volume.shared import adjustment_key
 
     block, p = calibration.result.block, outcome.pickets
     crs = horizontal_crs(block.crs)
-    content = terrain_json(outcome, str(block.name), block.crs)
+    content = terrain_json(outcome, str(block.name), block.crs) | {"adjustment": adjustment_key(calibration)}
     with atomic_folder(target, own=OWN_NAMES) as folder:
         write_pickets(folder / "pickets.parquet", p, outcome.adjustment)
         own = p.accepted

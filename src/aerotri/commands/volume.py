@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +15,13 @@ from aerotri.commands.results import refuse_foreign_folder
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
-    from aerotri.pipeline import Adjustment
     from aerotri.rasters import Grid, RasterReader
     from aerotri.report.plots_volume import ThicknessMap
-    from aerotri.volume.accuracy import Part, SigmaOptions, VolumeSigma
+    from aerotri.volume.accuracy import VolumeSigma
     from aerotri.volume.bases import Base
     from aerotri.volume.boundary import Boundary
     from aerotri.volume.compute import SectionPlan, Volumes
+    from aerotri.volume.parts import SigmaOptions
 
 OWN_NAMES = ("volume.json", "thickness.tif", "sections.csv", "plots", "volume.html")
 MOST_MAP_CELLS = 500
@@ -38,6 +38,7 @@ class VolumeInput:
     adjustment: Path | None
     pickets: Path | None
     base_adjustment: Path | None
+    base_pickets: Path | None = None
 
 
 def run_volume(
@@ -87,8 +88,10 @@ def summary(content: dict[str, Any]) -> list[str]:
 
 
 def _check(given: VolumeInput) -> None:
-    if given.adjustment is None and (given.pickets or given.base_adjustment):
-        raise InputError("--pickets and --base-adjustment belong to --adjustment", "give the adjustment")
+    if given.adjustment is None and (given.pickets or given.base_adjustment or given.base_pickets):
+        raise InputError(
+            "--pickets, --base-pickets and --base-adjustment belong to --adjustment", "give the adjustment"
+        )
 
 
 def _computed(
@@ -152,7 +155,8 @@ def _sigma(
     given: VolumeInput, reader: RasterReader, base: Base, boundary: Boundary, options: SigmaOptions, console: Console
 ) -> VolumeSigma | None:
     from aerotri.commands.deform import check_crs, reopened
-    from aerotri.volume.accuracy import part_of_cells, volume_sigma
+    from aerotri.commands.volume_parts import base_calibration, surface_part
+    from aerotri.volume.accuracy import volume_sigma
     from aerotri.volume.bases import SurfaceBase
 
     if given.adjustment is None:
@@ -160,50 +164,18 @@ def _sigma(
     calibration = reopened(given.adjustment, console)
     check_crs(calibration, reader.epsg, given.dtm)
     console.progress("σ of the volume")
-    if given.pickets is not None:
-        part = _part_of_file(calibration, given.pickets, boundary, base, options)
-    else:
-        part = part_of_cells(calibration, reader, boundary, base, options)
-    below = None
-    if given.base_adjustment is not None:
-        if not isinstance(base, SurfaceBase):
-            raise InputError("--base-adjustment needs a surface as base", "give its raster as --base")
-        other = reopened(given.base_adjustment, console)
-        below = part_of_cells(other, base.surface, boundary, None, options)
-    return volume_sigma(reader, base, boundary, part, below, options)
-
-
-def _part_of_file(
-    calibration: Adjustment, path: Path, boundary: Boundary, base: Base, options: SigmaOptions
-) -> Part:
-    """The share of pickets.parquet as `aerotri dtm` writes it: X, Y, Z, photographs, status, sZ_matching."""
-    import pyarrow as pa
-
-    from aerotri.formats.parquet import load_parquet
-    from aerotri.volume.accuracy import matching_sigma_mm, part_of_pickets
-    from aerotri.volume.functionals import triangulated
-    from aerotri.volume.pickets import pickets_of_names, with_height_sigmas
-
-    table = load_parquet(path)
-    for name in ("X", "Y", "Z", "photographs"):
-        if name not in table.column_names:
-            raise InputError(f"has no column '{name}'", "give pickets.parquet of `aerotri dtm`", path)
-    xyz = np.column_stack([table.column(axis).cast(pa.float64()).to_numpy() for axis in "XYZ"])
-    names = table.column("photographs").to_pylist()
-    used = np.isfinite(xyz).all(axis=1) & (np.array([len(own or ()) for own in names]) >= 2)
-    if "status" in table.column_names:
-        used &= np.array(table.column("status").to_pylist(), dtype=str) == "accepted"
-    if used.sum() < 3:
-        raise InputError("has hardly a picket that was accepted", "measure again", path)
-    rows = np.flatnonzero(used)
-    pickets = pickets_of_names(
-        calibration.result.block, xyz[rows], [[str(n) for n in names[k]] for k in rows],
-        matching_sigma_mm(calibration, options),
-    )  # fmt: skip
-    if options.matching_sigma_um is None and "sZ_matching" in table.column_names:
-        stated = table.column("sZ_matching").cast(pa.float64()).to_numpy()[rows]
-        pickets = with_height_sigmas(calibration, pickets, stated)
-    return part_of_pickets(calibration, pickets, triangulated(pickets.xyz), boundary, base, options)
+    part = surface_part(calibration, reader, given.pickets, boundary, base, options)
+    below, notes = None, ()
+    if isinstance(base, SurfaceBase):
+        other, notes = base_calibration(given, calibration, console)
+        if other is not None:
+            below = surface_part(other, base.surface, given.base_pickets, boundary, None, options)
+    elif given.base_adjustment is not None or given.base_pickets is not None:
+        raise InputError(
+            "--base-adjustment and --base-pickets need a surface as base", "give its raster as --base"
+        )
+    sigma = volume_sigma(reader, base, boundary, part, below, options)
+    return replace(sigma, notes=(*notes, *sigma.notes))
 
 
 def _write_sections(path: Path, volumes: Volumes) -> None:

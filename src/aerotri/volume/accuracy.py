@@ -7,24 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-from aerotri.conventions import InputError
-from aerotri.deformation.orientation import Calibration
-from aerotri.rasters import Grid
 from aerotri.volume.bases import Base, PlaneBase, SplineBase, Surface, quadrature_of, sampled
 from aerotri.volume.boundary import Boundary, boundary_of
-from aerotri.volume.functionals import Functional, cell_volume, tin_volume
-from aerotri.volume.pickets import PER_POINT, Pickets, pickets_where_seen
-from aerotri.volume.response import Response, Systematic, control_response, respond, systematic
-from aerotri.volume.roughness import (
-    Between,
-    Roughness,
-    curvature_of_cells,
-    ground_between,
-    roughness_of_cells,
-    roughness_of_pickets,
-)
+from aerotri.volume.parts import Part, SigmaOptions
+from aerotri.volume.response import Systematic, systematic
+from aerotri.volume.roughness import Between, roughness_of_cells
+from aerotri.volume.shared import difference_part, same_adjustment, shared_control_covariance, shared_in_words
 from aerotri.volume.sums import cells_within
-from aerotri.volume.triangles import areas, cut_to
 
 ALONG_EDGE = 33
 """Places along every edge of the boundary."""
@@ -35,48 +24,7 @@ RING_STEPS = 9
 MOST_RING_CELLS = 4_000_000
 SMOOTHEST_BELOW = 0.9
 """Exponent of the ground under a spline at most: what a ring shows as smooth need not be so far inwards."""
-LATTICE_PATCH = 16
-PATCH_CELLS = 512
-"""Cells a side of the part of a raster whose roughness is taken."""
 PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")
-
-
-@dataclass(frozen=True)
-class SigmaOptions:
-    """What is known beside the adjustment.
-
-    Parameters
-    ----------
-    matching_sigma_um : of an image coordinate of a picket; None: σ̂0 of the adjustment's image coordinates.
-    matching_window_m : side of the matching window on the ground, within which neighbouring cells share their noise.
-    per_point : photographs a cell is measured in. base_sigma : m, common to the whole base.
-    boundary_sigma : m, of either coordinate of every corner. corrected : the photographs were corrected.
-    """
-
-    matching_sigma_um: float | None = None
-    matching_window_m: float = 0.0
-    per_point: int = PER_POINT
-    base_sigma: float = 0.0
-    boundary_sigma: float = 0.0
-    corrected: bool = True
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """One surface's share in the uncertainty of a volume.
-
-    Parameters
-    ----------
-    calibration, response : of its adjustment. between : the ground between its heights, None where not known.
-    unseen : m², area no photographs were found for.
-    """
-
-    calibration: Calibration
-    response: Response
-    between: Between | None
-    pickets: int
-    rays: int
-    unseen: float
 
 
 @dataclass(frozen=True)
@@ -107,43 +55,6 @@ class VolumeSigma:
         return float(np.sqrt(sum(part**2 for part in self.parts.values())))
 
 
-def part_of_cells(
-    calibration: Calibration, surface: Surface, boundary: Boundary, base: Base | None, options: SigmaOptions
-) -> Part:
-    """The share of a surface whose cells are taken for its pickets, measured in the photographs nearest to them."""
-    functional = cell_volume(surface, boundary, base)
-    cell = surface.grid.cell_x * surface.grid.cell_y
-    share = functional.noise_share * max(1.0, options.matching_window_m**2 / cell)
-    pickets, seen = pickets_where_seen(
-        calibration, functional.xyz, matching_sigma_mm(calibration, options), options.per_point, share
-    )
-    if not seen.any():
-        raise InputError("no photograph of the adjustment sees the surface", "check the CRS of surface and block")
-    response = respond(calibration, pickets, functional.gradient[seen], options.corrected)
-    unseen = float(np.abs(functional.gradient[~seen, 2]).sum())
-    between = _between_cells(surface, boundary)
-    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen)
-
-
-def part_of_pickets(
-    calibration: Calibration, pickets: Pickets, triangles: np.ndarray, boundary: Boundary, base: Base | None,
-    options: SigmaOptions,
-) -> Part:  # fmt: skip
-    """The share of a TIN of pickets whose photographs are known."""
-    functional = tin_volume(pickets.xyz, triangles, boundary, base)[1]
-    response = respond(calibration, pickets, functional.gradient, options.corrected)
-    corners = pickets.xyz[triangles][:, :, :2]
-    pieces = cut_to(boundary.polygon, corners)
-    own = corners[pieces.triangle]
-    noise = _height_noise(response, functional)
-    share = pieces.area / np.maximum(areas(own), 1e-300)
-    used = triangles[pieces.triangle]
-    roughness = roughness_of_pickets(pickets.xyz, noise, np.unique(used))
-    between = None if roughness is None else ground_between(roughness, pickets.xyz, used, share, noise)
-    unseen = max(boundary.area - float(pieces.area.sum()), 0.0)
-    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen)
-
-
 def volume_sigma(
     surface: Surface, base: Base, boundary: Boundary, part: Part, base_part: Part | None, options: SigmaOptions
 ) -> VolumeSigma:
@@ -151,13 +62,17 @@ def volume_sigma(
 
     Parameters
     ----------
-    base_part : responses to the base's own volume, counted positive. Control points that both adjustments share, by
-        name and coordinates, correlate them.
+    base_part : responses to the base's own volume, counted positive. What both were measured with counts once: one
+        adjustment by the difference of the responses, control points that two adjustments share, by name and
+        coordinates, by their covariance.
     """
-    both = [part] if base_part is None else [part, base_part]
-    adjustment = sum(one.response.variance for one in both)
-    if base_part is not None:
-        adjustment -= 2.0 * shared_control_covariance(part, base_part)
+    both, shared, said = [part] if base_part is None else [part, base_part], 0.0, []
+    if base_part is not None and same_adjustment(part, base_part):
+        joint, once = difference_part(part, base_part, options.corrected)
+        both, said = [joint], [_one_adjustment(once)]
+    elif base_part is not None:
+        shared, said = shared_control_covariance(part, base_part), [shared_in_words(part, base_part)]
+    adjustment = sum(one.response.variance for one in both) - 2.0 * shared
     ground = _base_variance(base, boundary, surface, options)
     between = _difference([one.between for one in both])
     parts = {
@@ -167,39 +82,25 @@ def volume_sigma(
         "base": np.sqrt(ground),
         "boundary": np.sqrt(boundary_variance(surface, base, boundary, options.boundary_sigma)),
     }
-    found = tuple(systematic(part.calibration, part.response, variant) for variant in ("free", "absorbed")
-                  if len(part.response.by_parameters))  # fmt: skip
+    first = both[0]
+    found = tuple(systematic(first.calibration, first.response, variant) for variant in ("free", "absorbed")
+                  if len(first.response.by_parameters))  # fmt: skip
+    notes = (*said, *_notes(first, base_part, base, ground, options))
     return VolumeSigma(
         {name: float(value) for name, value in parts.items()},
         None if between is None else (between.curvature, float(np.sqrt(between.variance))), found, options.corrected,
-        sum(one.pickets for one in both), sum(one.rays for one in both), _notes(part, base_part, base, ground, options),
+        sum(one.pickets for one in both), sum(one.rays for one in both), notes,
     )  # fmt: skip
 
 
-def shared_control_covariance(first: Part, second: Part) -> float:
-    """Covariance of two functionals adjusted in blocks of their own that share control points.
-
-    [D] An error of a given coordinate moves both: Σ h'·h''·σ² over the coordinates shared, h = ∂V/∂(given coordinate).
-    """
-    sides = []
-    for one in (first, second):
-        u, block = one.calibration.system.unknowns, one.calibration.result.block
-        row = {int(point): k for k, point in enumerate(u.points)}
-        response = control_response(one.calibration, one.response)
-        sides.append({
-            str(block.points[point]): (xyz, sigma, response[row[int(point)]])
-            for point, xyz, sigma, check in zip(
-                block.control.point, block.control.xyz, block.control.sigma, block.control.is_check, strict=True
-            )
-            if not check and int(point) in row
-        })  # fmt: skip
-    total = 0.0
-    for name in sides[0].keys() & sides[1].keys():
-        (xyz, sigma, h), (other, _, k) = sides[0][name], sides[1][name]
-        same = np.isfinite(xyz) & (np.abs(xyz - other) < 1e-6)
-        total += float(np.sum((h * k * sigma**2)[same]))
-    s0 = [one.calibration.local.outcome.sigma0 for one in (first, second)]
-    return s0[0] * s0[1] * total
+def _one_adjustment(once: float) -> str:
+    """What two surfaces of one adjustment share, in words."""
+    said = "surface and base come from one adjustment: the errors that both share cancel"
+    if once > 1.0 - 1e-9:
+        return f"{said}; all heights are the same measurements"
+    if once > 0.0:
+        said += f", among them those of {100.0 * once:.3g} % of the area, which has the same heights in both"
+    return f"{said}; matching and interpolation are taken for independent where the heights differ"
 
 
 def boundary_variance(surface: Surface, base: Base, boundary: Boundary, sigma: float) -> float:
@@ -224,52 +125,12 @@ def boundary_variance(surface: Surface, base: Base, boundary: Boundary, sigma: f
     return sigma**2 * total
 
 
-def matching_sigma_mm(calibration: Calibration, options: SigmaOptions) -> float:
-    """mm, of an image coordinate of a picket."""
-    um = calibration.local.outcome.sigma0_um if options.matching_sigma_um is None else options.matching_sigma_um
-    return 1e-3 * um
-
-
-def _height_noise(response: Response, functional: Functional) -> float:
-    """m², mean variance of a height that is its own alone: the noise of the volume over the weights' squares."""
-    return response.noise / max(float(np.sum(functional.gradient[:, 2] ** 2)), 1e-300)
-
-
 def _difference(between: list[Between | None]) -> Between | None:
     """Of the surface less that of the base."""
     known = [(sign, one) for sign, one in zip((1.0, -1.0), between, strict=False) if one is not None]
     if not known:
         return None
     return Between(sum(sign * one.curvature for sign, one in known), sum(one.variance for _, one in known))
-
-
-def _between_cells(surface: Surface, boundary: Boundary) -> Between | None:
-    """For triangles between the centres of cells, from the middle of the boundary."""
-    grid = surface.grid
-    row, column, rows, columns = cells_within(grid, boundary)
-    take_rows, take_columns = min(rows, PATCH_CELLS), min(columns, PATCH_CELLS)
-    row, column = row + (rows - take_rows) // 2, column + (columns - take_columns) // 2
-    z = surface.read(row, column, take_rows, take_columns).astype(float)
-    z[boundary.coverage(grid.window(row, column, take_rows, take_columns)) < 0.5] = np.nan
-    roughness = roughness_of_cells(z, grid)
-    if roughness is None:
-        return None
-    patch, area = _lattice_patch(roughness, grid)
-    return Between(curvature_of_cells(z, grid) * boundary.area, patch.variance * boundary.area / area)
-
-
-def _lattice_patch(roughness: Roughness, grid: Grid) -> tuple[Between, float]:
-    """A patch of cells amid others, and its area."""
-    n = LATTICE_PATCH
-    x, y = np.meshgrid(np.arange(n) * grid.cell_x, np.arange(n) * grid.cell_y)
-    first = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
-    triangles = np.concatenate([np.column_stack([first, first + 1, first + n + 1]),
-                                np.column_stack([first, first + n, first + n + 1])])  # fmt: skip
-    row, column = np.divmod(first, n)
-    inner = np.tile((np.minimum(row, column) >= 2) & (np.maximum(row, column) < n - 3), 2)
-    xyz = np.column_stack([x.ravel(), y.ravel(), np.zeros(n * n)])
-    between = ground_between(roughness, xyz, triangles, inner.astype(float), 0.0)
-    return between, 0.5 * float(inner.sum()) * grid.cell_x * grid.cell_y
 
 
 def _base_variance(base: Base, boundary: Boundary, surface: Surface, options: SigmaOptions) -> float:

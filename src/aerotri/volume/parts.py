@@ -1,0 +1,157 @@
+"""A surface's share in the uncertainty of a volume: its pickets or cells, and the ground between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.deformation.orientation import Calibration
+from aerotri.rasters import Grid
+from aerotri.volume.bases import Base, Surface
+from aerotri.volume.boundary import Boundary
+from aerotri.volume.functionals import Functional, cell_volume, tin_volume
+from aerotri.volume.pickets import PER_POINT, Pickets, pickets_where_seen
+from aerotri.volume.response import Response, respond
+from aerotri.volume.roughness import (
+    Between,
+    Roughness,
+    curvature_of_cells,
+    ground_between,
+    roughness_of_cells,
+    roughness_of_pickets,
+)
+from aerotri.volume.sums import cells_within
+from aerotri.volume.triangles import areas, cut_to
+
+LATTICE_PATCH = 16
+PATCH_CELLS = 512
+"""Cells a side of the part of a raster whose roughness is taken."""
+
+
+@dataclass(frozen=True)
+class SigmaOptions:
+    """What is known beside the adjustment.
+
+    Parameters
+    ----------
+    matching_sigma_um : of an image coordinate of a picket; None: σ̂0 of the adjustment's image coordinates.
+    matching_window_m : side of the matching window on the ground, within which neighbouring cells share their noise.
+    per_point : photographs a cell is measured in. base_sigma : m, common to the whole base.
+    boundary_sigma : m, of either coordinate of every corner. corrected : the photographs were corrected.
+    """
+
+    matching_sigma_um: float | None = None
+    matching_window_m: float = 0.0
+    per_point: int = PER_POINT
+    base_sigma: float = 0.0
+    boundary_sigma: float = 0.0
+    corrected: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Pickets and the gradient (k, 3) of a volume by their coordinates."""
+
+    pickets: Pickets
+    gradient: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One surface's share in the uncertainty of a volume.
+
+    Parameters
+    ----------
+    calibration, response : of its adjustment. between : the ground between its heights, None where not known.
+    unseen : m², area no photographs were found for.
+    measured : what the surface was measured from; None where nobody asks for it.
+    """
+
+    calibration: Calibration
+    response: Response
+    between: Between | None
+    pickets: int
+    rays: int
+    unseen: float
+    measured: Measured | None = None
+
+
+def part_of_cells(
+    calibration: Calibration, surface: Surface, boundary: Boundary, base: Base | None, options: SigmaOptions
+) -> Part:
+    """The share of a surface whose cells are taken for its pickets, measured in the photographs nearest to them."""
+    functional = cell_volume(surface, boundary, base)
+    cell = surface.grid.cell_x * surface.grid.cell_y
+    share = functional.noise_share * max(1.0, options.matching_window_m**2 / cell)
+    pickets, seen = pickets_where_seen(
+        calibration, functional.xyz, matching_sigma_mm(calibration, options), options.per_point, share
+    )
+    if not seen.any():
+        raise InputError("no photograph of the adjustment sees the surface", "check the CRS of surface and block")
+    response = respond(calibration, pickets, functional.gradient[seen], options.corrected)
+    unseen = float(np.abs(functional.gradient[~seen, 2]).sum())
+    between = _between_cells(surface, boundary)
+    measured = Measured(pickets, functional.gradient[seen])
+    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen, measured)
+
+
+def part_of_pickets(
+    calibration: Calibration, pickets: Pickets, triangles: np.ndarray, boundary: Boundary, base: Base | None,
+    options: SigmaOptions,
+) -> Part:  # fmt: skip
+    """The share of a TIN of pickets whose photographs are known."""
+    functional = tin_volume(pickets.xyz, triangles, boundary, base)[1]
+    response = respond(calibration, pickets, functional.gradient, options.corrected)
+    corners = pickets.xyz[triangles][:, :, :2]
+    pieces = cut_to(boundary.polygon, corners)
+    own = corners[pieces.triangle]
+    noise = _height_noise(response, functional)
+    share = pieces.area / np.maximum(areas(own), 1e-300)
+    used = triangles[pieces.triangle]
+    roughness = roughness_of_pickets(pickets.xyz, noise, np.unique(used))
+    between = None if roughness is None else ground_between(roughness, pickets.xyz, used, share, noise)
+    unseen = max(boundary.area - float(pieces.area.sum()), 0.0)
+    measured = Measured(pickets, functional.gradient)
+    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen, measured)
+
+
+def matching_sigma_mm(calibration: Calibration, options: SigmaOptions) -> float:
+    """mm, of an image coordinate of a picket."""
+    um = calibration.local.outcome.sigma0_um if options.matching_sigma_um is None else options.matching_sigma_um
+    return 1e-3 * um
+
+
+def _height_noise(response: Response, functional: Functional) -> float:
+    """m², mean variance of a height that is its own alone: the noise of the volume over the weights' squares."""
+    return response.noise / max(float(np.sum(functional.gradient[:, 2] ** 2)), 1e-300)
+
+
+def _between_cells(surface: Surface, boundary: Boundary) -> Between | None:
+    """For triangles between the centres of cells, from the middle of the boundary."""
+    grid = surface.grid
+    row, column, rows, columns = cells_within(grid, boundary)
+    take_rows, take_columns = min(rows, PATCH_CELLS), min(columns, PATCH_CELLS)
+    row, column = row + (rows - take_rows) // 2, column + (columns - take_columns) // 2
+    z = surface.read(row, column, take_rows, take_columns).astype(float)
+    z[boundary.coverage(grid.window(row, column, take_rows, take_columns)) < 0.5] = np.nan
+    roughness = roughness_of_cells(z, grid)
+    if roughness is None:
+        return None
+    patch, area = _lattice_patch(roughness, grid)
+    return Between(curvature_of_cells(z, grid) * boundary.area, patch.variance * boundary.area / area)
+
+
+def _lattice_patch(roughness: Roughness, grid: Grid) -> tuple[Between, float]:
+    """A patch of cells amid others, and its area."""
+    n = LATTICE_PATCH
+    x, y = np.meshgrid(np.arange(n) * grid.cell_x, np.arange(n) * grid.cell_y)
+    first = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
+    triangles = np.concatenate([np.column_stack([first, first + 1, first + n + 1]),
+                                np.column_stack([first, first + n, first + n + 1])])  # fmt: skip
+    row, column = np.divmod(first, n)
+    inner = np.tile((np.minimum(row, column) >= 2) & (np.maximum(row, column) < n - 3), 2)
+    xyz = np.column_stack([x.ravel(), y.ravel(), np.zeros(n * n)])
+    between = ground_between(roughness, xyz, triangles, inner.astype(float), 0.0)
+    return between, 0.5 * float(inner.sum()) * grid.cell_x * grid.cell_y

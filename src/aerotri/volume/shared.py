@@ -1,0 +1,151 @@
+"""What two surfaces share: errors of one adjustment, measurements that are in both, control of two epochs.
+
+[D] The volume between two surfaces of one adjustment is one functional over the pickets of both, with the gradient
+g = g' − g'' where a picket is in both. Its response to the adjustment is c = c' − c'', so that whatever moves both
+surfaces alike (the datum, the camera, the orientation of their photographs) counts by its difference alone, and its
+noise is that of g: a measurement that is in both cancels.
+"""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+
+from aerotri.deformation.orientation import Calibration
+from aerotri.volume.parts import Measured, Part
+from aerotri.volume.pickets import Pickets
+from aerotri.volume.response import control_response, respond
+from aerotri.volume.roughness import Between
+
+SAME_PLACE_M = 1e-6
+"""Pickets at one place with one height, in the same photographs, are the same measurement."""
+
+
+def adjustment_key(calibration: Calibration) -> str:
+    """A short text that two adjustments have in common only when they are the same one."""
+    system, state = calibration.system, calibration.solution.state
+    digest = hashlib.sha256("\n".join(system.unknowns.block.images.names.astype(str)).encode())
+    for values in (system.unknowns.origin, state.centre, state.rotation, state.points, state.shared):
+        digest.update(np.ascontiguousarray(values, dtype=float).tobytes())
+    digest.update(f"{calibration.local.outcome.sigma0:.9e}".encode())
+    return digest.hexdigest()[:32]
+
+
+def same_adjustment(first: Part, second: Part) -> bool:
+    """Whether two surfaces were measured in one adjustment."""
+    one, other = first.calibration, second.calibration
+    return one is other or adjustment_key(one) == adjustment_key(other)
+
+
+def difference_part(surface: Part, base: Part, corrected: bool) -> tuple[Part, float]:
+    """The share of the difference of two surfaces of one adjustment, and which part of it was measured once, 0 … 1.
+
+    Parameters
+    ----------
+    base : responses to its own volume, counted positive. corrected : as of `respond`.
+    """
+    if surface.measured is None or base.measured is None:
+        raise ValueError("the pickets of both surfaces are needed")
+    joint, common = _joined(surface.measured, base.measured)
+    response = respond(surface.calibration, joint.pickets, joint.gradient, corrected)
+    between = _difference_between(surface.between, base.between, common)
+    rays = len(joint.pickets.image)
+    part = Part(
+        surface.calibration, response, between, len(joint.pickets), rays, surface.unseen + base.unseen, joint
+    )
+    return part, float(min(common))
+
+
+def _joined(first: Measured, second: Measured) -> tuple[Measured, tuple[float, float]]:
+    """The pickets of both, each once, with g' − g''; and the share of either's weight that is in both."""
+    one, other = first.pickets, second.pickets
+    both = Pickets(
+        np.concatenate([one.xyz, other.xyz]),
+        np.concatenate([one.start, one.start[-1] + other.start[1:]]),
+        np.concatenate([one.image, other.image]),
+        np.concatenate([one.sigma_mm, other.sigma_mm]),
+        np.concatenate([one.noise_share, other.noise_share]),
+    )
+    _, place, number = np.unique(_keys(both), axis=0, return_index=True, return_inverse=True)
+    number = number.ravel()
+    gradient = np.zeros((len(place), 3))
+    np.add.at(gradient, number[: len(one)], first.gradient)
+    np.subtract.at(gradient, number[len(one) :], second.gradient)
+    shares = []
+    sides = (number[: len(one)], number[len(one) :])
+    for own, rest, measured in zip(sides, sides[::-1], (first, second), strict=True):
+        weight = np.abs(measured.gradient[:, 2])
+        shares.append(float(weight[np.isin(own, rest)].sum() / max(weight.sum(), 1e-300)))
+    return Measured(both.take(place), gradient), (shares[0], shares[1])
+
+
+def _keys(pickets: Pickets) -> np.ndarray:
+    """(k, 6) whole numbers, equal for the same place, height and photographs."""
+    place = np.rint(pickets.xyz / SAME_PLACE_M).astype(np.int64)
+    first, count = pickets.start[:-1], np.diff(pickets.start)
+    image = pickets.image.astype(np.int64) + 1
+    sums = [np.add.reduceat(values, first) for values in (image, image**2)] if len(first) else [count, count]
+    return np.column_stack([place, count, *sums])
+
+
+def _difference_between(one: Between | None, other: Between | None, common: tuple[float, float]) -> Between | None:
+    """Of the surface less that of the base; where both have the same heights, nothing lies between them."""
+    sides = zip((1.0, -1.0), (one, other), common, strict=True)
+    known = [(sign, between, 1.0 - share) for sign, between, share in sides if between is not None]
+    if not known:
+        return None
+    return Between(
+        sum(sign * between.curvature * own for sign, between, own in known),
+        sum(between.variance * own for _, between, own in known),
+    )
+
+
+def shared_control_covariance(first: Part, second: Part) -> float:
+    """Covariance of two functionals adjusted in blocks of their own that share control points.
+
+    [D] An error of a given coordinate moves both: Σ h'·h''·σ² over the coordinates shared, h = ∂V/∂(given coordinate).
+    """
+    total = sum(float(np.sum(h * k * variance)) for h, k, variance in _shared_control(first, second))
+    s0 = [one.calibration.local.outcome.sigma0 for one in (first, second)]
+    return s0[0] * s0[1] * total
+
+
+def shared_in_words(first: Part, second: Part) -> str:
+    """A sentence about what two adjustments have in common as far as it is known."""
+    points = sum(bool(np.any(variance)) for _, _, variance in _shared_control(first, second))
+    names = [set(one.calibration.result.block.images.names.astype(str).tolist()) for one in (first, second)]
+    photographs = len(names[0] & names[1])
+    said = "surface and base come from two adjustments, taken for independent"
+    if points:
+        said += f" but for the {points} control points that both have with the same coordinates"
+    if photographs:
+        said += (
+            f"; {photographs} photographs have the same names in both: what their image points and their camera "
+            "share is not taken into account"
+        )
+    else:
+        said += "; what a camera or a GNSS base that both used would share is not known"
+    return said
+
+
+def _shared_control(first: Part, second: Part) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """For every control point of both: the responses (3,) of either, and the variances (3,) of equal coordinates."""
+    sides = []
+    for one in (first, second):
+        u, block = one.calibration.system.unknowns, one.calibration.result.block
+        row = {int(point): k for k, point in enumerate(u.points)}
+        response = control_response(one.calibration, one.response)
+        sides.append({
+            str(block.points[point]): (xyz, sigma, response[row[int(point)]])
+            for point, xyz, sigma, check in zip(
+                block.control.point, block.control.xyz, block.control.sigma, block.control.is_check, strict=True
+            )
+            if not check and int(point) in row
+        })  # fmt: skip
+    found = []
+    for name in sorted(sides[0].keys() & sides[1].keys()):
+        (xyz, sigma, h), (other, _, k) = sides[0][name], sides[1][name]
+        same = np.isfinite(xyz) & (np.abs(xyz - other) < 1e-6)
+        found.append((h, k, np.where(same, np.nan_to_num(sigma) ** 2, 0.0)))
+    return found
