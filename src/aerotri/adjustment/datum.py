@@ -189,7 +189,7 @@ def nothing_holds(system: NormalSystem) -> bool:
 
 def control_share(unknowns: Unknowns, state: State) -> float:
     """Area of the convex hull of the height control over that of the object points, in plan; 0 below three points."""
-    control = state.points[unknowns.prior_weight[:, 2] > 0.0, :2]
+    control = state.points[unknowns.given[:, 2], :2]
     try:
         return float(ConvexHull(control).volume / ConvexHull(state.points[:, :2]).volume)
     except (QhullError, ValueError):

@@ -61,7 +61,15 @@ def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
         )
     status, warnings = ray_status(block, start, off)
     measured = _freed_of_the_air(block, start)
-    return Prepared(*build_system(measured, start, status), status, tuple(warnings))
+    system, state = build_system(measured, start, status)
+    return Prepared(system, state, status, (*warnings, *_held_in_words(system.unknowns)))
+
+
+def _held_in_words(unknowns: Unknowns) -> tuple[str, ...]:
+    count, points = int(unknowns.control_held.sum()), int(unknowns.control_held.any(axis=1).sum())
+    if not count:
+        return ()
+    return (f"{count} coordinates of {points} control points have σ = 0 and are held at their given values",)
 
 
 def _freed_of_the_air(block: Block, start: StartValues) -> Block:

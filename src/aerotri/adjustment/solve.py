@@ -222,7 +222,8 @@ def _whole_step(
 ) -> Step | None:
     """The step of all unknowns from the solution x of the reduced equations; None where it is not a number."""
     move = system.back_substitute(state, x, damping, side, estimator)
-    if system.unknowns.point_held.any() and system.unknowns.motions.count:
+    free = system.unknowns.block.settings.adjustment.datum in ("minimal", "inner")
+    if free and system.unknowns.motions.count:
         move = without_motion(system.unknowns, state, move)
     finite = all(np.isfinite(part).all() for part in (move.images, move.shared, move.points))
     return move if finite else None

@@ -21,6 +21,8 @@ from aerotri.functional_model.rotation import (
 from aerotri.observations import Block, Prior
 
 ORIENTATION_ELEMENTS = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
+HELD_IN_CONDITIONS_M = 1e-6
+"""σ of a held coordinate whose point is in a condition: there it stays an unknown [C]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +101,7 @@ class Unknowns:
     eo_free : (n, 6) bool, point_free : (P, 3) bool: False where a value is held.
     by_angles : (n,) bool: small rotations run along ω, φ, κ, so that single angles can be held.
     prior_xyz, prior_weight : (P, 3) observed coordinates (local, m) and 1/σ², 0 where not observed.
+    control_held : (P, 3) bool, coordinates of control without error (σ = 0): they keep their given value.
     kept : (P,) first of the three shared parameters that stand for a point which is not eliminated, −1 for the others.
     motions : what is free in a free block.
     pair_start, pair_block, block_row, block_col : pattern of the reduced normal matrix.
@@ -116,6 +119,7 @@ class Unknowns:
     point_free: np.ndarray
     prior_xyz: np.ndarray
     prior_weight: np.ndarray
+    control_held: np.ndarray
     kept: np.ndarray
     motions: FreeMotions
     pair_start: np.ndarray
@@ -163,8 +167,13 @@ class Unknowns:
 
     @property
     def point_held(self) -> np.ndarray:
-        """(P, 3) bool, coordinates held for the datum."""
+        """(P, 3) bool, coordinates held: for the datum, or as control without error."""
         return ~self.point_free & (self.kept < 0)[:, None]
+
+    @property
+    def given(self) -> np.ndarray:
+        """(P, 3) bool, coordinates that control gives: observed, or held."""
+        return (self.prior_weight > 0.0) | self.control_held
 
     @property
     def kept_rows(self) -> np.ndarray:
@@ -221,7 +230,7 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
     xy = np.ascontiguousarray(block.image_points.xy[source])
     linear = linear_columns(block, images, ray_image, xy, shared)
     pair_start, pair_block, block_row, block_col = _pattern(len(images), row_start, ray_image)
-    prior_xyz, prior_weight = _control_priors(block, points, start.origin)
+    prior_xyz, prior_weight, held = _control_priors(block, points, start.origin)
     unknowns = Unknowns(
         block=block,
         images=images,
@@ -241,9 +250,10 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
         shared=shared,
         eo_free=np.ones((len(images), 6), dtype=bool),
         by_angles=np.zeros(len(images), dtype=bool),
-        point_free=np.ones((len(points), 3), dtype=bool),
+        point_free=~held,
         prior_xyz=prior_xyz,
         prior_weight=prior_weight,
+        control_held=held,
         kept=np.full(len(points), -1, dtype=np.int64),
         motions=FreeMotions(np.eye(7), np.zeros((len(shared), 7))),
         pair_start=pair_start,
@@ -251,9 +261,8 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
         block_row=block_row,
         block_col=block_col,
     )
-    state = State(
-        start.centre[images].copy(), start.rotation[images].copy(), start.points[points].copy(), np.array(shared.start)
-    )
+    xyz = np.where(held, prior_xyz, start.points[points])
+    state = State(start.centre[images].copy(), start.rotation[images].copy(), xyz, np.array(shared.start))
     return unknowns, state
 
 
@@ -286,9 +295,10 @@ def _pattern(n: int, row_start: np.ndarray, ray_image: np.ndarray):
 
 
 def _control_priors(block: Block, points: np.ndarray, origin: np.ndarray):
-    xyz, weight = np.zeros((len(points), 3)), np.zeros((len(points), 3))
+    """(P, 3) given coordinates, their weights, and which of them are held."""
+    xyz, weight, held = np.zeros((len(points), 3)), np.zeros((len(points), 3)), np.zeros((len(points), 3), dtype=bool)
     if block.settings.adjustment.datum != "control":
-        return xyz, weight
+        return xyz, weight, held
     row_of_point = np.full(len(block.points), -1)
     row_of_point[points] = np.arange(len(points))
     control = block.control
@@ -296,23 +306,27 @@ def _control_priors(block: Block, points: np.ndarray, origin: np.ndarray):
     rows = row_of_point[control.point[used]]
     known = np.isfinite(control.xyz[used])
     xyz[rows] = np.where(known, control.xyz[used] - origin, 0.0)
-    weight[rows] = np.where(known, 1.0 / control.sigma[used] ** 2, 0.0)
-    return xyz, weight
+    held[rows] = known & (control.sigma[used] == 0.0)
+    observed = known & ~held[rows]
+    weight[rows] = np.where(observed, 1.0 / np.where(observed, control.sigma[used], 1.0) ** 2, 0.0)
+    return xyz, weight, held
 
 
 def keep_points(unknowns: Unknowns, state: State, rows: np.ndarray) -> Unknowns:
     """The unknowns with points that conditions tie together moved from elimination to the shared parameters."""
     kept, point_free = unknowns.kept.copy(), unknowns.point_free.copy()
+    weights = unknowns.prior_weight.copy()
+    weights[rows] = np.where(unknowns.control_held[rows], HELD_IN_CONDITIONS_M**-2, weights[rows])
     for row in rows:
         name = str(unknowns.block.points[unknowns.points[row]])
         columns = []
         for axis, letter in enumerate("XYZ"):
-            weight = unknowns.prior_weight[row, axis]
+            weight = weights[row, axis]
             prior = Prior(unknowns.prior_xyz[row, axis], weight**-0.5 if weight > 0.0 else None)
             columns.append(unknowns.shared.add(letter, name, "point", prior=prior, start=state.points[row, axis]))
         kept[row] = columns[0]
         point_free[row] = False
-    return replace(unknowns, kept=kept, point_free=point_free)
+    return replace(unknowns, kept=kept, point_free=point_free, prior_weight=weights)
 
 
 def hold_orientation(unknowns: Unknowns, held: tuple[tuple[str, str], ...]) -> Unknowns:

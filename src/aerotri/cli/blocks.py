@@ -188,7 +188,7 @@ def _stated_sigmas(control: str, positions: str, orientation: str, angles: str) 
     from aerotri.commands.convert import three_values
 
     return {
-        "control_sigma_m": three_values(control, "--control-sigma-m"),
+        "control_sigma_m": three_values(control, "--control-sigma-m", may_be_zero=True),
         "positions_sigma_m": three_values(positions, "--positions-sigma-m"),
         "orientation_sigma_m": three_values(orientation, "--orientation-sigma-m"),
         "orientation_sigma_deg": three_values(angles, "--orientation-sigma-deg"),

@@ -17,7 +17,7 @@ MarkedControl = Annotated[str, typer.Option(help="Control points with their imag
 CheckPoints = Annotated[list[str] | None, typer.Option(help="Control point that is a check point; may repeat.")]
 PhotographPositions = Annotated[str, typer.Option(help="Positions of the photographs, in place of EXIF.")]
 SystemOfPhotographs = Annotated[str, typer.Option(help="Coordinate system; default that of control, else UTM of EXIF.")]
-ControlSigma = Annotated[str, typer.Option(help="σ of control points without one: X,Y,Z in m.")]
+ControlSigma = Annotated[str, typer.Option(help="σ of control points without one: X,Y,Z in m; 0: without error, held.")]
 PositionsSigma = Annotated[str, typer.Option(help="σ of positions without one: X,Y,Z in m.")]
 OrientationSigma = Annotated[str, typer.Option(help="Orientations are observations: σ X,Y,Z in m.")]
 AnglesSigma = Annotated[str, typer.Option(help="The same of omega,phi,kappa in degrees.")]

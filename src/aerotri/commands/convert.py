@@ -53,8 +53,8 @@ if TYPE_CHECKING:
     from aerotri.observations import Block
 
 
-def three_values(text: str, option: str) -> tuple[float, float, float] | None:
-    """Three standard deviations of ``X,Y,Z``, or of one value for all; None for ''.
+def three_values(text: str, option: str, may_be_zero: bool = False) -> tuple[float, float, float] | None:
+    """Three standard deviations of ``X,Y,Z``, or of one value for all; None for ''. 0, where it may be: without error.
 
     Raises
     ------
@@ -63,8 +63,10 @@ def three_values(text: str, option: str) -> tuple[float, float, float] | None:
     if not text:
         return None
     words = [word.strip() for word in text.split(",")]
-    if len(words) not in (1, 3) or not all(is_number(word) and float(word) > 0.0 for word in words):
-        raise InputError(f"{option} {text[:60]}", "give three values greater than 0, as 0.1,0.1,0.2, or one for all")
+    least = 0.0 if may_be_zero else np.nextafter(0.0, 1.0)
+    if len(words) not in (1, 3) or not all(is_number(word) and float(word) >= least for word in words):
+        size = "that are not negative" if may_be_zero else "greater than 0"
+        raise InputError(f"{option} {text[:60]}", f"give three values {size}, as 0.1,0.1,0.2, or one for all")
     values = [float(word) for word in words] * (3 // len(words))
     return values[0], values[1], values[2]
 
@@ -127,6 +129,7 @@ def _from_files(request: Request, target: Path, to: str) -> tuple[str, ...]:
         request = replace(request, name=request.name or target.resolve().name)
     reading = read_project(request)
     geoid = request.stated.geoid
+    reading = replace(reading, messages=(*reading.messages, *_about_held(reading.block)))
     if to == "block" or to in BLOCK_WRITERS:
         return (*reading.messages, *write_any(reading.block, target, to, reading.points))
     if to in ORIENTATION_WRITERS:
@@ -136,6 +139,12 @@ def _from_files(request: Request, target: Path, to: str) -> tuple[str, ...]:
     if oriented is None:
         oriented = _adjusted(reading.block, request)
     return (*reading.messages, *said, *write_oriented(oriented, target, to, geoid))
+
+
+def _about_held(block: Block) -> tuple[str, ...]:
+    """A sentence about control without error."""
+    count = int((block.control.sigma[~block.control.is_check] == 0.0).sum())
+    return (f"{count} coordinates of control points have σ = 0: an adjustment holds them",) if count else ()
 
 
 def _from_result(request: Request, target: Path, to: str) -> tuple[str, ...]:

@@ -155,6 +155,8 @@ def _positions_to_local(xyz: np.ndarray, sigma: np.ndarray, guess: np.ndarray, f
     # what is not known has no σ, and the guess in its place none to pass on
     variance = np.where(known, np.nan_to_num(sigma), 0.0) ** 2
     spread = np.sqrt(np.einsum("nij,nj->ni", local_per_crs**2, variance))
+    # what is held stays held, along the axis of the frame that takes its place
+    spread = np.where(sigma == 0.0, 0.0, spread)
     return np.where(known, local, np.nan), np.where(np.isfinite(sigma), spread, np.nan)
 
 
@@ -235,7 +237,9 @@ def _ground_from_local(
         return replace(ground, difference=difference, sigma=sigma, w=w)
     sigma_given_local = adjusted.block.control.sigma[row[ground.point]]
     # 1 − r is the variance of the adjusted over that of the given coordinate, each in its own axes
-    taken = (1.0 - ground.r) * (sigma / ground.sigma * sigma_given_local / sigma_given) ** 2
-    r = np.where(np.isfinite(taken), 1.0 - taken, ground.r)
-    w = normalised_residuals(difference, sigma_given, r)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        taken = (1.0 - ground.r) * (sigma / ground.sigma * sigma_given_local / sigma_given) ** 2
+    held = sigma_given == 0.0
+    r = np.where(np.isfinite(taken) & ~held, 1.0 - taken, ground.r)
+    w = np.where(held, ground.w, normalised_residuals(difference, sigma_given, r))
     return replace(ground, difference=difference, sigma=sigma, r=r, w=w)

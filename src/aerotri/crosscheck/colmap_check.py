@@ -177,7 +177,8 @@ def _add_control(problem: _Problem, ours: AdjustedBlock, sigma_px: float) -> Non
     row_of = {int(point): row for row, point in enumerate(problem.points)}
     for k in np.flatnonzero(~control.is_check).tolist():
         row = row_of.get(int(control.point[k]))
-        known = np.flatnonzero(np.isfinite(control.xyz[k]))
+        # what is held has its place already
+        known = np.flatnonzero(np.isfinite(control.xyz[k]) & (control.sigma[k] > 0.0))
         if row is None or not len(known):
             continue
         block = problem.point_block(row)

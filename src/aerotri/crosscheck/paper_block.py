@@ -109,6 +109,7 @@ class PaperBlock:
     ----------
     images, points : rows of the block that take part. origin : (3,) m. order : of the angles.
     point_value, point_inv_sigma : (P, 3) observed coordinates, local; 1/σ is 0 where not observed.
+    point_held : (P, 3) bool, coordinates without error, at `point_value`.
     """
 
     images: np.ndarray
@@ -120,6 +121,7 @@ class PaperBlock:
     antennas: Antennas | None
     point_value: np.ndarray
     point_inv_sigma: np.ndarray
+    point_held: np.ndarray
 
     @property
     def observations(self) -> int:
@@ -276,8 +278,9 @@ def _patterns(block: Block, setups: list, linear: list, setup: np.ndarray, xy: n
     return entries, values
 
 
-def _control(block: Block, points: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _control(block: Block, points: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     value, inv_sigma = np.zeros((len(points), 3)), np.zeros((len(points), 3))
+    held = np.zeros((len(points), 3), dtype=bool)
     if block.settings.adjustment.datum == "control":
         row = {int(p): k for k, p in enumerate(points)}
         control, in_use = block.control, _control_in_use(block)
@@ -286,8 +289,10 @@ def _control(block: Block, points: np.ndarray, origin: np.ndarray) -> tuple[np.n
             if at is not None and in_use[k]:
                 known = np.isfinite(control.xyz[k])
                 value[at, known] = (control.xyz[k] - origin)[known]
-                inv_sigma[at, known] = 1.0 / control.sigma[k, known]
-    return value, inv_sigma
+                held[at] = known & (control.sigma[k] == 0.0)
+                observed = known & ~held[at]
+                inv_sigma[at, observed] = 1.0 / control.sigma[k, observed]
+    return value, inv_sigma, held
 
 
 def _control_in_use(block: Block) -> np.ndarray:

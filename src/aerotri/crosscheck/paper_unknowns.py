@@ -72,7 +72,8 @@ def lay_out(paper: PaperBlock, known: KnownSolution) -> tuple[Layout, np.ndarray
     start[poses[:, :3]] = known.centre + np.where(known.held_poses[:, :3], 0.0, moved.centre)
     start[poses[:, 3:]] = angles + np.where(known.held_poses[:, 3:], 0.0, moved.angles)
     start[shared] = paper.shared.start
-    start[points] = _start_points(paper, layout, start, known, distance)
+    start[points] = np.where(paper.point_held, paper.point_value, _start_points(paper, layout, start, known, distance))
+    free[points[paper.point_held]] = False
     if known.datum_free:
         for row, axis in spread_points(known.points, np.bincount(paper.rays.point, minlength=p)):
             free[points[row, axis]] = False

@@ -166,6 +166,7 @@ def read_control(path: Path | None, measured: pa.StringArray, settings: BlockTom
         ~np.isnan(xyz),
         np.full(3, np.nan) if default is None else np.array(default, dtype=float),
         "give it in the table, or default_control_sigma_m under [stochastic] in block.toml",
+        may_be_zero=True,
     )
     point, names = _with_points_never_measured(table.text["point"], measured)
     return Control(point, xyz, sigma, _is_check(table)), names

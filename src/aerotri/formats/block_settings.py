@@ -30,6 +30,7 @@ Positive = Annotated[float, Field(gt=0)]
 Fraction = Annotated[float, Field(gt=0, lt=1)]
 Pixels = Annotated[int, Field(gt=0, le=10_000_000)]
 Three = Annotated[list[float], Field(min_length=3, max_length=3)]
+ThreeNotNegative = Annotated[list[Annotated[float, Field(ge=0)]], Field(min_length=3, max_length=3)]
 ThreePositive = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 OffOn = Literal["off", "on"]
 ORIENTATION_ELEMENTS = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
@@ -138,7 +139,7 @@ def _priors(section: BaseModel, names: tuple[str, ...]) -> dict[str, Prior]:
 
 class StochasticModel(_Section):
     image_sigma_um: Positive | None = None
-    default_control_sigma_m: ThreePositive | None = None
+    default_control_sigma_m: ThreeNotNegative | None = None
 
 
 class AdjustmentModel(_Section):

@@ -247,8 +247,8 @@ def _control_sigma(table: Table, keep: np.ndarray) -> np.ndarray:
     numbers = {name: given[:, k] for k, name in enumerate(("sx", "sy", "sz"))}
     values = Table(table.path, table.length, {}, numbers, table.source)
     wanted = np.repeat(keep[:, None], 3, axis=1)
-    remedy = "a control point without standard deviation is error-free to DBAT; give it a small one, in m"
-    return sigma_columns(values, ("sx", "sy", "sz"), wanted, np.full(3, np.nan), remedy)[keep]
+    # a coordinate without standard deviation is free of error to DBAT
+    return sigma_columns(values, ("sx", "sy", "sz"), wanted, np.zeros(3), "", may_be_zero=True)[keep]
 
 
 def _adjustment(

@@ -146,14 +146,15 @@ def _coordinates(found: _List) -> tuple[np.ndarray, str]:
     return found.numbers("lon", "lat", "Z"), GEOGRAPHIC
 
 
-def _sigma(found: _List) -> np.ndarray:
-    """(n, 3) m; the more particular column counts."""
+def _sigma(found: _List, may_be_zero: bool = False) -> np.ndarray:
+    """(n, 3) m; the more particular column counts. 0, where it may be, stands for a coordinate without error."""
     sigma = found.numbers("sX", "sY", "sZ")
     for fallback in (found.numbers("s_plan", "s_plan", "s_height"), found.numbers("s_all", "s_all", "s_all")):
         sigma = np.where(np.isnan(sigma), fallback, sigma)
-    bad = np.flatnonzero((sigma <= 0.0).any(axis=1))
+    bad = np.flatnonzero(((sigma < 0.0) | ((sigma == 0.0) & (not may_be_zero))).any(axis=1))
     if len(bad):
-        raise found.file.error(int(bad[0]) + 1, "a standard deviation is not greater than 0", "give a small one, in m")
+        size = "negative" if may_be_zero else "not greater than 0"
+        raise found.file.error(int(bad[0]) + 1, f"a standard deviation is {size}", "give a small one, in m")
     return sigma
 
 
@@ -207,7 +208,7 @@ def read_control_list(path: str | os.PathLike) -> PointList:
     if len(odd):
         raise found.file.error(int(odd[0]) + 1, f"role = '{roles[odd[0]][:60]}'", "a role is control or check")
     return PointList(
-        found.file.path, names, xyz, _sigma(found), roles == "check", crs,
+        found.file.path, names, xyz, _sigma(found, may_be_zero=True), roles == "check", crs,
         heights="ellipsoidal" if found.ellipsoidal else "", messages=_messages(found, "role"),
     )  # fmt: skip
 

@@ -107,7 +107,7 @@ def read_pix4d_gcp(path: str | os.PathLike, axes: str = "xy") -> PointList:
         With the line.
     """
     file, names, values = _rows(Path(path), GCP_WIDTHS, "label,c1,c2,z, then acc_h,acc_v or not", "point")
-    xyz, sigma = _ordered(values[:, :3], axes), _spread(file, values[:, 3:])
+    xyz, sigma = _ordered(values[:, :3], axes), _spread(file, values[:, 3:], may_be_zero=True)
     return PointList(file.path, texts(names), xyz, sigma, np.zeros(len(names), bool))
 
 
@@ -153,13 +153,14 @@ def _ordered(values: np.ndarray, axes: str) -> np.ndarray:
     return values[:, [1, 0, 2]] if axes == "yx" else values
 
 
-def _spread(file: TextFile, accuracy: np.ndarray) -> np.ndarray:
+def _spread(file: TextFile, accuracy: np.ndarray, may_be_zero: bool = False) -> np.ndarray:
     """(n, 3) σ of horizontal and vertical accuracies, of one for both, or of none."""
     if not accuracy.shape[1]:
         return no_sigma(len(accuracy))
-    bad = np.flatnonzero((accuracy <= 0.0).any(axis=1))
+    bad = np.flatnonzero(((accuracy < 0.0) | ((accuracy == 0.0) & (not may_be_zero))).any(axis=1))
     if len(bad):
-        raise file.error(int(bad[0]), "an accuracy is not greater than 0", "give a small one, in metres")
+        size = "negative" if may_be_zero else "not greater than 0"
+        raise file.error(int(bad[0]), f"an accuracy is {size}", "give a small one, in metres")
     return accuracy[:, [0, 0, -1]]
 
 

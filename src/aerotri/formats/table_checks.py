@@ -61,8 +61,9 @@ def three_or_none(table: Table, columns: tuple[str, str, str]) -> np.ndarray:
 
 
 def sigma_columns(
-    table: Table, columns: tuple[str, ...], wanted: np.ndarray, default: np.ndarray, remedy: str
-) -> np.ndarray:
+    table: Table, columns: tuple[str, ...], wanted: np.ndarray, default: np.ndarray, remedy: str,
+    may_be_zero: bool = False,
+) -> np.ndarray:  # fmt: skip
     """(n, k) standard deviations, by default where the table gives none, NaN where no value is wanted.
 
     Parameters
@@ -71,6 +72,7 @@ def sigma_columns(
     wanted : (n, k) bool, where there is an observation.
     default : (k,), NaN where there is no default.
     remedy : what to do where a standard deviation is missing.
+    may_be_zero : 0 stands for a value without error.
 
     Raises
     ------
@@ -79,14 +81,15 @@ def sigma_columns(
     """
     given = table.stack(*columns)
     for k, column in enumerate(columns):
-        bad = np.flatnonzero(given[:, k] <= 0.0)
+        bad = np.flatnonzero((given[:, k] < 0.0) | ((given[:, k] == 0.0) & (not may_be_zero)))
         if len(bad):
             row = int(bad[0])
             raise table.error(
                 row,
                 f"{column} = {given[row, k]:g} is not a standard deviation",
-                "give a small sigma greater than 0; what is to hold the datum exactly belongs under [adjustment] datum",
-            )
+                "give 0 for a coordinate without error, else the standard deviation" if may_be_zero else
+                "give a standard deviation greater than 0",
+            )  # fmt: skip
     sigma = np.where(np.isnan(given), default, given)
     missing = np.argwhere(np.isnan(sigma) & wanted)
     if len(missing):

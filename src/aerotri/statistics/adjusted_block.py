@@ -196,6 +196,8 @@ class GroundPointResults:
     r : (k, 3) redundancy numbers of the given coordinate (NaN for check points).
     w : (k, 3) normalised: control −v/(σ√r); check points d/√(σ_adjusted² + σ_given²).
     rays : (k,).
+    lone_sigma : (k, 3) m, of coordinates that are held (σ = 0), a priori, as all others predict them; NaN elsewhere.
+        Their r is 0, and w is (given − predicted)/lone_sigma: what −v/(σ√r) tends to with σ.
     """
 
     point: np.ndarray
@@ -204,6 +206,7 @@ class GroundPointResults:
     r: np.ndarray
     w: np.ndarray
     rays: np.ndarray
+    lone_sigma: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.point)

@@ -30,6 +30,8 @@ __all__ = ["FreeCheck", "check_free", "free_block"]
 SAME_SCALE = 0.01
 """σ̂0 of the free block nearer to 1 than this needs no adjustment with other weights."""
 NAMED_SUSPECTS = 10
+LEAST_SIGMA_M = 1e-6
+"""Stands for σ = 0 of control in the weights of a similarity."""
 
 Adjust = Callable[[Block], AdjustedBlock]
 
@@ -216,7 +218,7 @@ def _similarity(free: AdjustedBlock) -> Similarity | None:
     if not len(control):
         return None
     row_of = {int(point): row for row, point in enumerate(free.block.control.point)}
-    sigma = free.block.control.sigma[[row_of[int(point)] for point in control.point]]
+    sigma = np.maximum(free.block.control.sigma[[row_of[int(point)] for point in control.point]], LEAST_SIGMA_M)
     adjusted = free.points.xyz[control.point]
     return fit_similarity(adjusted, adjusted - control.difference, sigma)
 

@@ -99,7 +99,7 @@ def _control_fits(adjusted: AdjustedBlock) -> list[GroupFit]:
         return []
     given = {int(point): k for k, point in enumerate(block.control.point)}
     sigma = block.control.sigma[[given[int(point)] for point in control.point]]
-    known = np.isfinite(control.r) & np.isfinite(control.difference)
+    known = np.isfinite(control.r) & np.isfinite(control.difference) & (sigma > 0.0)
     names = control_groups(known.shape)[known]
     return _fits_by_name(names, "m", control.difference[known], sigma[known], control.r[known])
 

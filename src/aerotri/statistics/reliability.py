@@ -9,7 +9,7 @@ most is a matter of `external_reliability`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
@@ -85,7 +85,13 @@ def control_reliability(adjusted: AdjustedBlock) -> Reliability:
 
     A given coordinate touches no unknown but its own point's, and among these itself most: there its effect is δ̄0.
     """
-    return reliability(adjusted, adjusted.control.w, adjusted.control.r, given_sigma(adjusted.block, adjusted.control))
+    control, settings = adjusted.control, adjusted.block.settings.adjustment
+    found = reliability(adjusted, control.w, control.r, given_sigma(adjusted.block, control))
+    if control.lone_sigma is None:
+        return found
+    # of what is held, δ0·σ/√r tends to δ0 times σ of its prediction
+    of_held = noncentrality(settings.alpha, settings.power) * control.lone_sigma
+    return replace(found, detectable=np.where(np.isfinite(of_held), of_held, found.detectable))
 
 
 def observation_reliability(adjusted: AdjustedBlock) -> Reliability | None:
@@ -120,9 +126,16 @@ def suspected_blunders(block: Block, rays: RayResults, control: GroundPointResul
         for k, axis, w in _beyond(rays.w, limit)
     ]
     for k, axis, w in _beyond(control.w, limit):
-        error_mm = float(-1e3 * control.difference[k, axis] / control.r[k, axis])
+        error_mm = 1e3 * _control_error(control, k, axis)
         found.append(Blunder("", str(points[control.point[k]]), w, error_mm, "kept"))
     return tuple(sorted(found, key=lambda blunder: -abs(blunder.w))[:LISTED_BLUNDERS])
+
+
+def _control_error(control: GroundPointResults, k: int, axis: int) -> float:
+    """m, estimated error of a given coordinate."""
+    if control.lone_sigma is not None and np.isfinite(control.lone_sigma[k, axis]):
+        return float(control.w[k, axis] * control.lone_sigma[k, axis])
+    return float(-control.difference[k, axis] / control.r[k, axis])
 
 
 def _beyond(w: np.ndarray, limit: float) -> list[tuple[int, int, float]]:

@@ -27,6 +27,7 @@ from aerotri.statistics.adjusted_block import (
 )
 from aerotri.statistics.covariance import Cofactors, cofactors, correlations, orientation_cofactors, total_correlations
 from aerotri.statistics.external_reliability import ray_effects, row_effects
+from aerotri.statistics.held_control import HeldTests, held_tests
 from aerotri.statistics.reliability import detectable_share, normalised_residuals, suspected_blunders
 
 OF_POINTS = ("point", "constraint")
@@ -90,7 +91,7 @@ def summarise(
     )
     rays = _rays(system, solution, q, ray_status)
     points = _points(system, solution, q, rays, sigma0)
-    control, check = _ground_points(system, solution, q, points, sigma0)
+    control, check = _ground_points(system, q, points, held_tests(system, solution, factor))
     extra_groups, observations = _extra_results(system, solution, q)
     return AdjustedBlock(
         block=block,
@@ -242,7 +243,7 @@ def _percent(r: float) -> str:
     return f"{100.0 * r:.2f} %"
 
 
-def _ground_points(system: NormalSystem, solution: Solution, q: Cofactors, points: PointResults, sigma0: float):
+def _ground_points(system: NormalSystem, q: Cofactors, points: PointResults, tests: HeldTests):
     """Control and check points that were adjusted."""
     block, u = system.unknowns.block, system.unknowns
     row = np.full(len(block.points), -1)
@@ -255,14 +256,17 @@ def _ground_points(system: NormalSystem, solution: Solution, q: Cofactors, point
         known = np.isfinite(block.control.xyz[k])
         sigma_given = block.control.sigma[k]
         adjusted = np.where(known, points.sigma[point], np.nan)
+        lone_sigma = None
         if is_check:
             r = np.full((len(k), 3), np.nan)
             w = difference / np.sqrt(adjusted**2 + sigma_given**2)
         else:
+            held, lone_sigma = u.control_held[row[point]], tests.sigma[row[point]]
             weight = np.where(known, u.prior_weight[row[point]], np.nan)
             r = 1.0 - weight * np.diagonal(q.points[row[point]], axis1=1, axis2=2)
-            w = normalised_residuals(difference, sigma_given, r)
-        out.append(GroundPointResults(point, difference, adjusted, r, w, points.rays[point]))
+            r = np.where(held, 0.0, r)
+            w = np.where(held, tests.w[row[point]], normalised_residuals(difference, sigma_given, r))
+        out.append(GroundPointResults(point, difference, adjusted, r, w, points.rays[point], lone_sigma))
     return out
 
 
@@ -287,7 +291,7 @@ def _groups(system: NormalSystem, solution: Solution, q: Cofactors, rays: RayRes
         sigma_control = block.control.sigma[[given[int(p)] for p in control.point]]
         for name, axes in (("control plan", [0, 1]), ("control height", [2])):
             d, s, r = control.difference[:, axes], sigma_control[:, axes], control.r[:, axes]
-            known = np.isfinite(d)
+            known = np.isfinite(d) & (s > 0.0)
             if known.any():
                 pvv = float(np.sum((d[known] / s[known]) ** 2))
                 rms = float(np.sqrt(np.mean(d[known] ** 2)))

@@ -125,7 +125,7 @@ def participants(unknowns: Unknowns, switches: Switches) -> Participants:
     """What takes part when points without enough rays drop out."""
     point = ray_points(unknowns)
     count = np.bincount(point[switches.rays], minlength=len(unknowns.points))
-    known = np.where(switches.control, (unknowns.prior_weight > 0.0).sum(axis=1), 0)
+    known = np.where(switches.control, unknowns.given.sum(axis=1), 0)
     weak = (2 * count + known < 4) | ((count == 1) & (known < 3))
     rays = switches.rays & ~weak[point]
     return Participants(rays, ~weak, np.bincount(unknowns.rays.image[rays], minlength=len(unknowns.images)) > 0)

@@ -20,6 +20,8 @@ from aerotri.tie_points.first_orientation import Mapped, map_incrementally
 from aerotri.tie_points.georeferencing import is_line, place
 from aerotri.tie_points.given import Given, complete, is_held_by_control
 
+LEAST_SIGMA_M = 1e-3
+"""Stands for less, 0 too, in the weights of control for a first orientation."""
 SHORTEST_STRIP = 3.0
 """Photographs a strip has on average, where the track is one."""
 PLAUSIBLE = 0.1
@@ -123,7 +125,8 @@ def _placed(block: Block, mapped: Mapped, frame: LocalFrame | None, seed: int) -
     usable &= np.isfinite(found.points[control.point]).all(axis=1)
     target = control.xyz[usable]
     if len(target) >= 3 and not is_line(target):
-        source, sigma = found.points[control.point[usable]], control.sigma[usable].max(axis=1)
+        source = found.points[control.point[usable]]
+        sigma = np.maximum(control.sigma[usable].max(axis=1), LEAST_SIGMA_M)
         what = "control points"
     else:
         source, target, sigma = _positions_of(block, mapped)
