@@ -279,3 +279,12 @@ def test_real_blocks_come_back_from_a_folder(shared_data, tmp_path, name):
     assert again.settings == block.settings
     np.testing.assert_array_equal(again.image_points.xy, block.image_points.xy)
     assert again.points.tolist() == block.points.tolist()
+
+
+def test_control_without_standard_deviation_is_free_of_error(script):
+    """As DBAT's camcal has it: no column of σ, or a σ of 0."""
+    plain = SCRIPT.replace("id,label,x,y,z,sxyz", "id,label,x,y,z")
+    block = read_dbat(script({"script.xml": plain, "control.txt": "1,A, 10,20,30\n3, B,11,21,31\n"}))
+    np.testing.assert_array_equal(block.control.sigma, 0.0)
+    block = read_dbat(script({"script.xml": SCRIPT, "control.txt": "1,A, 10,20,30,0\n3, B,11,21,31,0.02\n"}))
+    np.testing.assert_array_equal(block.control.sigma, [[0.0] * 3, [0.02] * 3])
