@@ -114,7 +114,7 @@ TABLES = {
     "role missing": Case(C, "point,X,Y,Z\n", 1, "column 'role' is missing"),
     "control twice": Case(C, control("p1,1,2,3,1,1,1,control", "p1,1,2,3,1,1,1,check"), 3, "point 'p1' is there twice"),
     "control without coordinates": Case(C, control("p1,,,,1,1,1,control"), 2, "X, Y and Z are all empty"),
-    "control sigma zero": Case(C, control("p1,1,2,3,1,0,1,control"), 2, "datum"),
+    "control sigma negative": Case(C, control("p1,1,2,3,1,-1,1,control"), 2, "without error"),
     "control without sigma": Case(
         C, control("p1,1,2,3,,,,control"), 2, "default_control_sigma_m",
         ((T, BLOCK_TOML.replace("default_control_sigma_m = [0.1, 0.2, 0.3]", "")),),

@@ -16,7 +16,7 @@ from aerotri.formats.bingo import write_bingo
 from aerotri.formats.camera_spec import CameraSpec
 from aerotri.formats.convert import write_any, write_oriented
 from aerotri.formats.metashape import write_metashape
-from aerotri.formats.names_match import likely_prefix, match_photographs
+from aerotri.formats.names_match import match_photographs
 from aerotri.formats.odm import write_odm_gcp
 from aerotri.formats.patb import write_patb
 from aerotri.formats.pix4d import write_pix4d_gcp, write_pix4d_geo
@@ -31,6 +31,7 @@ from aerotri.formats.placing import (
 from aerotri.formats.project import Request, read_project
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Prior
+from aerotri.observations.names import prefix_of
 
 UTM = (717000.0, 1606000.0, 0.0)
 SPEC = CameraSpec(name="P1", size_px=(8000, 6000), pixel_um=5.0, focal_length_mm=40.0)
@@ -114,7 +115,7 @@ def test_photographs_of_other_folders_and_endings(files):
     assert reading.block.gnss_ins is not None
     assert reading.block.gnss_ins.image.tolist() == [0, 1, 2, 3]
     assert "other.csv: 4 photographs are named with another folder or file ending" in reading.messages
-    assert "other.csv: 1 photographs are not in the block and were left out, the first 'more.jpg'" in reading.messages
+    assert "other.csv: 1 photographs are not in the block and were left out: 'more.jpg'" in reading.messages
     (files / "none.csv").write_text("x.jpg,1,2,3,.1,.1\n")
     with pytest.raises(
         InputError, match=r"none\.csv: names no photograph of the block: 'x\.jpg' is not among 'p0\.jpg'"
@@ -129,8 +130,8 @@ def test_names_match_only_where_that_is_clear():
     assert loosely == 1
     # two names for one photograph
     assert match_photographs(np.array(["a.jpg", "a.tif"]), known)[0].tolist() == [-1, -1]
-    assert likely_prefix(np.array(["02", "GCP10"]), np.array(["GCP_GCP10", "x"])) == "GCP_"
-    assert likely_prefix(np.array(["02"]), np.array(["03"])) is None
+    assert prefix_of(np.array(["02", "GCP10"]), np.array(["GCP_GCP10", "x"])) == "GCP_"
+    assert prefix_of(np.array(["02"]), np.array(["03"])) is None
 
 
 def test_prefix_of_control(files):
@@ -148,7 +149,7 @@ def test_points_never_measured_are_kept_and_said(files):
     (files / "more.csv").write_text((files / "gcp.csv").read_text() + "far,717100,1608050,100,.1,.1\n")
     reading = read_project(request(files, control=str(files / "more.csv")))
     assert reading.block.points[reading.block.control.point[-1]] == "far"
-    assert "more.csv: 1 points are not measured: far" in reading.messages
+    assert "more.csv: 1 points are not measured: 'far'" in reading.messages
 
 
 def test_axes(files):

@@ -23,6 +23,7 @@ from aerotri.adjustment.unknowns import (
 from aerotri.conventions import InputError
 from aerotri.functional_model.atmosphere import corrected_image_points
 from aerotri.observations import Block
+from aerotri.observations.names import partnerless_in_words
 
 USED, ONE_RAY, OFF, NO_START, NOT_FINITE, REMOVED = range(6)
 """Status of a ray; the words stand in `statistics.adjusted_block.RAY_STATUS`."""
@@ -62,7 +63,8 @@ def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
     status, warnings = ray_status(block, start, off)
     measured = _freed_of_the_air(block, start)
     system, state = build_system(measured, start, status)
-    return Prepared(system, state, status, (*warnings, *_held_in_words(system.unknowns)))
+    lonely = partnerless_in_words(block) if block.settings.adjustment.datum == "control" else ()
+    return Prepared(system, state, status, (*warnings, *lonely, *_held_in_words(system.unknowns)))
 
 
 def _held_in_words(unknowns: Unknowns) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from aerotri.cli.app import app
-from aerotri.cli.options import BlockFolder, GeoidGrid, Json
+from aerotri.cli.options import BlockFolder, ControlPrefix, GeoidGrid, Json
 
 
 @app.command(epilog="Example: aerotri adjust blocks/frederiksstad_ultracam --parameters bluh:1-12,ultracam_d:42-73")
@@ -23,13 +23,14 @@ def adjust(
     check_free: Annotated[
         bool, typer.Option("--check-free", help="Adjust free as well: is an error in the tie points or in the control?")
     ] = False,
+    control_prefix: ControlPrefix = "",
     plots: Annotated[bool, typer.Option(help="Draw the plots and the report.")] = True,
     json_: Json = False,
 ) -> None:
     """Adjust a block: orientation, points, self-calibration, and σ of everything."""
     from aerotri.commands.adjust import run_adjust
 
-    raise typer.Exit(run_adjust(block, out, parameters, robust, geoid, plots, json_, check_free))
+    raise typer.Exit(run_adjust(block, out, parameters, robust, geoid, plots, json_, check_free, control_prefix))
 
 
 @app.command(epilog="Example: aerotri parameters --family dmc --draw patterns")

@@ -11,6 +11,7 @@ from aerotri.cli.app import app
 from aerotri.cli.options import (
     AnglesSigma,
     CheckPoints,
+    ControlPrefix,
     ControlSigma,
     GeoidOfSystem,
     Json,
@@ -84,7 +85,7 @@ def convert(
     orientation_sigma_m: OrientationSigma = "",
     orientation_sigma_deg: AnglesSigma = "",
     control_sigma_m: ControlSigma = "",
-    control_prefix: Annotated[str, typer.Option(help="What image points have before names of control.")] = "",
+    control_prefix: ControlPrefix = "",
     control_heights: Annotated[str, typer.Option(help="crs, or ellipsoidal.")] = "crs",
     check: CheckPoints = None,
     gnss_shift: Annotated[str | None, typer.Option(help="off, block or strip.")] = None,
@@ -145,6 +146,7 @@ def tiepoints(
     crs: SystemOfPhotographs = "",
     geoid: GeoidOfSystem = None,
     control_sigma_m: ControlSigma = "",
+    control_prefix: ControlPrefix = "",
     mark_sigma_px: Annotated[float, typer.Option(min=1e-3, help="σ of the image points of control.")] = 0.5,
     positions_sigma_m: PositionsSigma = "",
     orientation_sigma_m: OrientationSigma = "",
@@ -165,6 +167,7 @@ def tiepoints(
         crs=crs,
         geoid=geoid,
         **_stated_sigmas(control_sigma_m, positions_sigma_m, orientation_sigma_m, orientation_sigma_deg),
+        control_prefix=control_prefix,
     )
     options = TiePointOptions(
         gcp=gcp,

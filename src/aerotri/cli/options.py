@@ -21,4 +21,5 @@ ControlSigma = Annotated[str, typer.Option(help="σ of control points without on
 PositionsSigma = Annotated[str, typer.Option(help="σ of positions without one: X,Y,Z in m.")]
 OrientationSigma = Annotated[str, typer.Option(help="Orientations are observations: σ X,Y,Z in m.")]
 AnglesSigma = Annotated[str, typer.Option(help="The same of omega,phi,kappa in degrees.")]
+ControlPrefix = Annotated[str, typer.Option(help="What image points have before names of control.")]
 GeoidOfSystem = Annotated[Path | None, typer.Option(help="Geoid grid for its heights.")]

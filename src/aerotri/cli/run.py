@@ -8,7 +8,15 @@ from typing import Annotated
 import typer
 
 from aerotri.cli.app import app
-from aerotri.cli.options import CheckPoints, ControlSigma, Json, MarkedControl, PhotographPositions, SystemOfPhotographs
+from aerotri.cli.options import (
+    CheckPoints,
+    ControlPrefix,
+    ControlSigma,
+    Json,
+    MarkedControl,
+    PhotographPositions,
+    SystemOfPhotographs,
+)
 
 
 @app.command(epilog="Example: aerotri run photographs --out project --gcp gcp_list.txt --control-sigma-m 0.02")
@@ -18,6 +26,7 @@ def run(
     gcp: MarkedControl = "",
     check: CheckPoints = None,
     control_sigma_m: ControlSigma = "",
+    control_prefix: ControlPrefix = "",
     positions: PhotographPositions = "",
     camera: Annotated[str, typer.Option(help="Camera: [camera.NAME] tables (.toml), orthority.")] = "",
     focal_length_mm: Annotated[str, typer.Option(help="In place of EXIF.")] = "",
@@ -40,10 +49,12 @@ def run(
 
     passed_on = {
         "tiepoints": given(
-            gcp=gcp, control_sigma_m=control_sigma_m, positions=positions, camera=camera,
+            gcp=gcp, control_sigma_m=control_sigma_m, control_prefix=control_prefix if gcp else "",
+            positions=positions, camera=camera,
             focal_length_mm=focal_length_mm, pixel_um=pixel_um, crs=crs, geoid=geoid, seed=str(seed),
         ) + tuple(word for name in check or () for word in ("--check", name)),
-        "adjust": given(parameters=parameters, geoid=geoid) + (() if plots else ("--no-plots",)),
+        "adjust": given(parameters=parameters, geoid=geoid, control_prefix="" if gcp else control_prefix)
+        + (() if plots else ("--no-plots",)),
         "dtm": given(interval=interval),
         "volume": given(boundary=boundary, base=base) if boundary else (),
     }  # fmt: skip

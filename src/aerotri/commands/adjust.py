@@ -36,13 +36,15 @@ def run_adjust(
     plots: bool,
     as_json: bool,
     check_free: bool = False,
+    control_prefix: str = "",
 ) -> int:
     """Exit code of the command: 0 when converged and not rejected, 1 otherwise; arguments as on the command line."""
     console = Console(quiet=as_json)
     begun = time.perf_counter()
     from aerotri.formats.block_folder import read_block
+    from aerotri.observations.names import with_control_prefix
 
-    block = with_settings(read_block(path), parameters, robust)
+    block = with_control_prefix(with_settings(read_block(path), parameters, robust), control_prefix)
     if check_free:
         refuse_free_datum(block)
     read_s = time.perf_counter() - begun

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -121,14 +121,34 @@ def _given(options: TiePointOptions) -> Given:
     reading = kinds.ReadingOptions(kinds.axes_of(options.stated.crs))
     if options.check and not options.gcp:
         raise InputError("--check names control points, and there are none", "give them: --gcp gcp_list.txt")
+    control = None
+    if options.gcp:
+        control = _named(kinds.read_control(options.gcp, reading), options.stated.control_prefix)
     return Given(
-        stated=options.stated,
+        # the names have the prefix already
+        stated=replace(options.stated, control_prefix=""),
         positions=kinds.read_position_list(options.positions, reading) if options.positions else None,
-        control=kinds.read_control(options.gcp, reading) if options.gcp else None,
-        check=options.check,
+        control=control,
+        check=tuple(_in_block(name, control, options.stated.control_prefix) for name in options.check),
         orientation=kinds.read_orientations(options.orientation, reading) if options.orientation else None,
         mark_sigma_px=options.mark_sigma_px,
     )
+
+
+def _in_block(name: str, control: PointList | None, prefix: str) -> str:
+    """The name of a check point as the block has it, whether it was given with the prefix or without."""
+    known = () if control is None else control.points.tolist()
+    return prefix + name if name not in known and prefix + name in known else name
+
+
+def _named(control: PointList, prefix: str) -> PointList:
+    """The control points under the names they have in the block."""
+    if not prefix:
+        return control
+    rays = control.rays
+    if rays is not None:
+        rays = replace(rays, points=np.array([prefix + name for name in rays.points.tolist()], dtype=str))
+    return replace(control, points=np.array([prefix + name for name in control.points.tolist()], dtype=str), rays=rays)
 
 
 def write_marks(

@@ -17,6 +17,7 @@ from aerotri.formats.parts import OrientationList, PositionList, RayList, Readin
 from aerotri.formats.reprojection import settle
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.observations import Block, Camera, GnssIns, ImagePoints, Images
+from aerotri.observations.names import in_words
 
 OUTSIDE = 0.05
 """Part of the format by which an image point may lie outside of it."""
@@ -83,7 +84,7 @@ def with_rays(reading: Reading, rays: RayList, sigma_px: float = 1.0) -> Reading
     block, messages = reading.block, [*reading.messages, *rays.messages]
     index, loosely = match_photographs(rays.images, block.images.names)
     keep = np.flatnonzero(index[rays.image] >= 0)
-    messages += _about_names(rays.path.name, rays.images, index, loosely)
+    messages += _about_names(rays.path.name, rays.images, index, loosely, block.images.names)
     image = index[rays.image[keep]]
     place = {name: i for i, name in enumerate(block.points.tolist())}
     used, point_of_ray = np.unique(rays.point[keep], return_inverse=True)
@@ -109,15 +110,20 @@ def with_rays(reading: Reading, rays: RayList, sigma_px: float = 1.0) -> Reading
     return Reading(replace(block, points=points, image_points=both), known, tuple(messages))
 
 
-def _about_names(file: str, names: np.ndarray, index: np.ndarray, loosely: int) -> list[str]:
+def _about_names(file: str, names: np.ndarray, index: np.ndarray, loosely: int, known: np.ndarray) -> list[str]:
     said = []
     if loosely:
         said.append(f"{file}: {loosely} photographs are named with another folder or file ending")
     missing = np.flatnonzero(index < 0)
     if len(missing):
-        first = f"the first '{names[missing[0]]}'"
-        said.append(f"{file}: {len(missing)} photographs are not in the block and were left out, {first}")
+        others = in_words(names[missing].astype(str).tolist(), _not_met(known, index))
+        said.append(f"{file}: {len(missing)} photographs are not in the block and were left out: {others}")
     return said
+
+
+def _not_met(known: np.ndarray, index: np.ndarray) -> list[str]:
+    """Names of photographs that nothing was found for."""
+    return known[np.setdiff1d(np.arange(len(known)), index)].astype(str).tolist()
 
 
 def _to_mm(xy: np.ndarray, unit: str, camera: np.ndarray, cameras: tuple[Camera, ...]) -> np.ndarray:
@@ -164,7 +170,8 @@ def with_orientations(reading: Reading, given: OrientationList, stated: Statemen
     block = reading.block
     index, loosely = match_photographs(given.images, block.images.names)
     _refuse_strangers(given.images, index, block, given.path)
-    messages = [*reading.messages, *given.messages, *_about_names(given.path.name, given.images, index, loosely)]
+    said = _about_names(given.path.name, given.images, index, loosely, block.images.names)
+    messages = [*reading.messages, *given.messages, *said]
     rows = np.flatnonzero(index >= 0)
     own = index[rows]
     centre, rotation = block.images.centre.copy(), np.full((len(block.images), 3, 3), np.nan)
@@ -210,7 +217,8 @@ def _refuse_strangers(names: np.ndarray, index: np.ndarray, block: Block, file: 
     if not len(names):
         raise InputError("holds no photographs", "give a row for each", file)
     if not (index >= 0).any():
-        example = f"'{names[0]}' is not among '{block.images.names[0]}' …"
+        others = in_words(names.astype(str).tolist(), block.images.names.astype(str).tolist())
+        example = f"{others} is not among '{block.images.names[0]}' …"
         raise InputError(f"names no photograph of the block: {example}", "use the same names", file)
 
 
@@ -248,7 +256,8 @@ def with_positions(reading: Reading, given: PositionList, stated: Statements) ->
     index, loosely = match_photographs(given.images, block.images.names)
     rows = np.flatnonzero(index >= 0)
     _refuse_strangers(given.images, index, block, given.path)
-    messages = [*reading.messages, *given.messages, *_about_names(given.path.name, given.images, index, loosely)]
+    said = _about_names(given.path.name, given.images, index, loosely, block.images.names)
+    messages = [*reading.messages, *given.messages, *said]
     image = index[rows]
     xyz = given.xyz[rows]
     if given.crs:

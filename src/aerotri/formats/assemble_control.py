@@ -9,9 +9,9 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.formats import placing
 from aerotri.formats.assemble import Statements, given_or_stated, padded, refuse_local
-from aerotri.formats.names_match import likely_prefix
 from aerotri.formats.parts import PointList, Reading, no_sigma
 from aerotri.observations import Block, Control
+from aerotri.observations.names import in_words, prefix_of, quoted
 
 HEIGHTS = ("crs", "ellipsoidal")
 
@@ -31,12 +31,16 @@ def with_control(reading: Reading, given: PointList, stated: Statements) -> Read
     place = {name: i for i, name in enumerate(block.points.tolist())}
     measured = np.array([name in place for name in names.tolist()], bool)
     if len(block.image_points) and not measured.any():
-        prefix = likely_prefix(given.points, block.points)
-        remedy = "use the same names" if prefix is None else f"state what stands before them: --control-prefix {prefix}"
-        raise InputError(f"none of its points is measured, '{names[0]}' for one", remedy, given.path)
+        others = block.points.astype(str).tolist()
+        prefix = prefix_of(given.points.astype(str).tolist(), others)
+        remedy = "use the same names"
+        if prefix is not None:
+            remedy = f"state what stands before them: --control-prefix {quoted(prefix)}"
+        raise InputError(f"none of its points is measured: {in_words(names.tolist(), others)}", remedy, given.path)
     messages = [*reading.messages, *given.messages]
     if not measured.all() and len(block.image_points):
-        missing = ", ".join(names[~measured][:5].tolist())
+        others = np.setdiff1d(block.points, names[measured]).astype(str).tolist()
+        missing = in_words(names[~measured].tolist(), others)
         messages.append(f"{given.path.name}: {int((~measured).sum())} points are not measured: {missing}")
     for name in names.tolist():
         place.setdefault(name, len(place))

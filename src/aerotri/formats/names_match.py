@@ -2,17 +2,9 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
-ENDING = re.compile(r"\.(jpe?g|tiff?|png|dng|raw|iiq|arw|cr2|cr3|nef|bmp|jp2|ecw|sid|img|ptx)$", re.IGNORECASE)
-"""File endings of images."""
-
-
-def stem(name: str) -> str:
-    """The name of an image file without folder and ending."""
-    return ENDING.sub("", name.replace("\\", "/").rsplit("/", 1)[-1])
+from aerotri.observations.names import stem
 
 
 def match_photographs(names: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, int]:
@@ -43,17 +35,3 @@ def match_photographs(names: np.ndarray, known: np.ndarray) -> tuple[np.ndarray,
     found, count = np.unique(index[index >= 0], return_counts=True)
     index[np.isin(index, found[count > 1])] = -1
     return index, loosely
-
-
-def likely_prefix(names: np.ndarray, known: np.ndarray) -> str | None:
-    """What stands before one of the names where it is found among the known ones, '' never; None where nothing fits.
-
-    Parameters
-    ----------
-    names : (n,) str; known : (k,) str.
-    """
-    for name in names.tolist():
-        for other in known.tolist():
-            if len(other) > len(name) and other.endswith(name):
-                return other[: -len(name)]
-    return None

@@ -9,6 +9,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.formats.tables import Table
 from aerotri.observations import Images
+from aerotri.observations.names import SHOWN_NEAR, near_names
 
 
 def refuse_duplicates(table: Table, keys: np.ndarray, name: Callable[[int], str]) -> None:
@@ -115,5 +116,9 @@ def image_index(table: Table, images: Images, may_be_empty: bool = False) -> np.
     if len(unknown):
         row = int(unknown[0])
         name = table.cell("image", row)
-        raise table.error(row, f"image '{name}' is not in the table of images", "add it there, or remove its rows")
+        near = near_names([name], known)[name][:SHOWN_NEAR]
+        remedy = "add it there, or remove its rows"
+        if near:
+            remedy = f"write it as there: {', '.join(repr(other) for other in near)}"
+        raise table.error(row, f"image '{name}' is not in the table of images", remedy)
     return index

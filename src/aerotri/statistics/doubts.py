@@ -8,6 +8,7 @@ from aerotri.adjustment.datum import control_share, nothing_holds
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.unknowns import State
+from aerotri.observations.names import partnerless_in_words
 from aerotri.statistics.adjusted_block import Outcome
 from aerotri.statistics.summarise import count_observations
 
@@ -49,12 +50,13 @@ def failure(system: NormalSystem, status: str, message: str, iterations: int = 0
 
 def defects_in_words(system: NormalSystem, defects: list[str] | tuple[str, ...]) -> str:
     """The rank defects with their cause and remedy."""
-    text = "; ".join(defects)
-    if system.unknowns.block.settings.adjustment.datum != "control" or "datum" not in text:
+    text, block = "; ".join(defects), system.unknowns.block
+    if block.settings.adjustment.datum != "control" or "datum" not in text:
         return text
+    lonely = "".join(f". {sentence}" for sentence in partnerless_in_words(block))
     if nothing_holds(system):
-        return f'no control: {text}. Give control points, or set datum = "minimal" or "inner"'
-    return f"too little control: {text}"
+        return f'no control: {text}. Give control points, or set datum = "minimal" or "inner"{lonely}'
+    return f"too little control: {text}{lonely}"
 
 
 def refuse_runaway(system: NormalSystem, solution: Solution) -> None:
