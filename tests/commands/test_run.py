@@ -112,3 +112,25 @@ def test_names_cannot_run_anything(tmp_path):
     assert "<img src=x" not in page
     assert "<script>x" not in page
     assert "<td>12</td>" in page
+
+
+def test_nothing_is_built_on_a_rejected_adjustment(tmp_path):
+    """What the adjustment wrote is to be looked at; only --go-on builds on it."""
+    (tmp_path / "photographs").mkdir()
+    out, called = tmp_path / "out", []
+
+    def rejects(arguments):
+        called.append(arguments[0])
+        if arguments[0] != "adjust":
+            return 0
+        (out / "result").mkdir(parents=True, exist_ok=True)
+        content = {"verdict": "rejected", "reasons": ["σ₀ is 522"], "message": ""}
+        (out / "result" / "adjustment.json").write_text(json.dumps(content))
+        return 1
+
+    assert run_all(tmp_path / "photographs", out, {}, rejects, ALL, True) == 1
+    assert called == ["tiepoints", "adjust"]
+    assert steps(out)["adjust"] == ("failed", "rejected: σ₀ is 522")
+    assert steps(out)["dtm"] == ("left out", "adjust is rejected; --go-on builds on it all the same")
+    assert run_all(tmp_path / "photographs", out, {}, rejects, ALL, True, go_on=True) == 1
+    assert called[2:] == ["tiepoints", "adjust", "dtm"]

@@ -9,11 +9,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from aerotri.diagnosis import findings
 from aerotri.image_errors import group_changes
 from aerotri.report.html import LARGEST_SVG, Findings, report_html, write_report
 from aerotri.report.interactive_plan import interactive_plan
 from aerotri.report.plots import all_plots, save_plots
-from aerotri.report.quality import findings
 from aerotri.report.rendering import RenderedPlot, render_plots
 from aerotri.report.tables import observation_groups
 from aerotri.statistics.adjusted_block import ObservationGroup

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aerotri.diagnosis import findings
 from aerotri.report import quality, tables
 from synthetic import make_adjusted_block
 
@@ -23,10 +24,13 @@ def by_hand(adjusted, difference, check=True):
     r = np.full((k, 3), np.nan) if check else np.where(np.isfinite(difference), 0.75, np.nan)
     results = replace(source, point=points, difference=difference, sigma=np.full((k, 3), 0.03), r=r,
                       w=np.ones((k, 3)), rays=np.full(k, 5))  # fmt: skip
+    columns = ("point", "difference", "sigma", "r", "w", "rays")
+    none = replace(source, **{name: getattr(source, name)[:0] for name in columns})
     control = replace(adjusted.block.control, point=points, xyz=np.ones((k, 3)), sigma=np.full((k, 3), 0.05),
                       is_check=np.full(k, check))  # fmt: skip
     block = replace(adjusted.block, control=control)
-    return replace(adjusted, block=block, **{"check" if check else "control": results})
+    mine, other = ("check", "control") if check else ("control", "check")
+    return replace(adjusted, block=block, **{mine: results, other: none})
 
 
 def column(table, name):
@@ -75,7 +79,7 @@ def test_asprs_warning_below_30(adjusted, n, warns):
 
 
 def finding(adjusted, start):
-    return next(f for f in quality.findings(adjusted) if f.quantity.startswith(start))
+    return next(f for f in findings(adjusted) if f.quantity.startswith(start))
 
 
 def test_sigma0_beside_its_band(adjusted):
@@ -101,7 +105,7 @@ def test_check_points_beside_their_sigma(adjusted):
 def test_bias_at_check_points(adjusted):
     rng = np.random.default_rng(1)
     shifted = rng.normal(0, 0.03, (12, 3)) + [0, 0, 0.2]
-    quantities = [f.quantity for f in quality.findings(by_hand(adjusted, shifted))]
+    quantities = [f.quantity for f in findings(by_hand(adjusted, shifted))]
     assert "mean of dZ at check points" in quantities
     assert "mean of dX at check points" not in quantities
 

@@ -88,7 +88,7 @@ def convert(
     control_prefix: ControlPrefix = "",
     control_heights: Annotated[str, typer.Option(help="crs, or ellipsoidal.")] = "crs",
     check: CheckPoints = None,
-    gnss_shift: Annotated[str | None, typer.Option(help="off, block or strip.")] = None,
+    gnss_shift: Annotated[str | None, typer.Option(help="Shift of GNSS: off (default), block or strip.")] = None,
     axes: Annotated[str | None, typer.Option(help="Order of coordinates in lists of Pix4D: xy or yx.")] = None,
     offset: Annotated[Path | None, typer.Option(help="_offset.xyz of Pix4D, added to orientations.")] = None,
     patb_rotation: Annotated[str | None, typer.Option(help="camera-to-object or object-to-camera.")] = None,

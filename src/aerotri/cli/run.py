@@ -39,6 +39,7 @@ def run(
     boundary: Annotated[str, typer.Option(help="Of a volume: GeoPackage, GeoJSON or WKT; no volume without.")] = "",
     base: Annotated[str, typer.Option(help="Of the volume, as aerotri volume takes it.")] = "",
     plots: Annotated[bool, typer.Option(help="Draw the plots of the adjustment.")] = True,
+    go_on: Annotated[bool, typer.Option("--go-on", help="Go on after an adjustment that was rejected.")] = False,
     json_: Json = False,
 ) -> None:
     """Everything: photographs to tie points, adjustment, terrain and volume, with one report."""
@@ -58,7 +59,7 @@ def run(
         "dtm": given(interval=interval),
         "volume": given(boundary=boundary, base=base) if boundary else (),
     }  # fmt: skip
-    raise typer.Exit(run_all(source, out, passed_on, invoke, command_names(), json_))
+    raise typer.Exit(run_all(source, out, passed_on, invoke, command_names(), json_, go_on))
 
 
 def command_names() -> set[str]:

@@ -180,6 +180,7 @@ def _write_parameter_tables(adjustment: Adjustment, changes: tuple[Change, ...],
 
 
 def _draw(adjustment: Adjustment, folder: Path, checked: FreeCheck | None, changes: tuple[Change, ...]) -> None:
+    from aerotri.diagnosis import findings
     from aerotri.report.html import Findings, write_report
     from aerotri.report.plots import all_plots, save_plots
     from aerotri.report.plots_comparison import plot_comparison
@@ -189,11 +190,11 @@ def _draw(adjustment: Adjustment, folder: Path, checked: FreeCheck | None, chang
     if adjustment.compared is not None:
         figures["compare_parameters"] = plot_comparison(adjustment.compared)
     plots = save_plots(figures, folder / "plots")
-    findings = Findings(
+    beside = Findings(
         work_list(adjustment.local), checked, effects=_effects(adjustment), changes=changes,
-        compared=adjustment.compared,
+        compared=adjustment.compared, lights=findings(adjustment.local),
     )  # fmt: skip
-    write_report(adjustment.result, plots, folder / "report.html", findings)
+    write_report(adjustment.result, plots, folder / "report.html", beside)
 
 
 def _effects(adjustment: Adjustment) -> ParameterEffects | None:

@@ -46,7 +46,7 @@ class Console:
             print(line)
 
     def failure(self, text: str) -> None:
-        """Print why there is no result."""
+        """Print why there is no result, or why not to trust the one there is."""
         self._clear()
         print(f"aerotri: {text}", file=sys.stderr)
 

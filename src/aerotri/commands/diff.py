@@ -32,15 +32,27 @@ def run_diff(first: Path, second: Path, top: int, as_json: bool) -> int:
 
     comparison = compare(*runs)
     if as_json:
-        content = {"first": str(first), "second": str(second)} | comparison_json(comparison, top)
+        verdicts = [{"verdict": run.outcome.verdict, "reasons": list(run.outcome.reasons)} for run in runs]
+        content = {"first": str(first), "second": str(second), "verdicts": verdicts} | comparison_json(comparison, top)
         print(json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False))
         return 0
-    lines = [f"first: {printable(first)}, second: {printable(second)}", SIGMA_NOTE]
+    lines = [f"first: {printable(first)}, second: {printable(second)}", *_verdicts(runs), SIGMA_NOTE]
     lines += [f"note: {printable(note, 500)}" for note in comparison.notes]
     for table in comparison_tables(comparison, top):
         lines += ["", *table_lines(table)]
     console.lines(lines)
     return 0
+
+
+def _verdicts(runs: list[AdjustedBlock]) -> list[str]:
+    """What each result is worth, with the gravest reason."""
+    from aerotri.report.quality import printable
+
+    lines = []
+    for name, run in zip(("first", "second"), runs, strict=True):
+        why = f": {printable(run.outcome.reasons[0], 500)}" if run.outcome.reasons else ""
+        lines.append(f"{name} is {run.outcome.verdict}{why}")
+    return lines
 
 
 def read_result(folder: Path, console: Console) -> AdjustedBlock:

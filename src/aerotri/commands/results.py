@@ -31,7 +31,11 @@ def reopened(result: Path, console: Console) -> Adjustment:
     saved = read_solution(result / "solution.npz")
     if saved.status != "converged":
         raise InputError(f"the adjustment ended '{saved.status}'", "give the result of a converged one", result)
-    return reopen(read_block(result / "block"), saved)
+    found = reopen(read_block(result / "block"), saved)
+    outcome = found.result.outcome
+    if outcome.verdict != "accepted":
+        console.failure(f"{result}: the adjustment is {outcome.verdict}: {outcome.reasons[0]}")
+    return found
 
 
 def refuse_foreign_folder(folder: Path, *own: str) -> None:

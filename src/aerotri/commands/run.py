@@ -47,8 +47,11 @@ def run_all(
     invoke: Invoke,
     known: Collection[str],
     as_json: bool,
+    go_on: bool = False,
 ) -> int:
     """Exit code: 0 when every step that there is was done, 1 when one failed; arguments as on the command line.
+
+    An adjustment that is rejected is a step that failed: nothing is built on it, unless `go_on` says so.
 
     Parameters
     ----------
@@ -63,9 +66,13 @@ def run_all(
     begun = time.perf_counter()
     steps, missing = [], ""
     for step in _steps(source, out, passed_on):
+        before = _written(out)
         done = _left_out(step, missing, known) or _called(step, invoke, first=not steps, quiet=as_json)
+        ending = "is missing" if done.status == "failed" else ""
+        if ending and step.name == "adjust" and _written(out) != before:
+            done, ending = _judged(done, out), "" if go_on else "is rejected; --go-on builds on it all the same"
         steps.append(done)
-        missing = missing or (f"{step.name} is missing" if done.status == "failed" else "")
+        missing = missing or (f"{step.name} {ending}" if ending else "")
     content = {"source": str(source), "steps": [asdict(step) for step in steps],
                "seconds": round(time.perf_counter() - begun, 1), "report": str(out / REPORT)}  # fmt: skip
     write_report(content, out)
@@ -95,6 +102,18 @@ def _steps(source: Path, out: Path, passed_on: dict[str, tuple[str, ...]]) -> li
     else:
         steps = [begin, adjust, surface, volume]
     return [replace(step, arguments=step.arguments + passed_on.get(step.name, ())) for step in steps]
+
+
+def _written(out: Path) -> int:
+    """When the adjustment's result was written, ns; 0 where there is none."""
+    path = out / RESULT / "adjustment.json"
+    return path.stat().st_mtime_ns if path.is_file() else 0
+
+
+def _judged(step: Step, out: Path) -> Step:
+    """The step of an adjustment that has a result all the same, with what speaks against it."""
+    content = json.loads((out / RESULT / "adjustment.json").read_text(encoding="utf-8"))
+    return replace(step, reason=f"{content['verdict']}: {next(iter(content['reasons']), content['message'])}")
 
 
 def _left_out(step: Step, missing: str, known: Collection[str]) -> Step | None:

@@ -1,6 +1,6 @@
 """What is put into words: whether a result may be used, and what is wrong where it may not."""
 
-from aerotri.diagnosis.reason import ACCEPTED, DOUBTFUL, REJECTED, Reason
-from aerotri.diagnosis.verdict import Verdict, judge
+from aerotri.diagnosis.finding import Finding
+from aerotri.diagnosis.verdict import Verdict, findings, judge
 
-__all__ = ["ACCEPTED", "DOUBTFUL", "REJECTED", "Reason", "Verdict", "judge"]
+__all__ = ["Finding", "Verdict", "findings", "judge"]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.diagnosis.left_out import some
-from aerotri.diagnosis.reason import Reason, graded
+from aerotri.diagnosis.finding import Finding, Grade, doubt, graded, some
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
 
@@ -13,7 +12,7 @@ SOME_BEHIND, MANY_BEHIND = 0.01, 0.10
 """Shares of the rays whose point lies behind the camera or far out: mismatches are few, a wrong block has many."""
 
 FAR = 100.0
-"""Distance of a point, in median distances, from which it is as good as at infinity."""
+"""Distance of a point, in usual distances, from which it is as good as at infinity."""
 
 TURNED_DEG = 45.0
 """Turn of a photograph from its given orientation: no error of a given orientation, but another convention."""
@@ -21,7 +20,8 @@ TURNED_DEG = 45.0
 MOVED = 0.5
 """Way from the given position to the adjusted one, in distances to the ground."""
 
-MANY_MOVED = 0.5
+MOST = 0.5
+"""Share of the photographs turned or moved from which the block as a whole is in question."""
 
 
 def depths(adjusted: AdjustedBlock) -> np.ndarray:
@@ -33,55 +33,63 @@ def depths(adjusted: AdjustedBlock) -> np.ndarray:
     return np.where(adjusted.rays.status == RAY_STATUS.index("used"), depth, np.nan)
 
 
-def of_depths(adjusted: AdjustedBlock) -> list[Reason]:
-    """Points behind a camera, or as good as at infinity."""
+def usual_distance(adjusted: AdjustedBlock) -> float:
+    """m, the median distance of points from their cameras; NaN where nothing was adjusted."""
     depth = depths(adjusted)
+    depth = np.abs(depth[np.isfinite(depth)])
+    return float(np.median(depth)) if len(depth) else np.nan
+
+
+def of_depths(adjusted: AdjustedBlock) -> list[Finding]:
+    """Points behind a camera, or as good as at infinity."""
+    depth, usual = depths(adjusted), usual_distance(adjusted)
     depth = depth[np.isfinite(depth)]
-    if not len(depth):
-        return []
-    reasons = []
-    typical = float(np.median(np.abs(depth)))
+    found = []
     for wrong, words in (
         (depth <= 0.0, "behind the camera"),
-        (depth > FAR * typical, f"farther than {FAR:.0f} times the usual distance of {typical:.3g} m"),
+        (depth > FAR * usual, f"farther than {FAR:.0f} times the usual distance of {usual:.3g} m"),
     ):
-        level = graded(float(wrong.mean()), SOME_BEHIND, MANY_BEHIND)
-        if level != "accepted":
-            reasons.append(Reason(level, f"{int(wrong.sum())} of {len(depth)} rays lead to points {words}"))
-    return reasons
+        share = float(wrong.mean()) if len(depth) else 0.0
+        value = f"{int(wrong.sum())} of {len(depth)}"
+        reason = f"{value} rays lead to points {words}"
+        expected = f"below {100 * SOME_BEHIND:.0f} %"
+        found += doubt(f"rays to points {words}", value, expected, graded(share, SOME_BEHIND, MANY_BEHIND), reason)
+    return found
 
 
-def of_given_orientations(adjusted: AdjustedBlock) -> list[Reason]:
-    """Photographs turned or moved far away from the orientation given."""
-    given, found = adjusted.block.images, adjusted.images
-    reasons = []
-    turn = _turns(adjusted)
-    turned = np.flatnonzero(turn > TURNED_DEG)
-    compared = int(np.isfinite(turn).sum())
-    if len(turned):
-        level = "rejected" if len(turned) > MANY_MOVED * compared else "doubtful"
-        angle = float(np.median(turn[turned]))
-        reasons.append(
-            Reason(level, f"{len(turned)} of {compared} photographs were turned by about {angle:.0f}° from the "
-                          f"orientation given ({some(given.names[turned])})")
-        )  # fmt: skip
-    way = np.linalg.norm(found.centre - given.centre, axis=1)
-    typical = float(np.nanmedian(np.abs(depths(adjusted)))) if np.isfinite(depths(adjusted)).any() else np.nan
-    moved = np.flatnonzero(way > MOVED * typical)
-    compared = int(np.isfinite(way).sum())
-    if len(moved):
-        level = "rejected" if len(moved) > MANY_MOVED * compared else "doubtful"
-        reasons.append(
-            Reason(level, f"{len(moved)} of {compared} photographs were moved by up to {way[moved].max():.3g} m from "
-                          f"the position given, at {typical:.3g} m from the ground ({some(given.names[moved])})")
-        )  # fmt: skip
-    return reasons
-
-
-def _turns(adjusted: AdjustedBlock) -> np.ndarray:
-    """(n,) degrees between the given and the adjusted rotation; NaN where there is none of them."""
+def of_turns(adjusted: AdjustedBlock) -> list[Finding]:
+    """Photographs turned far from the angles given."""
     order = adjusted.block.rotation
     given = rotation_from_angles(adjusted.block.images.angles, order)
     found = rotation_from_angles(adjusted.images.angles, order)
     trace = np.einsum("nij,nij->n", given, found)
-    return np.degrees(np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0)))
+    turn = np.degrees(np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0)))
+    turned = np.flatnonzero(turn > TURNED_DEG)
+    if not len(turned):
+        return []
+    value = f"{len(turned)} of {int(np.isfinite(turn).sum())}"
+    angle, names = float(np.median(turn[turned])), some(adjusted.block.images.names[turned])
+    reason = f"{value} photographs were turned by about {angle:.0f}° from the angles given ({names})"
+    grade = _of_share(len(turned), turn)
+    return doubt("photographs turned from the angles given", value, f"by less than {TURNED_DEG:.0f}°", grade, reason)
+
+
+def of_ways(adjusted: AdjustedBlock) -> list[Finding]:
+    """Photographs moved far from the position given."""
+    way = np.linalg.norm(adjusted.images.centre - adjusted.block.images.centre, axis=1)
+    usual = usual_distance(adjusted)
+    moved = np.flatnonzero(way > MOVED * usual)
+    if not len(moved):
+        return []
+    value = f"{len(moved)} of {int(np.isfinite(way).sum())}"
+    names = some(adjusted.block.images.names[moved])
+    reason = (
+        f"{value} photographs were moved by up to {way[moved].max():.3g} m from the position given, {usual:.3g} m from "
+        f"the ground ({names})"
+    )
+    expected = f"by less than {MOVED * usual:.3g} m"
+    return doubt("photographs moved from the position given", value, expected, _of_share(len(moved), way), reason)
+
+
+def _of_share(count: int, measured: np.ndarray) -> Grade:
+    return "rejected" if count > MOST * np.isfinite(measured).sum() else "doubtful"

@@ -1,42 +1,53 @@
-"""Rules on what did not take part: photographs, points, rays left out."""
+"""Rules on what did not take part: photographs, points and rays left out."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from aerotri.diagnosis.reason import Reason, graded
+from aerotri.diagnosis.finding import Finding, doubt, graded, some
 from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
 
 SOME_PHOTOGRAPHS, MANY_PHOTOGRAPHS = 0.02, 0.25
-SOME_POINTS, MANY_POINTS = 0.05, 0.30
-"""Shares left out. A few per cent of mismatched points are usual in automatic measurements, photographs are not."""
+SOME_POINTS, MANY_POINTS = 0.10, 0.40
+SOME_RAYS, MANY_RAYS = 0.15, 0.40
+"""Shares left out. Mismatched points and rays are usual in automatic measurements, lost photographs are not."""
+
+TURNED_DOWN = 0.1
+"""Robust weight below which a ray no longer takes part."""
 
 
-def of_photographs(adjusted: AdjustedBlock) -> list[Reason]:
+def of_photographs(adjusted: AdjustedBlock) -> list[Finding]:
     """Photographs with image points that were not adjusted."""
     measured = np.unique(adjusted.block.image_points.image)
     gone = measured[~np.isfinite(adjusted.images.centre[measured, 0])]
-    level = graded(len(gone) / max(len(measured), 1), SOME_PHOTOGRAPHS, MANY_PHOTOGRAPHS)
-    if level == "accepted":
-        return []
-    names = adjusted.block.images.names[gone]
-    return [Reason(level, f"{len(gone)} of {len(measured)} photographs were left out ({some(names)})")]
+    grade = graded(len(gone) / max(len(measured), 1), SOME_PHOTOGRAPHS, MANY_PHOTOGRAPHS)
+    value = f"{len(gone)} of {len(measured)}"
+    names = some(adjusted.block.images.names[gone])
+    expected = f"below {100 * SOME_PHOTOGRAPHS:.0f} %"
+    return doubt("photographs left out", value, expected, grade, f"{value} photographs were left out ({names})")
 
 
-def of_points(adjusted: AdjustedBlock) -> list[Reason]:
+def of_points(adjusted: AdjustedBlock) -> list[Finding]:
     """Points measured in two photographs or more that were not adjusted; not those that the operator took out."""
     rays, status = adjusted.block.image_points, adjusted.rays.status
     asked = status != RAY_STATUS.index("off")
     pairs = np.unique(np.column_stack([rays.point[asked], rays.image[asked]]), axis=0)
     measured = np.flatnonzero(np.bincount(pairs[:, 0], minlength=len(adjusted.block.points)) >= 2)
     gone = measured[~np.isfinite(adjusted.points.xyz[measured, 0])]
-    level = graded(len(gone) / max(len(measured), 1), SOME_POINTS, MANY_POINTS)
-    if level == "accepted":
-        return []
-    names = adjusted.block.points[gone]
-    return [Reason(level, f"{len(gone)} of {len(measured)} measured points were left out ({some(names)})")]
+    grade = graded(len(gone) / max(len(measured), 1), SOME_POINTS, MANY_POINTS)
+    value = f"{len(gone)} of {len(measured)}"
+    names, expected = some(adjusted.block.points[gone]), f"below {100 * SOME_POINTS:.0f} %"
+    return doubt("points left out", value, expected, grade, f"{value} measured points were left out ({names})")
 
 
-def some(names: np.ndarray) -> str:
-    """The first few names."""
-    return ", ".join(str(name) for name in names[:3]) + (" …" if len(names) > 3 else "")
+def of_rays(adjusted: AdjustedBlock) -> list[Finding]:
+    """Rays that data snooping removed or a robust estimator gave no weight."""
+    status, weight = adjusted.rays.status, adjusted.rays.weight
+    removed = status == RAY_STATUS.index("removed")
+    used = status == RAY_STATUS.index("used")
+    gone = int(removed.sum()) + int(np.sum(weight[used] < TURNED_DOWN))
+    count = int(removed.sum() + used.sum())
+    value = f"{gone} of {count}"
+    grade = graded(gone / max(count, 1), SOME_RAYS, MANY_RAYS)
+    expected = f"below {100 * SOME_RAYS:.0f} %"
+    return doubt("gross errors", value, expected, grade, f"{value} rays were taken for gross errors")

@@ -3,27 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from aerotri.diagnosis import fit, geometry, left_out, parameters
-from aerotri.diagnosis.reason import LEVELS, Level, Reason
+from aerotri.diagnosis import check_points, fit, geometry, left_out, parameters
+from aerotri.diagnosis.finding import GRADES, Finding, Grade
 from aerotri.statistics.adjusted_block import AdjustedBlock
 
-Rule = Callable[[AdjustedBlock], list[Reason]]
+Rule = Callable[[AdjustedBlock], list[Finding]]
 
 RULES: tuple[Rule, ...] = (
+    fit.of_status,
     fit.of_sigma0,
-    fit.of_groups,
-    fit.of_check_points,
+    fit.of_redundancy,
+    check_points.of_check_points,
+    check_points.of_means,
     left_out.of_photographs,
     left_out.of_points,
+    left_out.of_rays,
     geometry.of_depths,
-    geometry.of_given_orientations,
+    geometry.of_turns,
+    geometry.of_ways,
+    fit.of_groups,
     fit.of_single_observations,
+    fit.of_large_residuals,
     parameters.of_interior,
-    parameters.of_gnss_shifts,
+    parameters.of_gnss,
+    parameters.of_additional,
 )
-"""In the order in which their reasons are read: first what the numbers say, then where it may come from."""
+"""In the order in which they are read: first what the numbers are worth, then where it may come from."""
 
 
 @dataclass(frozen=True)
@@ -36,20 +43,39 @@ class Verdict:
     reasons : sentences, the gravest first; empty where the result is accepted.
     """
 
-    level: Level
+    level: Grade
     reasons: tuple[str, ...] = ()
 
 
-def judge(adjusted: AdjustedBlock) -> Verdict:
-    """The verdict over an adjustment.
+def findings(adjusted: AdjustedBlock) -> list[Finding]:
+    """What to look at first, each number beside what it should be.
+
+    No σ of an adjustment that is not accepted can call anything good: the check points say so.
 
     Parameters
     ----------
     adjusted : in metres, in the frame of the adjustment; its block has the orientations and cameras as given.
     """
-    reasons = [reason for rule in RULES for reason in rule(adjusted)]
-    if adjusted.outcome.status != "converged":
-        reasons.insert(0, Reason("rejected", f"{adjusted.outcome.status}: {adjusted.outcome.message}"))
-    level = max((reason.level for reason in reasons), key=LEVELS.index, default="accepted")
-    ordered = sorted(reasons, key=lambda reason: -LEVELS.index(reason.level))
-    return Verdict(level, tuple(reason.sentence for reason in ordered))
+    found = [finding for rule in RULES for finding in rule(adjusted)]
+    worst = _worst(found)
+    if worst == "accepted":
+        return found
+    return [_with_doubtful_sigma(f, worst) if f.quantity.endswith(check_points.AT_CHECK_POINTS) else f for f in found]
+
+
+def _with_doubtful_sigma(finding: Finding, verdict: Grade) -> Finding:
+    if finding.level != "good":
+        return finding
+    says = f"no more than the σ allow, but the adjustment is {verdict}, and the σ with it"
+    return replace(finding, says=says, level="attention" if verdict == "rejected" else "note")
+
+
+def judge(adjusted: AdjustedBlock) -> Verdict:
+    """The verdict over an adjustment; `adjusted` as in `findings`."""
+    found = [finding for finding in findings(adjusted) if finding.grade != "accepted"]
+    ordered = sorted(found, key=lambda finding: -GRADES.index(finding.grade))
+    return Verdict(_worst(found), tuple(finding.reason for finding in ordered))
+
+
+def _worst(found: list[Finding]) -> Grade:
+    return GRADES[max((GRADES.index(finding.grade) for finding in found), default=0)]

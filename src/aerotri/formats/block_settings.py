@@ -164,7 +164,7 @@ class CorrectionsModel(_Section):
 
 
 class GnssModel(_Section):
-    shift: Literal["off", "block", "strip"] = "strip"
+    shift: Literal["off", "block", "strip"] = "off"
     drift: Literal["off", "block", "strip"] = "off"
     lever_arm_m: Three = [0.0, 0.0, 0.0]
     lever_arm_sigma_m: ThreePositive | None = None

@@ -26,7 +26,6 @@ from aerotri.observations import (
     Camera,
     Control,
     GnssIns,
-    GnssSettings,
     ImagePoints,
     Images,
     Prior,
@@ -62,7 +61,6 @@ def read_dbat(path: str | os.PathLike, positions: str | os.PathLike | None = Non
     pixel_um = cameras[0].pixel_um
     settings = Settings(
         adjustment=_adjustment(script, cameras, images, ids, bool(len(control))),
-        gnss=GnssSettings() if observed is None else GnssSettings(shift="off"),
         image_sigma_um=pixel_um,
     )
     return Block(

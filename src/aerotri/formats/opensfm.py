@@ -29,7 +29,6 @@ from aerotri.observations import (
     Block,
     Camera,
     GnssIns,
-    GnssSettings,
     ImagePoints,
     Images,
     Prior,
@@ -159,7 +158,6 @@ def read_opensfm(path: str | os.PathLike, pixel_um: float = 1.0) -> Reading:
         gnss_ins=observed,
         settings=Settings(
             AdjustmentSettings(additional_parameters=parameters, datum=datum),
-            GnssSettings(shift="off"),
             image_sigma_um=pixel_um,
         ),
     )

@@ -27,7 +27,7 @@ from aerotri.formats.opensfm import read_opensfm
 from aerotri.formats.parts import OrientationList, PointList, RayList, Reading, no_sigma
 from aerotri.formats.pix4d import read_pix4d_offset
 from aerotri.formats.reprojection import FEWEST, control_at_start, residuals_at_start
-from aerotri.observations import AdjustmentSettings, Block, Camera, GnssSettings, ImagePoints, Images
+from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images
 
 FOLDERS = {"ign": "IGN", "patb": "PAT-B"}
 """Kinds of folders whose files are parts."""
@@ -148,9 +148,6 @@ def _whole(request: Request) -> Reading | None:
     if kind == "block":
         return Reading(read_block(path, rays_needed=False))
     block, points = convert.read_any(path, kind)
-    if kind == "dbat":
-        # DBAT takes positions as they are
-        block = replace(block, settings=replace(block.settings, gnss=GnssSettings(shift="off")))
     return Reading(block, points)
 
 
@@ -260,7 +257,7 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
             raise InputError(f"--gnss-shift {request.gnss_shift}", f"it is {', '.join(SHIFTS)}")
         settings = replace(settings, gnss=replace(settings.gnss, shift=request.gnss_shift))
     elif request.positions and settings.gnss.shift != "off":
-        messages.append(f"GNSS positions may be shifted ({settings.gnss.shift}): state it with --gnss-shift")
+        messages.append(f"the block lets GNSS positions be shifted ({settings.gnss.shift}): --gnss-shift off does not")
     block = replace(block, settings=settings, image_points=replace(rays, sigma=sigma))
     messages += fit_of_start_values(block, request.stated.geoid)
     return replace(reading, block=block, messages=tuple(messages))

@@ -284,7 +284,7 @@ class AdjustmentSettings:
 class GnssSettings:
     """What `[gnss]` says. `lever_arm_m` runs from the projection centre to the antenna, in the camera frame."""
 
-    shift: str = "strip"
+    shift: str = "off"
     drift: str = "off"
     lever_arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     lever_arm_sigma_m: tuple[float, float, float] | None = None

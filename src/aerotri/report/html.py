@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -18,7 +18,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from aerotri import diagnosis
 from aerotri.crosscheck import CrosscheckResult
+from aerotri.diagnosis import Finding
 from aerotri.image_errors import Change
 from aerotri.report import parameter_tables, precision_tables, quality, tables, work_tables
 from aerotri.report.interactive_plan import interactive_plan
@@ -86,6 +88,7 @@ class Findings:
         others, as 'crosscheck'.
     effects : what leaving parameters out changes at the check points; None where there are none, or it was not asked.
     changes : of the image errors between groups. compared : the sets of additional parameters that were compared.
+    lights : what the result is judged by; None: made from the result, as the work list.
     """
 
     work: WorkList | None = None
@@ -94,6 +97,7 @@ class Findings:
     effects: ParameterEffects | None = None
     changes: tuple[Change, ...] = ()
     compared: ParameterComparison | None = None
+    lights: Sequence[Finding] | None = None
 
 
 NOTHING_BESIDE = Findings()
@@ -135,9 +139,10 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
     return {
         "name": quality.printable(adjusted.block.name),
         "outcome": adjusted.outcome,
+        "reasons": [quality.printable(reason, 1000) for reason in adjusted.outcome.reasons],
         "version": _version(),
         "cards": _cards(adjusted),
-        "findings": quality.findings(adjusted),
+        "findings": diagnosis.findings(adjusted) if beside.lights is None else beside.lights,
         "warnings": [quality.printable(text, 1000) for text in adjusted.outcome.warnings],
         "asprs": quality.asprs_warning(adjusted),
         "plots": {name: _embedded(name, plot) for name, plot in plots.items()},

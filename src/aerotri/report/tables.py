@@ -21,6 +21,7 @@ TOP_WEAK = 15
 LONGEST_CELL = 1000
 MOST_ROWS = 3000
 GNSS_UNITS = {"shift": "m", "drift": "m/s"}
+MOST_REASONS = 6
 
 
 @dataclass(frozen=True)
@@ -316,7 +317,9 @@ def weak_images(adjusted: AdjustedBlock, top: int = TOP_WEAK) -> Table:
 def verdict_lines(outcome: Outcome) -> list[str]:
     """What the result is worth, and why: the first that is read."""
     first = [f"verdict: {outcome.verdict}"] if outcome.verdict else []
-    return first + [f"  because {printable(reason, 500)}" for reason in outcome.reasons]
+    more = len(outcome.reasons) - MOST_REASONS
+    rest = [f"  and {more} more reason{'s' * (more > 1)}, see adjustment.json"] if more > 0 else []
+    return first + [f"  because {printable(reason, 500)}" for reason in outcome.reasons[:MOST_REASONS]] + rest
 
 
 def summary_lines(adjusted: AdjustedBlock) -> list[str]:

@@ -108,12 +108,9 @@ def complete(reading: Reading, given: Given, crs: str, positions: PositionList |
 
 
 def _with_datum(reading: Reading) -> Reading:
-    """Positions may be shifted as a whole where control holds the block; without either the datum is minimal."""
+    """Without positions and control the datum is minimal."""
     block, settings = reading.block, reading.block.settings
-    held = is_held_by_control(block)
-    if block.gnss_ins is not None and held:
-        settings = replace(settings, gnss=replace(settings.gnss, shift="block"))
-    if block.gnss_ins is None and not held:
+    if block.gnss_ins is None and not is_held_by_control(block):
         settings = replace(settings, adjustment=replace(settings.adjustment, datum="minimal"))
     return replace(reading, block=replace(block, settings=settings))
 

@@ -1,0 +1,156 @@
+"""Rules on check points: differences against what σ of the adjusted and the given coordinates let expect."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import gammaincinv
+
+from aerotri.diagnosis.finding import SIGNIFICANCE, Finding, Grade, chi_square_p, graded, metre_digits, times
+from aerotri.diagnosis.geometry import usual_distance
+from aerotri.statistics.adjusted_block import AdjustedBlock, GroundPointResults
+
+ENOUGH_CHECK_POINTS = 30
+AT_CHECK_POINTS = "at check points"
+
+POOR, WORTHLESS = 2.0, 10.0
+"""RMS over what σ let expect. Up to two, errors not modelled in real cameras are usual; at ten σ say nothing."""
+
+ABSURD = 0.2
+"""RMS over the distance from the cameras to the ground: such a result is none, however large its σ."""
+
+
+@dataclass(frozen=True, eq=False)
+class GroundStatistics:
+    """Differences adjusted − given over control or check points, metres; NaN where there is no coordinate.
+
+    Parameters
+    ----------
+    count, rms, mean, max : (3,) of X, Y, Z; max without sign.
+    expected : (3,) the RMS that the σ of the adjusted and the given coordinates lead to expect.
+    """
+
+    count: np.ndarray
+    rms: np.ndarray
+    mean: np.ndarray
+    max: np.ndarray
+    expected: np.ndarray
+
+    @property
+    def rmse_h(self) -> float:
+        """m, √(RMS_X² + RMS_Y²)."""
+        return float(np.hypot(self.rms[0], self.rms[1]))
+
+    @property
+    def rmse_v(self) -> float:
+        """m."""
+        return float(self.rms[2])
+
+
+def ground_statistics(adjusted: AdjustedBlock, results: GroundPointResults) -> GroundStatistics:
+    """Count, RMS, mean and largest difference by coordinate.
+
+    The given coordinates enter the expected RMS with their own σ. Control points were adjusted: their differences are
+    residuals, whose expected size is σ·√r.
+    """
+    d = results.difference
+    given = np.isfinite(d)
+    n = given.sum(axis=0)
+    filled = np.where(given, d, 0.0)
+    sigma = _sigma_given(adjusted, results)
+    variance = (
+        results.sigma**2 + sigma**2 if results is adjusted.check else (adjusted.outcome.sigma0 * sigma) ** 2 * results.r
+    )
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rms = np.sqrt((filled**2).sum(axis=0) / n)
+        mean = filled.sum(axis=0) / n
+        largest = np.where(n > 0, np.abs(filled).max(axis=0, initial=0.0), np.nan)
+        expected = np.sqrt(np.where(given, variance, 0.0).sum(axis=0) / n)
+    return GroundStatistics(n, rms, mean, largest, expected)
+
+
+def _sigma_given(adjusted: AdjustedBlock, results: GroundPointResults) -> np.ndarray:
+    """(k, 3) m, σ of the given coordinates; 0 where none was given."""
+    control = adjusted.block.control
+    row_of = {int(point): row for row, point in enumerate(control.point)}
+    sigma = np.zeros((len(results), 3))
+    for i, point in enumerate(results.point):
+        row = row_of.get(int(point))
+        if row is not None:
+            sigma[i] = np.nan_to_num(control.sigma[row])
+    return sigma
+
+
+def asprs_warning(adjusted: AdjustedBlock) -> str:
+    """A sentence where there are too few check points for the ASPRS standard, '' otherwise."""
+    n = len(adjusted.check)
+    if n >= ENOUGH_CHECK_POINTS:
+        return ""
+    found = (
+        "There are no check points" if n == 0 else f"There {'is' if n == 1 else 'are'} {n} check point{'s' * (n > 1)}"
+    )
+    return (
+        f"{found}; the ASPRS Positional Accuracy Standards, edition 2, require at least {ENOUGH_CHECK_POINTS} to test "
+        "the accuracy of a product."
+    )
+
+
+def of_check_points(adjusted: AdjustedBlock) -> list[Finding]:
+    """How many there are, and their RMS in plan and height."""
+    results = adjusted.check
+    if not len(results):
+        return [
+            Finding("check points", "none", f"at least {ENOUGH_CHECK_POINTS}", asprs_warning(adjusted), "attention")
+        ]
+    s = ground_statistics(adjusted, results)
+    few, digits = len(results) < ENOUGH_CHECK_POINTS, metre_digits(results.sigma)
+    found = [
+        Finding("check points", f"{len(results)}", f"at least {ENOUGH_CHECK_POINTS} (ASPRS, edition 2)",
+                "too few to report a tested accuracy" if few else "enough", "attention" if few else "good"),
+    ]  # fmt: skip
+    distance = usual_distance(adjusted)
+    expected_h, n_h = float(np.hypot(s.expected[0], s.expected[1])), int(s.count[:2].sum())
+    for name, rmse, expected, n in (("RMSE_H", s.rmse_h, expected_h, n_h),
+                                    ("RMSE_V", s.rmse_v, float(s.expected[2]), int(s.count[2]))):  # fmt: skip
+        found.append(_rmse(f"{name} {AT_CHECK_POINTS}", rmse, expected, n, digits, distance))
+    return found
+
+
+def _rmse(name: str, rmse: float, expected: float, n: int, digits: int, distance: float) -> Finding:
+    """RMS against the σ of adjusted and given coordinates; n differences make the χ² bound."""
+    if n == 0 or not np.isfinite(rmse):
+        return Finding(name, "–", "–", "no coordinate to compare", "note")
+    if rmse > ABSURD * distance:
+        reason = f"{name} is {rmse:.3g} m, at a distance of {distance:.3g} m from the cameras"
+        return Finding(name, f"{rmse:.3g} m", f"{expected:.3g} m from the σ", "no result", "attention", "rejected",
+                       reason)  # fmt: skip
+    limit = expected * float(np.sqrt(2.0 * gammaincinv(n / 2.0, 0.975) / n))
+    value = f"{rmse:.{digits}f} m"
+    text = f"{expected:.{digits}f} m from the σ; at most {limit:.{digits}f} m (χ², 97.5 %)"
+    if not rmse > limit:
+        return Finding(name, value, text, "as the σ say", "good")
+    grade: Grade = "accepted"
+    if chi_square_p(n * (rmse / expected) ** 2, n) < SIGNIFICANCE:
+        grade = graded(rmse / expected, POOR, WORTHLESS)
+    reason = f"{name} is {value}, {times(rmse / expected)} as large as the σ let expect"
+    return Finding(name, value, text, "larger than the σ say: systematic errors, or σ too small", "attention", grade,
+                   reason if grade != "accepted" else "")  # fmt: skip
+
+
+def of_means(adjusted: AdjustedBlock) -> list[Finding]:
+    """Coordinates whose mean difference is not what chance leaves."""
+    found = []
+    if not len(adjusted.check):
+        return found
+    s, digits = ground_statistics(adjusted, adjusted.check), metre_digits(adjusted.check.sigma)
+    for axis, n, mean, rms in zip("XYZ", s.count, s.mean, s.rms, strict=True):
+        if n < 5 or not rms > abs(mean):
+            continue
+        t = abs(mean) / np.sqrt((rms**2 - mean**2) / (n - 1))
+        if t > 3.0:
+            expected = f"0 within 3 σ of the mean; t = {t:.1f}"
+            says = "the block is shifted against the check points"
+            value = f"{mean:+.{digits}f} m"
+            found.append(Finding(f"mean of d{axis} {AT_CHECK_POINTS}", value, expected, says, "attention"))
+    return found
