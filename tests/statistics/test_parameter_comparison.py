@@ -63,9 +63,12 @@ def test_prediction_of_what_nothing_else_determines():
 
 
 def test_folds():
-    assert sorted(folds_of(7, 100).tolist()) == list(range(7))
-    assert np.bincount(folds_of(23, 5)).tolist() == [5, 5, 5, 4, 4]
-    np.testing.assert_array_equal(folds_of(23, 5), folds_of(23, 5))
+    assert sorted(folds_of(np.arange(7), 100).tolist()) == list(range(7))
+    place = np.arange(23)
+    assert np.bincount(folds_of(place, 5)).tolist() == [5, 5, 5, 4, 4]
+    np.testing.assert_array_equal(folds_of(place, 5), folds_of(place, 5))
+    # the same points in other rows
+    np.testing.assert_array_equal(folds_of(place[::-1] * 3, 5), folds_of(place, 5)[::-1])
 
 
 def test_each_set_as_adjust_has_it(block, compared):

@@ -1,5 +1,7 @@
 """Parameters left out: the check points move as an adjustment without them moves them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,10 +14,11 @@ ERRORS = {"bluh.1": 2e-5, "bluh.9": 1e-8, "ultracam_d.50": 4e-3}
 SPEC = "bluh:1-4+9,ultracam_d:50-52"
 
 
-def effects_of(check_points=30):
+def effects_of(check_points=30, change=None):
     camera = {"ucd": {"preset": "ultracam_d", "errors": {"parameters": ERRORS}}}
     control = {"distance_bases": 3.0, "sigma_m": [0.03, 0.03, 0.05], "check_points": check_points}
     block, _ = small_block(3, SPEC, camera=camera, control=control)
+    block = block if change is None else change(block)
     found = adjust_keeping_system(block)
     factor = found.system.factorise(found.solution.equations)
     return block, found.local, parameter_effects(found.local, found.system, found.solution, factor)
@@ -72,3 +75,21 @@ def test_nodes_of_a_grid_are_left_out_together():
     factor = found.system.factorise(found.solution.equations)
     effects = parameter_effects(found.local, found.system, found.solution, factor)
     assert [one.label for one in effects.left_out] == ["all", "bluh", "legendre", "bluh.1", "bluh.9"]
+
+
+def test_points_in_any_order(case):
+    """Points are numbered as their table has them, and adjusted in another order."""
+
+    def reversed_points(block):
+        last, rays, control = len(block.points) - 1, block.image_points, block.control
+        return replace(
+            block, points=block.points[::-1], image_points=replace(rays, point=last - rays.point),
+            control=replace(control, point=last - control.point),
+        )  # fmt: skip
+
+    _, _, effects = case
+    _, _, found = effects_of(change=reversed_points)
+    for one, other in zip(effects.left_out, found.left_out, strict=True):
+        assert other.label == one.label
+        np.testing.assert_allclose(other.difference, one.difference, atol=1e-9)
+        assert other.worse == pytest.approx(one.worse, rel=1e-6)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment import _intersection_kernels
-from aerotri.adjustment.track import AXIS_ANGLE, headings, strips_of_track, vertical_rotations
+from aerotri.adjustment.track import AXIS_ANGLE, headings, order_of_exposure, strips_of_track, vertical_rotations
 from aerotri.adjustment.unknowns import StartValues
 from aerotri.functional_model.additional_parameters import brown, lens
 from aerotri.functional_model.collinearity import interior_row
@@ -98,7 +98,11 @@ def _observed_centres(block: Block, centre: np.ndarray, origin: np.ndarray) -> n
 def _orient_along_track(block: Block, origin, directions, observed, rotation, centre, known) -> np.ndarray:
     """Vertical photographs along the track, refined with the centres as observations; the points they intersect."""
     there = np.flatnonzero(np.isfinite(observed[:, 0]))
-    strip = strips_of_track(observed[there], np.asarray(block.images.strip)[there])
+    time = _times(block)[there]
+    names, strips = np.asarray(block.images.names)[there], np.asarray(block.images.strip)[there]
+    order = order_of_exposure(observed[there], strips, names, time)
+    there = there[order]
+    strip = strips_of_track(observed[there], strips[order])
     heading = headings(observed[there], strip)
     stated = [block.cameras[c].flight_axis for c in block.images.camera[there]]
     best = None
@@ -106,6 +110,8 @@ def _orient_along_track(block: Block, origin, directions, observed, rotation, ce
         axes = np.array([a or axis for a in stated])
         trial = np.full_like(rotation, np.nan)
         trial[there] = vertical_rotations(heading, axes)
+        if not np.isfinite(time).all():
+            _turn_strips(trial, block, directions, observed, there, strip)
         points = np.full_like(known, np.nan)
         miss = _intersect_into(points, block, directions, trial, observed)
         if best is None or miss < best[0]:
@@ -123,6 +129,56 @@ def _orient_along_track(block: Block, origin, directions, observed, rotation, ce
             return points
         rotation[:], centre[:] = np.nan, np.nan
     return known.copy()
+
+
+def _times(block: Block) -> np.ndarray:
+    """(n,) s, times of exposure; NaN where not given."""
+    time = np.full(len(block.images), np.nan)
+    if block.gnss_ins is not None:
+        time[block.gnss_ins.image] = block.gnss_ins.time
+    return time
+
+
+def _turn_strips(trial: np.ndarray, block: Block, directions: _Directions, observed, there, strip) -> None:
+    """Strips flown the other way round than taken: those whose own rays meet better with the photographs turned.
+
+    Parameters
+    ----------
+    trial : (n, 3, 3) rotations, changed in place. there, strip : (k,) photographs and the strip of each.
+    """
+    of_image = np.full(len(block.images), -1)
+    of_image[there] = strip
+    turned = trial.copy()
+    turned[there] = trial[there] @ np.diag([-1.0, -1.0, 1.0])
+    missed = [_miss_by_strip(block, directions, rotation, observed, of_image) for rotation in (trial, turned)]
+    wrong = there[missed[1][strip] < missed[0][strip]]
+    trial[wrong] = turned[wrong]
+
+
+def _miss_by_strip(block: Block, directions: _Directions, rotation, centre, of_image: np.ndarray) -> np.ndarray:
+    """(strips,) rad, median angular distance of rays from the points that the strip's photographs alone give."""
+    rays = block.image_points
+    strips = int(of_image.max()) + 1
+    use = of_image[rays.image] >= 0
+    strip = of_image[rays.image[use]]
+    pair, point = np.unique(rays.point[use] * strips + strip, return_inverse=True)
+    image, tangent = rays.image[use], directions.tangent[use]
+    _, miss = _meet(len(pair), point, rotation[image], centre[image], tangent, directions.tolerance[use])
+    # a point in one photograph of the strip says nothing
+    tells = np.bincount(point, minlength=len(pair))[point] > 1
+    own = [miss[tells & (strip == k)] for k in range(strips)]
+    return np.array([np.median(of_strip) if len(of_strip) else 0.0 for of_strip in own])
+
+
+def _meet(count: int, point, rotation, centre, tangent, tolerance) -> tuple[np.ndarray, np.ndarray]:
+    """Points (count, 3) where rays meet, and the angular distance (m,) rad of each ray, π where there is no point."""
+    ray = np.einsum("mij,mj->mi", rotation, np.column_stack([tangent, -np.ones(len(tangent))]))
+    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    found = intersect(count, point, centre, ray, tolerance)
+    reach = found[point] - centre
+    with np.errstate(invalid="ignore"):
+        along = np.einsum("mi,mi->m", reach, ray) / np.linalg.norm(reach, axis=1)
+    return found, np.where(np.isfinite(along), np.arccos(np.clip(along, -1.0, 1.0)), np.pi)
 
 
 def _loose_centres(block: Block, observed: np.ndarray, sigma_m: float) -> GnssIns:
@@ -203,16 +259,11 @@ def _intersect_into(points, block: Block, directions: _Directions, rotation, cen
     rays = block.image_points
     use = np.isfinite(centre[rays.image, 0])
     image, point = rays.image[use], rays.point[use]
-    tangent = directions.tangent[use]
-    ray = np.einsum("mij,mj->mi", rotation[image], np.column_stack([tangent, -np.ones(len(tangent))]))
-    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-    found = intersect(len(points), point, centre[image], ray, directions.tolerance[use])
+    found, miss = _meet(
+        len(points), point, rotation[image], centre[image], directions.tangent[use], directions.tolerance[use]
+    )
     there = np.isfinite(found).all(axis=1)
     points[there] = found[there]
-    reach = found[point] - centre[image]
-    with np.errstate(invalid="ignore"):
-        along = np.einsum("mi,mi->m", reach, ray) / np.linalg.norm(reach, axis=1)
-    miss = np.where(np.isfinite(along), np.arccos(np.clip(along, -1.0, 1.0)), np.pi)
     return float(np.median(miss)) if len(miss) else np.pi
 
 
@@ -251,6 +302,8 @@ def _resect_into(rotation, centre, points, block: Block, directions: _Directions
         if count < enough:
             continue
         own = rows[begin : begin + count]
+        # random sampling draws by place: the same rays in other rows have to give the same
+        own = own[np.lexsort(directions.tangent[own].T)]
         pose = resect(
             points[rays.point[own]], directions.tangent[own], tolerance * float(np.median(directions.tolerance[own]))
         )

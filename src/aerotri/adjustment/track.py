@@ -6,6 +6,8 @@ is the camera's `flight_axis`; where it is not stated, all four are tried by the
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -17,6 +19,40 @@ LONG_LEG = 3.0
 
 AXIS_ANGLE = {"+x": 0.0, "+y": np.pi / 2.0, "-x": np.pi, "-y": -np.pi / 2.0}
 """Direction of the flight in the image, counted from the x axis."""
+
+
+def along_strip(centre: np.ndarray) -> np.ndarray:
+    """(n,) order of the photographs of a strip (n, 3) along its line, from west to east, or south to north."""
+    middle = centre.mean(axis=0)
+    along = np.linalg.svd(centre - middle)[2][0]
+    # a direction has no sign of its own
+    along = along * np.sign(along[np.argmax(np.abs(along))])
+    return np.argsort((centre - middle) @ along, kind="stable")
+
+
+def order_of_exposure(centre: np.ndarray, strips: np.ndarray, names: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """(n,) order in which photographs were taken, or the other way round.
+
+    By their time where all have one, else along the named strips, else in the order of the rows or of the names
+    (numbers in them counted as such), whichever makes the shorter track.
+
+    Parameters
+    ----------
+    centre : (n, 3) m. strips, names : (n,) str, strips '' where unknown. time : (n,) s, NaN where unknown.
+    """
+    if np.isfinite(time).all():
+        return np.argsort(time, kind="stable")
+    if all(strips.tolist()):
+        own = [np.flatnonzero(strips == strip) for strip in dict.fromkeys(strips.tolist())]
+        return np.concatenate([rows[along_strip(centre[rows])] for rows in own])
+    by_name = np.array(sorted(range(len(names)), key=lambda k: _natural(str(names[k]))), dtype=np.int64)
+    orders = (np.arange(len(names)), by_name)
+    return min(orders, key=lambda rows: float(np.linalg.norm(np.diff(centre[rows, :2], axis=0), axis=1).sum()))
+
+
+def _natural(name: str) -> list[tuple[int, int, str]]:
+    """A name as a key to sort by, 'IMG_9' before 'IMG_10'."""
+    return [(1, int(part), "") if part.isdecimal() else (0, 0, part) for part in re.split(r"(\d+)", name)]
 
 
 def strips_of_track(centre: np.ndarray, names: np.ndarray) -> np.ndarray:
@@ -44,7 +80,7 @@ def strips_of_track(centre: np.ndarray, names: np.ndarray) -> np.ndarray:
 def headings(centre: np.ndarray, strip: np.ndarray) -> np.ndarray:
     """(n,) rad, direction of flight of every photograph, counted from the X axis; NaN for a strip of one.
 
-    The direction of a strip is that from its first to its last half; of a short one, of its neighbours.
+    The direction of a strip is that from its first to its last half; of a single photograph, of the nearest one.
     """
     heading = np.full(len(centre), np.nan)
     for number in np.unique(strip):
@@ -56,7 +92,7 @@ def headings(centre: np.ndarray, strip: np.ndarray) -> np.ndarray:
     known = np.flatnonzero(np.isfinite(heading))
     for k in np.flatnonzero(~np.isfinite(heading)):
         if len(known):
-            heading[k] = heading[known[np.argmin(np.abs(known - k))]]
+            heading[k] = heading[known[np.argmin(np.linalg.norm(centre[known] - centre[k], axis=1))]]
     return heading
 
 

@@ -94,6 +94,8 @@ def _part_of_file(
     if used.sum() < 3:
         raise InputError("has hardly a picket that was accepted", "measure again", path)
     rows = np.flatnonzero(used)
+    # what is drawn of them at random must not hang on the order of the file
+    rows = rows[order_in_plan(xyz[rows])]
     pickets = pickets_of_names(
         calibration.result.block, xyz[rows], [[str(n) for n in names[k]] for k in rows],
         matching_sigma_mm(calibration, options),

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.adjustment.track import along_strip
 from aerotri.conventions import InputError
 from aerotri.deformation.model_geometry import ModelGeometry, geometry_of
 from aerotri.deformation.model_grid import (
@@ -111,9 +112,7 @@ def strip_pairs(calibration: Calibration, of: Restitution, step: int = 1) -> lis
     for strip in dict.fromkeys(strips[known].tolist()):
         members = np.flatnonzero(known & (strips == strip))
         if strip and len(members) > 1:
-            middle = centre[members].mean(axis=0)
-            along = np.linalg.svd(centre[members] - middle)[2][0]
-            members = members[np.argsort((centre[members] - middle) @ along, kind="stable")]
+            members = members[along_strip(centre[members])]
         for left, right in zip(members[:-step].tolist(), members[step:].tolist(), strict=True):
             model = pair_model(of, ("", ""), (left, right))
             if geometry_of(model, ground).end_lap >= SMALLEST_END_LAP:

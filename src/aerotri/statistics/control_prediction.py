@@ -16,6 +16,7 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.unknowns import Unknowns
+from aerotri.observations.order import ranks_of
 
 UNDETERMINED = 1e-9
 """Redundancy of a combination of coordinates below which nothing else determines it."""
@@ -44,9 +45,17 @@ def control_rows(unknowns: Unknowns) -> np.ndarray:
     return np.flatnonzero((unknowns.prior_weight > 0.0).any(axis=1))
 
 
-def folds_of(count: int, folds: int) -> np.ndarray:
-    """(count,) the fold of every control point: as equal as can be, shuffled, always alike."""
-    return np.random.default_rng(0).permutation(count) % max(1, min(folds, count))
+def folds_of(place: np.ndarray, folds: int) -> np.ndarray:
+    """(k,) the fold of every control point: as equal as can be, shuffled, always alike.
+
+    Parameters
+    ----------
+    place : (k,) of the points in an order that does not depend on rows or names.
+    """
+    count = len(place)
+    fold = np.empty(count, dtype=np.int64)
+    fold[np.argsort(place)] = np.random.default_rng(0).permutation(count) % max(1, min(folds, count))
+    return fold
 
 
 def predict_control(
@@ -59,7 +68,7 @@ def predict_control(
     factor : undamped, at the solution. folds : how many; no more than there are points.
     """
     u, rows = system.unknowns, control_rows(system.unknowns)
-    fold = folds_of(len(rows), folds)
+    fold = folds_of(ranks_of(u.block).point[u.points[rows]], folds)
     difference, sigma = np.full((len(rows), 3), np.nan), np.full((len(rows), 3), np.nan)
     for number in range(int(fold.max(initial=-1)) + 1):
         own = np.flatnonzero(fold == number)

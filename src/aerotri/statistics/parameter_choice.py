@@ -107,6 +107,9 @@ def gain(outcome: SetOutcome, other: SetOutcome, differences: tuple[np.ndarray, 
     own, against = own[known] ** 2, against[known] ** 2
     if not len(own):
         return Gain(other.name, float("nan"), float("nan"))
+    # drawing goes by place: the same points in another order have to give the same
+    order = np.lexsort(np.hstack([own, against]).T)
+    own, against = own[order], against[order]
     chosen = np.random.default_rng(0).multinomial(len(own), np.full(len(own), 1.0 / len(own)), RESAMPLES)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.exp(0.5 * np.mean(np.log(chosen @ own) - np.log(chosen @ against), axis=1))

@@ -87,7 +87,9 @@ def parameter_effects(
         return None
     column_of = {key: k for k, key in enumerate(zip(u.shared.names, u.shared.groups, strict=True))}
     columns = np.array([column_of[str(p.names[row]), str(p.groups[row])] for row in rows])
-    at = np.searchsorted(u.points, adjusted.check.point)
+    row = np.full(len(u.block.points), -1)
+    row[u.points] = np.arange(len(u.points))
+    at = row[adjusted.check.point]
     q_points, q = _cofactors(system, solution, factor, columns, at)
     value, d = p.value[rows], adjusted.check.difference
     variance = adjusted.check.sigma**2 + _given_sigma(adjusted) ** 2

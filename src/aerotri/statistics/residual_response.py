@@ -16,8 +16,11 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.robust import LEAST_SQUARES
 from aerotri.adjustment.solve import Solution
 from aerotri.functional_model.observed_unknowns import Rows
+from aerotri.observations.order import ranks_of
 from aerotri.statistics.observation_groups import EXTRA_GROUPS, control_groups, image_groups_of
 
+EXACT = 32
+"""Observations up to which a group is computed exactly: what is drawn at random says too little of so few."""
 SMALL = 1e-3
 """Size, in σ, of the errors that are put in: far below any curvature, far above rounding."""
 
@@ -41,6 +44,17 @@ class ResidualResponse:
         self._factor = self._system.factorise(self._system.assemble(self._state, 0.0, LEAST_SQUARES))
         self._sizes = [inv_sigma.size, unknowns.prior_weight.size, *(rows.gap.size for rows in self._rows)]
         self._at_rest = self._after_a_step(np.zeros(sum(self._sizes)))
+
+    @property
+    def places(self) -> np.ndarray:
+        """(N,) of the observations within their groups, in an order that does not depend on rows or names."""
+        u, ranks = self._unknowns, ranks_of(self._unknowns.block)
+        places = [2 * ranks.ray[u.rays.source][:, None] + np.arange(2)]
+        places.append(3 * ranks.point[u.points][:, None] + np.arange(3))
+        for rows in self._rows:
+            own = np.where(rows.image >= 0, ranks.image[u.images[rows.image]], np.arange(len(rows.image)))
+            places.append(own[:, None] * rows.gap.shape[1] + np.arange(rows.gap.shape[1]))
+        return np.concatenate([part.ravel() for part in places])
 
     @property
     def groups(self) -> np.ndarray:
@@ -98,7 +112,7 @@ def _add_rows(right: np.ndarray, images: int, rows: Rows, errors: np.ndarray) ->
 def cross_redundancy(response: ResidualResponse, names: tuple[str, ...], probes: int) -> np.ndarray:
     """S with S_gh = Σ R_ij² over the observations i of group g and j of group h; its rows sum to the redundancy of g.
 
-    A group of no more than `probes` observations is computed exactly, the others from random signs (Hutchinson): the
+    A group of no more than `EXACT` observations is computed exactly, the others from random signs (Hutchinson): the
     mean of |R·z|² over h, z of signs ±1 on g.
 
     Parameters
@@ -107,10 +121,12 @@ def cross_redundancy(response: ResidualResponse, names: tuple[str, ...], probes:
     """
     groups = response.groups
     members = [np.flatnonzero(groups == name) for name in names]
+    places = response.places
+    members = [own[np.argsort(places[own], kind="stable")] for own in members]
     rng = np.random.default_rng(0)
     s = np.zeros((len(names), len(names)))
     for g, own in enumerate(members):
-        exact = len(own) <= probes
+        exact = len(own) <= max(probes, EXACT)
         for k in range(len(own) if exact else probes):
             errors = np.zeros(len(groups))
             if exact:

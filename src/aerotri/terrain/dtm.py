@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.adjustment.track import along_strip
 from aerotri.conventions import InputError
 from aerotri.deformation.block_models import strip_pairs
 from aerotri.deformation.model_geometry import geometry_of
@@ -98,8 +99,7 @@ def chosen_rows(calibration: Calibration, subset: str) -> np.ndarray:
         members = np.flatnonzero(images.strip == strip)
         centre = calibration.local.images.centre[members]
         if strip and len(members) > 1 and np.isfinite(centre).all():
-            along = np.linalg.svd(centre - centre.mean(axis=0))[2][0]
-            members = members[np.argsort(centre @ along, kind="stable")]
+            members = members[along_strip(centre)]
         rows.append(members[0 if subset == "odd" else 1 :: 2])
     found = np.sort(np.concatenate(rows))
     return found[oriented[found]]

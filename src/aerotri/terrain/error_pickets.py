@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import Delaunay, KDTree
 
 from aerotri.terrain.pickets import NEIGHBOURS, PEAK, Pickets
+from aerotri.terrain.tin import order_in_plan
 
 N_NEIGHBOURS = 12
 LIMIT = 6.0
@@ -72,6 +73,13 @@ def peaks_and_pits(xyz: np.ndarray, floor: float) -> np.ndarray:
     A corner stands out where it is higher, or lower, than its neighbours by more than `PEAK_LIMIT` times what corners
     around differ from theirs.
     """
+    order = order_in_plan(xyz)
+    standing = np.empty(len(xyz), dtype=bool)
+    standing[order] = _stand_out(xyz[order], floor)
+    return standing
+
+
+def _stand_out(xyz: np.ndarray, floor: float) -> np.ndarray:
     delaunay = Delaunay(xyz[:, :2] - xyz[:, :2].mean(axis=0))
     start, neighbours = delaunay.vertex_neighbor_vertices
     count = np.diff(start)

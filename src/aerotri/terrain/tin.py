@@ -80,12 +80,13 @@ def triangulate(
     ------
     InputError
     """
-    own = np.zeros(len(xyz)) if variance is None else variance
-    shared = np.zeros(len(xyz)) if common is None else common
     if len(xyz) < 3:
         raise InputError(f"{len(xyz)} points make no surface", "measure more pickets")
-    origin = xyz[:, :2].mean(axis=0)
-    plan, z, source = xyz[:, :2] - origin, xyz[:, 2], np.arange(len(xyz))
+    source = order_in_plan(xyz)
+    own = np.zeros(len(xyz)) if variance is None else variance[source]
+    shared = np.zeros(len(xyz)) if common is None else common[source]
+    origin = xyz[source, :2].mean(axis=0)
+    plan, z = xyz[source, :2] - origin, xyz[source, 2]
     if breaklines:
         line_points, segments = _segments([line - [*origin, 0.0] for line in breaklines])
         apart = KDTree(line_points[:, :2]).query(plan)[0] > SAME_PLACE_M
@@ -99,6 +100,22 @@ def triangulate(
     corners = plan[delaunay.simplices]
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     return Tin(origin, plan, z, own, shared, delaunay, sides.max(axis=1) <= longest, source)
+
+
+def order_in_plan(xyz: np.ndarray) -> np.ndarray:
+    """(n,) rows of points (n, 3) by X, then Y, then Z.
+
+    Four points on a circle, as those of a grid are, may be joined either way: which way hangs on their order, and that
+    must not be the one of the rows they came in.
+    """
+    return np.lexsort(xyz.T[::-1])
+
+
+def corners_in_plan(xyz: np.ndarray) -> np.ndarray:
+    """(t, 3) rows of the corners of the Delaunay triangles over points (n, 3)."""
+    order = order_in_plan(xyz)
+    plan = xyz[order, :2]
+    return order[Delaunay(plan - plan.mean(axis=0)).simplices]
 
 
 def _delaunay(plan: np.ndarray) -> Delaunay:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from scipy.spatial import Delaunay
 
 from aerotri.rasters import Grid
+from aerotri.terrain.tin import corners_in_plan
 from aerotri.volume.bases import Base, SplineBase, Surface
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.sums import cells_within, windows
@@ -40,7 +40,7 @@ class Functional:
 
 def triangulated(xyz: np.ndarray) -> np.ndarray:
     """(t, 3) corners of the Delaunay triangles over pickets (k, 3)."""
-    return Delaunay(xyz[:, :2] - xyz[:, :2].mean(axis=0)).simplices
+    return corners_in_plan(xyz)
 
 
 def triangle_slopes(xyz: np.ndarray, triangles: np.ndarray) -> np.ndarray:
