@@ -78,6 +78,7 @@ def _part_of_file(
     import pyarrow as pa
 
     from aerotri.formats.parquet import load_parquet
+    from aerotri.terrain.tin import order_in_plan
     from aerotri.volume.functionals import triangulated
     from aerotri.volume.parts import matching_sigma_mm, part_of_pickets
     from aerotri.volume.pickets import pickets_of_names, with_height_sigmas
