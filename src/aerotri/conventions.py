@@ -48,6 +48,24 @@ class InputError(Exception):
         return _printable(f"{text} — {self.remedy}" if self.remedy else text)
 
 
+LARGEST = 1e12
+"""No number that a user states is larger, whatever its unit; a larger one would overflow in a square."""
+
+
+def stated_number(text: str) -> float:
+    """The number that a text states.
+
+    Raises
+    ------
+    ValueError
+        When it is none, or one that nothing measured can have.
+    """
+    value = float(text)
+    if not abs(value) <= LARGEST:
+        raise ValueError(f"{text} is no number to compute with")
+    return value
+
+
 def _printable(text: str) -> str:
     """Text as it may go to a terminal: what a file brought along that is not printable is escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

@@ -138,7 +138,7 @@ def _distance(xy: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     [
         (("--subset", "third"), "there is no subset"),
         (("--window", "16"), "has no middle"),
-        (("--interval", "wide"), "is no interval"),
+        (("--interval", "wide"), "--interval .wide. is none"),
         (("--breaklines", "lines.shp"), "no known kind"),
     ],
 )

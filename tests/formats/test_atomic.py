@@ -7,17 +7,21 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 
 from aerotri.conventions import InputError
-from aerotri.formats import atomic
+from aerotri.formats import atomic, work_place
 from aerotri.formats.atomic import atomic_file, atomic_folder
+from aerotri.formats.ownership import LEDGER, foreign_files
+from aerotri.formats.work_place import held
 
 
 def _names(folder):
-    return sorted(path.name for path in folder.iterdir())
+    """All entries but the list of what was written."""
+    return sorted(path.name for path in folder.iterdir() if path.name != LEDGER)
 
 
 def test_folder_appears_whole(tmp_path):
@@ -70,7 +74,7 @@ def test_exchange_that_fails_brings_the_old_folder_back(tmp_path, monkeypatch):
         real(source, target)
 
     monkeypatch.setattr(os, "rename", failing)
-    with pytest.raises(InputError, match="No space left"), atomic_folder(tmp_path / "old") as place:
+    with pytest.raises(InputError, match="the disk is full"), atomic_folder(tmp_path / "old") as place:
         (place / "a").write_text("new")
     assert (tmp_path / "old" / "a").read_text() == "old"
     assert _names(tmp_path) == ["old"]
@@ -132,8 +136,101 @@ def test_a_killed_program_leaves_the_old_folder(tmp_path):
     process.wait()
     process.stdout.close()
     assert (tmp_path / "old" / "a").read_text() == "whole"
-    left = [path for path in tmp_path.iterdir() if path.name != "old"]
-    assert all(path.name.startswith(".old.") for path in left)
+    assert _names(tmp_path) == [".old.aerotri.tmp", "old"]
+    with atomic_folder(tmp_path / "old") as place:
+        (place / "a").write_text("next")
+    assert _names(tmp_path) == ["old"]
+    assert (tmp_path / "old" / "a").read_text() == "next"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="locks of files")
+def test_the_work_of_a_living_run_is_left_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr(work_place, "WAIT_S", 0.2)
+    process = subprocess.Popen([sys.executable, "-c", KILLED, str(tmp_path / "new")], stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    assert process.stdout.readline().strip() == b"writing"
+    growing = tmp_path / ".new.aerotri.tmp" / "new" / "a"
+    with pytest.raises(InputError, match="another run is writing here"), held(tmp_path / "new"):
+        pass
+    assert growing.read_text() == "half"
+    process.kill()
+    process.wait()
+    process.stdout.close()
+    with held(tmp_path / "new"):
+        assert not growing.exists()
+    assert _names(tmp_path) == []
+
+
+def test_two_writers_take_turns(tmp_path):
+    """Each folder is of one writer, whichever comes last."""
+
+    def write(text):
+        with atomic_folder(tmp_path / "out", own=("a", "b")) as place:
+            for name in "ab":
+                (place / name).write_text(text)
+        done.append(text)
+
+    done = []
+    threads = [threading.Thread(target=write, args=(str(k),)) for k in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(done) == 8
+    assert (tmp_path / "out" / "a").read_text() == (tmp_path / "out" / "b").read_text()
+    assert _names(tmp_path) == ["out"]
+
+
+def test_a_killed_exchange_brings_the_old_folder_back(tmp_path):
+    """Where two names cannot be swapped in one step, the older result waits in the hidden folder for a moment."""
+    aside = tmp_path / ".out.aerotri.tmp" / ".older-result"
+    aside.mkdir(parents=True)
+    (aside / "a").write_text("old")
+    (tmp_path / ".out.aerotri.tmp" / "lock").touch()
+    with held(tmp_path / "out"):
+        assert (tmp_path / "out" / "a").read_text() == "old"
+    assert _names(tmp_path) == ["out"]
+
+
+def test_files_of_the_user_inside_our_folders_stay(tmp_path):
+    out = tmp_path / "out"
+
+    def write(names):
+        with atomic_folder(out, own=("plots", "report.html")) as place:
+            (place / "plots").mkdir()
+            for name in names:
+                (place / name).write_text("ours")
+
+    write(["plots/a.png", "plots/b.png", "report.html"])
+    (out / "plots" / "mine.png").write_text("mine")
+    (out / "plots" / "deep").mkdir()
+    (out / "plots" / "deep" / "mine.txt").write_text("mine")
+    (out / "plots" / "c.png").write_text("mine")
+    write(["plots/a.png", "plots/c.png"])
+    assert _names(out / "plots") == ["a.png", "c.png", "c.yours1.png", "deep", "mine.png"]
+    assert (out / "plots" / "c.yours1.png").read_text() == "mine"
+    assert (out / "plots" / "deep" / "mine.txt").read_text() == "mine"
+    assert not (out / "report.html").exists()
+
+
+def test_changed_files_are_known(tmp_path):
+    with atomic_folder(tmp_path / "out", own=("a", "b")) as place:
+        (place / "a").write_text("ours")
+        (place / "b").write_text("ours")
+    assert foreign_files(tmp_path / "out", ("a", "b", "c")) == []
+    (tmp_path / "out" / "b").write_text("mine")
+    (tmp_path / "out" / "c").write_text("mine")
+    assert foreign_files(tmp_path / "out", ("a", "b", "c")) == ["b", "c"]
+
+
+def test_a_foreign_folder_of_the_hidden_name_stays(tmp_path):
+    foreign = tmp_path / ".out.aerotri.tmp"
+    foreign.mkdir()
+    (foreign / "mine").write_text("mine")
+    with atomic_file(tmp_path / "out") as place:
+        place.write_text("new")
+    assert (foreign / "mine").read_text() == "mine"
+    assert _names(tmp_path) == [".out.aerotri.tmp", "out"]
 
 
 def test_folders_get_ordinary_permissions(tmp_path):

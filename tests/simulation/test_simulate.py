@@ -139,7 +139,7 @@ def test_a_block_is_written_with_its_truth_and_read_again(small_spec, tmp_path):
     block, truth = simulate(small_spec(**EVERYTHING), 1)
     (tmp_path / "small" / "truth").mkdir(parents=True)
     (tmp_path / "small" / "simulation.toml").write_text("# the spec")
-    (tmp_path / "small" / "truth" / "old.csv").write_text("of another block")
+    (tmp_path / "small" / "truth" / "mine.csv").write_text("of the user")
     write_simulated(tmp_path / "small", block, truth)
     again = block_folder.read_block(tmp_path / "small")
     assert again.points.tolist() == block.points.tolist()
@@ -147,4 +147,4 @@ def test_a_block_is_written_with_its_truth_and_read_again(small_spec, tmp_path):
     assert again.gnss_ins is not None
     assert (tmp_path / "small" / "simulation.toml").read_text() == "# the spec"
     assert (tmp_path / "small" / "truth" / "images.csv").exists()
-    assert not (tmp_path / "small" / "truth" / "old.csv").exists()
+    assert (tmp_path / "small" / "truth" / "mine.csv").read_text() == "of the user"

@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import os
 import sys
+from typing import Any
+
+from aerotri.cli import interruption
+
+if interruption.is_program():
+    interruption.while_importing()
+
+import typer
 
 from aerotri.cli import adjusting, blocks, image_errors, run, terrain, volumes
 from aerotri.cli.app import app
@@ -11,22 +21,79 @@ from aerotri.conventions import InputError
 
 __all__ = ["adjusting", "app", "blocks", "image_errors", "main", "run", "terrain", "volumes"]
 
+BAD_INPUT, BUG = 2, 3
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+UsageError: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
+"""What typer raises for a command line that cannot be read; where the class stands depends on its version."""
+
 
 def main() -> None:
-    """Entry point: bad input is one line and exit 2, a failed adjustment its status and exit 1."""
+    """Entry point.
+
+    Exit codes: 0 done, 1 the adjustment failed, 2 bad input, 3 an error of this program, 130 and 143 interrupted.
+    """
+    interruption.while_running()
     try:
-        app()
-    except InputError as error:
-        print(f"aerotri: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
-    except BrokenPipeError:
-        raise SystemExit(0) from None
-    except Exception as error:
-        if os.environ.get("AEROTRI_DEBUG"):
-            raise
-        text = f"aerotri: unexpected {type(error).__name__}: {error} — please report it; AEROTRI_DEBUG=1 tells where"
-        print(text, file=sys.stderr)
-        raise SystemExit(1) from None
+        code = _ended()
     except KeyboardInterrupt:
-        print("aerotri: interrupted, nothing was written", file=sys.stderr)
-        raise SystemExit(130) from None
+        # a second signal, or one that came between the two lines
+        code = _told(interruption.message(), interruption.exit_code())
+    interruption.afterwards()
+    try:
+        sys.stdout.flush()
+    except OSError:
+        _forget_output()
+    raise SystemExit(code)
+
+
+def _ended() -> int:
+    """Run the command line; its exit code, when what went wrong is told."""
+    try:
+        ended = app(standalone_mode=False)
+        if interruption.was_interrupted():
+            # typer makes an exit code of the exception
+            return _told(interruption.message(), interruption.exit_code())
+        return ended if isinstance(ended, int) else 0
+    except (KeyboardInterrupt, typer.Abort):
+        return _told(interruption.message(), interruption.exit_code())
+    except UsageError as error:
+        error.show()
+        return error.exit_code
+    except InputError as error:
+        return _told(f"aerotri: {error}", BAD_INPUT)
+    except BrokenPipeError:
+        # whoever read our outcome has read enough; it stands in the files
+        _forget_output()
+        return 0
+    except Exception as error:
+        if interruption.was_interrupted():
+            return _told(interruption.message(), interruption.exit_code())
+        return _unexpected(error)
+
+
+def _unexpected(error: Exception) -> int:
+    """Tell an error that is no InputError: what the machine lacks, or what is wrong with this program."""
+    if os.environ.get("AEROTRI_DEBUG"):
+        raise error
+    if isinstance(error, MemoryError):
+        text = f": {error}" if str(error) else ""
+        return _told(f"aerotri: not enough memory{text} — give less at a time, or use a larger machine", BAD_INPUT)
+    if isinstance(error, OSError) and error.errno in NO_SPACE:
+        place = f" ({error.filename})" if error.filename else ""
+        return _told(f"aerotri: the disk is full{place} — free some space, or choose another place", BAD_INPUT)
+    said = " ".join(str(error).split())[:500]
+    text = f"aerotri: unexpected {type(error).__name__}: {said} — please report it; AEROTRI_DEBUG=1 tells where"
+    return _told(text, BUG)
+
+
+def _told(text: str, code: int) -> int:
+    """Print a line to stderr, whoever reads it; the code."""
+    with contextlib.suppress(OSError):
+        print(text, file=sys.stderr, flush=True)
+    return code
+
+
+def _forget_output() -> None:
+    """What is still to be written to stdout goes nowhere, so that the end of the program does not fail by it."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

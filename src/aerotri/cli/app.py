@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from aerotri import __version__
+from aerotri.cli.numbers import CheckedCommand
 
-app = typer.Typer(
+
+class Program(typer.Typer):
+    """Commands whose numbers are checked."""
+
+    def command(self, *args: Any, **kwargs: Any) -> Any:
+        return super().command(*args, **{"cls": CheckedCommand, **kwargs})
+
+
+app = Program(
     name="aerotri",
     help="Bundle block adjustment with self-calibration for aerial photographs, and how sure it is.",
     no_args_is_help=True,
@@ -16,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-predict = typer.Typer(help="What a flight will give, before it is flown.", no_args_is_help=True, rich_markup_mode=None)
+predict = Program(help="What a flight will give, before it is flown.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(predict, name="predict")
 
 

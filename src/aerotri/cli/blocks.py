@@ -17,6 +17,7 @@ from aerotri.cli.options import (
     Json,
     MarkedControl,
     OrientationSigma,
+    Overwrite,
     PhotographPositions,
     PositionsSigma,
     SystemOfPhotographs,
@@ -34,6 +35,7 @@ def simulate(
     targets: Annotated[bool, typer.Option("--targets", help="Render discs at control and check points.")] = False,
     blur_px: Annotated[float, typer.Option(min=0.0, max=20.0, help="σ of the point spread rendered, px.")] = 0.5,
     noise: Annotated[float, typer.Option(min=0.0, max=20000.0, help="σ of the grey values rendered.")] = 50.0,
+    overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:
     """Make a block with known truth from a flight plan, and photographs of it."""
@@ -46,7 +48,7 @@ def simulate(
         options = RenderOptions(blur_px=blur_px, noise=noise, targets=targets)
     elif only or targets:
         raise InputError("--only and --targets are about photographs", "add --render")
-    run_simulate(spec, out, seed, json_, options, tuple(only or ()))
+    run_simulate(spec, out, seed, json_, options, tuple(only or ()), overwrite)
 
 
 @app.command(epilog="Example: aerotri convert bingo.txt block --positions rtk.csv --control gcp.csv --camera p1.toml")
@@ -95,6 +97,7 @@ def convert(
     linear_alteration: Annotated[
         float | None, typer.Option(help="Height of the ground, where heights of .OPK are corrected for scale.")
     ] = None,
+    overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:
     """Convert between formats, or make a block of several files; adjusts first where the target needs it."""
@@ -126,7 +129,7 @@ def convert(
         image_sigma_px=image_sigma_px,
         gnss_shift=gnss_shift,
     )
-    run_convert(request, target, to, json_)
+    run_convert(request, target, to, json_, overwrite)
 
 
 @app.command(
@@ -156,6 +159,7 @@ def tiepoints(
     feature_size: Annotated[int, typer.Option(min=300, help="Features are sought in photographs of this size.")] = 2000,
     neighbours: Annotated[int, typer.Option(min=1, help="Photographs each is compared with, the nearest.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same block.")] = 1,
+    overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:
     """From photographs to a block: tie points, first orientation, control."""
@@ -183,7 +187,7 @@ def tiepoints(
         neighbours=neighbours,
         seed=seed,
     )
-    run_tiepoints(photographs, out, options, json_)
+    run_tiepoints(photographs, out, options, json_, overwrite)
 
 
 def _stated_sigmas(control: str, positions: str, orientation: str, angles: str) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from aerotri.cli.app import app
-from aerotri.cli.options import Json, ResultFolder
+from aerotri.cli.options import Json, Overwrite, ResultFolder
 
 
 @app.command(epilog="Example: aerotri deform saar_result --end-lap 0.663 --variant absorbed --out saar_deformation")
@@ -69,12 +69,13 @@ def demcor(
             help="Orientation the DEM was made with: images.csv, a result, or absorbed; default that of RESULT."
         ),
     ] = None,
+    overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:
     """Free a DEM of the deformation of its models: heights and plan, window by window, with σ."""
     from aerotri.commands.demcor import run_demcor
 
-    raise typer.Exit(run_demcor(result, dem, out, pair, models, model_table, dem_orientation, json_))
+    raise typer.Exit(run_demcor(result, dem, out, pair, models, model_table, dem_orientation, json_, overwrite))
 
 
 @app.command(epilog="Example: aerotri imgeo saar_result photographs/*.tif --out ideal")
@@ -89,9 +90,10 @@ def imgeo(
     group: Annotated[
         str | None, typer.Option(help="Parameter group (camera, day) of photographs that are not in the block.")
     ] = None,
+    overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:
     """Photographs without systematic image errors, their camera, and the errors for other programs."""
     from aerotri.commands.imgeo import ImgeoOptions, run_imgeo
 
-    run_imgeo(result, photographs or [], out, ImgeoOptions(resampling, compression, group), json_)
+    run_imgeo(result, photographs or [], out, ImgeoOptions(resampling, compression, group), json_, overwrite)

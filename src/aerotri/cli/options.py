@@ -9,6 +9,9 @@ import typer
 
 Json = Annotated[bool, typer.Option("--json", help="Print the outcome as JSON instead of text.")]
 BlockFolder = Annotated[Path, typer.Argument(help="Block folder, or its block.toml.")]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace files that aerotri has not written, or that were changed since.")
+]
 ResultFolder = Annotated[Path, typer.Argument(help="Result folder of `aerotri adjust`.")]
 GeoidGrid = Annotated[
     Path | None, typer.Option(help="Geoid grid (PROJ GeoTIFF) for heights that the CRS does not bring along.")

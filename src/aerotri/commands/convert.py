@@ -42,7 +42,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerotri.commands.console import Console
-from aerotri.conventions import FLIGHT_AXES, InputError
+from aerotri.commands.results import refuse_existing_file, refuse_foreign_entries
+from aerotri.conventions import FLIGHT_AXES, LARGEST, InputError
 from aerotri.formats.camera_spec import CameraSpec
 from aerotri.formats.text_lines import is_number
 
@@ -64,7 +65,7 @@ def three_values(text: str, option: str, may_be_zero: bool = False) -> tuple[flo
         return None
     words = [word.strip() for word in text.split(",")]
     least = 0.0 if may_be_zero else np.nextafter(0.0, 1.0)
-    if len(words) not in (1, 3) or not all(is_number(word) and float(word) >= least for word in words):
+    if len(words) not in (1, 3) or not all(is_number(word) and least <= float(word) <= LARGEST for word in words):
         size = "that are not negative" if may_be_zero else "greater than 0"
         raise InputError(f"{option} {text[:60]}", f"give three values {size}, as 0.1,0.1,0.2, or one for all")
     values = [float(word) for word in words] * (3 // len(words))
@@ -97,20 +98,24 @@ def camera_spec(
     return CameraSpec(file, name, size_px, pixel_um, focal_length_mm, flight_axis, free)
 
 
-def run_convert(request: Request, target: Path, to: str, as_json: bool) -> None:
+def run_convert(request: Request, target: Path, to: str, as_json: bool, overwrite: bool = False) -> None:
     """Convert; arguments as on the command line.
 
     Raises
     ------
     InputError
     """
-    from aerotri.formats.convert import TARGETS
+    from aerotri.formats.convert import FOLDER_TARGETS, TARGETS
 
     if to not in TARGETS:
         raise InputError(f"'{to}' is not a format that is written", f"known are {', '.join(TARGETS)}")
     source = Path(request.source)
     if target.resolve() == source.resolve():
         raise InputError("source and target are the same", "choose another target", target)
+    if to in FOLDER_TARGETS:
+        refuse_foreign_entries(target, FOLDER_TARGETS[to], overwrite)
+    else:
+        refuse_existing_file(target, overwrite)
     is_result = (source / "solution.npz").is_file()
     messages = _from_result(request, target, to) if is_result else _from_files(request, target, to)
     if as_json:

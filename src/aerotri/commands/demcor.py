@@ -12,7 +12,7 @@ import numpy as np
 
 from aerotri.commands.console import Console
 from aerotri.commands.deform import check_crs, refuse_without_errors
-from aerotri.commands.results import reopened
+from aerotri.commands.results import refuse_existing_file, reopened
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from aerotri.pipeline import Adjustment
     from aerotri.rasters import RasterReader
 
-ABSORBED = "absorbed"
+ABSORBED, RECORD = "absorbed", "demcor.json"
 
 
 def run_demcor(
     source: Path, dem: Path, out: Path, pair: tuple[str, str] | None, models: Path | None, table: Path | None,
-    orientation: str | None, as_json: bool,
+    orientation: str | None, as_json: bool, overwrite: bool = False,
 ) -> int:  # fmt: skip
     """Exit code of the command; arguments as on the command line."""
     console = Console(quiet=as_json)
@@ -36,6 +36,7 @@ def run_demcor(
         raise InputError("either --pair or --models says which photographs the DEM was made of", "give one of the two")
     if out.resolve() == dem.resolve():
         raise InputError("source and target are the same", "choose another --out", out)
+    _refuse_foreign_files(out, overwrite)
     calibration = reopened(source, console)
     from aerotri.deformation.absorbed import AbsorptionFailedError
     from aerotri.deformation.restitution import FREE, restitution
@@ -62,6 +63,12 @@ def run_demcor(
     else:
         console.lines([*_summary(content), f"Written to {out}"])
     return 0
+
+
+def _refuse_foreign_files(out: Path, overwrite: bool) -> None:
+    """Files that are there are replaced where the JSON file of an older correction of this name stands beside them."""
+    for file in () if beside(out, RECORD).is_file() else (out, beside(out, "dZ.tif"), beside(out, "sigma_dZ.tif")):
+        refuse_existing_file(file, overwrite)
 
 
 def beside(out: Path, what: str) -> Path:
@@ -156,7 +163,7 @@ def _corrected(
     common = {"crs": reader.crs, "no_data": no_data, "options": reader.options, "threads": thread_count()}
     with ExitStack() as files:
         places = {what: files.enter_context(atomic_file(beside(out, what)))
-                  for what in ("dZ.tif", "sigma_dZ.tif", "demcor.json")}  # fmt: skip
+                  for what in ("dZ.tif", "sigma_dZ.tif", RECORD)}  # fmt: skip
         place = files.enter_context(atomic_file(out))
         with (
             RasterWriter(place, reader.grid, reader.dtype, **common) as writer,
@@ -171,7 +178,7 @@ def _corrected(
         name = str(calibration.result.block.name)
         content = correction_json(outcome, models, reader.grid, name, reader.path.name)
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-        places["demcor.json"].write_text(text + "\n", encoding="utf-8")
+        places[RECORD].write_text(text + "\n", encoding="utf-8")
     return content
 
 

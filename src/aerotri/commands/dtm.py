@@ -12,7 +12,7 @@ import numpy as np
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import refuse_foreign_folder, reopened
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, stated_number
 
 if TYPE_CHECKING:
     from aerotri.pipeline import Adjustment
@@ -71,9 +71,9 @@ def metres_or_auto(text: str) -> float | None:
     if text == "auto":
         return None
     try:
-        return float(text)
+        return stated_number(text)
     except ValueError:
-        raise InputError(f"'{text}' is no interval", "give metres, or auto") from None
+        raise InputError(f"--interval '{text}' is none", "give metres, or auto") from None
 
 
 def run_dtm(source: Path, photographs: list[Path], out: Path | None, options: DtmOptions, as_json: bool) -> int:

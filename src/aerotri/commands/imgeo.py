@@ -47,7 +47,9 @@ class Job:
     name: str
 
 
-def run_imgeo(result: Path, photographs: list[Path], out: Path, options: ImgeoOptions, as_json: bool) -> None:
+def run_imgeo(
+    result: Path, photographs: list[Path], out: Path, options: ImgeoOptions, as_json: bool, overwrite: bool = False
+) -> None:
     """Resample and export; arguments as on the command line.
 
     Raises
@@ -65,9 +67,12 @@ def run_imgeo(result: Path, photographs: list[Path], out: Path, options: ImgeoOp
     jobs = _jobs(adjusted, groups, photographs, out, options)
     used = sorted({job.group for job in jobs}) if jobs else range(len(groups))
     errors = {k: error_function(adjusted, groups[k]) for k in used}
-    record = export(adjusted, errors, out, options.resampling)
-    record["photographs"] = _resample_all(jobs, errors, out, options, console)
-    write_record(record, out)
+    from aerotri.formats.work_place import held
+
+    with held(out):
+        record = export(adjusted, errors, out, options.resampling, [job.name for job in jobs], overwrite)
+        record["photographs"] = _resample_all(jobs, errors, out, options, console)
+        write_record(record, out)
     _tell(record, out, console, as_json)
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from aerotri.commands.results import refuse_existing_file
 
 if TYPE_CHECKING:
     from aerotri.image_errors.error_exports import NearestLens
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 SIGN = "measured = ideal + d; corrected = measured - d"
 RECORD = "imgeo.json"
+EXPORTS = ("correction.csv", "camera.toml", "cameras.txt", "ideal_cameras.txt", "correction.tif",
+           *(f"correction_{k}.tif" for k in range(1, 100)))  # fmt: skip
 CORRECTION_HEAD = f"""# {SIGN}
 # x y dx dy sx sy in mm from the image centre, y up; column row in pixels, (0, 0) the corner of the upper left pixel
 # interpolate between nodes of one tile only; nodes on a seam stand here once for either side
@@ -26,12 +30,16 @@ camera,group,tile,column,row,x,y,dx,dy,sx,sy
 """
 
 
-def export(adjusted: AdjustedBlock, errors: Mapping[int, ErrorFunction], out: Path, resampling: str) -> dict[str, Any]:
+def export(
+    adjusted: AdjustedBlock, errors: Mapping[int, ErrorFunction], out: Path, resampling: str,
+    photographs: Sequence[str] = (), overwrite: bool = False,
+) -> dict[str, Any]:  # fmt: skip
     """Write cameras and correction grids, and the record of the run without its photographs.
 
     Parameters
     ----------
     errors : of the groups in use, by their number in the block.
+    photographs : names of the files that will follow. overwrite : whether files of others may be replaced.
 
     Returns
     -------
@@ -44,12 +52,12 @@ def export(adjusted: AdjustedBlock, errors: Mapping[int, ErrorFunction], out: Pa
 
     cameras = _camera_names(errors)
     nearest = {k: nearest_opencv(function) for k, function in errors.items()}
-    records, tables = [], []
+    records, tables, rasters = [], [], {}
     for number, (k, function) in enumerate(errors.items(), start=1):
         raster = "correction.tif" if len(errors) == 1 else f"correction_{number}.tif"
+        rasters[raster] = function
         records.append(_group_record(function, nearest[k], cameras[k], raster))
         tables.append(_correction_rows(adjusted, function))
-        _write_correction_raster(function, out / raster)
     ideal = {cameras[k]: _camera_table(function) for k, function in errors.items()}
     content = outcome_json(adjusted.block, adjusted.outcome)
     record = {
@@ -64,11 +72,30 @@ def export(adjusted: AdjustedBlock, errors: Mapping[int, ErrorFunction], out: Pa
             {k: (cameras[k], ideal_camera(function), "no image errors") for k, function in errors.items()}
         ),
     }
+    record["files"] = [*rasters, *texts, *photographs]
+    older = _older_files(out)
+    for name in record["files"]:
+        if name not in older:
+            refuse_existing_file(out / name, overwrite)
+    # first, so that a run after one that was killed knows what is ours
+    write_record({**record, "files": list(dict.fromkeys([*record["files"], *older]))}, out)
+    for name, function in rasters.items():
+        _write_correction_raster(function, out / name)
     for name, text in texts.items():
         with atomic_file(out / name) as place:
             place.write_text(text, encoding="utf-8")
-    write_record(record, out)
     return record
+
+
+def _older_files(out: Path) -> set[str]:
+    """What the record of an older run in this folder says it has written."""
+    try:
+        record = json.loads((out / RECORD).read_text(encoding="utf-8"))
+        written = {str(photograph["written"]) for photograph in record["photographs"]}
+        # records of older versions do not list the exports, whose names are fixed
+        return written | {str(name) for name in record.get("files", EXPORTS)}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return set()
 
 
 def _camera_names(errors: Mapping[int, ErrorFunction]) -> dict[int, str]:

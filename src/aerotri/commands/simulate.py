@@ -9,11 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
+from aerotri.commands.results import refuse_existing_file, refuse_foreign_entries
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
     from aerotri.observations import Block
     from aerotri.simulation.rendering import RenderOptions, Scene
+    from aerotri.simulation.spec import SimulationSpec
+    from aerotri.simulation.truth import Truth
 
 PHOTOGRAPHS, RECORD = "photographs", "rendered.json"
 
@@ -25,20 +28,23 @@ def run_simulate(
     as_json: bool,
     render: RenderOptions | None = None,
     only: tuple[str, ...] = (),
+    overwrite: bool = False,
 ) -> None:
     """Simulate and write; arguments as on the command line.
 
     Parameters
     ----------
     render : how photographs look; None: none are made. only : names of the photographs to make, empty = all.
+    overwrite : whether files of others in the folder may be replaced.
     """
-    from aerotri.simulation import read_spec, simulate, write_simulated
+    from aerotri.formats.work_place import held
+    from aerotri.simulation import read_spec, simulate
 
     plan = read_spec(spec)
     block, truth = simulate(plan, seed)
     chosen = _chosen(block, only) if render is not None else []
-    _remove_rendered(out)
-    write_simulated(out, block, truth)
+    with held(out):
+        _write(plan, seed, block, truth, out, overwrite, render, chosen, Console(quiet=as_json))
     counts: dict[str, Any] = {
         "block": block.name,
         "images": len(block.images),
@@ -48,9 +54,6 @@ def run_simulate(
         "check": int(block.control.is_check.sum()),
     }
     if render is not None:
-        from aerotri.simulation.rendering import make_scene
-
-        _render(make_scene(plan, seed, block, truth, render), chosen, out / PHOTOGRAPHS, Console(quiet=as_json))
         counts["rendered"] = len(chosen)
     if as_json:
         print(json.dumps(counts, ensure_ascii=False))
@@ -77,19 +80,40 @@ def _chosen(block: Block, only: tuple[str, ...]) -> list[int]:
     return [names.index(name) for name in dict.fromkeys(only)] if only else list(range(len(names)))
 
 
-def _remove_rendered(out: Path) -> None:
-    """Photographs of an older block of this place, those that its record names: none may stand beside another block."""
+def _write(
+    plan: SimulationSpec, seed: int, block: Block, truth: Truth, out: Path, overwrite: bool,
+    render: RenderOptions | None, chosen: list[int], console: Console,
+) -> None:  # fmt: skip
+    """The block with its truth in one step, then its photographs one by one."""
+    from aerotri.formats.block_writer import OWN_ENTRIES
+    from aerotri.simulation import write_simulated
+    from aerotri.simulation.truth import TRUTH
+
+    refuse_foreign_entries(out, (*OWN_ENTRIES, TRUTH), overwrite)
+    older = _rendered(out)
+    photographs = [f"{block.images.names[image]}.tif" for image in chosen]
+    for name in photographs:
+        if name not in older:
+            refuse_existing_file(out / PHOTOGRAPHS / name, overwrite)
+    # photographs of an older block of this place: none may stand beside another block
+    gone = {f"{PHOTOGRAPHS}/{name}" for name in (*older, RECORD)} if older else set()
+    write_simulated(out, block, truth, gone)
+    if render is not None:
+        from aerotri.simulation.rendering import make_scene
+
+        _render(make_scene(plan, seed, block, truth, render), chosen, out / PHOTOGRAPHS, console)
+
+
+def _rendered(out: Path) -> list[str]:
+    """The photographs that the record of an older run names, and that this program may therefore remove."""
     record = out / PHOTOGRAPHS / RECORD
     if not record.is_file():
-        return
+        return []
     try:
         names = [str(name) for name in json.loads(record.read_text(encoding="utf-8"))["photographs"]]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"cannot be read: {error}", "remove the folder, or choose another --out", record) from error
-    for name in names:
-        if Path(name).name == name:
-            (record.parent / name).unlink(missing_ok=True)
-    record.unlink()
+    return [name for name in names if Path(name).name == name]
 
 
 def _render(scene: Scene, chosen: list[int], folder: Path, console: Console) -> None:

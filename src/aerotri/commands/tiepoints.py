@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
-from aerotri.commands.results import refuse_foreign_folder
+from aerotri.commands.results import refuse_foreign_entries, refuse_foreign_folder
 from aerotri.conventions import InputError
 from aerotri.formats.assemble import Statements
+from aerotri.formats.block_writer import OWN_ENTRIES
 from aerotri.formats.camera_spec import CameraSpec
 
 if TYPE_CHECKING:
@@ -45,23 +46,34 @@ class TiePointOptions:
     seed: int = 1
 
 
-def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bool) -> None:
+def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bool, overwrite: bool = False) -> None:
     """Tie and write; arguments as on the command line.
 
     Raises
     ------
     InputError
     """
-    console = Console(quiet=as_json)
+    from aerotri.formats.work_place import held
+    from aerotri.tie_points.photographs_to_block import CACHE
+
+    refuse_foreign_folder(out, RECORD, CACHE)
+    refuse_foreign_entries(out, (*OWN_ENTRIES, MARKS), overwrite)
+    with held(out):
+        content = _tied(folder, out, options, Console(quiet=as_json))
+    if as_json:
+        print(json.dumps(content, ensure_ascii=False))
+
+
+def _tied(folder: Path, out: Path, options: TiePointOptions, console: Console) -> dict[str, Any]:
+    """Tie, write and tell; returns the content of tiepoints.json."""
     begun = time.perf_counter()
     from aerotri.compiled import compilation_notice
+    from aerotri.formats.atomic import atomic_folder
     from aerotri.formats.block_writer import write_block
     from aerotri.tie_points.features import FeatureOptions
     from aerotri.tie_points.matching import MatchOptions
     from aerotri.tie_points.photographs import find_photographs
     from aerotri.tie_points.photographs_to_block import CACHE, Options, tie_photographs
-
-    refuse_foreign_folder(out, RECORD, CACHE)
 
     photographs = find_photographs(folder, _stated_camera(options.camera))
     given = _given(options)
@@ -77,16 +89,16 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
         out / CACHE,
         Progress(console),
     )
-    write_block(tied.block, out)
-    if given.control is not None:
-        console.progress("control points in the photographs")
-        write_marks(tied, given.control, photographs, options.stated, out / MARKS)
-    content = _content(tied, time.perf_counter() - begun)
-    (out / RECORD).write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    if as_json:
-        print(json.dumps(content, ensure_ascii=False))
-        return
+    # in one step, so that block, marks and record belong together
+    with atomic_folder(out, own=(*OWN_ENTRIES, MARKS, RECORD)) as place:
+        write_block(tied.block, place)
+        if given.control is not None:
+            console.progress("control points in the photographs")
+            write_marks(tied, given.control, photographs, options.stated, place / MARKS)
+        content = _content(tied, time.perf_counter() - begun)
+        (place / RECORD).write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     console.lines([*content["messages"], *_lines(content), f"Written to {out}"])
+    return content
 
 
 class Progress:

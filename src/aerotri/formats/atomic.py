@@ -1,13 +1,14 @@
-"""Results appear whole or not at all: written to a temporary name beside their place, renamed at the end.
+"""Results appear whole or not at all: written to a hidden place beside their own, renamed at the end.
 
-A program that is killed leaves what was there before untouched, and at most a hidden temporary entry beside it.
+A program that is killed leaves what was there before untouched, and at most a hidden folder beside it, which the next
+run that writes there removes. Files of the user are told from ours by a list of what was written (`ownership`).
 """
 
 from __future__ import annotations
 
 import ctypes
+import errno
 import os
-import secrets
 import shutil
 import sys
 from collections.abc import Callable, Collection, Iterator
@@ -15,9 +16,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from aerotri.conventions import InputError
+from aerotri.formats.ownership import carry_over, record_files
+from aerotri.formats.work_place import OLDER, work_place, written
 
 AT_FDCWD = -100
 RENAME_EXCHANGE = 2
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+LEAST_ROOM = 16384
 
 
 @contextmanager
@@ -30,7 +35,7 @@ def atomic_file(target: str | os.PathLike) -> Iterator[Path]:
 
     Yields
     ------
-    A path in the same folder that does not exist yet.
+    A path on the same disk that does not exist yet, with the name of the target.
 
     Raises
     ------
@@ -40,28 +45,29 @@ def atomic_file(target: str | os.PathLike) -> Iterator[Path]:
     target = _place(target)
     if target.is_dir():
         raise InputError("is a folder, a file is to be written here", "give another name", target)
-    temporary = _temporary(target)
     with _told_as_input_error(target):
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            yield temporary
-            os.replace(temporary, target)
-        finally:
-            temporary.unlink(missing_ok=True)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with work_place(target) as place, _told_as_input_error(target):
+            yield place / target.name
+            os.replace(place / target.name, target)
+            written.append(target)
 
 
 @contextmanager
-def atomic_folder(target: str | os.PathLike, own: Collection[str] | None = None) -> Iterator[Path]:
+def atomic_folder(
+    target: str | os.PathLike, own: Collection[str] | None = None, gone: Collection[str] = ()
+) -> Iterator[Path]:
     """An empty folder to fill; it takes the name `target` when the block ends without an error.
 
     An older folder of that name is exchanged for the new one in one step. What it holds besides (a user's notes beside
-    our tables) is carried over, never deleted.
+    our tables, or in our folders) is carried over, never deleted.
 
     Parameters
     ----------
     target : the folder to be; folders above it are made.
     own : the names this writer gives. An older entry of such a name is dropped even when the new folder has none, so
         that nothing old stands beside what is new. None: everything that the new folder lacks is carried over.
+    gone : relative paths of further files that are dropped.
 
     Yields
     ------
@@ -75,20 +81,22 @@ def atomic_folder(target: str | os.PathLike, own: Collection[str] | None = None)
     target = _place(target)
     if target.exists() and not target.is_dir():
         raise InputError("is a file, a folder is to be written here", "give another name", target)
-    temporary = _temporary(target)
     with _told_as_input_error(target):
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            temporary.mkdir()
-            yield temporary
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with work_place(target) as place, _told_as_input_error(target):
+            new = place / target.name
+            new.mkdir()
+            yield new
+            record_files(new)
             if target.is_dir():
-                _carry_over(target, temporary, own or ())
-                _exchange(temporary, target)
+                seen: set[Path] = set()
+                carry_over(target, new, own or (), gone, seen)
+                _exchange(new, target)
+                # what came while it was being carried over
+                carry_over(new, target, own or (), gone, seen)
             else:
-                os.rename(temporary, target)
-        finally:
-            # after an exchange this is the older folder
-            shutil.rmtree(temporary, ignore_errors=True)
+                os.rename(new, target)
+            written.append(target)
 
 
 def _place(target: str | os.PathLike) -> Path:
@@ -96,15 +104,18 @@ def _place(target: str | os.PathLike) -> Path:
     return Path(target).resolve()
 
 
-def _temporary(target: Path) -> Path:
-    return target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
-
-
 @contextmanager
 def _told_as_input_error(target: Path) -> Iterator[None]:
     try:
         yield
-    except OSError as error:
+    except InputError:
+        raise
+    except Exception as error:
+        # GDAL has errors of its own for a disk that is full
+        if getattr(error, "errno", None) in NO_SPACE or _is_full(target.parent):
+            raise InputError("the disk is full", "free some space, or choose another place", target) from error
+        if not isinstance(error, OSError):
+            raise
         raise InputError(
             f"cannot be written: {error.strerror or error}",
             "check permissions and free space, or choose another place",
@@ -112,37 +123,26 @@ def _told_as_input_error(target: Path) -> Iterator[None]:
         ) from error
 
 
-def _carry_over(old: Path, new: Path, own: Collection[str]) -> None:
-    """Bring entries of others into the new folder, as links where the file system has them; `old` stays whole."""
-    for entry in old.iterdir():
-        place = new / entry.name
-        if entry.name in own or place.exists():
-            continue
-        if entry.is_dir() and not entry.is_symlink():
-            shutil.copytree(entry, place, symlinks=True, copy_function=_link_or_copy)
-        else:
-            _link_or_copy(entry, place)
-
-
-def _link_or_copy(source: str | Path, place: str | Path) -> None:
+def _is_full(folder: Path) -> bool:
+    """Whether nothing more can be written there."""
     try:
-        os.link(source, place, follow_symlinks=False)
+        return shutil.disk_usage(folder).free < LEAST_ROOM
     except OSError:
-        shutil.copy2(source, place, follow_symlinks=False)
+        return False
 
 
-def _exchange(temporary: Path, target: Path) -> None:
+def _exchange(new: Path, target: Path) -> None:
     """Swap the two folders, in one step where the system can."""
-    if _exchange_in_one_step(temporary, target):
+    if _exchange_in_one_step(new, target):
         return
-    aside = _temporary(target)
+    aside = new.with_name(OLDER)
     os.rename(target, aside)
     try:
-        os.rename(temporary, target)
+        os.rename(new, target)
     except OSError:
         os.rename(aside, target)
         raise
-    os.rename(aside, temporary)
+    os.rename(aside, new)
 
 
 def _exchange_in_one_step(temporary: Path, target: Path) -> bool:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from aerotri.conventions import InputError
+from aerotri.conventions import LARGEST, InputError
 from aerotri.formats.csv_text import BLANKS
 from aerotri.formats.tables import CONTROL_CHARACTERS
 from aerotri.formats.toml_text import line_of_key, read_toml
@@ -26,11 +26,12 @@ from aerotri.observations import (
 )
 from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
 
-Positive = Annotated[float, Field(gt=0)]
+Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST)]
 Fraction = Annotated[float, Field(gt=0, lt=1)]
 Pixels = Annotated[int, Field(gt=0, le=10_000_000)]
-Three = Annotated[list[float], Field(min_length=3, max_length=3)]
-ThreeNotNegative = Annotated[list[Annotated[float, Field(ge=0)]], Field(min_length=3, max_length=3)]
+Three = Annotated[list[Real], Field(min_length=3, max_length=3)]
+ThreeNotNegative = Annotated[list[Annotated[float, Field(ge=0, le=LARGEST)]], Field(min_length=3, max_length=3)]
 ThreePositive = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 OffOn = Literal["off", "on"]
 ORIENTATION_ELEMENTS = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
@@ -53,7 +54,7 @@ class _Section(BaseModel):
 class PriorModel(_Section):
     """A start value with what is known of it: ``{ value, sigma }`` (no sigma: free) or ``fixed = true``."""
 
-    value: float | None = None
+    value: Real | None = None
     sigma: Positive | None = None
     fixed: bool = False
 
@@ -96,13 +97,13 @@ class CameraModel(_Section):
     size_px: Annotated[list[Pixels], Field(min_length=2, max_length=2)]
     pixel_um: Positive
     focal_length_mm: Positive
-    principal_point_mm: Annotated[list[float], Field(min_length=2, max_length=2)] = [0.0, 0.0]
+    principal_point_mm: Annotated[list[Real], Field(min_length=2, max_length=2)] = [0.0, 0.0]
     flight_axis: Literal["+x", "-x", "+y", "-y"] | None = None
     interior: InteriorModel = InteriorModel()
     brown: BrownModel = BrownModel()
     lens: LensModel = LensModel()
     interior_orientation: Literal["affine", "projective", "similarity"] | None = None
-    fiducials: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = {}
+    fiducials: dict[str, Annotated[list[Real], Field(min_length=2, max_length=2)]] = {}
 
     @model_validator(mode="after")
     def _focal_length_positive(self) -> CameraModel:
@@ -146,7 +147,7 @@ class AdjustmentModel(_Section):
     additional_parameters: list[str] = []
     parameter_groups: str = "camera"
     parameter_selection: OffOn = "off"
-    t_limit: Annotated[float, Field(ge=0)] = 1.0
+    t_limit: Annotated[float, Field(ge=0, le=LARGEST)] = 1.0
     correlation_limit: Annotated[float, Field(gt=0, le=1)] = 0.85
     robust: Literal["off", "huber", "danish", "cauchy", "adaptive", "data-snooping"] = "off"
     datum: Literal["control", "minimal", "inner", "fixed"] = "control"

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.formats import block_writer, bundler, colmap, opensfm, patb
 from aerotri.formats.bal import is_bal, read_bal, write_bal
 from aerotri.formats.bingo import write_bingo
 from aerotri.formats.block_folder import read_block, write_block
@@ -86,6 +87,15 @@ BLOCK_WRITERS: Mapping[str, Callable[[Block, Path], tuple[str, ...]]] = {
     "ign-app": write_ign_app,
 }
 """Formats of what was measured."""
+FOLDER_TARGETS: Mapping[str, tuple[str, ...]] = {
+    "block": block_writer.OWN_ENTRIES,
+    "colmap": colmap.OWN_ENTRIES,
+    "colmap-text": colmap.OWN_ENTRIES,
+    "bundler": (bundler.BUNDLE, bundler.LIST),
+    "opensfm": (opensfm.RECONSTRUCTION, opensfm.TRACKS),
+    "patb": patb.FILES,
+}
+"""Formats that are folders, with the files written there."""
 TARGETS = ("block", *WRITERS, *ORIENTATION_WRITERS, *BLOCK_WRITERS)
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
-import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,23 +53,28 @@ class Truth:
     control_blunder_m: np.ndarray
 
 
-def write_simulated(folder: str | os.PathLike, block: Block, truth: Truth) -> None:
-    """Write the block's folder and, under `truth/`, what is behind it; other files of the folder stay."""
+TRUTH = "truth"
+
+
+def write_simulated(
+    folder: str | os.PathLike, block: Block, truth: Truth, gone: Collection[str] = ()
+) -> None:
+    """Write the block's folder and, under `truth/`, what is behind it; other files stay but for `gone`."""
     # imported here: those who only simulate need no file formats
     from aerotri.formats.block_folder import write_block
+    from aerotri.formats.block_writer import OWN_ENTRIES
 
-    # a block must never stand beside the truth of another one, not even when the program is killed here
-    if (Path(folder) / "truth").exists():
-        shutil.rmtree(Path(folder) / "truth")
-    write_block(block, Path(folder))
-    write_truth(folder, block, truth)
+    # in one step: a block must never stand beside the truth of another one
+    with atomic_folder(folder, own=(*OWN_ENTRIES, TRUTH), gone=gone) as place:
+        write_block(block, place)
+        write_truth(place, block, truth)
 
 
 def write_truth(folder: str | os.PathLike, block: Block, truth: Truth) -> None:
     """Write `truth/` of a block's folder: images, points, additional_parameters, cameras, image_errors, gross_errors,
     control_blunders (.csv). Metres, millimetres in the image, degrees.
     """
-    with atomic_folder(Path(folder) / "truth") as place:
+    with atomic_folder(Path(folder) / TRUTH) as place:
         _write_tables(place, block, truth)
 
 

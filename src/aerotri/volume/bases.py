@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, stated_number
 from aerotri.rasters import Grid
 from aerotri.volume.boundary import Boundary
 
@@ -203,9 +203,9 @@ def parse_base(text: str, surface: Surface, boundary: Boundary, open_raster) -> 
     kind, _, rest = text.partition(":")
     try:
         if kind == "level" or not _is_word(text):
-            return level(float(rest if kind == "level" else text))
+            return level(stated_number(rest if kind == "level" else text))
         if kind == "plane" and rest:
-            points = np.array([[float(v) for v in point.split(",")] for point in rest.split(";")])
+            points = np.array([[stated_number(v) for v in point.split(",")] for point in rest.split(";")])
             if points.ndim != 2 or points.shape[1] != 3:
                 raise ValueError
             return plane_through(points, "plane through given points")

@@ -1,0 +1,37 @@
+"""Numbers of the command line are finite and of a size that something measured can have."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, cast
+
+import typer
+from typer.core import TyperCommand
+
+from aerotri.conventions import LARGEST
+
+LARGEST_COUNT = 2**31 - 1
+LARGEST_SEED = 2**63 - 1
+
+
+class CheckedCommand(TyperCommand):
+    """A command whose numbers are held against what can be, before anything is done."""
+
+    def invoke(self, ctx: Any) -> Any:
+        for param in self.params:
+            reason = refusal(str(param.name), ctx.params.get(param.name))
+            if reason:
+                raise typer.BadParameter(reason, ctx=ctx, param=cast(Any, param))
+        return super().invoke(ctx)
+
+
+def refusal(name: str, value: Any) -> str:
+    """Why the value of an option cannot be, '' where it can; values of several are looked at one by one."""
+    if isinstance(value, (tuple, list)):
+        return next(filter(None, (refusal(name, one) for one in value)), "")
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return ""
+    if isinstance(value, float) and not math.isfinite(value):
+        return f"{value} is no number to compute with."
+    largest = LARGEST if isinstance(value, float) else LARGEST_SEED if name == "seed" else LARGEST_COUNT
+    return f"{value:g} is too large, at most {largest:g} can be." if abs(value) > largest else ""
