@@ -32,6 +32,7 @@ import numpy as np
 from aerotri.commands.console import Console
 from aerotri.commands.dtm import DtmOptions, make_plan
 from aerotri.commands.results import reopened
+from aerotri.terrain._plan_kernels import Nodes, Plan
 from aerotri.terrain._search_kernels import find_heights
 from aerotri.terrain._view_kernels import parallax_per_metre, photo_place
 from aerotri.terrain.photographs import photographs_of, site_at
@@ -64,11 +65,11 @@ def cut(view, nodes: np.ndarray, pair: np.ndarray) -> list[tuple[np.ndarray, np.
     """Templates and strips of 8 bits around the places of nodes; strips as long as the range, along columns."""
     h, found, grey = POSTS // 2, [], []
     for k in pair:
-        offset, _, _, rows, columns = view[5][k]
-        grey.append((view[6][offset : offset + rows * columns].reshape(rows, columns) >> 8).astype(np.uint8))
+        offset, _, _, rows, columns = view.crops[k]
+        grey.append((view.pixels[offset : offset + rows * columns].reshape(rows, columns) >> 8).astype(np.uint8))
     for x, y, z in nodes:
         (c, r), (oc, orow) = (
-            np.array(photo_place(view, k, 0, 0, x, y, z)).astype(int) - view[5][k, [2, 1]] for k in pair
+            np.array(photo_place(view, k, 0, 0, x, y, z)).astype(int) - view.crops[k, [2, 1]] for k in pair
         )
         template = grey[0][r - h : r + h + 1, c - h : c + h + 1]
         reach = h + HALF_RANGE
@@ -108,7 +109,8 @@ def main() -> None:
     def ours(step: float) -> None:
         slopes = np.zeros((len(nodes), 2))
         most = int(2 * HALF_RANGE / step) + 2
-        find_heights(view, nodes, slopes, ranges, chosen, POSTS, gsd, step, most, heights, scores)
+        plan = Plan(POSTS, gsd, step, most)
+        find_heights(view, Nodes(nodes, slopes, ranges, chosen), plan, heights, scores)
 
     runs = {
         "aerotri, a height every post": lambda: ours(1.0),

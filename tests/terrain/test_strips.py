@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from aerotri.terrain._search_kernels import make_room, search
-from aerotri.terrain._strip_kernels import make_strips, strip_search
+from aerotri.terrain._plan_kernels import Locus, make_rooms
+from aerotri.terrain._search_kernels import search
+from aerotri.terrain._strip_kernels import strip_search
 from aerotri.terrain.photographs import site_at
 
 POSTS, WINDOW, STEP, HEIGHTS = 17, 1.0, 2.0, 41
@@ -24,14 +25,14 @@ def test_strips_find_the_height_that_windows_find(rendered):
     ])  # fmt: skip
     delta = np.column_stack([xy, z]) - site.place
     view = site.view(0, delta.min(axis=0) - [0, 0, half], delta.max(axis=0) + [0, 0, half], 0.0, 40.0)
-    room, strips = make_room(POSTS, HEIGHTS, 4), make_strips(POSTS, HEIGHTS, 4)
+    rooms = make_rooms(POSTS, HEIGHTS, HEIGHTS, 4)
     exact, fast, compared = np.empty(HEIGHTS), np.empty(HEIGHTS), 0
     for place, slope in zip(delta, slopes, strict=True):
         nearest = np.argsort(np.hypot(*(site.centres[:, :2] - place[:2]).T))
-        spot, low = np.array([*place, *slope]), place[2] - half
+        spot, locus = np.array([*place, *slope]), Locus(0.0, 0.0, place[2] - half, STEP)
         for chosen in (nearest[:2], nearest):
-            best = search(view, chosen, spot, np.zeros(2), low, STEP, WINDOW, room, exact)
-            found = strip_search(view, chosen, spot, low, STEP, WINDOW, room, strips, fast)
+            best = search(view, chosen, spot, locus, WINDOW, rooms.search, exact)
+            found = strip_search(view, chosen, spot, locus, WINDOW, rooms, fast)
             if found < 0 or exact[best] < 0.9:
                 continue
             compared += 1

@@ -111,6 +111,7 @@ def pilot_of(pickets, interval: float, tolerance: float | None) -> Pilot:
     is as wrong as a picket itself: closer pickets then show noise, wider ones lose terrain [C].
     """
     from aerotri.terrain.interval import Pilot, chosen_interval
+    from aerotri.terrain.picket_status import PicketStatus
     from aerotri.terrain.surface import errors_by_interval
 
     own = pickets.accepted
@@ -123,7 +124,7 @@ def pilot_of(pickets, interval: float, tolerance: float | None) -> Pilot:
     return Pilot(
         interval=widths, rmse=rmse, pickets=np.array([int((own & part).sum()) for part in kept]),
         errors=np.array([int((pickets.errors & part).sum()) for part in kept]), noise=noise,
-        area_m2=float((pickets.status != 1).sum() * interval**2),
+        area_m2=float((pickets.status != PicketStatus.NOT_SEEN).sum() * interval**2),
         chosen=chosen_interval(widths, rmse, noise if tolerance is None else tolerance),
     )  # fmt: skip
 

@@ -4,21 +4,16 @@ P = I(true; m − d(m)), m = π(used, P_w), exact at a point. Patches of cells t
 either photograph of each get it from 3 × 3 exact nodes a model, biquadratic in plan and quadratic in the height above
 the surface through the nodes; the worst cells of the patch are computed exactly, and where they are off by more than a
 tolerance the patch is quartered, in the end down to exact cells.
-
-photo   : (15,) U (3, 4) row by row with u = U·(x, y, z, 1), then c, x0, y0 in mm
-photos  : (M, 4, 15) of every model: used left, used right, true left, true right
-source  : (M, 2) image errors of left and right
-cameras : half (S, 2) mm of the formats; edges (S, 2, 2) mm, x and y of the seams, rising, ∞ where there is none;
-          meta (S, 3, 3, 7) of every tile (column, row from below): offset into values, nodes along x and y, x and y of
-          the first node, nodes per mm along x and y; values (·,) mm, dx and dy at the nodes
-place   : (4,) x of the first cell, its change per column, y of the first cell, its change per row
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from aerotri.compiled import kernel
+from aerotri.functional_model._photo_kernels import ErrorTable, image_error, partials, project
 
 SMALLEST_PATCH, NODES, CHECKS, MODELS_IN_PATCH = 4, 9, 6, 3
 MIXED, ONE_TILE, OFF = 0, 1, 2
@@ -27,80 +22,96 @@ LAST_STEP_M = 5e-3
 """A step of the intersection after which the next one is below 0.01 mm: steps shrink a thousandfold."""
 
 
-@kernel
-def tile_of(s, x, y, edges):
-    """Column and row from below of the tile that holds a position in a photograph with image errors s."""
-    i = int(x >= edges[s, 0, 0]) + int(x >= edges[s, 0, 1])
-    j = int(y >= edges[s, 1, 0]) + int(y >= edges[s, 1, 1])
-    return i, j
+class Models(NamedTuple):
+    """M stereo models.
+
+    photos : (M, 4, 15) used left, used right, true left, true right, as in `_photo_kernels`.
+    source : (M, 2) image errors of left and right. errors : of all groups of photographs.
+    """
+
+    photos: np.ndarray
+    source: np.ndarray
+    errors: ErrorTable
+
+
+class Dem(NamedTuple):
+    """A window of a DEM.
+
+    z : (h, w) m, NaN without data. number : (h, w) model of every cell, −1 for none.
+    place : (4,) x of the first cell, its change per column, y of the first cell, its change per row.
+    """
+
+    z: np.ndarray
+    number: np.ndarray
+    place: np.ndarray
+
+
+class Moves(NamedTuple):
+    """(h, w) each: dX and dY of a DEM in columns and rows, dZ in m; NaN outside the models."""
+
+    du: np.ndarray
+    dv: np.ndarray
+    dz: np.ndarray
+
+
+class Square(NamedTuple):
+    """A patch of cells: its first row, the row after its last, the same of columns."""
+
+    row: int
+    last_row: int
+    column: int
+    last_column: int
+
+
+class Patch(NamedTuple):
+    """box : (4,) first and last row, first and last column. heights : (2,) lowest, highest. present : its models."""
+
+    box: np.ndarray
+    heights: np.ndarray
+    present: np.ndarray
+
+
+class Fit(NamedTuple):
+    """A fitted patch.
+
+    f : (4, 3, 3) coefficients of dX, dY, dZ and of the surface through the nodes. slope : (2, 3) of the deformation by
+    height and height squared. node : (4, 3, 3) what was fitted.
+    """
+
+    f: np.ndarray
+    slope: np.ndarray
+    node: np.ndarray
+
+
+class Lines(NamedTuple):
+    """Room for one row or column of a patch each."""
+
+    lows: np.ndarray
+    highs: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
+    z: np.ndarray
 
 
 @kernel
-def error_in_tile(s, i, j, x, y, meta, values):
-    """(dx, dy) mm of a tile at a measured position; beyond the tile it goes on straight."""
-    nx, ny = int(meta[s, i, j, 1]), int(meta[s, i, j, 2])
-    fx, fy = (x - meta[s, i, j, 3]) * meta[s, i, j, 5], (y - meta[s, i, j, 4]) * meta[s, i, j, 6]
-    kx, ky = min(max(int(fx), 0), nx - 2), min(max(int(fy), 0), ny - 2)
-    fx, fy = fx - kx, fy - ky
-    low = int(meta[s, i, j, 0]) + 2 * (ky * nx + kx)
-    high = low + 2 * nx
-    low_x = values[low] + fx * (values[low + 2] - values[low])
-    low_y = values[low + 1] + fx * (values[low + 3] - values[low + 1])
-    high_x = values[high] + fx * (values[high + 2] - values[high])
-    high_y = values[high + 1] + fx * (values[high + 3] - values[high + 1])
-    return low_x + fy * (high_x - low_x), low_y + fy * (high_y - low_y)
-
-
-@kernel
-def image_error(s, x, y, edges, meta, values):
-    """(dx, dy) mm at a measured position in a photograph with image errors s."""
-    i, j = tile_of(s, x, y, edges)
-    return error_in_tile(s, i, j, x, y, meta, values)
-
-
-@kernel
-def project(photos, m, k, x, y, z):
-    """(x, y) mm in photograph k of model m, and u3, which is negative in front of the camera."""
-    u1 = photos[m, k, 0] * x + photos[m, k, 1] * y + photos[m, k, 2] * z + photos[m, k, 3]
-    u2 = photos[m, k, 4] * x + photos[m, k, 5] * y + photos[m, k, 6] * z + photos[m, k, 7]
-    u3 = photos[m, k, 8] * x + photos[m, k, 9] * y + photos[m, k, 10] * z + photos[m, k, 11]
-    scale = -photos[m, k, 12] / u3
-    return photos[m, k, 13] + scale * u1, photos[m, k, 14] + scale * u2, u3
-
-
-@kernel
-def partials(photos, m, k, x, y, z):
-    """Partials of x, then of y, in photograph k of model m by the point."""
-    u1 = photos[m, k, 0] * x + photos[m, k, 1] * y + photos[m, k, 2] * z + photos[m, k, 3]
-    u2 = photos[m, k, 4] * x + photos[m, k, 5] * y + photos[m, k, 6] * z + photos[m, k, 7]
-    inverse = -1.0 / (photos[m, k, 8] * x + photos[m, k, 9] * y + photos[m, k, 10] * z + photos[m, k, 11])
-    a, b, f = u1 * inverse, u2 * inverse, photos[m, k, 12] * inverse
-    v0, v1, v2 = photos[m, k, 8], photos[m, k, 9], photos[m, k, 10]
-    return (
-        f * (photos[m, k, 0] + a * v0), f * (photos[m, k, 1] + a * v1), f * (photos[m, k, 2] + a * v2),
-        f * (photos[m, k, 4] + b * v0), f * (photos[m, k, 5] + b * v1), f * (photos[m, k, 6] + b * v2),
-    )  # fmt: skip
-
-
-@kernel
-def deformation(photos, source, cameras, m, x, y, z):
+def deformation(models, m, x, y, z):
     """(dX, dY, dZ) at a point of the DEM in model m; NaN where not both photographs show it.
 
     The intersection keeps the partials A of its start, metres away from its end: that slows it down by a thousandth a
     step, and moves its end by that share of what the y-parallax does. a, b are rows of A of the left, c, d of the right
     photograph.
     """
-    half, edges, meta, values = cameras
-    left, right = source[m, 0], source[m, 1]
+    photos, half = models.photos, models.errors.half
+    left, right = models.source[m, 0], models.source[m, 1]
     x1, y1, depth1 = project(photos, m, 0, x, y, z)
     x2, y2, depth2 = project(photos, m, 1, x, y, z)
     on_left = depth1 < 0.0 and abs(x1) <= half[left, 0] and abs(y1) <= half[left, 1]
     on_right = depth2 < 0.0 and abs(x2) <= half[right, 0] and abs(y2) <= half[right, 1]
     if not (on_left and on_right):
         return np.nan, np.nan, np.nan
-    dx, dy = image_error(left, x1, y1, edges, meta, values)
+    dx, dy = image_error(left, x1, y1, models.errors)
     x1, y1 = x1 - dx, y1 - dy
-    dx, dy = image_error(right, x2, y2, edges, meta, values)
+    dx, dy = image_error(right, x2, y2, models.errors)
     x2, y2 = x2 - dx, y2 - dy
     a0, a1, a2, b0, b1, b2 = partials(photos, m, 2, x, y, z)
     c0, c1, c2, d0, d1, d2 = partials(photos, m, 3, x, y, z)
@@ -132,28 +143,26 @@ def deformation(photos, source, cameras, m, x, y, z):
 
 
 @kernel
-def deform_points(models, photos, source, cameras, points, out):
-    """`deformation` at points (n, 3) of models (n,); out (n, 3)."""
+def deform_points(models, number, points, out):
+    """`deformation` at points (n, 3) in models of these numbers (n,); out (n, 3)."""
     for k in range(len(points)):
-        out[k, 0], out[k, 1], out[k, 2] = deformation(
-            photos, source, cameras, models[k], points[k, 0], points[k, 1], points[k, 2]
-        )
+        out[k, 0], out[k, 1], out[k, 2] = deformation(models, number[k], points[k, 0], points[k, 1], points[k, 2])
 
 
 @kernel
-def tile_case(photos, source, cameras, m, place, box, low, high):
-    """Where a box of cells, from height low to high, lies: ONE_TILE of either photograph, OFF one of them, or MIXED.
+def tile_case(models, m, place, patch):
+    """Where a patch of cells lies: ONE_TILE of either photograph, OFF one of them, or MIXED.
 
-    Tiles are rectangles and a box is convex: its corners decide. box : (4,) first and last row, first and last column.
+    Tiles are rectangles and the box of a patch is convex: its corners decide.
     """
-    half, edges, _, _ = cameras
+    photos, half, edges, box = models.photos, models.errors.half, models.errors.edges, patch.box
     case = ONE_TILE
     for k in range(2):
-        s = source[m, k]
+        s = models.source[m, k]
         x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
         for corner in range(8):
             row, column = box[corner & 1], box[2 + ((corner >> 1) & 1)]
-            height = high if corner & 4 else low
+            height = patch.heights[1] if corner & 4 else patch.heights[0]
             x, y, u3 = project(photos, m, k, place[0] + place[1] * column, place[2] + place[3] * row, height)
             if not u3 < 0.0:
                 return MIXED
@@ -209,14 +218,10 @@ def find_height(z, box, height):
 
 
 @kernel
-def fit_patch(z, photos, source, cameras, m, place, box, heights, tolerance, fit):
-    """Fit the deformation of a patch; False where it is off by more than the tolerance at the worst cells.
-
-    box : (4,) first and last row, first and last column. heights : (2,) the lowest and the highest.
-    fit : coefficients f (4, 3, 3) of dX, dY, dZ and of the surface through the nodes; slope (2, 3) of the deformation
-    by height and height squared; node (4, 3, 3) scratch.
-    """
-    f, slope, node = fit
+def fit_patch(dem, models, m, patch, tolerance, fit):
+    """Fit the deformation of a patch; False where it is off by more than the tolerance at the worst cells."""
+    f, slope, node = fit.f, fit.slope, fit.node
+    z, place, box, heights = dem.z, dem.place, patch.box, patch.heights
     x0, dx, y0, dy = place[0], place[1], place[2], place[3]
     half_rows, half_columns = 0.5 * (box[1] - box[0]), 0.5 * (box[3] - box[2])
     middle, span = 0.5 * (heights[0] + heights[1]), max(1.0, 0.5 * (heights[1] - heights[0]))
@@ -239,7 +244,7 @@ def fit_patch(z, photos, source, cameras, m, place, box, heights, tolerance, fit
             r, c, height = float(i), float(j), float(z[i, j])
             if height != height:
                 continue
-        d = deformation(photos, source, cameras, m, x0 + dx * c, y0 + dy * r, height)
+        d = deformation(models, m, x0 + dx * c, y0 + dy * r, height)
         if k < NODES:
             p, q = k // 3, k % 3
             node[0, p, q], node[1, p, q], node[2, p, q], node[3, p, q] = d[0], d[1], d[2], height
@@ -261,11 +266,13 @@ def fit_patch(z, photos, source, cameras, m, place, box, heights, tolerance, fit
 
 
 @kernel
-def fill_patch(z, number, m, whole, place, box, f, slope, lines, du, dv, dz):
+def fill_patch(dem, m, whole, box, fit, lines, moves):
     """The fitted deformation at the cells of a patch in model m; NaN where the DEM has no data.
 
-    whole : all cells are in it. lines : three rows of scratch.
+    whole : all cells are in it.
     """
+    z, number, place, f, slope = dem.z, dem.number, dem.place, fit.f, fit.slope
+    du, dv, dz = moves.du, moves.dv, moves.dz
     per_column, per_row = 1.0 / place[1], 1.0 / place[3]
     half_rows, half_columns = 0.5 * (box[1] - box[0]), 0.5 * (box[3] - box[2])
     ax, ay, az, bx, by, bz = slope[0, 0], slope[0, 1], slope[0, 2], slope[1, 0], slope[1, 1], slope[1, 2]
@@ -286,7 +293,7 @@ def fill_patch(z, number, m, whole, place, box, f, slope, lines, du, dv, dz):
         h1 = f[3, 0, 1] + t * (f[3, 1, 1] + t * f[3, 2, 1])
         h2 = f[3, 0, 2] + t * (f[3, 1, 2] + t * f[3, 2, 2])
         heights = z[i, first : first + n]
-        out_u, out_v, out_z = lines[0][:n], lines[1][:n], lines[2][:n]
+        out_u, out_v, out_z = lines.u[:n], lines.v[:n], lines.z[:n]
         if whole:
             out_u, out_v, out_z = du[i, first : first + n], dv[i, first : first + n], dz[i, first : first + n]
         for j in range(n):
@@ -302,11 +309,13 @@ def fill_patch(z, number, m, whole, place, box, f, slope, lines, du, dv, dz):
 
 
 @kernel
-def patch_extremes(z, number, row, last_row, column, last_column, lows, highs, heights):
+def patch_extremes(dem, square, lines, heights):
     """Lowest and highest height of a patch into heights (2,), ∞ and −∞ without data; whether it lies in one model.
 
-    Column by column in lows and highs, which the processor does many at a time.
+    Column by column in rows of their own, which the processor does many at a time.
     """
+    z, number, lows, highs = dem.z, dem.number, lines.lows, lines.highs
+    row, last_row, column, last_column = square.row, square.last_row, square.column, square.last_column
     n = last_column - column
     for j in range(n):
         lows[j], highs[j] = np.inf, -np.inf
@@ -326,11 +335,11 @@ def patch_extremes(z, number, row, last_row, column, last_column, lows, highs, h
 
 
 @kernel
-def find_models(number, row, last_row, column, last_column, present):
+def find_models(number, square, present):
     """The models of a patch into present; how many, or one more than there is room for."""
     n = 0
-    for i in range(row, last_row):
-        for j in range(column, last_column):
+    for i in range(square.row, square.last_row):
+        for j in range(square.column, square.last_column):
             m, known = number[i, j], number[i, j] < 0
             for k in range(n):
                 known |= present[k] == m
@@ -343,53 +352,52 @@ def find_models(number, row, last_row, column, last_column, present):
 
 
 @kernel
-def blank_patch(box, du, dv, dz):
+def blank_patch(box, moves):
     """No deformation in a patch: NaN."""
     for i in range(int(box[0]), int(box[1]) + 1):
         for j in range(int(box[2]), int(box[3]) + 1):
-            du[i, j] = dv[i, j] = dz[i, j] = np.nan
+            moves.du[i, j] = moves.dv[i, j] = moves.dz[i, j] = np.nan
 
 
 @kernel
-def deform_patch(
-    z, number, photos, source, cameras, place, tolerance, box, heights, present, n, whole, fit, lines, du, dv, dz
-):
-    """The deformation of a patch by a fit for each of its n models; False where one of them does not fit.
+def deform_patch(dem, models, tolerance, patch, whole, room, moves):
+    """The deformation of a patch by a fit for each of its models; False where one of them does not fit.
 
-    whole : all cells of the patch are in its one model.
+    whole : all cells of the patch are in its one model. room : a `Fit` and `Lines`.
     """
-    wide = min(box[1] - box[0], box[3] - box[2]) >= 2
-    for k in range(n):
-        m = present[k]
-        case = tile_case(photos, source, cameras, m, place, box, heights[0], heights[1])
+    fit, lines = room
+    wide = min(patch.box[1] - patch.box[0], patch.box[3] - patch.box[2]) >= 2
+    for m in patch.present:
+        case = tile_case(models, m, dem.place, patch)
         if case == OFF:
             if whole:
-                blank_patch(box, du, dv, dz)
+                blank_patch(patch.box, moves)
             continue
         if case != ONE_TILE or not wide:
             return False
-        if not fit_patch(z, photos, source, cameras, m, place, box, heights, tolerance, fit):
+        if not fit_patch(dem, models, m, patch, tolerance, fit):
             return False
-        fill_patch(z, number, m, whole, place, box, fit[0], fit[1], lines, du, dv, dz)
+        fill_patch(dem, m, whole, patch.box, fit, lines, moves)
     return True
 
 
 @kernel
-def deform_window(z, number, photos, source, cameras, place, tolerance, largest, du, dv, dz):
+def deform_window(dem, models, tolerance, largest, moves):
     """The deformation of all cells of a window; returns how many of them were computed one by one.
 
     Parameters
     ----------
-    z : (h, w) m, NaN where the DEM has no data.
-    number : (h, w) model of every cell, −1 for none.
     tolerance : m, of the fit. largest : cells along the side of a patch to begin with, a power of two.
-    du, dv : (h, w) out, dX and dY in columns and rows. dz : (h, w) out, m. NaN outside the models.
+    moves : out.
     """
+    z, number, place = dem.z, dem.number, dem.place
     rows, columns = z.shape
-    fit = np.empty((4, 3, 3)), np.empty((2, 3)), np.empty((4, 3, 3))
+    fit = Fit(np.empty((4, 3, 3)), np.empty((2, 3)), np.empty((4, 3, 3)))
     box, heights, present = np.empty(4), np.empty(2), np.empty(MODELS_IN_PATCH, np.int64)
-    lows, highs = np.empty(largest, z.dtype), np.empty(largest, z.dtype)
-    lines = np.empty(largest, du.dtype), np.empty(largest, du.dtype), np.empty(largest, dz.dtype)
+    lines = Lines(
+        np.empty(largest, z.dtype), np.empty(largest, z.dtype), np.empty(largest, moves.du.dtype),
+        np.empty(largest, moves.du.dtype), np.empty(largest, moves.dz.dtype),
+    )  # fmt: skip
     stack = np.empty((256, 3), np.int64)
     exact = 0
     for first_row in range(0, rows, largest):
@@ -401,21 +409,21 @@ def deform_window(z, number, photos, source, cameras, place, tolerance, largest,
                 row, column, size = stack[top, 0], stack[top, 1], stack[top, 2]
                 last_row, last_column = min(row + size, rows), min(column + size, columns)
                 box[0], box[1], box[2], box[3] = row, last_row - 1, column, last_column - 1
-                uniform = patch_extremes(z, number, row, last_row, column, last_column, lows, highs, heights)
+                square = Square(row, last_row, column, last_column)
+                uniform = patch_extremes(dem, square, lines, heights)
                 present[0], n = number[row, column], 1
                 if heights[0] > heights[1] or (uniform and present[0] < 0):
                     n = 0
                 elif not uniform:
-                    n = find_models(number, row, last_row, column, last_column, present)
+                    n = find_models(number, square, present)
                 if n == 0 or not uniform:
-                    blank_patch(box, du, dv, dz)
+                    blank_patch(box, moves)
                 if n == 0:
                     continue
-                if n <= len(present) and deform_patch(
-                    z, number, photos, source, cameras, place, tolerance, box, heights, present, n, uniform, fit,
-                    lines, du, dv, dz,
-                ):  # fmt: skip
-                    continue
+                if n <= len(present):
+                    patch = Patch(box, heights, present[:n])
+                    if deform_patch(dem, models, tolerance, patch, uniform, (fit, lines), moves):
+                        continue
                 if size > SMALLEST_PATCH:
                     size //= 2
                     for i in range(row, last_row, size):
@@ -428,10 +436,11 @@ def deform_window(z, number, photos, source, cameras, place, tolerance, largest,
                         m = number[i, j]
                         height = z[i, j]
                         if m < 0 or height != height:
-                            du[i, j] = dv[i, j] = dz[i, j] = np.nan
+                            moves.du[i, j] = moves.dv[i, j] = moves.dz[i, j] = np.nan
                             continue
                         x, y = place[0] + place[1] * j, place[2] + place[3] * i
-                        d = deformation(photos, source, cameras, m, x, y, height)
-                        du[i, j], dv[i, j], dz[i, j] = d[0] / place[1], d[1] / place[3], d[2]
+                        d = deformation(models, m, x, y, height)
+                        moves.du[i, j], moves.dv[i, j] = d[0] / place[1], d[1] / place[3]
+                        moves.dz[i, j] = d[2]
                         exact += 1
     return exact

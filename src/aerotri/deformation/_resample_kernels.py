@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from aerotri.compiled import kernel
@@ -10,6 +12,17 @@ FIXED_POINTS = 30
 N_SUMS = 14
 """Of `resample`: cells corrected, without data, outside the models, shifted beyond the halo; Σ and Σ² of dZ, smallest
 and largest dZ; Σ of Z before and after; smallest and largest Z before, and after."""
+
+
+class Corrected(NamedTuple):
+    """A corrected window.
+
+    z, dz : (h − 2·halo, w − 2·halo) corrected height and dZ, m. sums : (N_SUMS,) zero, ±∞ for extremes at first.
+    """
+
+    z: np.ndarray
+    dz: np.ndarray
+    sums: np.ndarray
 
 
 @kernel
@@ -28,7 +41,7 @@ def slope_of_corrected(z, dz, i, j, down, right):
 
 
 @kernel
-def resample(z, du, dv, dz, halo, tolerance, out, out_dz, sums):
+def resample(z, moves, halo, tolerance, corrected):
     """The corrected surface on the cells of a window.
 
     The cells of the DEM at their true places, X − dX, Y − dY, Z − dZ, make a surface of bilinear patches. It is met at
@@ -37,11 +50,12 @@ def resample(z, du, dv, dz, halo, tolerance, out, out_dz, sums):
 
     Parameters
     ----------
-    z, du, dv, dz : (h, w) with `halo` cells around the window.
+    z : (h, w) with `halo` cells around the window. moves : `Moves` of the same cells.
     tolerance : (2,) columns and rows, of the fixed point.
-    out, out_dz : (h − 2·halo, w − 2·halo) out, corrected height and dZ.
-    sums : (N_SUMS,) zero, ±∞ for extremes; out.
+    corrected : out.
     """
+    du, dv, dz = moves.du, moves.dv, moves.dz
+    out, out_dz, sums = corrected.z, corrected.dz, corrected.sums
     rows, columns = z.shape
     limit_u, limit_v = tolerance[0], tolerance[1]
     no_data = outside = escaped = 0

@@ -81,10 +81,8 @@ class DemModels:
         x, y = xyz[known, :2].mean(axis=0)
         chosen, local = np.unique(number[known], return_inverse=True)
         found = np.empty((len(known), 3))
-        _kernels.deform_points(
-            local, self.photos(x, y, chosen), self.source[chosen], self.tables.as_tuple(), xyz[known] - (x, y, 0.0),
-            found,
-        )  # fmt: skip
+        models = _kernels.Models(self.photos(x, y, chosen), self.source[chosen], self.tables.for_kernels)
+        _kernels.deform_points(models, local, xyz[known] - (x, y, 0.0), found)
         out[known] = found
         return out
 
@@ -109,7 +107,8 @@ class DemModels:
             sums[1], sums[2] = window[0] * window[1] - known, known
             return CorrectedWindow(np.full(window, np.nan, z.dtype), np.full(window, np.nan, np.float32), sums, 0)
         x, y = float(grid.x(column + z.shape[1] // 2)), float(grid.y(row + z.shape[0] // 2))
-        number, photos = _renumbered(number, chosen, present), self.photos(x, y, chosen)
+        number = _renumbered(number, chosen, present)
+        models = _kernels.Models(self.photos(x, y, chosen), self.source[chosen], self.tables.for_kernels)
         out, out_dz, exact = np.empty(window, z.dtype), np.empty(window, np.float32), 0
         for i in range(0, window[0], PART):
             for j in range(0, window[1], PART):
@@ -118,27 +117,24 @@ class DemModels:
                 place = np.array(
                     [grid.x(column + j) - x, grid.cell_x, grid.y(row + i) - y, -grid.cell_y], dtype=float
                 )  # fmt: skip
-                part = self._part(z[around], number[around], photos, self.source[chosen], place, halo)
+                dem = _kernels.Dem(np.ascontiguousarray(z[around]), np.ascontiguousarray(number[around]), place)
+                part = _corrected_part(dem, models, halo)
                 inner = np.s_[i : i + rows, j : j + columns]
                 out[inner], out_dz[inner] = part.z, part.dz
                 sums, exact = added_sums(sums, part.sums), exact + part.exact
         return CorrectedWindow(out, out_dz, sums, exact)
 
-    def _part(
-        self, z: np.ndarray, number: np.ndarray, photos: np.ndarray, source: np.ndarray, place: np.ndarray, halo: int
-    ) -> CorrectedWindow:
-        """Correct a part of a window that stays in the processor's cache; `number`, `photos`, `source` go together."""
-        z, number = np.ascontiguousarray(z), np.ascontiguousarray(number)
-        du, dv, dz = (np.empty(z.shape, np.float32) for _ in range(3))
-        cameras, sums = self.tables.as_tuple(), no_sums()
-        exact = _kernels.deform_window(
-            z, number, photos, source, cameras, place, FIT_TOLERANCE_M, LARGEST_PATCH, du, dv, dz
-        )
-        shape = z.shape[0] - 2 * halo, z.shape[1] - 2 * halo
-        out, out_dz = np.empty(shape, z.dtype), np.empty(shape, np.float32)
-        tolerance = FIXED_POINT_TOLERANCE_M / np.abs(place[[1, 3]])
-        _resample_kernels.resample(z, du, dv, dz, halo, tolerance, out, out_dz, sums)
-        return CorrectedWindow(out, out_dz, sums, exact)
+
+def _corrected_part(dem: _kernels.Dem, models: _kernels.Models, halo: int) -> CorrectedWindow:
+    """Correct a part of a window that stays in the processor's cache; `dem.number` counts within `models`."""
+    z = dem.z
+    moves = _kernels.Moves(*(np.empty(z.shape, np.float32) for _ in range(3)))
+    exact = _kernels.deform_window(dem, models, FIT_TOLERANCE_M, LARGEST_PATCH, moves)
+    shape = z.shape[0] - 2 * halo, z.shape[1] - 2 * halo
+    corrected = _resample_kernels.Corrected(np.empty(shape, z.dtype), np.empty(shape, np.float32), no_sums())
+    tolerance = FIXED_POINT_TOLERANCE_M / np.abs(dem.place[[1, 3]])
+    _resample_kernels.resample(z, moves, halo, tolerance, corrected)
+    return CorrectedWindow(corrected.z, corrected.dz, corrected.sums, exact)
 
 
 def dem_models(calibration: Calibration, of: Restitution, names: tuple[tuple[str, str], ...]) -> DemModels:

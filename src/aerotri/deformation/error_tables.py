@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from aerotri.deformation.photo_errors import PhotoErrors, seams_mm
+from aerotri.functional_model._photo_kernels import ErrorTable
 
 FIRST_STEP_MM = 1.0
 MOST_NODES = 1 << 21
@@ -20,11 +21,11 @@ INSIDE_MM = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class ErrorTables:
-    """Image errors of several groups of photographs, `cameras` as the kernels want it.
+    """Image errors of several groups of photographs.
 
     Parameters
     ----------
-    half : (S, 2) mm. edges : (S, 2, 2) mm, seams. meta : (S, 3, 3, 7). values : (·,) mm. See `_kernels`.
+    half : (S, 2) mm. edges : (S, 2, 2) mm, seams. meta : (S, 3, 3, 7). values : (·,) mm. See `ErrorTable`.
     accuracy : mm, largest difference seen between table and function.
     """
 
@@ -34,8 +35,10 @@ class ErrorTables:
     values: np.ndarray
     accuracy: float
 
-    def as_tuple(self) -> tuple[np.ndarray, ...]:
-        return self.half, self.edges, self.meta, self.values
+    @property
+    def for_kernels(self) -> ErrorTable:
+        """The tables as kernels take them."""
+        return ErrorTable(self.half, self.edges, self.meta, self.values)
 
 
 def error_tables(errors: tuple[PhotoErrors, ...], tolerance: float) -> ErrorTables:

@@ -23,7 +23,8 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.parquet import load_parquet
-from aerotri.terrain.pickets import STATUS, Pickets
+from aerotri.terrain.picket_status import PicketStatus
+from aerotri.terrain.pickets import Pickets
 
 NUMBERS = ("node_X", "node_Y", "X", "Y", "Z", "sX", "sY", "sZ", "sX_matching", "sY_matching", "sZ_matching",
            "correlation")  # fmt: skip
@@ -48,7 +49,7 @@ class PicketTable:
     @property
     def accepted(self) -> np.ndarray:
         """(n,) bool."""
-        return self.status == STATUS[0]
+        return self.status == PicketStatus.ACCEPTED.text
 
 
 def write_pickets(path: Path, pickets: Pickets, adjustment: np.ndarray) -> None:
@@ -69,7 +70,7 @@ def write_pickets(path: Path, pickets: Pickets, adjustment: np.ndarray) -> None:
     names = [str(name) for name in p.names]
     listed = [[names[k] for k in row if k >= 0] for row in p.photographs.tolist()]
     columns["photographs"] = pa.array(listed, pa.list_(pa.string()))
-    columns["status"] = pa.array([STATUS[k] for k in p.status.tolist()])
+    columns["status"] = pa.array([PicketStatus(k).text for k in p.status.tolist()])
     columns["steps_aside"] = pa.array(p.tries.astype(np.int32))
     columns["model"] = pa.array(p.model.astype(np.int32))
     parquet.write_table(pa.table(columns), path)

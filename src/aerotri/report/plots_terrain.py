@@ -26,12 +26,15 @@ from aerotri.report.canvas import (
 )
 from aerotri.terrain.compare import Comparison
 from aerotri.terrain.dtm import TerrainOutcome
-from aerotri.terrain.pickets import FIRST_ERROR
+from aerotri.terrain.picket_status import PicketStatus
 
 HIGHEST = 6.4
 HOLE = "#cfe0f2"
 MOST_CELLS = 1200
-ERROR_MARKS = {5: ("x", "backward"), 6: ("+", "ambiguous"), 7: ("s", "off its neighbours"), 8: ("^", "peak or pit")}
+ERROR_MARKS = {
+    PicketStatus.BACKWARD: ("x", "backward"), PicketStatus.AMBIGUOUS: ("+", "ambiguous"),
+    PicketStatus.NEIGHBOURS: ("s", "off its neighbours"), PicketStatus.PEAK: ("^", "peak or pit"),
+}  # fmt: skip
 
 
 @styled
@@ -71,8 +74,8 @@ def plot_surface(outcome: TerrainOutcome, block_name: str) -> Figure:
 def plot_pickets(outcome: TerrainOutcome, block_name: str) -> Figure:
     """Where pickets are: accepted, stepped aside, in error by what shows it, and the nodes that stayed holes."""
     p = outcome.pickets
-    seen = p.status != 1
-    holes = seen & (p.status > 1) & (p.status < FIRST_ERROR)
+    seen = p.status != PicketStatus.NOT_SEEN
+    holes = seen & (p.status >= PicketStatus.LOW_CORRELATION) & (p.status < PicketStatus.BACKWARD)
     subtitle = (
         f"{int(p.accepted.sum())} of {int(seen.sum())} nodes accepted, {int((p.accepted & (p.tries > 0)).sum())} of "
         f"them stepped aside; {int(p.errors.sum())} error pickets, {int(holes.sum())} holes"

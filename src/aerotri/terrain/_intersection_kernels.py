@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.compiled import kernel
-from aerotri.deformation._kernels import partials, project
+from aerotri.functional_model._photo_kernels import partials, project
 from aerotri.terrain._shift_kernels import invert
 
 AGREEING_POSTS = 1.0
@@ -13,24 +13,23 @@ AGREEING_POSTS = 1.0
 
 
 @kernel
-def intersect(view, chosen, shifts, used, spot, point, covariance, ideal, weight):
+def intersect(view, chosen, spot, measured, room):
     """Least-squares intersection of the rays of the first and the used photographs; vᵀPv, or −1.
 
     The variance of a shift between two windows is half that of either one [C]: the first photograph's ray has the mean
     of the halves.
 
-    Parameters
-    ----------
-    shifts : (m, 6) of `match_shift`, turned into x and y of the plan: dx, dy, their variances, covariance.
-    point : (3,), covariance : (3, 3) out. ideal (m, 2), weight (m, 3) room.
+    measured : a `Measured`; its point and covariance are out. room : a `ShiftRoom`.
     """
     m = len(chosen)
+    shifts, used, point, covariance = measured.shifts, measured.used, measured.point, measured.covariance
+    ideal, weight = room.ideal, room.ray_weight
     for k in range(m):
         if not used[k]:
             continue
         x, y = spot[0] + shifts[k, 0], spot[1] + shifts[k, 1]
-        ideal[k, 0], ideal[k, 1], _ = project(view[0], 0, chosen[k], x, y, spot[2])
-        a0, a1, _, b0, b1, _ = partials(view[0], 0, chosen[k], x, y, spot[2])
+        ideal[k, 0], ideal[k, 1], _ = project(view.photos, 0, chosen[k], x, y, spot[2])
+        a0, a1, _, b0, b1, _ = partials(view.photos, 0, chosen[k], x, y, spot[2])
         sxx, syy, sxy = 0.5 * shifts[k, 2], 0.5 * shifts[k, 3], 0.5 * shifts[k, 4]
         vx = a0 * a0 * sxx + 2.0 * a0 * a1 * sxy + a1 * a1 * syy
         vy = b0 * b0 * sxx + 2.0 * b0 * b1 * sxy + b1 * b1 * syy
@@ -49,11 +48,11 @@ def intersect(view, chosen, shifts, used, spot, point, covariance, ideal, weight
         for k in range(m):
             if not used[k]:
                 continue
-            x, y, u3 = project(view[0], 0, chosen[k], point[0], point[1], point[2])
+            x, y, u3 = project(view.photos, 0, chosen[k], point[0], point[1], point[2])
             if not u3 < 0.0:
                 return -1.0
             gx, gy = ideal[k, 0] - x, ideal[k, 1] - y
-            a = partials(view[0], 0, chosen[k], point[0], point[1], point[2])
+            a = partials(view.photos, 0, chosen[k], point[0], point[1], point[2])
             wx, wy, wxy = weight[k, 0], weight[k, 1], weight[k, 2]
             total += gx * gx * wx + 2.0 * gx * gy * wxy + gy * gy * wy
             for i in range(3):
@@ -72,24 +71,25 @@ def intersect(view, chosen, shifts, used, spot, point, covariance, ideal, weight
 
 
 @kernel
-def worst_ray(view, chosen, used, point, ideal, window):
+def worst_ray(view, chosen, measured, ideal, window):
     """The photograph, of those used but the first, whose ray misses a point most, and by how many posts."""
-    worst, most = -1, 0.0
+    used, point, worst, most = measured.used, measured.point, -1, 0.0
     for k in range(1, len(chosen)):
         if used[k]:
-            x, y, u3 = project(view[0], 0, chosen[k], point[0], point[1], point[2])
-            away = np.hypot(ideal[k, 0] - x, ideal[k, 1] - y) * abs(u3 / view[0][0, chosen[k], 12]) / window
+            x, y, u3 = project(view.photos, 0, chosen[k], point[0], point[1], point[2])
+            away = np.hypot(ideal[k, 0] - x, ideal[k, 1] - y) * abs(u3 / view.photos[0, chosen[k], 12]) / window
             if away > most:
                 worst, most = k, away
     return worst, most
 
 
 @kernel
-def agreeing_rays(view, chosen, shifts, used, spot, window, room, point, covariance):
+def agreeing_rays(view, chosen, spot, window, measured, room):
     """Intersect the used rays; those that miss the point are left out one by one. vᵀPv, or −1.
 
     The first photograph has the mean of the variances of the others.
     """
+    shifts, used = measured.shifts, measured.used
     while True:
         kept = 0
         shifts[0, 2:5] = 0.0
@@ -101,10 +101,10 @@ def agreeing_rays(view, chosen, shifts, used, spot, window, room, point, covaria
             return -1.0
         shifts[0, 2:5] /= kept
         used[0] = True
-        total = intersect(view, chosen, shifts, used, spot, point, covariance, room[4], room[5])
+        total = intersect(view, chosen, spot, measured, room)
         if total < 0.0:
             return -1.0
-        worst, away = worst_ray(view, chosen, used, point, room[4], window)
+        worst, away = worst_ray(view, chosen, measured, room.ideal, window)
         if away <= AGREEING_POSTS:
             return total
         used[worst] = False

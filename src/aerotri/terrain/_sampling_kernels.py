@@ -10,7 +10,7 @@ from aerotri.compiled import kernel
 @kernel
 def sample_linear(view, k, corner, window):
     """Grey values at the posts between corners, bilinear."""
-    pixels, offset, columns = view[6], view[5][k, 0], view[5][k, 4]
+    pixels, offset, columns = view.pixels, view.crops[k, 0], view.crops[k, 4]
     n, m = window.shape
     for q in range(n):
         t = q / (n - 1.0)
@@ -44,7 +44,7 @@ def sample_cubic(view, k, corner, bend, window, weights):
     bend : (5,) px of column and row per metre of displacement, and m of it for u², uv, v², u and v being ±1 at the
         sides. weights : (2, 4) room.
     """
-    pixels, offset, columns = view[6], view[5][k, 0], view[5][k, 4]
+    pixels, offset, columns = view.pixels, view.crops[k, 0], view.crops[k, 4]
     n = window.shape[0]
     for q in range(n):
         t = q / (n - 1.0)

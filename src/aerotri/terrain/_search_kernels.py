@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.compiled import kernel
+from aerotri.terrain._plan_kernels import Locus, make_rooms
 from aerotri.terrain._sampling_kernels import mean_of_best, normalise, product, sample_linear
-from aerotri.terrain._strip_kernels import make_strips, strip_search
+from aerotri.terrain._strip_kernels import strip_search
 from aerotri.terrain._view_kernels import SMALLEST_ANGLE, parallax_per_metre, window_corners
 
 AROUND = 3
@@ -16,7 +17,7 @@ AROUND = 3
 @kernel
 def correlation_at(view, chosen, spot, window, room):
     """Correlation of the first of the photographs with others that show the window, `mean_of_best`; −1: none does."""
-    first, second, corner, shift, values = room[0], room[1], room[2], room[3], room[5]
+    first, second, corner, shift, values = room.first, room.second, room.corner, room.shift, room.values
     reach = 0.5 * (first.shape[0] - 1) * window
     shift[:] = 0.0
     if not window_corners(view, chosen[0], spot, reach, shift, corner):
@@ -35,19 +36,14 @@ def correlation_at(view, chosen, spot, window, room):
 
 
 @kernel
-def search(view, chosen, spot, along, low, step, window, room, profile):
-    """Correlation at heights low, low + step … on a locus through the spot; the number of the best.
-
-    Parameters
-    ----------
-    along : (2,) m in x and y per metre of height: 0, 0 on the vertical line. profile : (k,) out.
-    """
+def search(view, chosen, spot, locus, window, room, profile):
+    """Correlation at the heights of a locus through the spot; the number of the best. profile : (k,) out."""
     best, place = 0, np.empty(5)
     place[3:] = spot[3:]
     for s in range(len(profile)):
-        z = low + s * step
-        place[0] = spot[0] + along[0] * (z - spot[2])
-        place[1] = spot[1] + along[1] * (z - spot[2])
+        z = locus.low + s * locus.step
+        place[0] = spot[0] + locus.along_x * (z - spot[2])
+        place[1] = spot[1] + locus.along_y * (z - spot[2])
         place[2] = z
         profile[s] = correlation_at(view, chosen, place, window, room)
         if profile[s] > profile[best]:
@@ -80,51 +76,41 @@ def second_peak(profile, best, apart):
 @kernel
 def off_line(view, k, spot, z):
     """m of plan between the vertical line and the ray of photograph k through a spot, at a height."""
-    centre = view[4][k]
+    centre = view.centres[k]
     return np.hypot(spot[0] - centre[0], spot[1] - centre[1]) * abs(z - spot[2]) / (centre[2] - spot[2])
 
 
 @kernel
-def make_room(n, most, photographs):
-    """What `correlation_at` and others work in."""
-    first, second = np.empty((n, n), np.float32), np.empty((n, n), np.float32)
-    return first, second, np.empty((4, 2)), np.zeros(6), np.empty(most), np.empty(photographs)
-
-
-@kernel
-def find_heights(view, nodes, slopes, ranges, chosen, posts, window, step_px, most, heights, scores):
+def find_heights(view, nodes, plan, heights, scores):
     """Height of best correlation on the vertical line of every node, within a range about its prior height.
 
-    Parameters
-    ----------
-    nodes : (n, 3) m, x, y and the prior height. slopes : (n, 2). ranges : (n, 2) m, lowest and highest height.
-    chosen : (n, m) photographs, the first being the reference, −1 for none.
-    posts, window : posts a side and m between them. step_px : of the heights, posts of parallax. most : steps.
     heights, scores : (n,) out; NaN and −1 where there is none.
     """
-    room, spot, along = make_room(posts, most, chosen.shape[1]), np.empty(5), np.zeros(2)
-    strips = make_strips(posts, most, chosen.shape[1])
-    for p in range(len(nodes)):
+    m = nodes.chosen.shape[1]
+    rooms, spot = make_rooms(plan.posts, plan.most_steps, plan.most_steps, m), np.empty(5)
+    room, window = rooms.search, plan.window
+    for p in range(len(nodes.places)):
+        chosen, ranges = nodes.chosen[p], nodes.ranges[p]
         heights[p], scores[p] = np.nan, -1.0
-        if chosen[p, 1] < 0:
+        if chosen[1] < 0:
             continue
-        spot[:3], spot[3:] = nodes[p], slopes[p]
-        per_metre = parallax_per_metre(view, chosen[p], spot)
+        spot[:3], spot[3:] = nodes.places[p], nodes.slopes[p]
+        per_metre = parallax_per_metre(view, chosen, spot)
         if not per_metre > SMALLEST_ANGLE:
             continue
-        step = step_px * window / per_metre
-        count = min(int((ranges[p, 1] - ranges[p, 0]) / step) + 2, most)
-        profile = room[4][:count]
-        low = ranges[p, 0]
-        best = strip_search(view, chosen[p], spot, low, step, window, room, strips, profile)
+        step = plan.step * window / per_metre
+        count = min(int((ranges[1] - ranges[0]) / step) + 2, plan.most_steps)
+        profile = room.profile[:count]
+        locus = Locus(0.0, 0.0, ranges[0], step)
+        best = strip_search(view, chosen, spot, locus, window, rooms, profile)
         if best < 0:
-            best = search(view, chosen[p], spot, along, low, step, window, room, profile)
-        elif 0 < best < count - 1 and off_line(view, chosen[p, 0], spot, low + best * step) > window:
+            best = search(view, chosen, spot, locus, window, room, profile)
+        elif 0 < best < count - 1 and off_line(view, chosen[0], spot, locus.low + best * step) > window:
             # along the ray of the first photograph that was: once more from the vertical line
-            spot[2] = low + best * step
-            low, profile = spot[2] - AROUND * step, room[4][: 2 * AROUND + 1]
-            again = strip_search(view, chosen[p], spot, low, step, window, room, strips, profile)
+            spot[2] = locus.low + best * step
+            locus, profile = Locus(0.0, 0.0, spot[2] - AROUND * step, step), room.profile[: 2 * AROUND + 1]
+            again = strip_search(view, chosen, spot, locus, window, rooms, profile)
             best = again if again >= 0 else AROUND
         if profile[best] > 0.0 and 0 < best < len(profile) - 1:
-            heights[p] = low + (best + peak_offset(profile, best)) * step
+            heights[p] = locus.low + (best + peak_offset(profile, best)) * step
             scores[p] = profile[best]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.compiled import kernel
+from aerotri.terrain._plan_kernels import UNKNOWNS
 from aerotri.terrain._sampling_kernels import sample_cubic
 from aerotri.terrain._view_kernels import window_corners
 
 SHIFT_STEPS = 12
-UNKNOWNS = 9
 FIRST_NOISE = 0.05
 """Share of the variance of the grey values that is taken for noise before it is known."""
 CONVERGED_POSTS = 0.005
@@ -89,7 +89,7 @@ def excess_of_slopes(template, other, e, gain):
 
 
 @kernel
-def match_shift(view, k, spot, e, window, bending, template, other, normal, room, found):
+def match_shift(view, k, spot, window, bending, room):
     """Displacement of photograph k's window against the template by least squares, in plan.
 
     g(u + D(u)) = r0 + r1·f(u), D = (a0 + a1·u + a2·v + a3·u² + a4·uv + a5·v²)·e + b0·e⊥, e the direction of parallax:
@@ -99,15 +99,17 @@ def match_shift(view, k, spot, e, window, bending, template, other, normal, room
     Parameters
     ----------
     bending : m, σ of a3 and a5; that of a4 is 2/√3 of it, as on ground that is rough alike in all directions.
-    template : (n + 2, n + 2) grey values of the reference, scaled to a deviation of 1. other : (n, n) room.
-    normal : of the template.
-    found : (5,) out, a0, b0 m, their variances m², correlation.
+    room : a `ShiftRoom`; its template are the grey values of the reference, scaled to a deviation of 1, and normal is
+        that of the template. found : (5,) out, a0, b0 m, their variances m², correlation.
 
     Returns
     -------
     Whether it converged.
     """
-    corner, shift, weights, right, bend, cofactor = room[0], room[1], room[2], room[3], room[6], room[7]
+    template, other, normal, e, found = room.template, room.other, room.normal, room.e, room.found
+    corner, shift, weights, right, bend, cofactor = (
+        room.corner, room.shift, room.weights, room.right, room.bend, room.cofactor
+    )  # fmt: skip
     n = other.shape[0]
     reach, slope = 0.5 * (n - 1) * window, 0.5 / window
     x = np.zeros(UNKNOWNS)

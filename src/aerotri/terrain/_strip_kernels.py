@@ -10,36 +10,22 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.compiled import kernel
+from aerotri.terrain._plan_kernels import LANES
 from aerotri.terrain._sampling_kernels import mean_of_best, normalise, sample_linear
 from aerotri.terrain._view_kernels import SMALLEST_ANGLE, turned_corners
 
 LEAST_RISE = 0.2
-MOST_PLACES = 1024
-LANES = 32
-"""Products are formed for so many places at once, some beyond the last: loops of a fixed length are the fastest."""
 
 
 @kernel
-def make_strips(n, most, photographs):
-    """What `strip_search` works in, for windows of n posts and profiles of at most `most` heights."""
-    return (
-        np.empty(n * (n + MOST_PLACES), np.float32), np.zeros((4, n + MOST_PLACES + LANES), np.float32),
-        np.empty(MOST_PLACES, np.float32), np.empty((photographs, most)),
-    )  # fmt: skip
-
-
-@kernel
-def strip_profile(view, pair, spot, e, window, reach_posts, room, strip, sums, profile):
-    """Correlation of a pair at shifts of whole posts along the direction e of parallax, −reach … reach.
+def strip_profile(view, pair, spot, e, window, reach_posts, rooms):
+    """Correlation of a pair at shifts of whole posts along the direction e of parallax, −reach … reach, into `of_pair`.
 
     The first photograph's window is fixed: heights go along its ray. The other's windows are one strip, rectified once
     on the plane of the spot. False where not all of the strip is seen.
-
-    Parameters
-    ----------
-    strip : (·,), sums : (4, ≥ n + 2·reach + LANES) float32 room. profile : (≥ 2·reach + 1,) out.
     """
-    first, corner = room[0], room[2]
+    first, corner = rooms.search.first, rooms.search.corner
+    strip, sums, profile = rooms.strips.strip, rooms.strips.sums, rooms.strips.of_pair
     n = first.shape[0]
     half = 0.5 * (n - 1) * window
     if not turned_corners(view, pair[0], spot, e, half, half, corner):
@@ -84,16 +70,16 @@ def strip_profile(view, pair, spot, e, window, reach_posts, room, strip, sums, p
 
 
 @kernel
-def strip_search(view, chosen, spot, low, step, window, room, strips, profile):
+def strip_search(view, chosen, spot, locus, window, rooms, profile):
     """As `search` on the vertical line, along the ray of the first photograph, by strips; −1 where one is not all seen.
 
     Pairs of the first with every other photograph have profiles of their own, joined height by height: linearly between
     posts of parallax.
     """
-    centres, a = view[4], chosen[0]
-    strip, sums, of_pair, joined = strips
+    centres, a, low, step = view.centres, chosen[0], locus.low, locus.step
+    of_pair, joined = rooms.strips.of_pair, rooms.strips.joined
     pair, e = np.empty(2, np.int64), np.empty(2)
-    places, values = len(profile), room[5]
+    places, values = len(profile), rooms.search.values
     ax = (spot[0] - centres[a, 0]) / (centres[a, 2] - spot[2])
     ay = (spot[1] - centres[a, 1]) / (centres[a, 2] - spot[2])
     count = 0
@@ -114,9 +100,7 @@ def strip_search(view, chosen, spot, low, step, window, room, strips, profile):
         per_metre = length / (window * max(rise, LEAST_RISE))
         reach = int(furthest * per_metre) + 1
         pair[1] = b
-        if 2 * reach + 1 > len(of_pair) or not strip_profile(
-            view, pair, spot, e, window, reach, room, strip, sums, of_pair
-        ):
+        if 2 * reach + 1 > len(of_pair) or not strip_profile(view, pair, spot, e, window, reach, rooms):
             return -1
         for s in range(places):
             at = reach + (low + s * step - spot[2]) * per_metre

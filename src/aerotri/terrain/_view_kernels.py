@@ -2,36 +2,52 @@
 
 A window is a square of posts on a plane piece of ground. Its corners are projected into a photograph with the image
 errors of the tile that shows its middle, its posts lie bilinearly between them.
-
-view   : photos (1, n, 15) u = U·(x, y, z, 1) row by row, then c, x0, y0; source (n,) image errors; cameras as in
-         `deformation._kernels`; sensor (n, 3) half columns, half rows, pixels per mm; centres (n, 3) m;
-         crops (n, 5) offset into pixels, first row, first column, rows, columns, of the level; pixels (·,) uint16;
-         scale, pixels of the level per pixel of the photograph; edge, share of the format at its edge not used
-window : posts a side (odd), m between posts
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from aerotri.compiled import kernel
-from aerotri.deformation._kernels import error_in_tile, project, tile_of
+from aerotri.functional_model._photo_kernels import ErrorTable, error_in_tile, project, tile_of
 
 SMALLEST_ANGLE = 0.02
 """Base over height below which two photographs give no height."""
 FIXED_POINT_MM, FIXED_POINT_STEPS = 1e-5, 40
 
 
+class View(NamedTuple):
+    """n photographs about a piece of ground, their pixels cut out.
+
+    photos : (1, n, 15) as in `_photo_kernels`. source : (n,) image errors. errors : of all groups of photographs.
+    sensor : (n, 3) half columns, half rows, pixels per mm. centres : (n, 3) m.
+    crops : (n, 5) offset into pixels, first row, first column, rows, columns, of the level. pixels : (·,) uint16.
+    scale : pixels of the level per pixel of the photograph. edge : share of the format at its edge not used.
+    """
+
+    photos: np.ndarray
+    source: np.ndarray
+    errors: ErrorTable
+    sensor: np.ndarray
+    centres: np.ndarray
+    crops: np.ndarray
+    pixels: np.ndarray
+    scale: float
+    edge: float
+
+
 @kernel
 def photo_place(view, k, i, j, x, y, z):
     """(column, row) px in photograph k, with the image errors of its tile (i, j); NaN behind the camera."""
-    photos, source, cameras, sensor = view[0], view[1], view[2], view[3]
-    ideal_x, ideal_y, u3 = project(photos, 0, k, x, y, z)
+    sensor = view.sensor
+    ideal_x, ideal_y, u3 = project(view.photos, 0, k, x, y, z)
     if not u3 < 0.0:
         return np.nan, np.nan
     mx, my = ideal_x, ideal_y
     for _ in range(FIXED_POINT_STEPS):
-        dx, dy = error_in_tile(source[k], i, j, mx, my, cameras[2], cameras[3])
+        dx, dy = error_in_tile(view.source[k], i, j, mx, my, view.errors)
         change = abs(ideal_x + dx - mx) + abs(ideal_y + dy - my)
         mx, my = ideal_x + dx, ideal_y + dy
         if not change > FIXED_POINT_MM:
@@ -42,29 +58,34 @@ def photo_place(view, k, i, j, x, y, z):
 @kernel
 def is_seen(view, k, x, y, z):
     """Whether a place lies in the usable part of photograph k."""
-    half, edge = view[2][0], view[8]
-    ideal_x, ideal_y, u3 = project(view[0], 0, k, x, y, z)
+    half, edge, source = view.errors.half, view.edge, view.source[k]
+    ideal_x, ideal_y, u3 = project(view.photos, 0, k, x, y, z)
     if not u3 < 0.0:
         return False
-    i, j = tile_of(view[1][k], ideal_x, ideal_y, view[2][1])
+    i, j = tile_of(source, ideal_x, ideal_y, view.errors.edges)
     column, row = photo_place(view, k, i, j, x, y, z)
-    across = abs(column / view[3][k, 0] - 1.0)
-    along = abs(row / view[3][k, 1] - 1.0)
-    beyond = abs(ideal_x) > 3.0 * half[view[1][k], 0] or abs(ideal_y) > 3.0 * half[view[1][k], 1]
+    across = abs(column / view.sensor[k, 0] - 1.0)
+    along = abs(row / view.sensor[k, 1] - 1.0)
+    beyond = abs(ideal_x) > 3.0 * half[source, 0] or abs(ideal_y) > 3.0 * half[source, 1]
     return not beyond and across <= 1.0 - 2.0 * edge and along <= 1.0 - 2.0 * edge
 
 
 @kernel
-def corners_of(view, k, spot, away_x, away_y, ux, uy, uz, vx, vy, vz, corner):
-    """Corners spot + away ± (ux, uy, uz) ± (vx, vy, vz) in the crop of photograph k, as of `window_corners`."""
-    sensor, crop, scale = view[3], view[5][k], view[7]
-    ideal_x, ideal_y, u3 = project(view[0], 0, k, spot[0], spot[1], spot[2])
+def corners_of(view, k, spot, away, side_u, side_v, corner):
+    """Corners spot + away ± side_u ± side_v in the crop of photograph k, as of `window_corners`.
+
+    away : x, y. side_u, side_v : x, y, z; m each.
+    """
+    sensor, crop, scale = view.sensor, view.crops[k], view.scale
+    ux, uy, uz = side_u
+    vx, vy, vz = side_v
+    ideal_x, ideal_y, u3 = project(view.photos, 0, k, spot[0], spot[1], spot[2])
     if not u3 < 0.0:
         return False
-    i, j = tile_of(view[1][k], ideal_x, ideal_y, view[2][1])
+    i, j = tile_of(view.source[k], ideal_x, ideal_y, view.errors.edges)
     for c in range(4):
         u, v = (1.0 if c & 1 else -1.0), (1.0 if c & 2 else -1.0)
-        x, y = spot[0] + away_x + u * ux + v * vx, spot[1] + away_y + u * uy + v * vy
+        x, y = spot[0] + away[0] + u * ux + v * vx, spot[1] + away[1] + u * uy + v * vy
         column, row = photo_place(view, k, i, j, x, y, spot[2] + u * uz + v * vz)
         if not (0.0 <= column <= 2.0 * sensor[k, 0] and 0.0 <= row <= 2.0 * sensor[k, 1]):
             return False
@@ -87,25 +108,24 @@ def window_corners(view, k, spot, reach, shift, corner):
     -------
     Whether all of it lies in the crop.
     """
-    return corners_of(
-        view, k, spot, shift[0], shift[1], reach + shift[2], shift[3], reach * spot[3], shift[4], reach + shift[5],
-        reach * spot[4], corner,
-    )  # fmt: skip
+    side_u = reach + shift[2], shift[3], reach * spot[3]
+    side_v = shift[4], reach + shift[5], reach * spot[4]
+    return corners_of(view, k, spot, (shift[0], shift[1]), side_u, side_v, corner)
 
 
 @kernel
 def turned_corners(view, k, spot, e, along, across, corner):
     """As `window_corners` of a rectangle with sides along e and across it, ± those m from the middle."""
     ux, uy, vx, vy = along * e[0], along * e[1], -across * e[1], across * e[0]
-    return corners_of(
-        view, k, spot, 0.0, 0.0, ux, uy, ux * spot[3] + uy * spot[4], vx, vy, vx * spot[3] + vy * spot[4], corner
-    )
+    side_u = ux, uy, ux * spot[3] + uy * spot[4]
+    side_v = vx, vy, vx * spot[3] + vy * spot[4]
+    return corners_of(view, k, spot, (0.0, 0.0), side_u, side_v, corner)
 
 
 @kernel
 def parallax_per_metre(view, chosen, spot):
     """m of plan that the widest pair with the first photograph sees a metre of height as."""
-    centres, widest = view[4], 0.0
+    centres, widest = view.centres, 0.0
     a = chosen[0]
     ax = (spot[0] - centres[a, 0]) / (centres[a, 2] - spot[2])
     ay = (spot[1] - centres[a, 1]) / (centres[a, 2] - spot[2])
@@ -124,7 +144,7 @@ def choose_photographs(view, nodes, candidates, most, chosen):
 
     nodes : (n, 3). candidates : (k,) photographs. chosen : (n, ≤ most) out.
     """
-    centres = view[4]
+    centres = view.centres
     distance = np.empty(chosen.shape[1])
     for p in range(len(nodes)):
         count = 0
@@ -152,7 +172,7 @@ def choose_models(view, nodes, pairs, middles, chosen, number):
 
     pairs : (k, 2) photographs. middles : (k, 2) m, middles of their bases. chosen : (n, 2) out. number : (n,) out.
     """
-    centres = view[4]
+    centres = view.centres
     for p in range(len(nodes)):
         number[p], nearest = -1, np.inf
         for k in range(len(pairs)):

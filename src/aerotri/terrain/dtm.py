@@ -20,7 +20,8 @@ from aerotri.terrain.error_pickets import with_error_pickets
 from aerotri.terrain.interval import interval_of_gsd, interval_of_surface, k_of_slope
 from aerotri.terrain.matching import measure
 from aerotri.terrain.photographs import Photographs, photographs_of
-from aerotri.terrain.pickets import FIRST_ERROR, STATUS, Area, MatchOptions, Models, Pickets, footprint
+from aerotri.terrain.picket_status import PicketStatus
+from aerotri.terrain.pickets import Area, MatchOptions, Models, Pickets, footprint
 from aerotri.terrain.surface import Surface, grid_over, ground_cells, interpolation_error, surface_of
 
 BEST_END_LAP = 0.6
@@ -255,7 +256,8 @@ def terrain_json(outcome: TerrainOutcome, block: str, crs: str) -> dict[str, Any
     from aerotri import __version__
 
     o, p = outcome, outcome.pickets
-    count = np.bincount(p.status, minlength=len(STATUS))
+    count = np.bincount(p.status, minlength=len(PicketStatus))
+    holes = count[PicketStatus.LOW_CORRELATION : PicketStatus.BACKWARD]
     own = p.accepted
     matching, adjustment = p.covariance[own, 2, 2], o.adjustment[own, 2]
     seen = int(len(p) - count[1])
@@ -266,10 +268,10 @@ def terrain_json(outcome: TerrainOutcome, block: str, crs: str) -> dict[str, Any
         "cell_m": o.cell,
         "pickets": {
             "nodes": len(p), "seen": seen, "accepted": int(own.sum()), "errors": int(p.errors.sum()),
-            "stepped_aside": int((own & (p.tries > 0)).sum()), "holes": int(count[2:FIRST_ERROR].sum()),
+            "stepped_aside": int((own & (p.tries > 0)).sum()), "holes": int(holes.sum()),
             "rays_mean": float((p.photographs[own] >= 0).sum(axis=1).mean()),
         },
-        "status": {name: int(n) for name, n in zip(STATUS, count, strict=True)},
+        "status": {status.text: int(n) for status, n in zip(PicketStatus, count, strict=True)},
         "sigma_Z_m": {
             "median": float(np.median(np.sqrt(matching + adjustment))), "matching": float(np.median(np.sqrt(matching))),
             "adjustment": float(np.median(np.sqrt(adjustment))), "interpolation": o.interpolation,

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import Delaunay, KDTree
 
-from aerotri.terrain.pickets import NEIGHBOURS, PEAK, Pickets
+from aerotri.terrain.picket_status import PicketStatus
+from aerotri.terrain.pickets import Pickets
 from aerotri.terrain.tin import order_in_plan
 
 N_NEIGHBOURS = 12
@@ -34,16 +35,16 @@ def with_error_pickets(pickets: Pickets, metres_per_px: float) -> Pickets:
     status = pickets.status.copy()
     floor = SMALLEST_PX * metres_per_px
     for _ in range(2):
-        own = np.flatnonzero(status == 0)
+        own = np.flatnonzero(status == PicketStatus.ACCEPTED)
         if len(own) <= N_NEIGHBOURS:
             break
         wrong = own[_off_neighbours(pickets.xyz[own], floor)]
         if not len(wrong):
             break
-        status[wrong] = NEIGHBOURS
-    own = np.flatnonzero(status == 0)
+        status[wrong] = PicketStatus.NEIGHBOURS
+    own = np.flatnonzero(status == PicketStatus.ACCEPTED)
     if len(own) > N_NEIGHBOURS:
-        status[own[peaks_and_pits(pickets.xyz[own], floor)]] = PEAK
+        status[own[peaks_and_pits(pickets.xyz[own], floor)]] = PicketStatus.PEAK
     return replace(pickets, status=status)
 
 

@@ -17,9 +17,11 @@ from scipy.spatial import KDTree
 
 from aerotri.conventions import InputError
 from aerotri.terrain import _picket_kernels as kernels
+from aerotri.terrain._plan_kernels import LEAST_CORRELATION, Plan
 from aerotri.terrain._search_kernels import find_heights
 from aerotri.terrain.photographs import Photographs, Site
-from aerotri.terrain.pickets import FIRST_ERROR, Area, MatchOptions, Models, Pickets, footprint, grid_nodes
+from aerotri.terrain.picket_status import PicketStatus
+from aerotri.terrain.pickets import Area, MatchOptions, Models, Pickets, footprint, grid_nodes
 from aerotri.terrain.prior import COARSE_NODES_PX, SPARE_PX, Prior, cleaned, first_prior
 from aerotri.terrain.tiles import Tile, do_tiles
 
@@ -88,10 +90,7 @@ def _coarse_level(photographs, area: Area, prior: Prior, level: int, spacing: fl
 
     def one(tile: Tile) -> None:
         h, s = np.empty(len(tile.delta)), np.empty(len(tile.delta))
-        find_heights(
-            tile.view, tile.delta, tile.slopes, tile.ranges, tile.chosen, COARSE_WINDOW, window, COARSE_STEP_PX,
-            MOST_STEPS, h, s,
-        )  # fmt: skip
+        find_heights(tile.view, tile.nodes, Plan(COARSE_WINDOW, window, COARSE_STEP_PX, MOST_STEPS), h, s)
         heights[tile.own], scores[tile.own] = tile.site.place[2] + h, s
         ratio[tile.own] = tile.base_ratios()
 
@@ -114,28 +113,27 @@ def _fine_level(photographs, nodes, prior: Prior, gsd: float, options: MatchOpti
         names=photographs.names, sigma0=np.nan,
     )  # fmt: skip
     aside = steps_aside(options, gsd)
-    settings = (STEP_PX, float(MOST_STEPS), options.search_px, options.distinct)
-    limits = np.array([
-        options.threshold, options.agreeing, options.largest_sigma_px, min(FINE_START, options.threshold)
-    ])  # fmt: skip
+    plan = Plan(
+        options.window_px, gsd, STEP_PX, MOST_STEPS, float(options.search_px), options.distinct, options.threshold,
+        options.agreeing, options.largest_sigma_px, min(FINE_START, options.threshold),
+    )  # fmt: skip
 
     def one(tile: Tile) -> None:
         k = len(tile.own)
-        status, tries = np.empty(k, np.int8), np.zeros(k, np.int16)
-        points, covariance = np.full((k, 3), np.nan), np.full((k, 3, 3), np.nan)
-        used, numbers, shifts = np.zeros((k, m), bool), np.full((k, 4), np.nan), np.zeros((k, m, 6))
-        kernels.measure_pickets(
-            tile.view, tile.delta, tile.slopes, prior.curvatures(nodes[tile.own]), tile.ranges, tile.chosen, aside,
-            options.window_px, gsd, settings, limits, (status, tries, points, covariance, used, numbers, shifts),
+        found = kernels.MeasuredNodes(
+            status=np.empty(k, np.int8), tries=np.zeros(k, np.int16), point=np.full((k, 3), np.nan),
+            covariance=np.full((k, 3, 3), np.nan), used=np.zeros((k, m), bool), numbers=np.full((k, 4), np.nan),
+            shifts=np.zeros((k, m, 6)),
         )  # fmt: skip
-        measured = (status == 0) | (status >= FIRST_ERROR)
-        out.status[tile.own], out.tries[tile.own] = status, tries
-        out.correlation[tile.own], out.model[tile.own] = numbers[:, 2], tile.model
-        rows = tile.own[measured]
-        out.xyz[rows], out.covariance[rows] = tile.site.from_delta(points[measured]), covariance[measured]
-        out.photographs[rows], place = _packed(tile.chosen[measured], used[measured])
-        first_shift = shifts[measured][np.arange(len(rows)), place]
-        out.misfit[rows] = _misfit(tile.site, points[measured], out.photographs[rows, :2], first_shift)
+        kernels.measure_pickets(tile.view, tile.nodes, prior.curvatures(nodes[tile.own]), aside, plan, found)
+        measured = (found.status == PicketStatus.ACCEPTED) | (found.status >= PicketStatus.BACKWARD)
+        out.status[tile.own], out.tries[tile.own] = found.status, found.tries
+        out.correlation[tile.own], out.model[tile.own] = found.numbers[:, LEAST_CORRELATION], tile.model
+        rows, points = tile.own[measured], found.point[measured]
+        out.xyz[rows], out.covariance[rows] = tile.site.from_delta(points), found.covariance[measured]
+        out.photographs[rows], place = _packed(tile.chosen[measured], found.used[measured])
+        first_shift = found.shifts[measured][np.arange(len(rows)), place]
+        out.misfit[rows] = _misfit(tile.site, points, out.photographs[rows, :2], first_shift)
 
     do_tiles(photographs, nodes, prior, 0, gsd * options.window_px + np.abs(aside).max(), options, models, one, report)
     return out

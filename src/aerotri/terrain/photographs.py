@@ -21,13 +21,13 @@ from aerotri.deformation.orientation import Calibration, Orientation, photo_rows
 from aerotri.deformation.photo_errors import PhotoErrors
 from aerotri.deformation.restitution import FREE, Restitution, restitution
 from aerotri.rasters_images import open_photograph
+from aerotri.terrain._view_kernels import View
 
 CACHE_BYTES = 3 << 30
 COLOURS = 3
 TABLE_TOLERANCE_PX = 0.01
 CROP_MARGIN_PX = 24
 """By which crops reach beyond the windows of their nodes, pixels of the level."""
-View = tuple
 
 
 class PyramidStore:
@@ -170,9 +170,8 @@ class Site:
             parts.append(part.ravel())
             offset += part.size
         pixels = np.concatenate(parts) if parts else np.zeros(1, np.uint16)
-        return (
-            self.photos, p.source, p.tables.as_tuple(), p.sensor, self.centres, crops, pixels, scale, edge,
-        )  # fmt: skip
+        errors = p.tables.for_kernels
+        return View(self.photos, p.source, errors, p.sensor, self.centres, crops, pixels, scale, edge)
 
     def _window(self, k: int, low, high, reach: float, scale: float) -> tuple[int, int, int, int] | None:
         """First row and column, last row and column of the level that show the box; None where it is not seen."""

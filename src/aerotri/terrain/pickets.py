@@ -7,12 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.terrain.photographs import Photographs
-
-STATUS = ("accepted", "not seen", "low correlation", "at the end of the heights", "no texture along the base",
-          "backward", "ambiguous", "neighbours", "peak or pit")  # fmt: skip
-"""What became of a node, by its number; from 'backward' on it is an error picket."""
-FIRST_ERROR = 5
-NEIGHBOURS, PEAK = 7, 8
+from aerotri.terrain.picket_status import PicketStatus
 
 
 @dataclass(frozen=True)
@@ -74,7 +69,7 @@ class Pickets:
     ----------
     node : (n, 2) m, planned. xyz : (n, 3) in the CRS, NaN where nothing was measured.
     covariance : (n, 3, 3) m², of matching: σ̂0² of the rays of all pickets is in it.
-    status : (n,) number in `STATUS`. tries : (n,) steps aside.
+    status : (n,) number of a `PicketStatus`. tries : (n,) steps aside.
     photographs : (n, m) into `names`, −1 where there are fewer; the first is the reference.
     correlation : (n,) lowest of the rays, or the best there was.
     model : (n,) number of the model, −1 where photographs were chosen freely.
@@ -100,12 +95,12 @@ class Pickets:
     @property
     def accepted(self) -> np.ndarray:
         """(n,) bool."""
-        return self.status == 0
+        return self.status == PicketStatus.ACCEPTED
 
     @property
     def errors(self) -> np.ndarray:
         """(n,) bool, measured and found to be in error."""
-        return self.status >= FIRST_ERROR
+        return self.status >= PicketStatus.BACKWARD
 
     @property
     def sigma(self) -> np.ndarray:

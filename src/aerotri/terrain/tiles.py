@@ -10,6 +10,7 @@ import numpy as np
 
 from aerotri.adjustment.parallel import thread_count
 from aerotri.terrain import _view_kernels as kernels
+from aerotri.terrain._plan_kernels import Nodes
 from aerotri.terrain.photographs import Photographs, Site, site_at
 from aerotri.terrain.pickets import MatchOptions
 from aerotri.terrain.prior import Prior
@@ -24,12 +25,17 @@ class Tile:
 
     own: np.ndarray
     site: Site
-    view: tuple
+    view: kernels.View
     delta: np.ndarray
     slopes: np.ndarray
     ranges: np.ndarray
     chosen: np.ndarray
     model: np.ndarray
+
+    @property
+    def nodes(self) -> Nodes:
+        """The nodes as kernels take them."""
+        return Nodes(self.delta, self.slopes, self.ranges, self.chosen)
 
     def base_ratios(self) -> np.ndarray:
         """(n,) base over height of the first two photographs; NaN where there are none."""
@@ -74,7 +80,7 @@ def _make_tile(photographs: Photographs, nodes, own, prior: Prior, level: int, r
     low, high = delta.min(axis=0), delta.max(axis=0)
     low[2], high[2] = ranges[:, 0].min(), ranges[:, 1].max()
     view = site.view(level, low, high, options.edge, reach)
-    shown = np.flatnonzero(view[5][:, 3] > 0)
+    shown = np.flatnonzero(view.crops[:, 3] > 0)
     number = np.full(len(nodes), -1)
     if models is not None:
         chosen = np.full((len(nodes), 2), -1)
