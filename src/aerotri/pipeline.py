@@ -21,10 +21,12 @@ from aerotri.adjustment.unknowns import StartValues, State
 from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block, transform_result
 from aerotri.diagnosis import judge
+from aerotri.diagnosis.check_points import in_doubt
 from aerotri.formats.solution import SavedSolution
 from aerotri.functional_model.additional_parameters import AUTO
 from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import AdjustedBlock, Blunder, Outcome
+from aerotri.statistics.check_freedom import check_freedom
 from aerotri.statistics.common_height import common_height
 from aerotri.statistics.doubts import AdjustmentFailedError, defects_in_words, doubts, failure, refuse_runaway
 from aerotri.statistics.field_estimation import with_estimated_fields
@@ -115,6 +117,11 @@ def adjust_keeping_system(
 
 def judged(found: Adjustment) -> Adjustment:
     """The adjustment with the verdict over it."""
+    if found.local.block.settings.adjustment.datum == "control" and in_doubt(found.local):
+        factor = found.system.factorise(found.solution.equations)
+        freedom = check_freedom(found.system, found.solution, factor, found.local)
+        local = replace(found.local, check=replace(found.local.check, freedom=freedom))
+        found = replace(found, local=local, result=local if found.frame is None else found.result)
     verdict = judge(found.local)
     outcome = replace(found.result.outcome, verdict=verdict.level, reasons=verdict.reasons)
     return _with_outcome(found, outcome)

@@ -110,15 +110,32 @@ def of_check_points(adjusted: AdjustedBlock) -> list[Finding]:
                 "too few to report a tested accuracy" if few else "enough", "attention" if few else "good"),
     ]  # fmt: skip
     distance = usual_distance(adjusted)
-    expected_h, n_h = float(np.hypot(s.expected[0], s.expected[1])), int(s.count[:2].sum())
-    for name, rmse, expected, n in (("RMSE_H", s.rmse_h, expected_h, n_h),
-                                    ("RMSE_V", s.rmse_v, float(s.expected[2]), int(s.count[2]))):  # fmt: skip
+    for name, rmse, axes in (("RMSE_H", s.rmse_h, [0, 1]), ("RMSE_V", s.rmse_v, [2])):
+        expected, n = float(np.hypot.reduce(s.expected[axes])), _freedom(s, results, axes)
         found.append(_rmse(f"{name} {AT_CHECK_POINTS}", rmse, expected, n, digits, distance))
     return found
 
 
-def _rmse(name: str, rmse: float, expected: float, n: int, digits: int, distance: float) -> Finding:
-    """RMS against the σ of adjusted and given coordinates; n differences make the χ² bound."""
+def _freedom(s: GroundStatistics, results: GroundPointResults, axes: list[int]) -> float:
+    """Degrees of freedom of the differences in some coordinates: all of them, where their correlations are not known.
+
+    Of coordinates together by (Σ tr)²/Σ(tr²/ν), as `check_freedom` has it.
+    """
+    count = s.count[axes].astype(float)
+    if results.freedom is None or not (count > 0).all():
+        return float(count.sum())
+    trace = count * s.expected[axes] ** 2
+    return float(trace.sum() ** 2 / np.sum(trace**2 / results.freedom[axes]))
+
+
+def in_doubt(adjusted: AdjustedBlock) -> bool:
+    """Whether the correlations of the check points decide on the verdict."""
+    doubtful = [finding for finding in of_check_points(adjusted) if finding.grade != "accepted"]
+    return bool(doubtful) and adjusted.check.freedom is None
+
+
+def _rmse(name: str, rmse: float, expected: float, n: float, digits: int, distance: float) -> Finding:
+    """RMS against the σ of adjusted and given coordinates; n independent differences make the χ² bound."""
     if n == 0 or not np.isfinite(rmse):
         return Finding(name, "–", "–", "no coordinate to compare", "note")
     if rmse > ABSURD * distance:

@@ -121,7 +121,11 @@ def of_single_observations(adjusted: AdjustedBlock) -> list[Finding]:
     if adjusted.block.settings.adjustment.datum == "control" and len(control):
         names = adjusted.block.points[control.point]
         labels = [f"{axis} of control point {name}" for name in names for axis in "XYZ"]
-        found += _worst(adjusted, labels, control.w.ravel(), control.difference.ravel(), "m")
+        v = control.difference
+        if control.lone_sigma is not None:
+            # a held coordinate has no residual: how far the others would put it from there
+            v = np.where(np.isfinite(control.lone_sigma), -control.w * control.lone_sigma, v)
+        found += _worst(adjusted, labels, control.w.ravel(), v.ravel(), "m")
     o = adjusted.observations
     if o is not None:
         for group, noun, unit in (("projection centres", "position", "m"), ("attitudes", "attitude", "rad")):
@@ -138,7 +142,7 @@ def _worst(adjusted: AdjustedBlock, labels: list[str], w: np.ndarray, v: np.ndar
     size = np.abs(np.nan_to_num(w)) / max(1.0, float(np.nan_to_num(adjusted.outcome.sigma0, nan=1.0)))
     k, critical = int(np.argmax(size)), max(WORST_OFFENDER, critical_of_worst(tested))
     amount = f"{np.degrees(v[k]):+.3g}°" if unit == "rad" else f"{v[k]:+.3g} m"
-    reason = f"{labels[k]} is corrected by {amount}, {times(float(size[k]))} its σ"
+    reason = f"{labels[k]} disagrees with the rest by {amount}, {times(float(size[k]))} its σ"
     expected = f"|w| at most {critical:.1f}, the largest of {tested} by chance"
     return doubt(labels[k], f"{amount}, |w| {size[k]:.2g}", expected, graded(float(size[k]), critical, GROSS), reason)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.diagnosis.finding import Finding, Grade, doubt, graded, some
+from aerotri.diagnosis.finding import Finding, doubt, graded, some
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
 
@@ -19,9 +19,6 @@ TURNED_DEG = 45.0
 
 MOVED = 0.5
 """Way from the given position to the adjusted one, in distances to the ground."""
-
-MOST = 0.5
-"""Share of the photographs turned or moved from which the block as a whole is in question."""
 
 
 def depths(adjusted: AdjustedBlock) -> np.ndarray:
@@ -58,7 +55,7 @@ def of_depths(adjusted: AdjustedBlock) -> list[Finding]:
 
 
 def of_turns(adjusted: AdjustedBlock) -> list[Finding]:
-    """Photographs turned far from the angles given."""
+    """Photographs turned far from the angles given: doubtful only, for the result may be right all the same."""
     order = adjusted.block.rotation
     given = rotation_from_angles(adjusted.block.images.angles, order)
     found = rotation_from_angles(adjusted.images.angles, order)
@@ -70,12 +67,12 @@ def of_turns(adjusted: AdjustedBlock) -> list[Finding]:
     value = f"{len(turned)} of {int(np.isfinite(turn).sum())}"
     angle, names = float(np.median(turn[turned])), some(adjusted.block.images.names[turned])
     reason = f"{value} photographs were turned by about {angle:.0f}° from the angles given ({names})"
-    grade = _of_share(len(turned), turn)
-    return doubt("photographs turned from the angles given", value, f"by less than {TURNED_DEG:.0f}°", grade, reason)
+    expected = f"by less than {TURNED_DEG:.0f}°"
+    return doubt("photographs turned from the angles given", value, expected, "doubtful", reason)
 
 
 def of_ways(adjusted: AdjustedBlock) -> list[Finding]:
-    """Photographs moved far from the position given."""
+    """Photographs moved far from the position given; doubtful only, as in `of_turns`."""
     way = np.linalg.norm(adjusted.images.centre - adjusted.block.images.centre, axis=1)
     usual = usual_distance(adjusted)
     moved = np.flatnonzero(way > MOVED * usual)
@@ -88,8 +85,4 @@ def of_ways(adjusted: AdjustedBlock) -> list[Finding]:
         f"the ground ({names})"
     )
     expected = f"by less than {MOVED * usual:.3g} m"
-    return doubt("photographs moved from the position given", value, expected, _of_share(len(moved), way), reason)
-
-
-def _of_share(count: int, measured: np.ndarray) -> Grade:
-    return "rejected" if count > MOST * np.isfinite(measured).sum() else "doubtful"
+    return doubt("photographs moved from the position given", value, expected, "doubtful", reason)

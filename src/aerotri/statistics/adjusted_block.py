@@ -198,6 +198,7 @@ class GroundPointResults:
     rays : (k,).
     lone_sigma : (k, 3) m, of coordinates that are held (σ = 0), a priori, as all others predict them; NaN elsewhere.
         Their r is 0, and w is (given − predicted)/lone_sigma: what −v/(σ√r) tends to with σ.
+    freedom : (3,) degrees of freedom of X, Y, Z of check points, see `check_freedom`; None where not computed.
     """
 
     point: np.ndarray
@@ -207,6 +208,7 @@ class GroundPointResults:
     w: np.ndarray
     rays: np.ndarray
     lone_sigma: np.ndarray | None = None
+    freedom: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.point)
