@@ -6,18 +6,21 @@ import csv
 import json
 import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from aerotri.commands.adjust import run_adjust
+from aerotri.commands.console import Console
 from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
 from aerotri.conventions import InputError, px_from_mm
 from aerotri.coordinates import local_frame
 from aerotri.formats.assemble import Statements
 from aerotri.formats.block_folder import read_block
 from aerotri.formats.camera_spec import CameraSpec
+from aerotri.formats.photograph_files import match_files
 from aerotri.rasters_images import create_image
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.rendering import RenderOptions, make_scene, render
@@ -186,3 +189,89 @@ def test_photographs_that_say_nothing(files, tmp_path):
         run_tiepoints(tmp_path / "black", tmp_path / "out", alone, True)
     with pytest.raises(InputError, match=r"^1\.jpg: cannot be read"):
         run_tiepoints(tmp_path / "cut", tmp_path / "out2", alone, True)
+
+
+def test_subfolders_blanks_and_a_list_without_crs(files, tmp_path):
+    """Photographs in two folders, two of them of one name; marks of names with blanks; dtm and imgeo find them."""
+    from aerotri.commands.dtm import DtmOptions, make_plan
+    from aerotri.commands.imgeo import ImgeoOptions, run_imgeo
+    from aerotri.commands.results import reopened
+    from aerotri.formats.photograph_files import files_of
+
+    folder, photographs = tmp_path / "flight", sorted((files[0] / "photographs").iterdir())
+    called = {}
+    for number, path in enumerate(photographs):
+        name = f"day {number // 3 + 1}/photo {number % 3}.tif"
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, folder / name)
+        called[path.name] = name
+    lines = (files[0] / "gcp_list.txt").read_text().splitlines()
+    renamed = [lines[0]]
+    for line in lines[1:]:
+        *numbers, image, point = line.split()
+        renamed.append(f'{" ".join(numbers)} "{called[image]}" "point {point}"')
+    (tmp_path / "gcp_list.txt").write_text("\n".join(renamed) + "\n")
+    check = tuple(f"point {name}" for name in files[1])
+    out = folder / "made" / "block"
+    run_tiepoints(folder, out, options(files, gcp=str(tmp_path / "gcp_list.txt"), check=check), True)
+    block = read_block(out)
+    assert sorted(block.images.names.tolist()) == sorted(called.values())
+    names = set(block.points[block.control.point].tolist())
+    assert set(check) < names
+    # what was made in the folder is no photograph
+    assert len(files_of(folder, (".tif", ".jpg"))) == len(photographs)
+    assert run_adjust(out, tmp_path / "result", None, None, None, False, True) == 0
+    calibration = reopened(tmp_path / "result", Console(quiet=True))
+    assert len(make_plan(calibration, [folder], DtmOptions()).rows) == len(photographs)
+    run_imgeo(tmp_path / "result", [folder / "day 1", folder / "day 2"], tmp_path / "ideal", ImgeoOptions(), True)
+    written = (tmp_path / "ideal").rglob("photo*.tif")
+    assert {path.relative_to(tmp_path / "ideal").as_posix() for path in written} == set(called.values())
+
+
+def test_two_files_of_one_photograph(tmp_path):
+    for name in ("a/one.tif", "b/one.tif"):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).write_bytes(b"")
+    paths = [tmp_path / "a" / "one.tif", tmp_path / "b" / "one.tif"]
+    assert match_files(paths, np.array(["b/one.tif", "a/one.tif"])).tolist() == [1, 0]
+    with pytest.raises(InputError, match="both called as photograph"):
+        match_files(paths, np.array(["one.tif"]))
+
+
+def photographs_of_exif():
+    """Two photographs that know where they are, as far as it is asked for here."""
+    from aerotri.tie_points.photographs import PhotographSet
+
+    place = np.array([[9.0, 48.0, 500.0], [9.0005, 48.0, 500.0]])
+    return PhotographSet(
+        (Path("a.jpg"), Path("b.jpg")), np.array(["a.jpg", "b.jpg"]), (), np.zeros(2, int), place,
+        np.full((2, 3), np.nan), np.zeros(2, bool),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("shift", "crs"), [(0.0, "EPSG:32632"), (3e6, "local")])
+def test_control_without_crs_keeps_positions(shift, crs, tmp_path):
+    """EXIF is WGS 84: control near the photographs in their UTM zone is in it; what lies elsewhere is not."""
+    from aerotri.formats.pix4d import read_pix4d_gcp
+    from aerotri.tie_points.given import Given, crs_of, positions_in
+
+    (tmp_path / "gcp.csv").write_text(f"P1,{500010.0 + shift},5316600,450\nP2,{500050.0 + shift},5316700,451\n")
+    photographs, given = photographs_of_exif(), Given(control=read_pix4d_gcp(tmp_path / "gcp.csv"))
+    assert crs_of(photographs, given) == crs
+    positions, said = positions_in(photographs, given, crs)
+    assert "gcp.csv names no" in said[0] or "gcp.csv names none" in said[0]
+    assert (positions is None) == (crs == "local")
+    if positions is not None:
+        np.testing.assert_allclose(positions.xyz[0, :2], [500000.0, 5316300.0], atol=1000.0)
+
+
+def test_marking_page_is_named(files, tmp_path, capsys):
+    """Without a mark there is still something to do, and a page to do it on."""
+    lines = (files[0] / "gcp_list.txt").read_text().splitlines()
+    points = {line.split()[-1]: line.split()[:3] for line in lines[1:]}
+    table = ["name,X,Y,Z", *(",".join([name, *place]) for name, place in points.items())]
+    (tmp_path / "control.csv").write_text("\n".join(table) + "\n")
+    given = options(files, gcp=str(tmp_path / "control.csv"), check=())
+    run_tiepoints(files[0] / "photographs", tmp_path / "block", given, False)
+    assert str(tmp_path / "block" / "control_marks" / "marking.html") in capsys.readouterr().out
+    assert (tmp_path / "block" / "control_marks" / "marking.html").is_file()

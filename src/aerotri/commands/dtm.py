@@ -110,16 +110,13 @@ def make_plan(calibration: Adjustment, given: list[Path], options: DtmOptions) -
     InputError
     """
     from aerotri.formats.breaklines import read_breaklines
-    from aerotri.formats.names_match import match_photographs
+    from aerotri.formats.photograph_files import match_files, photographs_in
     from aerotri.rasters import horizontal_crs
     from aerotri.terrain.dtm import TerrainPlan, chosen_rows
     from aerotri.terrain.pickets import Area
 
-    files = [f for path in given for f in (sorted(path.iterdir()) if path.is_dir() else [path])]
-    files = [f for f in files if f.suffix.lower() in ENDINGS]
-    names = np.array([f.name for f in files], dtype=str)
-    known = calibration.result.block.images.names
-    found = match_photographs(names, known)[0] if len(names) else np.zeros(0, np.int64)
+    files = [f for f in photographs_in(given, ENDINGS) if f.suffix.lower() in ENDINGS]
+    found = match_files(files, calibration.result.block.images.names)
     path_of = {int(row): file for row, file in zip(found, files, strict=True) if row >= 0}
     rows = np.array([r for r in chosen_rows(calibration, options.subset) if r in path_of], dtype=np.int64)
     if len(rows) < 2:

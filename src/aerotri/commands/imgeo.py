@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from aerotri.commands.console import Console
 from aerotri.commands.imgeo_exports import RECORD, export, plain, write_record
 from aerotri.commands.results import refuse_foreign_folder, reopened
@@ -20,6 +18,9 @@ if TYPE_CHECKING:
     from aerotri.image_errors.error_function import ErrorFunction
     from aerotri.image_errors.ideal_map import IdealMap
     from aerotri.statistics.adjusted_block import AdjustedBlock
+
+
+ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff")
 
 
 @dataclass(frozen=True)
@@ -91,23 +92,22 @@ def _jobs(
     adjusted: AdjustedBlock, groups: tuple[ImageGroup, ...], photographs: list[Path], out: Path, options: ImgeoOptions
 ) -> list[Job]:
     """Which group every file belongs to, by its name; nothing is written before all are known."""
-    from aerotri.formats.names_match import match_photographs
+    from aerotri.formats.photograph_files import match_files, photographs_in
     from aerotri.image_errors.ideal_photographs import check_photograph, name_of
 
     block = adjusted.block
-    # every name once: to the matching, two of one name mean none
-    names = np.array(list(dict.fromkeys(path.name for path in photographs)), dtype=str)
-    found = dict(zip(names.tolist(), match_photographs(names, block.images.names)[0].tolist(), strict=True))
+    photographs = list(dict.fromkeys(photographs_in(photographs, ENDINGS)))
     jobs, taken = [], {}
-    for path in photographs:
-        row = found[path.name]
+    for path, row in zip(photographs, match_files(photographs, block.images.names).tolist(), strict=True):
         if row in block.interior_fits:
             raise InputError(
                 "is scanned film, whose interior orientation imgeo does not resample", "use the correction grid", path
             )
         group = _named_group(groups, options.group, path) if row < 0 else _group_of(groups, row)
         check_photograph(path, groups[group].camera)
-        name = name_of(path)
+        # in the subfolder that the block knows the photograph by
+        within = Path(str(block.images.names[row])).parent if row >= 0 else Path()
+        name = (within / name_of(path)).as_posix() if not within.is_absolute() else name_of(path)
         if name in taken:
             raise InputError(f"'{name}' would be written twice, for {taken[name]} too", "give other names", path)
         if (out / name).exists() and (out / name).samefile(path):
@@ -156,6 +156,7 @@ def _resample_all(
             console.progress(f"photograph {number + 1} of {len(jobs)}: {100 * share:.0f} %, {left:.0f} s left")
 
         started = time.perf_counter()
+        (out / job.name).parent.mkdir(parents=True, exist_ok=True)
         with atomic_file(out / job.name) as place:
             lost = ideal_photograph(job.source, place, maps[job.group], options.resampling, options.compression, report)
         done.append({

@@ -23,6 +23,7 @@ def run_parameters(draw: Path | None, family: str | None, as_json: bool) -> None
     if family is not None and family not in FAMILIES:
         raise InputError(f"unknown parameter family '{family}'", f"known are {', '.join(FAMILIES)}")
     entries = [d for d in describe() if family in (None, d.family)]
+    drawn = [] if draw is None else _draw(draw, family)
     if as_json:
         print(json.dumps([vars(d) for d in entries], ensure_ascii=False, indent=2))
         return
@@ -34,18 +35,18 @@ def run_parameters(draw: Path | None, family: str | None, as_json: bool) -> None
         if family is None and len(own) > MOST:
             print(f"  … {len(own) - MOST} more: aerotri parameters --family {name}")
     if draw is not None:
-        print(f"Drawn to {draw}: {', '.join(_draw(draw, family))}")
+        print(f"Drawn to {draw}: {', '.join(drawn)}")
 
 
 def _draw(folder: Path, family: str | None) -> list[str]:
-    from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
+    from aerotri.functional_model.additional_parameters import FAMILIES
     from aerotri.report.plots import save_plots
     from aerotri.report.plots_parameters import plot_pattern_sheets
     from aerotri.simulation.cameras import block_camera
     from aerotri.simulation.spec import CameraSpec
 
     drawn = []
-    for name, own in LINEAR_FAMILIES.items():
+    for name, own in FAMILIES.items():
         if family in (None, name):
             model = own.camera_model or "ultracam_d"
             camera = block_camera(model, CameraSpec.model_validate({"preset": model}))

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from aerotri.tie_points.photographs import PhotographSet, StatedCamera
     from aerotri.tie_points.photographs_to_block import Given, TiedBlock
 
-RECORD, MARKS = "tiepoints.json", "control_marks"
+RECORD, MARKS, PAGE = "tiepoints.json", "control_marks", "marking.html"
 NO_CRS = "+proj=local"
 """First line of a gcp_list.txt in local coordinates: a system that has no name, taken as it is."""
 
@@ -96,6 +96,7 @@ def _tied(folder: Path, out: Path, options: TiePointOptions, console: Console) -
             console.progress("control points in the photographs")
             write_marks(tied, given.control, photographs, options.stated, place / MARKS)
         content = _content(tied, time.perf_counter() - begun)
+        content["marking_page"] = "" if given.control is None else str(out / MARKS / PAGE)
         (place / RECORD).write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     console.lines([*content["messages"], *_lines(content), f"Written to {out}"])
     return content
@@ -180,7 +181,7 @@ def write_marks(
     marks = predict_marks(tied.block, control, tied.points, stated.geoid)
     names = tied.block.images.names
     paths = dict(zip(photographs.names.tolist(), photographs.paths, strict=True))
-    with atomic_folder(folder, own=("predicted.csv", "pieces", "marking.html")) as place:
+    with atomic_folder(folder, own=("predicted.csv", "pieces", PAGE)) as place:
         write_table(
             {
                 "point": marks.points[marks.point],
@@ -204,7 +205,7 @@ def write_marks(
         rows.sort(key=lambda row: (row["point"], row["image"]))
         crs = control.crs or (NO_CRS if tied.block.crs == "local" else tied.block.crs)
         given = dict(zip(control.points.tolist(), map(tuple, control.xyz.tolist()), strict=True))
-        (place / "marking.html").write_text(marking_page(crs, given, rows), encoding="utf-8")
+        (place / PAGE).write_text(marking_page(crs, given, rows), encoding="utf-8")
 
 
 def _content(tied: TiedBlock, seconds: float) -> dict[str, Any]:
@@ -243,6 +244,9 @@ def _lines(content: dict[str, Any]) -> list[str]:
         f"{content['control']} control and {content['check']} check points; first orientation fits to "
         f"{content['median_residual_px']:.2f} px (median); {content['seconds']:.0f} s",
     ]
+    if content["marking_page"]:
+        done = "more of them can be marked" if content["control"] + content["check"] else "mark them"
+        said.append(f"control points in the photographs: {done} in {content['marking_page']}")
     if content["left_out"]:
         said.append(f"could not be tied and left out: {', '.join(content['left_out'])}")
     return said

@@ -3,7 +3,8 @@
 Both begin with the coordinate system: ``EPSG:n``, a PROJ string, or ``WGS84 UTM 16N``. gcp_list.txt then has
 ``geo_x geo_y geo_z im_x im_y image [point] [extras]``, a row an image point; pixels count from 0 at the CENTRE of the
 upper left one, as OpenSfM takes them, so half a pixel is added. geo.txt has ``image geo_x geo_y [geo_z] [yaw] [pitch]
-[roll] [h_acc v_acc]``, angles in degrees, pitch 0 straight down [C].
+[roll] [h_acc v_acc]``, angles in degrees, pitch 0 straight down [C]. Names with blanks stand in quotes, or tabs
+separate the entries; the name of an image ends where its file does.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from aerotri.formats.losses import losses
 from aerotri.formats.parts import PointList, PositionList, RayList, no_sigma, texts
 from aerotri.formats.text_lines import TextFile, check_words, first_lines, is_number
 from aerotri.observations import Block
+from aerotri.observations.names import ENDING
 
 FIRST_PIXEL = 0.5
 """Position of the centre of the first pixel, which OpenSfM calls 0."""
@@ -56,7 +58,7 @@ def _utm(zone: int, south: bool) -> str:
 def is_odm_gcp(path: Path) -> bool:
     """Whether a file begins with a coordinate system and a row of five numbers and a name."""
     lines = first_lines(path, 2)
-    words = lines[1].split() if len(lines) > 1 else []
+    words = _cells(lines[1], 5) if len(lines) > 1 else []
     known = [is_number(word) or word.lower() in UNKNOWN for word in words[:5]]
     return len(words) > 5 and crs_of_header(lines[0]) is not None and all(known)
 
@@ -64,13 +66,28 @@ def is_odm_gcp(path: Path) -> bool:
 def is_odm_geo(path: Path) -> bool:
     """Whether a file begins with a coordinate system, a name and two or more numbers."""
     lines = first_lines(path, 2)
-    words = lines[1].split() if len(lines) > 1 else []
+    words = _cells(lines[1], 0) if len(lines) > 1 else []
     return (
         len(words) > 2
         and crs_of_header(lines[0]) is not None
         and not is_number(words[0])
         and all(is_number(word) or word.lower() in UNKNOWN for word in words[1:4])
     )
+
+
+def _cells(line: str, before: int) -> list[str]:
+    """The entries of a row with an image's name behind `before` numbers; names may have blanks.
+
+    A name with blanks stands in quotes, or tabs separate the entries; without either the image's name ends where its
+    file does.
+    """
+    if "\t" in line:
+        return [cell.strip().strip('"') for cell in line.split("\t")]
+    if '"' in line:
+        return [quoted or plain for quoted, plain in re.findall(r'"([^"]*)"|(\S+)', line)]
+    words = line.split()
+    end = next((k for k in range(before, len(words)) if ENDING.search(words[k])), before)
+    return [*words[:before], " ".join(words[before : end + 1]), *words[end + 1 :]]
 
 
 def _begin(path: Path, form: str) -> tuple[TextFile, str, tuple[str, ...]]:
@@ -97,7 +114,7 @@ def read_odm_gcp(path: str | os.PathLike) -> PointList:
     """
     form = "geo_x geo_y geo_z im_x im_y image [point]"
     file, crs, messages = _begin(Path(path), form)
-    words, rows = file.words(), list(range(1, len(file)))
+    words, rows = [_cells(line, 5) for line in file.lines], list(range(1, len(file)))
     for row in rows:
         if len(words[row]) < 6:
             raise file.error(row, f"the row has {len(words[row])} entries", f"rows are: {form}")
@@ -182,7 +199,7 @@ def read_odm_geo(path: str | os.PathLike) -> PositionList:
     """
     form = "image geo_x geo_y [geo_z] [yaw pitch roll] [h_acc v_acc]"
     file, crs, messages = _begin(Path(path), form)
-    words, rows = file.words(), list(range(1, len(file)))
+    words, rows = [_cells(line, 0) for line in file.lines], list(range(1, len(file)))
     for row in rows:
         if len(words[row]) < min(WIDTHS):
             raise file.error(row, f"the row has {len(words[row])} entries", f"rows are: {form}")

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from aerotri.functional_model.additional_parameters import brown, lens, parameter_set, text_of
+from aerotri.functional_model.additional_parameters import FAMILIES, brown, dmc, lens, parameter_set, text_of
 from aerotri.functional_model.additional_parameters.registry import INTERIOR_FAMILIES, default_items, sizes_of
 from aerotri.functional_model.additional_parameters.sizes import size_of
 from aerotri.observations import Camera
@@ -27,6 +27,8 @@ LONGEST_IN_CELLS = 0.95
 LETTER = 0.53
 """Mean width of a letter, in its height."""
 EXAMPLE_GRID = (7, 5)
+EXAMPLE_HEIGHTS = (1000.0, 100.0)
+"""Flying height, and height of the point above the mean ground, m, of patterns that depend on them."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -40,6 +42,10 @@ def pattern_sheets(family: str) -> list[tuple[str, ...]]:
         (nx, ny), known = EXAMPLE_GRID, sizes.items(EXAMPLE_GRID)
         corner, centre = 0, ny // 2 * nx + nx // 2
         items = tuple(known[axis * nx * ny + node] for node in (corner, centre) for axis in (0, 1))
+    elif sizes is None:
+        # beside the full set those that cannot be in it
+        own = FAMILIES[family]
+        items = (*items, *(item for item in (*own.items, *own.needs_height) if item not in items))
     return [items[k : k + MOST_ON_A_SHEET] for k in range(0, len(items), MOST_ON_A_SHEET)]
 
 
@@ -118,9 +124,15 @@ def _positions(camera: Camera, width: float, grid: tuple[int, int] | None) -> tu
 def _patterns(family: str, items: Sequence[str], camera: Camera, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(n, 2, p) mm per unit."""
     if family not in INTERIOR_FAMILIES:
-        chosen = parameter_set(family, items, camera)
+        full = default_items(family) if sizes_of(family) is None else items
+        together = tuple(item for item in items if item in full)
+        chosen = parameter_set(family, together, camera)
         basis = chosen.basis(x, y)
-        return basis[:, :, [chosen.items.index(item) for item in items]]
+        patterns = dict(zip(chosen.items, np.moveaxis(basis, 2, 0), strict=True))
+        for item in items:
+            if item not in patterns:
+                patterns[item] = _pattern_apart(family, item, camera, x, y)
+        return np.stack([patterns[item] for item in items], axis=-1)
     x_bar, y_bar = x - camera.principal_point_mm[0], y - camera.principal_point_mm[1]
     if family == brown.FAMILY.name:
         return brown.basis(x_bar, y_bar)[:, :, [brown.ITEMS.index(item) for item in items]]
@@ -128,6 +140,14 @@ def _patterns(family: str, items: Sequence[str], camera: Camera, x: np.ndarray, 
     a, b, ideal = x_bar / c, y_bar / c, np.column_stack([x_bar, y_bar])
     units = np.eye(len(lens.ITEMS))[[lens.ITEMS.index(item) for item in items]]
     return np.stack([c * lens.distort(a, b, unit) - ideal for unit in units], axis=-1)
+
+
+def _pattern_apart(family: str, item: str, camera: Camera, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(n, 2) mm per unit of an item that is not in the full set; one that needs heights, at `EXAMPLE_HEIGHTS`."""
+    if item in FAMILIES[family].needs_height:
+        flying, above = (np.full(len(x), height) for height in EXAMPLE_HEIGHTS)
+        return dmc.centre_offset(camera, x, y, flying, above)
+    return parameter_set(family, (item,), camera).basis(x, y)[:, :, 0]
 
 
 def _draw(axes: Axes, camera: Camera, item: str, at: np.ndarray, d: np.ndarray, width: float) -> None:

@@ -14,6 +14,8 @@ from aerotri.formats.parts import OrientationList, PointList, PositionList, Read
 from aerotri.observations import Block
 from aerotri.tie_points.photographs import PhotographSet
 
+NEAR_M = 20_000.0
+"""Distance from the photographs within which coordinates are taken for those of their UTM zone."""
 EXIF_SIGMA_M = (5.0, 5.0, 10.0)
 """Standard deviations of a position that does not say how good it is: hand-held GNSS [C]."""
 
@@ -46,9 +48,19 @@ def crs_of(photographs: PhotographSet, given: Given) -> str:
         if part.crs:
             return part.crs if is_projected(part.crs) else utm_crs(part.xyz[:, 0], part.xyz[:, 1])
     known = np.isfinite(photographs.lon_lat_height).all(axis=1)
-    if lists or given.orientation is not None or not known.any():
+    if not known.any():
         return "local"
-    return utm_crs(*photographs.lon_lat_height[known, :2].T)
+    utm = utm_crs(*photographs.lon_lat_height[known, :2].T)
+    centres = [part.centre for part in (given.orientation,) if part is not None]
+    coordinates = [*(part.xyz for part in lists), *centres]
+    return utm if all(_lie_near(photographs.lon_lat_height[known], utm, xyz) for xyz in coordinates) else "local"
+
+
+def _lie_near(lon_lat_height: np.ndarray, crs: str, xyz: np.ndarray) -> bool:
+    """Whether coordinates (n, 3) without a named system may be in this one: near where the photographs are in it."""
+    flown = placing.to_crs(lon_lat_height, "EPSG:4326", crs, None)[:, :2].mean(axis=0)
+    plan = xyz[np.isfinite(xyz[:, :2]).all(axis=1), :2]
+    return bool(len(plan)) and bool((np.hypot(*(plan - flown).T) < NEAR_M).all())
 
 
 def positions_in(photographs: PhotographSet, given: Given, crs: str) -> tuple[PositionList | None, tuple[str, ...]]:
@@ -59,10 +71,18 @@ def positions_in(photographs: PhotographSet, given: Given, crs: str) -> tuple[Po
     if not len(known):
         return None, ()
     if crs == "local":
-        return None, ("positions of EXIF were left out: the block has no coordinate system; state it with --crs",)
+        control = given.control
+        why = "the block has none" if control is None else f"{control.path.name} names none and is not in UTM"
+        return None, (f"positions of EXIF were left out for want of a coordinate system: {why}; state it with --crs",)
     xyz = photographs.lon_lat_height[known]
     flat = placing.to_crs(xyz, "EPSG:4326", placing.horizontal_part(crs), None)
     said = []
+    first = given.control or given.orientation
+    if first is not None and not getattr(first, "crs", "") and not given.stated.crs:
+        said.append(
+            f"{first.path.name} names no coordinate system: {crs}, in which it lies where the photographs were taken, "
+            "is taken; state another with --crs"
+        )
     if "+" in crs and photographs.ellipsoidal[known].all():
         flat = placing.from_ellipsoidal_heights(flat, crs, given.stated.geoid)
     elif not photographs.ellipsoidal[known].any():

@@ -11,6 +11,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.formats.exif import PhotographTags, read_exif
 from aerotri.formats.parts import texts
+from aerotri.formats.photograph_files import files_of
 from aerotri.observations import Camera, Prior
 
 ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff")
@@ -25,7 +26,7 @@ class PhotographSet:
 
     Parameters
     ----------
-    paths : of the files; names : (n,) str, their names with ending.
+    paths : of the files; names : (n,) str, their names with ending, and with their subfolder where there is one.
     cameras : the cameras; camera : (n,) index into them.
     lon_lat_height : (n, 3) degrees and m; sigma_m : (n, 3) m; NaN where not known.
     ellipsoidal : (n,) bool, whether the height is said to count from the ellipsoid.
@@ -59,7 +60,7 @@ class StatedCamera:
 
 
 def find_photographs(folder: Path, stated: StatedCamera = StatedCamera()) -> PhotographSet:
-    """The photographs of a folder.
+    """The photographs of a folder and of its subfolders.
 
     Raises
     ------
@@ -68,14 +69,14 @@ def find_photographs(folder: Path, stated: StatedCamera = StatedCamera()) -> Pho
     """
     if not folder.is_dir():
         raise InputError("is no folder", "give the folder of the photographs", folder)
-    paths = tuple(sorted(p for p in folder.iterdir() if p.suffix.lower() in ENDINGS and not p.name.startswith(".")))
+    paths = files_of(folder, ENDINGS)
     if len(paths) < 2:
         raise InputError(f"holds {len(paths)} photographs", f"give a folder with files {', '.join(ENDINGS)}", folder)
     tags = [read_exif(path) for path in paths]
     cameras, camera = _cameras(paths, tags, stated)
     return PhotographSet(
         paths=paths,
-        names=texts([path.name for path in paths]),
+        names=texts([path.relative_to(folder).as_posix() for path in paths]),
         cameras=cameras,
         camera=camera,
         lon_lat_height=np.array([tag.lon_lat_height for tag in tags]),
