@@ -59,7 +59,7 @@ def match_files(files: Sequence[Path], known: np.ndarray) -> np.ndarray:
         parts = file.absolute().parts
         names = ("/".join(parts[k:]) for k in range(1, len(parts)))
         index[number] = next((exact[name] for name in names if name in exact), -1)
-    rest = np.flatnonzero(index < 0)
+    rest = np.flatnonzero(index < 0).tolist()
     # to the matching two of one name mean none
     loose = list(dict.fromkeys(files[k].name for k in rest))
     rows = match_photographs(np.array(loose, dtype=str), known)[0].tolist() if loose else []
