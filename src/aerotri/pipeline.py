@@ -15,9 +15,10 @@ from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.prepare import build_system, prepare
 from aerotri.adjustment.robust import Estimator
-from aerotri.adjustment.solve import Solution, SolveOptions, minimise
+from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import StartValues, State
+from aerotri.adjustment.weak_geometry import minimise_tied
 from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block, transform_result
 from aerotri.diagnosis import judge
@@ -271,7 +272,8 @@ def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray 
         raise failure(system, "rank deficient", defects_in_words(system, [free]))
     settings = block.settings.adjustment
     options = SolveOptions(settings.max_iterations, settings.robust, report)
-    solution = minimise(system, state, count_observations(system).redundancy, options)
+    prepared, solution = minimise_tied(prepared, options, lambda tied: count_observations(tied).redundancy)
+    system, state = prepared.system, prepared.state
     if solution.defects:
         raise failure(system, "rank deficient", defects_in_words(system, solution.defects))
     refuse_runaway(system, solution)

@@ -14,8 +14,9 @@ from synthetic import make_adjusted_block
 
 # lists of the design's "What adjust writes"
 COLUMNS = {
-    "images.csv": "image, camera, strip, X0, Y0, Z0, omega, phi, kappa, sX0, sY0, sZ0, s_omega, s_phi, s_kappa, rays",
-    "points.csv": "point, X, Y, Z, sX, sY, sZ, rays, max_abs_w",
+    "images.csv": "image, camera, strip, X0, Y0, Z0, omega, phi, kappa, sX0, sY0, sZ0, s_omega, s_phi, s_kappa, rays, "
+    "status, reason",
+    "points.csv": "point, X, Y, Z, sX, sY, sZ, rays, max_abs_w, status, reason",
     "parameters.csv": "name, group, mark, value, sigma, t, max_correlation, max_correlation_with, total_correlation, "
     "status, reason",
     "control.csv": "point, dX, dY, dZ, sX, sY, sZ, rX, rY, rZ, wX, wY, wZ, rays",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerotri.adjustment._intersection_kernels import smallest_eigenvalue
 from aerotri.adjustment._robust_kernels import robust_factor
 from aerotri.compiled import inlined, kernel
 from aerotri.functional_model._kernels import linearise_ray
@@ -192,3 +193,44 @@ def reduce_point(p, n_rays, n_union, table, points, damping, work, lower, misclo
                 couple_shared[a, t] -= lower[a, c] * couple_shared[c, t]
             couple_shared[a, t] /= lower[a, a]
     return cost, ok
+
+
+@kernel
+def looseness(first, last, rays, table, state, estimator, limit, residual, weight, work, loose):
+    """σ of the points first..last in their worst direction over the distance to their nearest photograph.
+
+    Of the point's own weighted 3 × 3 normals, the photographs held; a held or kept point has 0. loose : (P,) out.
+    """
+    start, image = rays[0], rays[1]
+    _, _, _, _, prior_weight, point_free, _ = table
+    centre, points = state[1], state[2]
+    by_pt, normal = work[1], np.empty((3, 3))
+    for p in range(first, last):
+        linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
+        normal[:] = 0.0
+        nearest = np.inf
+        for q in range(start[p + 1] - start[p]):
+            i, squares = image[start[p] + q], 0.0
+            for a in range(3):
+                squares += (points[p, a] - centre[i, a]) ** 2
+                for b in range(3):
+                    normal[a, b] += by_pt[q, 0, a] * by_pt[q, 0, b] + by_pt[q, 1, a] * by_pt[q, 1, b]
+            nearest = min(nearest, squares)
+        held = 0
+        for a in range(3):
+            normal[a, a] += prior_weight[p, a]
+            if point_free[p, a] == 0.0:
+                held += 1
+                normal[a, a] = np.inf
+        if held == 3:
+            loose[p] = 0.0
+            continue
+        # a held coordinate is known: as well as the best direction, times a million
+        largest = 0.0
+        for a in range(3):
+            if normal[a, a] < np.inf:
+                largest = max(largest, normal[a, a])
+        for a in range(3):
+            if normal[a, a] == np.inf:
+                normal[a, a] = 1e6 * largest
+        loose[p] = 1.0 / np.sqrt(max(smallest_eigenvalue(normal), 1e-16 * largest) * nearest)

@@ -317,6 +317,21 @@ class NormalSystem:
         run_chunks(chunk, len(self._bounds))
         return settled
 
+    def looseness(self, state: State, estimator: Estimator) -> np.ndarray:
+        """(P,) σ of every point in its worst direction over its distance, the photographs held; see the kernel."""
+        loose, m = np.empty(len(self.unknowns.points)), len(self.unknowns.rays.image)
+        residual, weight = np.empty((m, 2)), np.empty(m)
+        rays, table, kernel_state = self.unknowns.rays.as_tuple(), self._table(state), self._state(state)
+
+        def chunk(k: int):
+            _point_kernels.looseness(
+                *self._bounds[k], rays, table, kernel_state, estimator.code, estimator.limit, residual, weight,
+                self._work(), loose,
+            )  # fmt: skip
+
+        run_chunks(chunk, len(self._bounds))
+        return loose
+
     def point_cofactors(self, state: State, inverse: InverseOnPattern, estimator: Estimator):
         """Cofactors of the points (P, 3, 3) and redundancy numbers of the rays (m, 2), in the order of `unknowns`."""
         u = self.unknowns

@@ -25,8 +25,11 @@ from aerotri.functional_model.atmosphere import corrected_image_points
 from aerotri.observations import Block
 from aerotri.observations.names import partnerless_in_words
 
-USED, ONE_RAY, OFF, NO_START, NOT_FINITE, REMOVED = range(6)
+USED, ONE_RAY, OFF, NO_START, NOT_FINITE, REMOVED, WEAK_POINT, WEAK_PHOTOGRAPH = range(8)
 """Status of a ray; the words stand in `statistics.adjusted_block.RAY_STATUS`."""
+
+
+WEAK_ENDINGS = (" too weakly tied to the others, set aside", " not fixed in distance by their rays, set aside")
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +170,32 @@ def ray_status(block: Block, start: StartValues, off: np.ndarray | None = None) 
     status[~np.isfinite(start.centre[rays.image, 0])] = NO_START
     if off is not None:
         status[off] = OFF
+    status = with_lonely_rays(block, status)
+    status[(status == USED) & ~np.isfinite(start.points[rays.point, 0])] = NO_START
+    warnings = []
+    photos = np.setdiff1d(np.unique(rays.image), np.unique(rays.image[status == USED]))
+    photos = np.union1d(photos, np.flatnonzero(~np.isfinite(start.centre[:, 0])))
+    no_rays = np.setdiff1d(np.arange(len(block.images)), np.unique(rays.image))
+    if len(no_rays):
+        warnings.append(f"{some_names(block.images.names[no_rays], 'photograph')} without image points, left out")
+    photos = np.setdiff1d(photos, no_rays)
+    if len(photos):
+        warnings.append(
+            f"{some_names(block.images.names[photos], 'photograph')} without start values or usable points, left out"
+        )
+    for code, words in ((ONE_RAY, "measured in one photograph only"), (NO_START, "whose rays do not intersect")):
+        points = np.unique(rays.point[(status == code) & np.isfinite(start.centre[rays.image, 0])])
+        if len(points):
+            warnings.append(f"{some_names(block.points[points], 'point')} {words}, left out")
+    return status, warnings
+
+
+def with_lonely_rays(block: Block, status: np.ndarray) -> np.ndarray:
+    """The status of rays (m,) with those that are alone in their point `ONE_RAY`.
+
+    A point needs two rays, or one ray and enough known coordinates.
+    """
+    rays, status = block.image_points, status.copy()
     known = np.zeros(len(block.points), dtype=np.int64)
     if block.settings.adjustment.datum == "control":
         control = ~block.control.is_check
@@ -175,26 +204,23 @@ def ray_status(block: Block, start: StartValues, off: np.ndarray | None = None) 
     count = np.bincount(rays.point[usable], minlength=len(block.points))
     weak = (2 * count + known < 4) | ((count == 1) & (known < 3))
     status[usable & weak[rays.point]] = ONE_RAY
-    status[(status == USED) & ~np.isfinite(start.points[rays.point, 0])] = NO_START
-    warnings = []
-    photos = np.setdiff1d(np.unique(rays.image), np.unique(rays.image[status == USED]))
-    photos = np.union1d(photos, np.flatnonzero(~np.isfinite(start.centre[:, 0])))
-    no_rays = np.setdiff1d(np.arange(len(block.images)), np.unique(rays.image))
-    if len(no_rays):
-        warnings.append(f"{_some(block.images.names[no_rays], 'photograph')} without image points, left out")
-    photos = np.setdiff1d(photos, no_rays)
-    if len(photos):
-        warnings.append(
-            f"{_some(block.images.names[photos], 'photograph')} without start values or usable points, left out"
-        )
-    for code, words in ((ONE_RAY, "measured in one photograph only"), (NO_START, "whose rays do not intersect")):
-        points = np.unique(rays.point[(status == code) & np.isfinite(start.centre[rays.image, 0])])
-        if len(points):
-            warnings.append(f"{_some(block.points[points], 'point')} {words}, left out")
-    return status, warnings
+    return status
 
 
-def _some(names: np.ndarray, noun: str) -> str:
+def with_weak_words(block: Block, status: np.ndarray, warnings: tuple[str, ...]) -> tuple[str, ...]:
+    """The warnings with sentences about points and photographs that were set aside for their geometry."""
+    rays = block.image_points
+    kept = [said for said in warnings if not said.endswith(WEAK_ENDINGS)]
+    weak = np.unique(rays.image[status == WEAK_PHOTOGRAPH])
+    if len(weak):
+        kept.append(f"{some_names(block.images.names[weak], 'photograph')}{WEAK_ENDINGS[0]}")
+    weak = np.setdiff1d(rays.point[status == WEAK_POINT], rays.point[status == USED])
+    if len(weak):
+        kept.append(f"{some_names(block.points[weak], 'point')}{WEAK_ENDINGS[1]}")
+    return tuple(kept)
+
+
+def some_names(names: np.ndarray, noun: str) -> str:
     shown = ", ".join(str(name) for name in names[:5])
     more = f" and {len(names) - 5} more" if len(names) > 5 else ""
     return f"{len(names)} {noun}{'s' if len(names) > 1 else ''} ({shown}{more})"

@@ -61,6 +61,12 @@ class Estimator:
     def is_robust(self) -> bool:
         return self.code != _kernels.NONE
 
+    @property
+    def scale(self) -> float:
+        """The robust standard deviation of the residuals that it was made for, in a-priori σ; 1 when not robust."""
+        name = {code: name for name, code in CODES.items()}.get(self.code, "adaptive")
+        return self.limit / LIMITS[name] if self.is_robust else 1.0
+
     def is_near(self, other: Estimator) -> bool:
         """Whether the two weigh practically alike."""
         if not (self.is_robust and other.is_robust):

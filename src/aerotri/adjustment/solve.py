@@ -21,12 +21,20 @@ COST_TOLERANCE = 1e-9
 STEP_TOLERANCE = 1e-5
 SURE_CONTRACTION = 1e-2
 ROBUST_COST_TOLERANCE, ROBUST_STEP_TOLERANCE, EARLY_STEP_TOLERANCE = 1e-4, 1e-2, 0.3
+VALLEY_STEP_TOLERANCE = 0.1
+"""Share of σ within which robust estimation ends in a flat and curved valley."""
+WHOLE_STEP = 1e-2
+"""Damping over the smallest pivot up to which a step is as good as undamped."""
 FIRST_DAMPING, LAST_DAMPING, NO_DAMPING = 1e-5, 1e12, 1e-11
 MAX_SCALE_CHANGES = 20
 LEAST_RATIO, LONGEST_STRETCH = 0.5, 5.0
 SLOWEST_CONTRACTION = 1e-2
 
 Report = Callable[[int, float, float], None]
+Inspect = Callable[[NormalSystem, State, NormalEquations, Estimator, int, bool], bool]
+"""Asked before the first step (iteration 0) and after every one, whether to stop; the last argument tells that a pivot
+has nearly vanished."""
+INTERRUPTED = "interrupted"
 
 
 @dataclass(frozen=True)
@@ -35,18 +43,20 @@ class SolveOptions:
 
     robust : a key of `robust.STAGES`; each of its stages has `max_iterations`.
     report : called after every iteration with (iteration, cost, damping), for progress.
+    inspect : may stop the adjustment, whose status is `INTERRUPTED` then.
     """
 
     max_iterations: int = 30
     robust: str = "off"
     report: Report | None = None
+    inspect: Inspect | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Where `minimise` ended: values, equations and estimator there, and how it went.
 
-    status : 'converged', 'not converged' or 'rank deficient'.
+    status : 'converged', 'not converged', 'rank deficient', or 'interrupted' where `SolveOptions.inspect` wanted it.
     costs : Σρ at the start and after every iteration of the last stage.
     defects : sentences naming what the observations leave free, when rank deficient.
     """
@@ -90,7 +100,7 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
     done = 0
     for name in early:
         solution = _descend(system, state, redundancy, options, Stage(name, done, EARLY_STEP_TOLERANCE))
-        if solution.defects:
+        if solution.defects or solution.status == INTERRUPTED:
             return solution
         state, done = solution.state, solution.iterations
     return _descend(system, state, redundancy, options, Stage(last, done))
@@ -106,10 +116,12 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
     while iteration < last_iteration:
         iteration += 1
         step = _step(system, state, equations, estimator, damping.value)
-        if iteration == 1 and (step is None or step.is_suspect):
-            defects = find_defects(system, state, equations)
-            if defects:
-                return Solution("rank deficient", state, equations, estimator, 0, tuple(costs), tuple(defects))
+        if iteration == 1:
+            refused = _refused(system, state, equations, estimator, options, step is None or step.is_suspect)
+            if refused is not None:
+                return replace(refused, costs=tuple(costs))
+        if _in_curved_valley(equations, step, damping, redundancy, stage, costs):
+            return Solution("converged", state, equations, estimator, iteration - 1, tuple(costs))
         step, damping = _until_better(system, state, equations, estimator, step, damping)
         if step is None:
             return Solution("not converged", state, equations, estimator, iteration, tuple(costs))
@@ -131,6 +143,10 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
                 scale_changes += 1
         if settled:
             return Solution("converged", state, equations, estimator, iteration, tuple(costs))
+        if options.inspect is not None and options.inspect(
+            system, state, equations, estimator, iteration - stage.done, False
+        ):
+            return Solution(INTERRUPTED, state, equations, estimator, iteration, tuple(costs))
         if plain and not stage.is_robust and within_scatter:
             followed = _followed(system, step, redundancy, range(iteration + 1, last_iteration + 1), options.report)
             state, equations, last_decrement = followed.state, followed.equations, followed.decrement
@@ -139,6 +155,17 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
             if followed.settled:
                 return Solution("converged", state, equations, estimator, iteration, tuple(costs))
     return Solution("not converged", state, equations, estimator, last_iteration, tuple(costs))
+
+
+def _refused(
+    system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, options: SolveOptions,
+    suspect: bool,
+) -> Solution | None:  # fmt: skip
+    """What ends an adjustment before its first step: what it was asked for, or a rank defect; None where nothing."""
+    if options.inspect is not None and options.inspect(system, state, equations, estimator, 0, suspect):
+        return Solution(INTERRUPTED, state, equations, estimator, 0)
+    defects = find_defects(system, state, equations) if suspect else []
+    return Solution("rank deficient", state, equations, estimator, 0, (), tuple(defects)) if defects else None
 
 
 @dataclass(frozen=True)
@@ -314,6 +341,24 @@ def _settled(equations, step: _Trial, redundancy: int, stage: Stage, last_decrem
     if not np.isfinite(last_decrement):
         contraction = 1.0
     return _is_negligible(abs(step.decrement) * contraction, step.equations.cost, redundancy)
+
+
+def _in_curved_valley(
+    equations: NormalEquations, step: _Trial | None, damping: Damping, redundancy: int, stage: Stage,
+    costs: list[float],
+) -> bool:  # fmt: skip
+    """Whether robust estimation stands where the whole step, short against σ, leads uphill: the valley is curved.
+
+    Unknowns that are hardly told apart (tilt of all photographs and principal point) make it long and flat. Damped
+    steps would creep along it without end, each by less than what is sought.
+    """
+    if not stage.is_robust or step is None or len(costs) < 2 or step.improves(equations):
+        return False
+    if damping.value > WHOLE_STEP * step.factor.smallest_pivot:
+        return False
+    variance = max(equations.cost, 1e-30) / max(redundancy, 1)
+    still = abs(costs[-2] - costs[-1]) <= ROBUST_COST_TOLERANCE * costs[-1]
+    return still and step.decrement - equations.point_decrement <= VALLEY_STEP_TOLERANCE**2 * variance
 
 
 def _is_negligible(decrement: float, cost: float, redundancy: int) -> bool:

@@ -22,6 +22,7 @@ from aerotri.image_errors import interior_elements
 from aerotri.observations import Block
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock, GroundPointResults, Outcome
+from aerotri.statistics.set_aside import photograph_reasons, point_reasons, status_columns
 
 NEEDS_QUOTES = re.compile(r'[,"\r\n#]')
 TIMINGS = ("read", "start_values", "solve", "statistics", "plots", "write")
@@ -107,7 +108,7 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
 
 
 def image_columns(adjusted: AdjustedBlock) -> dict[str, np.ndarray]:
-    """Columns of images.csv; σ of the angles in degrees, and in mgon in columns of our own."""
+    """Columns of images.csv; σ of the angles in degrees, and in mgon in columns of our own; what was set aside, why."""
     block, images = adjusted.block, adjusted.images
     cameras = np.array([camera.name for camera in block.cameras])
     sigma = images.sigma
@@ -117,6 +118,7 @@ def image_columns(adjusted: AdjustedBlock) -> dict[str, np.ndarray]:
     columns |= _split(("sX0", "sY0", "sZ0"), sigma[:, :3])
     columns |= _split(("s_omega", "s_phi", "s_kappa"), np.degrees(sigma[:, 3:]))
     columns["rays"] = images.rays
+    columns |= status_columns(photograph_reasons(adjusted))
     return columns | _split(("x_s_omega_mgon", "x_s_phi_mgon", "x_s_kappa_mgon"), sigma[:, 3:] * MGON_PER_RADIAN)
 
 
@@ -125,7 +127,8 @@ def point_columns(adjusted: AdjustedBlock) -> dict[str, np.ndarray]:
     points = adjusted.points
     columns = {"point": adjusted.block.points} | _split(("X", "Y", "Z"), points.xyz)
     columns |= _split(("sX", "sY", "sZ"), points.sigma)
-    return columns | {"rays": points.rays, "max_abs_w": points.max_abs_w}
+    columns |= {"rays": points.rays, "max_abs_w": points.max_abs_w}
+    return columns | status_columns(point_reasons(adjusted))
 
 
 def parameter_columns(adjusted: AdjustedBlock) -> dict[str, np.ndarray]:

@@ -15,8 +15,11 @@ if TYPE_CHECKING:
     from aerotri.statistics.significance import Removal
     from aerotri.statistics.variance_components import VarianceComponents
 
-RAY_STATUS = ("used", "one ray", "off", "no start value", "not finite", "removed")
-"""Status of a ray: adjusted, or why it was left out; data snooping removes. The records hold the index into this."""
+RAY_STATUS = (
+    "used", "one ray", "off", "no start value", "not finite", "removed", "weak point", "weak photograph",
+)  # fmt: skip
+"""Status of a ray: adjusted, or why it was left out; data snooping removes; a point is weak that its rays do not fix,
+a photograph that is tied too weakly. The records hold the index into this."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
+from aerotri.adjustment.carry_over import start_values_at, with_shared
 from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.prepare import Prepared, build_system
@@ -31,7 +32,6 @@ from aerotri.functional_model.additional_parameters import format_parameters
 from aerotri.observations import Block
 from aerotri.statistics.control_prediction import predict_control
 from aerotri.statistics.field_estimation import ReducedToFields, covariance_in_use, with_estimated_fields
-from aerotri.statistics.removal import start_values_at, with_shared
 from aerotri.statistics.summarise import count_observations, effective_redundancy, weighted_sum
 
 SIGNIFICANT_T = 1.96

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.adjustment.carry_over import reference_state, start_values_at, with_shared
 from aerotri.adjustment.prepare import Prepared, build_system
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
@@ -18,7 +19,6 @@ from aerotri.adjustment.unknowns import Unknowns
 from aerotri.functional_model.additional_parameters import Parameter, is_grid
 from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import SharedParameters
-from aerotri.statistics.removal import reference_state, start_values_at, with_shared
 from aerotri.statistics.significance import ParameterTests, Removal, partner, worst
 from aerotri.statistics.summarise import count_observations, effective_redundancy, weighted_sum
 

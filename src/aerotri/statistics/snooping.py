@@ -35,13 +35,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.adjustment.carry_over import reference_state, with_shared
 from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.robust import LIMITS, normalised_lengths
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import State
 from aerotri.statistics.adjusted_block import Blunder
-from aerotri.statistics.removal import Found, listed, reference_state, remembered, with_shared, without_removed
+from aerotri.statistics.removal import Found, listed, remembered, without_removed
 from aerotri.statistics.summarise import count_observations
 from aerotri.statistics.suspects import limits_of, to_remove, to_return
 from aerotri.statistics.switched_tests import AllTests, Switches, participants, ray_points, switched_system, test_all

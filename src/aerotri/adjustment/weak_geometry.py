@@ -1,0 +1,195 @@
+"""Points that their rays do not fix, and photographs too weakly tied: found by their σ and set aside with a reason.
+
+The measure of a point is σ in its worst direction over its distance to the nearest photograph, from its own weighted
+rays; that of a photograph σ of its attitude in rad, or of its position over the distance of its points. Where it is
+beyond LOOSE, three σ reach to infinity, or all the way round: the equations are linear over no such length, so neither
+the value nor its σ means anything, and the point or photograph creeps on from step to step. Weights of a robust
+estimator count: a point held by rays that are weighted down is as loose as if they were not there.
+
+A photograph is measured twice. Its own 6 × 6 block of the reduced normal equations tells whether it is tied even if
+all others were known; that costs nothing and is looked at in every adjustment. Photographs that hold each other and
+nothing else show in the inverse of the whole matrix alone, which is formed where a pivot vanishes or the adjustment
+does not settle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from aerotri.adjustment.carry_over import reference_state, start_values_at, with_shared
+from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.prepare import (
+    USED,
+    WEAK_PHOTOGRAPH,
+    WEAK_POINT,
+    Prepared,
+    build_system,
+    with_lonely_rays,
+    with_weak_words,
+)
+from aerotri.adjustment.robust import Estimator, normalised_lengths, scale_of
+from aerotri.adjustment.solve import Solution, SolveOptions, minimise
+from aerotri.adjustment.sparse_cholesky import BorderedMatrix, NotPositiveDefiniteError
+from aerotri.adjustment.unknowns import State, Unknowns
+
+LOOSE = 1.0 / 3.0
+"""σ over distance (points, positions) or in rad (attitudes) beyond which three σ reach to infinity."""
+MOST_PHOTOGRAPHS = 1.0 / 3.0
+"""Share of photographs beyond which it is the datum that is free and not they that are weak."""
+LOOKS = range(6, 1000, 4)
+"""Iterations after which a robust adjustment that has not settled is looked at."""
+LONG = 10
+"""Iterations after which photographs are looked at as well."""
+MOST_ROUNDS = 12
+REGULARISATION = 1e-12
+HELD = 1e12
+
+
+@dataclass(eq=False)
+class _Look:
+    """What an adjustment is asked while it runs; keeps what it found, rows of the system's photographs and points.
+
+    whole : whether points, and steps after the first, are looked at too.
+    """
+
+    redundancy: int
+    whole: bool
+    photographs: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    points: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def __call__(
+        self, system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, iteration: int,
+        suspect: bool,
+    ) -> bool:  # fmt: skip
+        if iteration == 0:
+            self.photographs = loose_alone(system, state, equations)
+            if suspect and not len(self.photographs):
+                self.photographs = loose_together(system, state, equations)
+        elif self.whole and estimator.is_robust and iteration in LOOKS:
+            self.look(system, state, equations, estimator, iteration >= LONG)
+        return bool(len(self.photographs) or len(self.points))
+
+    def look(self, system, state, equations, estimator, photographs: bool) -> bool:
+        """Look at the points, and the photographs too where there is time for that; whether any is loose."""
+        scale = _scale(system, equations, estimator, self.redundancy)
+        self.points = np.flatnonzero(scale * system.looseness(state, estimator) > LOOSE)
+        if photographs:
+            self.photographs = loose_together(system, state, equations, scale)
+        return bool(len(self.photographs) or len(self.points))
+
+
+def minimise_tied(
+    prepared: Prepared, options: SolveOptions, redundancy: Callable[[NormalSystem], int], whole: bool = True
+) -> tuple[Prepared, Solution]:
+    """As `minimise`, with what is too weak set aside on the way; the rest goes on from where it stands.
+
+    Parameters
+    ----------
+    redundancy : of a system.
+    whole : look at points, and later than before the first step; False where start values are all that is wanted.
+
+    Returns
+    -------
+    The block prepared without what was set aside, its state where the given one was, and its solution.
+    """
+    state, done = prepared.state, 0
+    report = options.report
+    for round_ in range(MOST_ROUNDS + 1):
+        freedom = redundancy(prepared.system)
+        look = _Look(freedom, whole)
+        counted = replace(options, inspect=look if round_ < MOST_ROUNDS else None)
+        if report is not None:
+            counted = replace(counted, report=_counting(report, done))
+        solution = minimise(prepared.system, state, freedom, counted)
+        done += solution.iterations
+        ended = not solution.defects and solution.status in ("not converged", "converged")
+        robust = solution.estimator.is_robust
+        if ended and whole and (robust or solution.status != "converged") and round_ < MOST_ROUNDS:
+            stuck = solution.status != "converged"
+            look.look(prepared.system, solution.state, solution.equations, solution.estimator, stuck)
+        if not (len(look.photographs) or len(look.points)):
+            break
+        prepared, state = set_aside(prepared, solution.state, look.photographs, look.points)
+    return prepared, replace(solution, iterations=done)
+
+
+def _counting(report: Callable[[int, float, float], None], done: int) -> Callable[[int, float, float], None]:
+    return lambda iteration, cost, damping: report(done + iteration, cost, damping)
+
+
+def _scale(system: NormalSystem, equations: NormalEquations, estimator: Estimator, redundancy: int) -> float:
+    """σ of the residuals in a-priori σ, by their median."""
+    if estimator.is_robust:
+        return estimator.scale
+    share = redundancy / max(redundancy + system.unknowns.count, 1)
+    return scale_of(normalised_lengths(equations.residual, system.unknowns.rays.inv_sigma), share)
+
+
+def loose_alone(system: NormalSystem, state: State, equations: NormalEquations) -> np.ndarray:
+    """Rows of the photographs that would be loose if all others were known; none where it is the datum."""
+    n = len(system.unknowns.images)
+    normal = equations.matrix.blocks[:n] / _unit_products(system.unknowns, state)
+    held = ~system.unknowns.eo_free
+    diagonal = np.arange(6)
+    normal[:, diagonal, diagonal] = np.where(held, HELD, normal[:, diagonal, diagonal])
+    smallest = np.linalg.eigvalsh(normal)[:, 0]
+    return _unless_many(np.flatnonzero(smallest * LOOSE**2 < 1.0), n)
+
+
+def loose_together(system: NormalSystem, state: State, equations: NormalEquations, scale: float = 1.0) -> np.ndarray:
+    """Rows of the photographs that are loose within the whole block; none where it is the datum.
+
+    A trace of regularisation lets the matrix be inverted; what is free gets a σ beyond all bounds by it.
+    """
+    n, matrix = len(system.unknowns.images), equations.matrix
+    blocks, corner, diagonal = matrix.blocks.copy(), matrix.corner.copy(), np.arange(6)
+    blocks[:n, diagonal, diagonal] *= 1.0 + REGULARISATION
+    corner[np.diag_indices_from(corner)] *= 1.0 + REGULARISATION
+    try:
+        inverse = system.symbolic.factorise(BorderedMatrix(blocks, matrix.border, corner)).inverse_on_pattern()
+    except NotPositiveDefiniteError:
+        return np.zeros(0, dtype=np.int64)
+    cofactor = inverse.blocks[:n] * _unit_products(system.unknowns, state)
+    cofactor[~system.unknowns.eo_free] = 0.0
+    largest = np.linalg.eigvalsh(0.5 * (cofactor + np.swapaxes(cofactor, 1, 2)))[:, -1]
+    return _unless_many(np.flatnonzero(~(scale**2 * largest <= LOOSE**2)), n)
+
+
+def _unit_products(unknowns: Unknowns, state: State) -> np.ndarray:
+    """(n, 6, 6) by which cofactors are multiplied, normals divided, to count positions in distances of the points.
+
+    The distance of a photograph is the harmonic mean of its rays' lengths, on which points far away have no influence.
+    """
+    rays, n = unknowns.rays, len(unknowns.images)
+    point = np.repeat(np.arange(len(unknowns.points)), np.diff(rays.start))
+    reach = np.maximum(np.linalg.norm(state.points[point] - state.centre[rays.image], axis=1), 1e-300)
+    nearness = np.bincount(rays.image, 1.0 / reach, n) / np.maximum(np.bincount(rays.image, minlength=n), 1)
+    unit = np.ones((n, 6))
+    unit[:, :3] = nearness[:, None]
+    return unit[:, :, None] * unit[:, None, :]
+
+
+def _unless_many(rows: np.ndarray, n: int) -> np.ndarray:
+    return rows if len(rows) <= MOST_PHOTOGRAPHS * n else rows[:0]
+
+
+def set_aside(prepared: Prepared, state: State, photographs: np.ndarray, points: np.ndarray) -> tuple[Prepared, State]:
+    """The block prepared anew without some photographs and points, and the state to go on from.
+
+    Parameters
+    ----------
+    photographs, points : rows of the system's unknowns.
+    """
+    u, rays = prepared.system.unknowns, prepared.system.unknowns.block.image_points
+    status = prepared.ray_status.copy()
+    used = status == USED
+    status[used & np.isin(rays.point, u.points[points])] = WEAK_POINT
+    status[used & np.isin(rays.image, u.images[photographs])] = WEAK_PHOTOGRAPH
+    status = with_lonely_rays(u.block, status)
+    warnings = with_weak_words(u.block, status, prepared.warnings)
+    system, start = build_system(u.block, start_values_at(u, state), status)
+    prepared = Prepared(system, reference_state(system.unknowns, u, start, prepared.state), status, warnings)
+    return prepared, with_shared(system.unknowns, u, start, state)
