@@ -195,7 +195,7 @@ def trial(case: Case, mode: str, chance: random.Random, log: Path) -> None:
         case.failures.append(f"{mode}: exit {code}: {log.read_text(errors='replace')[-300:]}")
     look(case, mode, (before, case.whole[variant]))
     case.tally["leftovers"] += bool(hidden(case))
-    if case.seconds < 1.0 or chance.random() < 0.5:
+    if chance.random() < 0.4:
         run_again(case, mode, chance.randrange(2), log)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from aerotri.conventions import InputError
+from aerotri.memory import available_bytes
 
 CHUNKS = 4
 """Pieces of every parallel sum. A constant of the program, never the number of threads: it decides the rounding."""
@@ -63,16 +64,6 @@ def run_chunks(function: Callable[[int], object], count: int) -> list:
         return [function(k) for k in range(count)]
     with ThreadPoolExecutor(threads) as pool:
         return list(pool.map(function, range(count)))
-
-
-def available_bytes() -> int | None:
-    """Memory that may still be taken; None where the system does not tell."""
-    try:
-        with open("/proc/meminfo", encoding="ascii") as file:
-            fields = dict(line.split(":", 1) for line in file)
-        return 1024 * int(fields["MemAvailable"].split()[0])
-    except (OSError, KeyError, ValueError):
-        return None
 
 
 def refuse_more_than_there_is(needed: int, what: str) -> None:

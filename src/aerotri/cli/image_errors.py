@@ -24,7 +24,7 @@ def deform(
         bool, typer.Option("--block", help="The whole block, every node in the model nearest to it (the default).")
     ] = False,
     step: Annotated[
-        int, typer.Option(help="With --block: pair every photograph with the STEP-th after it in its strip.")
+        int, typer.Option(min=1, help="With --block: pair every photograph with the STEP-th after it in its strip.")
     ] = 1,
     variant: Annotated[
         str, typer.Option(help="free: orientation of the result; absorbed: as adjusted without parameters.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
 
 OWN_NAMES = ("compare.json", "difference.tif", "plots")
 CELLS = 1000
+LARGEST_HELD = 64_000_000
+"""Cells of a raster that is held as a whole; a larger one is read part by part."""
+BYTES_OF_CELL = 64
+"""Of the grid of differences: places, heights of both, and what the statistics sort."""
 CLOUDS, RASTERS = (".las", ".laz"), (".tif", ".tiff", ".asc", ".img", ".vrt")
 
 
@@ -26,7 +31,7 @@ def run_compare(
     test: Path, control: Path, out: Path | None, method: str, align: str, cell: float | None, plots: bool, as_json: bool
 ) -> None:
     """Compare and write; arguments as on the command line."""
-    from aerotri.terrain.compare import ALIGNMENTS, METHODS, compare
+    from aerotri.terrain.compare import ALIGNMENTS, METHODS
 
     for name, value, known in (("method", method, METHODS), ("align", align, ALIGNMENTS)):
         if value not in known:
@@ -35,14 +40,11 @@ def run_compare(
     target = out or Path(f"{test.resolve().stem}_comparison")
     refuse_foreign_folder(target, "compare.json")
     console.progress("reading")
-    (one, area, cells, crs), (other, control_area, control_cells, control_crs) = (_surface(p) for p in (test, control))
-    if crs is not None and control_crs is not None and crs != control_crs:
-        raise InputError(f"is in EPSG:{crs}, the control in EPSG:{control_crs}", "bring them into one CRS", test)
-    grid = _common_grid(area, control_area, cell or max(cells, control_cells))
-    console.progress("comparing")
-    found = compare(one, other, grid, method, align)
+    with ExitStack() as stack:
+        found, crs = _compared(test, control, method, align, cell, stack, console)
+    grid = found.grid
     content = comparison_json(found, test.name, control.name, method)
-    _write(target, found, content, f"{test.name} − {control.name}", crs or control_crs, plots)
+    _write(target, found, content, f"{test.name} − {control.name}", crs, plots)
     if as_json:
         print(json.dumps(content, indent=2, ensure_ascii=False))
         return
@@ -55,22 +57,45 @@ def run_compare(
     console.lines([*lines, *([found.alignment_text] if found.alignment_text else []), f"Written to {target}"])
 
 
-def _surface(path: Path) -> tuple[Heights, np.ndarray, float, int | None]:
+def _compared(
+    test: Path, control: Path, method: str, align: str, cell: float | None, stack: ExitStack, console: Console
+) -> tuple[Comparison, int | None]:
+    """The comparison, and the code of its CRS where that is known."""
+    from aerotri.rasters import cache_limited
+    from aerotri.terrain.compare import compare
+
+    stack.enter_context(cache_limited())
+    (one, area, cells, crs), (other, control_area, control_cells, control_crs) = (
+        _surface(p, stack) for p in (test, control)
+    )
+    if crs is not None and control_crs is not None and crs != control_crs:
+        raise InputError(f"is in EPSG:{crs}, the control in EPSG:{control_crs}", "bring them into one CRS", test)
+    grid = _common_grid(area, control_area, cell or max(cells, control_cells))
+    console.progress("comparing")
+    found = compare(
+        one, other, grid, method, align, lambda done, count: console.work("comparing", done / count)
+    )  # fmt: skip
+    return found, crs or control_crs
+
+
+def _surface(path: Path, stack: ExitStack) -> tuple[Heights, np.ndarray, float, int | None]:
     """A surface, (2, 2) m what it covers, its typical cell in m, and the code of its CRS."""
     from aerotri.formats.pickets import read_pickets
     from aerotri.formats.point_cloud import read_point_cloud
     from aerotri.rasters import RasterReader
-    from aerotri.terrain.compare import PointHeights, RasterHeights
+    from aerotri.terrain.compare import FileHeights, PointHeights, RasterHeights
 
     if path.is_dir():
         path = path / "dsm.tif"
     if not path.is_file():
         raise InputError("there is no such file", "give a GeoTIFF, LAZ, or pickets.parquet", path)
     if path.suffix.lower() in RASTERS:
-        with RasterReader(path) as reader:
-            g = reader.grid
-            z = reader.read(0, 0, g.rows, g.columns).astype(float)
-            epsg = reader.epsg
+        reader = stack.enter_context(RasterReader(path))
+        g = reader.grid
+        if g.rows * g.columns > LARGEST_HELD:
+            left, bottom, right, top = g.bounds
+            return FileHeights(reader), np.array([[left, bottom], [right, top]]), g.cell_x, reader.epsg
+        z, epsg = reader.read(0, 0, g.rows, g.columns).astype(float), reader.epsg
         known_rows, known_columns = np.isfinite(z).any(axis=1), np.isfinite(z).any(axis=0)
         if not known_rows.any():
             raise InputError("has no data", "give a raster with heights", path)
@@ -96,7 +121,7 @@ def _common_grid(one: np.ndarray, other: np.ndarray, cell: float) -> Grid:
     low, high = np.maximum(one[0], other[0]), np.minimum(one[1], other[1])
     if (low >= high).any():
         raise InputError("the surfaces have no place in common", "check their coordinate systems")
-    return grid_over(np.array([low, high]), max(cell, float((high - low).max()) / (10 * CELLS)))
+    return grid_over(np.array([low, high]), max(cell, float((high - low).max()) / (10 * CELLS)), BYTES_OF_CELL)
 
 
 def comparison_json(found: Comparison, test: str, control: str, method: str) -> dict[str, Any]:

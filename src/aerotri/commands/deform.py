@@ -160,7 +160,7 @@ def _of_block(
 
     return deform_block(
         calibration, of, ground, options.spacing, options.step,
-        lambda done, count: console.progress(f"model {done} of {count}"),
+        lambda done, count: console.work("models", done / max(count, 1), f"{done} of {count}"),
     )  # fmt: skip
 
 

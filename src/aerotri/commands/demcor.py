@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import time
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -170,7 +170,8 @@ def _corrected(
             RasterWriter(places["dZ.tif"], reader.grid, np.float32, **common) as dz_writer,
         ):
             dz_writer.describe("dZ taken off the DEM, m")
-            outcome = correct_dem(models, numbers, reader, writer, dz_writer, _progress(console))
+            report = partial(console.work, "correcting")
+            outcome = correct_dem(models, numbers, reader, writer, dz_writer, report)
         _refuse_nothing(outcome, models, reader)
         write_raster(
             places["sigma_dZ.tif"], outcome.sigma, outcome.sigma_grid, reader.crs, "σ of dZ, m"
@@ -187,17 +188,6 @@ def _refuse_nothing(outcome: DemOutcome, models: DemModels, reader: RasterReader
         said = "has no data" if not outcome.sums[2] else "lies outside the models"
         names = ", ".join(models.names[0])
         raise InputError(f"{said}: nothing to correct", f"check the CRS and the photographs ({names} …)", reader.path)
-
-
-def _progress(console: Console):
-    """Share done and time left, as a moving line."""
-    begun = time.perf_counter()
-
-    def report(share: float) -> None:
-        left = (time.perf_counter() - begun) * (1.0 - share) / max(share, 1e-9)
-        console.progress(f"correcting {100.0 * share:.0f} %, {left:.0f} s left")
-
-    return report
 
 
 def _summary(content: dict[str, Any]) -> list[str]:

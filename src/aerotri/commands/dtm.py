@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -86,13 +85,7 @@ def run_dtm(source: Path, photographs: list[Path], out: Path | None, options: Dt
     plan = make_plan(calibration, photographs, options)
     from aerotri.terrain.dtm import make_terrain_model
 
-    begun = time.perf_counter()
-
-    def report(stage: str, share: float) -> None:
-        left = (time.perf_counter() - begun) * (1.0 - share) / max(share, 1e-3)
-        console.progress(f"{stage} {100.0 * share:.0f} %" + (f", {left:.0f} s left" if share > 0.02 else ""))
-
-    outcome = make_terrain_model(calibration, plan, report)
+    outcome = make_terrain_model(calibration, plan, console.work)
     console.progress("writing")
     content = write_terrain(target, outcome, calibration, options.plots)
     if as_json:

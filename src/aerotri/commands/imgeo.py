@@ -145,15 +145,13 @@ def _resample_all(
     if jobs:
         console.progress(compilation_notice())
     maps: dict[int, IdealMap] = {}
-    done, begun = [], time.perf_counter()
+    done = []
     for number, job in enumerate(jobs):
         if job.group not in maps:
             maps[job.group] = ideal_map(errors[job.group])
 
         def report(share: float, number: int = number) -> None:
-            whole = (number + share) / len(jobs)
-            left = (time.perf_counter() - begun) * (1.0 - whole) / whole
-            console.progress(f"photograph {number + 1} of {len(jobs)}: {100 * share:.0f} %, {left:.0f} s left")
+            console.work("correcting", (number + share) / len(jobs), f"photograph {number + 1} of {len(jobs)}")
 
         started = time.perf_counter()
         (out / job.name).parent.mkdir(parents=True, exist_ok=True)

@@ -89,7 +89,7 @@ def _by_pilot(question: IntervalQuestion, console: Console) -> dict[str, Any]:
         low, high = middle - half, middle + half
         area = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
     plan = make_plan(calibration, list(question.photographs), DtmOptions(interval=interval, area=area))
-    outcome = make_terrain_model(calibration, plan, lambda stage, share: console.progress(f"{stage} {share:.0%}"))
+    outcome = make_terrain_model(calibration, plan, console.work)
     console.lines([])
     pilot = pilot_of(outcome.pickets, interval, question.tolerance)
     content = _by_formula(gsd, None)

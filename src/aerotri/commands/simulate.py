@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
-import time
+import shutil
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import refuse_existing_file, refuse_foreign_entries
@@ -116,6 +118,23 @@ def _rendered(out: Path) -> list[str]:
     return [name for name in names if Path(name).name == name]
 
 
+def _refuse_without_room(scene: Scene, chosen: list[int], folder: Path) -> None:
+    """Photographs are as large as their pixels, 16 bit each.
+
+    Raises
+    ------
+    InputError
+        When they do not fit on the disk.
+    """
+    needed = sum(2.0 * float(np.prod(scene.camera(image).nominal.size_px, dtype=float)) for image in chosen)
+    free = shutil.disk_usage(next(p for p in folder.resolve().parents if p.is_dir())).free
+    if needed > free:
+        raise InputError(
+            f"{len(chosen)} photographs need {needed / 2**30:.3g} GiB, {free / 2**30:.3g} GiB of the disk are free",
+            "choose another place, or some of them by --only",
+        )
+
+
 def _render(scene: Scene, chosen: list[int], folder: Path, console: Console) -> None:
     """Every photograph whole or not at all; the record, written first, names them."""
     from aerotri.compiled import compilation_notice
@@ -123,18 +142,16 @@ def _render(scene: Scene, chosen: list[int], folder: Path, console: Console) -> 
     from aerotri.rasters_images import create_image
     from aerotri.simulation.rendering import rendered_rows
 
+    _refuse_without_room(scene, chosen, folder)
     console.progress(compilation_notice())
     files = [f"{scene.names[image]}.tif" for image in chosen]
     content = {"photographs": files, "seed": scene.seed, "options": asdict(scene.options)}
     with atomic_file(folder / RECORD) as place:
         place.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    begun = time.perf_counter()
     for number, (image, name) in enumerate(zip(chosen, files, strict=True)):
 
         def report(share: float, number: int = number) -> None:
-            whole = (number + share) / len(chosen)
-            left = (time.perf_counter() - begun) * (1.0 - whole) / whole
-            console.progress(f"rendering {number + 1} of {len(chosen)}: {100 * share:.0f} %, {left:.0f} s left")
+            console.work("rendering", (number + share) / len(chosen), f"photograph {number + 1} of {len(chosen)}")
 
         columns, rows = scene.camera(image).nominal.size_px
         with atomic_file(folder / name) as place, create_image(place, columns, rows, 1, "uint16") as writer:

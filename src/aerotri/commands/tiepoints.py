@@ -87,7 +87,7 @@ def _tied(folder: Path, out: Path, options: TiePointOptions, console: Console) -
             options.points,
         ),
         out / CACHE,
-        Progress(console),
+        lambda stage, done, count: console.work(stage, done / max(count, 1), f"{done} of {count}"),
     )
     # in one step, so that block, marks and record belong together
     with atomic_folder(out, own=(*OWN_ENTRIES, MARKS, RECORD)) as place:
@@ -100,21 +100,6 @@ def _tied(folder: Path, out: Path, options: TiePointOptions, console: Console) -
         (place / RECORD).write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     console.lines([*content["messages"], *_lines(content), f"Written to {out}"])
     return content
-
-
-class Progress:
-    """A moving line of what is going on, with the time left in this stage."""
-
-    def __init__(self, console: Console):
-        self._console, self._stage, self._begun, self._before = console, "", 0.0, 0
-
-    def __call__(self, stage: str, done: int, count: int) -> None:
-        now = time.perf_counter()
-        if stage != self._stage:
-            self._stage, self._begun, self._before = stage, now, done
-        worked = done - self._before
-        left = f", {(now - self._begun) * (count - done) / worked:.0f} s left" if worked else ""
-        self._console.progress(f"{stage}: {done} of {count}{left}")
 
 
 def _stated_camera(spec: CameraSpec) -> StatedCamera:

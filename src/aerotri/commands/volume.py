@@ -127,7 +127,7 @@ def _computed(
                     writer.write(window.row - row, window.column - column, inside.astype(np.float32))
 
                 volumes = compute_volumes(reader, base, boundary, given.method, plan, keep,
-                                          lambda what, k, n: console.progress(f"{what} {k} of {n}"))  # fmt: skip
+                                          lambda what, k, n: console.work(what, k / n, f"{k} of {n}"))  # fmt: skip
             sigma = _sigma(given, reader, base, boundary, sigma_options, console)
             sources = Sources(given.dtm.name, "" if reader.epsg is None else f"EPSG:{reader.epsg}",
                               *("" if p is None else p.name for p in (given.adjustment, given.pickets)))  # fmt: skip

@@ -8,9 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.memory import fitting, refuse_beyond_memory
 from aerotri.observations import Camera
 from aerotri.simulation.spec import CrossStripSpec, FlightSpec
 
+BYTES_OF_PHOTOGRAPH = 3000
+"""With its name, its line of a table and its true orientation."""
 AXIS_ANGLE = {"+x": 0.0, "+y": np.pi / 2, "-x": np.pi, "-y": -np.pi / 2}
 
 
@@ -106,9 +109,29 @@ def plan_flight(
     used = [_known(index, name, "flight.cameras") for name in spec.cameras] or list(range(len(cameras)))
     height = flying_height(spec, cameras[used[0]])
     frame = _frame(spec, cameras[used[0]], height)
+    _refuse_too_many(spec, frame)
     strips = _main_strips(spec, frame, cameras, used, height)
     strips += [_cross_strip(spec, cross, i, frame, cameras, index, height) for i, cross in enumerate(spec.cross_strips)]
     return _fly(spec, strips, frame, cameras, ground_m + height, rng), frame
+
+
+def _refuse_too_many(spec: FlightSpec, frame: FlightFrame) -> None:
+    """Photographs are counted before any is planned.
+
+    Raises
+    ------
+    InputError
+        When they do not fit into memory.
+    """
+    step = frame.footprint * (1.0 - np.array([spec.end_lap, spec.side_lap]))
+    cross = [c.images or 2.0 * frame.half_axes[1] / step[0] + 1.0 for c in spec.cross_strips]
+    count = float((2.0 * frame.half_axes / step + 1.0).prod()) + sum(cross)
+    refuse_beyond_memory(
+        BYTES_OF_PHOTOGRAPH * count, f"{count:.3g} photographs",
+        f"make the area smaller or the photographs larger on the ground; {fitting(BYTES_OF_PHOTOGRAPH):.2g} would fit",
+    )  # fmt: skip
+    if spec.days is not None and spec.days > count:
+        raise InputError(f"'flight.days' = {spec.days} is more than the photographs", f"give {count:.0f} at most")
 
 
 def _known(index: Mapping[str, int], name: str, key: str) -> int:

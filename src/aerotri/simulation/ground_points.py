@@ -9,6 +9,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.functional_model.rotation import rotation_from_angles
+from aerotri.memory import fitting, refuse_beyond_memory
 from aerotri.observations import Camera
 from aerotri.simulation.flight import FlightFrame, FlownImages
 from aerotri.simulation.random_streams import scattered
@@ -17,6 +18,8 @@ from aerotri.simulation.spec import ControlSpec, TiePointSpec, TowerSpec
 CONTROL_REACH = 0.7
 """Control lies as far beyond the outer strip axes as this share of half a footprint."""
 CHECK_SURPLUS = 2
+BYTES_OF_POINT = 2000
+"""With its name and its rays in as many photographs as usually see one."""
 TOWER_REACH = (0.1, 0.5)
 """Where towers stand, from the middle of a photograph along and across the flight, in units of the half format [C]: at
 60 % end lap the neighbours see them too."""
@@ -67,6 +70,9 @@ def _clustered(
     spec: TiePointSpec, count: int, flown: FlownImages, cameras: Sequence[Camera], ground_m: float, rng
 ) -> np.ndarray:
     """Around the nodes of a pattern in each image, as Gruber laid them out; the nodes of overlapping images meet."""
+    nodes = float(np.prod(spec.pattern))
+    _refuse_too_many(nodes * (len(flown) if spec.distribution == "nodes" else 1.0), "nodes of tie points",
+                     "lower 'tie_points.pattern'")
     if spec.distribution == "nodes":
         cells = len(flown) * spec.pattern[0] * spec.pattern[1]
         order = np.concatenate([rng.permutation(cells) for _ in range(-(-count // cells))])[:count]
@@ -84,10 +90,23 @@ def tower_places(
     spec: TowerSpec, flown: FlownImages, cameras: Sequence[Camera], ground_m: float, rng: np.random.Generator
 ) -> np.ndarray:
     """(t, 2) m plan positions of the towers, in the order of the photographs they stand in."""
+    _refuse_too_many(2.0 * len(flown) * spec.per_image, "points of towers", "lower 'towers.per_image'")
     image = np.repeat(np.arange(len(flown)), spec.per_image)
     along, across = (rng.uniform(-reach, reach, size=len(image)) for reach in TOWER_REACH)
     position = _by_axes(along, across, image, flown, cameras)
     return _on_ground(image, position[:, None, :], flown, cameras, ground_m)[:, 0]
+
+
+def _refuse_too_many(count: float, what: str, remedy: str) -> None:
+    """Points are counted before any is made.
+
+    Raises
+    ------
+    InputError
+        When they do not fit into memory.
+    """
+    told = f"{remedy}; {fitting(BYTES_OF_POINT):.2g} would fit"
+    refuse_beyond_memory(BYTES_OF_POINT * count, f"{count:.3g} {what}", told)
 
 
 def _by_axes(along: np.ndarray, across: np.ndarray, image: np.ndarray, flown: FlownImages, cameras: Sequence[Camera]):
@@ -128,6 +147,9 @@ def lay_out_control(spec: ControlSpec, frame: FlightFrame, base_m: float, rng: n
     base_m : base length that the distance of the control counts in.
     """
     half = frame.half_axes + np.array([0.0, CONTROL_REACH * frame.footprint[1] / 2.0])
+    mesh = np.inf if spec.distance_bases is None else spec.distance_bases * base_m
+    _refuse_too_many(float((2.0 * half / mesh + 2.0).prod()) + CHECK_SURPLUS * spec.check_points,
+                     "control and check points", "raise 'control.distance_bases' or lower 'control.check_points'")
     if spec.positions:
         control = (2.0 * np.array(spec.positions) - 1.0) * half
     elif spec.distance_bases is not None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.memory import fitting, refuse_beyond_memory
 from aerotri.observations import Camera
 from aerotri.simulation.camera_errors import ImageError
 from aerotri.simulation.projection import Photographs, Rays, inside_format, measured_positions, visible_rays
@@ -16,6 +17,8 @@ from aerotri.simulation.spec import GrossErrorSpec, TiePointSpec
 PILOT_SHARE = 1.4
 """Candidates drawn first, over the number that the wanted rays need when every candidate counts."""
 ROUNDS = 8
+BYTES_OF_RAY = 800
+"""What the simulation takes for an image point at its peak, 500 measured, and its line of a table."""
 HOPELESS = 1000
 """So many candidates without one usable point mean that the flight gives none."""
 
@@ -84,6 +87,10 @@ def tie_rays(
     (N, 3) m and rays with noise-free measured positions.
     """
     wanted_rays = len(imaging.photographs.centre) * spec.per_image
+    refuse_beyond_memory(
+        BYTES_OF_RAY * wanted_rays, f"{wanted_rays:.3g} image points",
+        f"lower 'tie_points.per_image' to {fitting(BYTES_OF_RAY) / len(imaging.photographs.centre):.3g}",
+    )  # fmt: skip
     number = int(PILOT_SHARE * wanted_rays / (spec.rays_per_point or 4.0)) + 10
     for _ in range(ROUNDS):
         points = candidates(number)

@@ -8,6 +8,7 @@ both by cubic splines. RMSE counts every cell; median, NMAD = 1.4826·median|Δ 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,7 +17,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.ndimage import map_coordinates
 
 from aerotri.conventions import InputError
-from aerotri.rasters import Grid
+from aerotri.rasters import Grid, RasterReader
 from aerotri.terrain.tin import Tin, triangulate
 
 METHODS = ("linear", "spline")
@@ -28,6 +29,7 @@ ROUNDS, SETTLED_M = 15, 1e-4
 CUT = 3.0
 MOST_ALIGNED = 200_000
 FEWEST = 20
+PART_CELLS = 16_000_000
 AXES = np.eye(2)
 
 
@@ -53,6 +55,33 @@ class RasterHeights:
         known = np.isfinite(self.z)
         filled = np.where(known, self.z, np.nanmean(self.z))
         return np.where(np.isfinite(linear), map_coordinates(filled, place, order=3, mode="nearest"), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class FileHeights:
+    """Heights of a raster that is too large to be held: read where they are asked for."""
+
+    reader: RasterReader
+
+    def at(self, xy: np.ndarray, method: str) -> np.ndarray:
+        """Bilinear as `RasterHeights`, of the part of the file around the places."""
+        if method != "linear":
+            raise InputError("is too large for splines", "compare with --method linear", self.reader.path)
+        grid = self.reader.grid
+        row, column = grid.row(xy[:, 1]), grid.column(xy[:, 0])
+        out = np.full(len(xy), np.nan)
+        inside = (row >= 0.0) & (row <= grid.rows - 1) & (column >= 0.0) & (column <= grid.columns - 1)
+        if not inside.any():
+            return out
+        (top, bottom), (left, right) = (
+            (int(at[inside].min()), min(int(at[inside].max()) + 2, count))
+            for at, count in ((row, grid.rows), (column, grid.columns))
+        )
+        z = self.reader.read(top, left, bottom - top, right - left).astype(float)
+        if np.isfinite(z).any():
+            place = np.array([row[inside] - top, column[inside] - left])
+            out[inside] = map_coordinates(z, place, order=1, mode="constant", cval=np.nan)
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +189,10 @@ def statistics_of(difference: np.ndarray) -> Statistics:
     )  # fmt: skip
 
 
-def compare(test: Heights, control: Heights, grid: Grid, method: str = "linear", alignment: str = "none") -> Comparison:
+def compare(
+    test: Heights, control: Heights, grid: Grid, method: str = "linear", alignment: str = "none",
+    report: Callable[[int, int], None] | None = None,
+) -> Comparison:  # fmt: skip
     """Differences of two surfaces on a grid.
 
     Parameters
@@ -168,11 +200,17 @@ def compare(test: Heights, control: Heights, grid: Grid, method: str = "linear",
     method : of `METHODS`, the interpolation of both.
     alignment : of `ALIGNMENTS`; 'shift' in X, Y, Z [L: Nuth & Kääb 2011], 'rigid' with three rotations besides
         [L: Gruen & Akca 2005, least squares surface matching].
+    report : called with the parts that are done and all there are, where a surface is read part by part.
 
     Raises
     ------
     InputError
     """
+    files = [surface for surface in (test, control) if isinstance(surface, FileHeights)]
+    if files and alignment != "none":
+        raise InputError("is too large to be aligned", "cut out the part in common", files[0].reader.path)
+    if files:
+        return _by_parts(test, control, grid, method, min(f.reader.grid.cell_x for f in files), report)
     x, y = grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows))
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     z = control.at(places, method)
@@ -182,6 +220,27 @@ def compare(test: Heights, control: Heights, grid: Grid, method: str = "linear",
     known = np.isfinite(z)
     covered = float(np.isfinite(difference[known]).mean()) if known.any() else 0.0
     return Comparison(grid, difference.reshape(grid.rows, grid.columns), statistics_of(difference), covered, moved)
+
+
+def _by_parts(
+    test: Heights, control: Heights, grid: Grid, method: str, finest: float, report: Callable[[int, int], None] | None
+) -> Comparison:
+    """As `compare`, square by square of the grid, each about as large in the finest file as fits well into memory."""
+    side = int(np.clip(PART_CELLS**0.5 * finest / grid.cell_x, 1, 1024))
+    corners = [(row, column) for row in range(0, grid.rows, side) for column in range(0, grid.columns, side)]
+    difference, known, covered = np.full((grid.rows, grid.columns), np.nan), 0, 0
+    for k, (row, column) in enumerate(corners):
+        part = slice(row, min(row + side, grid.rows)), slice(column, min(column + side, grid.columns))
+        x, y = grid.x(np.arange(part[1].start, part[1].stop)), grid.y(np.arange(part[0].start, part[0].stop))
+        places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        z = control.at(places, method)
+        if np.isfinite(z).any():
+            d = test.at(places, method) - z
+            difference[part] = d.reshape(len(y), len(x))
+            known, covered = known + int(np.isfinite(z).sum()), covered + int(np.isfinite(d).sum())
+        if report is not None:
+            report(k + 1, len(corners))
+    return Comparison(grid, difference, statistics_of(difference), covered / known if known else 0.0, None)
 
 
 def align(test: Heights, control: Heights, places: np.ndarray, z: np.ndarray, method: str, kind: str,

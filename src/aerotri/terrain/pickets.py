@@ -6,8 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.memory import fitting, refuse_beyond_memory
 from aerotri.terrain.photographs import Photographs
 from aerotri.terrain.picket_status import PicketStatus
+
+BYTES_OF_PICKET = 1500
+"""Its row of `Pickets`, and its share of tiles, triangles and trees at their peak."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +113,20 @@ class Pickets:
 
 
 def grid_nodes(area: Area, interval: float) -> np.ndarray:
-    """(n, 2) whole multiples of the interval in an area, row by row: two sets of photographs get the same nodes."""
+    """(n, 2) whole multiples of the interval in an area, row by row: two sets of photographs get the same nodes.
+
+    Raises
+    ------
+    InputError
+        When they do not fit into memory.
+    """
+    size = area.high - area.low
+    count = float((size / interval + 1.0).prod())
+    least = float(np.sqrt(size.prod() / fitting(BYTES_OF_PICKET)))
+    refuse_beyond_memory(
+        BYTES_OF_PICKET * count, f"{count:.3g} pickets every {interval:g} m",
+        f"give an --interval of at least {least:.2g} m, or a smaller --area",
+    )  # fmt: skip
     x, y = (
         interval * np.arange(np.ceil(low / interval - 1e-9), np.floor(high / interval + 1e-9) + 1)
         for low, high in zip(area.low, area.high, strict=True)

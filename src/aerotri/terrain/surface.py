@@ -13,12 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_dilation, distance_transform_edt, grey_opening
 
+from aerotri.memory import fitting, refuse_beyond_memory
 from aerotri.rasters import Grid
 from aerotri.terrain.tin import triangulate
 
 LONGEST_SIDE = 2.6
 """Sides of triangles, in intervals, that still count as ground between pickets; longer ones bridge a hole."""
 ROWS_AT_A_TIME = 256
+BYTES_OF_CELL = 160
+"""Two surfaces with their σ, and what the filter of objects holds at its peak."""
 FEWEST_LEFT_OUT = 30
 LEAST_POWER, MOST_POWER = 0.5, 2.0
 SMRF_SLOPE, SMRF_WINDOW_M, SMRF_HEIGHT_M, SMRF_SCALE = 0.15, 18.0, 0.5, 1.25
@@ -33,9 +36,20 @@ class Surface:
     sigma: np.ndarray
 
 
-def grid_over(xy: np.ndarray, cell: float) -> Grid:
-    """A grid whose cells' centres are multiples of the cell, over all points (n, 2)."""
+def grid_over(xy: np.ndarray, cell: float, bytes_of_cell: int = BYTES_OF_CELL) -> Grid:
+    """A grid whose cells' centres are multiples of the cell, over all points (n, 2).
+
+    Raises
+    ------
+    InputError
+        When what is computed on it, with so many bytes a cell, does not fit into memory.
+    """
     low, high = np.floor(xy.min(axis=0) / cell), np.ceil(xy.max(axis=0) / cell)
+    count = float((high - low + 1.0).prod())
+    refuse_beyond_memory(
+        bytes_of_cell * count, f"{count:.3g} cells of {cell:g} m",
+        f"give a --cell of at least {cell * np.sqrt(count / fitting(bytes_of_cell)):.2g} m",
+    )  # fmt: skip
     columns, rows = (high - low + 1).astype(int).tolist()
     return Grid(rows, columns, float(low[0] - 0.5) * cell, float(high[1] + 0.5) * cell, cell, cell)
 

@@ -22,6 +22,7 @@ RULES = ("trapezoidal", "simpson", "simpson38")
 INSET = 1e-9
 """Of the extent: the outermost sections lie so much inside, where the boundary has a length along them."""
 PIECES_AT_ONCE = 4096
+MOST_SECTIONS = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +81,11 @@ def cross_sections(
             "choose a smaller --section-spacing",
         )
     length = high - low
+    if length / spacing > MOST_SECTIONS:
+        raise InputError(
+            f"sections every {spacing:g} m would be {length / spacing:.3g}, {MOST_SECTIONS} at most are cut",
+            f"choose a --section-spacing of at least {length / MOST_SECTIONS:.2g} m",
+        )
     station = spacing * np.arange(int(np.floor(length / spacing * (1.0 + 1e-12))) + 1)
     if length - station[-1] > 1e-9 * length:
         station = np.append(station, length)

@@ -1,0 +1,83 @@
+"""Memory predicted before it is taken, so that what cannot fit is refused with what would."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from aerotri.conventions import InputError
+
+SHARE = 0.8
+"""Of the memory that is free: the rest is for what is not predicted, and for others."""
+NAMES_OF_LIMITS = (
+    ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
+    ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
+)
+"""Limit and use of a container, of its two kinds."""
+
+
+def available_bytes() -> int | None:
+    """Memory that may still be taken; None where the system does not tell."""
+    told = (_of_machine(), *map(_of_container, NAMES_OF_LIMITS), _of_process())
+    known = [value for value in told if value is not None]
+    return max(min(known), 0) if known else None
+
+
+def refuse_beyond_memory(needed: float, what: str, remedy: str) -> None:
+    """Say before taking it that the memory will not do.
+
+    Parameters
+    ----------
+    needed : bytes. what : a subject in the plural. remedy : what would fit; '{share}' in it becomes the share of
+        `needed` that does.
+
+    Raises
+    ------
+    InputError
+    """
+    there = available_bytes()
+    if there is not None and not needed <= SHARE * there:
+        share = SHARE * there / needed if needed < float("inf") else 0.0
+        raise InputError(
+            f"{what} need {_sized(needed)} of memory, {_sized(there)} are free", remedy.format(share=f"{share:.2g}")
+        )
+
+
+def fitting(bytes_each: float) -> float:
+    """How many things of a size fit into the memory that is free."""
+    there = available_bytes()
+    return float("inf") if there is None else SHARE * there / bytes_each
+
+
+def _sized(count: float) -> str:
+    return f"{count / 2**30:.1f} GiB" if count < 1e15 else "far more than a machine has"
+
+
+def _of_machine() -> int | None:
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            fields = dict(line.split(":", 1) for line in file)
+        return 1024 * int(fields["MemAvailable"].split()[0])
+    except (OSError, KeyError, ValueError):
+        return None
+
+
+def _of_container(names: tuple[str, str]) -> int | None:
+    try:
+        limit, used = (int(Path(name).read_text(encoding="ascii")) for name in names)
+        return limit - used
+    except (OSError, ValueError):
+        return None  # no container, or 'max'
+
+
+def _of_process() -> int | None:
+    """What a limit of the address space (ulimit -v) leaves."""
+    try:
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit == resource.RLIM_INFINITY:
+            return None
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return limit - int(file.read().split()[0]) * resource.getpagesize()
+    except (ImportError, OSError, ValueError):
+        return None
