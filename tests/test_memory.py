@@ -109,3 +109,10 @@ def test_sections_that_are_too_many(tmp_path):
         pytest.raises(InputError, match=r"would be 1.9e\+07, 1000000 at most .* of at least 1.9e-05 m"),
     ):
         cross_sections(reader, level(0.0), boundary_of_grid(grid), 1e-6)
+
+
+def test_a_design_of_too_many_models():
+    from aerotri.commands.predict import VolumeDesign, run_predict_volume
+
+    with pytest.raises(InputError, match=r"the area has .* models, 100000 at most"):
+        run_predict_volume(VolumeDesign(1.0, 1e12, 1e12, 100.0), False, 1, True)

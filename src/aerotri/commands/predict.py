@@ -12,7 +12,7 @@ from aerotri.conventions import InputError
 
 FILM_MM, FOCAL_MM = 230.0, 153.0
 """The wide-angle film camera of the theory, 60 % end lap."""
-SITE_PLACES = 41
+SITE_PLACES, MOST_MODELS = 41, 100_000
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,12 @@ def run_predict_volume(design: VolumeDesign, simulate: bool, seed: int, as_json:
 
     if min(design.height, design.length, design.width, design.bridging, design.sigma0_share) <= 0.0:
         raise InputError("sizes have to be positive", "give metres")
+    models = (design.length / design.base + 1.0) * (design.width / (2.0 * design.base) + 1.0)
+    if models > MOST_MODELS:
+        raise InputError(
+            f"the area has {models:.3g} models, {MOST_MODELS} at most are adjusted",
+            "make --length and --width smaller, or --height larger",
+        )
     p = predict_volume(design.height, design.length, design.width, design.bridging, design.sigma0_share, BASE_SHARE)
     rows = [
         ("span by span (Kubik, repaired)", p.spanwise), ("adjusted as a whole, same error model", p.joint),
