@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment.datum import FREEDOMS, nothing_holds, restore_datum
-from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
-from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.defects import checked_factor, point_without_rays_enough
+from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.prepare import build_system, prepare
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.solve import Solution, SolveOptions
-from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
-from aerotri.adjustment.unknowns import StartValues, State
+from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.adjustment.unknowns import StartValues
 from aerotri.adjustment.weak_geometry import minimise_tied
 from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block, transform_result
@@ -250,7 +250,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     system.refresh_motions(state)
     equations = system.assemble(state, 0.0, estimator)
     solution = Solution(saved.status, state, equations, estimator, saved.iterations)
-    factor = _factor(system, state, equations)
+    factor = _factor(system, solution)
     result = replace(summarise(system, solution, factor, saved.ray_status, saved.warnings), block=local)
     result = replace(result, parameters=with_removed(result.parameters, removals), removals=removals)
     if saved.components:
@@ -295,7 +295,7 @@ def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray 
         moved = restore_datum(system.unknowns, solution.state, state.points)
         system.refresh_motions(moved)
         solution = replace(solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator))
-    factor = _factor(system, solution.state, solution.equations)
+    factor = _factor(system, solution)
     solved = time.perf_counter()
     warnings = prepared.warnings + doubts(system, solution.state)
     result = summarise(system, solution, factor, prepared.ray_status, warnings)
@@ -315,22 +315,16 @@ def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray 
     return Adjustment(result, result, system, solution)
 
 
-def _factor(system: NormalSystem, state: State, equations: NormalEquations) -> Factor:
+def _factor(system: NormalSystem, solution: Solution) -> Factor:
     """The factor of the undamped equations; a defect ends the adjustment with the unknowns named.
 
     Raises
     ------
     AdjustmentFailedError
     """
-    try:
-        factor = system.factorise(equations)
-        if factor.smallest_pivot > SUSPECT_PIVOT:
-            return factor
-    except NotPositiveDefiniteError:
-        factor = None
-    defects = find_defects(system, state, equations)
-    if factor is None and not defects:
-        defects = ["the normal equations are singular"]
-    if defects:
+    equations = solution.equations
+    factor, defects = checked_factor(system, solution.state, equations, solution.estimator)
+    defects += point_without_rays_enough(system, equations)
+    if factor is None or defects:
         raise failure(system, "rank deficient", defects_in_words(system, defects))
-    return system.factorise(equations)
+    return factor

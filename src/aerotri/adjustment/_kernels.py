@@ -80,16 +80,17 @@ def assemble(
 ):
     """Reduced normal equations of points first..last, added to `sums`.
 
-    sums : diagonal (ni, 6, 6), pairs (no, 6, 6), border (ni, s, 6), corner (s, s), right (ni, 6), right_shared (s), of
-        the photographs and pairs this range of points touches; `offsets` are the numbers of the first of each. Of the
-        corner each element is added on one side of the diagonal, whichever.
+    sums : diagonal (ni, 6, 6), pairs (no, 6, 6), border (ni, s, 6), corner (s, s), right (ni, 6), right_shared (s),
+        squares (ni, 6) and squares_shared (s) of the columns before the points are eliminated, of the photographs and
+        pairs this range of points touches; `offsets` are the numbers of the first of each. Of the corner each element
+        is added on one side of the diagonal, whichever.
 
     Returns the cost, the part of the Newton decrement that belongs to the points, and the number of a point that its
     rays do not determine (−1 when all are).
     """
     start, image = rays[0], rays[1]
     pair_start, pair_block = pattern
-    diagonal, pairs, border, corner, right, right_shared = sums
+    diagonal, pairs, border, corner, right, right_shared, squares, squares_shared = sums
     first_image, first_pair = offsets
     by_eo, _, by_sh, whitened, columns, n_columns, union, _, couple, couple_shared, _, _ = work
     lower, misclosure = np.zeros((3, 3)), np.zeros(3)
@@ -110,6 +111,7 @@ def assemble(
             c0, c1, c2 = couple[q, 0], couple[q, 1], couple[q, 2]
             for a in range(E):
                 right[i, a] += e0[a] * whitened[q, 0] + e1[a] * whitened[q, 1] - c0[a] * y0 - c1[a] * y1 - c2[a] * y2
+                squares[i, a] += e0[a] * e0[a] + e1[a] * e1[a]
             add_rank_two(own, by_eo[q])
             subtract_rank_three(own, couple[q], couple[q])
             if n_union:
@@ -121,6 +123,7 @@ def assemble(
             for t in range(n_columns[q]):
                 column, s0, s1 = union[columns[q, t]], by_sh[q, 0, t], by_sh[q, 1, t]
                 right_shared[column] += s0 * whitened[q, 0] + s1 * whitened[q, 1]
+                squares_shared[column] += s0 * s0 + s1 * s1
                 for c in range(t + 1):
                     corner[column, union[columns[q, c]]] += s0 * by_sh[q, 0, c] + s1 * by_sh[q, 1, c]
         for t in range(n_union):

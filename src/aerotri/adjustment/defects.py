@@ -1,104 +1,97 @@
 """Rank defects by name: which unknowns the observations leave free.
 
-The null space of the reduced normal matrix is found by inverse iteration with a small regularisation; motions of the
-whole block are named first, what remains by the unknowns that take part in it.
+Three looks, none of which hangs on rounding. The motions of the whole block are held against every observation that
+could notice one. The factor's smallest eigenvalue is estimated; where it is suspect, the weak directions are measured
+by the design matrix. Motions of the whole block are named first, what remains by the unknowns that take part in it.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from aerotri.adjustment.datum import FREEDOMS, motions_of_images
+from aerotri.adjustment.block_motions import FreeOfObservations, unnoticed_motions
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
-from aerotri.adjustment.sparse_cholesky import BorderedMatrix, NotPositiveDefiniteError
+from aerotri.adjustment.null_space import SUSPECT, free_directions, smallest_eigenvalue
+from aerotri.adjustment.robust import Estimator
+from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import State
 
-REGULARISATION = 1e-8
-NULL_EIGENVALUE = 2e-11
-SUSPECT_PIVOT = 1e-11
-"""Pivot (relative to a unit diagonal) below which a defect is looked for."""
-SUBSPACE = 14
+SHOWN = 6
+"""Names listed in one sentence."""
 
 
-def find_defects(system: NormalSystem, state: State, equations: NormalEquations) -> list[str]:
-    """Sentences naming what is free; empty where the matrix has full rank."""
-    dead = _dead_columns(system, equations.matrix)
+def checked_factor(
+    system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, factor: Factor | None = None,
+    suspect: bool | None = None,
+) -> tuple[Factor | None, list[str]]:  # fmt: skip
+    """The factor of the equations and sentences naming what is free: none where the matrix has full rank.
+
+    Parameters
+    ----------
+    equations : undamped, at `state`. factor : of them, where there is one already.
+    suspect : what `is_suspect` says of the factor, where it was asked already.
+
+    Returns
+    -------
+    The factor, valid until the next one, None where there is a defect; and the sentences.
+    """
+    dead = _dead_columns(system, equations)
     if dead:
-        return [f"no ray depends on {', '.join(dead[:6])}" + (f" and {len(dead) - 6} more" if len(dead) > 6 else "")]
-    scale, vectors = _null_space(system, equations.matrix)
-    if vectors.shape[1] == 0:
+        return None, [f"no ray depends on {_listed(dead)}"]
+    factor = factor or _factor(system, equations)
+    motions = unnoticed_motions(system, state, equations.diagonal)
+    if suspect is None:
+        suspect = factor is None or is_suspect(factor, equations)
+    if factor is not None and not motions.count and not suspect:
+        return factor, []
+    free = free_directions(system, state, equations, estimator, motions.directions)
+    sentences = _named(system, equations, motions, free)
+    factor = None if sentences else _factor(system, equations)
+    return factor, sentences if factor or sentences else ["the normal equations are singular"]
+
+
+def _factor(system: NormalSystem, equations: NormalEquations) -> Factor | None:
+    try:
+        return system.factorise(equations)
+    except NotPositiveDefiniteError:
+        return None
+
+
+def is_suspect(factor: Factor, equations: NormalEquations) -> bool:
+    """Whether the factor alone leaves open that something is free."""
+    return smallest_eigenvalue(factor, equations.diagonal) < SUSPECT
+
+
+def point_without_rays_enough(system: NormalSystem, equations: NormalEquations) -> list[str]:
+    """A sentence on a point that its own rays do not fix, with the photographs held; empty where there is none."""
+    row, u = equations.undetermined, system.unknowns
+    rays = slice(u.rays.start[row], u.rays.start[row + 1]) if row >= 0 else slice(0)
+    if not (u.rays.inv_sigma[rays] > 0.0).any():
         return []
-    sentences, rest = _name_motions(system, state, scale, vectors)
-    for vector in rest.T:
+    return [f"not determined: point {u.block.points[u.points[row]]}, whose rays are parallel or one"]
+
+
+def _dead_columns(system: NormalSystem, equations: NormalEquations) -> list[str]:
+    return [system.unknowns.name_of(int(k)) for k in np.flatnonzero(~(equations.diagonal > 0.0))]
+
+
+def _listed(names: list[str]) -> str:
+    more = len(names) - SHOWN
+    return ", ".join(names[:SHOWN]) + (f" and {more} more" if more > 0 else "")
+
+
+def _named(
+    system: NormalSystem, equations: NormalEquations, motions: FreeOfObservations, vectors: np.ndarray
+) -> list[str]:
+    """Sentences for the motions of the whole block, and for what else is in the null space."""
+    sentences = [f"the datum is free in {', '.join(motions.names)}"] if motions.names else []
+    moved = np.linalg.qr(motions.directions * np.sqrt(equations.diagonal)[:, None])[0]
+    left, size, _ = np.linalg.svd(vectors - moved @ (moved.T @ vectors), full_matrices=False)
+    rest = left[:, size > 0.5]
+    for vector in rest.T[:SHOWN]:
         part = np.abs(vector) / np.abs(vector).max()
         members = [system.unknowns.name_of(int(k)) for k in np.argsort(-part)[:4] if part[k] > 0.3]
         sentences.append("not determined: " + ", ".join(members))
+    if rest.shape[1] > SHOWN:
+        sentences.append(f"{rest.shape[1] - SHOWN} more directions are not determined")
     return sentences
-
-
-def _dead_columns(system: NormalSystem, matrix: BorderedMatrix) -> list[str]:
-    n = len(system.unknowns.images)
-    diagonal = np.concatenate([np.diagonal(matrix.blocks[:n], axis1=1, axis2=2).ravel(), np.diagonal(matrix.corner)])
-    return [system.unknowns.name_of(int(k)) for k in np.flatnonzero(~(diagonal > 0.0))]
-
-
-def _null_space(system: NormalSystem, matrix: BorderedMatrix) -> tuple[np.ndarray, np.ndarray]:
-    """Square roots of the diagonal, and the null vectors (size, k) of the matrix scaled by them."""
-    n = len(system.unknowns.images)
-    blocks, corner = matrix.blocks.copy(), matrix.corner.copy()
-    diagonal = np.arange(6)
-    scale = np.sqrt(np.concatenate([blocks[:n, diagonal, diagonal].ravel(), np.diagonal(corner)]))
-    blocks[:n, diagonal, diagonal] *= 1.0 + REGULARISATION
-    corner[np.diag_indices_from(corner)] *= 1.0 + REGULARISATION
-    try:
-        factor = system.symbolic.factorise(BorderedMatrix(blocks, matrix.border, corner))
-    except NotPositiveDefiniteError:
-        return scale, np.zeros((len(scale), 0))
-    rng = np.random.default_rng(0)
-    basis = np.linalg.qr(rng.normal(size=(len(scale), min(SUBSPACE, len(scale)))))[0]
-    for _ in range(4):
-        basis = np.linalg.qr(scale[:, None] * factor.solve(scale[:, None] * basis))[0]
-    image = scale[:, None] * factor.solve(scale[:, None] * basis)
-    eigenvalue, turn = np.linalg.eigh(basis.T @ image)
-    return scale, (basis @ turn)[:, 1.0 / eigenvalue - REGULARISATION < NULL_EIGENVALUE]
-
-
-def _name_motions(system, state, scale, vectors) -> tuple[list[str], np.ndarray]:
-    """The motions of the whole block within the null space, and what is left of it."""
-    n = len(state.centre)
-    motions = np.zeros((len(scale), 7))
-    motions[: 6 * n] = motions_of_images(state.centre).reshape(6 * n, 7)
-    _add_shifts(system, motions, 6 * n)
-    motions *= scale[:, None]
-    motions /= np.linalg.norm(motions, axis=0)
-    inside = np.linalg.norm(vectors.T @ motions, axis=0) > 0.999
-    free = [name for name, free in zip(FREEDOMS, inside, strict=True) if free]
-    mixed, combinations = _mixed_motions(motions, inside, vectors)
-    free += mixed
-    if not free:
-        return [], vectors
-    named = np.linalg.qr(np.hstack([motions[:, inside], combinations]))[0]
-    left, size, _ = np.linalg.svd(vectors - named @ (named.T @ vectors), full_matrices=False)
-    return [f"the datum is free in {', '.join(free)}"], left[:, size > 0.5]
-
-
-def _mixed_motions(motions, inside, vectors) -> tuple[list[str], np.ndarray]:
-    """Motions of the whole block that are none of the seven alone, such as a rotation about two control points."""
-    pure = np.linalg.qr(motions[:, inside])[0] if inside.any() else motions[:, :0]
-    span, scale, mix = np.linalg.svd(motions - pure @ (pure.T @ motions), full_matrices=False)
-    span, mix = span[:, scale > 1e-8], mix[scale > 1e-8] / scale[scale > 1e-8, None]
-    left, cosine, _ = np.linalg.svd(span.T @ vectors, full_matrices=False)
-    shared = left[:, cosine > 0.999]
-    weight = np.abs(mix.T @ shared)
-    names = [
-        "a combination of " + " and ".join(f for f, w in zip(FREEDOMS, column / column.max(), strict=True) if w > 0.05)
-        for column in weight.T
-    ]
-    return names, span @ shared
-
-
-def _add_shifts(system: NormalSystem, motions: np.ndarray, first: int) -> None:
-    """A translation of the block takes the GNSS shifts along."""
-    for column, name in enumerate(system.unknowns.shared.names):
-        if name.startswith("gnss.shift_"):
-            motions[first + column, "XYZ".index(name[-1])] = 1.0

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from aerotri.adjustment import _covariance_kernels, _kernels, _point_kernels
+from aerotri.adjustment.chunk_sums import ChunkSums, add_gaps, add_own_squares, add_squares
 from aerotri.adjustment.datum import free_motions
 from aerotri.adjustment.field_prior import FieldPrior, field_prior
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
@@ -52,55 +53,16 @@ class RightSide:
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations(RightSide):
-    """The reduced normal equations at a state; matrix : of photographs and shared parameters."""
+    """The reduced normal equations at a state.
+
+    Parameters
+    ----------
+    matrix : of photographs and shared parameters.
+    diagonal : (6·n + s,) of the same unknowns before the points are eliminated: what rounding is measured against.
+    """
 
     matrix: BorderedMatrix
-
-
-class _ChunkSums:
-    """Sums of one chunk of points, over the photographs and pairs that it touches and no others."""
-
-    def __init__(self, unknowns: Unknowns, first: int, last: int, n_shared: int):
-        image = unknowns.rays.image[unknowns.rays.start[first] : unknowns.rays.start[last]]
-        pair = unknowns.pair_block[unknowns.pair_start[first] : unknowns.pair_start[last]]
-        self._images = slice(int(image.min()), int(image.max()) + 1)
-        n = len(unknowns.images)
-        self._pairs = slice(int(pair.min()), int(pair.max()) + 1) if len(pair) else slice(n, n)
-        n_images, n_pairs = self._images.stop - self._images.start, self._pairs.stop - self._pairs.start
-        self.offsets = (self._images.start, self._pairs.start)
-        self._arrays = (
-            np.empty((n_images, 6, 6)),
-            np.empty((n_pairs, 6, 6)),
-            np.empty((n_images, n_shared, 6)),
-            np.empty((n_shared, n_shared)),
-            np.empty((n_images, 6)),
-            np.empty(n_shared),
-        )
-
-    def cleared(self) -> tuple[np.ndarray, ...]:
-        """The arrays, set to zero."""
-        for array in self._arrays:
-            array.fill(0.0)
-        return self._arrays
-
-    def cleared_right(self) -> tuple[np.ndarray, ...]:
-        """The arrays of the right side, set to zero."""
-        for array in self._arrays[4:]:
-            array.fill(0.0)
-        return self._arrays[4:]
-
-    def add_matrix_to(self, blocks, border, corner) -> None:
-        """Add to the matrix of all chunks."""
-        diagonal, pairs, own_border, own_corner, _, _ = self._arrays
-        blocks[self._images] += diagonal
-        blocks[self._pairs] += pairs
-        border[self._images] += own_border
-        corner += own_corner
-
-    def add_right_to(self, right, right_shared) -> None:
-        """Add to the right side of all chunks."""
-        right[self._images] += self._arrays[4]
-        right_shared += self._arrays[5]
+    diagonal: np.ndarray
 
 
 class NormalSystem:
@@ -120,7 +82,7 @@ class NormalSystem:
         self._max_rays = int(counts.max(initial=1))
         n, s = len(unknowns.images), len(unknowns.shared)
         self.symbolic = Symbolic(n, unknowns.block_row, unknowns.block_col, position, s)
-        self._sums = [_ChunkSums(unknowns, first, last, s) for first, last in self._bounds]
+        self._sums = [ChunkSums(unknowns, first, last, s) for first, last in self._bounds]
         sigma = np.array(unknowns.shared.sigma).reshape(-1)
         self._prior_weight = np.where(np.isfinite(sigma), 1.0 / sigma**2, 0.0)
         self._prior_value = np.array(unknowns.shared.observed).reshape(-1)
@@ -194,22 +156,27 @@ class NormalSystem:
         outcomes = run_chunks(chunk, len(self._bounds))
         n, s = len(u.images), len(u.shared)
         blocks, border, corner = np.zeros((len(u.block_row), 6, 6)), np.zeros((n, s, 6)), np.zeros((s, s))
+        squares, squares_shared = np.zeros((n, 6)), np.array(self._prior_weight)
         for sums in self._sums:
             sums.add_matrix_to(blocks, border, corner)
+            sums.add_squares_to(squares, squares_shared)
         corner = corner + corner.T - np.diag(np.diagonal(corner))
         rows = self.whitened_rows(state)
         for observed in rows:
-            _add_squares(observed, blocks, border, corner)
+            add_squares(observed, blocks, border, corner)
+            add_own_squares(observed, squares, squares_shared)
         corner[np.diag_indices_from(corner)] += self._prior_weight
         for field in self._fields:
             corner[field.columns, field.columns] += field.weight
+            squares_shared[field.columns] += np.diagonal(field.weight)
         held_image, held_column = np.nonzero(~u.eo_free)
-        blocks[held_image, held_column, held_column] = 1.0
+        blocks[held_image, held_column, held_column] = squares[held_image, held_column] = 1.0
         diagonal = np.arange(6)
         blocks[: len(u.images), diagonal, diagonal] *= 1.0 + damping
         corner[np.diag_indices_from(corner)] *= 1.0 + damping
         side = self._summed(state, rows, outcomes, residual, weight)
-        return NormalEquations(**side.__dict__, matrix=BorderedMatrix(blocks, border, corner))
+        whole = np.concatenate([squares.ravel(), squares_shared]) * (1.0 + damping)
+        return NormalEquations(**side.__dict__, matrix=BorderedMatrix(blocks, border, corner), diagonal=whole)
 
     def right_side(self, state: State, estimator: Estimator) -> RightSide:
         """The right side of the undamped equations at `state` and the cost there: a third of the work of `assemble`."""
@@ -235,7 +202,7 @@ class NormalSystem:
         for sums in self._sums:
             sums.add_right_to(right, right_shared)
         for observed in rows:
-            _add_gaps(observed, right, right_shared)
+            add_gaps(observed, right, right_shared)
         gap = self._prior_value - state.shared
         right_shared += self._prior_weight * gap
         cost = sum(o[0] for o in outcomes) + sum(float(np.sum(observed.gap**2)) for observed in rows)
@@ -272,6 +239,27 @@ class NormalSystem:
                 )
             )
         return out
+
+    def products_beside(self, state: State, images: np.ndarray, shared: np.ndarray) -> np.ndarray:
+        """VᵀAᵀA·V (k, k) of directions over all observations but image points, and over what is held.
+
+        Parameters
+        ----------
+        images : (n, 6, k), shared : (s, k) the directions.
+        """
+        held = images[~self.unknowns.eo_free]
+        total = held.T @ held + shared.T @ (self._prior_weight[:, None] * shared)
+        for rows in self.whitened_rows(state):
+            value = np.zeros((*rows.gap.shape, shared.shape[1]))
+            own = rows.image >= 0
+            value[own] = rows.by_image[own] @ images[rows.image[own]]
+            for c in range(rows.columns.shape[1]):
+                there = rows.columns[:, c] >= 0
+                value[there] += rows.by_shared[there, :, c, None] * shared[rows.columns[there, c]][:, None, :]
+            total += np.einsum("gka,gkb->ab", value, value)
+        for field in self._fields:
+            total += shared[field.columns].T @ field.weight @ shared[field.columns]
+        return total
 
     def refresh_motions(self, state: State) -> None:
         """Linearise anew, at `state`, what the observations leave free of a block in a minimal or inner datum."""
@@ -440,26 +428,3 @@ class NormalSystem:
         points *= u.point_free[:, :, None]
         points[u.kept_rows] = shared[u.kept_columns]
         return points
-
-
-def _add_squares(rows: Rows, blocks: np.ndarray, border: np.ndarray, corner: np.ndarray) -> None:
-    """Add whitened observations beside the image points to the matrix."""
-    image, own = rows.image, rows.image >= 0
-    np.add.at(blocks, image[own], np.einsum("gka,gkb->gab", rows.by_image[own], rows.by_image[own]))
-    for c in range(rows.columns.shape[1]):
-        column, there, value = rows.columns[:, c], rows.columns[:, c] >= 0, rows.by_shared[:, :, c]
-        both = there & own
-        np.add.at(border, (image[both], column[both]), np.einsum("gka,gk->ga", rows.by_image[both], value[both]))
-        for d in range(rows.columns.shape[1]):
-            pair = there & (rows.columns[:, d] >= 0)
-            product = np.sum(value[pair] * rows.by_shared[pair, :, d], axis=1)
-            np.add.at(corner, (column[pair], rows.columns[pair, d]), product)
-
-
-def _add_gaps(rows: Rows, right: np.ndarray, right_shared: np.ndarray) -> None:
-    """Add whitened observations beside the image points to the right side."""
-    own = rows.image >= 0
-    np.add.at(right, rows.image[own], np.einsum("gka,gk->ga", rows.by_image[own], rows.gap[own]))
-    for c in range(rows.columns.shape[1]):
-        column, there = rows.columns[:, c], rows.columns[:, c] >= 0
-        np.add.at(right_shared, column[there], np.sum(rows.by_shared[there, :, c] * rows.gap[there], axis=1))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment.datum import without_motion
-from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
+from aerotri.adjustment.defects import checked_factor, is_suspect
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem, RightSide
 from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for, normalised_lengths
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
@@ -29,6 +29,8 @@ FIRST_DAMPING, LAST_DAMPING, NO_DAMPING = 1e-5, 1e12, 1e-11
 MAX_SCALE_CHANGES = 20
 LEAST_RATIO, LONGEST_STRETCH = 0.5, 5.0
 SLOWEST_CONTRACTION = 1e-2
+SUSPECT_PIVOT = 1e-11
+"""Pivot (relative to a unit diagonal) below which a factor serves for one step only."""
 
 Report = Callable[[int, float, float], None]
 Inspect = Callable[[NormalSystem, State, NormalEquations, Estimator, int, bool], bool]
@@ -117,9 +119,10 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
         iteration += 1
         step = _step(system, state, equations, estimator, damping.value)
         if iteration == 1:
-            refused = _refused(system, state, equations, estimator, options, step is None or step.is_suspect)
+            refused, factor = _refused(system, state, equations, estimator, options, step)
             if refused is not None:
                 return replace(refused, costs=tuple(costs))
+            step = replace(step, factor=factor) if step and factor else step
         if _in_curved_valley(equations, step, damping, redundancy, stage, costs):
             return Solution("converged", state, equations, estimator, iteration - 1, tuple(costs))
         step, damping = _until_better(system, state, equations, estimator, step, damping)
@@ -159,13 +162,24 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
 
 def _refused(
     system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, options: SolveOptions,
-    suspect: bool,
-) -> Solution | None:  # fmt: skip
-    """What ends an adjustment before its first step: what it was asked for, or a rank defect; None where nothing."""
+    step: _Trial | None,
+) -> tuple[Solution | None, Factor | None]:  # fmt: skip
+    """What ends an adjustment before its first step: what it was asked for, or a rank defect; None where nothing.
+
+    Returns
+    -------
+    The solution that ends it, and the factor of the equations, valid until the next one.
+    """
+    factor = step.factor if step is not None else None
+    suspect = factor is None or is_suspect(factor, equations)
     if options.inspect is not None and options.inspect(system, state, equations, estimator, 0, suspect):
-        return Solution(INTERRUPTED, state, equations, estimator, 0)
-    defects = find_defects(system, state, equations) if suspect else []
-    return Solution("rank deficient", state, equations, estimator, 0, (), tuple(defects)) if defects else None
+        return Solution(INTERRUPTED, state, equations, estimator, 0), None
+    # who inspects something suspect factorises
+    known = None if suspect else factor
+    factor, defects = checked_factor(system, state, equations, estimator, known, suspect)
+    if defects:
+        return Solution("rank deficient", state, equations, estimator, 0, (), tuple(defects)), None
+    return None, factor
 
 
 @dataclass(frozen=True)

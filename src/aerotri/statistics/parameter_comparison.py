@@ -21,11 +21,11 @@ import numpy as np
 from scipy.stats import chi2
 
 from aerotri.adjustment.carry_over import start_values_at, with_shared
-from aerotri.adjustment.defects import SUSPECT_PIVOT, find_defects
+from aerotri.adjustment.defects import checked_factor
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.prepare import Prepared, build_system
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
-from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
+from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.unknowns import State, Unknowns
 from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import format_parameters
@@ -176,15 +176,9 @@ def _outcome(
     if solution.defects:
         return _failed(choice, f"rank deficient: {'; '.join(solution.defects)}"), None
     system, solution = with_estimated_fields(system, solution, options)
-    try:
-        factor = system.factorise(solution.equations)
-    except NotPositiveDefiniteError:
-        return _failed(choice, "rank deficient"), None
-    if factor.smallest_pivot < SUSPECT_PIVOT:
-        defects = find_defects(system, solution.state, solution.equations)
-        if defects:
-            return _failed(choice, f"rank deficient: {'; '.join(defects)}"), None
-        factor = system.factorise(solution.equations)
+    factor, defects = checked_factor(system, solution.state, solution.equations, solution.estimator)
+    if factor is None:
+        return _failed(choice, f"rank deficient: {'; '.join(defects)}"), None
     where = system.unknowns, solution.state
     if solution.status != "converged":
         return _failed(choice, solution.status), None

@@ -1,0 +1,197 @@
+"""Motions of the whole block that nothing notices: held against every observation that could, whatever the factor says.
+
+A block may be moved, turned and scaled without changing a ray; only control, GNSS, INS, conditions and held values can
+notice it. Their rows times the seven motions are a small matrix, and its null space is what the datum leaves free, a
+rotation about two control points as well as a plain shift.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.sparse import csr_array, vstack
+
+from aerotri.adjustment.datum import FOLLOWING, FREEDOMS, motions_of_images, motions_of_points
+from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
+from aerotri.adjustment.null_space import NOT_DETERMINED
+from aerotri.adjustment.unknowns import State, Unknowns
+from aerotri.functional_model.observed_unknowns import Rows
+
+WEAK = 1e-8
+"""Square of the effect, relative to the motion's size, below which a motion is measured anew without squaring."""
+REAL = 1e-6
+"""Share of the largest motion below which only what follows moves, not the block."""
+ALONE = 0.999
+"""Cosine with the free space from which a motion is free on its own."""
+PART = 0.05
+"""Share of a combination below which a motion is not named in it."""
+
+
+@dataclass(frozen=True, eq=False)
+class FreeOfObservations:
+    """Motions of the whole block that nothing notices.
+
+    Parameters
+    ----------
+    names : of the free motions and of combinations of them. directions : (size, d) of the reduced unknowns.
+    """
+
+    names: tuple[str, ...]
+    directions: np.ndarray
+
+    @property
+    def count(self) -> int:
+        return self.directions.shape[1]
+
+
+@dataclass(frozen=True, eq=False)
+class _Motions:
+    """The seven motions about the middle of the block: of photographs (n, 6, 7), points (P, 3, 7), shared (s, 7).
+
+    place : (s,) column of a shared parameter that may follow, after the seven motions; −1 of the others.
+    seen : (P,), active : (n,) bool, with a ray or, of points, a condition.
+    """
+
+    images: np.ndarray
+    points: np.ndarray
+    shared: np.ndarray
+    place: np.ndarray
+    seen: np.ndarray
+    active: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """Motions and what may follow them."""
+        return 7 + int((self.place >= 0).sum())
+
+
+def unnoticed_motions(system: NormalSystem, state: State, diagonal: np.ndarray) -> FreeOfObservations:
+    """What is free of the seven motions and their combinations, shifts and the like following as they may.
+
+    The measure is that of `null_space`, over the seven motions alone.
+
+    Parameters
+    ----------
+    diagonal : (size,) of the normal matrix before the points are eliminated.
+    """
+    motions = _motions(system.unknowns, state)
+    directions = _directions(motions, len(diagonal))
+    size = _size(motions, directions, diagonal)
+    unit = 1.0 / np.sqrt(np.maximum(np.diagonal(size), 1e-300))
+    size, rows = size * np.outer(unit, unit), _rows(system, state, motions) * unit[None, :]
+    weak = eigh((rows.T @ rows).toarray(), size, subset_by_value=(-np.inf, WEAK))[1]
+    # a second time over the weak ones alone: squares of small numbers, none of them a difference of large ones
+    effect = rows @ weak
+    value, turn = eigh(effect.T @ effect, weak.T @ size @ weak) if weak.shape[1] else (np.zeros(0), np.zeros((0, 0)))
+    names, free = _named(weak @ turn[:, value < NOT_DETERMINED])
+    return FreeOfObservations(names, directions @ (free * unit[:, None]))
+
+
+def _motions(u: Unknowns, state: State) -> _Motions:
+    used = (u.rays.inv_sigma > 0.0).any(axis=1)
+    seen = (np.add.reduceat(used, u.rays.start[:-1], dtype=np.int64) > 0) | (u.kept >= 0)
+    active = np.bincount(u.rays.image[used], minlength=len(u.images)) > 0
+    middle = state.points[seen].mean(axis=0) if seen.any() else np.zeros(3)
+    points, images = motions_of_points(state.points - middle), motions_of_images(state.centre - middle)
+    images[~active] = 0.0
+    shared = np.zeros((len(u.shared), 7))
+    shared[u.kept_columns] = points[u.kept_rows]
+    follows = np.isin(np.array(u.shared.kinds, dtype=object), FOLLOWING)
+    place = np.where(follows, 6 + np.cumsum(follows), -1)
+    images[:, 3:] = np.linalg.solve(u.turn(state), images[:, 3:])
+    return _Motions(images, points, shared, place, seen, active)
+
+
+def _directions(motions: _Motions, size: int) -> np.ndarray:
+    """(size, 7 + a) the motions and what may follow, over the reduced unknowns."""
+    n = 6 * len(motions.images)
+    directions = np.zeros((size, motions.count))
+    directions[:n, :7], directions[n:, :7] = motions.images.reshape(n, 7), motions.shared
+    follows = np.flatnonzero(motions.place >= 0)
+    directions[n + follows, motions.place[follows]] = 1.0
+    return directions
+
+
+def _size(motions: _Motions, directions: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
+    """(7 + a, 7 + a) products of the motions in units of the columns' lengths.
+
+    Points enter with the mean length: a ray's partials by the point are those by the centre with the sign changed.
+    """
+    size = directions.T @ (diagonal[:, None] * directions)
+    moved = motions.points[motions.seen].reshape(-1, 7)
+    per_image = diagonal[: 6 * len(motions.images)].reshape(-1, 6)[motions.active, :3]
+    size[:7, :7] += moved.T @ moved * (per_image.sum() / max(len(moved), 1))
+    return size
+
+
+def _rows(system: NormalSystem, state: State, motions: _Motions) -> csr_array:
+    """(·, 7 + a) whitened effect of the motions and of what may follow on every observation that could notice it."""
+    u = system.unknowns
+    parts = [_beside(rows, motions, u.turn(state)) for extra in system.extras for rows in [_of(extra, state)]]
+    observed = np.flatnonzero((motions.place >= 0) & np.isfinite(u.shared.sigma))
+    of_follower = np.zeros((len(observed), motions.count))
+    of_follower[np.arange(len(observed)), motions.place[observed]] = 1.0 / np.array(u.shared.sigma)[observed]
+    parts.append(csr_array(of_follower))
+    weight = np.sqrt(u.prior_weight) * motions.seen[:, None]
+    known, held = weight > 0.0, u.point_held & motions.seen[:, None]
+    # a held value notices as much as the best observation
+    best = max([float(weight.max(initial=0.0))] + [float(abs(part).max()) for part in parts if part.nnz]) or 1.0
+    moved = [
+        weight[known][:, None] * motions.points[known],
+        best * motions.points[held],
+        best * motions.images[~u.eo_free & motions.active[:, None]],
+    ]
+    of_motions = np.concatenate(moved)
+    beside = np.zeros((len(of_motions), motions.count - 7))
+    return csr_array(vstack([*parts, csr_array(np.hstack([of_motions, beside]))]))
+
+
+def _of(extra: ExtraObservations, state: State) -> Rows:
+    return extra.rows(state.centre, state.rotation, state.shared)
+
+
+def _beside(rows: Rows, motions: _Motions, turn: np.ndarray) -> csr_array:
+    """The rows of observations beside image points and control."""
+    own = rows.image >= 0
+    effect = np.zeros((*rows.gap.shape, 7))
+    by_image = rows.by_image[own].copy()
+    by_image[:, :, 3:] = by_image[:, :, 3:] @ turn[rows.image[own]]
+    effect[own] = by_image @ motions.images[rows.image[own]]
+    row = np.arange(rows.gap.size).reshape(rows.gap.shape)
+    places, values = [], []
+    for c in range(rows.columns.shape[1]):
+        there = rows.columns[:, c] >= 0
+        column = rows.columns[there, c]
+        effect[there] += rows.by_shared[there, :, c, None] * motions.shared[column][:, None, :]
+        place = np.broadcast_to(motions.place[column][:, None], row[there].shape)
+        follows = place >= 0
+        places.append(np.stack([row[there][follows], place[follows]]))
+        values.append((rows.by_shared[there, :, c] * rows.inv_sigma[there])[follows])
+    places.append(np.stack([np.repeat(row.ravel(), 7), np.tile(np.arange(7), row.size)]))
+    values.append((effect * rows.inv_sigma[:, :, None]).ravel())
+    all_rows = csr_array((np.concatenate(values), tuple(np.concatenate(places, axis=1))), (row.size, motions.count))
+    # a photograph without rays of its own goes where its observation wants it
+    takes_part = ~own
+    takes_part[own] = motions.active[rows.image[own]]
+    return csr_array(all_rows[np.flatnonzero((rows.inv_sigma > 0.0) & takes_part[:, None])])
+
+
+def _named(free: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names of the motions within the span of `free` (7 + a, d), and the part of it that moves the block (7 + a, r).
+
+    A combination of motions, such as a rotation about two control points, follows the motions free on their own.
+    """
+    left, scale, right = np.linalg.svd(free[:7], full_matrices=False)
+    real = scale > REAL * scale.max(initial=0.0)
+    span, moving = left[:, real], free @ (right[real].T / scale[real])
+    alone = np.linalg.norm(span, axis=1) > ALONE
+    mixed = span.copy()
+    mixed[alone] = 0.0
+    combinations, size, _ = np.linalg.svd(mixed, full_matrices=False)
+    names = [name for name, free_alone in zip(FREEDOMS, alone, strict=True) if free_alone]
+    for column in np.abs(combinations[:, size > 0.5]).T:
+        parts = [name for name, share in zip(FREEDOMS, column / column.max(), strict=True) if share > PART]
+        names.append("a combination of " + " and ".join(parts))
+    return tuple(names), moving

@@ -1,0 +1,93 @@
+"""What the reduced normal equations are added up from: chunks of points, and observations beside the image points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerotri.adjustment.unknowns import Unknowns
+from aerotri.functional_model.observed_unknowns import Rows
+
+
+class ChunkSums:
+    """Sums of one chunk of points, over the photographs and pairs that it touches and no others."""
+
+    def __init__(self, unknowns: Unknowns, first: int, last: int, n_shared: int):
+        image = unknowns.rays.image[unknowns.rays.start[first] : unknowns.rays.start[last]]
+        pair = unknowns.pair_block[unknowns.pair_start[first] : unknowns.pair_start[last]]
+        self._images = slice(int(image.min()), int(image.max()) + 1)
+        n = len(unknowns.images)
+        self._pairs = slice(int(pair.min()), int(pair.max()) + 1) if len(pair) else slice(n, n)
+        n_images, n_pairs = self._images.stop - self._images.start, self._pairs.stop - self._pairs.start
+        self.offsets = (self._images.start, self._pairs.start)
+        self._arrays = (
+            np.empty((n_images, 6, 6)),
+            np.empty((n_pairs, 6, 6)),
+            np.empty((n_images, n_shared, 6)),
+            np.empty((n_shared, n_shared)),
+            np.empty((n_images, 6)),
+            np.empty(n_shared),
+            np.empty((n_images, 6)),
+            np.empty(n_shared),
+        )
+
+    def cleared(self) -> tuple[np.ndarray, ...]:
+        """The arrays, set to zero."""
+        for array in self._arrays:
+            array.fill(0.0)
+        return self._arrays
+
+    def cleared_right(self) -> tuple[np.ndarray, ...]:
+        """The arrays of the right side, set to zero."""
+        for array in self._arrays[4:6]:
+            array.fill(0.0)
+        return self._arrays[4:6]
+
+    def add_matrix_to(self, blocks, border, corner) -> None:
+        """Add to the matrix of all chunks."""
+        diagonal, pairs, own_border, own_corner = self._arrays[:4]
+        blocks[self._images] += diagonal
+        blocks[self._pairs] += pairs
+        border[self._images] += own_border
+        corner += own_corner
+
+    def add_squares_to(self, squares, squares_shared) -> None:
+        """Add to the squares of the columns, before points are eliminated, of all chunks."""
+        squares[self._images] += self._arrays[6]
+        squares_shared += self._arrays[7]
+
+    def add_right_to(self, right, right_shared) -> None:
+        """Add to the right side of all chunks."""
+        right[self._images] += self._arrays[4]
+        right_shared += self._arrays[5]
+
+
+def add_squares(rows: Rows, blocks: np.ndarray, border: np.ndarray, corner: np.ndarray) -> None:
+    """Add whitened observations beside the image points to the matrix."""
+    image, own = rows.image, rows.image >= 0
+    np.add.at(blocks, image[own], np.einsum("gka,gkb->gab", rows.by_image[own], rows.by_image[own]))
+    for c in range(rows.columns.shape[1]):
+        column, there, value = rows.columns[:, c], rows.columns[:, c] >= 0, rows.by_shared[:, :, c]
+        both = there & own
+        np.add.at(border, (image[both], column[both]), np.einsum("gka,gk->ga", rows.by_image[both], value[both]))
+        for d in range(rows.columns.shape[1]):
+            pair = there & (rows.columns[:, d] >= 0)
+            product = np.sum(value[pair] * rows.by_shared[pair, :, d], axis=1)
+            np.add.at(corner, (column[pair], rows.columns[pair, d]), product)
+
+
+def add_gaps(rows: Rows, right: np.ndarray, right_shared: np.ndarray) -> None:
+    """Add whitened observations beside the image points to the right side."""
+    own = rows.image >= 0
+    np.add.at(right, rows.image[own], np.einsum("gka,gk->ga", rows.by_image[own], rows.gap[own]))
+    for c in range(rows.columns.shape[1]):
+        column, there = rows.columns[:, c], rows.columns[:, c] >= 0
+        np.add.at(right_shared, column[there], np.sum(rows.by_shared[there, :, c] * rows.gap[there], axis=1))
+
+
+def add_own_squares(rows: Rows, squares: np.ndarray, squares_shared: np.ndarray) -> None:
+    """Add the squared columns of whitened observations beside the image points: (n, 6) and (s,)."""
+    own = rows.image >= 0
+    np.add.at(squares, rows.image[own], np.sum(rows.by_image[own] ** 2, axis=1))
+    for c in range(rows.columns.shape[1]):
+        there = rows.columns[:, c] >= 0
+        np.add.at(squares_shared, rows.columns[there, c], np.sum(rows.by_shared[there, :, c] ** 2, axis=1))
