@@ -80,7 +80,7 @@ def unnoticed_motions(system: NormalSystem, state: State, diagonal: np.ndarray) 
     directions = _directions(motions, len(diagonal))
     size = _size(motions, directions, diagonal)
     unit = 1.0 / np.sqrt(np.maximum(np.diagonal(size), 1e-300))
-    size, rows = size * np.outer(unit, unit), _rows(system, state, motions) * unit[None, :]
+    size, rows = size * np.outer(unit, unit), _rows(system, state, motions, diagonal) * unit[None, :]
     weak = eigh((rows.T @ rows).toarray(), size, subset_by_value=(-np.inf, WEAK))[1]
     # a second time over the weak ones alone: squares of small numbers, none of them a difference of large ones
     effect = rows @ weak
@@ -126,7 +126,7 @@ def _size(motions: _Motions, directions: np.ndarray, diagonal: np.ndarray) -> np
     return size
 
 
-def _rows(system: NormalSystem, state: State, motions: _Motions) -> csr_array:
+def _rows(system: NormalSystem, state: State, motions: _Motions, diagonal: np.ndarray) -> csr_array:
     """(·, 7 + a) whitened effect of the motions and of what may follow on every observation that could notice it."""
     u = system.unknowns
     parts = [_beside(rows, motions, u.turn(state)) for extra in system.extras for rows in [_of(extra, state)]]
@@ -136,12 +136,14 @@ def _rows(system: NormalSystem, state: State, motions: _Motions) -> csr_array:
     parts.append(csr_array(of_follower))
     weight = np.sqrt(u.prior_weight) * motions.seen[:, None]
     known, held = weight > 0.0, u.point_held & motions.seen[:, None]
-    # a held value notices as much as the best observation
-    best = max([float(weight.max(initial=0.0))] + [float(abs(part).max()) for part in parts if part.nnz]) or 1.0
+    # a held value notices as much as all the rays of a photograph
+    squares = diagonal[: u.eo_free.size].reshape(u.eo_free.shape)
+    strength = np.sqrt(np.sum(squares * u.eo_free, axis=0) / np.maximum(u.eo_free.sum(axis=0), 1))
+    held_element = ~u.eo_free & motions.active[:, None]
     moved = [
         weight[known][:, None] * motions.points[known],
-        best * motions.points[held],
-        best * motions.images[~u.eo_free & motions.active[:, None]],
+        strength[:3].max() * motions.points[held],
+        np.where(strength > 0.0, strength, 1.0)[np.nonzero(held_element)[1], None] * motions.images[held_element],
     ]
     of_motions = np.concatenate(moved)
     beside = np.zeros((len(of_motions), motions.count - 7))
@@ -191,7 +193,25 @@ def _named(free: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
     mixed[alone] = 0.0
     combinations, size, _ = np.linalg.svd(mixed, full_matrices=False)
     names = [name for name, free_alone in zip(FREEDOMS, alone, strict=True) if free_alone]
-    for column in np.abs(combinations[:, size > 0.5]).T:
+    for column in np.abs(_apart(combinations[:, size > 0.5])).T:
         parts = [name for name, share in zip(FREEDOMS, column / column.max(), strict=True) if share > PART]
         names.append("a combination of " + " and ".join(parts))
     return tuple(names), moving
+
+
+def _apart(combinations: np.ndarray) -> np.ndarray:
+    """The same space (7, d) by columns of which each has a rotation or the scale that the others have not."""
+    reduced, left = combinations.T.copy(), list(range(len(combinations.T)))
+    for group in ((3, 4, 5, 6), (0, 1, 2)):
+        for motion in group:
+            if not left:
+                break
+            best = max(left, key=lambda row: abs(reduced[row, motion]))
+            if abs(reduced[best, motion]) < PART:
+                continue
+            reduced[best] /= reduced[best, motion]
+            for row in range(len(reduced)):
+                if row != best:
+                    reduced[row] -= reduced[row, motion] * reduced[best]
+            left.remove(best)
+    return reduced.T
