@@ -64,7 +64,8 @@ def _on(processor: str, seeds: int, folder: Path) -> list[Look]:
     """All looks in a process of their own."""
     print(f"looking on {processor}", file=sys.stderr, flush=True)
     out = folder / "looks.json"
-    environment = os.environ | PROCESSORS[processor] | {"NUMBA_CACHE_DIR": str(folder / processor)}
+    own = {"NUMBA_CACHE_DIR": str(folder / processor), "OPENBLAS_NUM_THREADS": "1", "AEROTRI_THREADS": "1"}
+    environment = os.environ | PROCESSORS[processor] | own
     subprocess.run([sys.executable, __file__, "--child", out, "--seeds", str(seeds)], env=environment, check=True)
     return [Look(**look) for look in json.loads(out.read_text(encoding="utf-8"))]
 

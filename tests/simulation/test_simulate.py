@@ -106,11 +106,11 @@ def test_truth_is_written(small_spec, tmp_path):
     write_truth(tmp_path, block, truth)
     images = rows(tmp_path / "truth" / "images.csv")
     assert [r["image"] for r in images] == block.images.names.tolist()
-    assert float(images[3]["Z0"]) == truth.centre[3, 2]
-    assert np.radians(float(images[3]["kappa"])) == pytest.approx(truth.angles[3, 2], abs=1e-15)
+    assert float(images[3]["Z0"]) == round(truth.centre[3, 2], 6)
+    assert np.radians(float(images[3]["kappa"])) == pytest.approx(truth.angles[3, 2], abs=1e-11)
     points = rows(tmp_path / "truth" / "points.csv")
     assert [r["point"] for r in points] == block.points.tolist()
-    assert [float(points[7][k]) for k in "XYZ"] == truth.points[7].tolist()
+    assert [float(points[7][k]) for k in "XYZ"] == truth.points[7].round(6).tolist()
     parameters = rows(tmp_path / "truth" / "additional_parameters.csv")
     assert [(r["name"], r["group"], float(r["value"])) for r in parameters] == [
         ("bluh.1", "cam", 1e-5),
@@ -121,12 +121,12 @@ def test_truth_is_written(small_spec, tmp_path):
     ]
     errors = rows(tmp_path / "truth" / "image_errors.csv")
     assert len(errors) == 46 * 30
-    assert float(errors[100]["dx"]) == truth.image_errors[0].d[100, 0]
+    assert float(errors[100]["dx"]) == round(truth.image_errors[0].d[100, 0], 9)
     gross = rows(tmp_path / "truth" / "gross_errors.csv")
     ray = truth.gross_errors[1]
     assert gross[1]["image"] == block.images.names[block.image_points.image[ray]]
     assert gross[1]["point"] == block.points[block.image_points.point[ray]]
-    assert float(gross[1]["dy"]) == truth.gross_error_mm[1, 1]
+    assert float(gross[1]["dy"]) == round(truth.gross_error_mm[1, 1], 7)
     assert rows(tmp_path / "truth" / "control_blunders.csv") == [
         {"point": "C02", "dX": "0.0", "dY": "5.0", "dZ": "0.0"}
     ]
@@ -143,7 +143,7 @@ def test_a_block_is_written_with_its_truth_and_read_again(small_spec, tmp_path):
     write_simulated(tmp_path / "small", block, truth)
     again = block_folder.read_block(tmp_path / "small")
     assert again.points.tolist() == block.points.tolist()
-    np.testing.assert_allclose(again.image_points.xy, block.image_points.xy, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(again.image_points.xy, block.image_points.xy, rtol=0, atol=6e-8)
     assert again.gnss_ins is not None
     assert (tmp_path / "small" / "simulation.toml").read_text() == "# the spec"
     assert (tmp_path / "small" / "truth" / "images.csv").exists()

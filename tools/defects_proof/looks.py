@@ -67,7 +67,7 @@ def look_at(case: Case, seed: int, variant: str) -> Look:
     design = dense_design(system, state)
     length = np.linalg.norm(design, axis=0)
     scaled = design[:, length > 0.0] / length[length > 0.0]
-    _, values, right = np.linalg.svd(scaled, full_matrices=len(scaled) < scaled.shape[1])
+    _, values, right = np.linalg.svd(np.linalg.qr(scaled, mode="r"), full_matrices=len(scaled) < scaled.shape[1])
     values = np.concatenate([values, np.zeros(scaled.shape[1] - len(values))])
     null = values < DENSE_ZERO
     singular = float(values[null].max(initial=0.0)), float(values[~null].min())

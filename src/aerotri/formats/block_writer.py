@@ -20,14 +20,23 @@ from aerotri.observations.block import INTERIOR_ELEMENTS
 ANGLE_UNIT = "deg"
 TABLE_NAMES = ("images", "image_points", "control", "gnss_ins", "fiducials", "edits", "constraints")
 OWN_ENTRIES = ("block.toml", *(f"{name}.{ending}" for name in TABLE_NAMES for ending in ("csv", "parquet")))
+DECIMALS = {
+    **dict.fromkeys(("X", "Y", "Z", "X0", "Y0", "Z0", "time"), 6),
+    **dict.fromkeys(("x", "y"), 7),
+    **dict.fromkeys(("omega", "phi", "kappa"), 9),
+}
+"""Decimals that mean something: a micrometre on the ground, a tenth of a nanometre in the image, 1e-9 degrees."""
 IMAGE_FIELDS = ("image", "camera", "strip", "X0", "Y0", "Z0", "omega", "phi", "kappa")
 
 
-def write_block(block: Block, folder: str | os.PathLike, tables: Literal["csv", "parquet"] = "csv") -> None:
+def write_block(
+    block: Block, folder: str | os.PathLike, tables: Literal["csv", "parquet"] = "csv", rounded: bool = False
+) -> None:
     """Write a block; the folder appears when it is whole.
 
     Tables of an older block of that name are replaced, whatever else the folder holds is kept. Units are mm (pixels
-    where film was scanned) and degrees; floating point numbers are written so that they are read back the same.
+    where film was scanned) and degrees; floating point numbers are written so that they are read back the same, or
+    `rounded` to what a measurement can mean.
 
     Parameters
     ----------
@@ -46,7 +55,14 @@ def write_block(block: Block, folder: str | os.PathLike, tables: Literal["csv", 
         _check_all_names(block)
         (place / "block.toml").write_bytes(_utf8(toml_of(_settings(block))))
         for name, columns in _tables(block).items():
+            if rounded:
+                columns = {column: with_meaning(column, values) for column, values in columns.items()}
             write_table(columns, place / f"{name}.{tables}")
+
+
+def with_meaning(column: str, values: np.ndarray) -> np.ndarray:
+    """A column of a table with the decimals that mean something; as it is where nothing is said of it."""
+    return np.round(values, DECIMALS[column]) if column in DECIMALS else values
 
 
 def _utf8(text: str) -> bytes:

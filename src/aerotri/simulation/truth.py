@@ -59,14 +59,17 @@ TRUTH = "truth"
 def write_simulated(
     folder: str | os.PathLike, block: Block, truth: Truth, gone: Collection[str] = ()
 ) -> None:
-    """Write the block's folder and, under `truth/`, what is behind it; other files stay but for `gone`."""
+    """Write the block's folder and, under `truth/`, what is behind it; other files stay but for `gone`.
+
+    Numbers are rounded to what they can mean, so that another processor writes the same.
+    """
     # imported here: those who only simulate need no file formats
     from aerotri.formats.block_folder import write_block
     from aerotri.formats.block_writer import OWN_ENTRIES
 
     # in one step: a block must never stand beside the truth of another one
     with atomic_folder(folder, own=(*OWN_ENTRIES, TRUTH), gone=gone) as place:
-        write_block(block, place)
+        write_block(block, place, rounded=True)
         write_truth(place, block, truth)
 
 
@@ -80,9 +83,9 @@ def write_truth(folder: str | os.PathLike, block: Block, truth: Truth) -> None:
 
 def _write_tables(place: Path, block: Block, truth: Truth) -> None:
     names = block.images.names
-    orientation = np.hstack([truth.centre, np.degrees(truth.angles)])
+    orientation = np.hstack([np.round(truth.centre, 6), np.round(np.degrees(truth.angles), 9)])
     _write(place / "images.csv", ["image", "X0", "Y0", "Z0", "omega", "phi", "kappa"], _rows((names,), orientation))
-    _write(place / "points.csv", ["point", "X", "Y", "Z"], _rows((block.points,), truth.points))
+    _write(place / "points.csv", ["point", "X", "Y", "Z"], _rows((block.points,), np.round(truth.points, 6)))
     parameters = (truth.parameter_names, truth.parameter_groups)
     _write(
         place / "additional_parameters.csv",
@@ -94,21 +97,22 @@ def _write_tables(place: Path, block: Block, truth: Truth) -> None:
     _write_image_errors(place / "image_errors.csv", truth.image_errors)
     rays = block.image_points
     wrong = (names[rays.image[truth.gross_errors]], block.points[rays.point[truth.gross_errors]])
-    _write(place / "gross_errors.csv", ["image", "point", "dx", "dy"], _rows(wrong, truth.gross_error_mm))
+    _write(place / "gross_errors.csv", ["image", "point", "dx", "dy"], _rows(wrong, np.round(truth.gross_error_mm, 7)))
     blundered = (block.points[block.control.point[truth.control_blunders]],)
-    _write(place / "control_blunders.csv", ["point", "dX", "dY", "dZ"], _rows(blundered, truth.control_blunder_m))
+    blunder = np.round(truth.control_blunder_m, 6)
+    _write(place / "control_blunders.csv", ["point", "dX", "dY", "dZ"], _rows(blundered, blunder))
 
 
 def _write_image_errors(path: Path, samples: Sequence[ImageErrorSample]) -> None:
     rows = []
     for sample in samples:
         count = len(sample.xy)
-        rows += _rows(([sample.camera] * count, [sample.day] * count), np.hstack([sample.xy, sample.d]))
+        rows += _rows(([sample.camera] * count, [sample.day] * count), np.round(np.hstack([sample.xy, sample.d]), 9))
     _write(path, ["camera", "day", "x", "y", "dx", "dy"], rows)
 
 
 def _rows(texts: tuple[Iterable, ...], numbers: np.ndarray) -> list[list]:
-    """Rows of text columns and numbers; repr keeps every bit of a number."""
+    """Rows of text columns and numbers; repr keeps every digit that a number was rounded to."""
     return [
         [*(str(t) for t in text), *(repr(v) for v in values)]
         for text, values in zip(zip(*texts, strict=True), numbers.tolist(), strict=True)
