@@ -78,7 +78,7 @@ def markdown(found: dict[str, list[Look]], seeds: int) -> str:
     lines = [
         "# Rank defects: found, and only where there are any",
         "",
-        f"{len({look.case for look in every})} kinds of lack, {seeds} blocks of each and as many twins with just "
+        f"{len({look.case for look in every})} kinds of lack, {'one block' if seeds == 1 else f'{seeds} blocks'} of each and as many twins with just "
         f"enough, in {len({look.variant for look in every})} ways of writing them down, on {len(found)} processors "
         f"({', '.join(found)}): {len(lacking)} looks at deficient and {len(enough)} at determined blocks, "
         f"**{len(wrong)} wrong**.",
