@@ -75,10 +75,11 @@ def markdown(found: dict[str, list[Look]], seeds: int) -> str:
     every = [look for list_of_one in found.values() for look in list_of_one]
     lacking, enough = [look for look in every if look.expected], [look for look in every if not look.expected]
     wrong = [look for look in every if not look.is_right]
+    blocks = "one block" if seeds == 1 else f"{seeds} blocks"
     lines = [
         "# Rank defects: found, and only where there are any",
         "",
-        f"{len({look.case for look in every})} kinds of lack, {'one block' if seeds == 1 else f'{seeds} blocks'} of each and as many twins with just "
+        f"{len({look.case for look in every})} kinds of lack, {blocks} of each and as many twins with just "
         f"enough, in {len({look.variant for look in every})} ways of writing them down, on {len(found)} processors "
         f"({', '.join(found)}): {len(lacking)} looks at deficient and {len(enough)} at determined blocks, "
         f"**{len(wrong)} wrong**.",
