@@ -16,7 +16,7 @@ from aerotri.adjustment.unknowns import StartValues
 from aerotri.functional_model.additional_parameters import brown, lens
 from aerotri.functional_model.collinearity import interior_row
 from aerotri.functional_model.rotation import rotation_from_angles
-from aerotri.observations import Block, Control, GnssIns, GnssSettings
+from aerotri.observations import Block, Control, GnssIns, GnssSettings, Prior
 
 MIN_RESECTION_POINTS = 4
 RESECTION_TOLERANCES = (8.0, 40.0)
@@ -29,6 +29,8 @@ LOOSE_CENTRE = 0.01
 """σ of a projection centre while start values are sought, as a share of the flying height."""
 TRACK_ITERATIONS = 20
 """Iterations of the adjustment that refines vertical photographs."""
+HELD_TRACK_ITERATIONS = 30
+"""The same with the cameras held, where they ran away."""
 TRACK_TOLERANCE = 20.0
 """Median miss of the rays, in tolerances, beyond which the track was no track."""
 OPENCV_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
@@ -116,19 +118,26 @@ def _orient_along_track(block: Block, origin, directions, observed, rotation, ce
         miss = _intersect_into(points, block, directions, trial, observed)
         if best is None or miss < best[0]:
             best = (miss, trial, points)
-    if best is not None:
-        rotation[:], points = best[1], best[2]
+    if best is None:
+        return known.copy()
+    height = float(np.nanmedian(observed[:, 2]) - np.nanmedian(best[2][:, 2]))
+    centres = _loose_centres(block, observed + origin, LOOSE_CENTRE * max(abs(height), 1.0))
+    # far from the solution a free camera may run away: where it has, it is held
+    for tried, iterations in ((block, TRACK_ITERATIONS), (_with_held_cameras(block), HELD_TRACK_ITERATIONS)):
+        rotation[:], points = best[1], best[2].copy()
         centre[there] = observed[there]
-        height = float(np.nanmedian(observed[:, 2]) - np.nanmedian(points[:, 2]))
-        centres = _loose_centres(block, observed + origin, LOOSE_CENTRE * max(abs(height), 1.0))
-        refine(block, origin, rotation, centre, points, TRACK_ITERATIONS, centres)
-        trial = known.copy()
-        if _intersect_into(trial, block, directions, rotation, centre) < TRACK_TOLERANCE * np.median(
-            directions.tolerance
-        ):
+        refine(tried, origin, rotation, centre, points, iterations, centres)
+        miss = _intersect_into(known.copy(), block, directions, rotation, centre)
+        if miss < TRACK_TOLERANCE * np.median(directions.tolerance):
             return points
-        rotation[:], centre[:] = np.nan, np.nan
+    rotation[:], centre[:] = np.nan, np.nan
     return known.copy()
+
+
+def _with_held_cameras(block: Block) -> Block:
+    """The block with the interior orientation of its cameras held at what was stated."""
+    held = [{k: Prior(p.value, fixed=True) for k, p in camera.interior.items()} for camera in block.cameras]
+    return replace(block, cameras=tuple(replace(c, interior=h) for c, h in zip(block.cameras, held, strict=True)))
 
 
 def _times(block: Block) -> np.ndarray:
