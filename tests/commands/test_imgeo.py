@@ -191,7 +191,7 @@ def test_what_cannot_be_done_is_said_before_anything_is_written(result, by_day, 
     for match, folder, files, target, options in (
         ("no photograph of the block", result, [good, stranger], out, ImgeoOptions()),
         ("no group", result, [stranger], out, ImgeoOptions(group="x")),
-        ("written twice", result, [good, other], out, ImgeoOptions()),
+        ("both called as photograph", result, [good, other], out, ImgeoOptions()),
         ("no such file", result, [tmp_path / "1_004.tif"], out, ImgeoOptions()),
         ("is 20 × 30 pixels", result, [good, photograph(tmp_path / "1_002.tif", (20, 30))], out, ImgeoOptions()),
         ("holds other files", result, [good], foreign, ImgeoOptions()),
