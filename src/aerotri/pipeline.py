@@ -21,6 +21,7 @@ from aerotri.adjustment.unknowns import StartValues
 from aerotri.adjustment.weak_geometry import minimise_tied
 from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block, transform_result
+from aerotri.coordinates.metric import outside_in_words
 from aerotri.diagnosis import judge
 from aerotri.diagnosis.check_points import in_doubt
 from aerotri.formats.solution import SavedSolution
@@ -183,10 +184,15 @@ def _adjust_in_frame(
         return _adjust_local(block, report, given_points)
     frame = frame_of_block(block, geoid)
     points = None if given_points is None else frame.to_local(given_points)
+    outside = outside_in_words(frame)
     found = _adjust_local(transform_block(block, frame), report, points)
     for _ in range(FRAME_ROUNDS if needs_positions(block) else 0):
         local = transform_block(block, frame, found.local.points.xyz, found.local.images.centre)
         found = _adjust_local(local, report, found.local.points.xyz)
+    if outside:
+        outcome = found.local.outcome
+        local = replace(found.local, outcome=replace(outcome, warnings=(outside, *outcome.warnings)))
+        found = replace(found, local=local)
     used = with_findings_of(with_datum_of(block, found.local.block), found.local.block)
     return replace(found, result=transform_result(found.local, used, frame), frame=frame)
 

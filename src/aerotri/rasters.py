@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -148,8 +148,20 @@ class RasterReader:
 
     @property
     def epsg(self) -> int | None:
-        """Code of the CRS, None where it has none."""
-        return None if self.crs is None else self.crs.to_epsg()
+        """Code of the CRS, of its plan where it has a height system too; None where it has none."""
+        if self.crs is None:
+            return None
+        code = self.crs.to_epsg()
+        if code is None:
+            from pyproj import CRS
+            from pyproj.exceptions import CRSError
+
+            try:
+                whole = CRS.from_wkt(self.crs.to_wkt())
+            except CRSError:
+                return None
+            code = whole.sub_crs_list[0].to_epsg() if whole.is_compound else None
+        return code
 
     def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
         """A window, (rows, columns) of `dtype`; NaN where nothing is known and beyond the edges."""
@@ -202,7 +214,7 @@ class RasterReader:
         out[there] = sum(np.where(w > 0.0, w * c, 0.0) for w, c in zip(weights, corners, strict=True))
         return out
 
-    def __enter__(self) -> RasterReader:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:

@@ -88,8 +88,10 @@ def test_geopackage(tmp_path, order, z, envelope, several):
     found = read_polygons(write_gpkg(tmp_path / "m.gpkg", rows), 25832)
     assert found.names == (("a", "b"), ("b", "c"))
     np.testing.assert_array_equal(found.numbers(GRID, 0, 0, 12, 10), EXPECTED)
-    with pytest.raises(InputError, match="EPSG:25833"):
-        read_polygons(tmp_path / "m.gpkg", 25833)
+    assert found.note == ""
+    moved = read_polygons(tmp_path / "m.gpkg", 25833)
+    assert "from EPSG:25832 to EPSG:25833" in moved.note
+    assert np.abs(moved.bounds - found.bounds)[:, 0].min() > 1000.0
 
 
 @pytest.mark.parametrize(
@@ -103,7 +105,7 @@ def test_geopackage(tmp_path, order, z, envelope, several):
             "polygon",
         ),
         (json.dumps({"features": [{"properties": {}, "geometry": None}]}), "polygon"),
-        (json.dumps({"crs": {"properties": {"name": "urn:ogc:def:crs:EPSG::4326"}}, "features": []}), "EPSG:4326"),
+        (json.dumps({"crs": {"properties": {"name": "urn:ogc:def:crs:EPSG::4326"}}, "features": []}), "no polygons"),
     ],
 )
 def test_bad_polygons(tmp_path, content, message):

@@ -143,8 +143,12 @@ def test_breaklines_from_files(tmp_path):
     package.commit()
     package.close()
     np.testing.assert_array_equal(read_breaklines(tmp_path / "lines.gpkg", "EPSG:25832")[0], line)
-    with pytest.raises(InputError, match="EPSG:25832, the block in EPSG:25833"):
-        read_breaklines(tmp_path / "lines.gpkg", "EPSG:25833")
+    from pyproj import Transformer
+
+    moved = read_breaklines(tmp_path / "lines.gpkg", "EPSG:25833")[0]
+    there = Transformer.from_crs("EPSG:25832", "EPSG:25833", always_xy=True)
+    np.testing.assert_allclose(moved[:, :2], np.column_stack(there.transform(*np.array(line)[:, :2].T)), atol=1e-6)
+    np.testing.assert_array_equal(moved[:, 2], np.array(line)[:, 2])
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.commands.console import Console
-from aerotri.commands.results import refuse_foreign_folder
+from aerotri.commands.results import block_in_metres, refuse_foreign_folder
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ def run_adjust(
     from aerotri.observations.names import with_control_prefix
 
     block = with_control_prefix(with_settings(read_block(path), parameters, robust), control_prefix)
+    block = block_in_metres(block, console, geoid)
     if check_free:
         refuse_free_datum(block)
     read_s = time.perf_counter() - begun

@@ -65,8 +65,9 @@ def _compared(
     from aerotri.terrain.compare import compare
 
     stack.enter_context(cache_limited())
+    target = _common_crs(test, control)
     (one, area, cells, crs), (other, control_area, control_cells, control_crs) = (
-        _surface(p, stack) for p in (test, control)
+        _surface(p, stack, target, console) for p in (test, control)
     )
     if crs is not None and control_crs is not None and crs != control_crs:
         raise InputError(f"is in EPSG:{crs}, the control in EPSG:{control_crs}", "bring them into one CRS", test)
@@ -78,11 +79,37 @@ def _compared(
     return found, crs or control_crs
 
 
-def _surface(path: Path, stack: ExitStack) -> tuple[Heights, np.ndarray, float, int | None]:
-    """A surface, (2, 2) m what it covers, its typical cell in m, and the code of its CRS."""
-    from aerotri.formats.pickets import read_pickets
-    from aerotri.formats.point_cloud import read_point_cloud
+def _common_crs(*paths: Path) -> str | None:
+    """Where a raster that does not count in metres is brought to: the CRS of the other one, else None."""
     from aerotri.rasters import RasterReader
+    from aerotri.rasters_metric import metric_crs_for, units_of
+
+    wanted = None
+    for path in paths:
+        file = path / "dsm.tif" if path.is_dir() else path
+        if file.suffix.lower() not in RASTERS or not file.is_file():
+            continue
+        with RasterReader(file) as reader:
+            if units_of(reader).plan == "metre":
+                if reader.epsg is not None:
+                    return f"EPSG:{reader.epsg}"
+            else:
+                wanted = wanted or metric_crs_for(reader)
+    return wanted
+
+
+def _surface(
+    path: Path, stack: ExitStack, crs: str | None, console: Console
+) -> tuple[Heights, np.ndarray, float, int | None]:
+    """A surface, (2, 2) m what it covers, its typical cell in m, and the code of its CRS.
+
+    Parameters
+    ----------
+    crs : 'EPSG:n' that a raster in degrees or feet is brought to; None: the UTM zone.
+    """
+    from aerotri.formats.pickets import read_pickets
+    from aerotri.formats.point_cloud import read_point_cloud, refuse_cloud_units
+    from aerotri.rasters_metric import MetricReader
     from aerotri.terrain.compare import FileHeights, PointHeights, RasterHeights
 
     if path.is_dir():
@@ -90,7 +117,9 @@ def _surface(path: Path, stack: ExitStack) -> tuple[Heights, np.ndarray, float, 
     if not path.is_file():
         raise InputError("there is no such file", "give a GeoTIFF, LAZ, or pickets.parquet", path)
     if path.suffix.lower() in RASTERS:
-        reader = stack.enter_context(RasterReader(path))
+        reader = stack.enter_context(MetricReader(path, target=crs))
+        if reader.note:
+            console.note(reader.note)
         g = reader.grid
         if g.rows * g.columns > LARGEST_HELD:
             left, bottom, right, top = g.bounds
@@ -104,6 +133,7 @@ def _surface(path: Path, stack: ExitStack) -> tuple[Heights, np.ndarray, float, 
         return RasterHeights(g, z), area, g.cell_x, epsg
     if path.suffix.lower() in CLOUDS:
         xyz = read_point_cloud(path)[0]
+        refuse_cloud_units(path)
     elif path.suffix.lower() == ".parquet":
         table = read_pickets(path)
         xyz = table.xyz[table.accepted]

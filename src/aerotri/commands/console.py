@@ -88,6 +88,11 @@ class Console:
         for line in lines:
             print(line)
 
+    def note(self, text: str) -> None:
+        """Print a sentence on what was done with the input; to stderr, so that JSON stays whole."""
+        self._clear()
+        print(f"aerotri: {text}", file=sys.stderr)
+
     def failure(self, text: str) -> None:
         """Print why there is no result."""
         self._clear()

@@ -116,9 +116,10 @@ def _computed(
                 calibration, of, options.end_lap, options.spacing, options.group, options.gsd
             )  # fmt: skip
         elif options.pair is not None:
-            one = deform_pair(calibration, of, options.pair, _ground(calibration, options, stack), options.spacing)
+            ground = _ground(calibration, options, stack, console)
+            one = deform_pair(calibration, of, options.pair, ground, options.spacing)
         else:
-            whole = _of_block(calibration, of, options, _ground(calibration, options, stack), console)
+            whole = _of_block(calibration, of, options, _ground(calibration, options, stack, console), console)
             content = block_deformation_json(whole, name)
             _write(target, content, whole, _block_figures(whole, name) if plots else {})
             return content
@@ -127,14 +128,21 @@ def _computed(
     return content
 
 
-def _ground(calibration: Adjustment, options: DeformOptions, stack: ExitStack) -> Ground:
+def _ground(calibration: Adjustment, options: DeformOptions, stack: ExitStack, console: Console) -> Ground:
     """The DEM, open as long as the stack, or the level of the object points."""
     from aerotri.deformation.model_grid import DemGround, FlatGround, mean_ground
-    from aerotri.rasters import RasterReader
+    from aerotri.rasters import RasterReader, horizontal_crs
+    from aerotri.rasters_metric import MetricReader, refuse_other_units
 
     if options.dem is None:
         return FlatGround(mean_ground(calibration))
-    reader = stack.enter_context(RasterReader(options.dem))
+    own = horizontal_crs(calibration.result.block.crs)
+    reader = stack.enter_context(MetricReader(options.dem, target=own))
+    if own is None and reader.note:
+        # where a local block lies in that CRS nobody knows
+        refuse_other_units(stack.enter_context(RasterReader(options.dem)))
+    if reader.note:
+        console.note(reader.note)
     check_crs(calibration, reader.epsg, options.dem)
     return DemGround(reader)
 

@@ -39,8 +39,10 @@ def run_demcor(
     _refuse_foreign_files(out, overwrite)
     calibration = reopened(source, console)
     from aerotri.deformation.absorbed import AbsorptionFailedError
+    from aerotri.deformation.model_map import PolygonMap
     from aerotri.deformation.restitution import FREE, restitution
     from aerotri.rasters import RasterReader, cache_limited
+    from aerotri.rasters_metric import refuse_other_units
 
     try:
         used = None if orientation in (None, ABSORBED) else _orientation(calibration, Path(str(orientation)), console)
@@ -53,8 +55,11 @@ def run_demcor(
     with ExitStack() as stack:
         stack.enter_context(cache_limited())
         reader = stack.enter_context(RasterReader(dem))
+        refuse_other_units(reader)
         check_crs(calibration, reader.epsg, dem)
         chosen = _model_map(pair, models, table, reader, stack)
+        if isinstance(chosen, PolygonMap) and chosen.note:
+            console.note(chosen.note)
         from aerotri.deformation.dem_window import dem_models
 
         content = _corrected(dem_models(calibration, of, chosen.names), chosen, reader, out, calibration, console)

@@ -82,7 +82,7 @@ def run_dtm(source: Path, photographs: list[Path], out: Path | None, options: Dt
     target = out or Path(f"{source.resolve().name.removesuffix('_result')}_dtm")
     refuse_foreign_folder(target, "dtm.json")
     calibration = reopened(source, console)
-    plan = make_plan(calibration, photographs, options)
+    plan = make_plan(calibration, photographs, options, None if as_json else console)
     from aerotri.terrain.dtm import make_terrain_model
 
     outcome = make_terrain_model(calibration, plan, console.work)
@@ -95,14 +95,16 @@ def run_dtm(source: Path, photographs: list[Path], out: Path | None, options: Dt
     return 0
 
 
-def make_plan(calibration: Adjustment, given: list[Path], options: DtmOptions) -> TerrainPlan:
+def make_plan(
+    calibration: Adjustment, given: list[Path], options: DtmOptions, console: Console | None = None
+) -> TerrainPlan:
     """Which photographs are matched, where and how.
 
     Raises
     ------
     InputError
     """
-    from aerotri.formats.breaklines import read_breaklines
+    from aerotri.formats.breaklines import breaklines_and_note
     from aerotri.formats.photograph_files import match_files, photographs_in
     from aerotri.rasters import horizontal_crs
     from aerotri.terrain.dtm import TerrainPlan, chosen_rows
@@ -120,7 +122,9 @@ def make_plan(calibration: Adjustment, given: list[Path], options: DtmOptions) -
         area = Area(np.array(options.area[:2]), np.array(options.area[2:]))
     lines = ()
     if options.breaklines is not None:
-        lines = read_breaklines(options.breaklines, horizontal_crs(calibration.result.block.crs))
+        lines, note = breaklines_and_note(options.breaklines, horizontal_crs(calibration.result.block.crs))
+        if note and console is not None:
+            console.lines([f"note: {note}"])
     pairs = options.pairs or options.step is not None
     edge = options.edge if options.edge is not None else EDGE_OF_PAIRS if pairs else EDGE
     return TerrainPlan(

@@ -10,6 +10,7 @@ from aerotri.commands.console import Console
 from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
+    from aerotri.observations import Block
     from aerotri.pipeline import Adjustment
 
 
@@ -22,6 +23,7 @@ def reopened(result: Path, console: Console) -> Adjustment:
         When the folder is no result, or the adjustment has not converged.
     """
     from aerotri.compiled import compilation_notice
+    from aerotri.coordinates.georeference import is_projected
     from aerotri.formats.block_folder import read_block
     from aerotri.formats.solution import read_solution
     from aerotri.pipeline import reopen
@@ -32,7 +34,13 @@ def reopened(result: Path, console: Console) -> Adjustment:
     saved = read_solution(result / "solution.npz")
     if saved.status != "converged":
         raise InputError(f"the adjustment ended '{saved.status}'", "give the result of a converged one", result)
-    found = reopen(read_block(result / "block"), saved)
+    block = read_block(result / "block")
+    if block.crs != "local" and not is_projected(block.crs):
+        raise InputError(
+            f"the result is in {block.crs}, which counts in degrees",
+            "adjust the block again: `aerotri adjust` brings it to metres", result,
+        )  # fmt: skip
+    found = reopen(block, saved)
     outcome = found.result.outcome
     if outcome.verdict != "accepted":
         console.failure(f"{result}: the adjustment is {outcome.verdict}: {outcome.reasons[0]}")
@@ -70,6 +78,21 @@ def refuse_existing_file(file: Path, overwrite: bool = False) -> None:
     """
     if file.is_file() and not overwrite:
         raise InputError("exists already", "choose another name, or add --overwrite", file)
+
+
+def block_in_metres(block: Block, console: Console, geoid: Path | None = None) -> Block:
+    """The block, out of a CRS in degrees into the UTM zone; said so where that is done.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.coordinates.metric import in_metres
+
+    found, note = in_metres(block, geoid)
+    if note:
+        console.note(note)
+    return found
 
 
 def refuse_foreign_folder(folder: Path, *own: str) -> None:

@@ -16,6 +16,7 @@ from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
     from aerotri.rasters import Grid, RasterReader
+    from aerotri.rasters_metric import MetricReader
     from aerotri.report.plots_volume import ThicknessMap
     from aerotri.volume.accuracy import VolumeSigma
     from aerotri.volume.bases import Base
@@ -99,7 +100,8 @@ def _computed(
 ) -> dict[str, Any]:
     """Compute and write; returns the content of volume.json."""
     from aerotri.formats.atomic import atomic_folder
-    from aerotri.rasters import RasterReader, RasterWriter, cache_limited
+    from aerotri.rasters import RasterWriter, cache_limited
+    from aerotri.rasters_metric import MetricReader
     from aerotri.volume.bases import parse_base
     from aerotri.volume.boundary import boundary_of_grid, read_boundary
     from aerotri.volume.compute import compute_volumes
@@ -107,10 +109,16 @@ def _computed(
     from aerotri.volume.sums import cells_within
 
     with cache_limited(), ExitStack() as stack:
-        reader = stack.enter_context(RasterReader(given.dtm))
+        reader = stack.enter_context(MetricReader(given.dtm, target=_crs_of_result(given.adjustment)))
         boundary = boundary_of_grid(reader.grid) if given.boundary is None else read_boundary(
             given.boundary, reader.epsg)  # fmt: skip
-        base = parse_base(given.base, reader, boundary, lambda path: stack.enter_context(_other(path, reader)))
+        others: list[MetricReader] = []
+
+        def opened(path: str) -> MetricReader:
+            others.append(stack.enter_context(_other(path, reader)))
+            return others[-1]
+
+        base = parse_base(given.base, reader, boundary, opened)
         row, column, rows, columns = cells_within(reader.grid, boundary)
         if not rows or not columns:
             raise InputError("the boundary does not meet the surface", "check the CRS of both", given.dtm)
@@ -132,6 +140,8 @@ def _computed(
             sources = Sources(given.dtm.name, "" if reader.epsg is None else f"EPSG:{reader.epsg}",
                               *("" if p is None else p.name for p in (given.adjustment, given.pickets)))  # fmt: skip
             content = volume_json(volumes, base, boundary, sources, sigma)
+            said = (reader.note, *(other.note for other in others), boundary.note)
+            content["warnings"] = [*(text for text in said if text), *content["warnings"]]
             _write_sections(folder / "sections.csv", volumes)
             if plots:
                 console.progress("plots")
@@ -141,11 +151,26 @@ def _computed(
     return content
 
 
-def _other(path: str, reader: RasterReader) -> RasterReader:
-    """The raster of a base, in the CRS of the surface."""
-    from aerotri.rasters import RasterReader
+def _crs_of_result(result: Path | None) -> str | None:
+    """The plan CRS of a result's block, None where there is no result or it is local."""
+    import tomllib
 
-    other = RasterReader(path)
+    from aerotri.rasters import horizontal_crs
+
+    if result is None:
+        return None
+    try:
+        content = tomllib.loads((result / "block" / "block.toml").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return horizontal_crs(str(content.get("crs", "local")))
+
+
+def _other(path: str, reader: RasterReader) -> MetricReader:
+    """The raster of a base, in the CRS of the surface."""
+    from aerotri.rasters_metric import MetricReader
+
+    other = MetricReader(path, target=None if reader.epsg is None else f"EPSG:{reader.epsg}")
     if other.epsg is not None and reader.epsg is not None and other.epsg != reader.epsg:
         raise InputError(f"is in EPSG:{other.epsg}, the surface in EPSG:{reader.epsg}", "bring it into one CRS", path)
     return other

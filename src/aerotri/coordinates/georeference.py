@@ -137,6 +137,26 @@ def utm_crs(lon: np.ndarray, lat: np.ndarray) -> str:
     return f"EPSG:{(32600 if np.mean(lat) >= 0.0 else 32700) + zone}"
 
 
+def utm_on_datum(crs: str, lon: float, lat: float) -> str:
+    """'EPSG:n' of the UTM zone at a place on the datum of a CRS, on WGS 84 where that has none."""
+    from pyproj.aoi import AreaOfInterest
+    from pyproj.database import query_utm_crs_info
+
+    whole = _read_crs(crs)
+    geographic = (whole.sub_crs_list[0] if whole.is_compound else whole).geodetic_crs
+    name = "WGS 84" if geographic is None else geographic.name
+    area = AreaOfInterest(lon, lat, lon, lat)
+    found = query_utm_crs_info(datum_name=name, area_of_interest=area) if name != "WGS 84" else []
+    return f"EPSG:{found[0].code}" if found else utm_crs(np.array([lon]), np.array([lat]))
+
+
+def area_of_use(crs: str) -> tuple[float, float, float, float] | None:
+    """West, south, east, north in degrees; None where PROJ knows none."""
+    whole = _read_crs(crs)
+    area = (whole.sub_crs_list[0] if whole.is_compound else whole).area_of_use
+    return None if area is None else (area.west, area.south, area.east, area.north)
+
+
 def is_projected(crs: str) -> bool:
     """Whether a CRS counts in metres of a plane.
 
@@ -171,7 +191,7 @@ def _checked_geographic(crs: str, whole: CRS, flat: CRS) -> CRS:
         if axis.unit_name != wanted:
             raise InputError(
                 f"crs {crs} ({whole.name}) counts {axis.name} in {axis.unit_name}",
-                f"transform the block to a CRS in {wanted}s",
+                f"transform coordinates and their σ to a CRS in {wanted}s{_example(crs, flat)}",
                 file="block.toml",
             )
         if axis.direction == "down":
@@ -184,6 +204,16 @@ def _checked_geographic(crs: str, whole: CRS, flat: CRS) -> CRS:
             file="block.toml",
         )
     return geographic
+
+
+def _example(crs: str, flat: CRS) -> str:
+    """A CRS in metres at the same place, in words."""
+    area = flat.area_of_use
+    if area is None or not flat.is_projected:
+        return ""
+    source = crs.partition("+")[0]
+    target = utm_on_datum(source, (area.west + area.east) / 2.0, (area.south + area.north) / 2.0)
+    return f", such as {target}: cs2cs {source} {target}"
 
 
 def _geoid_file(path: Path, crs: str, whole: CRS) -> Transformer:

@@ -46,11 +46,12 @@ class OneModel:
 
 @dataclass(frozen=True, eq=False)
 class PolygonMap:
-    """Polygons: GeoJSON geometries with their model and their (left, bottom, right, top)."""
+    """Polygons: GeoJSON geometries with their model and their (left, bottom, right, top); note : about their CRS."""
 
     names: tuple[tuple[str, str], ...]
     shapes: tuple[tuple[Mapping[str, Any], int], ...]
     bounds: np.ndarray
+    note: str = ""
 
     def numbers(self, grid: Grid, row: int, column: int, rows: int, columns: int) -> np.ndarray:
         """(rows, columns); −1 where no polygon holds the centre of the cell."""
@@ -86,16 +87,17 @@ def read_polygons(path: Path, epsg: int | None = None) -> PolygonMap:
 
     Parameters
     ----------
-    epsg : code of the DEM's CRS, which the polygons have to share; None when not known.
+    epsg : code of the DEM's CRS, which they are brought to; None when not known.
 
     Raises
     ------
     InputError
-        When the file cannot be read, has another CRS, or a polygon lacks its photographs.
+        When the file cannot be read, or a polygon lacks its photographs.
     """
     found: dict[tuple[str, str], int] = {}
     shapes, bounds = [], []
-    for number, (properties, polygon) in enumerate(polygon_features(path, epsg), start=1):
+    features, note = polygon_features(path, epsg)
+    for number, (properties, polygon) in enumerate(features, start=1):
         names = str(properties.get("left") or ""), str(properties.get("right") or "")
         if not all(names):
             raise InputError(
@@ -105,7 +107,7 @@ def read_polygons(path: Path, epsg: int | None = None) -> PolygonMap:
         bounds.append(polygon.bounds)
     if not shapes:
         raise InputError("has no polygons", "give a polygon for every model", path)
-    return PolygonMap(tuple(found), tuple(shapes), np.array(bounds))
+    return PolygonMap(tuple(found), tuple(shapes), np.array(bounds), note)
 
 
 def read_number_table(path: Path) -> dict[int, tuple[str, str]]:

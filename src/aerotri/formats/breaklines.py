@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.vector_crs import VectorSystem, system_of_geojson, vector_system
 
 LINE, MULTILINE = 2, 5
 ENVELOPE_BYTES = (0, 32, 48, 48, 64)
@@ -19,11 +20,19 @@ ENVELOPE_BYTES = (0, 32, 48, 48, 64)
 
 
 def read_breaklines(path: Path, crs: str | None = None) -> tuple[np.ndarray, ...]:
-    """Lines (k, 3) m of a file.
+    """Lines (k, 3) m of a file, see `breaklines_and_note`."""
+    return breaklines_and_note(path, crs)[0]
+
+
+def breaklines_and_note(path: Path, crs: str | None = None) -> tuple[tuple[np.ndarray, ...], str]:
+    """Lines (k, 3) m of a file, and a sentence about their CRS.
+
+    GeoJSON is longitude and latitude by RFC 7946, GeoPackage and the old member "crs" name their CRS; heights stay as
+    they are.
 
     Parameters
     ----------
-    crs : 'EPSG:…' of the block, which a GeoPackage has to share; None when not known.
+    crs : 'EPSG:…' of the block, to which the lines are brought; None when not known.
 
     Raises
     ------
@@ -37,29 +46,38 @@ def read_breaklines(path: Path, crs: str | None = None) -> tuple[np.ndarray, ...
     if not path.is_file():
         raise InputError("there is no such file", "give breaklines as .gpkg, .geojson or .dxf", path)
     try:
-        lines = [np.asarray(line, dtype=float) for line in reader(path, crs)]
+        parts, system = reader(path, None if crs is None else int(crs.rpartition(":")[2]))
+        lines = [np.asarray(line, dtype=float) for line in parts]
     except (OSError, ValueError, KeyError, TypeError, IndexError, struct.error, sqlite3.Error) as error:
         raise InputError(f"cannot be read: {error}", "give lines with heights", path) from error
     for number, line in enumerate(lines, start=1):
         if line.ndim != 2 or line.shape[1] < 3 or not np.isfinite(line[:, :3]).all():
             raise InputError(f"line {number} has no heights", "give lines in three dimensions", path)
-    lines = [line[:, :3] for line in lines if len(line) > 1]
+    lines = [np.column_stack([system.place(line[:, :2], path), line[:, 2]]) for line in lines if len(line) > 1]
     if not lines:
         raise InputError("has no lines", "give lines with heights", path)
-    return tuple(lines)
+    return tuple(lines), system.note
 
 
-def _of_geojson(path: Path, crs: str | None) -> Iterator[list]:
+def _of_geojson(path: Path, epsg: int | None) -> tuple[list, VectorSystem]:
     content = json.loads(path.read_text(encoding="utf-8-sig"))
+    lines = []
     for feature in content["features"]:
         geometry = feature["geometry"]
         if geometry["type"] == "LineString":
-            yield geometry["coordinates"]
+            lines.append(geometry["coordinates"])
         elif geometry["type"] == "MultiLineString":
-            yield from geometry["coordinates"]
+            lines += geometry["coordinates"]
+    xy = np.array([place[:2] for line in lines for place in line], dtype=float).reshape(-1, 2)
+    return lines, system_of_geojson(content, xy, epsg, path.name)
 
 
-def _of_dxf(path: Path, crs: str | None) -> Iterator[np.ndarray]:
+def _of_dxf(path: Path, epsg: int | None) -> tuple[list[np.ndarray], VectorSystem]:
+    """A drawing names no CRS: its coordinates are those of the block."""
+    return list(_lines_of_dxf(path)), VectorSystem()
+
+
+def _lines_of_dxf(path: Path) -> Iterator[np.ndarray]:
     """Lines and polylines in three dimensions."""
     import ezdxf
 
@@ -78,16 +96,19 @@ def _of_dxf(path: Path, crs: str | None) -> Iterator[np.ndarray]:
         yield np.vstack([points, points[:1]]) if entity.closed else points  # pyright: ignore
 
 
-def _of_geopackage(path: Path, crs: str | None) -> Iterator[np.ndarray]:
+def _of_geopackage(path: Path, epsg: int | None) -> tuple[list[np.ndarray], VectorSystem]:
+    lines, systems = [], {}
     with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as database:
         query = "SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns"
         for table, column, srs in database.execute(query).fetchall():
-            if crs is not None and srs > 0 and crs.upper() != f"EPSG:{srs}":
-                raise InputError(f"is in EPSG:{srs}, the block in {crs}", "bring it into the CRS of the block", path)
+            systems[srs] = vector_system(f"EPSG:{srs}" if srs > 0 else None, epsg, path.name)
+            if len(systems) > 1:
+                raise InputError("has layers in several CRS", "give one layer", path)
             names = ['"' + str(name).replace('"', '""') + '"' for name in (column, table)]
             for (blob,) in database.execute(f"SELECT {names[0]} FROM {names[1]}"):
                 if blob is not None:
-                    yield from _lines_of_wkb(blob, 8 + ENVELOPE_BYTES[(blob[3] >> 1) & 7])[0]
+                    lines += _lines_of_wkb(blob, 8 + ENVELOPE_BYTES[(blob[3] >> 1) & 7])[0]
+    return lines, next(iter(systems.values()), VectorSystem())
 
 
 def _lines_of_wkb(blob: bytes, at: int) -> tuple[list[np.ndarray], int]:

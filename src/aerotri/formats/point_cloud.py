@@ -45,3 +45,28 @@ def read_point_cloud(path: Path) -> tuple[np.ndarray, np.ndarray]:
         return np.column_stack(xyz), np.asarray(cloud.classification)
     except Exception as error:  # laspy and lazrs raise whatever a damaged file leads to
         raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
+
+
+def refuse_cloud_units(path: Path) -> None:
+    """Refuse a LAS or LAZ file whose CRS counts in degrees or feet.
+
+    Raises
+    ------
+    InputError
+    """
+    import laspy
+
+    try:
+        with laspy.open(path) as file:
+            crs = file.header.parse_crs()
+    except Exception as error:  # as above
+        raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
+    if crs is None:
+        return
+    for axis in crs.axis_info:
+        if axis.unit_name not in ("metre", "meter", "unity"):
+            raise InputError(
+                f"is in {crs.name}, which counts {axis.name} in {axis.unit_name}",
+                "bring it to metres first: pdal translate IN OUT reprojection --filters.reprojection.out_srs=EPSG:…",
+                path,
+            )

@@ -11,8 +11,9 @@ from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
 from aerotri.conventions import InputError
-from aerotri.polygons import VECTOR_ENDINGS, polygon_features, polygon_of_wkt
+from aerotri.polygons import VECTOR_ENDINGS, placed, polygon_features, polygon_of_wkt, srid_of_wkt
 from aerotri.rasters import Grid, rasterise
+from aerotri.vector_crs import vector_system
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,11 +22,12 @@ class Boundary:
 
     Parameters
     ----------
-    polygon : valid shapely geometry. name : where it came from.
+    polygon : valid shapely geometry. name : where it came from. note : about its CRS, '' where there is nothing to say.
     """
 
     polygon: BaseGeometry
     name: str
+    note: str = ""
 
     @property
     def area(self) -> float:
@@ -58,7 +60,7 @@ class Boundary:
         return part
 
 
-def boundary_of(polygon: BaseGeometry, name: str) -> Boundary:
+def boundary_of(polygon: BaseGeometry, name: str, note: str = "") -> Boundary:
     """A boundary, made valid.
 
     Raises
@@ -72,7 +74,7 @@ def boundary_of(polygon: BaseGeometry, name: str) -> Boundary:
         )
     if not polygon.area > 0.0:
         raise InputError(f"the boundary '{name}' has no area", "give a polygon")
-    return Boundary(polygon, name)
+    return Boundary(polygon, name, note)
 
 
 def read_boundary(source: str, epsg: int | None = None) -> Boundary:
@@ -80,21 +82,27 @@ def read_boundary(source: str, epsg: int | None = None) -> Boundary:
 
     Parameters
     ----------
-    epsg : CRS of the surface; a file in another one is refused.
+    epsg : CRS of the surface; what names another one is brought to it, and GeoJSON is longitude and latitude.
     """
     if source.lstrip().upper().startswith(("POLYGON", "MULTIPOLYGON", "SRID=")):
-        return boundary_of(polygon_of_wkt(source), "the polygon given")
+        return _of_wkt(source, "the polygon given", epsg)
     path = Path(source)
     if path.suffix.lower() in VECTOR_ENDINGS:
-        polygons = [polygon for _, polygon in polygon_features(path, epsg)]
+        features, note = polygon_features(path, epsg)
+        polygons = [polygon for _, polygon in features]
         if not polygons:
             raise InputError("has no polygons", "give the boundary of the volume", path)
-        return boundary_of(polygons[0] if len(polygons) == 1 else shapely.union_all(polygons), path.name)
+        return boundary_of(polygons[0] if len(polygons) == 1 else shapely.union_all(polygons), path.name, note)
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot be read: {error}", "give GeoJSON, GeoPackage or WKT", path) from error
-    return boundary_of(polygon_of_wkt(text, path), path.name)
+    return _of_wkt(text, path.name, epsg, path)
+
+
+def _of_wkt(text: str, name: str, epsg: int | None, path: Path | None = None) -> Boundary:
+    system = vector_system(srid_of_wkt(text), epsg, name)
+    return boundary_of(placed(polygon_of_wkt(text, path), system, path), name, system.note)
 
 
 def boundary_of_grid(grid: Grid) -> Boundary:

@@ -1,0 +1,98 @@
+"""The coordinate system of vector files, and their coordinates in that of a surface."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerotri.conventions import InputError
+
+LON_LAT = "OGC:CRS84"
+"""Longitude and latitude on WGS 84: what GeoJSON has by RFC 7946."""
+CODE = re.compile(r"(EPSG|OGC|ESRI)(?::[\w.]*)?:+(\w+)$", re.IGNORECASE)
+
+
+@dataclass(frozen=True, eq=False)
+class VectorSystem:
+    """How the coordinates of a file become those of a surface.
+
+    Parameters
+    ----------
+    transformer : pyproj's; None where they are the same. note : what was done or taken for granted, '' where nothing.
+    """
+
+    transformer: Any = None
+    note: str = ""
+
+    def place(self, xy: np.ndarray, path: Path | None = None) -> np.ndarray:
+        """(n, 2) in the system of the surface.
+
+        Raises
+        ------
+        InputError
+            Where that system does not reach.
+        """
+        if self.transformer is None:
+            return xy
+        found = np.column_stack(self.transformer.transform(xy[:, 0], xy[:, 1]))
+        if not np.isfinite(found).all():
+            raise InputError("lies outside the range of the surface's CRS", "check the CRS of both", path)
+        return found
+
+
+def vector_system(own: str | None, epsg: int | None, name: str) -> VectorSystem:
+    """From the CRS that a file names to that of the surface.
+
+    Parameters
+    ----------
+    own : as 'EPSG:25832', None where the file does not say. epsg : of the surface, None where it has none.
+    name : of the file, for the note.
+    """
+    if own is None or (epsg is not None and own.upper() == f"EPSG:{epsg}"):
+        return VectorSystem()
+    if epsg is None:
+        return VectorSystem(None, f"{name} is in {own}; the surface has no CRS, its coordinates are taken for these")
+    from pyproj import Transformer
+    from pyproj.exceptions import ProjError
+
+    try:
+        transformer = Transformer.from_crs(own, f"EPSG:{epsg}", always_xy=True)
+    except ProjError:
+        raise InputError(f"{name}: PROJ knows no way from {own} to EPSG:{epsg}", "bring it into one CRS") from None
+    return VectorSystem(transformer, f"{name} was brought from {own} to EPSG:{epsg}")
+
+
+def system_of_geojson(content: Mapping[str, Any], xy: np.ndarray, epsg: int | None, name: str) -> VectorSystem:
+    """Of GeoJSON: the old member "crs" where it has one, else longitude and latitude.
+
+    Coordinates that can be no longitudes and latitudes, in a file that names no CRS, are those of the surface.
+
+    Parameters
+    ----------
+    xy : (n, 2) all its coordinates.
+    """
+    own = stated_crs(content)
+    if own is not None:
+        return vector_system(own, epsg, name)
+    if epsg is None:
+        return VectorSystem()
+    if "crs" not in content and len(xy) and np.all(np.abs(xy) <= [180.0, 90.0]):
+        found = vector_system(LON_LAT, epsg, name)
+        note = f"{name} was brought from longitude and latitude, which GeoJSON has by RFC 7946, to EPSG:{epsg}"
+        return VectorSystem(found.transformer, note)
+    return VectorSystem(
+        None, f"{name} names no CRS, and its coordinates are no longitudes and latitudes: taken for EPSG:{epsg}"
+    )
+
+
+def stated_crs(content: Mapping[str, Any]) -> str | None:
+    """The CRS that the old member "crs" of GeoJSON names, None where there is none or it is null."""
+    member = content.get("crs")
+    text = str(((member or {}).get("properties") or {}).get("name", "")) if isinstance(member, Mapping) else ""
+    found = CODE.search(text.strip())
+    return None if found is None else f"{found[1].upper()}:{found[2].upper()}"
