@@ -19,6 +19,7 @@ from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.unknowns import StartValues
 from aerotri.adjustment.weak_geometry import minimise_tied
+from aerotri.conventions import InputError
 from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block, transform_result
 from aerotri.coordinates.metric import outside_in_words
@@ -251,6 +252,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     held = [(int(point), int(axis)) for point, axis in saved.held]
     measured = replace(local, image_points=replace(local.image_points, xy=saved.xy))
     system, state = build_system(measured, start, saved.ray_status, held)
+    _refuse_other_parameters(system, saved)
     state = replace(state, shared=saved.shared)
     estimator = Estimator(saved.estimator_code, saved.estimator_limit)
     system.refresh_motions(state)
@@ -266,6 +268,17 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     delivered = result if frame is None else transform_result(result, block, frame)
     found = Adjustment(delivered, result, system, solution, frame)
     return found if saved.verdict else judged(found)
+
+
+def _refuse_other_parameters(system: NormalSystem, saved: SavedSolution) -> None:
+    """The shared parameters of the file have to be those of the block, one by one."""
+    own, kept = system.unknowns.shared, saved
+    same = len(own.names) == len(kept.shared) and (
+        list(own.names) == kept.shared_names.tolist() and list(own.groups) == kept.shared_groups.tolist()
+    )
+    if not same:
+        message = f"has {len(kept.shared)} shared parameters, the block beside it {len(own.names)} or others"
+        raise InputError(message, "adjust the block again", "solution.npz")
 
 
 def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray | None) -> Adjustment:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import sqlite3
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +12,13 @@ from shapely.geometry import shape
 from shapely.geometry.base import BaseGeometry
 
 from aerotri.conventions import InputError
+from aerotri.geojson import LARGEST_M, crs_of_name, read_geojson
+from aerotri.geopackage import read_geopackage
 from aerotri.vector_crs import VectorSystem, system_of_geojson, vector_system
 
 VECTOR_ENDINGS = (".geojson", ".json", ".gpkg")
 KINDS = ("Polygon", "MultiPolygon")
-ENVELOPE_BYTES = (0, 32, 48, 48, 64)
-"""Of a GeoPackage geometry, by the kind of envelope its header has."""
+WKT_REMEDY = "give POLYGON ((X Y, …)) or MULTIPOLYGON"
 
 Feature = tuple[Mapping[str, Any], BaseGeometry]
 
@@ -39,14 +37,16 @@ def polygon_features(path: Path, epsg: int | None = None) -> tuple[list[Feature]
     """
     read = _gpkg_features if path.suffix.lower() == ".gpkg" else _geojson_features
     found: list[Feature] = []
+    number = 0
     try:
         features, system = read(path, epsg)
         for number, (properties, geometry) in enumerate(features, start=1):
-            if geometry is None or geometry.geom_type not in KINDS or geometry.is_empty:
+            if geometry is None or geometry.is_empty:
                 raise InputError(f"feature {number} is no polygon", "give polygons only", path)
             found.append((properties, placed(shapely.force_2d(geometry), system, path)))
-    except (OSError, ValueError, KeyError, TypeError, IndexError, sqlite3.Error, shapely.errors.ShapelyError) as error:
-        raise InputError(f"cannot be read: {error}", "give polygons as GeoJSON or GeoPackage", path) from error
+    except (ValueError, shapely.errors.ShapelyError) as error:
+        # shapely refuses rings of too few corners
+        raise InputError(f"a feature is no polygon: {error}", "correct its rings", path) from error
     return found, system.note
 
 
@@ -60,7 +60,8 @@ def placed(geometry: BaseGeometry, system: VectorSystem, path: Path | None = Non
 def srid_of_wkt(text: str) -> str | None:
     """The CRS that `SRID=…;` before a WKT text names, None where there is none."""
     number = text.strip()[5:].partition(";")[0].strip() if text.strip().upper().startswith("SRID=") else ""
-    return f"EPSG:{int(number)}" if number.isdigit() and int(number) > 0 else None
+    known = number.isascii() and number.isdigit() and len(number) < 9
+    return f"EPSG:{int(number)}" if known and int(number) > 0 else None
 
 
 def polygon_of_wkt(text: str, path: Path | None = None) -> BaseGeometry:
@@ -70,45 +71,45 @@ def polygon_of_wkt(text: str, path: Path | None = None) -> BaseGeometry:
     ------
     InputError
     """
+    plain = text.partition(";")[2] if text.upper().lstrip().startswith("SRID=") else text
+    if not plain.lstrip().upper().startswith(("POLYGON", "MULTIPOLYGON")):
+        raise InputError("is no polygon", WKT_REMEDY, path)
     try:
-        geometry = shapely.from_wkt(text.partition(";")[2] if text.upper().startswith("SRID=") else text)
+        # numbers beyond all bounds are refused below
+        with np.errstate(all="ignore"):
+            geometry = shapely.from_wkt(plain)
     except shapely.errors.ShapelyError as error:
-        raise InputError(f"is no WKT: {error}", "give POLYGON ((X Y, …)) or MULTIPOLYGON", path) from error
+        raise InputError(f"is no WKT: {str(error)[:200]}", WKT_REMEDY, path) from error
     if geometry is None or geometry.geom_type not in KINDS or geometry.is_empty:
-        raise InputError("is no polygon", "give POLYGON ((X Y, …)) or MULTIPOLYGON", path)
+        raise InputError("is no polygon", WKT_REMEDY, path)
+    if not (np.abs(shapely.get_coordinates(geometry)) <= LARGEST_M).all():
+        raise InputError("has a coordinate that is not possible", "give metres", path)
     return shapely.force_2d(geometry)
 
 
 def _geojson_features(path: Path, epsg: int | None) -> tuple[Sequence[tuple[Mapping[str, Any], Any]], VectorSystem]:
-    content = json.loads(path.read_text(encoding="utf-8-sig"))
+    name, read = read_geojson(path)
     features = [
-        (feature.get("properties") or {}, None if feature["geometry"] is None else shape(feature["geometry"]))
-        for feature in content["features"]
+        (one.properties, shape({"type": one.kind, "coordinates": one.coordinates}) if one.kind in KINDS else None)
+        for one in read
     ]
     xy = [shapely.get_coordinates(geometry) for _, geometry in features if geometry is not None]
     places = np.concatenate(xy) if xy else np.zeros((0, 2))
-    return features, system_of_geojson(content, places, epsg, path.name)
+    return features, system_of_geojson(crs_of_name(name), places, epsg, path.name)
 
 
 def _gpkg_features(path: Path, epsg: int | None) -> tuple[Sequence[tuple[Mapping[str, Any], Any]], VectorSystem]:
-    if not path.is_file():
-        raise InputError("there is no such file", "give a GeoPackage", path)
-    with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as database:
-        database.row_factory = sqlite3.Row
-        layers = database.execute("SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns").fetchall()
-        if len(layers) != 1:
-            raise InputError(f"has {len(layers)} layers", "give a GeoPackage with one layer of polygons", path)
-        table, column, srs = layers[0]
-        quoted = '"' + str(table).replace('"', '""') + '"'
-        features = [
-            ({key.lower(): row[key] for key in row.keys() if key != column}, _gpkg_geometry(row[column]))  # noqa: SIM118
-            for row in database.execute(f"SELECT * FROM {quoted}")
-        ]
-    return features, vector_system(f"EPSG:{srs}" if srs > 0 else None, epsg, path.name)
+    layers, features, system = 0, [], VectorSystem()
+    for layers, (_, srs, rows) in enumerate(read_geopackage(path), start=1):
+        if layers > 1:
+            break
+        features = [(row.properties, _polygon(row.parts) if row.kind in KINDS else None) for row in rows]
+        system = vector_system(None if srs is None else f"EPSG:{srs}", epsg, path.name)
+    if layers != 1:
+        raise InputError(f"has {layers or 'no'} layers", "give a GeoPackage with one layer of polygons", path)
+    return features, system
 
 
-def _gpkg_geometry(blob: bytes) -> BaseGeometry:
-    """The geometry of a GeoPackage blob: a header, then WKB [L: OGC 12-128]."""
-    if blob[:2] != b"GP":
-        raise ValueError("a geometry is none of GeoPackage")
-    return shapely.from_wkb(blob[8 + ENVELOPE_BYTES[(blob[3] >> 1) & 7] :])
+def _polygon(parts: list[list[np.ndarray]]) -> BaseGeometry:
+    polygons = [shapely.Polygon(rings[0], rings[1:]) if rings else shapely.Polygon() for rings in parts]
+    return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)

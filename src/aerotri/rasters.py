@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerotri.conventions import InputError
+from aerotri.geojson import LARGEST_M
 
 NO_DATA = -9999.0
 """Stands for what is not known in the files of this program."""
@@ -27,6 +28,7 @@ CACHE_MB = 256
 TILE = 512
 SIGMA = "σ"
 """The description of a band of σ begins with it."""
+DAMAGED = "write the file anew, it is damaged"
 KEPT_OPTIONS = ("compress", "predictor")
 
 
@@ -108,19 +110,19 @@ class RasterReader:
 
     def __init__(self, path: str | os.PathLike, band: int = 1):
         import rasterio
-        from rasterio.errors import RasterioError
 
         self.path, self.band = Path(path), band
+        with _told(self.path, "is no raster", "give a GeoTIFF"), _quietly():
+            self._file = rasterio.open(self.path)
         try:
-            with _quietly():
-                self._file = rasterio.open(self.path)
-        except RasterioError as error:
-            raise InputError(f"is no raster: {error}", "give a GeoTIFF", self.path) from error
-        try:
-            self._check()
+            with _told(self.path, "cannot be read", DAMAGED):
+                self._check()
+                self._look()
         except InputError:
             self._file.close()
             raise
+
+    def _look(self) -> None:
         t = self._file.transform
         self.grid = Grid(self._file.height, self._file.width, t.c, t.f, t.a, -t.e)
         given = np.dtype(self._file.dtypes[0])
@@ -141,6 +143,8 @@ class RasterReader:
         t = file.transform
         if t.b or t.d or t.a <= 0.0 or t.e >= 0.0:
             raise InputError("is turned, mirrored or without georeference", "give a north-up GeoTIFF", self.path)
+        if not all(abs(value) <= LARGEST_M for value in (t.a, t.c, t.e, t.f)):
+            raise InputError("lies at no possible place", "give a north-up GeoTIFF in metres", self.path)
         if np.dtype(file.dtypes[0]).kind not in "iuf":
             raise InputError(f"has values of type {file.dtypes[0]}", "give numbers", self.path)
         if file.scales[0] != 1.0 or file.offsets[0] != 0.0:
@@ -151,7 +155,8 @@ class RasterReader:
         """Code of the CRS, of its plan where it has a height system too; None where it has none."""
         if self.crs is None:
             return None
-        code = self.crs.to_epsg()
+        with _told(self.path, "has a CRS that cannot be read", "write the file anew"):
+            code = self.crs.to_epsg()
         if code is None:
             from pyproj import CRS
             from pyproj.exceptions import CRSError
@@ -179,13 +184,9 @@ class RasterReader:
         return out
 
     def _values(self, window) -> np.ndarray:
-        from rasterio.errors import RasterioError
-
-        try:
+        with _told(self.path, "cannot be read", DAMAGED):
             raw = self._file.read(self.band, window=window)
             mask = self._file.read_masks(self.band, window=window) if self._masked else None
-        except RasterioError as error:
-            raise InputError(f"cannot be read: {error}", "write the file anew, it is damaged", self.path) from error
         values = raw.astype(self.dtype, copy=False)
         if mask is not None:
             values[mask == 0] = np.nan
@@ -340,6 +341,19 @@ def _transform(grid: Grid) -> Any:
     from rasterio import Affine
 
     return Affine(grid.cell_x, 0.0, grid.left, 0.0, -grid.cell_y, grid.top)
+
+
+@contextmanager
+def _told(path: Path, what: str, remedy: str) -> Iterator[None]:
+    """What rasterio and GDAL raise over a damaged file as an error that names it."""
+    from rasterio._err import CPLE_BaseError
+    from rasterio.errors import RasterioError
+
+    try:
+        yield
+    except (RasterioError, CPLE_BaseError, OSError, ValueError, MemoryError, SystemError) as error:
+        short = (str(error.__cause__ or error).splitlines() or [""])[0][:200] or type(error).__name__
+        raise InputError(f"{what}: {short}", remedy, path) from error
 
 
 @contextmanager

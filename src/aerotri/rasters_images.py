@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import rasterio
+from rasterio._err import CPLE_BaseError
 from rasterio.enums import ColorInterp, MaskFlags
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 from rasterio.transform import Affine
@@ -80,13 +81,14 @@ class Photograph:
 
     def left_out(self) -> tuple[str, ...]:
         """What a copy of the pixels does not carry, in words."""
-        flags = self.dataset.mask_flag_enums
+        with _told(self.path):
+            flags, domains = self.dataset.mask_flag_enums, self.dataset.tag_namespaces()
+            pages = len(self.dataset.subdatasets) - 1
         masked = any(MaskFlags.per_dataset in band and MaskFlags.alpha not in band for band in flags)
-        pages = len(self.dataset.subdatasets) - 1
         lost = ["its mask"] if masked else []
         if pages > 0:
             lost.append(f"its {pages} further pages")
-        lost += [f"its {domain[4:]} packet" for domain in self.dataset.tag_namespaces() if domain.startswith("xml:")]
+        lost += [f"its {domain[4:]} packet" for domain in domains if domain.startswith("xml:")]
         return tuple(lost)
 
     def read(self, first: int, last: int) -> np.ndarray:
@@ -115,7 +117,9 @@ def open_photograph(path: str | os.PathLike) -> Iterator[Photograph]:
     with _told(path), rasterio.Env(**SETTINGS):
         dataset = rasterio.open(path.resolve(), driver=_driver(path))
     with dataset:
-        yield Photograph(path, dataset, _bits(path, dataset))
+        with _told(path):
+            bits = _bits(path, dataset)
+        yield Photograph(path, dataset, bits)
 
 
 def _driver(path: Path) -> str:
@@ -149,7 +153,7 @@ def _told(path: Path) -> Iterator[None]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
             yield
-    except (RasterioError, OSError, ValueError, UnicodeError, MemoryError) as error:
+    except (RasterioError, CPLE_BaseError, OSError, ValueError, UnicodeError, MemoryError, SystemError) as error:
         cause = error.__cause__ or error
         raise InputError(
             f"cannot be read: {str(cause).strip() or type(cause).__name__}", "give a whole TIFF or JPEG file", path

@@ -139,7 +139,7 @@ WRONG = {
     "nan": (SMALL.replace("\n450\n", "\nnan\n"), 21, "'nan' is not a finite number"),
     "camera": (SMALL.replace("\n1 2 -7", "\n2 2 -7"), 5, "names a camera or point that there is not"),
     "point": (SMALL.replace("\n1 2 -7", "\n1 3 -7"), 5, "names a camera or point that there is not"),
-    "far": (SMALL.replace("-7 8e1", "-7 8e300"), 5, "outside of any image"),
+    "far": (SMALL.replace("-7 8e1", "-7 8e14"), 5, "outside of any image"),
     "twice": (SMALL.replace("\n1 2 -7", "\n1 0 -7"), 5, "observed twice"),
     "focal length": (SMALL.replace("\n450\n", "\n-450\n"), 21, "focal length is not positive"),
 }

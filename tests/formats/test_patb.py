@@ -163,7 +163,7 @@ WRONG_IM = {
     "photograph twice": (IM.replace("  102 ", "  101 "), 5, "'101' is there twice"),
     "point twice": (IM.replace("        2 ", "        1 "), 3, "point '1' in photograph '101' is there twice"),
     "principal distance": (IM.replace("152818.000", "-152818.0", 1), 1, "is not positive"),
-    "far": (IM.replace("2000.25", "2e30"), 2, "outside of any image"),
+    "far": (IM.replace("2000.25", "2e13"), 2, "outside of any image"),
 }
 WRONG_ORI = {
     "empty": ("", 1, "is empty"),

@@ -139,7 +139,10 @@ def _surface(
         xyz = table.xyz[table.accepted]
     else:
         raise InputError("is of no known kind", "give a GeoTIFF, LAZ, or pickets.parquet", path)
-    surface = PointHeights.of(xyz)
+    try:
+        surface = PointHeights.of(xyz)
+    except InputError as error:
+        raise InputError(error.message, error.remedy, path) from error
     area = np.array([xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)])
     return surface, area, float(np.sqrt(np.prod(area[1] - area[0]) / len(xyz))), None
 

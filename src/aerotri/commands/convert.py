@@ -157,8 +157,7 @@ def _from_result(request: Request, target: Path, to: str) -> tuple[str, ...]:
     from aerotri.formats.block_folder import read_block
     from aerotri.formats.convert import BLOCK_WRITERS, write_any, write_oriented
     from aerotri.formats.oriented import oriented_from_adjusted
-    from aerotri.formats.solution import read_solution
-    from aerotri.pipeline import reopen
+    from aerotri.opening import open_result
 
     if request != type(request)(request.source, request.name, stated=request.stated):
         raise InputError("a result is whole", "leave out what would add to it", request.source)
@@ -166,8 +165,7 @@ def _from_result(request: Request, target: Path, to: str) -> tuple[str, ...]:
     block = read_block(source / "block")
     if to == "block" or to in BLOCK_WRITERS:
         return write_any(block, target, to)
-    saved = read_solution(source / "solution.npz")
-    return write_oriented(oriented_from_adjusted(reopen(block, saved).result), target, to, request.stated.geoid)
+    return write_oriented(oriented_from_adjusted(open_result(source).result), target, to, request.stated.geoid)
 
 
 def _at_start_values(reading: Reading, to: str) -> tuple[OrientedBlock | None, tuple[str, ...]]:

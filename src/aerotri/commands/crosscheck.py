@@ -56,14 +56,13 @@ def _adjusted(source: Path, console: Console) -> AdjustedBlock:
 
 def _adjustment(source: Path, console: Console) -> Adjustment:
     from aerotri.compiled import compilation_notice
-    from aerotri.pipeline import adjust_keeping_system, reopen
+    from aerotri.pipeline import adjust_keeping_system
 
     console.progress(compilation_notice())
     if (source / "solution.npz").is_file():
-        from aerotri.formats.block_folder import read_block
-        from aerotri.formats.solution import read_solution
+        from aerotri.opening import open_result
 
-        return reopen(read_block(source / "block"), read_solution(source / "solution.npz"))
+        return open_result(source)
     from aerotri.formats.convert import read_any
 
     block, points = read_any(source)
@@ -88,11 +87,14 @@ def _write(result: CrosscheckResult, adjusted: AdjustedBlock, target: Path) -> N
 def _write_table(result: CrosscheckResult, path: Path) -> None:
     import csv
 
+    from aerotri.spreadsheet import plain_row
+
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["peer", "kind", "count", "max", "rms", "worst"])
         for check in result.checks:
-            writer.writerows([check.peer, d.kind, d.count, d.max, d.rms, d.worst] for d in check.differences)
+            rows = ([check.peer, d.kind, d.count, d.max, d.rms, d.worst] for d in check.differences)
+            writer.writerows(plain_row(row) for row in rows)
 
 
 def _tell(result: CrosscheckResult, target: Path, console: Console, as_json: bool) -> None:

@@ -213,16 +213,18 @@ def _write_tables(folder: Path, d: BlockDeformation) -> None:
     """models.csv, which `demcor --models model.tif` takes, and seams.csv."""
     import csv
 
+    from aerotri.spreadsheet import plain_row
+
     with (folder / "models.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["number", "left", "right"])
-        writer.writerows([k, *one.model.names] for k, one in enumerate(d.models))
+        writer.writerows(plain_row([k, *one.model.names]) for k, one in enumerate(d.models))
     with (folder / "seams.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["first_left", "first_right", "second_left", "second_right", "nodes", "mean", "rms", "max"])
         for seam in d.seams:
             names = (*d.models[seam.first].model.names, *d.models[seam.second].model.names)
-            writer.writerow([*names, seam.count, seam.mean, seam.rms, seam.max])
+            writer.writerow(plain_row([*names, seam.count, seam.mean, seam.rms, seam.max]))
 
 
 def _summary(content: dict[str, Any]) -> list[str]:

@@ -63,9 +63,7 @@ def read_result(folder: Path, console: Console) -> AdjustedBlock:
     InputError
     """
     from aerotri.compiled import compilation_notice
-    from aerotri.formats.block_folder import read_block
-    from aerotri.formats.solution import read_solution
-    from aerotri.pipeline import AdjustmentFailedError, reopen
+    from aerotri.opening import open_result
 
     remedy = "give the folder that `aerotri adjust` wrote"
     if not folder.is_dir():
@@ -74,11 +72,7 @@ def read_result(folder: Path, console: Console) -> AdjustedBlock:
         raise InputError(f"'{folder}' holds no adjustment.json", remedy)
     console.progress(compilation_notice() or f"reading {folder}")
     try:
-        saved = read_solution(folder / "solution.npz")
-        return reopen(read_block(folder / "block"), saved).result
+        return open_result(folder).result
     except InputError as error:
         # both folders have files of the same names
         raise InputError(f"result '{folder}': {error}") from None
-    except (AdjustmentFailedError, ValueError, IndexError) as error:
-        what = f"result '{folder}': solution.npz does not belong to the block beside it ({error})"
-        raise InputError(what, "adjust the block again") from error

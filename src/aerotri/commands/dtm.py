@@ -172,10 +172,12 @@ def write_terrain(target: Path, outcome: TerrainOutcome, calibration: Adjustment
 def _write_models(path: Path, names: np.ndarray, pairs: np.ndarray) -> None:
     import csv
 
+    from aerotri.spreadsheet import plain_row
+
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["number", "left", "right"])
-        writer.writerows([k, names[a], names[b]] for k, (a, b) in enumerate(pairs.tolist()))
+        writer.writerows(plain_row([k, names[a], names[b]]) for k, (a, b) in enumerate(pairs.tolist()))
 
 
 def summary(content: dict[str, Any]) -> list[str]:

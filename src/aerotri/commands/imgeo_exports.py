@@ -153,6 +153,7 @@ def _nearest_record(nearest: NearestLens) -> dict[str, Any]:
 def _correction_rows(adjusted: AdjustedBlock, errors: ErrorFunction) -> str:
     from aerotri.image_errors import systematic_errors
     from aerotri.image_errors.error_exports import correction_nodes
+    from aerotri.spreadsheet import plain_row
 
     nodes = correction_nodes(errors.camera)
     d = errors.of_measured(nodes.xy)
@@ -163,7 +164,8 @@ def _correction_rows(adjusted: AdjustedBlock, errors: ErrorFunction) -> str:
     numbers = np.hstack([nodes.column_row, nodes.xy, d, sigma])
     for tile, row in zip(nodes.tile.tolist(), numbers.tolist(), strict=True):
         place = [f"{value:.3f}" for value in row[:2]]
-        writer.writerow([errors.camera.name, errors.group, tile, *place, *(f"{value:.7f}" for value in row[2:])])
+        names = plain_row([errors.camera.name, errors.group])
+        writer.writerow([*names, tile, *place, *(f"{value:.7f}" for value in row[2:])])
     return text.getvalue()
 
 

@@ -24,23 +24,18 @@ def reopened(result: Path, console: Console) -> Adjustment:
     """
     from aerotri.compiled import compilation_notice
     from aerotri.coordinates.georeference import is_projected
-    from aerotri.formats.block_folder import read_block
-    from aerotri.formats.solution import read_solution
-    from aerotri.pipeline import reopen
+    from aerotri.opening import open_result
 
-    if not (result / "solution.npz").is_file():
-        raise InputError("holds no adjustment", "give the folder that `aerotri adjust` wrote", result)
     console.progress(compilation_notice())
-    saved = read_solution(result / "solution.npz")
-    if saved.status != "converged":
-        raise InputError(f"the adjustment ended '{saved.status}'", "give the result of a converged one", result)
-    block = read_block(result / "block")
+    found = open_result(result)
+    status, block = found.solution.status, found.result.block
+    if status != "converged":
+        raise InputError(f"the adjustment ended '{status}'", "give the result of a converged one", result)
     if block.crs != "local" and not is_projected(block.crs):
         raise InputError(
             f"the result is in {block.crs}, which counts in degrees",
             "adjust the block again: `aerotri adjust` brings it to metres", result,
         )  # fmt: skip
-    found = reopen(block, saved)
     outcome = found.result.outcome
     if outcome.verdict != "accepted":
         console.failure(f"{result}: the adjustment is {outcome.verdict}: {outcome.reasons[0]}")

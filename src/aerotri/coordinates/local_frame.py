@@ -164,7 +164,12 @@ def local_frame(
         )
     reference = georeference(crs, around, geoid)
     if origin is None:
-        origin = _middle(*(np.radians(v) for v in reference.horizontal.transform(around[:, 0], around[:, 1])))
+        lon, lat = reference.horizontal.transform(around[:, 0], around[:, 1])
+        if not (np.isfinite(lon).all() and np.isfinite(lat).all()):
+            raise InputError(
+                f"a position of the block is no place in {crs}", "correct it, or the crs", file="block.toml"
+            )
+        origin = _middle(np.radians(lon), np.radians(lat))
     return _frame(reference, np.asarray(origin, dtype=float))
 
 

@@ -18,6 +18,7 @@ from shapely.geometry import mapping
 from aerotri.conventions import InputError
 from aerotri.polygons import polygon_features
 from aerotri.rasters import Grid, RasterReader, rasterise
+from aerotri.spreadsheet import with_formula
 
 
 class ModelMap(Protocol):
@@ -126,7 +127,8 @@ def read_number_table(path: Path) -> dict[int, tuple[str, str]]:
     out: dict[int, tuple[str, str]] = {}
     for line, row in enumerate(rows, start=2):
         try:
-            number, names = int(row["number"]), (row["left"].strip(), row["right"].strip())
+            number = int(row["number"])
+            names = with_formula(row["left"].strip()), with_formula(row["right"].strip())
         except (KeyError, ValueError, AttributeError, TypeError) as error:
             remedy = "give a whole number and two names"
             raise InputError("is no row of number,left,right", remedy, path, line) from error

@@ -19,6 +19,7 @@ from aerotri.conventions import InputError
 from aerotri.formats.atomic import atomic_file
 from aerotri.formats.csv_text import read_bytes
 from aerotri.formats.oriented import OrientedBlock
+from aerotri.formats.tables import LARGEST_NUMBER
 from aerotri.formats.text_lines import line_of_word
 from aerotri.functional_model.rotation import angles_from_rotation, exponential, logarithm
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Prior, Settings
@@ -27,6 +28,7 @@ PIXEL_UM = 1000.0
 CAMERA_VALUES = 9
 FARTHEST_PX = 1e6
 """No photograph reaches farther from its centre."""
+SMALLEST_FOCAL_PX = 1e-3
 WRITTEN_LENS = ("k1", "k2")
 
 
@@ -124,16 +126,16 @@ def _parse(path: Path) -> tuple[int, int, np.ndarray, np.ndarray, np.ndarray]:
         values = np.array(words[3:], dtype=float)
     except ValueError:
         values = np.array([_number(word) for word in words[3:]])
-    bad = np.flatnonzero(~np.isfinite(values))
+    bad = np.flatnonzero(~(np.abs(values) <= LARGEST_NUMBER))
     if len(bad):
         place = int(bad[0]) + 3
         word = words[place][:60].decode("utf-8", "replace")
-        line = line_of_word(raw, place)
-        raise InputError(f"'{word}' is not a finite number", "repair the file", path, line)
+        what = "is not possible" if np.isfinite(values[bad[0]]) else "is not a finite number"
+        raise InputError(f"'{word}' {what}", "repair the file", path, line_of_word(raw, place))
     observations = values[: 4 * m].reshape(m, 4)
     cameras = values[4 * m : 4 * m + CAMERA_VALUES * n_images].reshape(n_images, CAMERA_VALUES)
     _check_observations(observations, (n_images, n_points), raw, path)
-    short = np.flatnonzero(cameras[:, 6] <= 0.0)
+    short = np.flatnonzero(cameras[:, 6] < SMALLEST_FOCAL_PX)
     if len(short):
         place = 3 + 4 * m + CAMERA_VALUES * int(short[0]) + 6
         raise InputError("a focal length is not positive", "repair the camera", path, line_of_word(raw, place))

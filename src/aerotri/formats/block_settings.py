@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from aerotri.conventions import LARGEST, InputError
 from aerotri.formats.csv_text import BLANKS
-from aerotri.formats.tables import CONTROL_CHARACTERS
+from aerotri.formats.tables import CONTROL_CHARACTERS, SMALLEST_POSITIVE
 from aerotri.formats.toml_text import line_of_key, read_toml
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.observations import (
@@ -27,7 +27,7 @@ from aerotri.observations import (
 from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
 
 Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[float, Field(gt=0, le=LARGEST)]
+Positive = Annotated[float, Field(gt=0, ge=SMALLEST_POSITIVE, le=LARGEST)]
 Fraction = Annotated[float, Field(gt=0, lt=1)]
 Pixels = Annotated[int, Field(gt=0, le=10_000_000)]
 Three = Annotated[list[Real], Field(min_length=3, max_length=3)]

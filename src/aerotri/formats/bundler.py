@@ -15,10 +15,11 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.atomic import atomic_folder
-from aerotri.formats.bal import FARTHEST_PX, WRITTEN_LENS
+from aerotri.formats.bal import FARTHEST_PX, SMALLEST_FOCAL_PX, WRITTEN_LENS
 from aerotri.formats.csv_text import read_bytes
 from aerotri.formats.oriented import OrientedBlock
 from aerotri.formats.parts import Reading, texts
+from aerotri.formats.tables import LARGEST_NUMBER
 from aerotri.formats.text_lines import TextFile, check_words, first_lines, is_number, line_of_word
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Prior, Settings
@@ -61,9 +62,10 @@ class _Numbers:
         except ValueError:
             good = [is_number(word.decode("utf-8", "replace")) for word in self.words]
             raise self.error(good.index(False) if False in good else 0, "is not a number") from None
-        bad = np.flatnonzero(~np.isfinite(self.values))
+        bad = np.flatnonzero(~(np.abs(self.values) <= LARGEST_NUMBER))
         if len(bad):
-            raise self.error(int(bad[0]), "is not a finite number")
+            finite = np.isfinite(self.values[bad[0]])
+            raise self.error(int(bad[0]), "is not possible" if finite else "is not a finite number")
 
     def error(self, place: int, message: str) -> InputError:
         word = self.words[place].decode("utf-8", "replace")[:60] if place < len(self.words) else "the end"
@@ -123,7 +125,7 @@ def _check_cameras(numbers: _Numbers, cameras: np.ndarray) -> None:
     bad = np.flatnonzero((cameras[:, 0] > 0.0) & odd)
     if len(bad):
         raise numbers.error(2 + CAMERA_VALUES * int(bad[0]) + 3, "begins a matrix that is no rotation")
-    negative = np.flatnonzero(cameras[:, 0] < 0.0)
+    negative = np.flatnonzero((cameras[:, 0] < SMALLEST_FOCAL_PX) & (cameras[:, 0] != 0.0))
     if len(negative):
         raise numbers.error(2 + CAMERA_VALUES * int(negative[0]), "is no principal distance")
 

@@ -12,6 +12,7 @@ camera's own where it is known.
 from __future__ import annotations
 
 import os
+import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
@@ -22,7 +23,9 @@ import numpy as np
 
 from aerotri.conventions import InputError, mm_from_px, px_from_mm
 from aerotri.formats.atomic import atomic_folder
+from aerotri.formats.colmap_binary import check_binary_model
 from aerotri.formats.oriented import OrientedBlock
+from aerotri.formats.tables import CONTROL_CHARACTERS, LARGEST_NUMBER, LONGEST_NAME
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Prior, Settings
 from aerotri.observations.block import LENS_NAMES
@@ -39,6 +42,7 @@ LENS_OF_MODEL: Mapping[str, tuple[str, ...]] = {
 """Models that can be expressed, and their lens parameters in COLMAP's order."""
 TWO_FOCAL_LENGTHS = ("PINHOLE", "OPENCV", "FULL_OPENCV")
 SIGN = {"p1": -1.0}
+SMALLEST_FOCAL_PX, MOST_PIXELS, LARGEST_RATIO = 1e-3, 10_000_000, 100.0
 FILES = ("cameras", "images", "points3D")
 OWN_ENTRIES = tuple(f"{name}.{end}" for name in (*FILES, "rigs", "frames") for end in ("txt", "bin"))
 
@@ -80,10 +84,13 @@ def read_colmap(folder: str | os.PathLike, pixel_um: float = 1.0) -> tuple[Block
     cameras, camera_place = _cameras_of(model, pixel_um, folder)
     ids = sorted(model.images)
     images = _images_of(model, ids, camera_place)
+    _check_images(images, folder)
     image, point_id, px = _observations(model, ids)
     image, point_id, px = _once_each(image, point_id, px)
     if not len(image):
         raise InputError("the model has no points that were measured", "export it with its points", folder)
+    if not (np.abs(px) <= MOST_PIXELS).all():
+        raise InputError("an image point lies outside of any image", "export the model anew", folder)
     numbers, first, point = np.unique(point_id, return_index=True, return_inverse=True)
     appearance = np.argsort(first)
     place = np.empty_like(appearance)
@@ -104,7 +111,19 @@ def read_colmap(folder: str | os.PathLike, pixel_um: float = 1.0) -> tuple[Block
             image_sigma_um=pixel_um,
         ),
     )
-    return block, np.array([model.points3D[number].xyz for number in numbers.tolist()])
+    return block, _points_of(model, numbers, folder)
+
+
+def _points_of(model: Any, numbers: np.ndarray, folder: Path) -> np.ndarray:
+    """(N, 3) the object points of these numbers."""
+    missing = [number for number in numbers.tolist() if number not in model.points3D]
+    if missing:
+        message = f"image points belong to object point {missing[0]}, which there is not"
+        raise InputError(message, "export the model with its points", folder)
+    xyz = np.array([model.points3D[number].xyz for number in numbers.tolist()])
+    if not (np.abs(xyz) <= LARGEST_NUMBER).all():
+        raise InputError("an object point lies at no possible place", "export the model anew", folder)
+    return xyz
 
 
 def _read_model(folder: Path) -> Any:
@@ -112,6 +131,7 @@ def _read_model(folder: Path) -> Any:
 
     if not is_colmap(folder):
         raise InputError("holds no COLMAP model", "give a folder with cameras, images and points3D", folder)
+    check_binary_model(folder)
     try:
         return pycolmap.Reconstruction(folder)
     except (RuntimeError, ValueError, IndexError, MemoryError, OSError) as error:
@@ -147,7 +167,9 @@ def _camera_of(camera: Any, pixel_um: float, folder: Path) -> Camera:
             "estimate it as OPENCV or with k4 to k6 held at 0",
             folder,
         )
-    if min(focal) <= 0.0 or not np.isfinite(values).all():
+    possible = min(focal) >= SMALLEST_FOCAL_PX and max(focal) < LARGEST_RATIO * min(focal)
+    possible = possible and (np.abs(values) <= LARGEST_NUMBER).all()
+    if not possible or not 0 < min(camera.width, camera.height) <= max(camera.width, camera.height) <= MOST_PIXELS:
         raise InputError(f"camera {camera.camera_id} has no valid parameters", "calibrate it first", folder)
     size = (int(camera.width), int(camera.height))
     x0, y0 = mm_from_px(np.array([[cx, cy]]), size, pixel_um * 1e-3)[0]
@@ -178,6 +200,8 @@ def _images_of(model: Any, ids: list[int], camera_place: dict[int, int]) -> Imag
         image = model.images[number]
         if image.has_pose:
             colmap_from_world = image.cam_from_world().matrix()
+            if not (np.abs(colmap_from_world) <= LARGEST_NUMBER).all():
+                continue
             rotation = colmap_from_world[:, :3].T @ COLMAP_FROM_CAMERA
             centre[row] = -colmap_from_world[:, :3].T @ colmap_from_world[:, 3]
             angles[row] = angles_from_rotation(rotation)
@@ -188,6 +212,17 @@ def _images_of(model: Any, ids: list[int], camera_place: dict[int, int]) -> Imag
         centre=centre,
         angles=angles,
     )
+
+
+def _check_images(images: Images, folder: Path) -> None:
+    """Refuse names that occur twice or that no table could hold, and photographs at no possible place."""
+    names = images.names.tolist()
+    odd = [name for name in names if not name or len(name) > LONGEST_NAME or re.search(CONTROL_CHARACTERS, name)]
+    if odd or len(set(names)) < len(names):
+        what = f"{odd[0][:60]!r} is no name of an image" if odd else "two images have the same name"
+        raise InputError(what, "export the model anew", folder)
+    if (np.abs(images.centre) > LARGEST_NUMBER).any() or (np.isnan(images.centre) != np.isnan(images.angles)).any():
+        raise InputError("an image lies at no possible place", "export the model anew", folder)
 
 
 def _observations(model: Any, ids: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

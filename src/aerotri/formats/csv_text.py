@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.spreadsheet import with_formula
 
 UTF8_REMEDY = "save the table as UTF-8"
 QUOTE = b'"'
@@ -139,7 +140,7 @@ def cells(line: bytes) -> list[str]:
 
 def _header_cells(text: bytes, path: Path, line: int) -> tuple[str, ...]:
     try:
-        return tuple(cell.strip(BLANKS) for cell in cells(text))
+        return tuple(with_formula(cell.strip(BLANKS)) for cell in cells(text))
     except UnicodeDecodeError as error:
         raise InputError("is not UTF-8", UTF8_REMEDY, path, line) from error
     except csv.Error as error:

@@ -18,7 +18,7 @@ from aerotri.conventions import RADIANS_PER, InputError, mm_from_px
 from aerotri.formats.dbat_camera import DbatCamera, estimated_elements, read_camera
 from aerotri.formats.dbat_script import Script, one, read_script
 from aerotri.formats.table_checks import refuse_duplicates, sigma_columns
-from aerotri.formats.tables import Columns, Table, read_table
+from aerotri.formats.tables import LARGEST_NUMBER, SMALLEST_POSITIVE, Columns, Table, read_table
 from aerotri.formats.xml_text import read_xml, text_of
 from aerotri.observations import (
     AdjustmentSettings,
@@ -106,6 +106,8 @@ def _images(script: Script, camera_numbers: list[str]) -> tuple[Images, list[str
     table = script.table(one(script.root, "input/images/file", script.path), ("id",), ("path", "label", "cam"))
     refuse_duplicates(table, table.text["id"].index, lambda row: f"image '{table.cell('id', row)}'")
     ids = table.text["id"].rows().tolist()
+    if not ids:
+        raise InputError("holds no images", "give a row for every photograph", table.path)
     source = next(field for field in ("path", "label", "id") if field in table.text)
     names = np.array([re.split(r"[/\\]", text)[-1] for text in table.text[source].rows().tolist()], dtype=str)
     if len(set(names.tolist())) < len(names):
@@ -199,8 +201,8 @@ def _positive(text: str, name: str, path: Path) -> float:
         value = float(text)
     except ValueError:
         value = np.nan
-    if not 0.0 < value < np.inf:
-        raise InputError(f"{name} = '{text}' is not a standard deviation", "give pixels, greater than 0", path)
+    if not SMALLEST_POSITIVE <= value <= LARGEST_NUMBER:
+        raise InputError(f"{name} = '{text[:60]}' is not a standard deviation", "give pixels, greater than 0", path)
     return value
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from aerotri.conventions import InputError
+from aerotri.formats.tables import SMALLEST_POSITIVE
 from aerotri.formats.xml_text import child_text, numbers, text_of
 from aerotri.observations import Camera, Prior
 
@@ -100,7 +101,7 @@ def _pixel_mm(element: Element, size_px: tuple[int, int], name: str, path: Path)
             "give it with square pixels; affinity and shear are the additional parameters brown:b1+b2",
             path,
         )
-    if height <= 0.0:
+    if height < SMALLEST_POSITIVE:
         raise InputError(f"camera '{name}' has a sensor of no size", "give width,height in mm", path)
     return height
 
@@ -116,7 +117,7 @@ def _values(
     middle = [size_px[0] * pixel_mm / 2.0, size_px[1] * pixel_mm / 2.0]
     point = middle if pp == "default" else numbers(pp, 2, "pp", path)
     values = {"cc": numbers(cc, 1, "cc", path)[0], "px": point[0], "py": point[1]}
-    if values["cc"] <= 0.0:
+    if values["cc"] < SMALLEST_POSITIVE:
         raise InputError(f"cc = {cc} is no principal distance", "give it in mm, greater than 0", path)
     for letter, names in (("K", LENS[:3]), ("P", LENS[3:])):
         text = "" if default_values else child_text(element, letter, path, "")

@@ -19,6 +19,7 @@ from aerotri.formats.atomic import atomic_file
 from aerotri.formats.losses import losses
 from aerotri.formats.oriented import OrientedBlock
 from aerotri.formats.parts import OrientationList, PointList, RayList, no_sigma, texts
+from aerotri.formats.tables import SMALLEST_POSITIVE
 from aerotri.formats.text_lines import TextFile, all_numbers, check_words, first_lines
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Camera, Prior
@@ -181,7 +182,7 @@ def read_ign_camera(path: str | os.PathLike, pixel_um: float) -> Camera:
     rows, words = zip(*(found[key] for key in CAMERA_KEYS[1:]), strict=True)
     px, py, focal, width, height = file.values(words, rows, "value").tolist()
     for row, value in ((rows[2], focal), (rows[3], width), (rows[4], height)):
-        if not 0.0 < value <= LARGEST_FORMAT_PX or (row != rows[2] and value != int(value)):
+        if not SMALLEST_POSITIVE <= value <= LARGEST_FORMAT_PX or (row != rows[2] and value != int(value)):
             raise file.error(row, f"{value:g} is not possible here", "sizes are pixels, greater than 0")
     name_row, name = found["name"]
     file.check_names([name], [name_row], "camera")

@@ -15,6 +15,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.parts import OrientationList, PointList, PositionList, texts
+from aerotri.formats.tables import LONGEST_NAME, SMALLEST_POSITIVE
 from aerotri.formats.text_lines import TextFile, all_numbers, first_lines
 from aerotri.functional_model.rotation import rotation_from_angles
 
@@ -47,6 +48,7 @@ MEANINGS: dict[str, tuple[str, ...]] = {
     "role": ("role",),
 }  # fmt: skip
 ELLIPSOIDAL = ("ellipsoidalheight", "ellheight")
+MOST_COLUMNS = 1000
 NO_NUMBER = ("", "nan", "NaN", "NAN")
 """What stands where nothing is known."""
 
@@ -95,7 +97,10 @@ def _separator(header: str) -> str:
 
 
 def _plain(column: str) -> str:
-    return re.sub(r"[^a-z0-9]", "", re.sub(r"[(\[].*?[)\]]", "", column.lower()))
+    """Letters and digits of a column's name, without what stands in brackets."""
+    if len(column) > LONGEST_NAME:
+        return ""
+    return re.sub(r"[^a-z0-9]", "", re.sub(r"[(\[][^)\]]*[)\]]", "", column.lower()))
 
 
 def _meaning(column: str) -> str | None:
@@ -109,6 +114,10 @@ def _read(path: Path) -> _List:
         raise InputError("is empty", "the first row names the columns", path)
     words = file.words(_separator(file.lines[0]))
     header = [word.strip('"') for word in words[0]]
+    if len(words[0]) > MOST_COLUMNS or any(len(word) > LONGEST_NAME for word in header):
+        remedy = "the first row names the columns by short texts"
+        raise file.error(0, f"the header has {len(header)} columns, the longest of {max(map(len, header))} characters",
+                         remedy)  # fmt: skip
     if all_numbers(header[1:]):
         raise file.error(0, "does not begin with the names of the columns", "add a first row that names them")
     for row, line in enumerate(words):
@@ -151,7 +160,7 @@ def _sigma(found: _List, may_be_zero: bool = False) -> np.ndarray:
     sigma = found.numbers("sX", "sY", "sZ")
     for fallback in (found.numbers("s_plan", "s_plan", "s_height"), found.numbers("s_all", "s_all", "s_all")):
         sigma = np.where(np.isnan(sigma), fallback, sigma)
-    bad = np.flatnonzero(((sigma < 0.0) | ((sigma == 0.0) & (not may_be_zero))).any(axis=1))
+    bad = np.flatnonzero(((sigma < SMALLEST_POSITIVE) & ~((sigma == 0.0) & may_be_zero)).any(axis=1))
     if len(bad):
         size = "negative" if may_be_zero else "not greater than 0"
         raise found.file.error(int(bad[0]) + 1, f"a standard deviation is {size}", "give a small one, in m")

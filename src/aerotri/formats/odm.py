@@ -19,6 +19,7 @@ from aerotri.conventions import InputError, px_from_mm
 from aerotri.formats.atomic import atomic_file
 from aerotri.formats.losses import losses
 from aerotri.formats.parts import PointList, PositionList, RayList, no_sigma, texts
+from aerotri.formats.tables import SMALLEST_POSITIVE
 from aerotri.formats.text_lines import TextFile, check_words, first_lines, is_number
 from aerotri.observations import Block
 from aerotri.observations.names import ENDING
@@ -217,7 +218,7 @@ def read_odm_geo(path: str | os.PathLike) -> PositionList:
         bad = int(np.flatnonzero(np.isnan(values[:, :2]).any(axis=1))[0])
         raise file.error(rows[bad], "the plan position is missing", f"rows are: {form}")
     accuracy = values[:, 6:8]
-    bad = np.flatnonzero((accuracy <= 0.0).any(axis=1))
+    bad = np.flatnonzero((accuracy < SMALLEST_POSITIVE).any(axis=1))
     if len(bad):
         raise file.error(rows[int(bad[0])], "an accuracy is not greater than 0", "give a small one, in metres")
     angles = np.radians(values[:, 3:6])

@@ -22,6 +22,7 @@ from aerotri.formats.colmap import COLMAP_FROM_CAMERA, SIGN, colmap_camera
 from aerotri.formats.csv_text import UTF8_REMEDY, read_bytes
 from aerotri.formats.oriented import OrientedBlock
 from aerotri.formats.parts import Reading, no_sigma, texts
+from aerotri.formats.tables import SMALLEST_POSITIVE
 from aerotri.formats.text_lines import TextFile
 from aerotri.functional_model.rotation import angles_from_rotation, exponential, logarithm
 from aerotri.observations import (
@@ -201,7 +202,7 @@ def _camera(name: str, node: _Node, pixel_um: float) -> Camera:
     size, longer = (int(width), int(height)), max(width, height)
     two = node.has("focal_x") or kind in ("radial", "simple_radial", "brown")
     fx, fy = (node.get(key).number() * longer for key in (("focal_x", "focal_y") if two else ("focal", "focal")))
-    if min(fx, fy) <= 0.0:
+    if min(fx, fy) < SMALLEST_POSITIVE:
         raise node.error("a focal length is not greater than 0")
     cx, cy = (node.get(key).number() * longer if node.has(key) else 0.0 for key in ("c_x", "c_y"))
     scale = pixel_um * 1e-3
@@ -242,7 +243,7 @@ def _positions(shots: dict[str, _Node]) -> GnssIns | None:
     for row, node in enumerate(shots.values()):
         if node.has("gps_position") and node.has("gps_dop"):
             dop = node.get("gps_dop").number()
-            if dop <= 0.0:
+            if dop < SMALLEST_POSITIVE:
                 raise node.error("gps_dop is not greater than 0")
             rows.append(row)
             xyz.append(node.get("gps_position").numbers(3))

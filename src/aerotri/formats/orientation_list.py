@@ -14,6 +14,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.parts import OrientationList, texts
+from aerotri.formats.tables import SMALLEST_POSITIVE
 from aerotri.formats.text_lines import TextFile, all_numbers, first_lines
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Camera, Prior
@@ -83,7 +84,7 @@ def read_ortho_camera(path: str | os.PathLike) -> Camera:
     width_mm, height_mm = _numbers(file, entries["sensor_size"], 2)
     cx, cy = (_numbers(file, entries[key], 1)[0] if key in entries else 0.0 for key in ("cx", "cy"))
     row = entries["im_size"][0]
-    if min(width, height, focal, width_mm, height_mm) <= 0.0 or max(width, height) > LARGEST_FORMAT_PX:
+    if min(width, height, focal, width_mm, height_mm) < SMALLEST_POSITIVE or max(width, height) > LARGEST_FORMAT_PX:
         raise file.error(row, "a size is not possible", "sizes are greater than 0")
     if width != int(width) or height != int(height):
         raise file.error(row, "the image has no whole number of pixels", "give columns and rows")

@@ -20,8 +20,10 @@ from aerotri.formats.bingo import FARTHEST_MM
 from aerotri.formats.losses import losses
 from aerotri.formats.oriented import OrientedBlock
 from aerotri.formats.parts import OrientationList, PointList, RayList, no_sigma, texts
+from aerotri.formats.tables import SMALLEST_POSITIVE
 from aerotri.formats.text_lines import TextFile, all_numbers, first_lines, is_number
 from aerotri.observations import Block
+from aerotri.spreadsheet import without_formula
 
 END = "-99"
 SMALLEST_C_UM = 1000.0
@@ -80,8 +82,9 @@ def read_patb_im(path: str | os.PathLike) -> RayList:
     file.check_names(images, heads, "photograph")
     file.refuse_repeated(images, heads, "photograph")
     c = file.values([words[row][1] for row in heads], heads, "principal distance")
-    if (c <= 0.0).any():
-        raise file.error(heads[int(np.flatnonzero(c <= 0.0)[0])], "the principal distance is not positive", "give µm")
+    small = np.flatnonzero(c < SMALLEST_POSITIVE)
+    if len(small):
+        raise file.error(heads[int(small[0])], "the principal distance is not positive", "give µm")
     # one unit for the whole file, as writers have it
     in_mm = bool((c < SMALLEST_C_UM).all())
     scale = 1.0 if in_mm else 1e-3
@@ -233,7 +236,7 @@ def write_patb(oriented: OrientedBlock, folder: str | os.PathLike) -> tuple[str,
         "block.im": _im(block, photographs, points) if len(block.image_points) else [],
         "block.ori": _ori(oriented, photographs),
         "block.con": _con(block, points),
-        "names.csv": ["kind,number,name", *(f'{k},{n},"{o.replace(chr(34), chr(34) * 2)}"' for k, n, o in renamed)],
+        "names.csv": ["kind,number,name", *(f"{k},{n},{_quoted(o)}" for k, n, o in renamed)],
     }
     with atomic_folder(folder, own=FILES) as place:
         for name, lines in contents.items():
@@ -242,6 +245,10 @@ def write_patb(oriented: OrientedBlock, folder: str | os.PathLike) -> tuple[str,
     lost = losses(block, "cameras", "principal points", "image points", "orientations", "control")
     numbered = f"{len(renamed)} names are too long for PAT-B and were replaced by numbers, see names.csv"
     return (*lost, *((numbered,) if renamed else ()), *oriented.unoriented())
+
+
+def _quoted(name: str) -> str:
+    return '"' + without_formula(name).replace('"', '""') + '"'
 
 
 def _fitting_names(names: np.ndarray) -> np.ndarray:

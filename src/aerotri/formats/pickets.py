@@ -89,10 +89,14 @@ def read_pickets(path: Path) -> PicketTable:
     missing = [name for name in (*NUMBERS, "photographs", "status") if name not in table.column_names]
     if missing:
         raise InputError(f"has no column '{missing[0]}'", "give pickets.parquet of `aerotri dtm`", path)
+    if len(set(table.column_names)) < len(table.column_names):
+        raise InputError("has a column twice", "give pickets.parquet of `aerotri dtm`", path)
     try:
         v = np.column_stack([table.column(name).cast(pa.float64()).to_numpy() for name in NUMBERS])
         listed = tuple(tuple(str(name) for name in row or ()) for row in table.column("photographs").to_pylist())
-    except (pa.ArrowException, TypeError) as error:
+    except (pa.ArrowException, TypeError, ValueError) as error:
         raise InputError(f"cannot be read: {error}", "give pickets.parquet of `aerotri dtm`", path) from error
-    status = np.array(table.column("status").to_pylist(), dtype=str)
+    if not pa.types.is_string(table.column("status").type):
+        raise InputError("column 'status' holds no text", "give pickets.parquet of `aerotri dtm`", path)
+    status = np.array([one or "" for one in table.column("status").to_pylist()], dtype=str)
     return PicketTable(v[:, :2], v[:, 2:5], v[:, 5:8], v[:, 8:11], listed, status)

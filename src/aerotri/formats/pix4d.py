@@ -19,6 +19,7 @@ from aerotri.formats.atomic import atomic_file
 from aerotri.formats.losses import losses
 from aerotri.formats.oriented import OrientedBlock
 from aerotri.formats.parts import OrientationList, PointList, PositionList, no_sigma, texts
+from aerotri.formats.tables import SMALLEST_POSITIVE
 from aerotri.formats.text_lines import TextFile, all_numbers, check_words, first_lines
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Block
@@ -157,7 +158,7 @@ def _spread(file: TextFile, accuracy: np.ndarray, may_be_zero: bool = False) -> 
     """(n, 3) σ of horizontal and vertical accuracies, of one for both, or of none."""
     if not accuracy.shape[1]:
         return no_sigma(len(accuracy))
-    bad = np.flatnonzero(((accuracy < 0.0) | ((accuracy == 0.0) & (not may_be_zero))).any(axis=1))
+    bad = np.flatnonzero(((accuracy < SMALLEST_POSITIVE) & ~((accuracy == 0.0) & may_be_zero)).any(axis=1))
     if len(bad):
         size = "negative" if may_be_zero else "not greater than 0"
         raise file.error(int(bad[0]), f"an accuracy is {size}", "give a small one, in metres")

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.formats.las_header import check_las
+from aerotri.geojson import LARGEST_M
 
 UNCLASSIFIED, GROUND = 1, 2
 SCALE_M = 0.001
@@ -39,12 +41,19 @@ def read_point_cloud(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """
     import laspy
 
+    check_las(path)
     try:
         cloud = laspy.read(path)
-        xyz = [np.asarray(axis, dtype=float) for axis in (cloud.x, cloud.y, cloud.z)]
-        return np.column_stack(xyz), np.asarray(cloud.classification)
-    except Exception as error:  # laspy and lazrs raise whatever a damaged file leads to
+        xyz = np.column_stack([np.asarray(axis, dtype=float) for axis in (cloud.x, cloud.y, cloud.z)])
+        classes = np.asarray(cloud.classification)
+    except BaseException as error:
+        # laspy and lazrs raise whatever a damaged file leads to; a panic of lazrs is no Exception
+        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+            raise
         raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
+    if not (np.abs(xyz) <= LARGEST_M).all():
+        raise InputError("has points at no possible place", "write the file anew, its scale or offset is damaged", path)
+    return xyz, classes
 
 
 def refuse_cloud_units(path: Path) -> None:
@@ -56,6 +65,7 @@ def refuse_cloud_units(path: Path) -> None:
     """
     import laspy
 
+    check_las(path)
     try:
         with laspy.open(path) as file:
             crs = file.header.parse_crs()

@@ -216,7 +216,10 @@ def _begin(request: Request, parts: _Parts) -> Reading:
     named = np.array(sorted({name for name in camera_of.values() if name}), dtype=str)
     c_mm = np.concatenate([rays.focal_length_mm for rays in parts.rays]) if parts.rays else np.zeros(0)
     cameras = cameras_of(request.camera, parts.cameras, named, c_mm)
-    cameras, camera, said = camera_of_each(cameras, list(camera_of.values()))
+    try:
+        cameras, camera, said = camera_of_each(cameras, list(camera_of.values()))
+    except InputError as error:
+        raise InputError(error.message, error.remedy, error.file or Path(request.source)) from error
     count = len(camera_of)
     images = Images(
         names=np.array(list(camera_of), dtype=str),

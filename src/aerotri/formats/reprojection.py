@@ -63,8 +63,10 @@ def _tangents(camera: Camera, xy: np.ndarray) -> np.ndarray:
     forward = np.array([camera.lens[name].value if name in camera.lens else 0.0 for name in LENS_NAMES])
     ideal = distorted.copy()
     if forward.any():
-        for _ in range(LENS_ITERATIONS):
-            ideal = ideal - (lens.distort(ideal[:, 0], ideal[:, 1], forward) - distorted)
+        # a lens of impossible values has no ideal direction: the residual is then not known
+        with np.errstate(over="ignore", invalid="ignore"):
+            for _ in range(LENS_ITERATIONS):
+                ideal = ideal - (lens.distort(ideal[:, 0], ideal[:, 1], forward) - distorted)
     return ideal
 
 
@@ -110,7 +112,8 @@ def _intersected(
         for j in range(3):
             normal_sum[:, i, j] = np.bincount(point, weights=across[:, i, j], minlength=count)
     rays = np.bincount(point, minlength=count)
-    there = np.flatnonzero(rays > 1)
+    finite = np.isfinite(normal_sum).all(axis=(1, 2)) & np.isfinite(right_sum).all(axis=1)
+    there = np.flatnonzero((rays > 1) & finite)
     weakest = np.linalg.eigvalsh(normal_sum[there])[:, 0]
     there = there[weakest > WEAKEST * rays[there]]
     points = np.full((count, 3), np.nan)

@@ -18,6 +18,7 @@ import numpy as np
 
 from aerotri.conventions import MGON_PER_RADIAN
 from aerotri.formats.reliability_columns import control_columns, observation_columns, ray_columns
+from aerotri.formats.table_writer import with_plain_texts
 from aerotri.image_errors import interior_elements
 from aerotri.observations import Block
 from aerotri.observations.block import INTERIOR_ELEMENTS
@@ -191,7 +192,7 @@ def write_csv(path: Path, columns: dict[str, np.ndarray]) -> None:
     options = csv.WriteOptions(include_header=False, quoting_style=quoting)
     with open(path, "wb") as file:
         file.write((",".join(columns) + "\n").encode())
-        csv.write_csv(pa.table(arrays), file, options)
+        csv.write_csv(with_plain_texts(pa.table(arrays)), file, options)
 
 
 def _split(names: tuple[str, ...], values: np.ndarray) -> dict[str, np.ndarray]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,11 +14,11 @@ import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
-from aerotri.conventions import InputError
 from aerotri.coordinates import LocalFrame
+from aerotri.formats.npz import Archive
+from aerotri.formats.solution_checks import SCHEMA, checked_values
+from aerotri.observations import Block
 from aerotri.statistics.adjusted_block import AdjustedBlock
-
-SCHEMA = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,27 +113,16 @@ def write_solution(
     )
 
 
-def read_solution(path: str | os.PathLike) -> SavedSolution:
+def read_solution(path: str | os.PathLike, block: Block | None = None) -> SavedSolution:
     """Read solution.npz.
+
+    Parameters
+    ----------
+    block : that was adjusted, whose sizes the arrays must have; None: they only have to agree with one another.
 
     Raises
     ------
     InputError
-        When the file is missing, damaged or of another schema.
+        When the file is missing, damaged, of another schema, or holds what no adjustment writes.
     """
-    path = Path(path)
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        if int(arrays.pop("schema")) != SCHEMA:
-            raise InputError("was written by another version", "adjust the block again", path)
-        scalars = {"estimator_code": int, "estimator_limit": float, "sigma0": float, "iterations": int}
-        scalars |= {"status": str, "geoid": str, "components": str, "removals": str, "verdict": str}
-        values = {name: scalars[name](array) if name in scalars else array for name, array in arrays.items()}
-        values["warnings"] = tuple(str(w) for w in arrays["warnings"])
-        values["reasons"] = tuple(str(reason) for reason in arrays.get("reasons", ()))
-        return SavedSolution(**values)
-    except FileNotFoundError:
-        raise InputError("is missing", "give the folder that `aerotri adjust` wrote", path) from None
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
-        raise InputError(f"cannot be read: {error}", "adjust the block again", path) from error
+    return SavedSolution(**checked_values(Archive(Path(path)), block))

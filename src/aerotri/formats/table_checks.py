@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.formats.tables import Table
+from aerotri.formats.tables import SMALLEST_POSITIVE, Table
 from aerotri.observations import Images
 from aerotri.observations.names import SHOWN_NEAR, near_names
 
@@ -82,7 +82,7 @@ def sigma_columns(
     """
     given = table.stack(*columns)
     for k, column in enumerate(columns):
-        bad = np.flatnonzero((given[:, k] < 0.0) | ((given[:, k] == 0.0) & (not may_be_zero)))
+        bad = np.flatnonzero((given[:, k] < SMALLEST_POSITIVE) & ~((given[:, k] == 0.0) & may_be_zero))
         if len(bad):
             row = int(bad[0])
             raise table.error(

@@ -12,6 +12,7 @@ from aerotri.conventions import InputError
 from aerotri.formats.arrow_compute import arrow_compute
 from aerotri.formats.csv_text import BLANKS
 from aerotri.formats.tables import CONTROL_CHARACTERS, LONGEST_NAME
+from aerotri.spreadsheet import FORMULA, without_formula
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -98,6 +99,7 @@ def _write_csv(table: pa.Table, path: Path) -> None:
     from pyarrow import csv as arrow_csv
 
     compute = arrow_compute()
+    table = with_plain_texts(table)
     text = [column for column in table.columns if pa.types.is_string(column.type)]
     quoted = any(compute.any(compute.match_substring_regex(column, NEEDS_QUOTES)).as_py() for column in text)
     lone = table.num_columns == 1 and bool(text)
@@ -108,5 +110,18 @@ def _write_csv(table: pa.Table, path: Path) -> None:
         arrow_csv.write_csv(table, file, options)
 
 
+def with_plain_texts(table: pa.Table) -> pa.Table:
+    """The table with texts that a spreadsheet would run marked as texts; see `spreadsheet.without_formula`."""
+    import pyarrow as pa
+
+    compute = arrow_compute()
+    for at, column in enumerate(table.columns):
+        if pa.types.is_string(column.type) and compute.any(compute.match_substring_regex(column, FORMULA)).as_py():
+            plain = [None if text is None else without_formula(text) for text in column.to_pylist()]
+            table = table.set_column(at, table.column_names[at], pa.array(plain, pa.string()))
+    return table
+
+
 def _header_cell(name: str) -> str:
+    name = without_formula(name)
     return '"' + name.replace('"', '""') + '"' if any(c in name for c in '",#') else name

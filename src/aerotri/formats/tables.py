@@ -19,13 +19,19 @@ from aerotri.conventions import InputError
 from aerotri.formats import csv_text
 from aerotri.formats.arrow_compute import arrow_compute
 from aerotri.formats.csv_text import BLANKS, CsvText
+from aerotri.spreadsheet import MARKED
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 IGNORED_PREFIX = "x_"
 LONGEST_NAME = 1000
-NUMBER = r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$"
+NUMBER = r"^[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?$"
+"""Every digit belongs to one part alone: with two ways to read it the time grows with the square of the length."""
+LARGEST_NUMBER = 1e15
+"""No coordinate, angle or σ is larger in any unit; numbers beyond lose their decimals, and squares of them overflow."""
+SMALLEST_POSITIVE = 1e-12
+"""A σ or a focal length, which has to be greater than 0, is at least this in any unit, or its weight overflows."""
 CONTROL_CHARACTERS = r"[\x00-\x1f\x7f]"
 
 
@@ -274,6 +280,8 @@ def _text_column(column: pa.ChunkedArray, name: str, table: Table) -> TextColumn
     encoded = column.dictionary_encode().combine_chunks()
     names, index = encoded.dictionary, encoded.indices.to_numpy().astype(np.int64)
     trimmed = compute.ascii_trim(names, characters=BLANKS)
+    if table.source is not None:
+        trimmed = compute.replace_substring_regex(trimmed, MARKED, r"\1")
     if not trimmed.equals(names):
         merged = trimmed.dictionary_encode()
         names, index = merged.dictionary, merged.indices.to_numpy().astype(np.int64)[index]
@@ -295,12 +303,11 @@ def _text_column(column: pa.ChunkedArray, name: str, table: Table) -> TextColumn
 
 def _number_column(column: pa.ChunkedArray, name: str, table: Table) -> np.ndarray:
     values = column.to_numpy()
-    bad = ~np.isfinite(values)
+    bad = ~(np.abs(values) <= LARGEST_NUMBER)
     if bad.any() and column.null_count < np.count_nonzero(bad):
         row = int(np.flatnonzero(bad & column.is_valid().to_numpy())[0])
-        raise table.error(
-            row, f"{name} = {values[row]} is not a finite number", "leave the cell empty where nothing is known"
-        )
+        what = "is not possible" if np.isfinite(values[row]) else "is not a finite number"
+        raise table.error(row, f"{name} = {values[row]} {what}", "leave the cell empty where nothing is known")
     return values
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.csv_text import UTF8_REMEDY, read_bytes
-from aerotri.formats.tables import CONTROL_CHARACTERS, LONGEST_NAME, NUMBER
+from aerotri.formats.tables import CONTROL_CHARACTERS, LARGEST_NUMBER, LONGEST_NAME, NUMBER
 
 HEAD = 4096
 """Bytes from which the kind of a file is told."""
@@ -70,7 +70,8 @@ class TextFile:
         """
         try:
             found = np.array([float(word) for word in words], dtype=float)
-            if np.isfinite(found).all() and "_" not in "".join(words):
+            text = "".join(words)
+            if (np.abs(found) <= LARGEST_NUMBER).all() and "_" not in text and text.isascii():
                 return found
         except ValueError:
             pass
@@ -78,6 +79,8 @@ class TextFile:
             if not is_number(word):
                 remedy = "write numbers with a point as decimal sign"
                 raise self.error(row, f"{what} '{word[:60]}' is not a number", remedy)
+            if not abs(float(word)) <= LARGEST_NUMBER:
+                raise self.error(row, f"{what} '{word[:60]}' is not possible", "correct the number")
         raise self.error(0, f"{what} cannot be read", "write plain numbers")
 
     def table(self, words: Sequence[Sequence[str]], rows: Sequence[int], what: str) -> np.ndarray:
@@ -119,7 +122,7 @@ class TextFile:
 
 def is_number(word: str) -> bool:
     """Whether a word is a finite number as written in tables."""
-    return re.match(NUMBER, word) is not None and word.isascii() and math.isfinite(float(word))
+    return word.isascii() and re.match(NUMBER, word) is not None and math.isfinite(float(word))
 
 
 def _decoded(raw: bytes, path: Path) -> str:

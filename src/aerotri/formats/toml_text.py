@@ -18,10 +18,13 @@ from aerotri.formats.csv_text import read_bytes
 _KEY_PART = re.compile(r'"((?:[^"\\]|\\.)*)"|\'([^\']*)\'|([A-Za-z0-9_-]+)')
 _HEADER = re.compile(r"\s*\[([^\[\]]+)\]\s*(#.*)?$")
 _KEY = re.compile(r"\s*([^=#]+?)\s*=")
+DOTTED = re.compile(r"[\w-]+(?:[ \t]*\.[ \t]*[\w-]+)*")
+DEEPEST = 100
+"""Parts of a key a.b.c: tomllib takes a time that grows with the square of their number."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def read_toml(path: Path) -> tuple[dict[str, Any], str]:
+def read_toml(path: Path, remedy: str = "see the README for block.toml") -> tuple[dict[str, Any], str]:
     """Content and text of a TOML file.
 
     Raises
@@ -35,13 +38,17 @@ def read_toml(path: Path) -> tuple[dict[str, Any], str]:
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise InputError("is not UTF-8", "save the file as UTF-8", path, line) from error
+    deep = next((found for found in DOTTED.finditer(text) if found.group().count(".") > DEEPEST), None)
+    if deep is not None:
+        line = text.count("\n", 0, deep.start()) + 1
+        raise InputError("is not TOML: nested too deeply", remedy, path, line)
     try:
         return tomllib.loads(text), text
     except (ValueError, RecursionError) as error:
         found = re.search(r"at line (\d+), column (\d+)", str(error))
         line = int(found[1]) if found else text.count("\n") + 1
         reason = re.sub(r"\s*\(at .*\)$", "", str(error)) or "nested too deeply"
-        raise InputError(f"is not TOML: {reason}", "see the README for block.toml", path, line) from error
+        raise InputError(f"is not TOML: {reason}", remedy, path, line) from error
 
 
 def line_of_key(text: str, path: Sequence[str | int]) -> int | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from aerotri.conventions import InputError
+from aerotri.formats.toml_text import read_toml
 from aerotri.simulation import spec as spec_module
 from aerotri.simulation.spec import SimulationSpec, Table
 
@@ -26,16 +26,9 @@ def read_spec(path: str | os.PathLike) -> SimulationSpec:
         File missing or no TOML, an unknown key, a wrong value: names file, line and key.
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-        data = tomllib.loads(text)
-    except FileNotFoundError:
-        raise InputError("no such file", "give the path of a simulation.toml", path) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read: {error}", "", path) from None
-    except tomllib.TOMLDecodeError as error:
-        found = re.search(r"at line (\d+)", str(error))
-        raise InputError(f"is not TOML: {error}", "correct it", path, int(found[1]) if found else None) from None
+    if not path.exists():
+        raise InputError("no such file", "give the path of a simulation.toml", path)
+    data, text = read_toml(path, "see blocks/frederiksstad_ultracam/simulation.toml")
     return parse_spec(data, path, text)
 
 
@@ -49,6 +42,8 @@ def parse_spec(data: Mapping[str, Any], file: str | os.PathLike | None = None, t
     """
     try:
         return SimulationSpec.model_validate(data)
+    except OverflowError:
+        raise InputError("holds a number too large to be read", "correct it", file) from None
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
     keys = [str(part) for part in first["loc"] if part != "[key]"]
@@ -58,9 +53,14 @@ def parse_spec(data: Mapping[str, Any], file: str | os.PathLike | None = None, t
     if first["type"] == "missing":
         raise InputError(f"'{name}' is missing", "add it", file, line)
     value = first["input"]
-    given = "" if isinstance(value, Mapping | Table) else f" (given: {value!r})"
+    given = "" if isinstance(value, Mapping | Table) else f" (given: {_shown(value)})"
     message = first["msg"].removeprefix("Value error, ").replace("Input should", "should")
     raise InputError(f"'{name or 'spec'}': {message}{given}", "correct it", file, line)
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _suggestion(key: str) -> str:

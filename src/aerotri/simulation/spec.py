@@ -84,7 +84,7 @@ class CameraSpec(Table):
             return data
         own = dict(data)
         name = own.pop("preset")
-        if name not in PRESETS:
+        if not isinstance(name, str) or name not in PRESETS:
             raise ValueError(f"preset '{name}' is not known; known are {', '.join(PRESETS)}")
         return {**PRESETS[name], **own}
 

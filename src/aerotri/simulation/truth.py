@@ -12,6 +12,7 @@ import numpy as np
 
 from aerotri.formats.atomic import atomic_folder
 from aerotri.observations import Block
+from aerotri.spreadsheet import plain_row
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,4 +124,4 @@ def _write(path: Path, header: list[str], rows: Iterable[list]) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
-        writer.writerows(rows)
+        writer.writerows(plain_row(row) for row in rows)

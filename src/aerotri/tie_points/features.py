@@ -166,10 +166,13 @@ def _key(path: Path, options: FeatureOptions) -> str:
 
 def _kept(path: Path, key: str) -> Features | None:
     """Features from disk, None where there are none or they belong to something else."""
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            if str(file["key"]) == key:
-                return Features(file["xy"], file["descriptors"], float(file["sigma_px"]), key)
-    except (OSError, ValueError, KeyError, EOFError):
+    from aerotri.formats.npz import read_kept
+
+    wanted = {"key": ("U", ()), "xy": ("f", (None, 2)), "descriptors": ("fiu", (None, 128)), "sigma_px": ("f", ())}
+    kept = read_kept(path, wanted)
+    if kept is None or str(kept["key"]) != key or len(kept["xy"]) != len(kept["descriptors"]):
         return None
-    return None
+    sigma = float(kept["sigma_px"])
+    good = np.isfinite(kept["xy"]).all() and np.isfinite(sigma) and sigma > 0.0
+    good = good and ((kept["descriptors"] >= 0) & (kept["descriptors"] <= 255)).all()
+    return Features(kept["xy"].astype(np.float32), kept["descriptors"].astype(np.uint8), sigma, key) if good else None

@@ -8,7 +8,7 @@ explains is kept (COLMAP's two-view estimation).
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -97,8 +97,8 @@ def match_all(
     for first in sorted({i for i, _ in pairs}):
         seconds = [j for i, j in pairs if i == first]
         kept = cache / f"{names[first]}.npz"
-        known = _kept(kept)
         keys = {j: _key(features[first], features[j], cameras[first], cameras[j], options) for j in seconds}
+        known = _kept(kept, {keys[j]: (len(features[first].xy), len(features[j].xy)) for j in seconds})
 
         def one(j: int, first: int = first, known: dict = known, keys: dict = keys) -> np.ndarray:
             old = known.get(keys[j])
@@ -167,12 +167,21 @@ def _key(one: Features, other: Features, first: Camera, second: Camera, options:
     return "k" + hashlib.sha256(repr((one.key, other.key, geometry, settings)).encode()).hexdigest()
 
 
-def _kept(path: Path) -> dict[str, np.ndarray]:
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            return {key: file[key] for key in file.files}
-    except (OSError, ValueError, KeyError, EOFError):
-        return {}
+def _kept(path: Path, sizes: Mapping[str, tuple[int, int]]) -> dict[str, np.ndarray]:
+    """Matches from disk by their key; those that name features there are not are left out.
+
+    Parameters
+    ----------
+    sizes : numbers of features of the two photographs, by key.
+    """
+    from aerotri.formats.npz import read_kept
+
+    found = {}
+    for key, size in sizes.items():
+        kept = read_kept(path, {key: ("i", (None, 2))}) if path.is_file() else None
+        if kept is not None and ((kept[key] >= 0) & (kept[key] < np.array(size))).all():
+            found[key] = kept[key]
+    return found
 
 
 def _keep(path: Path, found: dict[str, np.ndarray]) -> None:

@@ -60,7 +60,7 @@ class Boundary:
         return part
 
 
-def boundary_of(polygon: BaseGeometry, name: str, note: str = "") -> Boundary:
+def boundary_of(polygon: BaseGeometry, name: str, note: str = "", file: Path | None = None) -> Boundary:
     """A boundary, made valid.
 
     Raises
@@ -70,10 +70,10 @@ def boundary_of(polygon: BaseGeometry, name: str, note: str = "") -> Boundary:
     """
     if not polygon.is_valid:
         raise InputError(
-            f"the boundary '{name}' is not valid: {shapely.is_valid_reason(polygon)}", "correct the polygon"
+            f"the boundary '{name}' is not valid: {shapely.is_valid_reason(polygon)}", "correct the polygon", file
         )
     if not polygon.area > 0.0:
-        raise InputError(f"the boundary '{name}' has no area", "give a polygon")
+        raise InputError(f"the boundary '{name}' has no area", "give a polygon", file)
     return Boundary(polygon, name, note)
 
 
@@ -92,17 +92,24 @@ def read_boundary(source: str, epsg: int | None = None) -> Boundary:
         polygons = [polygon for _, polygon in features]
         if not polygons:
             raise InputError("has no polygons", "give the boundary of the volume", path)
-        return boundary_of(polygons[0] if len(polygons) == 1 else shapely.union_all(polygons), path.name, note)
+        return boundary_of(polygons[0] if len(polygons) == 1 else _united(polygons, path), path.name, note, path)
     try:
         text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise InputError(f"cannot be read: {error}", "give GeoJSON, GeoPackage or WKT", path) from error
     return _of_wkt(text, path.name, epsg, path)
 
 
 def _of_wkt(text: str, name: str, epsg: int | None, path: Path | None = None) -> Boundary:
     system = vector_system(srid_of_wkt(text), epsg, name)
-    return boundary_of(placed(polygon_of_wkt(text, path), system, path), name, system.note)
+    return boundary_of(placed(polygon_of_wkt(text, path), system, path), name, system.note, path)
+
+
+def _united(polygons: list[BaseGeometry], path: Path) -> BaseGeometry:
+    try:
+        return shapely.union_all(polygons)
+    except shapely.errors.ShapelyError as error:
+        raise InputError(f"its polygons do not unite: {error}", "correct those that cross themselves", path) from error
 
 
 def boundary_of_grid(grid: Grid) -> Boundary:

@@ -1,0 +1,114 @@
+"""GeoJSON checked node by node: features with their attributes, kind of geometry and coordinates, and the CRS."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from aerotri.conventions import InputError
+
+LARGEST_M = 1e12
+"""No coordinate lies farther out; numbers beyond lose their decimals, and squares of them overflow."""
+DEPTH = {"Point": 0, "MultiPoint": 1, "LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 3}
+"""Lists around a position, by the kind of geometry."""
+REMEDY = "give a FeatureCollection as GeoJSON has it"
+
+
+@dataclass(frozen=True)
+class GeoJsonFeature:
+    """A feature: attributes, kind of its geometry ('' without one), and coordinates as nested lists of floats."""
+
+    properties: Mapping[str, Any]
+    kind: str
+    coordinates: list
+
+
+def read_geojson(path: Path) -> tuple[str, list[GeoJsonFeature]]:
+    """The name of the CRS ('' where there is none) and the features of a file.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, is no JSON or no FeatureCollection, naming the feature that is wrong.
+    """
+    content = _content(path)
+    if not isinstance(content, dict) or not isinstance(content.get("features"), list):
+        raise InputError("is no FeatureCollection", REMEDY, path)
+    features = [_feature(entry, number, path) for number, entry in enumerate(content["features"], start=1)]
+    return _crs_name(content, path), features
+
+
+def crs_of_name(name: str) -> dict[str, Any]:
+    """A FeatureCollection that says its CRS and nothing else."""
+    return {"crs": {"type": "name", "properties": {"name": name}}} if name else {}
+
+
+def _content(path: Path) -> Any:
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError("is not UTF-8", "save it as UTF-8", path) from error
+    except OSError as error:
+        reason = f"cannot be read: {error.strerror or error}"
+        raise InputError(reason, "check the file and its permissions", path) from error
+    try:
+        # a whole number of 5000 digits is a float without end here, and refused as a coordinate
+        return json.loads(text, parse_int=lambda digits: int(digits) if len(digits) < 17 else float(digits))
+    except json.JSONDecodeError as error:
+        raise InputError(f"is not JSON: {error.msg}", "is it cut off?", path, error.lineno) from error
+    except (RecursionError, ValueError) as error:
+        raise InputError("is not JSON that can be read: it is nested too deeply", REMEDY, path) from error
+
+
+def _crs_name(content: dict[str, Any], path: Path) -> str:
+    entry = content.get("crs")
+    if entry is None:
+        return ""
+    properties = entry.get("properties") if isinstance(entry, dict) else None
+    name = properties.get("name") if isinstance(properties, dict) else None
+    if not isinstance(name, str):
+        raise InputError("its crs has no name", 'write "crs": {"type": "name", "properties": {"name": …}}', path)
+    return name
+
+
+def _feature(entry: Any, number: int, path: Path) -> GeoJsonFeature:
+    if not isinstance(entry, dict):
+        raise InputError(f"feature {number} is no feature", REMEDY, path)
+    properties = entry.get("properties")
+    if properties is not None and not isinstance(properties, dict):
+        raise InputError(f"feature {number} has properties that are no table", REMEDY, path)
+    geometry = entry.get("geometry")
+    if geometry is None:
+        return GeoJsonFeature(properties or {}, "", [])
+    kind = geometry.get("type") if isinstance(geometry, dict) else None
+    if not isinstance(kind, str):
+        raise InputError(f"feature {number} has a geometry without a type", REMEDY, path)
+    if kind not in DEPTH:
+        return GeoJsonFeature(properties or {}, kind, [])
+    found = _positions(geometry.get("coordinates"), DEPTH[kind])
+    if found is None:
+        raise InputError(f"the coordinates of feature {number} are those of no {kind}", "give finite numbers", path)
+    return GeoJsonFeature(properties or {}, kind, found)
+
+
+def _positions(value: Any, depth: int) -> list | None:
+    """Nested lists of positions as floats; None where something else stands."""
+    if not isinstance(value, list):
+        return None
+    if depth == 0:
+        return _position(value)
+    found = [_positions(part, depth - 1) for part in value]
+    return None if any(part is None for part in found) else found
+
+
+def _position(value: list) -> list[float] | None:
+    """Two coordinates or three; what stands behind them is left out."""
+    known = value[:3]
+    if len(known) < 2 or any(isinstance(v, bool) or not isinstance(v, int | float) for v in known):
+        return None
+    numbers = [float(v) for v in known]
+    return numbers if all(math.isfinite(v) and abs(v) <= LARGEST_M for v in numbers) else None

@@ -1,0 +1,1 @@
+"""Parts of tools/fuzz.py: seeds, mutations, readers, workers, table."""
