@@ -13,7 +13,7 @@ import numpy as np
 from aerotri.adjustment.datum import FREEDOMS, nothing_holds, restore_datum
 from aerotri.adjustment.defects import checked_factor, point_without_rays_enough
 from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.prepare import build_system, prepare
+from aerotri.adjustment.prepare import NoStartValuesError, build_system, prepare
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor
@@ -23,7 +23,7 @@ from aerotri.conventions import InputError
 from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block, transform_result
 from aerotri.coordinates.metric import outside_in_words
-from aerotri.diagnosis import judge
+from aerotri.diagnosis import diagnose, judge
 from aerotri.diagnosis.check_points import in_doubt
 from aerotri.formats.solution import SavedSolution
 from aerotri.functional_model.additional_parameters import AUTO
@@ -118,6 +118,49 @@ def adjust_keeping_system(
     return judged(found)
 
 
+def adjust_and_explain(
+    block: Block,
+    report: Report | None = None,
+    geoid: str | os.PathLike | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Adjustment:
+    """As `adjust_keeping_system`; where the block is not accepted, what explains it stands first among the reasons.
+
+    Parameters
+    ----------
+    say : told when the search for it begins.
+    """
+    try:
+        found = adjust_keeping_system(block, report, geoid=geoid)
+    except AdjustmentFailedError as error:
+        o = error.outcome
+        raise AdjustmentFailedError(replace(o, reasons=(*_causes(block, None, geoid, say), *o.reasons))) from error
+    except NoStartValuesError as error:
+        causes = _causes(block, None, geoid, say)
+        if not causes:
+            raise
+        raise NoStartValuesError(error.message, "; ".join(causes), error.file) from error
+    outcome = found.result.outcome
+    if outcome.verdict == "accepted":
+        return found
+    return _with_outcome(found, replace(outcome, reasons=(*_causes(block, found, geoid, say), *outcome.reasons)))
+
+
+def _causes(
+    block: Block, found: Adjustment | None, geoid: str | os.PathLike | None, say: Callable[[str], None]
+) -> tuple[str, ...]:
+    """The usual mistake that explains a block, in words; nothing where none does."""
+    say("looking for what explains it")
+    try:
+        frame = None if block.crs == "local" else frame_of_block(block, geoid)
+    except InputError:
+        frame = None
+    return diagnose(
+        block, lambda changed: adjust_keeping_system(changed, geoid=geoid).result,
+        None if found is None else found.local, frame,
+    )  # fmt: skip
+
+
 def judged(found: Adjustment) -> Adjustment:
     """The adjustment with the verdict over it."""
     if found.local.block.settings.adjustment.datum == "control" and in_doubt(found.local):
@@ -195,7 +238,13 @@ def _adjust_in_frame(
         local = replace(found.local, outcome=replace(outcome, warnings=(outside, *outcome.warnings)))
         found = replace(found, local=local)
     used = with_findings_of(with_datum_of(block, found.local.block), found.local.block)
-    return replace(found, result=transform_result(found.local, used, frame), frame=frame)
+    try:
+        result = transform_result(found.local, used, frame)
+    except InputError as error:
+        raise failure(
+            found.system, "not converged", f"the block ran away: {error}", found.solution.iterations
+        ) from error
+    return replace(found, result=result, frame=frame)
 
 
 def _with_variance_components(

@@ -256,10 +256,12 @@ def test_doubtful_is_exit_0_and_said_wherever_it_is_read(tmp_path, capsys):
     capsys.readouterr()
     assert run_diff(doubtful / "result", good / "result", 3, False) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1].startswith("first is doubtful: σ₀ is 3.6")
+    assert lines[1].startswith("first is doubtful: C01 is off by")
     assert lines[2] == "second is accepted"
     assert run_adjust(doubtful / "block", doubtful / "again", None, None, None, False, False) == 0
-    assert capsys.readouterr().out.startswith("verdict: doubtful\n  because σ₀ is 3.6")
+    said = capsys.readouterr().out
+    assert said.startswith("verdict: doubtful\n  because C01 is off by")
+    assert "because σ₀ is 3.6" in said
 
 
 def test_shift_of_gnss_is_off_unless_it_is_asked_for():

@@ -32,6 +32,10 @@ USED, ONE_RAY, OFF, NO_START, NOT_FINITE, REMOVED, WEAK_POINT, WEAK_PHOTOGRAPH =
 WEAK_ENDINGS = (" too weakly tied to the others, set aside", " not fixed in distance by their rays, set aside")
 
 
+class NoStartValuesError(InputError):
+    """No photograph has start values, and none could be had."""
+
+
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """A block ready to be adjusted: the system, the start state, the status of every ray, what to tell the user."""
@@ -58,7 +62,7 @@ def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
     block, off = with_edits(block)
     start = start_values(block, given_points)
     if not np.isfinite(start.centre).all(axis=1).any():
-        raise InputError(
+        raise NoStartValuesError(
             "no photograph has start values, and none sees four known points",
             "give X0, Y0, Z0, omega, phi, kappa of some photographs in images.csv, or more control points",
             file="images.csv",

@@ -37,7 +37,7 @@ OPENCV_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True, eq=False)
-class _Directions:
+class Directions:
     """Rays as directions: tangents (m, 2) in the camera, freed of known lens errors, and their tolerance (m,)."""
 
     tangent: np.ndarray
@@ -61,7 +61,7 @@ def start_values(block: Block, given_points: np.ndarray | None = None) -> StartV
     given_points : (N, 3) m, start values of points where known from elsewhere.
     """
     origin = local_origin(block)
-    directions = _directions(block)
+    directions = directions_of(block)
     centre = block.images.centre - origin
     oriented = np.isfinite(centre).all(axis=1) & np.isfinite(block.images.angles).all(axis=1)
     rotation = np.full((len(block.images), 3, 3), np.nan)
@@ -74,11 +74,11 @@ def start_values(block: Block, given_points: np.ndarray | None = None) -> StartV
         points = _orient_along_track(block, origin, directions, observed, rotation, centre, known)
     for tolerance in RESECTION_TOLERANCES:
         while True:
-            _intersect_into(points, block, directions, rotation, centre)
+            intersect_into(points, block, directions, rotation, centre)
             if not _resect_into(rotation, centre, points, block, directions, tolerance):
                 break
             points = known.copy()
-            _intersect_into(points, block, directions, rotation, centre)
+            intersect_into(points, block, directions, rotation, centre)
             refine(block, origin, rotation, centre, points)
     if given_points is not None:
         there = np.isfinite(given_points).all(axis=1)
@@ -115,7 +115,7 @@ def _orient_along_track(block: Block, origin, directions, observed, rotation, ce
         if not np.isfinite(time).all():
             _turn_strips(trial, block, directions, observed, there, strip)
         points = np.full_like(known, np.nan)
-        miss = _intersect_into(points, block, directions, trial, observed)
+        miss = intersect_into(points, block, directions, trial, observed)
         if best is None or miss < best[0]:
             best = (miss, trial, points)
     if best is None:
@@ -127,7 +127,7 @@ def _orient_along_track(block: Block, origin, directions, observed, rotation, ce
         rotation[:], points = best[1], best[2].copy()
         centre[there] = observed[there]
         refine(tried, origin, rotation, centre, points, iterations, centres)
-        miss = _intersect_into(known.copy(), block, directions, rotation, centre)
+        miss = intersect_into(known.copy(), block, directions, rotation, centre)
         if miss < TRACK_TOLERANCE * np.median(directions.tolerance):
             return points
     rotation[:], centre[:] = np.nan, np.nan
@@ -148,7 +148,7 @@ def _times(block: Block) -> np.ndarray:
     return time
 
 
-def _turn_strips(trial: np.ndarray, block: Block, directions: _Directions, observed, there, strip) -> None:
+def _turn_strips(trial: np.ndarray, block: Block, directions: Directions, observed, there, strip) -> None:
     """Strips flown the other way round than taken: those whose own rays meet better with the photographs turned.
 
     Parameters
@@ -164,7 +164,7 @@ def _turn_strips(trial: np.ndarray, block: Block, directions: _Directions, obser
     trial[wrong] = turned[wrong]
 
 
-def _miss_by_strip(block: Block, directions: _Directions, rotation, centre, of_image: np.ndarray) -> np.ndarray:
+def _miss_by_strip(block: Block, directions: Directions, rotation, centre, of_image: np.ndarray) -> np.ndarray:
     """(strips,) rad, median angular distance of rays from the points that the strip's photographs alone give."""
     rays = block.image_points
     strips = int(of_image.max()) + 1
@@ -242,7 +242,7 @@ def _full_control(block: Block, origin: np.ndarray) -> np.ndarray:
     return points
 
 
-def _directions(block: Block) -> _Directions:
+def directions_of(block: Block) -> Directions:
     rays = block.image_points
     tangent, tolerance = np.empty((len(rays), 2)), np.empty(len(rays))
     camera_of_ray = block.images.camera[rays.image]
@@ -257,10 +257,10 @@ def _directions(block: Block) -> _Directions:
                 ideal = ideal - (lens.distort(ideal[:, 0], ideal[:, 1], row[10:]) - distorted)
         tangent[of_camera] = ideal
         tolerance[of_camera] = np.maximum(rays.sigma[of_camera].max(axis=1), camera.pixel_mm) / row[0]
-    return _Directions(tangent, tolerance)
+    return Directions(tangent, tolerance)
 
 
-def _intersect_into(points, block: Block, directions: _Directions, rotation, centre) -> float:
+def intersect_into(points, block: Block, directions: Directions, rotation, centre) -> float:
     """Intersect every point from the oriented photographs; points that cannot be keep what they have.
 
     Returns the median angular distance (rad) of rays from their points, π where a point could not be had.
@@ -296,7 +296,7 @@ def intersect(n_points: int, point: np.ndarray, centre: np.ndarray, ray: np.ndar
     return xyz
 
 
-def _resect_into(rotation, centre, points, block: Block, directions: _Directions, tolerance: float) -> bool:
+def _resect_into(rotation, centre, points, block: Block, directions: Directions, tolerance: float) -> bool:
     """Resect photographs that see enough known points, those that see most of them first; whether any was added."""
     rays = block.image_points
     usable = np.isfinite(points[rays.point, 0]) & ~np.isfinite(centre[rays.image, 0])

@@ -53,11 +53,11 @@ def run_adjust(
     refuse_foreign_folder(target, "adjustment.json")
 
     from aerotri.compiled import compilation_notice
-    from aerotri.pipeline import AdjustmentFailedError, adjust_keeping_system
+    from aerotri.pipeline import AdjustmentFailedError, adjust_and_explain
 
     console.progress(compilation_notice())
     try:
-        adjustment = adjust_keeping_system(block, report=console.iteration, geoid=geoid)
+        adjustment = adjust_and_explain(block, console.iteration, geoid, console.progress)
     except AdjustmentFailedError as failure:
         from aerotri.formats.result import outcome_json
 

@@ -1,0 +1,65 @@
+"""A part of a large block that shows its mistake: the photographs around the worst one, some of their points."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array
+
+from aerotri.diagnosis.free_model import sub_block
+from aerotri.observations import Block
+from aerotri.statistics.adjusted_block import AdjustedBlock
+
+MOST_PHOTOGRAPHS = 60
+MOST_RAYS = 12000
+WORST_W = 100.0
+
+
+def sampled(block: Block, result: AdjustedBlock | None) -> tuple[Block, bool]:
+    """The block, or of a large one a part around its worst photograph; whether it is a part."""
+    few = len(block.images) <= MOST_PHOTOGRAPHS
+    if few and len(block.image_points) <= MOST_RAYS:
+        return block, False
+    images = np.arange(len(block.images)) if few else _around(block, _worst(block, result))
+    part, _ = sub_block(block, images)
+    keep = _some_points(part)
+    part, _ = sub_block(part, np.arange(len(images)), keep)
+    return part, True
+
+
+def _worst(block: Block, result: AdjustedBlock | None) -> int:
+    """The photograph whose rays fit worst; left out counts as worst."""
+    measured = np.bincount(block.image_points.image, minlength=len(block.images))
+    if result is None or len(result.rays.w) != len(block.image_points):
+        return int(np.argmax(measured))
+    size = np.nanmax(np.abs(np.nan_to_num(result.rays.w, nan=WORST_W)), axis=1)
+    total = np.bincount(block.image_points.image, weights=np.minimum(size, WORST_W), minlength=len(block.images))
+    return int(np.argmax(np.where(measured > 5, total / np.maximum(measured, 1), 0.0)))
+
+
+def _around(block: Block, seed: int) -> np.ndarray:
+    """Photographs that hang together with one by common points, the nearest ones."""
+    rays, n = block.image_points, len(block.images)
+    seen = coo_array((np.ones(len(rays)), (rays.image, rays.point)), shape=(n, len(block.points))).tocsr()
+    chosen = np.zeros(n, bool)
+    chosen[seed] = True
+    while chosen.sum() < MOST_PHOTOGRAPHS:
+        common = seen @ (seen.T @ chosen.astype(float))
+        common[chosen] = 0.0
+        new = np.argsort(-common, kind="stable")[: max(1, min(8, MOST_PHOTOGRAPHS - int(chosen.sum())))]
+        new = new[common[new] > 0.0]
+        if not len(new):
+            break
+        chosen[new] = True
+    return np.flatnonzero(chosen)
+
+
+def _some_points(block: Block) -> np.ndarray:
+    """(N,) bool: the control and check points, and others at random up to a number of rays."""
+    count = np.bincount(block.image_points.point, minlength=len(block.points))
+    keep = np.zeros(len(block.points), bool)
+    keep[block.control.point] = True
+    order = np.random.default_rng(1).permutation(np.flatnonzero(~keep & (count >= 2)))
+    order = order[np.argsort(-np.minimum(count[order], 3), kind="stable")]
+    total = np.cumsum(count[order])
+    keep[order[total <= MOST_RAYS - count[keep].sum()]] = True
+    return keep

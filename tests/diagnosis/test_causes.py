@@ -1,0 +1,103 @@
+"""The cause of a wrong block is found and said, and nothing is said where there is none of the usual ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from aerotri.diagnosis import diagnose
+from aerotri.diagnosis.evidence import fit, gather
+from aerotri.diagnosis.free_model import connected_parts, free_model
+from aerotri.diagnosis.placement import lay_on
+from aerotri.diagnosis.sampling import MOST_PHOTOGRAPHS, MOST_RAYS, sampled
+from aerotri.functional_model.rotation import exponential
+from aerotri.pipeline import adjust
+from small_blocks import small_block
+from wrong_blocks import answer_of, clean, image_points, kinds, misses, negated
+
+FEW = (
+    ("navigation", "x of one photograph negated"),
+    ("control", "names of one photograph's points moved by one"),
+    ("control", "one control point 2 m off in X"),
+    ("navigation", "GNSS 10 m too high"),
+    ("navigation", "focal length a tenth"),
+    ("control", "strips without a common point"),
+    ("track", "X and Y of GNSS exchanged"),
+)
+"""Kinds that run in the tests; tools/wrong_blocks.py runs all of them."""
+
+
+@pytest.mark.parametrize(("geometry", "name"), FEW)
+def test_wrong_blocks_are_not_accepted_and_the_cause_is_said(geometry, name, tmp_path):
+    kind = next(kind for kind in kinds() if (kind.geometry, kind.name) == (geometry, name))
+    answer = answer_of(kind.spoil(clean(geometry)), tmp_path)
+    assert misses(kind, answer) == [], answer
+
+
+def test_there_are_sixty_kinds_each_named_once():
+    names = [(kind.geometry, kind.name) for kind in kinds()]
+    assert len(names) >= 60
+    assert len(set(names)) == len(names)
+
+
+def test_nothing_is_said_of_a_block_that_is_only_noisy():
+    block = clean("navigation")
+    noise = np.random.default_rng(5).normal(0.0, 0.02, block.image_points.xy.shape)
+    noisy = replace(block, image_points=replace(block.image_points, xy=block.image_points.xy + noise))
+    result = adjust(noisy)
+    assert result.outcome.verdict != "accepted"
+    assert diagnose(noisy, adjust, result) == ()
+
+
+def test_the_model_of_the_image_points_leaves_a_mirrored_photograph_out():
+    model = free_model(image_points(negated(0), 4)(clean("control")))
+    assert np.flatnonzero(~model.joined).tolist() == [4]
+
+
+def test_the_model_of_the_image_points_is_the_block():
+    """Laid on the control it puts the projection centres where they are, to some decimetres at 750 m."""
+    block, truth = small_block()
+    model = free_model(block)
+    placed = fit(gather(block, model), ("control",)).placed
+    assert np.abs(placed(model.centre) - truth.centre).max() < 1.0
+
+
+def test_placing_is_not_spoilt_by_wrong_positions():
+    rng = np.random.default_rng(2)
+    source = rng.normal(size=(12, 3))
+    turn, shift = exponential(np.array([0.3, -1.0, 2.0])), np.array([500.0, -20.0, 7.0])
+    target = 40.0 * source @ turn.T + shift
+    spoilt = target.copy()
+    spoilt[[1, 7, 8]] += rng.normal(0.0, 100.0, (3, 3))
+    placed = lay_on(source, spoilt, np.array([0.0, 0.0, -1.0]))
+    np.testing.assert_allclose(placed(source), target, atol=0.01)
+
+
+def test_a_strip_is_placed_with_its_direction_of_view_down():
+    line = np.outer(np.arange(6.0), [1.0, 0.0, 0.0])
+    placed = lay_on(line, 100.0 * line[:, [1, 0, 2]] + [0.0, 0.0, 900.0], np.array([0.0, 1.0, 0.0]))
+    down = placed(np.array([[0.0, 1.0, 0.0]])) - placed(np.zeros((1, 3)))
+    np.testing.assert_allclose(down[0], [0.0, 0.0, -100.0], atol=1e-6)
+
+
+def test_parts_of_a_block():
+    block = clean("control")
+    assert [len(part) for part in connected_parts(block)] == [10]
+    kind = next(kind for kind in kinds() if kind.name.startswith("strips without"))
+    assert [len(part) for part in connected_parts(kind.spoil(block))] == [5, 5]
+
+
+def test_of_a_large_block_the_part_around_the_worst_photograph_is_searched():
+    block, _ = small_block(flight={"gsd_m": 0.1, "strips": 6, "images_per_strip": 15, "end_lap": 0.6, "side_lap": 0.3})
+    worst = 40
+    w = np.ones_like(block.image_points.xy)
+    w[block.image_points.image == worst] = 90.0
+    part, is_part = sampled(block, SimpleNamespace(rays=SimpleNamespace(w=w)))
+    assert is_part
+    assert len(part.images) == MOST_PHOTOGRAPHS
+    assert len(part.image_points) <= MOST_RAYS
+    assert block.images.names[worst] in part.images.names
+    assert len(connected_parts(part)) == 1
