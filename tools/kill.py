@@ -19,6 +19,7 @@ import hashlib
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -207,10 +208,10 @@ def wait_for(case: Case, mode: str, chance: random.Random, number: int) -> None:
     else:
         place = case.out.with_name(f".{case.out.name}.aerotri.tmp")
         while not place.exists() and time.monotonic() < begun + DEADLINE_S and not is_over(number):
-            time.sleep(0.0005)
+            time.sleep(0.002)
         until = time.monotonic() + chance.uniform(0.0, 0.3) ** 2 * case.seconds
     while time.monotonic() < until and not is_over(number):
-        time.sleep(0.0005)
+        time.sleep(0.002)
 
 
 def is_over(number: int) -> bool:
@@ -397,15 +398,31 @@ def table(cases: list[Case], how_full: str) -> str:
     return "\n".join([*lines, *(["", "Failures:", *told] if told else [])]) + "\n"
 
 
+def joined(tables: list[str]) -> str:
+    """One table of those printed for some commands each."""
+    lines = [line for text in tables for line in text.splitlines()]
+    rows = [line for line in lines if line.startswith("| ") and line.split(" ")[1] in SHARES]
+    failures = [line for line in lines if line.startswith("- ")]
+    head = tables[0][tables[0].index("# Killed") :].split("|---", 1)[0]
+    head = re.sub(r"SIGKILL: [0-9]+", f"SIGKILL: {sum(int(row.split('|')[3]) for row in rows)}", head)
+    told = ["", "Failures:", *failures] if failures else []
+    return "\n".join([head + "|---" * 11 + "|", *rows, *told]) + "\n"
+
+
 def main() -> int:
     reader = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     reader.add_argument("--kills", type=int, default=1000)
     reader.add_argument("--full", type=int, default=10, help="disks filled for every command")
     reader.add_argument("--two", type=int, default=5, help="pairs of runs at once for every command")
+    reader.add_argument("--minutes", type=float, default=0.0, help="end the kills after so long; 0: when all are done")
+    reader.add_argument("--join", nargs="+", type=Path, help="make the table of tables printed for some commands each")
     reader.add_argument("--only", default=",".join(SHARES))
     reader.add_argument("--seed", type=int, default=1)
     reader.add_argument("--no-table", action="store_true", help="print the table, do not keep it")
     given = reader.parse_args()
+    if given.join:
+        RESULTS.write_text(joined([file.read_text(encoding="utf-8") for file in given.join]), encoding="utf-8")
+        return 0
     only = tuple(given.only.split(","))
     # one thread each, before anything is imported: a fork has only the thread that made it
     for setting in ("AEROTRI_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
@@ -426,13 +443,14 @@ def main() -> int:
             mount.mkdir()
         for case in cases:
             wanted, k = round(given.kills * SHARES[case.name] / whole), 0
-            while case.tally["killed"] < wanted and k < 3 * wanted and len(case.failures) < 20:
-                trial(case, MODES[k % 3], chance, log)
-                k += 1
+            until = time.monotonic() + (60.0 * given.minutes or float("inf")) * SHARES[case.name] / whole
             for _ in range(given.full):
                 disk_full(case, chance, log, mount)
             for _ in range(given.two):
                 two_at_once(case, log)
+            while case.tally["killed"] < wanted and k < 3 * wanted and time.monotonic() < until:
+                trial(case, MODES[k % 3], chance, log)
+                k += 1
             print(f"{case.name}: {dict(case.tally)}, {len(case.failures)} failures", file=sys.stderr)
         how = "a tmpfs of random size" if mount is not None else "a limit on the size of a file (RLIMIT_FSIZE)"
         text = table(cases, how)
