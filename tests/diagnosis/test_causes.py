@@ -8,11 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from aerotri.commands.adjust import run_adjust
 from aerotri.diagnosis import diagnose
 from aerotri.diagnosis.evidence import fit, gather
 from aerotri.diagnosis.free_model import connected_parts, free_model
 from aerotri.diagnosis.placement import lay_on
 from aerotri.diagnosis.sampling import MOST_PHOTOGRAPHS, MOST_RAYS, sampled
+from aerotri.formats.block_folder import write_block
 from aerotri.functional_model.rotation import exponential
 from aerotri.pipeline import adjust
 from small_blocks import small_block
@@ -101,3 +103,13 @@ def test_of_a_large_block_the_part_around_the_worst_photograph_is_searched():
     assert len(part.image_points) <= MOST_RAYS
     assert block.images.names[worst] in part.images.names
     assert len(connected_parts(part)) == 1
+
+
+def test_the_cause_of_a_failure_is_printed(tmp_path, capsys):
+    """Strips without a common point have no result with control in one of them only."""
+    kind = next(kind for kind in kinds() if (kind.geometry, kind.name[:14]) == ("control", "strips without"))
+    write_block(kind.spoil(clean("control")), tmp_path / "block")
+    assert run_adjust(tmp_path / "block", tmp_path / "result", None, None, None, False, False) == 1
+    said = capsys.readouterr().err
+    assert "rank deficient" in said
+    assert "because the photographs fall into 2 parts without a common point" in said

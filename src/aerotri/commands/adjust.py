@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from aerotri.image_errors import Change
     from aerotri.observations import Block
     from aerotri.pipeline import Adjustment
-    from aerotri.statistics.adjusted_block import AdjustedBlock
+    from aerotri.statistics.adjusted_block import AdjustedBlock, Outcome
     from aerotri.statistics.free_verdict import FreeCheck
     from aerotri.statistics.parameter_effects import ParameterEffects
 
@@ -61,7 +61,7 @@ def run_adjust(
     except AdjustmentFailedError as failure:
         from aerotri.formats.result import outcome_json
 
-        console.failure(str(failure))
+        console.failure("\n  ".join([str(failure), *_causes(failure.outcome)]))
         if check_free:
             _tell_free(_checked_unadjusted(block, geoid, console), as_json, console)
         if as_json:
@@ -74,6 +74,13 @@ def run_adjust(
     result = write_all(replace(adjustment, result=result), target, plots, console, checked)
     _tell(result, target, console, as_json, checked)
     return 1 if result.outcome.status != "converged" or result.outcome.verdict == "rejected" else 0
+
+
+def _causes(outcome: Outcome) -> list[str]:
+    """The reasons of a failure beside its message, which is printed already."""
+    from aerotri.report.quality import printable
+
+    return [f"because {printable(reason, 500)}" for reason in outcome.reasons if reason != outcome.message]
 
 
 def with_settings(block: Block, parameters: str | None, robust: str | None) -> Block:

@@ -62,6 +62,7 @@ class _Search:
     before: Trial
     frame: LocalFrame | None
     until: float
+    focal_length_mm: tuple[float, ...]
 
     @property
     def is_over(self) -> bool:
@@ -116,7 +117,8 @@ def diagnose(
     model = free_model(block)
     if model is None or model.joined.sum() < 3:
         return ()
-    search = _Search(model, adjust, before, frame, until)
+    given = tuple(camera.focal_length_mm for camera in block.cameras)
+    search = _Search(model, adjust, before, frame, until, given)
     return _of_photographs(block, search) or _of_the_block(block, search)
 
 
@@ -255,6 +257,7 @@ def _hypotheses(block: Block, local: Block | None, model: FreeModel, now: Fit | 
         evidence = gather(local, model)
         places = places_by_others(evidence)
         yield from residual_patterns.of_single_positions(block, evidence, now)
+        yield from residual_patterns.of_single_attitudes(evidence, now)
         yield from residual_patterns.of_offsets(evidence)
     if local is not None:
 
@@ -294,7 +297,7 @@ def _proven(candidates: list[_Candidate], search: _Search) -> tuple[str, ...]:
         return ()
     tried = _equally_good(tried)
     best, after = tried[0]
-    said = _sentence(best.hypothesis, search.before, after)
+    said = _sentence(best.hypothesis, search, after)
     same = [
         c.hypothesis for c, _ in tried[1:]
         if abs(c.cost - best.cost) < AS_GOOD
@@ -315,12 +318,13 @@ def _equally_good(tried: list[tuple[_Candidate, Trial]]) -> list[tuple[_Candidat
     return sorted((pair for pair in good if pair[1].misfit <= CLEARLY_BETTER * least), key=lambda pair: pair[0].cost)
 
 
-def _sentence(hypothesis: Hypothesis, before: Trial, after: Trial) -> str:
-    if hypothesis.free_focal and after.focal_length_mm:
-        found = ", ".join(f"{value:.5g} mm" for value in after.focal_length_mm)
-        hypothesis = replace(
-            hypothesis,
-            remedy=f"{hypothesis.remedy}, estimated at {found} (a wrong size of a pixel would look the same)",
+def _sentence(hypothesis: Hypothesis, search: _Search, after: Trial) -> str:
+    given = search.focal_length_mm
+    if hypothesis.free_focal and len(after.focal_length_mm) == len(given):
+        told = ", ".join(
+            f"{found / was:.4g} times the principal distance, {found:.5g} mm in place of {was:.5g} mm"
+            for found, was in zip(after.focal_length_mm, given, strict=True)
         )
-    said = in_words(hypothesis, before, after)
+        hypothesis = replace(hypothesis, remedy=f"{told}; a wrong size of a pixel would look the same")
+    said = in_words(hypothesis, search.before, after)
     return f"{hypothesis.note}: {said}" if hypothesis.note else said

@@ -19,6 +19,7 @@ FEW = 4
 OFF = 2.0
 """Misfit in tolerances from which a position is off."""
 SAME_PLACE = 1e-3
+HALF_ROUND = np.pi / 2.0
 FACTORS = np.exp(np.linspace(np.log(0.08), np.log(12.5), 25))
 LEAST_FACTOR = 0.002
 """Change of the principal distance, as a share, that is worth saying."""
@@ -42,6 +43,16 @@ def of_single_positions(block: Block, evidence: Evidence, found: Fit) -> Iterato
                 yield from _exchanged(block, own, int(off[a]), int(off[b]))
         if len(off):
             yield _taken_out(own, off, found.residual[own.name][off])
+
+
+def of_single_attitudes(evidence: Evidence, found: Fit) -> Iterator[Hypothesis]:
+    """Photographs whose kappa is given the other way round."""
+    for own in evidence.attitudes:
+        off = np.flatnonzero(found.turned[own.name] > HALF_ROUND)
+        if 0 < len(off) <= FEW and len(off) < 0.5 * len(own.row):
+            names = ", ".join(own.labels[off].tolist())
+            change = changes.on_angles((own.name,), changes.turned_about(np.pi, own.row[off]))
+            yield Hypothesis(f"{SUBJECTS[(own.name,)]} ({names})", "180° added to kappa", change)
 
 
 def _noun(own: Positions) -> str:
