@@ -158,6 +158,18 @@ def renamed(block: Block) -> Changed:
     return replace(same(with_names(block, names)), names=names)
 
 
+def by_names(block: Block, other: Block) -> Changed:
+    """The other block as one of the same names in other rows."""
+    place = {name: k for k, name in enumerate(other.images.names.tolist())}
+    image = np.array([place[name] for name in block.images.names.tolist()])
+    place = {name: k for k, name in enumerate(other.points.tolist())}
+    point = np.array([place[name] for name in block.points.tolist()])
+    a, b = block.image_points, other.image_points
+    place = {pair: k for k, pair in enumerate(zip(b.image.tolist(), b.point.tolist(), strict=True))}
+    ray = np.array([place[i, p] for i, p in zip(image[a.image].tolist(), point[a.point].tolist(), strict=True)])
+    return Changed(other, image, point, ray, Similarity.none(), {})
+
+
 def with_names(block: Block, names: Mapping[str, str]) -> Block:
     """The block with other names, in its settings too."""
 
