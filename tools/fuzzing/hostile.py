@@ -133,7 +133,7 @@ def call_of(arguments: list[str]) -> None:
 
 def target_of(case: Case) -> Target:
     """A case as an input of the fuzzer, to be run in its forked process."""
-    return Target(case.name, {}, (), lambda folder: call_of(command_of(case, folder)))
+    return Target(case.name, {case.file: b""}, (), lambda folder: call_of(command_of(case, folder)))
 
 
 def run_hostile() -> int:

@@ -176,7 +176,7 @@ def _surfaces() -> list[Target]:
 
     def cloud(path: Path) -> object:
         refuse_cloud_units(path)
-        return read_point_cloud(path)
+        return read_point_cloud(path, parallel=False)
 
     rasters = {
         "plain": seeds.raster(), "tiled": seeds.raster(tiled=True, blockxsize=16, blockysize=16, compress="deflate"),

@@ -92,10 +92,8 @@ def write_files(files: dict[str, bytes], folder: Path) -> None:
 def warm_up(targets: Sequence[Target], folder: Path) -> None:
     """Read the good files once, so that every forked process finds the program loaded and compiled."""
     for target in {target.name: target for target in targets}.values():
-        # lazrs has threads of its own, which a forked process would wait for in vain
-        if not target.name.startswith("laz"):
-            write_files(target.files, folder)
-            target.call(folder)
+        write_files(target.files, folder)
+        target.call(folder)
 
 
 def run_inputs(
@@ -198,7 +196,8 @@ def run_one(target: Target, folder: Path, number: int) -> Found:
             target.call(folder)
     except InputError as error:
         outcome, message = "refused", str(error)
-        if error.file is None or not error.remedy or not str(error).isprintable():
+        named = error.file is not None or any(Path(name).name in message for name in target.files)
+        if not named or not error.remedy or not str(error).isprintable():
             outcome, place = "exception", f"InputError without file or remedy at {_place(error)}"
     except TooLongError as error:
         outcome, place = "hang", _place(error)

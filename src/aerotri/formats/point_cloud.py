@@ -32,8 +32,12 @@ def write_point_cloud(path: Path, xyz: np.ndarray, sigma: np.ndarray, ground: np
         cloud.write(file, do_compress=True)
 
 
-def read_point_cloud(path: Path) -> tuple[np.ndarray, np.ndarray]:
+def read_point_cloud(path: Path, parallel: bool = True) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) m of a LAS or LAZ file and their classes (n,).
+
+    Parameters
+    ----------
+    parallel : whether LAZ is unpacked by several threads, which a forked process cannot.
 
     Raises
     ------
@@ -43,7 +47,8 @@ def read_point_cloud(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
     check_las(path)
     try:
-        cloud = laspy.read(path)
+        backends = laspy.LazBackend.detect_available() if parallel else (laspy.LazBackend.Lazrs,)
+        cloud = laspy.read(path, laz_backend=backends)
         xyz = np.column_stack([np.asarray(axis, dtype=float) for axis in (cloud.x, cloud.y, cloud.z)])
         classes = np.asarray(cloud.classification)
     except BaseException as error:

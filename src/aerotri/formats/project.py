@@ -215,8 +215,8 @@ def _begin(request: Request, parts: _Parts) -> Reading:
         raise InputError("holds no photographs", "give a file with some", request.source)
     named = np.array(sorted({name for name in camera_of.values() if name}), dtype=str)
     c_mm = np.concatenate([rays.focal_length_mm for rays in parts.rays]) if parts.rays else np.zeros(0)
-    cameras = cameras_of(request.camera, parts.cameras, named, c_mm)
     try:
+        cameras = cameras_of(request.camera, parts.cameras, named, c_mm)
         cameras, camera, said = camera_of_each(cameras, list(camera_of.values()))
     except InputError as error:
         raise InputError(error.message, error.remedy, error.file or Path(request.source)) from error
