@@ -29,7 +29,7 @@ def open_result(folder: str | os.PathLike) -> Adjustment:
     """
     path = Path(folder) / "solution.npz"
     if not path.is_file():
-        raise InputError("holds no adjustment", REMEDY, folder)
+        raise InputError("holds no adjustment: solution.npz is missing", REMEDY, folder)
     block = read_block(Path(folder) / "block")
     saved = read_solution(path, block)
     _check_rays(block, saved, path)

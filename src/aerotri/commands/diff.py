@@ -75,4 +75,5 @@ def read_result(folder: Path, console: Console) -> AdjustedBlock:
         return open_result(folder).result
     except InputError as error:
         # both folders have files of the same names
-        raise InputError(f"result '{folder}': {error}") from None
+        place = "" if error.file is None else f"{Path(error.file).name}: "
+        raise InputError(f"result '{folder}': {place}{error.message}", error.remedy) from None
