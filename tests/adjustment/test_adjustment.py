@@ -380,3 +380,33 @@ def test_heights_that_hang_on_the_principal_distance_are_said():
     # the check points' own σ contain it
     assert (alone.check.sigma[:, 2] > 0.9 * shared).all()
     assert not any("all heights share" in w for w in adjust(block).outcome.warnings)
+
+
+TAMPERED = {
+    "status": np.array("accepted"),
+    "estimator_code": np.array(7),
+    "estimator_limit": np.array(np.nan),
+    "held": np.array([[0, 5]]),
+    "points": np.zeros((3, 3)),
+    "shared_cofactor": np.zeros((1, 2)),
+    "weight": np.array(["1"]),
+    "rotation": None,
+    "removals": np.array('[{"name": 1}]'),
+    "components": np.array("[" * 5000),
+}
+
+
+@pytest.mark.parametrize("name", TAMPERED)
+def test_tampered_solution_is_refused(name, tmp_path):
+    """Whatever an adjustment cannot have written, in a file that is whole otherwise."""
+    block = small_block(20)[0]
+    adjustment = adjust_keeping_system(block)
+    path = tmp_path / "solution.npz"
+    write_solution(path, adjustment.system, adjustment.solution, adjustment.result)
+    with np.load(path) as file:
+        arrays = {key: file[key] for key in file.files}
+    assert read_solution(path, block).status == "converged"
+    np.savez(path, **(arrays | {name: 2.0 * arrays[name] if TAMPERED[name] is None else TAMPERED[name]}))
+    with pytest.raises(InputError, match=r"^solution\.npz: ") as caught:
+        read_solution(path, block)
+    assert caught.value.remedy

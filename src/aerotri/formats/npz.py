@@ -51,7 +51,7 @@ class Archive:
         except FileNotFoundError:
             raise InputError("is missing", "give the folder that `aerotri adjust` wrote", path) from None
         except WHAT_DAMAGE_RAISES as error:
-            raise self.error(f"is no archive that can be read: {_short(error)}") from error
+            raise self.error(f"cannot be read: {_short(error)}") from error
         self.members = {entry.filename.removesuffix(".npy"): entry for entry in entries}
         if len(self.members) < len(entries):
             raise self.error("holds an array twice")
