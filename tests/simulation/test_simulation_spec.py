@@ -82,7 +82,7 @@ def test_files_that_are_none(tmp_path):
         read_spec(path)
     assert caught.value.line == 1
     path.write_bytes(b"name = '\xff'")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="is not UTF-8"):
         read_spec(path)
 
 

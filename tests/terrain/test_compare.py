@@ -122,5 +122,5 @@ def test_point_clouds(tmp_path):
     np.testing.assert_allclose(found, xyz, atol=6e-4)
     np.testing.assert_array_equal(classes == 2, ground)
     (tmp_path / "b.laz").write_bytes(b"no cloud")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="is no LAS or LAZ file"):
         read_point_cloud(tmp_path / "b.laz")

@@ -118,7 +118,7 @@ def read_odm_gcp(path: str | os.PathLike) -> PointList:
     words, rows = [_cells(line, 5) for line in file.lines], list(range(1, len(file)))
     for row in rows:
         if len(words[row]) < 6:
-            raise file.error(row, f"the row has {len(words[row])} entries", f"rows are: {form}")
+            raise file.error(row, f"the row has {len(file.lines[row].split())} entries", f"rows are: {form}")
     heights = [words[row][2] for row in rows]
     unknown = np.array([word.lower() in UNKNOWN for word in heights])
     plain = [["0" if k == 2 and unknown[i] else words[row][k] for k in range(5)] for i, row in enumerate(rows)]
@@ -203,7 +203,7 @@ def read_odm_geo(path: str | os.PathLike) -> PositionList:
     words, rows = [_cells(line, 0) for line in file.lines], list(range(1, len(file)))
     for row in rows:
         if len(words[row]) < min(WIDTHS):
-            raise file.error(row, f"the row has {len(words[row])} entries", f"rows are: {form}")
+            raise file.error(row, f"the row has {len(file.lines[row].split())} entries", f"rows are: {form}")
     names = [words[row][0] for row in rows]
     file.check_names(names, rows, "photograph")
     file.refuse_repeated(names, rows, "photograph")
