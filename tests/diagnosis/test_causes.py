@@ -22,6 +22,7 @@ from wrong_blocks import answer_of, clean, image_points, kinds, misses, negated
 
 FEW = (
     ("navigation", "x of one photograph negated"),
+    ("track", "x of one photograph negated"),
     ("control", "names of one photograph's points moved by one"),
     ("control", "one control point 2 m off in X"),
     ("navigation", "GNSS 10 m too high"),

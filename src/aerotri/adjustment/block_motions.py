@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import LinAlgError, eigh
 from scipy.sparse import csr_array, vstack
 
 from aerotri.adjustment.datum import FOLLOWING, FREEDOMS, motions_of_images, motions_of_points
@@ -21,6 +21,8 @@ from aerotri.functional_model.observed_unknowns import Rows
 
 WEAK = 1e-8
 """Square of the effect, relative to the motion's size, below which a motion is measured anew without squaring."""
+SAME_MOTION = 1e-12
+"""Share of the largest size below which a combination of motions is none of its own."""
 REAL = 1e-6
 """Share of the largest motion below which only what follows moves, not the block."""
 ALONE = 0.999
@@ -81,12 +83,27 @@ def unnoticed_motions(system: NormalSystem, state: State, diagonal: np.ndarray) 
     size = _size(motions, directions, diagonal)
     unit = 1.0 / np.sqrt(np.maximum(np.diagonal(size), 1e-300))
     size, rows = size * np.outer(unit, unit), _rows(system, state, motions, diagonal) * unit[None, :]
-    weak = eigh((rows.T @ rows).toarray(), size, subset_by_value=(-np.inf, WEAK))[1]
+    weak = _weak((rows.T @ rows).toarray(), size)
     # a second time over the weak ones alone: squares of small numbers, none of them a difference of large ones
     effect = rows @ weak
     value, turn = eigh(effect.T @ effect, weak.T @ size @ weak) if weak.shape[1] else (np.zeros(0), np.zeros((0, 0)))
     names, free = _named(weak @ turn[:, value < NOT_DETERMINED])
     return FreeOfObservations(names, directions @ (free * unit[:, None]))
+
+
+def _weak(effect: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """(7 + a, w) combinations whose effect, over their size, is at most WEAK.
+
+    In a block that ran away, points far beyond all others make several motions one: these are counted once.
+    """
+    below = (-np.inf, WEAK)
+    try:
+        return eigh(effect, size, subset_by_value=below)[1]
+    except LinAlgError:
+        value, vectors = eigh(size)
+        there = value > SAME_MOTION * value[-1]
+        basis = vectors[:, there] / np.sqrt(value[there])
+        return basis @ eigh(basis.T @ effect @ basis, subset_by_value=below)[1]
 
 
 def _motions(u: Unknowns, state: State) -> _Motions:
