@@ -61,7 +61,9 @@ class Boundary:
 
 
 def boundary_of(polygon: BaseGeometry, name: str, note: str = "", file: Path | None = None) -> Boundary:
-    """A boundary, made valid.
+    """A boundary, its rings beginning at their lowest corner and going one way, whatever the file has.
+
+    Places along the rings, through which bases are laid, would else hang on the corner a ring begins with.
 
     Raises
     ------
@@ -74,7 +76,7 @@ def boundary_of(polygon: BaseGeometry, name: str, note: str = "", file: Path | N
         )
     if not polygon.area > 0.0:
         raise InputError(f"the boundary '{name}' has no area", "give a polygon", file)
-    return Boundary(polygon, name, note)
+    return Boundary(shapely.normalize(polygon), name, note)
 
 
 def read_boundary(source: str, epsg: int | None = None) -> Boundary:
