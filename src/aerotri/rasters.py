@@ -6,7 +6,9 @@ NaN inside the program and the no-data value in a file.
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -26,6 +28,7 @@ NO_DATA = -9999.0
 CACHE_MB = 256
 """Blocks that GDAL keeps: it would take a share of the machine's memory otherwise."""
 TILE = 512
+LEAST_ROOM = 16384
 SIGMA = "σ"
 """The description of a band of σ begins with it."""
 DAMAGED = "write the file anew, it is damaged"
@@ -300,6 +303,11 @@ def write_surface(path: str | os.PathLike, z: np.ndarray, sigma: np.ndarray, gri
                     file.write(np.where(known, values, NO_DATA).astype(np.float32), band)
                     file.set_band_description(band, what)
             rasterio.shutil.copy(plain, path, driver="COG", compress="DEFLATE", predictor="YES")
+    except Exception as error:
+        # GDAL closes a file that found no room without a word and fails when it reads it again
+        if shutil.disk_usage(plain.parent).free < LEAST_ROOM:
+            raise OSError(errno.ENOSPC, "No space left on device", str(plain)) from error
+        raise
     finally:
         plain.unlink(missing_ok=True)
 

@@ -49,6 +49,7 @@ def atomic_file(target: str | os.PathLike) -> Iterator[Path]:
         target.parent.mkdir(parents=True, exist_ok=True)
         with work_place(target) as place, _told_as_input_error(target):
             yield place / target.name
+            _refuse_full(target)
             os.replace(place / target.name, target)
             written.append(target)
 
@@ -88,6 +89,7 @@ def atomic_folder(
             new.mkdir()
             yield new
             record_files(new)
+            _refuse_full(target)
             if target.is_dir():
                 seen: set[Path] = set()
                 carry_over(target, new, own or (), gone, seen)
@@ -129,6 +131,17 @@ def _is_full(folder: Path) -> bool:
         return shutil.disk_usage(folder).free < LEAST_ROOM
     except OSError:
         return False
+
+
+def _refuse_full(target: Path) -> None:
+    """GDAL closes a file that found no room without a word: nothing written with so little left is trusted.
+
+    Raises
+    ------
+    OSError
+    """
+    if _is_full(target.parent):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(target))
 
 
 def _exchange(new: Path, target: Path) -> None:
