@@ -155,8 +155,8 @@ def test_breaklines_from_files(tmp_path):
     ("name", "content", "said"),
     [
         ("a.shp", b"", "no known kind"),
-        ("a.gpkg", b"nonsense", "cannot be read"),
-        ("a.geojson", b"{", "cannot be read"),
+        ("a.gpkg", b"nonsense", "no GeoPackage that can be read"),
+        ("a.geojson", b"{", "is not JSON"),
         ("a.geojson", b'{"features": []}', "no lines"),
         ("a.dxf", b"nonsense", "cannot be read"),
         (
