@@ -83,7 +83,7 @@ def read_colmap(folder: str | os.PathLike, pixel_um: float = 1.0) -> tuple[Block
     model = _read_model(folder)
     cameras, camera_place = _cameras_of(model, pixel_um, folder)
     ids = sorted(model.images)
-    images = _images_of(model, ids, camera_place)
+    images = _images_of(model, ids, camera_place, folder)
     _check_images(images, folder)
     image, point_id, px = _observations(model, ids)
     image, point_id, px = _once_each(image, point_id, px)
@@ -194,7 +194,14 @@ def _free_parameters(cameras: tuple[Camera, ...]) -> tuple[tuple[str, tuple[str,
     return tuple((family, items) for family, items in (("lens", lens), ("brown", affinity)) if items)
 
 
-def _images_of(model: Any, ids: list[int], camera_place: dict[int, int]) -> Images:
+def _name(image: Any, folder: Path) -> str:
+    try:
+        return image.name
+    except UnicodeDecodeError as error:
+        raise InputError("the name of an image is not UTF-8", "export the model anew", folder) from error
+
+
+def _images_of(model: Any, ids: list[int], camera_place: dict[int, int], folder: Path) -> Images:
     centre, angles = np.full((len(ids), 3), np.nan), np.full((len(ids), 3), np.nan)
     for row, number in enumerate(ids):
         image = model.images[number]
@@ -206,7 +213,7 @@ def _images_of(model: Any, ids: list[int], camera_place: dict[int, int]) -> Imag
             centre[row] = -colmap_from_world[:, :3].T @ colmap_from_world[:, 3]
             angles[row] = angles_from_rotation(rotation)
     return Images(
-        names=np.array([model.images[number].name for number in ids], dtype=str),
+        names=np.array([_name(model.images[number], folder) for number in ids], dtype=str),
         camera=np.array([camera_place[model.images[number].camera_id] for number in ids], dtype=np.int64),
         strip=np.full(len(ids), ""),
         centre=centre,
