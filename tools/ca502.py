@@ -19,13 +19,13 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.commands.adjust import with_settings
 from aerotri.formats.assemble import Statements
 from aerotri.formats.camera_spec import CameraSpec
 from aerotri.formats.project import Request, read_project
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Block, GnssIns, ImagePoints
 from aerotri.pipeline import AdjustmentFailedError, adjust
+from aerotri.public.adjustment import with_settings
 from aerotri.statistics.adjusted_block import AdjustedBlock
 from aerotri.statistics.set_aside import counts_by_reason, photograph_reasons, point_reasons
 
@@ -64,7 +64,7 @@ def unoriented(folder: Path) -> Block:
             image_sigma_px=SIGMA_PX, gnss_shift="off",
         )  # fmt: skip
         block = read_project(request).block
-    return with_settings(block, PARAMETERS, ROBUST)
+    return with_settings(block, {"additional_parameters": PARAMETERS, "robust": ROBUST})
 
 
 def part_of(block: Block, keep: np.ndarray) -> Block:

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.commands.adjust import with_settings
 from aerotri.formats.block_folder import read_block
 from aerotri.observations import Block
 from aerotri.pipeline import AdjustmentFailedError, adjust
+from aerotri.public.adjustment import with_settings
 from aerotri.statistics.adjusted_block import AdjustedBlock
 
 
@@ -80,7 +80,8 @@ def main() -> None:
     parser.add_argument("--parameters", help="additional parameters, in place of block.toml's")
     parser.add_argument("--robust", help="robust estimator, in place of block.toml's")
     options = parser.parse_args()
-    table = lines(with_settings(read_block(options.block), options.parameters, options.robust))
+    given = {"additional_parameters": options.parameters, "robust": options.robust}
+    table = lines(with_settings(read_block(options.block), given))
     print("| datum | left out | dX m | dY m | dZ m | c mm | σ0 µm |\n|---|---|---|---|---|---|---|")
     for entry in table:
         print("| " + " | ".join(entry.cells()) + " |")

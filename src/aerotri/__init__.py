@@ -1,3 +1,68 @@
-"""Bundle block adjustment with self-calibration for aerial photographs, and how sure it is."""
+"""Bundle block adjustment with self-calibration for aerial photographs, and how sure it is.
 
-__version__ = "0.1.0"
+>>> import aerotri
+>>> block = aerotri.simulate(aerotri.example_flight(), seed=1).block
+>>> result = aerotri.adjust(block)
+>>> result.status
+'converged'
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from aerotri.version import __version__
+
+if TYPE_CHECKING:
+    from aerotri.conventions import InputError as InputError
+    from aerotri.observations import Block as Block
+    from aerotri.pipeline import AdjustmentFailedError as AdjustmentFailedError
+    from aerotri.public.adjustment import Adjustment as Adjustment
+    from aerotri.public.adjustment import adjust as adjust
+    from aerotri.public.adjustment import open_result as open_result
+    from aerotri.public.blocks import example_flight as example_flight
+    from aerotri.public.blocks import read as read
+    from aerotri.public.blocks import read_block as read_block
+    from aerotri.public.blocks import simulate as simulate
+    from aerotri.public.comparing import compare_parameters as compare_parameters
+    from aerotri.public.comparing import crosscheck as crosscheck
+    from aerotri.public.converting import convert as convert
+    from aerotri.public.covariance import Covariance as Covariance
+    from aerotri.public.models import deform as deform
+    from aerotri.public.table import Table as Table
+
+
+_PLACES = {
+    "Adjustment": "aerotri.public.adjustment",
+    "AdjustmentFailedError": "aerotri.pipeline",
+    "Block": "aerotri.observations",
+    "Covariance": "aerotri.public.covariance",
+    "InputError": "aerotri.conventions",
+    "Table": "aerotri.public.table",
+    "compare_parameters": "aerotri.public.comparing",
+    "crosscheck": "aerotri.public.comparing",
+    "deform": "aerotri.public.models",
+    "adjust": "aerotri.public.adjustment",
+    "convert": "aerotri.public.converting",
+    "example_flight": "aerotri.public.blocks",
+    "open_result": "aerotri.public.adjustment",
+    "read": "aerotri.public.blocks",
+    "read_block": "aerotri.public.blocks",
+    "simulate": "aerotri.public.blocks",
+}
+"""Where every public name stands; imported when it is used, so that `import aerotri` is quick."""
+
+__all__ = ["__version__", *sorted(_PLACES)]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'aerotri' has no attribute '{name}'")
+    value = getattr(import_module(_PLACES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -40,7 +40,8 @@ def test_pair_as_flown(erring_result, erring, tmp_path, capsys):
     """Rasters node by node against the model itself; numbers of the JSON against the rasters."""
     content = deformed(erring_result, tmp_path / "out", capsys, plots=True, pair=PAIR, spacing=20.0)
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
-        "dX.tif", "dY.tif", "dZ.tif", "deform.json", "plots", "sigma_dX.tif", "sigma_dY.tif", "sigma_dZ.tif",
+        ".aerotri-files", "dX.tif", "dY.tif", "dZ.tif", "deform.json", "plots", "sigma_dX.tif", "sigma_dY.tif",
+        "sigma_dZ.tif",
     ]  # fmt: skip
     plots = {p.name for p in (tmp_path / "out" / "plots").iterdir()}
     assert plots == {"contours.png", "contours.svg", "profiles.png", "profiles.svg"}
@@ -81,7 +82,7 @@ def test_stated_end_lap_in_both_variants(erring_result, tmp_path, capsys):
     assert np.nanmax(np.abs(found["free"] - found["absorbed"])) > 0.1
 
 
-def test_block_and_the_map_of_its_models(erring_result, tmp_path, capsys):
+def test_block_and_the_map_of_its_models(erring_result, erring, tmp_path, capsys):
     content = deformed(erring_result, tmp_path / "out", capsys, plots=True, spacing=40.0, variant="absorbed")
     assert (tmp_path / "out" / "plots" / "block.png").stat().st_size > 10_000
     with (tmp_path / "out" / "models.csv").open(newline="", encoding="utf-8") as file:
@@ -96,7 +97,13 @@ def test_block_and_the_map_of_its_models(erring_result, tmp_path, capsys):
     assert len(seams) == content["seams"]["count"] > 10
     nodes, rms = (np.array([float(seam[key]) for seam in seams]) for key in ("nodes", "rms"))
     assert content["seams"]["rms"] == pytest.approx(np.sqrt(np.sum(nodes * rms**2) / nodes.sum()))
-    assert {model["right"] for model in content["models"] if model["left"] == "2_003"} == {"2_004"}
+    # neighbours in their strip, from west to east whichever way it was flown
+    names, east = erring.result.block.images.names.tolist(), erring.result.images.centre[:, 0]
+    for model in content["models"]:
+        (strip, left), (other, right) = (model[side].split("_") for side in ("left", "right"))
+        assert strip == other
+        assert abs(int(left) - int(right)) == 1
+        assert east[names.index(model["left"])] < east[names.index(model["right"])]
 
 
 def test_ground_from_a_dem(erring_result, erring, tmp_path, capsys):
@@ -183,4 +190,4 @@ def test_command_line(erring_result, tmp_path):
     assert (tmp_path / "result_deformation" / "dZ.tif").is_file()
     done = run("--pair", "2_003", "2_003")
     assert done.returncode == 2
-    assert done.stderr == "aerotri: '2_003' is named twice — a model needs two photographs\n"
+    assert done.stderr.endswith("aerotri: '2_003' is named twice — a model needs two photographs\n")

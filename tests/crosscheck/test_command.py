@@ -29,8 +29,9 @@ def test_a_block_is_adjusted_and_checked(block_folder, tmp_path):
     done = run("crosscheck", block_folder, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     out = tmp_path / "small_crosscheck"
-    assert {p.name for p in out.iterdir()} == {"crosscheck.json", "crosscheck.csv", "plots", "report.html"}
-    assert {p.name for p in (out / "plots").iterdir()} == {"crosscheck.png", "crosscheck.svg"}
+    written = {p.name for p in out.iterdir()} - {".aerotri-files"}
+    assert written == {"crosscheck.json", "crosscheck.csv", "plots", "report.html"}
+    assert {p.name for p in (out / "plots").iterdir()} - {".aerotri-files"} == {"crosscheck.png", "crosscheck.svg"}
     content = json.loads((out / "crosscheck.json").read_text(encoding="utf-8"))
     assert content["verdict"] == "agrees"
     assert done.stdout.startswith(content["message"])

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
-from aerotri import __version__
 from aerotri.cli.numbers import CheckedCommand
+from aerotri.version import __version__
 
 
 class Program(typer.Typer):

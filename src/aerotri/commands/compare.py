@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
-from aerotri.commands.results import refuse_foreign_folder
 from aerotri.conventions import InputError
+from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
     from aerotri.rasters import Grid
@@ -159,7 +159,7 @@ def _common_grid(one: np.ndarray, other: np.ndarray, cell: float) -> Grid:
 
 def comparison_json(found: Comparison, test: str, control: str, method: str) -> dict[str, Any]:
     """The content of compare.json."""
-    from aerotri import __version__
+    from aerotri.version import __version__
 
     a = found.alignment
     moved = None

@@ -78,6 +78,13 @@ class Console:
             self._tenth = int(10.0 * share + 1e-9)
             self._line(text)
 
+    def stage(self, name: str, share: float | None) -> None:
+        """Progress as the Python package tells it: what is being done, and how far it is, where that is known."""
+        if share is None:
+            self.progress(name)
+        else:
+            self.work(name, share)
+
     def step(self, number: int, count: int, name: str) -> None:
         """Progress of a piece of work out of several, which begins now."""
         self.work("comparing", (number - 1) / count, f"{number} of {count}, {name}")

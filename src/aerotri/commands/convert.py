@@ -42,10 +42,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerotri.commands.console import Console
-from aerotri.commands.results import refuse_existing_file, refuse_foreign_entries
 from aerotri.conventions import FLIGHT_AXES, LARGEST, InputError
 from aerotri.formats.camera_spec import CameraSpec
 from aerotri.formats.text_lines import is_number
+from aerotri.public.folders import refuse_existing_file, refuse_foreign_entries
 
 if TYPE_CHECKING:
     from aerotri.formats.oriented import OrientedBlock

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
-from aerotri.commands.deform import check_crs, refuse_without_errors
-from aerotri.commands.results import refuse_existing_file, reopened
+from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
+from aerotri.public.folders import refuse_existing_file
+from aerotri.public.models import check_crs, refuse_without_errors
 
 if TYPE_CHECKING:
     from aerotri.deformation.dem_correction import DemOutcome
@@ -51,7 +52,7 @@ def run_demcor(
         console.failure(str(failure))
         return 1
     if used is None:
-        refuse_without_errors(of, source)
+        refuse_without_errors(of, source.name)
     with ExitStack() as stack:
         stack.enter_context(cache_limited())
         reader = stack.enter_context(RasterReader(dem))

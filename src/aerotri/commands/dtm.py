@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
-from aerotri.commands.results import refuse_foreign_folder, reopened
+from aerotri.commands.results import reopened
 from aerotri.conventions import InputError, stated_number
+from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
     from aerotri.pipeline import Adjustment

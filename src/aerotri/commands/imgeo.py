@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
 from aerotri.commands.imgeo_exports import RECORD, export, plain, write_record
-from aerotri.commands.results import refuse_foreign_folder, reopened
+from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
+from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
     from aerotri.image_errors import ImageGroup

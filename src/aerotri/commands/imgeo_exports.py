@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerotri.commands.results import refuse_existing_file
+from aerotri.public.folders import refuse_existing_file
 
 if TYPE_CHECKING:
     from aerotri.image_errors.error_exports import NearestLens

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
-from aerotri.commands.results import refuse_existing_file, refuse_foreign_entries
 from aerotri.conventions import InputError
+from aerotri.public.folders import refuse_existing_file, refuse_foreign_entries
 
 if TYPE_CHECKING:
     from aerotri.observations import Block

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
-from aerotri.commands.results import refuse_foreign_entries, refuse_foreign_folder
 from aerotri.conventions import InputError
 from aerotri.formats.assemble import Statements
 from aerotri.formats.block_writer import OWN_ENTRIES
 from aerotri.formats.camera_spec import CameraSpec
+from aerotri.public.folders import refuse_foreign_entries, refuse_foreign_folder
 
 if TYPE_CHECKING:
     from aerotri.formats.parts import PointList

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.commands.console import Console
-from aerotri.commands.results import refuse_foreign_folder
 from aerotri.conventions import InputError
+from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
     from aerotri.rasters import Grid, RasterReader
@@ -179,8 +179,9 @@ def _other(path: str, reader: RasterReader) -> MetricReader:
 def _sigma(
     given: VolumeInput, reader: RasterReader, base: Base, boundary: Boundary, options: SigmaOptions, console: Console
 ) -> VolumeSigma | None:
-    from aerotri.commands.deform import check_crs, reopened
+    from aerotri.commands.results import reopened
     from aerotri.commands.volume_parts import base_calibration, surface_part
+    from aerotri.public.models import check_crs
     from aerotri.volume.accuracy import volume_sigma
     from aerotri.volume.bases import SurfaceBase
 

@@ -198,23 +198,36 @@ def _points_from_local(points: PointResults, frame: LocalFrame) -> PointResults:
 
 
 def _images_from_local(images: ImageResults, frame: LocalFrame, order: str) -> ImageResults:
-    """Orientation in the CRS. δ_crs = axesᵀ·δ_local, so the angles have the partials E_crs⁻¹·axesᵀ·E_local."""
+    """Orientation in the CRS."""
     centre = frame.from_local(images.centre)
     angles, covariance = np.full_like(images.angles, np.nan), np.full_like(images.covariance, np.nan)
     there = np.isfinite(images.centre).all(axis=1)
     axes = np.swapaxes(frame.axes_at(centre[there]), 1, 2)
     angles[there] = angles_from_rotation(axes @ rotation_from_angles(images.angles[there], order), order)
-    per_angle = small_rotation_per_angle(angles[there], order)
+    jacobian = orientation_partials(images.centre[there], images.angles[there], frame, order)
+    covariance[there] = jacobian @ images.covariance[there] @ np.swapaxes(jacobian, 1, 2)
+    return replace(images, centre=centre, angles=angles, covariance=covariance)
+
+
+def orientation_partials(centre: np.ndarray, angles: np.ndarray, frame: LocalFrame, order: str) -> np.ndarray:
+    """(n, 6, 6) partials of X0, Y0, Z0, ω, φ, κ in the CRS by those in the local frame.
+
+    δ_crs = axesᵀ·δ_local, so the angles have the partials E_crs⁻¹·axesᵀ·E_local; NaN at a middle angle of ±90°.
+
+    Parameters
+    ----------
+    centre : (n, 3) m and angles : (n, 3) rad, in the local frame.
+    """
+    axes = np.swapaxes(frame.axes_at(frame.from_local(centre)), 1, 2)
+    angles_crs = angles_from_rotation(axes @ rotation_from_angles(angles, order), order)
+    per_angle = small_rotation_per_angle(angles_crs, order)
     singular = np.abs(np.linalg.det(per_angle)) < SINGULAR
     jacobian = np.zeros((len(axes), 6, 6))
-    jacobian[:, :3, :3] = frame.crs_per_local(images.centre[there])
-    turned = axes @ small_rotation_per_angle(images.angles[there], order)
+    jacobian[:, :3, :3] = frame.crs_per_local(centre)
+    turned = axes @ small_rotation_per_angle(angles, order)
     jacobian[~singular, 3:, 3:] = np.linalg.solve(per_angle[~singular], turned[~singular])
-    covariance[there] = jacobian @ images.covariance[there] @ np.swapaxes(jacobian, 1, 2)
-    unclear = np.flatnonzero(there)[singular]
-    covariance[unclear, 3:] = np.nan
-    covariance[unclear, :, 3:] = np.nan
-    return replace(images, centre=centre, angles=angles, covariance=covariance)
+    jacobian[singular, 3:, 3:] = np.nan
+    return jacobian
 
 
 def _ground_from_local(

@@ -36,13 +36,13 @@ from typing import Any
 
 import numpy as np
 
-from aerotri import __version__
 from aerotri.deformation.block_models import BlockDeformation, BlockModel, Seam
 from aerotri.deformation.dem_correction import DemOutcome
 from aerotri.deformation.dem_window import FIT_TOLERANCE_M, DemModels
 from aerotri.deformation.model_grid import Deformation
 from aerotri.deformation.restitution import SIGMA_INCLUDES
 from aerotri.rasters import Grid
+from aerotri.version import __version__
 
 WORST_SEAMS = 10
 FEWEST_ON_SEAM = 4

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -375,3 +375,20 @@ def _known_keys(where: tuple[Any, ...]) -> str:
     known = list(model.model_fields)
     close = difflib.get_close_matches(str(where[-1]), known, 1)
     return (f"did you mean '{close[0]}'? " if close else "") + f"known are {', '.join(known)}"
+
+
+def checked_adjustment_settings(values: Mapping[str, object]) -> None:
+    """Settings of the adjustment given elsewhere than in block.toml are held to the same rules.
+
+    Raises
+    ------
+    InputError
+        Naming the setting.
+    """
+    try:
+        AdjustmentModel.model_validate(dict(values))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        name = ".".join(str(part) for part in first["loc"])
+        reason = first["msg"].removeprefix("Value error, ").replace("Input should be", "should be")
+        raise InputError(f"{name} = {_shown(first['input'])}: {reason}", "correct the setting") from None

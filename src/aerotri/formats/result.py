@@ -151,9 +151,14 @@ def ground_point_columns(adjusted: AdjustedBlock, results: GroundPointResults) -
 
 
 def _write_residuals(path: Path, adjusted: AdjustedBlock) -> None:
-    """residuals.parquet, a row per ray in the order of the input; a ray left out has no residual."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
+
+    pq.write_table(residual_table(adjusted), path, compression="zstd")
+
+
+def residual_table(adjusted: AdjustedBlock):
+    """The `pyarrow.Table` of residuals.parquet: a row per ray, in the order of the input; null for one left out."""
+    import pyarrow as pa
 
     block, rays, measured = adjusted.block, adjusted.rays, adjusted.block.image_points
     used = (rays.status == RAY_STATUS.index("used"))[:, None]
@@ -168,7 +173,7 @@ def _write_residuals(path: Path, adjusted: AdjustedBlock) -> None:
     arrays["weight"] = pa.array(np.asarray(rays.weight, dtype=float), from_pandas=True)
     arrays["status"] = _text_by_index(np.array(RAY_STATUS), rays.status)
     arrays |= ray_columns(adjusted)
-    pq.write_table(pa.table(arrays), path, compression="zstd")
+    return pa.table(arrays)
 
 
 def _text_by_index(names: np.ndarray, index: np.ndarray):

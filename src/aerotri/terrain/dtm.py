@@ -253,7 +253,7 @@ def _model_numbers(dsm: Surface, pickets: Pickets) -> np.ndarray:
 
 def terrain_json(outcome: TerrainOutcome, block: str, crs: str) -> dict[str, Any]:
     """The content of dtm.json."""
-    from aerotri import __version__
+    from aerotri.version import __version__
 
     o, p = outcome, outcome.pickets
     count = np.bincount(p.status, minlength=len(PicketStatus))

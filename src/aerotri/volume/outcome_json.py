@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri import __version__
+from aerotri.version import __version__
 from aerotri.volume.accuracy import PARTS, VolumeSigma
 from aerotri.volume.bases import Base, PlaneBase
 from aerotri.volume.boundary import Boundary

@@ -1,0 +1,360 @@
+"""An adjusted block as a notebook sees it: numbers, tables, plots, covariances, and a folder to keep it in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from aerotri.conventions import InputError
+from aerotri.public.progress import ProgressLike, stage_report
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping, Sequence
+
+    import numpy as np
+
+    from aerotri.observations import Block
+    from aerotri.pipeline import Adjustment as Record
+    from aerotri.public.covariance import Covariance
+    from aerotri.public.plots import AdjustmentPlots
+    from aerotri.public.table import Table
+    from aerotri.statistics.adjusted_block import AdjustedBlock
+
+Robust = Literal["off", "huber", "danish", "cauchy", "adaptive", "data-snooping"]
+Datum = Literal["control", "minimal", "inner", "fixed"]
+Switch = Literal["off", "on"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Adjustment:
+    """An adjusted block: what `aerotri.adjust` and `aerotri.open_result` return.
+
+    Parameters
+    ----------
+    record : the numbers of the result together with the equations they come from.
+    notes : what was done with the input before, in sentences.
+
+    Examples
+    --------
+    >>> import aerotri
+    >>> result = aerotri.adjust(aerotri.simulate(aerotri.example_flight(), seed=1).block)
+    >>> result.status
+    'converged'
+    >>> result.points["Z"].shape == (len(result.points),)
+    True
+    """
+
+    record: Record
+    notes: tuple[str, ...] = ()
+
+    @property
+    def adjusted(self) -> AdjustedBlock:
+        """The numbers as arrays, in the coordinate system of the block."""
+        return self.record.result
+
+    @property
+    def block(self) -> Block:
+        """The block as it was adjusted."""
+        return self.adjusted.block
+
+    @property
+    def status(self) -> str:
+        """'converged', 'not converged' or 'rank deficient'."""
+        return self.adjusted.outcome.status
+
+    @property
+    def verdict(self) -> str:
+        """'accepted', 'doubtful' or 'rejected'."""
+        return self.adjusted.outcome.verdict
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why the result is not simply accepted, in sentences."""
+        return self.adjusted.outcome.reasons
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What else the user should read."""
+        return self.adjusted.outcome.warnings
+
+    @property
+    def sigma0(self) -> float:
+        """σ̂0, dimensionless: 1 when the stated standard deviations are right."""
+        return self.adjusted.outcome.sigma0
+
+    @property
+    def sigma0_um(self) -> float:
+        """σ̂0 times the stated standard deviation of an image coordinate, µm."""
+        return self.adjusted.outcome.sigma0_um
+
+    @property
+    def redundancy(self) -> int:
+        """Observations − unknowns + conditions."""
+        return self.adjusted.outcome.redundancy
+
+    @cached_property
+    def images(self) -> Table:
+        """Exterior orientation with σ, a row a photograph: the columns of images.csv; m and degrees."""
+        from aerotri.public.tables import images_table
+
+        return images_table(self.adjusted)
+
+    @cached_property
+    def points(self) -> Table:
+        """Object points with σ: the columns of points.csv; m."""
+        from aerotri.public.tables import points_table
+
+        return points_table(self.adjusted)
+
+    @cached_property
+    def rays(self) -> Table:
+        """Image points with residuals, redundancy numbers and tests: the columns of residuals.parquet; mm."""
+        from aerotri.public.tables import rays_table
+
+        return rays_table(self.adjusted)
+
+    @cached_property
+    def parameters(self) -> Table:
+        """Interior orientation, additional parameters and others shared by many rays: those of parameters.csv."""
+        from aerotri.public.tables import parameters_table
+
+        return parameters_table(self.adjusted)
+
+    @cached_property
+    def control(self) -> Table:
+        """Control points, adjusted − given with σ: the columns of control.csv; m."""
+        from aerotri.public.tables import control_table
+
+        return control_table(self.adjusted)
+
+    @cached_property
+    def check(self) -> Table:
+        """Check points, adjusted − given with σ: the columns of check.csv; m."""
+        from aerotri.public.tables import check_table
+
+        return check_table(self.adjusted)
+
+    @cached_property
+    def groups(self) -> Table:
+        """Groups of observations: how well each fits its stated σ, and its share of the redundancy."""
+        from aerotri.public.tables import groups_table
+
+        return groups_table(self.adjusted)
+
+    @property
+    def plot(self) -> AdjustmentPlots:
+        """Plots of the result, each a matplotlib Figure."""
+        from aerotri.public.plots import AdjustmentPlots
+
+        return AdjustmentPlots(self.adjusted)
+
+    def covariance(self, names: Sequence[str]) -> Covariance:
+        """The joint covariance of points, photographs and parameters, however far apart.
+
+        Parameters
+        ----------
+        names : 'T12' (X, Y, Z of a point), 'T12:Z', '1_008' (all six elements of a photograph), '1_008:X0', a parameter
+            such as 'bluh.1', or 'bluh.1 (day2)' where groups have their own.
+
+        Returns
+        -------
+        Covariance
+            In the coordinate system of the block; m, rad, parameters in their unit; σ̂0² included.
+
+        Raises
+        ------
+        InputError
+            For a name that means nothing.
+        """
+        from aerotri.public.covariance import covariance_of
+
+        return covariance_of(self.record, list(names))
+
+    def save(self, out: str | os.PathLike, plots: bool = True, progress: ProgressLike = None) -> Path:
+        """Write the tables, adjustment.json, the solution, the block as used and the report into a folder.
+
+        Parameters
+        ----------
+        out : folder; an older result there is replaced in one step, files of others stay.
+        plots : draw the plots and the report; without them it is quicker.
+        progress : see `aerotri.adjust`.
+
+        Returns
+        -------
+        Path of the folder.
+
+        Raises
+        ------
+        InputError
+            When the folder holds other files, or cannot be written to.
+        """
+        from aerotri.public.saving import save_adjustment
+
+        return save_adjustment(self.record, Path(out), plots, progress)
+
+    def summary(self) -> str:
+        """The outcome in lines, as the command prints it."""
+        from aerotri.report.tables import summary_lines
+
+        return "\n".join(summary_lines(self.adjusted))
+
+    def __repr__(self) -> str:
+        name, o = self.block.name, self.adjusted.outcome
+        return (
+            f"<aerotri.Adjustment of {name!r}: {o.status}, {o.verdict}, σ0 {o.sigma0:.4g}, "
+            f"{len(self.images)} photographs, {len(self.points)} points>"
+        )
+
+    def _repr_html_(self) -> str:
+        """The outcome as a notebook shows it: the verdict first."""
+        o = self.adjusted.outcome
+        reasons = "".join(f"<li>{escape(reason)}</li>" for reason in (*o.reasons, *o.warnings))
+        return (
+            f"<div><b>{escape(str(self.block.name))}: {escape(o.verdict)}</b> ({escape(o.status)}), "
+            f"σ<sub>0</sub> {o.sigma0:.4g} ({o.sigma0_um:.3g} µm), redundancy {o.redundancy}"
+            f"{f'<ul>{reasons}</ul>' if reasons else ''}{self.groups._repr_html_()}</div>"
+        )
+
+
+def adjust(
+    block: Block | str | os.PathLike,
+    *,
+    parameters: str | None = None,
+    parameter_selection: Switch | None = None,
+    robust: Robust | None = None,
+    datum: Datum | None = None,
+    variance_components: Switch | None = None,
+    max_iterations: int | None = None,
+    points: np.ndarray | None = None,
+    geoid: str | os.PathLike | None = None,
+    progress: ProgressLike = None,
+) -> Adjustment:
+    """Adjust a block: orientation, points, self-calibration, and σ of everything.
+
+    What is not given is as the settings of the block have it.
+
+    Parameters
+    ----------
+    block : a block, or the folder of one.
+    parameters : additional parameters, 'bluh:1-12,ultracam_d:42-73', 'brown:K1+K2', 'auto' (chosen by
+        cross-validation) or 'none'.
+    parameter_selection : 'on' takes out parameters that are not significant or cannot be told from others.
+    robust : estimator that lowers the weight of gross errors; 'data-snooping' removes them one by one.
+    datum : what fixes the block: its control, the 'minimal' or 'inner' datum of a free network, or 'fixed' elements.
+    variance_components : 'on' estimates σ of every group of observations.
+    max_iterations : at most, in each stage of a robust estimator.
+    points : (N, 3) m, start values of the object points, where known from elsewhere.
+    geoid : grid of geoid undulations for a coordinate system that has none of its own.
+    progress : True for a bar in the terminal or notebook; or a function that takes (stage, share), share 0 … 1 or None
+        where it is not known.
+
+    Returns
+    -------
+    Adjustment
+        Look at its `verdict` first: a rejected result is returned too, so that it can be looked at.
+
+    Raises
+    ------
+    InputError
+        When a setting or an observation makes no sense; the message says what to do.
+    AdjustmentFailedError
+        When the observations do not determine the unknowns; the message names which.
+
+    Examples
+    --------
+    >>> import aerotri
+    >>> block = aerotri.simulate(aerotri.example_flight(), seed=1).block
+    >>> result = aerotri.adjust(block, parameters="brown:K1+K2", robust="huber")
+    >>> result.parameters["name"].tolist()
+    ['brown.K1', 'brown.K2']
+    """
+    from aerotri.coordinates.metric import in_metres
+    from aerotri.pipeline import adjust_and_explain, adjust_keeping_system
+    from aerotri.public.blocks import as_block
+
+    chosen = with_settings(
+        as_block(block),
+        {
+            "additional_parameters": parameters,
+            "parameter_selection": parameter_selection,
+            "robust": robust,
+            "datum": datum,
+            "variance_components": variance_components,
+            "max_iterations": max_iterations,
+        },
+    )
+    with stage_report(progress) as report:
+        if points is not None:
+            return Adjustment(adjust_keeping_system(chosen, report.iteration, points, geoid))
+        metric, note = in_metres(chosen, geoid)
+        found = adjust_and_explain(metric, report.iteration, geoid, lambda text: report.stage(text, None))
+        return Adjustment(found, (note,) if note else ())
+
+
+def with_settings(block: Block, given: Mapping[str, object]) -> Block:
+    """The block with settings of its adjustment changed.
+
+    Parameters
+    ----------
+    given : by the names of block.toml; None: as the block has it. `additional_parameters` as a specification.
+
+    Raises
+    ------
+    InputError
+        For a value that the setting cannot have.
+    """
+    from dataclasses import replace
+
+    from aerotri.formats.block_settings import checked_adjustment_settings
+    from aerotri.functional_model.additional_parameters import parse_parameters
+
+    changes = {name: value for name, value in given.items() if value is not None}
+    if isinstance(changes.get("additional_parameters"), str):
+        changes["additional_parameters"] = parse_parameters(str(changes["additional_parameters"]))
+    checked_adjustment_settings({k: v for k, v in changes.items() if k != "additional_parameters"})
+    adjustment = replace(block.settings.adjustment, **changes)
+    return replace(block, settings=replace(block.settings, adjustment=adjustment))
+
+
+def open_result(folder: str | os.PathLike, progress: ProgressLike = None) -> Adjustment:
+    """A result that was saved: linearised and factorised once at its solution, never adjusted again.
+
+    Parameters
+    ----------
+    folder : written by `Adjustment.save` or by `aerotri adjust`. progress : see `aerotri.adjust`.
+
+    Returns
+    -------
+    Adjustment
+
+    Raises
+    ------
+    InputError
+        When the folder is no result, or its adjustment has not converged.
+
+    Examples
+    --------
+    >>> import aerotri, tempfile
+    >>> result = aerotri.adjust(aerotri.simulate(aerotri.example_flight(), seed=1).block)
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     again = aerotri.open_result(result.save(f"{place}/result", plots=False))
+    >>> abs(again.sigma0 - result.sigma0) < 1e-9
+    True
+    """
+    from aerotri import opening
+    from aerotri.coordinates.georeference import is_projected
+
+    with stage_report(progress) as report:
+        report.stage("reading", None)
+        found = opening.open_result(folder)
+    status, crs = found.solution.status, found.result.block.crs
+    if status != "converged":
+        raise InputError(f"the adjustment ended '{status}'", "give the result of a converged one", folder)
+    if crs != "local" and not is_projected(crs):
+        remedy = "adjust the block again: `aerotri adjust` brings it to metres"
+        raise InputError(f"the result is in {crs}, which counts in degrees", remedy, folder)
+    return Adjustment(found)

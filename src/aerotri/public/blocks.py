@@ -1,0 +1,251 @@
+"""Where blocks come from and where they go: folders, foreign formats, simulation."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from aerotri.observations import Block
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from aerotri.simulation import Truth
+
+PathLike = str | os.PathLike
+GnssShift = Literal["off", "block", "strip"]
+
+
+def as_block(block: Block | PathLike) -> Block:
+    """The block itself, or the one of a folder.
+
+    Raises
+    ------
+    InputError
+        For anything the block format does not allow.
+    """
+    return block if isinstance(block, Block) else read_block(block)
+
+
+def read_block(folder: PathLike) -> Block:
+    """A block from its folder.
+
+    Parameters
+    ----------
+    folder : with block.toml and its tables, or the block.toml itself.
+
+    Returns
+    -------
+    Block
+
+    Raises
+    ------
+    InputError
+        With file, line, what is wrong and the remedy, for anything the format does not allow.
+
+    Examples
+    --------
+    >>> import aerotri, tempfile
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     folder = aerotri.simulate(aerotri.example_flight(), seed=1).save(f"{place}/flight")
+    ...     block = aerotri.read_block(folder)
+    >>> len(block.images)
+    12
+    """
+    from aerotri.formats import block_folder
+
+    return block_folder.read_block(folder)
+
+
+@dataclass(frozen=True, eq=False)
+class ReadBlock:
+    """A block from files of other programs.
+
+    Parameters
+    ----------
+    block : what was read.
+    points : (N, 3) m, object points that came along, as start values; None where none did.
+    messages : what was matched, assumed or left out, in sentences.
+    """
+
+    block: Block
+    points: np.ndarray | None
+    messages: tuple[str, ...]
+
+
+def read(
+    source: PathLike,
+    *,
+    image_points: Sequence[PathLike] = (),
+    positions: PathLike | None = None,
+    control: PathLike | None = None,
+    orientation: PathLike | None = None,
+    check: Sequence[str] = (),
+    crs: str = "",
+    camera: PathLike | None = None,
+    camera_name: str = "",
+    camera_size: tuple[int, int] | None = None,
+    pixel_um: float | None = None,
+    focal_length_mm: float | None = None,
+    flight_axis: Literal["+x", "-x", "+y", "-y"] | None = None,
+    free_interior: bool = False,
+    image_sigma_px: float | None = None,
+    control_prefix: str = "",
+    control_sigma_m: tuple[float, float, float] | None = None,
+    positions_sigma_m: tuple[float, float, float] | None = None,
+    gnss_shift: GnssShift | None = None,
+    geoid: PathLike | None = None,
+) -> ReadBlock:
+    """A block from files of other programs; several files make one block.
+
+    Parameters
+    ----------
+    source : block, result, DBAT, BAL, COLMAP, Bundler, OpenSfM, a folder of IGN or PAT-B files, image points (BINGO,
+        .im, .mes, gcp_list.txt) or a list of orientations; PATH, or kind:PATH where the kind cannot be told.
+    image_points : more files of image points.
+    positions : observed positions of the photographs. control : control points.
+    orientation : start values of the orientations.
+    check : names of control points that become check points.
+    crs : coordinate system, such as 'EPSG:32647' or 'EPSG:25832+7837'.
+    camera : file with the camera.
+    camera_name : name of the camera, where no file says it. The same of the four that follow.
+    camera_size : columns and rows.
+    pixel_um : size of a pixel, µm.
+    focal_length_mm : principal distance.
+    flight_axis : image axis that points along the flight.
+    free_interior : principal distance and principal point are unknowns.
+    image_sigma_px : σ of image coordinates, pixels.
+    control_prefix : what image points have before the names of control points.
+    control_sigma_m, positions_sigma_m : σ of X, Y, Z, m, where the files give none.
+    gnss_shift : estimate a shift of the GNSS positions, of the block or of every strip.
+    geoid : grid of geoid undulations for heights of the coordinate system.
+
+    Returns
+    -------
+    ReadBlock
+
+    Raises
+    ------
+    InputError
+        For whatever is missing, damaged or contradictory, naming the file.
+    """
+    from aerotri.formats.assemble import Statements
+    from aerotri.formats.camera_spec import CameraSpec
+    from aerotri.formats.project import Request, read_project
+
+    spec = CameraSpec(camera, camera_name, camera_size, pixel_um, focal_length_mm, flight_axis, free_interior)
+    stated = Statements(
+        crs=crs,
+        geoid=geoid,
+        control_sigma_m=control_sigma_m,
+        positions_sigma_m=positions_sigma_m,
+        control_prefix=control_prefix,
+    )
+    request = Request(
+        source=_text(source),
+        name="",
+        image_points=tuple(_text(path) for path in image_points),
+        orientation=_text(orientation),
+        positions=_text(positions),
+        control=_text(control),
+        camera=spec,
+        stated=stated,
+        check=tuple(check),
+        image_sigma_px=image_sigma_px,
+        gnss_shift=gnss_shift,
+    )
+    reading = read_project(request)
+    return ReadBlock(reading.block, reading.points, tuple(reading.messages))
+
+
+def _text(path: PathLike | None) -> str:
+    return "" if path is None else os.fspath(path)
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedBlock:
+    """A block together with the truth behind it.
+
+    Parameters
+    ----------
+    block : what was measured. truth : orientations, points and image errors as they are.
+    """
+
+    block: Block
+    truth: Truth
+
+    def save(self, out: PathLike) -> Path:
+        """Write the block's folder, with its truth in truth/; files of others stay.
+
+        Raises
+        ------
+        InputError
+            When the folder cannot be written to.
+        """
+        from aerotri.simulation import write_simulated
+
+        write_simulated(out, self.block, self.truth)
+        return Path(out)
+
+
+def simulate(plan: PathLike | Mapping[str, Any], seed: int = 1) -> SimulatedBlock:
+    """A block with known truth, from a flight plan.
+
+    Parameters
+    ----------
+    plan : file simulation.toml, or its tables as nested dictionaries; `example_flight` gives a small one.
+    seed : the same seed gives the same block.
+
+    Returns
+    -------
+    SimulatedBlock
+
+    Raises
+    ------
+    InputError
+        For a plan that makes no sense.
+
+    Examples
+    --------
+    >>> import aerotri
+    >>> flight = aerotri.simulate(aerotri.example_flight(), seed=1)
+    >>> len(flight.block.images), flight.truth.points.shape[1]
+    (12, 3)
+    """
+    from aerotri import simulation
+
+    spec = simulation.parse_spec(plan) if isinstance(plan, Mapping) else simulation.read_spec(plan)
+    return SimulatedBlock(*simulation.simulate(spec, seed))
+
+
+def example_flight() -> dict[str, Any]:
+    """The plan of a small flight, to try things on: two strips of six photographs, six control and four check points.
+
+    Returns
+    -------
+    dict
+        Tables as simulation.toml has them; change what you like.
+
+    Examples
+    --------
+    >>> import aerotri
+    >>> plan = aerotri.example_flight()
+    >>> plan["flight"]["strips"] = 3
+    >>> len(aerotri.simulate(plan, seed=1).block.images)
+    18
+    """
+    return {
+        "name": "example",
+        "camera": {"camera": {"model": "frame", "size_px": [5472, 3648], "pixel_um": 2.4, "focal_length_mm": 8.8,
+                              "flight_axis": "+y"}},
+        "flight": {"gsd_m": 0.03, "strips": 2, "images_per_strip": 6, "end_lap": 0.75, "side_lap": 0.5,
+                   "heading_deg": 0.0, "attitude_sigma_deg": [1.0, 1.0, 2.0], "position_sigma_m": [1.0, 1.0, 1.0]},
+        "terrain": {"kind": "undulating", "height_m": 100.0, "relief_rms_m": 5.0, "wavelength_m": 150.0},
+        "tie_points": {"per_image": 80, "sigma_um": 1.2},
+        "control": {"positions": [[0.02, 0.05], [0.02, 0.95], [0.5, 0.1], [0.5, 0.9], [0.98, 0.05], [0.98, 0.95]],
+                    "sigma_m": [0.01, 0.01, 0.015], "check_points": 4},
+        "start_values": {"kind": "perturbed", "position_sigma_m": 1.0, "angle_sigma_deg": 0.1},
+    }  # fmt: skip

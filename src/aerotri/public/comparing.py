@@ -1,0 +1,258 @@
+"""Sets of additional parameters side by side, and a block through other programs' solvers."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+
+from aerotri.conventions import InputError
+from aerotri.observations import Block
+from aerotri.public.adjustment import Adjustment, with_settings
+from aerotri.public.blocks import as_block, read
+from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.progress import ProgressLike, stage_report
+from aerotri.public.table import Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from aerotri.crosscheck import CrosscheckResult
+    from aerotri.statistics.adjusted_block import AdjustedBlock
+    from aerotri.statistics.parameter_comparison import ParameterComparison
+
+COMPARISON_NAMES = ("compare_parameters.json", "compare_parameters.csv", "compare_parameters.png",
+                    "compare_parameters.svg")  # fmt: skip
+CROSSCHECK_NAMES = ("crosscheck.json", "crosscheck.csv", "plots", "report.html")
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedParameters:
+    """Sets of additional parameters side by side.
+
+    Parameters
+    ----------
+    record : what was found of every set. choice : the set that `auto` would take, '' where none converged.
+    reason : why, in a sentence.
+    """
+
+    record: ParameterComparison
+    choice: str
+    reason: str
+
+    @property
+    def table(self) -> Table:
+        """A row a set: the columns of compare_parameters.csv."""
+        from aerotri.report.parameter_tables import comparison_columns
+
+        columns = {name: pa.array(np.asarray(values).tolist()) for name, values in
+                   comparison_columns(self.record).items()}  # fmt: skip
+        return Table("sets of additional parameters", pa.table(columns))
+
+    def plot(self) -> Figure:
+        """Check points and predicted control of every set."""
+        from aerotri.report.plots_comparison import plot_comparison
+
+        return plot_comparison(self.record)
+
+    def save(self, out: str | os.PathLike) -> Path:
+        """Write the comparison as JSON, CSV and a picture into a folder.
+
+        Raises
+        ------
+        InputError
+            When the folder holds other files, or cannot be written to.
+        """
+        from aerotri.formats.atomic import atomic_folder
+        from aerotri.public.saving import write_comparison_tables
+        from aerotri.report.plots import save_plots
+
+        target = Path(out)
+        refuse_foreign_folder(target, COMPARISON_NAMES[0])
+        with atomic_folder(target, own=COMPARISON_NAMES) as folder:
+            save_plots({"compare_parameters": self.plot()}, folder)
+            write_comparison_tables(self.record, folder)
+        return target
+
+    def _repr_html_(self) -> str:
+        return f"<div>{self.table._repr_html_()}<p>{self.reason}</p></div>"
+
+
+def compare_parameters(
+    block: Block | str | os.PathLike,
+    sets: Sequence[str] = (),
+    *,
+    folds: int = 10,
+    robust: str | None = None,
+    geoid: str | os.PathLike | None = None,
+    progress: ProgressLike = None,
+) -> ComparedParameters:
+    """Adjust a block with several sets of additional parameters, and predict its control by cross-validation.
+
+    Parameters
+    ----------
+    block : a block, or the folder of one.
+    sets : specifications as `aerotri.adjust` takes them; one of each family where empty.
+    folds : parts in which control points are left out and predicted.
+    robust : estimator, as of `aerotri.adjust`; data snooping is replaced by Huber's.
+    geoid, progress : as of `aerotri.adjust`.
+
+    Returns
+    -------
+    ComparedParameters
+
+    Raises
+    ------
+    InputError
+        For a set that does not exist, or that the block's camera does not have.
+    AdjustmentFailedError
+        When the block cannot be adjusted with any set.
+
+    Examples
+    --------
+    >>> import aerotri
+    >>> block = aerotri.simulate(aerotri.example_flight(), seed=1).block
+    >>> found = aerotri.compare_parameters(block, ["none", "brown:K1+K2"], folds=3)
+    >>> len(found.table)
+    2
+    """
+    from aerotri import pipeline
+    from aerotri.functional_model.additional_parameters import AUTO, format_parameters, parse_parameters
+    from aerotri.statistics.parameter_choice import candidate_sets, choose
+
+    choices = [parse_parameters(spec) for spec in sets]
+    if AUTO in choices:
+        raise InputError("auto is no set to compare with others", "without sets all that auto compares are shown")
+    chosen = with_settings(as_block(block), {"robust": robust})
+    with stage_report(progress) as report:
+        found = pipeline.compare_parameters(chosen, choices or candidate_sets(chosen), folds, geoid, report.set_of)
+    if not any(outcome.converged for outcome in found.outcomes):
+        return ComparedParameters(found, "", "")
+    best = choose(found)
+    return ComparedParameters(found, ",".join(format_parameters(best.choice)) or "none", best.reason)
+
+
+@dataclass(frozen=True, eq=False)
+class Crosscheck:
+    """A block through other programs' solvers.
+
+    Parameters
+    ----------
+    record : what was found of every peer. adjusted : the block as it was adjusted, in the frame of its adjustment.
+    """
+
+    record: CrosscheckResult
+    adjusted: AdjustedBlock
+
+    @property
+    def verdict(self) -> str:
+        """'agrees', or in a word what does not."""
+        return self.record.verdict
+
+    @property
+    def sentence(self) -> str:
+        """The outcome in a sentence."""
+        return self.record.sentence
+
+    @property
+    def table(self) -> Table:
+        """Differences against σ, a row a kind of unknown and peer: the columns of crosscheck.csv."""
+        rows = [(check.peer, d) for check in self.record.checks for d in check.differences]
+        columns = {"peer": [peer for peer, _ in rows]}
+        columns |= {name: [getattr(d, name) for _, d in rows] for name in ("kind", "count", "max", "rms", "worst")}
+        return Table("differences over σ", pa.table(columns))
+
+    def plot(self) -> Figure:
+        """Differences of every peer over σ."""
+        from aerotri.report.plots_crosscheck import plot_crosscheck
+
+        return plot_crosscheck(self.record)
+
+    def save(self, out: str | os.PathLike) -> Path:
+        """Write crosscheck.json, crosscheck.csv, the plots and the report into a folder.
+
+        Raises
+        ------
+        InputError
+            When the folder holds other files, or cannot be written to.
+        """
+        from aerotri.crosscheck.outcome_json import crosscheck_json
+        from aerotri.formats.atomic import atomic_folder
+        from aerotri.public.saving import write_json
+        from aerotri.report.html import Findings, write_report
+        from aerotri.report.plots import all_plots, save_plots
+
+        target = Path(out)
+        refuse_foreign_folder(target, CROSSCHECK_NAMES[0])
+        with atomic_folder(target, own=CROSSCHECK_NAMES) as folder:
+            drawn = save_plots({"crosscheck": self.plot()}, folder / "plots")
+            plots = {**all_plots(self.adjusted), **drawn}
+            write_report(self.adjusted, plots, folder / "report.html", Findings(crosscheck=self.record))
+            _write_rows(self.table, folder / "crosscheck.csv")
+            write_json(folder / "crosscheck.json", crosscheck_json(self.record))
+        return target
+
+    def _repr_html_(self) -> str:
+        return f"<div><p>{self.sentence}</p>{self.table._repr_html_()}</div>"
+
+
+def _write_rows(table: Table, path: Path) -> None:
+    import csv
+
+    from aerotri.spreadsheet import plain_row
+
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(table.columns)
+        writer.writerows(plain_row(row.values()) for row in table.arrow.to_pylist())
+
+
+def crosscheck(source: Adjustment | Block | str | os.PathLike, progress: ProgressLike = None) -> Crosscheck:
+    """Adjust the same block by pycolmap, and by Ceres with a model written from the papers alone.
+
+    Parameters
+    ----------
+    source : a result; or a block, a result's folder or files of any format that `aerotri.read` reads, adjusted first.
+    progress : as of `aerotri.adjust`.
+
+    Returns
+    -------
+    Crosscheck
+
+    Raises
+    ------
+    InputError
+        When the source cannot be read, or has not converged.
+    AdjustmentFailedError
+        When the block cannot be adjusted.
+    """
+    from aerotri import pipeline
+    from aerotri.crosscheck import crosscheck as check
+    from aerotri.crosscheck.freed import as_adjusted
+
+    with stage_report(progress) as report:
+        found = _adjusted(source, report.iteration)
+        if found.status != "converged":
+            message = found.adjusted.outcome.message
+            raise InputError(f"{found.status}: {message}; there is no solution to check", "mend the block")
+        local = as_adjusted(found.record.local, found.record.system.unknowns.block)
+        return Crosscheck(check(local, pipeline.adjust, lambda text: report.stage(text, None)), local)
+
+
+def _adjusted(source: Adjustment | Block | str | os.PathLike, iteration) -> Adjustment:
+    from aerotri.pipeline import adjust_keeping_system
+    from aerotri.public.adjustment import open_result
+
+    if isinstance(source, Adjustment):
+        return source
+    if isinstance(source, Block):
+        return Adjustment(adjust_keeping_system(source, iteration))
+    if (Path(source) / "solution.npz").is_file():
+        return open_result(source)
+    found = read(source)
+    return Adjustment(adjust_keeping_system(found.block, iteration, found.points))

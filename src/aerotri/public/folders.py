@@ -1,0 +1,52 @@
+"""Folders and files that results go into."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+from aerotri.conventions import InputError
+
+
+def refuse_foreign_entries(folder: Path, own: Collection[str], overwrite: bool = False) -> None:
+    """Files that this program has not written, or that were changed since, are replaced when the user says so.
+
+    Parameters
+    ----------
+    own : names in the folder that are going to be written.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.formats.ownership import foreign_files
+
+    found = [] if overwrite or not folder.is_dir() else foreign_files(folder, own)
+    if found:
+        others = f" and {len(found) - 1} more" if len(found) > 1 else ""
+        raise InputError(
+            f"'{folder}' holds {found[0]}{others}, not written by aerotri or changed since",
+            "choose another place, or add --overwrite",
+        )
+
+
+def refuse_existing_file(file: Path, overwrite: bool = False) -> None:
+    """A file that is there already is replaced when the user says so.
+
+    Raises
+    ------
+    InputError
+    """
+    if file.is_file() and not overwrite:
+        raise InputError("exists already", "choose another name, or add --overwrite", file)
+
+
+def refuse_foreign_folder(folder: Path, *own: str) -> None:
+    """Results go into an empty folder, or where the same command has written one of its files `own` before.
+
+    Raises
+    ------
+    InputError
+    """
+    if folder.is_dir() and any(folder.iterdir()) and not any((folder / name).exists() for name in own):
+        raise InputError(f"'{folder}' holds other files", "choose another --out, or an empty folder")

@@ -1,0 +1,127 @@
+"""The plots of a result. Each is a matplotlib Figure: a notebook shows it, `savefig` keeps it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from aerotri.statistics.adjusted_block import AdjustedBlock
+
+
+@dataclass(frozen=True, eq=False)
+class AdjustmentPlots:
+    """Plots of an adjusted block.
+
+    Parameters
+    ----------
+    adjusted : the numbers.
+    """
+
+    adjusted: AdjustedBlock
+
+    def systematic_errors(self, group: str | None = None, camera: str | None = None) -> Figure:
+        """The systematic image errors over the format, what is significant drawn darker.
+
+        Parameters
+        ----------
+        group : parameter group (a camera, a day); the first where None. camera : where a group has several.
+
+        Raises
+        ------
+        InputError
+            For a group that the block does not have.
+        """
+        from aerotri.image_errors import field_on_grid
+        from aerotri.report.plots_camera import plot_systematic_errors
+
+        field = field_on_grid(self.adjusted, *self._group(group, camera))
+        return plot_systematic_errors(field, self.adjusted.block.name)
+
+    def averaged_residuals(self, group: str | None = None, camera: str | None = None) -> Figure:
+        """Mean residuals by cell of the format: what the parameters have left.
+
+        Parameters
+        ----------
+        group, camera : as of `systematic_errors`.
+
+        Raises
+        ------
+        InputError
+            For a group that the block does not have.
+        """
+        from aerotri.image_errors import averaged_residuals
+        from aerotri.report.plots_camera import plot_averaged_residuals
+
+        name, _, own = self._group(group, camera)
+        found = averaged_residuals(self.adjusted, name, camera=own)
+        return plot_averaged_residuals(found, self.adjusted.block.name)
+
+    def block_plan(self) -> Figure:
+        """Photographs, strips, control and check points in plan."""
+        from aerotri.report.plots import plot_block_plan
+
+        return plot_block_plan(self.adjusted)
+
+    def ground_points(self) -> Figure:
+        """Differences at control and check points as arrows."""
+        from aerotri.report.plots import plot_ground_points
+
+        return plot_ground_points(self.adjusted)
+
+    def residuals(self) -> Figure:
+        """Histogram of the residuals of the image points beside the normal distribution."""
+        from aerotri.report.plots import plot_residual_histogram
+
+        return plot_residual_histogram(self.adjusted)
+
+    def correlations(self) -> Figure:
+        """Correlations of the shared parameters.
+
+        Raises
+        ------
+        InputError
+            When there are fewer than two.
+        """
+        from aerotri.conventions import InputError
+        from aerotri.report.plots_residuals import correlated_parameters, plot_correlations
+
+        if len(correlated_parameters(self.adjusted)) < 2:
+            raise InputError("fewer than two parameters are shared by the rays", "adjust with additional parameters")
+        return plot_correlations(self.adjusted)
+
+    def rays_per_point(self) -> Figure:
+        """How many photographs the object points were measured in."""
+        from aerotri.report.plots import plot_rays_per_point
+
+        return plot_rays_per_point(self.adjusted)
+
+    def reliability(self) -> Figure:
+        """Where gross errors that the tests would just not find do most to heights.
+
+        Raises
+        ------
+        InputError
+            When the external reliability was not computed.
+        """
+        from aerotri.conventions import InputError
+        from aerotri.report.plots import plot_reliability
+
+        if self.adjusted.effects is None:
+            raise InputError("the external reliability was not computed for this block", "")
+        return plot_reliability(self.adjusted)
+
+    def all(self) -> dict[str, Figure]:
+        """Every plot of the report by the name of its file."""
+        from aerotri.report.plots import all_plots
+
+        return all_plots(self.adjusted)
+
+    def _group(self, group: str | None, camera: str | None) -> tuple[str, None, str | None]:
+        """Name of the group, nodes of its grid (as the format has it), camera."""
+        from aerotri.image_errors import image_groups
+
+        first = image_groups(self.adjusted.block)[0]
+        return (first.name, None, first.camera.name) if group is None else (group, None, camera)

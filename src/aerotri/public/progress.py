@@ -1,0 +1,78 @@
+"""How far long work is: told to a function, or shown as a bar in the terminal or the notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+Progress = Callable[[str, float | None], None]
+"""Takes (stage, share): what is being done, and how far it is, 0 … 1, None where that is not known."""
+ProgressLike = Progress | bool | None
+
+
+class StageReport:
+    """Brings the reports of every stage to one form.
+
+    Parameters
+    ----------
+    tell : takes (stage, share).
+    """
+
+    def __init__(self, tell: Progress | None):
+        self._tell = tell
+
+    def stage(self, name: str, share: float | None) -> None:
+        """What is being done, and how far it is."""
+        if self._tell is not None:
+            self._tell(name, share)
+
+    def iteration(self, number: int, cost: float, damping: float) -> None:
+        """An iteration of the adjustment: how many there will be is not known."""
+        damped = f", damped {damping:.0e}" if damping else ""
+        self.stage(f"iteration {number}: vᵀPv {cost:.6g}{damped}", None)
+
+    def counted(self, name: str, done: int, count: int) -> None:
+        """A piece of work out of several."""
+        self.stage(name, done / count if count else None)
+
+    def set_of(self, number: int, count: int, name: str) -> None:
+        """The number-th of several sets begins."""
+        self.stage("comparing sets of parameters", (number - 1) / count)
+
+
+@contextmanager
+def stage_report(progress: ProgressLike) -> Iterator[StageReport]:
+    """The report of what the user gave for `progress`; a bar is taken away at the end.
+
+    Parameters
+    ----------
+    progress : True for a bar, a function that takes (stage, share), None or False for silence.
+    """
+    if callable(progress):
+        yield StageReport(progress)
+    elif progress:
+        with _bar() as tell:
+            yield StageReport(tell)
+    else:
+        yield StageReport(None)
+
+
+@contextmanager
+def _bar() -> Iterator[Progress]:
+    """A bar of rich, which knows terminals and notebooks."""
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
+    columns: tuple[Any, ...] = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Bar(*columns, transient=True) as bar:
+        task, shown = bar.add_task("", total=None), ""
+
+        def tell(stage: str, share: float | None) -> None:
+            nonlocal shown
+            if stage != shown:
+                bar.reset(task, description=stage, total=None if share is None else 1.0)
+                shown = stage
+            bar.update(task, completed=share or 0.0, total=None if share is None else 1.0)
+
+        yield tell

@@ -1,0 +1,153 @@
+"""The folder of a result: tables, adjustment.json, the solution, the block as used, plots and report."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerotri.formats.atomic import atomic_folder
+from aerotri.formats.block_folder import write_block
+from aerotri.formats.result import write_csv, write_result
+from aerotri.formats.solution import write_solution
+from aerotri.image_errors import group_changes
+from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.progress import ProgressLike, StageReport, stage_report
+
+if TYPE_CHECKING:
+    from aerotri.diagnosis import Finding
+    from aerotri.image_errors import Change
+    from aerotri.pipeline import Adjustment
+    from aerotri.statistics.adjusted_block import AdjustedBlock
+    from aerotri.statistics.free_verdict import FreeCheck
+    from aerotri.statistics.parameter_comparison import ParameterComparison
+    from aerotri.statistics.parameter_effects import ParameterEffects
+    from aerotri.statistics.work_list import WorkList
+
+RECORD = "adjustment.json"
+RESULT_NAMES = (
+    RECORD, "images.csv", "points.csv", "residuals.parquet", "parameters.csv", "control.csv", "check.csv",
+    "block", "solution.npz", "plots", "report.html", "observations.csv", "check_free.json", "variance_components.json",
+    "parameter_changes.json", "parameter_changes.csv", "compare_parameters.json", "compare_parameters.csv",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """What follows from an adjustment and stands on its report.
+
+    Parameters
+    ----------
+    work : what to look at next. effects : what leaving parameters out would change at check points, None without them.
+    lights : each number beside what it should be. changes : of the image errors between groups.
+    """
+
+    work: WorkList
+    effects: ParameterEffects | None
+    lights: list[Finding]
+    changes: tuple[Change, ...]
+
+
+def evaluate(adjustment: Adjustment) -> Evaluation:
+    """Compute what the report shows beside the tables."""
+    from aerotri.diagnosis import findings
+    from aerotri.statistics.parameter_effects import parameter_effects
+    from aerotri.statistics.work_list import work_list
+
+    system, solution = adjustment.system, adjustment.solution
+    effects = parameter_effects(adjustment.local, system, solution, system.factorise(solution.equations))
+    changes = group_changes(adjustment.result)
+    return Evaluation(work_list(adjustment.local), effects, findings(adjustment.local), changes)
+
+
+def save_adjustment(record: Adjustment, out: Path, plots: bool, progress: ProgressLike) -> Path:
+    """As `Adjustment.save`.
+
+    Raises
+    ------
+    InputError
+        When the folder holds other files, or cannot be written to.
+    """
+    with stage_report(progress) as report:
+        write_adjustment(record, out, plots, report)
+    return out
+
+
+def write_adjustment(
+    adjustment: Adjustment, target: Path, plots: bool, report: StageReport, checked: FreeCheck | None = None
+) -> AdjustedBlock:
+    """Write everything to a temporary folder, and rename it; gives the result with the time this took.
+
+    Parameters
+    ----------
+    plots : draw the plots and the report. checked : of `--check-free`.
+
+    Raises
+    ------
+    InputError
+    """
+    refuse_foreign_folder(target, RECORD)
+    result, begun = adjustment.result, time.perf_counter()
+    with atomic_folder(target, own=RESULT_NAMES) as folder:
+        write_block(result.block, folder / "block")
+        write_solution(
+            folder / "solution.npz", adjustment.system, adjustment.solution, adjustment.local, adjustment.frame
+        )
+        timings = {**result.outcome.timings_s, "write": time.perf_counter() - begun}
+        if plots:
+            report.stage("drawing", None)
+            begun = time.perf_counter()
+            _draw(adjustment, folder, checked)
+            timings["plots"] = time.perf_counter() - begun
+        result = replace(result, outcome=replace(result.outcome, timings_s=timings))
+        if checked is not None:
+            from aerotri.report.free_check_json import free_check_json
+
+            write_json(folder / "check_free.json", free_check_json(checked))
+        _write_parameter_tables(adjustment, folder)
+        write_result(result, folder)
+    return result
+
+
+def write_json(path: Path, content: Any) -> None:
+    """A file of JSON, as every command writes it."""
+    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8")
+
+
+def write_comparison_tables(comparison: ParameterComparison, folder: Path) -> None:
+    """Write compare_parameters.json and compare_parameters.csv into a folder."""
+    from aerotri.report.parameter_tables import comparison_columns, comparison_json
+
+    write_json(folder / "compare_parameters.json", comparison_json(comparison))
+    write_csv(folder / "compare_parameters.csv", comparison_columns(comparison))
+
+
+def _write_parameter_tables(adjustment: Adjustment, folder: Path) -> None:
+    """The differences between groups, and the sets that were compared, where there are any."""
+    from aerotri.report.parameter_tables import changes_columns, changes_json
+
+    changes = group_changes(adjustment.result)
+    if changes:
+        write_json(folder / "parameter_changes.json", changes_json(changes))
+        write_csv(folder / "parameter_changes.csv", changes_columns(changes))
+    if adjustment.compared is not None:
+        write_comparison_tables(adjustment.compared, folder)
+
+
+def _draw(adjustment: Adjustment, folder: Path, checked: FreeCheck | None) -> None:
+    from aerotri.report.html import Findings, write_report
+    from aerotri.report.plots import all_plots, save_plots
+    from aerotri.report.plots_comparison import plot_comparison
+
+    found = evaluate(adjustment)
+    figures = all_plots(adjustment.result, found.changes)
+    if adjustment.compared is not None:
+        figures["compare_parameters"] = plot_comparison(adjustment.compared)
+    beside = Findings(
+        found.work, checked, effects=found.effects, changes=found.changes, compared=adjustment.compared,
+        lights=found.lights,
+    )  # fmt: skip
+    write_report(adjustment.result, save_plots(figures, folder / "plots"), folder / "report.html", beside)

@@ -1,0 +1,138 @@
+"""A table of a result: Arrow underneath, pandas and geopandas where they are installed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from html import escape
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.public.optional import optional_module
+
+if TYPE_CHECKING:
+    import pyarrow
+
+SHOWN_ROWS = 10
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Table:
+    """Named columns of equal length; the columns are those of the written file of the same name.
+
+    Parameters
+    ----------
+    name : what the rows are, such as 'points'.
+    arrow : the columns.
+    units : unit of a column by its name, '' or missing where it has none.
+    geometry : names of the columns with X, Y, Z of a row's place, None where rows have no place.
+    crs : coordinate system of the geometry, 'local' or an EPSG code.
+
+    Examples
+    --------
+    >>> import pyarrow as pa
+    >>> table = Table("points", pa.table({"point": ["a", "b"], "Z": [1.0, 2.5]}), {"Z": "m"})
+    >>> len(table), table.columns
+    (2, ('point', 'Z'))
+    >>> table["Z"].tolist()
+    [1.0, 2.5]
+    """
+
+    name: str
+    arrow: pyarrow.Table
+    units: Mapping[str, str] = field(default_factory=dict)
+    geometry: tuple[str, str, str] | None = None
+    crs: str = "local"
+
+    def __len__(self) -> int:
+        return self.arrow.num_rows
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self.arrow.column_names)
+
+    def __getitem__(self, column: str) -> np.ndarray:
+        """(rows,) values of a column; NaN where a number is not known.
+
+        Raises
+        ------
+        InputError
+            For a column that the table does not have.
+        """
+        if column not in self.arrow.column_names:
+            raise InputError(f"the table '{self.name}' has no column '{column}'", f"it has {', '.join(self.columns)}")
+        return self.arrow.column(column).to_numpy()
+
+    def row(self, name: str) -> dict[str, Any]:
+        """The row of a name in the first column, as a dictionary.
+
+        Raises
+        ------
+        InputError
+            When no row has that name.
+        """
+        found = np.flatnonzero(self[self.columns[0]] == name)
+        if not len(found):
+            raise InputError(f"the table '{self.name}' has no row '{name}'", f"look at column '{self.columns[0]}'")
+        return {column: self.arrow.column(column)[int(found[0])].as_py() for column in self.columns}
+
+    def to_arrow(self) -> pyarrow.Table:
+        """The columns as a `pyarrow.Table`."""
+        return self.arrow
+
+    def to_pandas(self) -> Any:
+        """The table as a `pandas.DataFrame`.
+
+        Raises
+        ------
+        InputError
+            When pandas is not installed.
+        """
+        optional_module("pandas", "to_arrow() needs nothing more")
+        return self.arrow.to_pandas()
+
+    def to_geopandas(self) -> Any:
+        """The table as a `geopandas.GeoDataFrame` with points in the coordinate system of the block.
+
+        Raises
+        ------
+        InputError
+            When the rows have no place, or geopandas is not installed.
+        """
+        if self.geometry is None:
+            raise InputError(f"the rows of '{self.name}' have no place", "take to_pandas() or to_arrow()")
+        module: ModuleType = optional_module("geopandas", "to_arrow() needs nothing more")
+        x, y, z = (self[column] for column in self.geometry)
+        places = module.points_from_xy(x, y, z)
+        return module.GeoDataFrame(self.to_pandas(), geometry=places, crs=None if self.crs == "local" else self.crs)
+
+    def __repr__(self) -> str:
+        return f"<aerotri.Table '{self.name}': {len(self)} rows of {', '.join(self.columns)}>"
+
+    def _repr_html_(self) -> str:
+        """The first rows, as a notebook shows them."""
+        shown = self.arrow.slice(0, SHOWN_ROWS)
+        units = [self.units.get(column, "") for column in self.columns]
+        head = "".join(
+            f"<th>{escape(column)}{f' [{escape(unit)}]' if unit else ''}</th>"
+            for column, unit in zip(self.columns, units, strict=True)
+        )
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{escape(_cell(value))}</td>" for value in row.values()) + "</tr>"
+            for row in shown.to_pylist()
+        )
+        more = len(self) - shown.num_rows
+        caption = f"{escape(self.name)}: {len(self)} rows" + (f", the first {shown.num_rows} shown" if more > 0 else "")
+        return f"<table><caption>{caption}</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+
+
+def _cell(value: Any) -> str:
+    if value is None or (isinstance(value, float) and np.isnan(value)):
+        return "–"
+    return f"{value:.6g}" if isinstance(value, float) and abs(value) < 1e5 else (
+        f"{value:.3f}" if isinstance(value, float) else str(value)
+    )  # fmt: skip

@@ -1,0 +1,84 @@
+"""The tables of an adjusted block; their columns are those of the written files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pyarrow as pa
+
+from aerotri.formats.reliability_columns import control_columns
+from aerotri.formats.result import (
+    ground_point_columns,
+    image_columns,
+    parameter_columns,
+    point_columns,
+    residual_table,
+)
+from aerotri.public.table import Table
+from aerotri.statistics.adjusted_block import AdjustedBlock, GroundPointResults
+
+METRES = ("X", "Y", "Z", "X0", "Y0", "Z0", "sX", "sY", "sZ", "sX0", "sY0", "sZ0", "dX", "dY", "dZ")
+DEGREES = ("omega", "phi", "kappa", "s_omega", "s_phi", "s_kappa")
+UNITS = {
+    **dict.fromkeys(METRES, "m"), **dict.fromkeys(DEGREES, "°"), **dict.fromkeys(("x", "y", "vx", "vy"), "mm"),
+    **dict.fromkeys(("x_s_omega_mgon", "x_s_phi_mgon", "x_s_kappa_mgon"), "mgon"),
+}  # fmt: skip
+
+
+def images_table(adjusted: AdjustedBlock) -> Table:
+    """Exterior orientation, a row a photograph."""
+    return _table("photographs", image_columns(adjusted), ("X0", "Y0", "Z0"), adjusted.block.crs)
+
+
+def points_table(adjusted: AdjustedBlock) -> Table:
+    """Object points."""
+    return _table("points", point_columns(adjusted), ("X", "Y", "Z"), adjusted.block.crs)
+
+
+def rays_table(adjusted: AdjustedBlock) -> Table:
+    """Image points with residuals and tests."""
+    return Table("rays", residual_table(adjusted), UNITS)
+
+
+def parameters_table(adjusted: AdjustedBlock) -> Table:
+    """Parameters shared by many rays."""
+    return _table("parameters", parameter_columns(adjusted))
+
+
+def control_table(adjusted: AdjustedBlock) -> Table:
+    """Control points: adjusted − given."""
+    return _table("control", _ground(adjusted, adjusted.control) | control_columns(adjusted), *_place(adjusted))
+
+
+def check_table(adjusted: AdjustedBlock) -> Table:
+    """Check points: adjusted − given."""
+    return _table("check", _ground(adjusted, adjusted.check), *_place(adjusted))
+
+
+def groups_table(adjusted: AdjustedBlock) -> Table:
+    """Groups of observations."""
+    names = ("name", "count", "sigma_apriori", "rms", "redundancy", "sigma_aposteriori")
+    columns = {name: np.array([getattr(group, name) for group in adjusted.groups]) for name in names}
+    return _table("groups of observations", columns)
+
+
+def _ground(adjusted: AdjustedBlock, results: GroundPointResults) -> dict[str, np.ndarray]:
+    """Columns of control.csv or check.csv, and where the adjusted point lies."""
+    xyz = adjusted.points.xyz[results.point]
+    return ground_point_columns(adjusted, results) | {axis: xyz[:, k] for k, axis in enumerate("XYZ")}
+
+
+def _place(adjusted: AdjustedBlock) -> tuple[tuple[str, str, str], str]:
+    return ("X", "Y", "Z"), adjusted.block.crs
+
+
+def _table(
+    name: str, columns: Mapping[str, np.ndarray], geometry: tuple[str, str, str] | None = None, crs: str = "local"
+) -> Table:
+    arrays = {key: _array(np.asarray(values)) for key, values in columns.items()}
+    return Table(name, pa.table(arrays), {key: UNITS[key] for key in arrays if key in UNITS}, geometry, crs)
+
+
+def _array(values: np.ndarray) -> pa.Array:
+    return pa.array(values.astype(str), pa.string()) if values.dtype.kind in "OU" else pa.array(values)
