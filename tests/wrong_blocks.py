@@ -514,7 +514,7 @@ def _of_the_camera() -> list[Kind]:
         ]
     found += [
         Kind("focal length 24 for 35 mm", "navigation", focal_length(24.0 / 35.0), ("1.458", "principal distance")),
-        Kind("focal length 24 for 35 mm", "track", focal_length(24.0 / 35.0), ("1.458", "principal distance"), EITHER),
+        Kind("focal length 24 for 35 mm", "track", focal_length(24.0 / 35.0), ("1.45", "principal distance"), EITHER),
         Kind("focal length times ten", "navigation", focal_length(10.0), ("0.1 ", "principal distance")),
         Kind("pixel of half the size", "navigation", image_points(times(0.5)), ("principal distance", "pixel")),
     ]

@@ -17,7 +17,7 @@ from aerotri.adjustment.prepare import with_edits
 from aerotri.conventions import InputError
 from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block, transform_block
-from aerotri.diagnosis import catalogue, residual_patterns
+from aerotri.diagnosis import catalogue, focal_length, residual_patterns
 from aerotri.diagnosis.evidence import Evidence, Fit, fit, gather, places_by_others
 from aerotri.diagnosis.free_model import FreeModel, connected_parts, free_model
 from aerotri.diagnosis.hypothesis import Hypothesis
@@ -264,7 +264,8 @@ def _hypotheses(block: Block, local: Block | None, model: FreeModel, now: Fit | 
         def evidence_of(changed: FreeModel) -> Evidence:
             return gather(local, changed)
 
-        yield from residual_patterns.of_focal_length(block, model, evidence_of)
+        yield from focal_length.of_focal_length(block, model, evidence_of)
+    yield from focal_length.of_inner_fit(block, model)
     yield from catalogue.of_measurements()
     yield from catalogue.of_positions(block, places)
     yield from catalogue.of_angles(block)

@@ -15,7 +15,7 @@ import numpy as np
 from aerotri.adjustment.start_values import directions_of
 from aerotri.diagnosis.free_model import FreeModel
 from aerotri.diagnosis.placement import Placed, lay_on
-from aerotri.functional_model.rotation import logarithm, rotation_from_angles
+from aerotri.functional_model.rotation import exponential, logarithm, rotation_from_angles
 from aerotri.observations import Block
 
 MOST_DOUBLINGS = 14.0
@@ -252,13 +252,6 @@ def _turned(own: Attitudes, placed: Placed) -> np.ndarray:
         middle = apart[int(np.argmin(np.linalg.norm(logarithm(apart[0].T @ apart), axis=1)))]
         for _ in range(5):
             step = np.median(logarithm(np.swapaxes(middle[None], 1, 2) @ apart), axis=0)
-            middle = middle @ rotation_about(step)
+            middle = middle @ exponential(step)
         apart = middle.T @ apart
     return np.linalg.norm(logarithm(apart), axis=1)
-
-
-def rotation_about(vector: np.ndarray) -> np.ndarray:
-    """The rotation (3, 3) about a vector by its length."""
-    from aerotri.functional_model.rotation import exponential
-
-    return exponential(vector)

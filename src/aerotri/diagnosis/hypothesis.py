@@ -21,7 +21,7 @@ class Hypothesis:
     on_model : what the change does to the model of the image points; None where it does nothing.
     plural : whether the subject 'fit' or 'fits'.
     note : a sentence behind it, such as what would look the same.
-    by_adjustment : whether the model cannot show it, only an adjustment.
+    free_focal : whether the principal distance is estimated along with it, and said.
     """
 
     subject: str
@@ -30,5 +30,4 @@ class Hypothesis:
     on_model: Callable[[FreeModel], FreeModel] | None = None
     plural: bool = True
     note: str = ""
-    by_adjustment: bool = False
     free_focal: bool = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from aerotri.diagnosis import changes
 from aerotri.diagnosis.catalogue import SUBJECTS
 from aerotri.diagnosis.evidence import Evidence, Fit, Positions, fit, sizes
-from aerotri.diagnosis.free_model import FreeModel, with_focal_factor
+from aerotri.diagnosis.free_model import FreeModel
 from aerotri.diagnosis.hypothesis import Hypothesis
 from aerotri.observations import Block
 
@@ -20,11 +20,6 @@ OFF = 2.0
 """Misfit in tolerances from which a position is off."""
 SAME_PLACE = 1e-3
 HALF_ROUND = np.pi / 2.0
-FACTORS = np.exp(np.linspace(np.log(0.08), np.log(12.5), 25))
-LEAST_FACTOR = 0.002
-"""Change of the principal distance, as a share, that is worth saying."""
-SAME_FACTOR = 0.03
-KNOWN_FACTORS = (0.1, 24.0 / 35.0, 0.5, 35.0 / 24.0, 2.0, 10.0)
 
 
 def off_positions(own: Positions, found: Fit) -> np.ndarray:
@@ -157,51 +152,3 @@ def of_offsets(evidence: Evidence) -> Iterator[Hypothesis]:
         said = ", ".join(f"{axis} {value:+.4g} m" for axis, value in zip("XYZ", offset, strict=True) if value)
         remedy, note = f"a constant offset taken off ({said})", f"the GNSS positions are off by {said}"
     yield Hypothesis(SUBJECTS[("gnss",)], remedy, changes.on_positions(("gnss",), changes.plus(-offset)), note=note)
-
-
-def of_focal_length(
-    block: Block, model: FreeModel, evidence_of: Callable[[FreeModel], Evidence]
-) -> Iterator[Hypothesis]:
-    """The principal distance that the positions ask for, from how high the model has to be.
-
-    Parameters
-    ----------
-    evidence_of : a model, as function of it.
-    """
-    if all(camera.interior["focal_length_mm"].kind == "free" for camera in block.cameras):
-        return
-
-    def cost(log_factor: float) -> float:
-        return fit(evidence_of(model.stretched(float(np.exp(log_factor))))).cost
-
-    grid = np.log(FACTORS)
-    costs = np.array([cost(g) for g in grid])
-    best = int(np.argmin(costs))
-    low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    ratio = (np.sqrt(5.0) - 1.0) / 2.0
-    for _ in range(12):
-        a, b = high - ratio * (high - low), low + ratio * (high - low)
-        low, high = (low, b) if cost(a) <= cost(b) else (a, high)
-    factor = float(np.exp(0.5 * (low + high)))
-    near = min(KNOWN_FACTORS, key=lambda known: abs(np.log(factor / known)))
-    if abs(np.log(factor / near)) < SAME_FACTOR:
-        factor = near
-    if abs(np.log(factor)) > LEAST_FACTOR:
-        yield focal_hypothesis(factor)
-
-
-def focal_hypothesis(factor: float) -> Hypothesis:
-    """Another principal distance, estimated from there on."""
-
-    def change(block: Block) -> Block:
-        cameras = []
-        for camera in with_focal_factor(block, factor).cameras:
-            prior = camera.interior["focal_length_mm"]
-            free = replace(prior, fixed=False, sigma=None)
-            cameras.append(replace(camera, interior={**camera.interior, "focal_length_mm": free}))
-        return replace(block, cameras=tuple(cameras))
-
-    return Hypothesis(
-        "block", f"{factor:.4g} times the principal distance", change, on_model=lambda m: m.stretched(factor),
-        plural=False, free_focal=True,
-    )  # fmt: skip
