@@ -136,7 +136,8 @@ def test_map_of_models(erring_result, erring, kind, tmp_path):
         number = n[np.rint(own.row(xy[:, 1])).astype(int), np.rint(own.column(xy[:, 0])).astype(int)]
         number = np.nan_to_num(number, nan=-1).astype(int)
     else:
-        two = [k for k, m in enumerate(models) if m.model.names in (("2_003", "2_004"), ("2_004", "2_005"))]
+        pairs = ({"2_003", "2_004"}, {"2_004", "2_005"})
+        two = [k for k, m in enumerate(models) if set(m.model.names) in pairs]
         near = nearest_models(tuple(models[k] for k in two), Places(), np.column_stack([xy, terrain(xy)]))
         west = xy[:, 0] < middle[0]
         number = np.where(near < 0, -1, np.where(west, two[0], two[1]))
