@@ -53,7 +53,25 @@ _PLACES = {
 }
 """Where every public name stands; imported when it is used, so that `import aerotri` is quick."""
 
-__all__ = ["__version__", *sorted(_PLACES)]
+__all__ = [
+    "Adjustment",
+    "AdjustmentFailedError",
+    "Block",
+    "Covariance",
+    "InputError",
+    "Table",
+    "__version__",
+    "adjust",
+    "compare_parameters",
+    "convert",
+    "crosscheck",
+    "deform",
+    "example_flight",
+    "open_result",
+    "read",
+    "read_block",
+    "simulate",
+]
 
 
 def __getattr__(name: str) -> Any:

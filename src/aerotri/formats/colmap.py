@@ -167,8 +167,8 @@ def _camera_of(camera: Any, pixel_um: float, folder: Path) -> Camera:
             "estimate it as OPENCV or with k4 to k6 held at 0",
             folder,
         )
-    possible = min(focal) >= SMALLEST_FOCAL_PX and max(focal) < LARGEST_RATIO * min(focal)
-    possible = possible and (np.abs(values) <= LARGEST_NUMBER).all()
+    possible = bool((np.abs(values) <= LARGEST_NUMBER).all())
+    possible = possible and min(focal) >= SMALLEST_FOCAL_PX and max(focal) < LARGEST_RATIO * min(focal)
     if not possible or not 0 < min(camera.width, camera.height) <= max(camera.width, camera.height) <= MOST_PIXELS:
         raise InputError(f"camera {camera.camera_id} has no valid parameters", "calibrate it first", folder)
     size = (int(camera.width), int(camera.height))

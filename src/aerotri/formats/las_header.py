@@ -9,7 +9,9 @@ from __future__ import annotations
 import mmap
 import struct
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from aerotri.conventions import InputError
 from aerotri.formats.colmap_binary import mapped
@@ -134,8 +136,8 @@ def _check_compressed(raw: Bytes, header: _Header, laszip: bytes, path: Path) ->
 
 def _check_chunks(raw: Bytes, header: _Header, laszip: bytes, table: int, path: Path) -> None:
     """Every chunk within the point data, and its layers within the chunk."""
-    import lazrs
-
+    # the package has no stubs and is compiled
+    lazrs: Any = import_module("lazrs")
     try:
         with path.open("rb") as file:
             file.seek(header.offset)
