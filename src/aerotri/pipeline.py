@@ -392,7 +392,7 @@ def _factor(system: NormalSystem, solution: Solution) -> Factor:
     """
     equations = solution.equations
     factor, defects = checked_factor(system, solution.state, equations, solution.estimator)
-    defects += point_without_rays_enough(system, equations)
+    defects += point_without_rays_enough(system, solution.state, equations)
     if factor is None or defects:
         raise failure(system, "rank deficient", defects_in_words(system, defects))
     return factor

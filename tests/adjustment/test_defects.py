@@ -176,4 +176,4 @@ def test_a_point_that_its_rays_do_not_fix_is_named():
     prepared = prepare(block, given)
     equations = prepared.system.assemble(prepared.state, 0.0, LEAST_SQUARES)
     sentence = f"not determined: point {block.points[point]}, whose rays are parallel or one"
-    assert point_without_rays_enough(prepared.system, equations) == [sentence]
+    assert point_without_rays_enough(prepared.system, prepared.state, equations) == [sentence]

@@ -97,7 +97,7 @@ def test_geopackage(tmp_path, order, z, envelope, several):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("{", "cannot be read"),
+        ("{", "is not JSON"),
         ('{"type": "FeatureCollection", "features": []}', "no polygons"),
         (json.dumps({"features": [feature([LEFT_HALF], "", "b")]}), "attribute"),
         (

@@ -133,9 +133,9 @@ WRONG = {
     "nan": (BUNDLE.replace("10.05", "nan"), 20, "'nan' is not a finite number"),
     "camera": (BUNDLE.replace("2 7 1 2", "3 7 1 2"), 20, "'3' is no camera of the file"),
     "views": (BUNDLE.replace("2 0 5 10.05", "2.5 0 5 10.05"), 20, "'2.5' is no count"),
-    "far": (BUNDLE.replace("20.1", "2e200"), 20, "lies outside of any image"),
+    "far": (BUNDLE.replace("20.1", "2e200"), 20, "is not possible"),
     "rotation": (BUNDLE.replace("1 0 0\n0 1 0", "1 0 0\n0 2 0", 1), 4, "is no rotation"),
-    "rotation overflow": (BUNDLE.replace("1 0 0\n0 1 0", "1 0 0\n0 1e200 0", 1), 4, "is no rotation"),
+    "rotation overflow": (BUNDLE.replace("1 0 0\n0 1 0", "1 0 0\n0 1e200 0", 1), 5, "is not possible"),
     "focal length": (BUNDLE.replace("100 0.1", "-100 0.1", 1), 3, "is no principal distance"),
     "no rays": (
         BUNDLE.replace("2 0 5 10.05 20.1 2 7 1 2", "0").replace("2 0 6 5.5 0 2 8 -5.5 0", "0"),

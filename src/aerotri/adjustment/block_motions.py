@@ -19,6 +19,10 @@ from aerotri.adjustment.null_space import NOT_DETERMINED
 from aerotri.adjustment.unknowns import State, Unknowns
 from aerotri.functional_model.observed_unknowns import Rows
 
+BESIDE_A_CAMERA = 1e3
+"""Square of a column's length over the usual one, above which a point lies beside the camera."""
+NEAR = 0.25
+"""Share of the points that lie at their usual distance, even in a block that ran away."""
 WEAK = 1e-8
 """Square of the effect, relative to the motion's size, below which a motion is measured anew without squaring."""
 SAME_MOTION = 1e-12
@@ -110,7 +114,7 @@ def _motions(u: Unknowns, state: State) -> _Motions:
     used = (u.rays.inv_sigma > 0.0).any(axis=1)
     seen = (np.add.reduceat(used, u.rays.start[:-1], dtype=np.int64) > 0) | (u.kept >= 0)
     active = np.bincount(u.rays.image[used], minlength=len(u.images)) > 0
-    middle = state.points[seen].mean(axis=0) if seen.any() else np.zeros(3)
+    middle = np.median(state.points[seen], axis=0) if seen.any() else np.zeros(3)
     points, images = motions_of_points(state.points - middle), motions_of_images(state.centre - middle)
     images[~active] = 0.0
     shared = np.zeros((len(u.shared), 7))
@@ -134,11 +138,22 @@ def _directions(motions: _Motions, size: int) -> np.ndarray:
 def _size(motions: _Motions, directions: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
     """(7 + a, 7 + a) products of the motions in units of the columns' lengths.
 
-    Points enter with the mean length: a ray's partials by the point are those by the centre with the sign changed.
+    Points enter with the mean length: a ray's partials by the point are those by the centre with the sign changed. They
+    are the smaller the farther a point lies, so that one as good as at infinity counts no more than the others.
     """
+    n = 6 * len(motions.images)
+    of_images = diagonal[:n].reshape(-1, 6)
+    # a point that came to lie beside a camera makes columns that say nothing of the block
+    usual = np.median(of_images[motions.active], axis=0) if motions.active.any() else np.zeros(6)
+    of_images = np.minimum(of_images, BESIDE_A_CAMERA * usual)
+    diagonal = np.concatenate([of_images.ravel(), diagonal[n:]])
     size = directions.T @ (diagonal[:, None] * directions)
-    moved = motions.points[motions.seen].reshape(-1, 7)
-    per_image = diagonal[: 6 * len(motions.images)].reshape(-1, 6)[motions.active, :3]
+    seen = motions.points[motions.seen]
+    # the column of the scale is where the point lies from the middle
+    away = np.linalg.norm(seen[:, :, 6], axis=1)
+    nearness = 1.0 / np.maximum(1.0, away / max(np.quantile(away, NEAR), 1e-300)) if len(away) else away
+    moved = (seen * nearness[:, None, None]).reshape(-1, 7)
+    per_image = of_images[motions.active, :3]
     size[:7, :7] += moved.T @ moved * (per_image.sum() / max(len(moved), 1))
     return size
 

@@ -16,6 +16,10 @@ from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import State
 
+AT_INFINITY = 100.0
+"""Distance from the middle of the points, in usual distances, from which a point is as good as at infinity."""
+BEYOND_ALL_MEASURE = 1e6
+"""The same of the farthest point of a block that ran away, and of columns beside those of a usual photograph."""
 SHOWN = 6
 """Names listed in one sentence."""
 
@@ -44,6 +48,9 @@ def checked_factor(
         suspect = factor is None or is_suspect(factor, equations)
     if factor is not None and not motions.count and not suspect:
         return factor, []
+    if _has_run_away(state, equations) and (plain := _factor(system, equations)) is not None:
+        # no measure holds over so many powers of ten; the verdict says what such a result is worth
+        return plain, []
     free = free_directions(system, state, equations, estimator, motions.directions)
     sentences = _named(system, equations, motions, free)
     factor = None if sentences else _factor(system, equations)
@@ -62,9 +69,25 @@ def is_suspect(factor: Factor, equations: NormalEquations) -> bool:
     return smallest_eigenvalue(factor, equations.diagonal) < SUSPECT
 
 
-def point_without_rays_enough(system: NormalSystem, equations: NormalEquations) -> list[str]:
-    """A sentence on a point that its own rays do not fix, with the photographs held; empty where there is none."""
+def _has_run_away(state: State, equations: NormalEquations) -> bool:
+    """Whether points lie beyond all measure, or in a camera: the block has not kept together, whatever holds it."""
+    if not len(state.points):
+        return False
+    away = np.linalg.norm(state.points - np.median(state.points, axis=0), axis=1)
+    of_images = equations.diagonal[: 6 * len(state.centre)].reshape(-1, 6)
+    in_a_camera = of_images.max(axis=0) > BEYOND_ALL_MEASURE * np.median(of_images, axis=0)
+    return bool(away.max() > BEYOND_ALL_MEASURE * np.quantile(away, 0.25) or in_a_camera.any())
+
+
+def point_without_rays_enough(system: NormalSystem, state: State, equations: NormalEquations) -> list[str]:
+    """A sentence on a point that its own rays do not fix, with the photographs held; empty where there is none.
+
+    A point as good as at infinity is none: rays to it are parallel, and the rest of the block does not need it.
+    """
     row, u = equations.undetermined, system.unknowns
+    away = np.linalg.norm(state.points - np.median(state.points, axis=0), axis=1)
+    if row >= 0 and away[row] > AT_INFINITY * np.median(away):
+        return []
     rays = slice(u.rays.start[row], u.rays.start[row + 1]) if row >= 0 else slice(0)
     if not (u.rays.inv_sigma[rays] > 0.0).any():
         return []

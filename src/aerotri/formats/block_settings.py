@@ -348,11 +348,18 @@ def _as_input_error(error: ValidationError | OverflowError, path: Path, text: st
     elif kind == "extra_forbidden":
         message, remedy = f"unknown key '{key}'", _known_keys(where)
     else:
-        reason = first["msg"].removeprefix("Value error, ").replace("Input should be", "should be")
+        reason = _reason(first)
         message = f"{key} = {_shown(value)}: {REASONS.get(kind, reason)}"
         if kind == "string_type":
             remedy = "put names in quotes"
     return InputError(message, remedy, path, line)
+
+
+def _reason(first: Any) -> str:
+    """What pydantic says of a value, in the words of this program."""
+    reason = str(first["msg"]).removeprefix("Value error, ").replace("Input should be", "should be")
+    # the least positive number that is taken is a bound of arithmetic, not of photogrammetry
+    return reason.replace(f"greater than or equal to {SMALLEST_POSITIVE:.12f}", "greater than 0")
 
 
 def _shown(value: Any) -> str:
@@ -390,5 +397,5 @@ def checked_adjustment_settings(values: Mapping[str, object]) -> None:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         name = ".".join(str(part) for part in first["loc"])
-        reason = first["msg"].removeprefix("Value error, ").replace("Input should be", "should be")
+        reason = _reason(first)
         raise InputError(f"{name} = {_shown(first['input'])}: {reason}", "correct the setting") from None

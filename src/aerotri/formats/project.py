@@ -219,7 +219,7 @@ def _begin(request: Request, parts: _Parts) -> Reading:
         cameras = cameras_of(request.camera, parts.cameras, named, c_mm)
         cameras, camera, said = camera_of_each(cameras, list(camera_of.values()))
     except InputError as error:
-        raise InputError(error.message, error.remedy, error.file or Path(request.source)) from error
+        raise InputError(error.message, error.remedy, error.file or Path(request.source), error.line) from error
     count = len(camera_of)
     images = Images(
         names=np.array(list(camera_of), dtype=str),

@@ -25,7 +25,7 @@ def refuse_free_datum(block: Block) -> None:
     if datum != "control":
         raise InputError(
             f'with datum = "{datum}" the block is free of its control already',
-            'leave the free check out, or set datum = "control"',
+            'leave the free check (--check-free) out, or set datum = "control"',
             file="block.toml",
         )
 
