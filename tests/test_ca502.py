@@ -1,6 +1,7 @@
 """Five oblique heads with weak geometry, from the files alone: the first strip; the whole runs in tools/ca502.py."""
 
 import importlib.util
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from aerotri.formats.result import image_columns, point_columns
 from aerotri.pipeline import adjust
 
 TOOL = Path(__file__).resolve().parents[1] / "tools" / "ca502.py"
+STEPS_OF_A_STRIP = 120
 
 
 @pytest.fixture
@@ -21,9 +23,14 @@ def tool():
 
 
 def test_first_strip_converges_without_what_is_weak(tool, shared_data):
-    """Photograph D0627 has one ray. Some 10 s: a real block of 110 photographs with self-calibration of five heads."""
+    """Photograph D0627 has one ray. Some 10 s: a real block of 110 photographs with self-calibration of five heads.
+
+    By itself a strip may turn about its line by 0.03 rad, more than steps can follow: it takes more of them than the
+    whole, which is held across.
+    """
     block = tool.oriented(tool.exposures(tool.unoriented(shared_data("ca502")), 0, 22))
-    result = adjust(block)
+    settings = replace(block.settings, adjustment=replace(block.settings.adjustment, max_iterations=STEPS_OF_A_STRIP))
+    result = adjust(replace(block, settings=settings))
     assert result.outcome.status == "converged"
     images, points = image_columns(result), point_columns(result)
     status = dict(zip(images["image"].tolist(), images["status"].tolist(), strict=True))

@@ -14,6 +14,7 @@ from aerotri.adjustment.datum import without_motion
 from aerotri.adjustment.defects import checked_factor, is_suspect
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem, RightSide
 from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for, normalised_lengths
+from aerotri.adjustment.secants import Secants
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import State, Step
 
@@ -21,14 +22,15 @@ COST_TOLERANCE = 1e-9
 STEP_TOLERANCE = 1e-5
 SURE_CONTRACTION = 1e-2
 ROBUST_COST_TOLERANCE, ROBUST_STEP_TOLERANCE, EARLY_STEP_TOLERANCE = 1e-4, 1e-2, 0.3
-VALLEY_STEP_TOLERANCE = 0.1
-"""Share of σ within which robust estimation ends in a flat and curved valley."""
-WHOLE_STEP = 1e-2
-"""Damping over the smallest pivot up to which a step is as good as undamped."""
-FIRST_DAMPING, LAST_DAMPING, NO_DAMPING = 1e-5, 1e12, 1e-11
+BENT_STEP_TOLERANCE = 0.03
+"""Share of σ within which robust estimation ends where whole steps led uphill: points that their rays hardly fix go on
+moving there, and what they leave in the right side hides less."""
+FIRST_DAMPING, LAST_DAMPING, NO_DAMPING, SLIGHT_DAMPING = 1e-5, 1e12, 1e-11, 5e-8
 MAX_SCALE_CHANGES = 20
 LEAST_RATIO, LONGEST_STRETCH = 0.5, 5.0
 SLOWEST_CONTRACTION = 1e-2
+LEAST_GAIN, FAR_OFF = 0.25, -3.0
+"""Gain over promise below which an undamped step is not trusted, and below which it tells nothing of the curvature."""
 SUSPECT_PIVOT = 1e-11
 """Pivot (relative to a unit diagonal) below which a factor serves for one step only."""
 
@@ -114,26 +116,26 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
     estimator, equations = _estimated(system, state, equations, LEAST_SQUARES, stage.name, redundancy)
     costs = [equations.cost]
     damping, scale_changes, last_decrement = Damping(), 0, np.inf
+    secants: Secants | None = None
     iteration, last_iteration = stage.done, stage.done + options.max_iterations
     while iteration < last_iteration:
         iteration += 1
-        step = _step(system, state, equations, estimator, damping.value)
+        step = _step(system, state, equations, estimator, damping.value, secants)
         if iteration == 1:
             refused, factor = _refused(system, state, equations, estimator, options, step)
             if refused is not None:
                 return replace(refused, costs=tuple(costs))
             step = replace(step, factor=factor) if step and factor else step
-        if _in_curved_valley(equations, step, damping, redundancy, stage, costs):
-            return Solution("converged", state, equations, estimator, iteration - 1, tuple(costs))
-        step, damping = _until_better(system, state, equations, estimator, step, damping)
+        step, damping = _until_better(system, state, equations, estimator, step, damping, secants)
         if step is None:
             return Solution("not converged", state, equations, estimator, iteration, tuple(costs))
-        plain = damping.value == 0.0 and not step.points_settled
-        if stage.is_robust and plain:
+        plain = damping.value == 0.0 and (secants is not None or not step.points_settled)
+        secants, stage = _heeding(secants, stage, step, equations)
+        if stage.is_robust and plain and secants is None:
             step = _stretched(system, state, step, estimator, last_decrement)
         settled = plain and _settled(equations, step, redundancy, stage, last_decrement)
         last_decrement = step.decrement if plain else np.inf
-        damping = damping.lowered(step.gain_ratio(equations))
+        damping = damping.lowered(step.gain_ratio(equations), secants is not None)
         within_scatter = abs(step.decrement) <= step.equations.cost and not step.is_suspect
         state, equations = step.state, step.equations
         costs.append(equations.cost)
@@ -143,6 +145,7 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
             fresh, again = _estimated(system, state, equations, estimator, stage.name, redundancy)
             if fresh is not estimator:
                 estimator, equations, settled, last_decrement = fresh, again, False, np.inf
+                secants = Secants() if secants is not None else None
                 scale_changes += 1
         if settled:
             return Solution("converged", state, equations, estimator, iteration, tuple(costs))
@@ -158,6 +161,19 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
             if followed.settled:
                 return Solution("converged", state, equations, estimator, iteration, tuple(costs))
     return Solution("not converged", state, equations, estimator, last_iteration, tuple(costs))
+
+
+def _heeding(
+    secants: Secants | None, stage: Stage, step: _Trial, before: NormalEquations
+) -> tuple[Secants | None, Stage]:
+    """What the steps told about the curvature, this one included: from when robust estimation had to settle points."""
+    if secants is not None:
+        secants.learn(step.reduced, before.right, step.equations.right)
+        return secants, stage
+    if not (stage.is_robust and step.points_settled):
+        return None, stage
+    # before this step the right side was not that of points at their minimum: nothing to learn from yet
+    return Secants(), replace(stage, step_tolerance=max(stage.step_tolerance, BENT_STEP_TOLERANCE))
 
 
 def _refused(
@@ -191,15 +207,23 @@ class Damping:
 
     value: float = 0.0
     growth: float = 10.0
+    first: float = FIRST_DAMPING
 
     def raised(self) -> Damping:
         """After a step that failed."""
-        return Damping(max(FIRST_DAMPING, self.value * self.growth), 2.0 * self.growth if self.value else 10.0)
+        value = max(self.first, self.value * self.growth)
+        return Damping(value, 2.0 * self.growth if self.value else 10.0, self.first)
 
-    def lowered(self, gain_ratio: float) -> Damping:
-        """After a step that improved; gain_ratio is the gain over the gain promised."""
+    def lowered(self, gain_ratio: float, heeds_curvature: bool) -> Damping:
+        """After a step that improved; gain_ratio is the gain over the gain promised.
+
+        Where the curvature is heeded, slight damping is none, and the one that was enough is the first to be tried
+        should the next step fail.
+        """
         value = self.value * max(0.1, 1.0 - (2.0 * gain_ratio - 1.0) ** 3)
-        return Damping(value if value > NO_DAMPING else 0.0)
+        if heeds_curvature and 0.0 < value <= SLIGHT_DAMPING:
+            return Damping(first=max(10.0 * value, SLIGHT_DAMPING))
+        return Damping(value if value > NO_DAMPING else 0.0, first=self.first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,9 +241,19 @@ class _Trial:
     def is_suspect(self) -> bool:
         return self.factor.smallest_pivot < SUSPECT_PIVOT
 
+    @property
+    def reduced(self) -> np.ndarray:
+        """(6·n + s,) the step of photographs and shared parameters."""
+        return np.concatenate([self.move.images.ravel(), self.move.shared])
+
     def improves(self, before: NormalEquations) -> bool:
         # at the minimum the cost stands still within rounding
         return bool(np.isfinite(self.equations.cost)) and self.equations.cost <= before.cost * (1.0 + COST_TOLERANCE)
+
+    def keeps_promise(self, before: NormalEquations) -> bool:
+        """Whether it gains at least a share of what photographs and shared parameters promised, within rounding."""
+        gain, promised = before.cost - self.equations.cost, float(self.reduced @ before.right)
+        return self.improves(before) and gain >= LEAST_GAIN * promised - COST_TOLERANCE * before.cost
 
     def gain_ratio(self, before: NormalEquations) -> float:
         return min((before.cost - self.equations.cost) / max(self.decrement, 1e-300), 1.0)
@@ -227,35 +261,70 @@ class _Trial:
 
 def _until_better(
     system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, step: _Trial | None,
-    damping: Damping,
+    damping: Damping, secants: Secants | None,
 ) -> tuple[_Trial | None, Damping]:  # fmt: skip
     """The step, damped more and more until it improves; None where none does."""
+    if step is not None and secants is not None and damping.value == 0.0:
+        step = _trustworthy(system, state, equations, estimator, step, secants)
     while step is None or not step.improves(equations):
-        if step is not None:
+        if step is not None and secants is None:
             step = _with_settled_points(system, step, estimator)
             if step.improves(equations):
                 break
         damping = damping.raised()
         if damping.value > LAST_DAMPING:
             return None, damping
-        step = _step(system, state, equations, estimator, damping.value)
+        step = _step(system, state, equations, estimator, damping.value, secants)
     return step, damping
 
 
-def _step(system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, damping: float):
+def _trustworthy(
+    system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, step: _Trial,
+    secants: Secants,
+) -> _Trial | None:  # fmt: skip
+    """An undamped step that keeps enough of its promise; None where it has to be damped.
+
+    One that does not is taken anew, first with what it told itself about the curvature, then with the normal matrix
+    alone.
+    """
+    tried: _Trial | None = step
+    learns = len(secants) > 0 and step.gain_ratio(equations) > FAR_OFF
+    if not step.keeps_promise(equations) and learns:
+        secants.learn(step.reduced, equations.right, step.equations.right)
+        tried = _trial(system, state, equations, step.factor, estimator, 0.0, secants)
+    if (tried is None or not tried.keeps_promise(equations)) and len(secants):
+        secants.forget()
+        tried = _trial(system, state, equations, step.factor, estimator, 0.0, secants)
+    return tried if tried is not None and tried.keeps_promise(equations) else None
+
+
+def _step(
+    system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, damping: float,
+    secants: Secants | None,
+) -> _Trial | None:  # fmt: skip
     """Solve for a step and go there; None where the equations are singular."""
     damped = equations if damping == 0.0 else system.assemble(state, damping, estimator)
     try:
         factor = system.factorise(damped)
     except NotPositiveDefiniteError:
         return None
-    x = factor.solve(damped.right)
+    return _trial(system, state, damped, factor, estimator, damping, secants)
+
+
+def _trial(
+    system: NormalSystem, state: State, damped: NormalEquations, factor: Factor, estimator: Estimator, damping: float,
+    secants: Secants | None,
+) -> _Trial | None:  # fmt: skip
+    """The step by this factor; with secants an undamped one heeds them, and the points are led to their minimum."""
+    x = secants.solve(factor, damped.right) if secants is not None and damping == 0.0 else factor.solve(damped.right)
     decrement = float(x @ damped.right) + damped.point_decrement
     move = _whole_step(system, state, x, damped, estimator, damping)
     if move is None:
         return None
     there = system.unknowns.advance(state, move)
-    return _Trial(there, system.assemble(there, 0.0, estimator), decrement, factor, move)
+    if secants is not None:
+        there = system.settle_points(there, estimator)
+    return _Trial(there, system.assemble(there, 0.0, estimator), decrement, factor, move, secants is not None)
 
 
 def _whole_step(
@@ -355,24 +424,6 @@ def _settled(equations, step: _Trial, redundancy: int, stage: Stage, last_decrem
     if not np.isfinite(last_decrement):
         contraction = 1.0
     return _is_negligible(abs(step.decrement) * contraction, step.equations.cost, redundancy)
-
-
-def _in_curved_valley(
-    equations: NormalEquations, step: _Trial | None, damping: Damping, redundancy: int, stage: Stage,
-    costs: list[float],
-) -> bool:  # fmt: skip
-    """Whether robust estimation stands where the whole step, short against σ, leads uphill: the valley is curved.
-
-    Unknowns that are hardly told apart (tilt of all photographs and principal point) make it long and flat. Damped
-    steps would creep along it without end, each by less than what is sought.
-    """
-    if not stage.is_robust or step is None or len(costs) < 2 or step.improves(equations):
-        return False
-    if damping.value > WHOLE_STEP * step.factor.smallest_pivot:
-        return False
-    variance = max(equations.cost, 1e-30) / max(redundancy, 1)
-    still = abs(costs[-2] - costs[-1]) <= ROBUST_COST_TOLERANCE * costs[-1]
-    return still and step.decrement - equations.point_decrement <= VALLEY_STEP_TOLERANCE**2 * variance
 
 
 def _is_negligible(decrement: float, cost: float, redundancy: int) -> bool:
