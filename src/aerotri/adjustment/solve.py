@@ -130,7 +130,7 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
         if step is None:
             return Solution("not converged", state, equations, estimator, iteration, tuple(costs))
         plain = damping.value == 0.0 and (secants is not None or not step.points_settled)
-        secants, stage = _heeding(secants, stage, step, equations)
+        secants, stage = _heeding(secants, stage, step, equations, damping)
         if stage.is_robust and plain and secants is None:
             step = _stretched(system, state, step, estimator, last_decrement)
         settled = plain and _settled(equations, step, redundancy, stage, last_decrement)
@@ -164,13 +164,13 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
 
 
 def _heeding(
-    secants: Secants | None, stage: Stage, step: _Trial, before: NormalEquations
+    secants: Secants | None, stage: Stage, step: _Trial, before: NormalEquations, damping: Damping
 ) -> tuple[Secants | None, Stage]:
-    """What the steps told about the curvature, this one included: from when robust estimation had to settle points."""
+    """What the steps told about the curvature, this one included: from when a robust step had to be damped."""
     if secants is not None:
         secants.learn(step.reduced, before.right, step.equations.right)
         return secants, stage
-    if not (stage.is_robust and step.points_settled):
+    if not (stage.is_robust and damping.value > 0.0):
         return None, stage
     # before this step the right side was not that of points at their minimum: nothing to learn from yet
     return Secants(), replace(stage, step_tolerance=max(stage.step_tolerance, BENT_STEP_TOLERANCE))
