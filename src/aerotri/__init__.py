@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from aerotri.public.adjustment import Adjustment as Adjustment
     from aerotri.public.adjustment import adjust as adjust
     from aerotri.public.adjustment import open_result as open_result
-    from aerotri.public.blocks import example_flight as example_flight
     from aerotri.public.blocks import read as read
     from aerotri.public.blocks import read_block as read_block
-    from aerotri.public.blocks import simulate as simulate
     from aerotri.public.comparing import compare_parameters as compare_parameters
     from aerotri.public.comparing import crosscheck as crosscheck
     from aerotri.public.converting import convert as convert
     from aerotri.public.covariance import Covariance as Covariance
     from aerotri.public.models import deform as deform
+    from aerotri.public.simulating import example_flight as example_flight
+    from aerotri.public.simulating import simulate as simulate
     from aerotri.public.table import Table as Table
 
 
@@ -45,11 +45,11 @@ _PLACES = {
     "deform": "aerotri.public.models",
     "adjust": "aerotri.public.adjustment",
     "convert": "aerotri.public.converting",
-    "example_flight": "aerotri.public.blocks",
+    "example_flight": "aerotri.public.simulating",
     "open_result": "aerotri.public.adjustment",
     "read": "aerotri.public.blocks",
     "read_block": "aerotri.public.blocks",
-    "simulate": "aerotri.public.blocks",
+    "simulate": "aerotri.public.simulating",
 }
 """Where every public name stands; imported when it is used, so that `import aerotri` is quick."""
 

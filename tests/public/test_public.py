@@ -15,7 +15,7 @@ import aerotri
 from aerotri import InputError
 from aerotri.functional_model.rotation import rotation_from_angles
 
-MODULES = ("adjustment", "blocks", "comparing", "converting", "covariance", "models", "table")
+MODULES = ("adjustment", "blocks", "comparing", "converting", "covariance", "models", "simulating", "table")
 HEAVY = ("numba", "scipy", "pyarrow", "matplotlib", "cv2", "pyproj", "rasterio", "pydantic")
 
 

@@ -1,19 +1,16 @@
-"""Where blocks come from and where they go: folders, foreign formats, simulation."""
+"""Where blocks come from: folders and foreign formats."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from aerotri.observations import Block
 
 if TYPE_CHECKING:
     import numpy as np
-
-    from aerotri.simulation import Truth
 
 PathLike = str | os.PathLike
 GnssShift = Literal["off", "block", "strip"]
@@ -163,89 +160,3 @@ def read(
 
 def _text(path: PathLike | None) -> str:
     return "" if path is None else os.fspath(path)
-
-
-@dataclass(frozen=True, eq=False)
-class SimulatedBlock:
-    """A block together with the truth behind it.
-
-    Parameters
-    ----------
-    block : what was measured. truth : orientations, points and image errors as they are.
-    """
-
-    block: Block
-    truth: Truth
-
-    def save(self, out: PathLike) -> Path:
-        """Write the block's folder, with its truth in truth/; files of others stay.
-
-        Raises
-        ------
-        InputError
-            When the folder cannot be written to.
-        """
-        from aerotri.simulation import write_simulated
-
-        write_simulated(out, self.block, self.truth)
-        return Path(out)
-
-
-def simulate(plan: PathLike | Mapping[str, Any], seed: int = 1) -> SimulatedBlock:
-    """A block with known truth, from a flight plan.
-
-    Parameters
-    ----------
-    plan : file simulation.toml, or its tables as nested dictionaries; `example_flight` gives a small one.
-    seed : the same seed gives the same block.
-
-    Returns
-    -------
-    SimulatedBlock
-
-    Raises
-    ------
-    InputError
-        For a plan that makes no sense.
-
-    Examples
-    --------
-    >>> import aerotri
-    >>> flight = aerotri.simulate(aerotri.example_flight(), seed=1)
-    >>> len(flight.block.images), flight.truth.points.shape[1]
-    (12, 3)
-    """
-    from aerotri import simulation
-
-    spec = simulation.parse_spec(plan) if isinstance(plan, Mapping) else simulation.read_spec(plan)
-    return SimulatedBlock(*simulation.simulate(spec, seed))
-
-
-def example_flight() -> dict[str, Any]:
-    """The plan of a small flight, to try things on: two strips of six photographs, six control and four check points.
-
-    Returns
-    -------
-    dict
-        Tables as simulation.toml has them; change what you like.
-
-    Examples
-    --------
-    >>> import aerotri
-    >>> plan = aerotri.example_flight()
-    >>> plan["flight"]["strips"] = 3
-    >>> len(aerotri.simulate(plan, seed=1).block.images)
-    18
-    """
-    return {
-        "name": "example",
-        "camera": {"camera": {"model": "frame", "size_px": [5472, 3648], "pixel_um": 2.4, "focal_length_mm": 8.8,
-                              "flight_axis": "+y"}},
-        "flight": {"gsd_m": 0.03, "strips": 2, "images_per_strip": 6, "end_lap": 0.75, "side_lap": 0.5,
-                   "heading_deg": 0.0, "attitude_sigma_deg": [1.0, 1.0, 2.0], "position_sigma_m": [1.0, 1.0, 1.0]},
-        "terrain": {"kind": "undulating", "height_m": 100.0, "relief_rms_m": 5.0, "wavelength_m": 150.0},
-        "tie_points": {"per_image": 80, "sigma_um": 1.2},
-        "control": {"positions": [[0.02, 0.05], [0.02, 0.95], [0.5, 0.1], [0.5, 0.9], [0.98, 0.05], [0.98, 0.95]],
-                    "sigma_m": [0.01, 0.01, 0.015], "check_points": 4},
-        "start_values": {"kind": "perturbed", "position_sigma_m": 1.0, "angle_sigma_deg": 0.1},
-    }  # fmt: skip

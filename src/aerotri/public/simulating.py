@@ -1,0 +1,170 @@
+"""Blocks with known truth, and photographs of them, from a flight plan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerotri.observations import Block
+from aerotri.public.blocks import PathLike
+from aerotri.public.folders import refuse_existing_file, refuse_foreign_entries
+from aerotri.public.progress import ProgressLike, stage_report
+
+if TYPE_CHECKING:
+    from aerotri.simulation import SimulationSpec, Truth
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulatedBlock:
+    """A block together with the truth behind it.
+
+    Parameters
+    ----------
+    block : what was measured.
+    truth : orientations, points and image errors as they are.
+    plan : the flight plan. seed : of the random numbers.
+    """
+
+    block: Block
+    truth: Truth
+    plan: SimulationSpec
+    seed: int
+
+    def save(
+        self,
+        out: PathLike,
+        *,
+        photographs: bool = False,
+        only: Sequence[str] = (),
+        targets: bool = False,
+        blur_px: float = 0.5,
+        noise: float = 50.0,
+        overwrite: bool = False,
+        progress: ProgressLike = None,
+    ) -> Path:
+        """Write the block's folder, with its truth in truth/, and photographs in photographs/.
+
+        Parameters
+        ----------
+        out : folder; files of others stay. Photographs of an older block of this place are removed.
+        photographs : render photographs, 16 bit TIFF.
+        only : names of the photographs to render; all where empty.
+        targets : render bright discs at control and check points.
+        blur_px : σ of the point spread, pixels.
+        noise : σ of the grey values.
+        overwrite : replace files that aerotri has not written, or that were changed since.
+        progress : see `aerotri.adjust`.
+
+        Returns
+        -------
+        Path of the folder.
+
+        Raises
+        ------
+        InputError
+            When the folder holds files of others, cannot be written to, or has too little room; for a photograph that
+            the block does not have.
+        """
+        from aerotri.formats.work_place import held
+        from aerotri.simulation.photograph_files import chosen_photographs
+
+        target = Path(out)
+        chosen = chosen_photographs(self.block, only) if photographs else []
+        with held(target), stage_report(progress) as report:
+            self._write_block(target, chosen, overwrite)
+            if photographs:
+                from aerotri.compiled import compilation_notice
+                from aerotri.simulation.photograph_files import PHOTOGRAPHS, write_photographs
+                from aerotri.simulation.rendering import RenderOptions, make_scene
+
+                report.stage(compilation_notice() or "rendering", None)
+                looks = RenderOptions(blur_px=blur_px, noise=noise, targets=targets)
+                scene = make_scene(self.plan, self.seed, self.block, self.truth, looks)
+                write_photographs(scene, chosen, target / PHOTOGRAPHS, lambda share: report.stage("rendering", share))
+        return target
+
+    def _write_block(self, target: Path, chosen: Sequence[int], overwrite: bool) -> None:
+        """The block with its truth in one step; photographs of an older one go with it."""
+        from aerotri.formats.block_writer import OWN_ENTRIES
+        from aerotri.simulation import write_simulated
+        from aerotri.simulation.photograph_files import PHOTOGRAPHS, RECORD, file_name, rendered_before
+        from aerotri.simulation.truth import TRUTH
+
+        refuse_foreign_entries(target, (*OWN_ENTRIES, TRUTH), overwrite)
+        older = rendered_before(target)
+        for image in chosen:
+            name = file_name(str(self.block.images.names[image]))
+            if name not in older:
+                refuse_existing_file(target / PHOTOGRAPHS / name, overwrite)
+        # none of them may stand beside another block
+        gone = {f"{PHOTOGRAPHS}/{name}" for name in (*older, RECORD)} if older else set()
+        write_simulated(target, self.block, self.truth, gone)
+
+    def __repr__(self) -> str:
+        block = self.block
+        return (
+            f"<aerotri.SimulatedBlock {block.name!r}, seed {self.seed}: {len(block.images)} photographs, "
+            f"{len(block.points)} points>"
+        )
+
+
+def simulate(plan: PathLike | Mapping[str, Any], seed: int = 1) -> SimulatedBlock:
+    """A block with known truth, from a flight plan.
+
+    Parameters
+    ----------
+    plan : file simulation.toml, or its tables as nested dictionaries; `example_flight` gives a small one.
+    seed : the same seed gives the same block.
+
+    Returns
+    -------
+    SimulatedBlock
+
+    Raises
+    ------
+    InputError
+        For a plan that makes no sense.
+
+    Examples
+    --------
+    >>> import aerotri
+    >>> flight = aerotri.simulate(aerotri.example_flight(), seed=1)
+    >>> len(flight.block.images), flight.truth.points.shape[1]
+    (12, 3)
+    """
+    from aerotri import simulation
+
+    spec = simulation.parse_spec(plan) if isinstance(plan, Mapping) else simulation.read_spec(plan)
+    return SimulatedBlock(*simulation.simulate(spec, seed), spec, seed)
+
+
+def example_flight() -> dict[str, Any]:
+    """The plan of a small flight, to try things on: two strips of six photographs, six control and four check points.
+
+    Returns
+    -------
+    dict
+        Tables as simulation.toml has them; change what you like.
+
+    Examples
+    --------
+    >>> import aerotri
+    >>> plan = aerotri.example_flight()
+    >>> plan["flight"]["strips"] = 3
+    >>> len(aerotri.simulate(plan, seed=1).block.images)
+    18
+    """
+    return {
+        "name": "example",
+        "camera": {"camera": {"model": "frame", "size_px": [5472, 3648], "pixel_um": 2.4, "focal_length_mm": 8.8,
+                              "flight_axis": "+y"}},
+        "flight": {"gsd_m": 0.03, "strips": 2, "images_per_strip": 6, "end_lap": 0.75, "side_lap": 0.5,
+                   "heading_deg": 0.0, "attitude_sigma_deg": [1.0, 1.0, 2.0], "position_sigma_m": [1.0, 1.0, 1.0]},
+        "terrain": {"kind": "undulating", "height_m": 100.0, "relief_rms_m": 5.0, "wavelength_m": 150.0},
+        "tie_points": {"per_image": 80, "sigma_um": 1.2},
+        "control": {"positions": [[0.02, 0.05], [0.02, 0.95], [0.5, 0.1], [0.5, 0.9], [0.98, 0.05], [0.98, 0.95]],
+                    "sigma_m": [0.01, 0.01, 0.015], "check_points": 4},
+        "start_values": {"kind": "perturbed", "position_sigma_m": 1.0, "angle_sigma_deg": 0.1},
+    }  # fmt: skip

@@ -1,0 +1,107 @@
+"""The rendered photographs of a simulated block as files, and the record of them."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.formats.atomic import atomic_file
+from aerotri.observations import Block
+from aerotri.rasters_images import create_image
+from aerotri.simulation.rendering import Scene, rendered_rows
+
+PHOTOGRAPHS, RECORD = "photographs", "rendered.json"
+Report = Callable[[float], None]
+
+
+def chosen_photographs(block: Block, only: Sequence[str] = ()) -> list[int]:
+    """Numbers of the photographs to render.
+
+    Parameters
+    ----------
+    only : their names; all where empty.
+
+    Raises
+    ------
+    InputError
+        For a name that the block does not have.
+    """
+    names = block.images.names.tolist()
+    unknown = [name for name in only if name not in names]
+    if unknown:
+        raise InputError(f"there is no photograph '{unknown[0]}' to render", f"names are {names[0]} to {names[-1]}")
+    return [names.index(name) for name in dict.fromkeys(only)] if only else list(range(len(names)))
+
+
+def file_name(photograph: str) -> str:
+    """Name of the file of a photograph."""
+    return f"{photograph}.tif"
+
+
+def rendered_before(folder: Path) -> list[str]:
+    """The photographs that the record of an older run names, and that this program may therefore remove.
+
+    Parameters
+    ----------
+    folder : of the block.
+
+    Raises
+    ------
+    InputError
+        When the record is damaged.
+    """
+    record = folder / PHOTOGRAPHS / RECORD
+    if not record.is_file():
+        return []
+    try:
+        names = [str(name) for name in json.loads(record.read_text(encoding="utf-8"))["photographs"]]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"cannot be read: {error}", "remove the folder, or choose another --out", record) from error
+    return [name for name in names if Path(name).name == name]
+
+
+def write_photographs(scene: Scene, chosen: Sequence[int], folder: Path, report: Report) -> None:
+    """Write photographs, each whole or not at all; the record, written first, names them.
+
+    Parameters
+    ----------
+    chosen : numbers of the photographs. folder : of the photographs. report : takes the share that is done, 0 … 1.
+
+    Raises
+    ------
+    InputError
+        When they do not fit on the disk.
+    """
+    _refuse_without_room(scene, chosen, folder)
+    files = [file_name(str(scene.names[image])) for image in chosen]
+    content = {"photographs": files, "seed": scene.seed, "options": asdict(scene.options)}
+    with atomic_file(folder / RECORD) as place:
+        place.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    for number, (image, name) in enumerate(zip(chosen, files, strict=True)):
+        _write_photograph(
+            scene, image, folder / name, lambda share, before=number: report((before + share) / len(chosen))
+        )
+
+
+def _write_photograph(scene: Scene, image: int, path: Path, report: Report) -> None:
+    columns, rows = scene.camera(image).nominal.size_px
+    with atomic_file(path) as place, create_image(place, columns, rows, 1, "uint16") as writer:
+        for first, pixels in rendered_rows(scene, image, report):
+            writer.write(first, pixels[None])
+
+
+def _refuse_without_room(scene: Scene, chosen: Sequence[int], folder: Path) -> None:
+    """Photographs are as large as their pixels, 16 bit each."""
+    needed = sum(2.0 * float(np.prod(scene.camera(image).nominal.size_px, dtype=float)) for image in chosen)
+    free = shutil.disk_usage(next(p for p in folder.resolve().parents if p.is_dir())).free
+    if needed > free:
+        raise InputError(
+            f"{len(chosen)} photographs need {needed / 2**30:.3g} GiB, {free / 2**30:.3g} GiB of the disk are free",
+            "choose another place, or some of them by --only",
+        )
