@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from aerotri.public.adjustment import open_result as open_result
     from aerotri.public.blocks import read as read
     from aerotri.public.blocks import read_block as read_block
+    from aerotri.public.changes import changes as changes
     from aerotri.public.comparing import compare_parameters as compare_parameters
     from aerotri.public.comparing import crosscheck as crosscheck
     from aerotri.public.converting import convert as convert
@@ -40,6 +41,7 @@ _PLACES = {
     "Covariance": "aerotri.public.covariance",
     "InputError": "aerotri.conventions",
     "Table": "aerotri.public.table",
+    "changes": "aerotri.public.changes",
     "compare_parameters": "aerotri.public.comparing",
     "crosscheck": "aerotri.public.comparing",
     "deform": "aerotri.public.models",
@@ -62,6 +64,7 @@ __all__ = [
     "Table",
     "__version__",
     "adjust",
+    "changes",
     "compare_parameters",
     "convert",
     "crosscheck",

@@ -15,7 +15,10 @@ import aerotri
 from aerotri import InputError
 from aerotri.functional_model.rotation import rotation_from_angles
 
-MODULES = ("adjustment", "blocks", "comparing", "converting", "covariance", "models", "simulating", "table")
+MODULES = (
+    "adjustment", "blocks", "changes", "comparing", "converting", "covariance", "models", "parameters", "simulating",
+    "table",
+)  # fmt: skip
 HEAVY = ("numba", "scipy", "pyarrow", "matplotlib", "cv2", "pyproj", "rasterio", "pydantic")
 
 
@@ -202,3 +205,18 @@ def test_a_result_in_a_crs_has_its_covariance_there():
                                rtol=1e-6)  # fmt: skip
     rotation = rotation_from_angles(result.adjusted.images.angles[5:6], block.rotation)[0]
     assert np.allclose(rotation @ rotation.T, np.eye(3))
+
+
+def test_changes_between_results(result, flight, tmp_path):
+    """Second − first of the tables, and nothing between a result and itself."""
+    other = aerotri.adjust(flight.block, parameters="brown:K1")
+    found = aerotri.changes(result, other)
+    name = str(result.images["image"][4])
+    row, one, two = found.images.row(name), result.images.row(name), other.images.row(name)
+    assert row["dZ0"] == pytest.approx(two["Z0"] - one["Z0"], abs=1e-9)
+    assert row["dkappa"] == pytest.approx(two["kappa"] - one["kappa"], abs=1e-9)
+    assert found.summary(2)["parameters"]
+    assert "Photographs that changed most" in found._repr_html_()
+    assert not aerotri.changes(other, other).points["largest"].any()
+    with pytest.raises(InputError, match=r"holds no adjustment\.json"):
+        aerotri.changes(result, tmp_path)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from aerotri.conventions import InputError
+if TYPE_CHECKING:
+    from aerotri.functional_model.additional_parameters import ParameterDescription
 
 MOST = 16
 """Parameters of a family listed when all families are."""
@@ -18,39 +21,24 @@ def run_parameters(draw: Path | None, family: str | None, as_json: bool) -> None
     ------
     InputError
     """
-    from aerotri.functional_model.additional_parameters import FAMILIES, describe
+    from aerotri.public.parameters import draw_parameters, list_parameters
 
-    if family is not None and family not in FAMILIES:
-        raise InputError(f"unknown parameter family '{family}'", f"known are {', '.join(FAMILIES)}")
-    entries = [d for d in describe() if family in (None, d.family)]
-    drawn = [] if draw is None else _draw(draw, family)
+    entries = list_parameters(family)
+    drawn = None if draw is None else draw_parameters(draw, family)
     if as_json:
         print(json.dumps([vars(d) for d in entries], ensure_ascii=False, indent=2))
         return
+    lines = _lines(entries, whole=family is not None)
+    print("\n".join(lines if drawn is None else [*lines, f"Drawn to {draw}: {', '.join(drawn)}"]))
+
+
+def _lines(entries: Sequence[ParameterDescription], whole: bool) -> list[str]:
+    """A heading a family, and its parameters; all of them where `whole`."""
+    lines = []
     for name in dict.fromkeys(d.family for d in entries):
         own = [d for d in entries if d.family == name]
-        print(f"{name}: {len(own)} parameters. {own[0].reference}")
-        for d in own[:MOST] if family is None else own:
-            print(f"  {d.item:<12} [{d.mark}] {d.text}")
-        if family is None and len(own) > MOST:
-            print(f"  … {len(own) - MOST} more: aerotri parameters --family {name}")
-    if draw is not None:
-        print(f"Drawn to {draw}: {', '.join(drawn)}")
-
-
-def _draw(folder: Path, family: str | None) -> list[str]:
-    from aerotri.functional_model.additional_parameters import FAMILIES
-    from aerotri.report.plots import save_plots
-    from aerotri.report.plots_parameters import plot_pattern_sheets
-    from aerotri.simulation.cameras import block_camera
-    from aerotri.simulation.spec import CameraSpec
-
-    drawn = []
-    for name, own in FAMILIES.items():
-        if family in (None, name):
-            model = own.camera_model or "ultracam_d"
-            camera = block_camera(model, CameraSpec.model_validate({"preset": model}))
-            sheets = plot_pattern_sheets(name, camera)
-            save_plots({f"{name}_{k}" if k else name: sheet for k, sheet in enumerate(sheets)}, folder)
-            drawn.append(name)
-    return drawn
+        lines.append(f"{name}: {len(own)} parameters. {own[0].reference}")
+        lines += [f"  {d.item:<12} [{d.mark}] {d.text}" for d in (own if whole else own[:MOST])]
+        if not whole and len(own) > MOST:
+            lines.append(f"  … {len(own) - MOST} more: aerotri parameters --family {name}")
+    return lines
