@@ -112,7 +112,8 @@ def test_sections_that_are_too_many(tmp_path):
 
 
 def test_a_design_of_too_many_models():
-    from aerotri.commands.predict import VolumeDesign, run_predict_volume
+    from aerotri.commands.predict import run_predict_volume
+    from aerotri.simulation.designs import VolumeDesign
 
     with pytest.raises(InputError, match=r"the area has .* models, 100000 at most"):
         run_predict_volume(VolumeDesign(1.0, 1e12, 1e12, 100.0), False, 1, True)

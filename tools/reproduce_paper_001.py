@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from aerotri.commands.predict import VolumeDesign, simulated_sigma
+from aerotri.public.predict import VolumeDesign, simulated_sigma
 from aerotri.volume import theory
 
 HEIGHT = 1500.0

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from aerotri.conventions import InputError as InputError
     from aerotri.observations import Block as Block
     from aerotri.pipeline import AdjustmentFailedError as AdjustmentFailedError
+    from aerotri.public import predict as predict
     from aerotri.public.adjustment import Adjustment as Adjustment
     from aerotri.public.adjustment import adjust as adjust
     from aerotri.public.adjustment import open_result as open_result
@@ -49,11 +50,14 @@ _PLACES = {
     "convert": "aerotri.public.converting",
     "example_flight": "aerotri.public.simulating",
     "open_result": "aerotri.public.adjustment",
+    "predict": "aerotri.public.predict",
     "read": "aerotri.public.blocks",
     "read_block": "aerotri.public.blocks",
     "simulate": "aerotri.public.simulating",
 }
 """Where every public name stands; imported when it is used, so that `import aerotri` is quick."""
+_MODULES = ("predict",)
+"""Names that are whole modules."""
 
 __all__ = [
     "Adjustment",
@@ -71,6 +75,7 @@ __all__ = [
     "deform",
     "example_flight",
     "open_result",
+    "predict",
     "read",
     "read_block",
     "simulate",
@@ -80,7 +85,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _PLACES:
         raise AttributeError(f"module 'aerotri' has no attribute '{name}'")
-    value = getattr(import_module(_PLACES[name]), name)
+    module = import_module(_PLACES[name])
+    value = module if name in _MODULES else getattr(module, name)
     globals()[name] = value
     return value
 

@@ -6,8 +6,9 @@ import json
 
 import pytest
 
-from aerotri.commands.predict import AttitudeDesign, VolumeDesign, run_predict_attitude, run_predict_volume
+from aerotri.commands.predict import AttitudeDesign, run_predict_attitude, run_predict_volume
 from aerotri.conventions import InputError
+from aerotri.simulation.designs import VolumeDesign
 
 
 def test_volume_by_theory_and_by_a_simulated_strip(capsys):

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from transformations import about_z, both, moved, permuted, renamed, same
 
-from aerotri.commands.predict import AttitudeDesign, VolumeDesign, run_predict_attitude, run_predict_volume
+from aerotri.commands.predict import AttitudeDesign, run_predict_attitude, run_predict_volume
 from aerotri.commands.predict_interval import IntervalQuestion, run_predict_interval
 from aerotri.crosscheck import crosscheck
 from aerotri.pipeline import adjust
 from aerotri.simulation import parse_spec, simulate
+from aerotri.simulation.designs import VolumeDesign
 from small_blocks import small_block, small_spec
 
 ROWS = both(permuted(6), renamed)

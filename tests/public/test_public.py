@@ -16,8 +16,8 @@ from aerotri import InputError
 from aerotri.functional_model.rotation import rotation_from_angles
 
 MODULES = (
-    "adjustment", "blocks", "changes", "comparing", "converting", "covariance", "models", "parameters", "simulating",
-    "table",
+    "adjustment", "blocks", "changes", "comparing", "converting", "covariance", "models", "parameters", "predict",
+    "simulating", "table",
 )  # fmt: skip
 HEAVY = ("numba", "scipy", "pyarrow", "matplotlib", "cv2", "pyproj", "rasterio", "pydantic")
 
@@ -220,3 +220,17 @@ def test_changes_between_results(result, flight, tmp_path):
     assert not aerotri.changes(other, other).points["largest"].any()
     with pytest.raises(InputError, match=r"holds no adjustment\.json"):
         aerotri.changes(result, tmp_path)
+
+
+def test_prediction_of_a_volume_is_told_by_the_best_way():
+    """The simulated flight where there is one; the same number over the area."""
+    theory = aerotri.predict.volume(1500.0, 3600.0, 1800.0, 1800.0)
+    both = aerotri.predict.volume(1500.0, 3600.0, 1800.0, 1800.0, simulate=True)
+    assert theory.sigma_mean_height == theory.record.joint
+    assert both.sigma_mean_height == both.simulated
+    # pointing at control is in the simulated flight alone, and counts most where little is bridged
+    assert 1.0 < both.simulated / theory.record.joint < 2.5
+    assert both.sigma_volume == pytest.approx(both.simulated * 3600.0 * 1800.0)
+    assert both.table["by"].tolist()[-1] == "simulated flight, adjusted"
+    for shown in (theory, aerotri.predict.attitude(1.0, 5.0)):
+        assert "<table>" in shown._repr_html_()

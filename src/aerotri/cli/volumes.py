@@ -79,7 +79,8 @@ def predict_volume(
     json_: Json = False,
 ) -> None:
     """The accuracy of a volume: Kubik's theory, repaired, and the adjustment of a simulated flight."""
-    from aerotri.commands.predict import VolumeDesign, run_predict_volume
+    from aerotri.commands.predict import run_predict_volume
+    from aerotri.simulation.designs import VolumeDesign
 
     run_predict_volume(VolumeDesign(height, length, width, bridging, sigma0_share), simulate, seed, json_)
 
