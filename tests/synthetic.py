@@ -7,7 +7,7 @@ import numpy as np
 from aerotri.functional_model.additional_parameters import parameter_set, parse_parameters
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import AdjustmentSettings, Block, Camera, Control, ImagePoints, Images, Prior, Settings
-from aerotri.statistics.adjusted_block import (
+from aerotri.results.adjusted_block import (
     AdjustedBlock,
     Blunder,
     GroundPointResults,

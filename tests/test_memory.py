@@ -8,7 +8,7 @@ import pytest
 from aerotri import memory
 from aerotri.conventions import InputError
 from aerotri.memory import fitting, refuse_beyond_memory
-from aerotri.rasters import Grid, RasterReader, write_raster
+from aerotri.rasters.grids import Grid, RasterReader, write_raster
 from aerotri.simulation import parse_spec, simulate
 from aerotri.terrain import compare as comparing
 from aerotri.terrain.compare import FileHeights, RasterHeights, compare

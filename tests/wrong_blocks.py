@@ -15,7 +15,7 @@ import numpy as np
 from aerotri.commands.adjust import run_adjust
 from aerotri.conventions import InputError
 from aerotri.coordinates.local_frame import local_frame
-from aerotri.formats.block_folder import write_block
+from aerotri.formats.block.folder import write_block
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Block
 from aerotri.observations.block import GnssSettings, InsSettings

@@ -6,7 +6,7 @@ import numpy as np
 
 from aerotri.deformation.photo_errors import seams_mm
 from aerotri.deformation.stereo_model import deform_points, project
-from aerotri.rasters import Grid, RasterWriter
+from aerotri.rasters.grids import Grid, RasterWriter
 
 SLOPE = np.array([0.15, -0.3])
 

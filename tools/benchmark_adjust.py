@@ -91,7 +91,7 @@ def _say(text: str) -> None:
 
 
 def _write(folder: Path, runs: list[Run], table: str, threads: int) -> None:
-    from aerotri.report.rendering import save_plots
+    from aerotri.report.plots.rendering import save_plots
 
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "benchmark.md").write_text(table, encoding="utf-8")

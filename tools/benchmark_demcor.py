@@ -120,7 +120,7 @@ def _cases(folder: Path, result: Path, cells: int, arguments: argparse.Namespace
 
 def _make_dem(path: Path, middle: np.ndarray, width: float, cells: int, options: dict) -> None:
     """Hills of some ten metres and a roughness of 3 cm, rounded to centimetres."""
-    from aerotri.rasters import Grid, RasterWriter
+    from aerotri.rasters.grids import Grid, RasterWriter
 
     cell = width / cells
     grid = Grid(cells, cells, float(middle[0]) - width / 2.0, float(middle[1]) + width / 2.0, cell, cell)

@@ -79,7 +79,7 @@ def _errors(scale: int):
 
 
 def _make_photograph(path: Path, scale: int) -> None:
-    from aerotri.rasters_images import create_image
+    from aerotri.rasters.images import create_image
 
     columns, rows = SIZE[0] // scale, SIZE[1] // scale
     rng = np.random.default_rng(2)
@@ -131,7 +131,7 @@ def _in_turn(name: str, works: tuple[Callable[[], object], Callable[[], object]]
 def _in_memory(photograph: Path, arguments: argparse.Namespace) -> list:
     from aerotri.image_errors.ideal_map import ideal_map
     from aerotri.image_errors.ideal_photographs import PixelType, resample
-    from aerotri.rasters_images import open_photograph
+    from aerotri.rasters.images import open_photograph
 
     with open_photograph(photograph) as opened:
         pixels = opened.read(0, opened.rows)

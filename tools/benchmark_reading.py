@@ -23,8 +23,8 @@ from statistics import median
 
 from pyarrow import csv, parquet
 
-from aerotri.formats.block_folder import read_block
-from aerotri.formats.block_writer import write_block
+from aerotri.formats.block.folder import read_block
+from aerotri.formats.block.writer import write_block
 from aerotri.simulation import parse_spec, simulate
 from benchmark.blocks import spec_of
 

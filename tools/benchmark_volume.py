@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.functional_model.additional_parameters import parse_parameters
-from aerotri.pipeline import Adjustment, adjust_keeping_system
+from aerotri.pipeline import adjust_keeping_system
+from aerotri.results.adjustment import Adjustment
 from aerotri.simulation import parse_spec, simulate
 from aerotri.volume.pickets import pickets_where_seen
 from aerotri.volume.response import respond

@@ -19,14 +19,14 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.formats.assemble import Statements
-from aerotri.formats.camera_spec import CameraSpec
-from aerotri.formats.project import Request, read_project
+from aerotri.formats.assembly.assemble import Statements
+from aerotri.formats.assembly.camera_spec import CameraSpec
+from aerotri.formats.assembly.project import Request, read_project
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Block, GnssIns, ImagePoints
 from aerotri.pipeline import AdjustmentFailedError, adjust
 from aerotri.public.adjustment import with_settings
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.statistics.set_aside import counts_by_reason, photograph_reasons, point_reasons
 
 PARAMETERS, ROBUST = "brown:K1+K2+K3+P1+P2", "huber"

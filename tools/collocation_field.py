@@ -30,9 +30,9 @@ import numpy as np
 from aerotri.functional_model.additional_parameters import parameter_set, parse_parameters
 from aerotri.observations import Block
 from aerotri.pipeline import compare_parameters
+from aerotri.results.parameter_comparison import ParameterComparison
 from aerotri.simulation import parse_spec, simulate
-from aerotri.statistics.parameter_choice import choose
-from aerotri.statistics.parameter_comparison import ParameterComparison
+from aerotri.strategies.parameter_choice import choose
 
 SETS = (
     "none", "bluh:1-12", "ultracam_d:42-73", "bluh:1-12,ultracam_d:42-73", "brown", "ebner", "gruen", "legendre:5x5",

@@ -16,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.formats.block_folder import read_block
+from aerotri.formats.block.folder import read_block
 from aerotri.observations import Block
 from aerotri.pipeline import compare_parameters
+from aerotri.results.parameter_comparison import Accuracy
 from aerotri.simulation import read_spec, simulate
-from aerotri.statistics.parameter_choice import candidate_sets, choose
-from aerotri.statistics.parameter_comparison import Accuracy
+from aerotri.strategies.parameter_choice import candidate_sets, choose
 
 BLOCKS = Path(__file__).parents[1] / "blocks"
 SIMULATED = ("frederiksstad_ultracam", "frederiksstad_dmc", "frederiksstad_rmk", "dsk_saar_ultracam")

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.formats.block_folder import read_block
+from aerotri.formats.block.folder import read_block
 from aerotri.observations import Block
 from aerotri.pipeline import AdjustmentFailedError, adjust
 from aerotri.public.adjustment import with_settings
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 
 @dataclass(frozen=True)

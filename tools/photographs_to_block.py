@@ -37,10 +37,10 @@ from aerotri.commands.adjust import run_adjust
 from aerotri.commands.run import run_all
 from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
 from aerotri.conventions import px_from_mm
-from aerotri.formats.assemble import Statements
-from aerotri.formats.block_folder import read_block
-from aerotri.formats.camera_spec import CameraSpec
-from aerotri.rasters_images import create_image
+from aerotri.formats.assembly.assemble import Statements
+from aerotri.formats.assembly.camera_spec import CameraSpec
+from aerotri.formats.block.folder import read_block
+from aerotri.rasters.images import create_image
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.rendering import RenderOptions, make_scene, render
 

@@ -40,8 +40,9 @@ from scipy.stats import chi2
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
-from aerotri.pipeline import Adjustment, adjust_keeping_system
-from aerotri.rasters_images import create_image
+from aerotri.pipeline import adjust_keeping_system
+from aerotri.rasters.images import create_image
+from aerotri.results.adjustment import Adjustment
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.rendering import RenderOptions, make_scene, render
 from aerotri.simulation.terrain import Terrain

@@ -1,4 +1,4 @@
-"""Recovery of simulated truth at full count: the cases of tests/test_statistical_truth.py over many seeds.
+"""Recovery of simulated truth at full count: the cases of tests/adjustment/test_statistical_truth.py over many seeds.
 
 Prints, for every case, the unknowns' largest |mean z|·√n and the range of their mean z² beside the bounds of a 99.9 %
 test, and σ0² with its band. Single unknowns are never pooled.

@@ -48,9 +48,9 @@ from scipy.stats import binom
 
 from aerotri.observations import Block
 from aerotri.pipeline import adjust
+from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
 from aerotri.simulation import Truth, parse_spec, read_spec, simulate
 from aerotri.simulation.spec import SimulationSpec
-from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
 from aerotri.statistics.reliability import critical_value, noncentrality, ray_reliability
 
 DEMO = Path(__file__).parents[1] / "blocks" / "frederiksstad_ultracam" / "simulation.toml"

@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 from matplotlib.figure import Figure
 
-from aerotri.rasters import Grid, RasterReader
+from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import Boundary, boundary_of
 from aerotri.volume.functionals import tin_volume, triangulated

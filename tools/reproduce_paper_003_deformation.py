@@ -17,7 +17,8 @@ from aerotri.deformation import deform_normal_case, restitution
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.image_errors import ErrorField, field_on_grid
 from aerotri.observations import Block
-from aerotri.pipeline import Adjustment, adjust_keeping_system
+from aerotri.pipeline import adjust_keeping_system
+from aerotri.results.adjustment import Adjustment
 from aerotri.simulation import simulate
 from paper_003_deformation.cases import cases
 from paper_003_deformation.even_odd import EvenOdd, even_against_odd

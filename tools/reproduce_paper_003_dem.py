@@ -60,9 +60,9 @@ from aerotri.deformation.model_map import read_number_table
 from aerotri.deformation.photo_errors import seams_mm
 from aerotri.deformation.restitution import ABSORBED, restitution
 from aerotri.functional_model.additional_parameters import parameter_set, parse_parameters
-from aerotri.rasters import Grid, RasterReader
-from aerotri.report.canvas import WIDTH, axes_at, new_figure, styled
-from aerotri.report.rendering import save_plots
+from aerotri.rasters.grids import Grid, RasterReader
+from aerotri.report.plots.canvas import WIDTH, axes_at, new_figure, styled
+from aerotri.report.plots.rendering import save_plots
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.camera_errors.lens import format_grid
 from aerotri.simulation.rendering import RenderOptions

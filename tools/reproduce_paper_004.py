@@ -42,9 +42,9 @@ from matplotlib.figure import Figure
 
 from aerotri.conventions import mm_from_px
 from aerotri.pipeline import adjust_keeping_system
-from aerotri.rasters_images import create_image
-from aerotri.report.canvas import GREY, INK, WIDTH, axes_at, new_figure, styled
-from aerotri.report.rendering import save_plots
+from aerotri.rasters.images import create_image
+from aerotri.report.plots.canvas import GREY, INK, WIDTH, axes_at, new_figure, styled
+from aerotri.report.plots.rendering import save_plots
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.rendering import RenderOptions, Scene, make_scene, render
 from aerotri.terrain.compare import RasterHeights, compare

@@ -19,7 +19,8 @@ import numpy as np
 
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.observations import Block
-from aerotri.pipeline import Adjustment, adjust_keeping_system
+from aerotri.pipeline import adjust_keeping_system
+from aerotri.results.adjustment import Adjustment
 from aerotri.simulation import Truth, parse_spec, simulate
 from aerotri.volume.accuracy import volume_sigma
 from aerotri.volume.bases import level

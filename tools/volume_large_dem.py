@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.rasters import Grid, RasterReader, RasterWriter, cache_limited
+from aerotri.rasters.grids import Grid, RasterReader, RasterWriter, cache_limited
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import boundary_of_grid
 from aerotri.volume.compute import compute_volumes

@@ -36,8 +36,8 @@ from aerotri.commands.adjust import run_adjust
 from aerotri.commands.dtm import DtmOptions, run_dtm
 from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
 from aerotri.commands.volume import VolumeInput, run_volume
-from aerotri.formats.assemble import Statements
-from aerotri.formats.camera_spec import CameraSpec
+from aerotri.formats.assembly.assemble import Statements
+from aerotri.formats.assembly.camera_spec import CameraSpec
 from aerotri.simulation import parse_spec
 from aerotri.simulation.random_streams import stream
 from aerotri.simulation.terrain import make_terrain

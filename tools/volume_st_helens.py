@@ -20,8 +20,8 @@ import shapely
 from matplotlib.figure import Figure
 from scipy import ndimage
 
-from aerotri.rasters import Grid, RasterReader
-from aerotri.report.plots_volume import ThicknessMap, plot_thickness
+from aerotri.rasters.grids import Grid, RasterReader
+from aerotri.report.plots.volume import ThicknessMap, plot_thickness
 from aerotri.volume.bases import SurfaceBase
 from aerotri.volume.boundary import boundary_of
 from aerotri.volume.compute import SectionPlan, Volumes, compute_volumes

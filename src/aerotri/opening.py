@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.formats.block_folder import read_block
-from aerotri.formats.solution import SavedSolution, read_solution
+from aerotri.formats.block.folder import read_block
+from aerotri.formats.results.solution import SavedSolution, read_solution
 from aerotri.observations import Block
-from aerotri.pipeline import Adjustment, AdjustmentFailedError, reopen
-from aerotri.statistics.adjusted_block import RAY_STATUS
+from aerotri.pipeline import AdjustmentFailedError, reopen
+from aerotri.results.adjusted_block import RAY_STATUS
+from aerotri.results.adjustment import Adjustment
 
 REMEDY = "give the folder that `aerotri adjust` wrote, or adjust the block again"
 SAME_SIGMA0 = 1e-5

@@ -6,7 +6,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,34 +20,32 @@ from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.unknowns import StartValues
 from aerotri.adjustment.weak_geometry import minimise_tied
 from aerotri.conventions import InputError
-from aerotri.coordinates import LocalFrame
-from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block, transform_result
+from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block
 from aerotri.coordinates.metric import outside_in_words
 from aerotri.diagnosis import diagnose, judge
 from aerotri.diagnosis.check_points import in_doubt
-from aerotri.formats.solution import SavedSolution
+from aerotri.diagnosis.common_height import common_height
+from aerotri.diagnosis.doubts import defects_in_words, doubts, failure, refuse_runaway
+from aerotri.formats.results.solution import SavedSolution
 from aerotri.functional_model.additional_parameters import AUTO
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock, Blunder, Outcome
+from aerotri.results.adjusted_block import AdjustedBlock, Blunder, Outcome
+from aerotri.results.adjustment import Adjustment
+from aerotri.results.failure import AdjustmentFailedError
+from aerotri.results.in_crs import transform_result
+from aerotri.results.parameter_comparison import Choice, ParameterComparison
+from aerotri.results.removal import Removal
+from aerotri.results.variance_components import VarianceComponents
 from aerotri.statistics.check_freedom import check_freedom
-from aerotri.statistics.common_height import common_height
-from aerotri.statistics.doubts import AdjustmentFailedError, defects_in_words, doubts, failure, refuse_runaway
-from aerotri.statistics.field_estimation import with_estimated_fields
 from aerotri.statistics.observation_groups import with_scaled_sigmas
-from aerotri.statistics.parameter_choice import candidate_sets, choose
-from aerotri.statistics.parameter_comparison import Choice, ParameterComparison, Progress, compare_sets
-from aerotri.statistics.removal import with_datum_of
-from aerotri.statistics.selection import select, with_findings_of, with_removed, without_parameters
-from aerotri.statistics.significance import Removal
-from aerotri.statistics.snooping import snoop
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
-from aerotri.statistics.variance_components import (
-    Fitted,
-    VarianceComponents,
-    estimate_components,
-    in_words,
-    with_components,
-)
+from aerotri.strategies.field_estimation import with_estimated_fields
+from aerotri.strategies.parameter_choice import candidate_sets, choose
+from aerotri.strategies.parameter_comparison import Progress, compare_sets
+from aerotri.strategies.removal import with_datum_of
+from aerotri.strategies.selection import select, with_findings_of, with_removed, without_parameters
+from aerotri.strategies.snooping import snoop
+from aerotri.strategies.variance_components import Fitted, estimate_components, in_words, with_components
 
 __all__ = ["Adjustment", "AdjustmentFailedError", "adjust", "adjust_keeping_system", "reopen"]
 
@@ -55,25 +53,6 @@ Report = Callable[[int, float, float], None]
 FOLDS = 10
 FRAME_ROUNDS = 2
 """Adjustments after the first one where a coordinate's place in the local frame depends on the adjusted position."""
-
-
-@dataclass(frozen=True, eq=False)
-class Adjustment:
-    """A result together with what it came from, for stages that need covariances beyond σ.
-
-    Parameters
-    ----------
-    result : in the block's CRS. local : the same in the local frame, where `system` and `solution` live.
-    frame : the local frame, None for a block in local coordinates.
-    compared : the sets of additional parameters that were compared where the choice was left to the program.
-    """
-
-    result: AdjustedBlock
-    local: AdjustedBlock
-    system: NormalSystem
-    solution: Solution
-    frame: LocalFrame | None = None
-    compared: ParameterComparison | None = None
 
 
 def adjust(block: Block, report: Report | None = None, given_points: np.ndarray | None = None) -> AdjustedBlock:

@@ -8,7 +8,7 @@ import pytest
 from aerotri.adjustment.start_values import resect, start_values
 from aerotri.adjustment.track import headings, strips_of_track
 from aerotri.conventions import InputError
-from aerotri.formats.solution import read_solution, write_solution
+from aerotri.formats.results.solution import read_solution, write_solution
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Control, Prior
 from aerotri.observations.block import Constraints, Edits
@@ -176,7 +176,7 @@ def test_huber_changes_nothing_on_clean_observations_but_the_tails():
 
 
 def test_reopened_result_equals_the_one_in_memory(tmp_path):
-    from aerotri.formats.block_folder import read_block, write_block
+    from aerotri.formats.block.folder import read_block, write_block
 
     for k, settings in enumerate(({}, {"datum": "inner"}, {"robust": "huber"})):
         block = with_adjustment(small_block(20, "bluh:1-4")[0], **settings)

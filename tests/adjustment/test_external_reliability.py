@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from test_against_dense import TINY, dense_cofactors
 
-from aerotri.formats.reliability_columns import effect_names
+from aerotri.formats.results.reliability_columns import effect_names
 from aerotri.functional_model.rotation import small_rotation_per_angle
 from aerotri.observations import Prior
 from aerotri.observations.block import Constraints

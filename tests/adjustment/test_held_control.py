@@ -13,7 +13,7 @@ from aerotri.commands.adjust import run_adjust
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
-from aerotri.formats.block_folder import read_block, write_block
+from aerotri.formats.block.folder import read_block, write_block
 from aerotri.pipeline import adjust_keeping_system
 from dense_algebra import TINY, dense_design
 from small_blocks import small_block

@@ -7,11 +7,11 @@ import pytest
 
 from aerotri.adjustment.prepare import prepare
 from aerotri.adjustment.robust import LEAST_SQUARES
-from aerotri.formats.result import image_columns, point_columns
+from aerotri.formats.results.adjustment import image_columns, point_columns
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import ImagePoints
 from aerotri.pipeline import adjust
-from aerotri.statistics.adjusted_block import RAY_STATUS
+from aerotri.results.adjusted_block import RAY_STATUS
 from small_blocks import small_block, with_adjustment
 
 

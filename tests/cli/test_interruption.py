@@ -55,7 +55,7 @@ def test_an_interruption_is_one_line(program, number, code):
 
 
 def test_what_was_written_is_said(monkeypatch, tmp_path):
-    from aerotri.formats import work_place
+    from aerotri.formats.files import work_place
 
     monkeypatch.setattr(work_place, "written", [tmp_path / "a", tmp_path / "b"])
     assert interruption.message() == f"aerotri: interrupted, after {tmp_path / 'a'} was written and 1 more"
@@ -72,7 +72,7 @@ def test_what_was_written_is_said(monkeypatch, tmp_path):
     ],
 )
 def test_exit_codes(error, code, said, monkeypatch, capsys):
-    from aerotri.formats import work_place
+    from aerotri.formats.files import work_place
 
     def failing(**_):
         raise error

@@ -106,7 +106,7 @@ def test_numbers_within_a_text_are_refused(command, option, forms, tmp_path):
 def _raster(path):
     import numpy as np
 
-    from aerotri.rasters import Grid, write_raster
+    from aerotri.rasters.grids import Grid, write_raster
 
     write_raster(path, np.ones((8, 8)), Grid(8, 8, 0.0, 8.0, 1.0, 1.0), None, "Z, m")
     return path

@@ -5,7 +5,7 @@ import pytest
 from aerotri.commands.adjust import run_adjust
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
-from aerotri.formats.block_folder import write_block
+from aerotri.formats.block.folder import write_block
 from small_blocks import ERRING, small_block, with_adjustment
 
 

@@ -5,17 +5,17 @@ import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from aerotri.formats.block_folder import write_block
-from aerotri.formats.result import adjustment_json
+from aerotri.formats.block.folder import write_block
+from aerotri.formats.results.adjustment import adjustment_json
+from places import PROJECT
 from small_blocks import small_block
 
-DEMO = Path(__file__).parents[2] / "blocks" / "frederiksstad_ultracam"
+DEMO = PROJECT / "blocks" / "frederiksstad_ultracam"
 
 
 def run(*arguments, cwd=None, env=None):
@@ -186,7 +186,7 @@ def test_help_and_version():
 
 def test_read_only_installation_without_home(block_folder, tmp_path):
     """No writable place for compiled kernels: it runs, uncached, and says so."""
-    package = Path(__file__).parents[2] / "src" / "aerotri"
+    package = PROJECT / "src" / "aerotri"
     site = tmp_path / "site"
     shutil.copytree(package, site / "aerotri", ignore=shutil.ignore_patterns("__pycache__"))
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA", "XDG", "HOME", "PYTHON"))}
@@ -208,7 +208,7 @@ def test_read_only_installation_without_home(block_folder, tmp_path):
 
 
 def test_json_of_the_command_is_that_of_the_package(result_folder):
-    from aerotri.formats.block_folder import read_block
+    from aerotri.formats.block.folder import read_block
     from aerotri.pipeline import adjust
 
     written = json.loads((result_folder / "adjustment.json").read_text(encoding="utf-8"))

@@ -11,7 +11,7 @@ import pytest
 from aerotri.commands.adjust import run_adjust
 from aerotri.commands.compare_parameters import run_compare_parameters
 from aerotri.conventions import InputError
-from aerotri.formats.block_folder import read_block, write_block
+from aerotri.formats.block.folder import read_block, write_block
 from small_blocks import small_block, with_adjustment
 
 SETS = ("none", "bluh:1-4", "dmc")

@@ -17,10 +17,10 @@ import pytest
 import aerotri.commands.convert as convert_module
 from aerotri.commands.convert import camera_spec, run_convert, three_values
 from aerotri.conventions import InputError
-from aerotri.formats.block_folder import read_block, write_block
+from aerotri.formats.assembly.project import Request, read_project
+from aerotri.formats.block.folder import read_block, write_block
 from aerotri.formats.convert import TARGETS, detect_format
-from aerotri.formats.metashape import read_metashape
-from aerotri.formats.project import Request, read_project
+from aerotri.formats.foreign.metashape import read_metashape
 from small_blocks import small_block
 
 SHARED = "../shared/data"

@@ -15,7 +15,7 @@ from aerotri.conventions import InputError
 from aerotri.deformation import absorbed, restitution
 from aerotri.deformation.model_grid import mean_ground, pair_of
 from aerotri.deformation.stereo_model import covariance_of, deform_points
-from aerotri.rasters import Grid, RasterReader, write_raster
+from aerotri.rasters.grids import Grid, RasterReader, write_raster
 
 PAIR = ("2_003", "2_004")
 

@@ -20,7 +20,7 @@ from aerotri.deformation.block_models import block_models, nearest_models, strip
 from aerotri.deformation.model_grid import Places, mean_ground, pair_of
 from aerotri.deformation.orientation import calibrated_orientation
 from aerotri.deformation.stereo_model import covariance_of, deform_points
-from aerotri.rasters import Grid, RasterReader, write_raster
+from aerotri.rasters.grids import Grid, RasterReader, write_raster
 from wrong_dems import Terrain, cells, middle_of, square_grid, write_dem, wrong_heights
 from wrong_dems import beside as next_to
 

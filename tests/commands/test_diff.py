@@ -11,7 +11,7 @@ from test_cli import run
 
 from aerotri.commands.diff import run_diff
 from aerotri.conventions import InputError
-from aerotri.formats.block_folder import write_block
+from aerotri.formats.block.folder import write_block
 from small_blocks import small_block, with_adjustment
 
 

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 
 from aerotri.cli import app
 from aerotri.conventions import InputError
-from aerotri.formats.pickets import read_pickets
-from aerotri.formats.point_cloud import read_point_cloud
-from aerotri.rasters import RasterReader
+from aerotri.formats.results.pickets import read_pickets
+from aerotri.formats.results.point_cloud import read_point_cloud
+from aerotri.rasters.grids import RasterReader
 
 PLAN = """
 name = "tiny"

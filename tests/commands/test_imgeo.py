@@ -17,8 +17,8 @@ import rasterio
 from aerotri.commands.adjust import run_adjust
 from aerotri.commands.imgeo import ImgeoOptions, run_imgeo
 from aerotri.conventions import InputError
-from aerotri.formats.block_folder import read_block, write_block
-from aerotri.formats.solution import read_solution
+from aerotri.formats.block.folder import read_block, write_block
+from aerotri.formats.results.solution import read_solution
 from aerotri.image_errors import image_groups, systematic_errors
 from aerotri.observations import Block
 from aerotri.pipeline import reopen

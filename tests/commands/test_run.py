@@ -9,7 +9,7 @@ import pytest
 from aerotri.cli.run import command_names, invoke
 from aerotri.commands.run import run_all
 from aerotri.conventions import InputError
-from aerotri.formats.block_writer import write_block
+from aerotri.formats.block.writer import write_block
 from small_blocks import small_block
 
 ALL = ("tiepoints", "adjust", "dtm", "volume")

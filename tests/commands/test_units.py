@@ -18,13 +18,13 @@ from aerotri.commands.volume import VolumeInput, run_volume
 from aerotri.conventions import InputError
 from aerotri.coordinates.local_frame import local_frame
 from aerotri.coordinates.metric import in_metres, outside_in_words
-from aerotri.formats.block_folder import read_block, write_block
-from aerotri.formats.breaklines import breaklines_and_note
+from aerotri.formats.block.folder import read_block, write_block
+from aerotri.formats.foreign.breaklines import breaklines_and_note
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.pipeline import adjust, adjust_keeping_system
-from aerotri.polygons import polygon_features
-from aerotri.rasters import Grid, RasterReader, write_raster
-from aerotri.rasters_metric import MetricReader, refuse_other_units, units_of
+from aerotri.rasters.grids import Grid, RasterReader, write_raster
+from aerotri.rasters.metric import MetricReader, refuse_other_units, units_of
+from aerotri.vectors.polygons import polygon_features
 from aerotri.volume.boundary import read_boundary
 from aerotri.volume.compute import SectionPlan
 from aerotri.volume.parts import SigmaOptions

@@ -13,8 +13,8 @@ import shapely
 from aerotri.commands.adjust import run_adjust
 from aerotri.commands.volume import VolumeInput, run_volume
 from aerotri.conventions import InputError
-from aerotri.formats.block_folder import write_block
-from aerotri.rasters import Grid, RasterReader, write_raster
+from aerotri.formats.block.folder import write_block
+from aerotri.rasters.grids import Grid, RasterReader, write_raster
 from aerotri.volume.accuracy import PARTS
 from aerotri.volume.compute import SectionPlan
 from aerotri.volume.parts import SigmaOptions

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from aerotri.formats.block_folder import write_block
+from aerotri.formats.block.folder import write_block
 from small_blocks import small_block
 
 

@@ -12,12 +12,12 @@ from aerotri.crosscheck.outcome_json import crosscheck_json
 from aerotri.crosscheck.paper_block import paper_block
 from aerotri.crosscheck.paper_check import check_with_paper
 from aerotri.crosscheck.paper_system import solve_normal_equations
-from aerotri.formats.dbat import read_dbat
+from aerotri.formats.foreign.dbat import read_dbat
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Prior
 from aerotri.observations.block import Edits
 from aerotri.pipeline import adjust, adjust_keeping_system
-from aerotri.report.plots_crosscheck import crosscheck_table, plot_crosscheck
+from aerotri.report.plots.crosscheck import crosscheck_table, plot_crosscheck
 from small_blocks import small_block, with_adjustment
 
 ALL = "bluh:1-12,ultracam_d:42-73"

@@ -14,7 +14,7 @@ from aerotri.deformation.restitution import restitution
 from aerotri.deformation.stereo_model import covariance_of, deform_points, intersect, measured
 from aerotri.functional_model.rotation import logarithm
 from aerotri.pipeline import adjust_keeping_system
-from aerotri.statistics.adjusted_block import RAY_STATUS
+from aerotri.results.adjusted_block import RAY_STATUS
 from small_blocks import small_block, with_adjustment
 
 DRAWS = {"free": 200, "absorbed": 30}

@@ -13,7 +13,7 @@ from aerotri.deformation.model_grid import mean_ground, pair_of
 from aerotri.deformation.model_map import NumberMap, OneModel
 from aerotri.deformation.restitution import restitution
 from aerotri.deformation.stereo_model import deform_points, seen_by_both
-from aerotri.rasters import Grid, RasterReader, RasterWriter
+from aerotri.rasters.grids import Grid, RasterReader, RasterWriter
 from wrong_dems import SLOPE, Terrain, beside, cells, middle_of, square_grid, write_dem, wrong_heights
 
 TOLERANCE_M = 1e-3

@@ -10,7 +10,7 @@ import pytest
 from aerotri.conventions import InputError
 from aerotri.deformation.model_map import number_map, read_number_table, read_polygons
 from aerotri.deformation.seam_steps import added_steps, window_steps
-from aerotri.rasters import Grid, RasterReader, RasterWriter, write_raster
+from aerotri.rasters.grids import Grid, RasterReader, RasterWriter, write_raster
 
 GRID = Grid(12, 10, 100.0, 220.0, 2.0, 2.0)
 LEFT_HALF = [[100.0, 196.0], [109.9, 196.0], [109.9, 220.0], [100.0, 220.0], [100.0, 196.0]]

@@ -14,7 +14,7 @@ from aerotri.diagnosis.evidence import fit, gather
 from aerotri.diagnosis.free_model import connected_parts, free_model
 from aerotri.diagnosis.placement import lay_on
 from aerotri.diagnosis.sampling import MOST_PHOTOGRAPHS, MOST_RAYS, sampled
-from aerotri.formats.block_folder import write_block
+from aerotri.formats.block.folder import write_block
 from aerotri.functional_model.rotation import exponential
 from aerotri.pipeline import adjust
 from small_blocks import small_block

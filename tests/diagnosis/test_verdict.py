@@ -14,10 +14,10 @@ from aerotri.commands.diff import run_diff
 from aerotri.diagnosis import findings, judge
 from aerotri.diagnosis.finding import SIGNIFICANCE
 from aerotri.diagnosis.verdict import RULES
-from aerotri.formats.block_folder import write_block
+from aerotri.formats.block.folder import write_block
 from aerotri.pipeline import AdjustmentFailedError, adjust, adjust_keeping_system
-from aerotri.report.html import report_html
-from aerotri.statistics.adjusted_block import Outcome
+from aerotri.report.pages.adjustment import report_html
+from aerotri.results.adjusted_block import Outcome
 from small_blocks import small_block
 from ten_photographs import (
     ten_photographs,

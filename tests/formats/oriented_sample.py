@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerotri.formats.oriented import OrientedBlock, oriented_block
+from aerotri.formats.assembly.oriented import OrientedBlock, oriented_block
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block, Camera, Control, GnssIns, ImagePoints, Images, Prior, Settings
 

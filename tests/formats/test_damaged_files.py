@@ -10,30 +10,30 @@ import pytest
 from format_samples import FILM_TOML, SMALL, damaged
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from test_bingo import SMALL as BINGO
-from test_block_extras import CONSTRAINTS, EDITS, MARKS, PIXELS
-from test_bundler import BUNDLE
-from test_ign import APP, CAMERA, MES, OPK
-from test_opensfm import CONTENT, TRACKS
-from test_orientation_lists import EO, NAMED, PLAIN, YAML, rows
-from test_patb import CON, IM, ORI
-from test_point_lists import GCP, GEO, NATIVE, ODM_GCP, ODM_GEO, POSITIONS_LIST
-from test_project import CAMERAS_TOML
 
 from aerotri.conventions import InputError
-from aerotri.formats.bingo import is_bingo, read_bingo
-from aerotri.formats.block_folder import read_block
-from aerotri.formats.block_settings import read_cameras_toml
-from aerotri.formats.bundler import is_bundler, read_bundler
-from aerotri.formats.ign import read_ign_app, read_ign_camera, read_ign_mes, read_ign_opk
-from aerotri.formats.kinds import CONTROL, ORIENTATIONS, POSITIONS, RAYS, kind_of
-from aerotri.formats.metashape import read_metashape
-from aerotri.formats.named_lists import read_control_list, read_named_orientations, read_positions
-from aerotri.formats.odm import read_odm_gcp, read_odm_geo
-from aerotri.formats.opensfm import read_opensfm
-from aerotri.formats.orientation_list import read_orientation_list, read_ortho_camera
-from aerotri.formats.patb import read_patb_con, read_patb_im, read_patb_ori
-from aerotri.formats.pix4d import read_pix4d_eo, read_pix4d_gcp, read_pix4d_geo, read_pix4d_offset
+from aerotri.formats.assembly.kinds import CONTROL, ORIENTATIONS, POSITIONS, RAYS, kind_of
+from aerotri.formats.block.folder import read_block
+from aerotri.formats.block.settings import read_cameras_toml
+from aerotri.formats.foreign.bingo import is_bingo, read_bingo
+from aerotri.formats.foreign.bundler import is_bundler, read_bundler
+from aerotri.formats.foreign.ign import read_ign_app, read_ign_camera, read_ign_mes, read_ign_opk
+from aerotri.formats.foreign.metashape import read_metashape
+from aerotri.formats.foreign.named_lists import read_control_list, read_named_orientations, read_positions
+from aerotri.formats.foreign.odm import read_odm_gcp, read_odm_geo
+from aerotri.formats.foreign.opensfm import read_opensfm
+from aerotri.formats.foreign.orientation_list import read_orientation_list, read_ortho_camera
+from aerotri.formats.foreign.patb import read_patb_con, read_patb_im, read_patb_ori
+from aerotri.formats.foreign.pix4d import read_pix4d_eo, read_pix4d_gcp, read_pix4d_geo, read_pix4d_offset
+from formats.assembly.test_project import CAMERAS_TOML
+from formats.block.test_block_extras import CONSTRAINTS, EDITS, MARKS, PIXELS
+from formats.foreign.test_bingo import SMALL as BINGO
+from formats.foreign.test_bundler import BUNDLE
+from formats.foreign.test_ign import APP, CAMERA, MES, OPK
+from formats.foreign.test_opensfm import CONTENT, TRACKS
+from formats.foreign.test_orientation_lists import EO, NAMED, PLAIN, YAML, rows
+from formats.foreign.test_patb import CON, IM, ORI
+from formats.foreign.test_point_lists import GCP, GEO, NATIVE, ODM_GCP, ODM_GEO, POSITIONS_LIST
 
 QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
 READERS = {

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from places import PROJECT
+
+ROOT = PROJECT
 INPUTS = 300
 SEED = 20
 

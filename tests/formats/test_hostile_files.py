@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from aerotri.conventions import InputError
-from aerotri.formats.npz import Archive
-from aerotri.formats.text_lines import is_number
-from aerotri.formats.toml_text import read_toml
-from aerotri.formats.xml_text import read_xml
-from aerotri.geojson import read_geojson
-from aerotri.geopackage import read_geopackage
+from aerotri.formats.files.npz import Archive
+from aerotri.formats.text.text_lines import is_number
+from aerotri.formats.text.toml_text import read_toml
+from aerotri.formats.text.xml_text import read_xml
+from aerotri.vectors.geojson import read_geojson
+from aerotri.vectors.geopackage import read_geopackage
 
 DOCTYPE = '<?xml version="1.0" encoding="{}"?><!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'
 

@@ -17,7 +17,7 @@ from aerotri.image_errors import (
 )
 from aerotri.image_errors.field import significant
 from aerotri.observations import Prior
-from aerotri.statistics.adjusted_block import SharedParameters
+from aerotri.results.adjusted_block import SharedParameters
 from synthetic import make_adjusted_block, ultracam
 
 X = np.array([-40.0, -3.0, 12.5, 40.0, 25.0])

@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 from aerotri.cli import app
 from aerotri.conventions import InputError
-from aerotri.formats.block_folder import read_block, write_block
-from aerotri.formats.point_cloud import write_point_cloud
+from aerotri.formats.block.folder import read_block, write_block
+from aerotri.formats.results.point_cloud import write_point_cloud
 from aerotri.pipeline import adjust
 from small_blocks import ERRING, small_block
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from transformations import both, by_names, largest_difference, numbers_of, permuted, renamed, same, with_names
 
-from aerotri.formats.assemble import Statements
-from aerotri.formats.bingo import write_bingo
-from aerotri.formats.block_folder import write_block
-from aerotri.formats.camera_spec import CameraSpec
+from aerotri.formats.assembly.assemble import Statements
+from aerotri.formats.assembly.camera_spec import CameraSpec
+from aerotri.formats.assembly.oriented import oriented_block
+from aerotri.formats.assembly.project import Request, read_project
+from aerotri.formats.block.folder import write_block
 from aerotri.formats.convert import read_any, write_any, write_oriented
-from aerotri.formats.metashape import write_metashape
-from aerotri.formats.oriented import oriented_block
-from aerotri.formats.pix4d import write_pix4d_gcp, write_pix4d_geo
-from aerotri.formats.project import Request, read_project
+from aerotri.formats.foreign.bingo import write_bingo
+from aerotri.formats.foreign.metashape import write_metashape
+from aerotri.formats.foreign.pix4d import write_pix4d_gcp, write_pix4d_geo
 from aerotri.pipeline import adjust
 from small_blocks import small_block
 

@@ -18,10 +18,10 @@ from aerotri.commands.adjust import run_adjust
 from aerotri.commands.demcor import beside, run_demcor
 from aerotri.commands.dtm import DtmOptions, run_dtm
 from aerotri.commands.volume import VolumeInput, run_volume
-from aerotri.formats.block_folder import read_block, write_block
-from aerotri.formats.pickets import read_pickets
+from aerotri.formats.block.folder import read_block, write_block
+from aerotri.formats.results.pickets import read_pickets
 from aerotri.pipeline import adjust
-from aerotri.rasters import Grid, RasterReader, write_raster
+from aerotri.rasters.grids import Grid, RasterReader, write_raster
 from aerotri.volume.compute import SectionPlan
 from aerotri.volume.parts import SigmaOptions
 from small_blocks import ERRING, small_block

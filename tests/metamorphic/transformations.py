@@ -14,7 +14,7 @@ import numpy as np
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Block, Control, GnssIns, ImagePoints, Images
 from aerotri.observations.block import Constraints, Edits
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import pytest
 
 from aerotri.commands.adjust import run_adjust
 from aerotri.conventions import InputError
-from aerotri.formats.block_folder import read_block, write_block
+from aerotri.formats.block.folder import read_block, write_block
 from aerotri.observations.block import Edits
 from aerotri.observations.names import in_words, near_names, partnerless_in_words, prefix_of, with_control_prefix
 from aerotri.pipeline import AdjustmentFailedError, adjust

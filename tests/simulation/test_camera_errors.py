@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import scipy.linalg
@@ -17,8 +15,9 @@ from aerotri.simulation.camera_errors import dmc, rms_mm, ultracam_d
 from aerotri.simulation.camera_errors.lens import random_lens
 from aerotri.simulation.cameras import block_camera
 from aerotri.simulation.spec import CameraSpec
+from places import PROJECT
 
-BLOCKS = Path(__file__).parents[2] / "blocks"
+BLOCKS = PROJECT / "blocks"
 SEAMS_X = np.array([3877 - 5750, 7623 - 5750]) * 0.009
 SEAMS_Y = np.array([3750 - 2543, 3750 - 4957]) * 0.009
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import csv
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from aerotri.conventions import InputError
 from aerotri.simulation import read_spec, simulate, write_simulated, write_truth
+from places import PROJECT
 
-BLOCKS = Path(__file__).parents[2] / "blocks"
+BLOCKS = PROJECT / "blocks"
 EVERYTHING = {
     "camera": {
         "cam": {
@@ -135,7 +135,7 @@ def test_truth_is_written(small_spec, tmp_path):
 
 
 def test_a_block_is_written_with_its_truth_and_read_again(small_spec, tmp_path):
-    block_folder = pytest.importorskip("aerotri.formats.block_folder")
+    block_folder = pytest.importorskip("aerotri.formats.block.folder")
     block, truth = simulate(small_spec(**EVERYTHING), 1)
     (tmp_path / "small" / "truth").mkdir(parents=True)
     (tmp_path / "small" / "simulation.toml").write_text("# the spec")

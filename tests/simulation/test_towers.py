@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from aerotri.conventions import InputError
-from aerotri.formats.block_folder import read_block, write_block
+from aerotri.formats.block.folder import read_block, write_block
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.simulation import simulate
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from aerotri.formats.reliability_columns import effect_names
+from aerotri.formats.results.reliability_columns import effect_names
 from aerotri.pipeline import adjust
 from aerotri.statistics.reliability import (
     control_reliability,

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.observations import Block
-from aerotri.pipeline import Adjustment, adjust_keeping_system
-from aerotri.rasters_images import create_image
+from aerotri.pipeline import adjust_keeping_system
+from aerotri.rasters.images import create_image
+from aerotri.results.adjustment import Adjustment
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.rendering import RenderOptions, Scene, make_scene, render
 from aerotri.terrain.photographs import Photographs, photographs_of

@@ -7,7 +7,7 @@ import pytest
 from rendered_blocks import Rendered, rendered_block, write_photograph
 from scipy.ndimage import gaussian_filter
 
-from aerotri.rasters_images import open_photograph
+from aerotri.rasters.images import open_photograph
 from aerotri.simulation.rendering import RenderOptions
 from aerotri.terrain.error_pickets import with_error_pickets
 from aerotri.terrain.matching import measure

@@ -7,7 +7,7 @@ import pytest
 from rendered_blocks import Rendered, write_photograph
 
 from aerotri.conventions import InputError
-from aerotri.rasters_images import open_photograph
+from aerotri.rasters.images import open_photograph
 from aerotri.terrain.dtm import TerrainPlan, chosen_rows, make_terrain_model, models_of
 from aerotri.terrain.error_pickets import with_error_pickets
 from aerotri.terrain.matching import measure, steps_aside

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from aerotri.conventions import InputError
-from aerotri.formats.breaklines import read_breaklines
-from aerotri.rasters import Grid
+from aerotri.formats.foreign.breaklines import read_breaklines
+from aerotri.rasters.grids import Grid
 from aerotri.terrain.surface import (
     errors_by_interval,
     grid_over,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from aerotri.rasters_images import create_image
+from aerotri.rasters.images import create_image
 from aerotri.tie_points.features import FeatureOptions, features_of, find_features, grey_8bit
 from aerotri.tie_points.matching import mutual_matches, neighbours
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aerotri.conventions import InputError, px_from_mm
-from aerotri.formats.parts import PointList, no_sigma
+from aerotri.formats.assembly.parts import PointList, no_sigma
 from aerotri.functional_model.rotation import exponential, rotation_from_angles
 from aerotri.observations import ImagePoints, Prior
 from aerotri.simulation import parse_spec, simulate

@@ -17,11 +17,11 @@ from aerotri.commands.console import Console
 from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
 from aerotri.conventions import InputError, px_from_mm
 from aerotri.coordinates import local_frame
-from aerotri.formats.assemble import Statements
-from aerotri.formats.block_folder import read_block
-from aerotri.formats.camera_spec import CameraSpec
-from aerotri.formats.photograph_files import match_files
-from aerotri.rasters_images import create_image
+from aerotri.formats.assembly.assemble import Statements
+from aerotri.formats.assembly.camera_spec import CameraSpec
+from aerotri.formats.block.folder import read_block
+from aerotri.formats.files.photograph_files import match_files
+from aerotri.rasters.images import create_image
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.rendering import RenderOptions, make_scene, render
 
@@ -196,7 +196,7 @@ def test_subfolders_blanks_and_a_list_without_crs(files, tmp_path):
     from aerotri.commands.dtm import DtmOptions, make_plan
     from aerotri.commands.imgeo import ImgeoOptions, run_imgeo
     from aerotri.commands.results import reopened
-    from aerotri.formats.photograph_files import files_of
+    from aerotri.formats.files.photograph_files import files_of
 
     folder, photographs = tmp_path / "flight", sorted((files[0] / "photographs").iterdir())
     called = {}
@@ -252,7 +252,7 @@ def photographs_of_exif():
 @pytest.mark.parametrize(("shift", "crs"), [(0.0, "EPSG:32632"), (3e6, "local")])
 def test_control_without_crs_keeps_positions(shift, crs, tmp_path):
     """EXIF is WGS 84: control near the photographs in their UTM zone is in it; what lies elsewhere is not."""
-    from aerotri.formats.pix4d import read_pix4d_gcp
+    from aerotri.formats.foreign.pix4d import read_pix4d_gcp
     from aerotri.tie_points.given import Given, crs_of, positions_in
 
     (tmp_path / "gcp.csv").write_text(f"P1,{500010.0 + shift},5316600,450\nP2,{500050.0 + shift},5316700,451\n")

@@ -10,10 +10,10 @@ import pytest
 import rasterio
 
 from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
-from aerotri.formats.assemble import Statements
-from aerotri.formats.block_folder import read_block
-from aerotri.formats.camera_spec import CameraSpec
-from aerotri.formats.reprojection import residuals_at_start
+from aerotri.formats.assembly.assemble import Statements
+from aerotri.formats.assembly.camera_spec import CameraSpec
+from aerotri.formats.assembly.reprojection import residuals_at_start
+from aerotri.formats.block.folder import read_block
 from aerotri.pipeline import adjust
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ import shapely
 from scipy.spatial import KDTree
 from scipy.stats import chi2
 
-from aerotri.rasters import Grid
+from aerotri.rasters.grids import Grid
 from aerotri.volume.accuracy import boundary_variance
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import boundary_of
@@ -24,6 +23,7 @@ from aerotri.volume.roughness import (
     roughness_of_pickets,
 )
 from aerotri.volume.triangles import areas, cut_to
+from places import PROJECT
 
 RUNS = 10
 
@@ -32,7 +32,7 @@ RUNS = 10
 def proof():
     """The modules of the tool."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(Path(__file__).parents[2] / "tools"))
+        patch.syspath_prepend(str(PROJECT / "tools"))
         yield importlib.import_module("volume_proof.simulated")
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from aerotri.rasters import Grid, RasterReader, write_raster
+from aerotri.rasters.grids import Grid, RasterReader, write_raster
 from aerotri.volume.bases import PlaneBase, SurfaceBase, level, plane_through, spline_through
 from aerotri.volume.boundary import Boundary, boundary_of, boundary_of_grid
 from aerotri.volume.sections import RULES, cross_sections, section_volume

@@ -18,6 +18,7 @@ from aerotri.volume.parts import Measured, Part, SigmaOptions, part_of_pickets
 from aerotri.volume.pickets import pickets_where_seen
 from aerotri.volume.response import respond
 from aerotri.volume.shared import adjustment_key, difference_part, same_adjustment
+from places import PROJECT
 
 RUNS = 12
 
@@ -26,10 +27,9 @@ RUNS = 12
 def proof():
     """The modules of the tool."""
     import importlib
-    from pathlib import Path
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(Path(__file__).parents[2] / "tools"))
+        patch.syspath_prepend(str(PROJECT / "tools"))
         yield importlib.import_module("volume_proof.simulated")
 
 

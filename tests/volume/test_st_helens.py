@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import importlib
-from pathlib import Path
 
 import pytest
+
+from places import PROJECT
 
 
 @pytest.fixture(scope="module")
 def tool():
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(Path(__file__).parents[2] / "tools"))
+        patch.syspath_prepend(str(PROJECT / "tools"))
         yield importlib.import_module("volume_st_helens")
 
 

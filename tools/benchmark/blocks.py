@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.crosscheck.start import intersect
-from aerotri.formats.colmap import write_colmap
-from aerotri.formats.oriented import OrientedBlock
+from aerotri.formats.assembly.oriented import OrientedBlock
+from aerotri.formats.foreign.colmap import write_colmap
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block
 from aerotri.simulation import parse_spec, simulate

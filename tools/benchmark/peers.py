@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.formats.colmap import point_numbers
+from aerotri.formats.foreign.colmap import point_numbers
 from aerotri.observations import Block
 from benchmark.blocks import load_block
 from benchmark.child import Memory, Timer

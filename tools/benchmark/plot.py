@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from aerotri.report.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, styled
+from aerotri.report.plots.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, styled
 from benchmark.measure import OURS, OURS_44, PROGRAMS
 from benchmark.summary import Row, growth
 

@@ -108,7 +108,7 @@ CASES = (
 """Every folder of the corpus, once."""
 READERS = {
     "models": "from aerotri.deformation.model_map import read_polygons as read",
-    "breaklines": "from aerotri.formats.breaklines import read_breaklines as read",
+    "breaklines": "from aerotri.formats.foreign.breaklines import read_breaklines as read",
 }
 
 

@@ -29,7 +29,7 @@ def _single(name: str, content: bytes, file: str, call: Callable[[Path], object]
 
 def _lists(written: dict[str, dict[str, bytes]]) -> list[Target]:
     """Lists of one file, by the kinds of `aerotri convert`; recognised and read."""
-    from aerotri.formats import kinds
+    from aerotri.formats.assembly import kinds
 
     options = kinds.ReadingOptions()
     lists, extra = seeds.of_tests("test_point_lists"), seeds.of_tests("test_orientation_lists")
@@ -62,7 +62,7 @@ def _lists(written: dict[str, dict[str, bytes]]) -> list[Target]:
 
 
 def _recognised(known, read, options) -> Callable[[Path], object]:
-    from aerotri.formats import kinds
+    from aerotri.formats.assembly import kinds
 
     def call(path: Path) -> object:
         kinds.kind_of(path, known)
@@ -73,9 +73,9 @@ def _recognised(known, read, options) -> Callable[[Path], object]:
 
 def _projects(written: dict[str, dict[str, bytes]]) -> list[Target]:
     """Whole blocks of other programs, and blocks of several files."""
-    from aerotri.formats.assemble import Statements
-    from aerotri.formats.camera_spec import CameraSpec
-    from aerotri.formats.project import Request, read_project
+    from aerotri.formats.assembly.assemble import Statements
+    from aerotri.formats.assembly.camera_spec import CameraSpec
+    from aerotri.formats.assembly.project import Request, read_project
 
     targets = []
     for kind in ("bal", "colmap", "colmap-text", "bundler", "opensfm"):
@@ -112,9 +112,9 @@ def _projects(written: dict[str, dict[str, bytes]]) -> list[Target]:
 
 def _several(written: dict[str, dict[str, bytes]], positions: str, control: str) -> Target:
     """Image points, orientations, positions, control and camera from a file each."""
-    from aerotri.formats.assemble import Statements
-    from aerotri.formats.camera_spec import CameraSpec
-    from aerotri.formats.project import Request, read_project
+    from aerotri.formats.assembly.assemble import Statements
+    from aerotri.formats.assembly.camera_spec import CameraSpec
+    from aerotri.formats.assembly.project import Request, read_project
 
     files = {"rays.txt": written["bingo"]["x"], "eo.txt": written["pix4d-eo"]["x"], "camera.toml": CAMERA,
              "positions.txt": written[positions]["x"], "control.txt": written[control]["x"]}  # fmt: skip
@@ -139,7 +139,7 @@ def _detected(path: Path) -> None:
 
 
 def _blocks() -> list[Target]:
-    from aerotri.formats.block_folder import read_block
+    from aerotri.formats.block.folder import read_block
 
     targets = []
     for name, files in (("block", seeds.block_folder("csv")), ("block, film", seeds.film_folder()),
@@ -165,9 +165,9 @@ def _results() -> list[Target]:
 def _surfaces() -> list[Target]:
     """Rasters, point clouds, pickets; as `compare`, `volume` and `demcor` open them."""
     from aerotri.deformation.model_map import read_number_table
-    from aerotri.formats.pickets import read_pickets
-    from aerotri.formats.point_cloud import read_point_cloud, refuse_cloud_units
-    from aerotri.rasters import RasterReader
+    from aerotri.formats.results.pickets import read_pickets
+    from aerotri.formats.results.point_cloud import read_point_cloud, refuse_cloud_units
+    from aerotri.rasters.grids import RasterReader
 
     def window(path: Path) -> object:
         with RasterReader(path) as reader:
@@ -192,8 +192,8 @@ def _surfaces() -> list[Target]:
 
 
 def _photographs() -> list[Target]:
-    from aerotri.formats.exif import read_exif
-    from aerotri.rasters_images import open_photograph
+    from aerotri.formats.foreign.exif import read_exif
+    from aerotri.rasters.images import open_photograph
 
     def pixels(path: Path) -> object:
         with open_photograph(path) as one:
@@ -210,7 +210,7 @@ def _photographs() -> list[Target]:
 
 def _vectors() -> list[Target]:
     from aerotri.deformation.model_map import read_polygons
-    from aerotri.formats.breaklines import read_breaklines
+    from aerotri.formats.foreign.breaklines import read_breaklines
     from aerotri.volume.boundary import read_boundary
 
     wkt = f"SRID=25832;POLYGON (({', '.join(f'{x} {y}' for x, y in seeds.POLYGON[0])}))".encode()
@@ -229,10 +229,10 @@ def _vectors() -> list[Target]:
 
 
 def _settings() -> list[Target]:
-    from aerotri.formats.block_settings import read_cameras_toml
-    from aerotri.formats.ign import read_ign_camera
-    from aerotri.formats.orientation_list import read_ortho_camera
-    from aerotri.formats.pix4d import read_pix4d_offset
+    from aerotri.formats.block.settings import read_cameras_toml
+    from aerotri.formats.foreign.ign import read_ign_camera
+    from aerotri.formats.foreign.orientation_list import read_ortho_camera
+    from aerotri.formats.foreign.pix4d import read_pix4d_offset
     from aerotri.simulation.reading import read_spec
 
     spec = (seeds.ROOT / "blocks" / "frederiksstad_ultracam" / "simulation.toml").read_bytes()

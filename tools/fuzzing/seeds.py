@@ -56,7 +56,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def block_folder(tables: str) -> dict[str, bytes]:
     """A block with everything a folder may hold, but scanned film."""
-    from aerotri.formats.block_folder import read_block, write_block
+    from aerotri.formats.block.folder import read_block, write_block
 
     samples, extras = of_tests("format_samples"), of_tests("test_block_extras")
     files = samples.SMALL | {
@@ -83,7 +83,7 @@ def film_folder() -> dict[str, bytes]:
 def result_folder(parameters: str) -> dict[str, bytes]:
     """What an adjustment leaves of a small block: solution.npz and the block."""
     from aerotri.commands.adjust import run_adjust
-    from aerotri.formats.block_folder import write_block
+    from aerotri.formats.block.folder import write_block
 
     small = of_tests("small_blocks")
     changes = {"flight": small.small_spec()["flight"] | {"strips": 2, "images_per_strip": 4, "cross_strips": []}}
@@ -196,7 +196,7 @@ def picket_table() -> bytes:
     import pyarrow as pa
     from pyarrow import parquet
 
-    from aerotri.formats.pickets import NUMBERS
+    from aerotri.formats.results.pickets import NUMBERS
 
     rng = np.random.default_rng(1)
     columns: dict[str, Any] = {name: pa.array(rng.uniform(0.1, 50.0, 40)) for name in NUMBERS}

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from scipy.stats import chi2
 
-from aerotri.report.plots_panels import Panel, plot_panels
+from aerotri.report.plots.panels import Panel, plot_panels
 from aerotri.simulation import SimulationSpec
 from paper_003.cases import PRINTED, Case
 from paper_003.runs import Days, Row, true_field

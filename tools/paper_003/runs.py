@@ -20,8 +20,8 @@ from aerotri.image_errors import (
 )
 from aerotri.observations import Block
 from aerotri.pipeline import adjust
+from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.simulation import SimulationSpec, Truth, parse_spec, simulate, true_image_errors
-from aerotri.statistics.adjusted_block import AdjustedBlock
 from paper_003.cases import Case
 
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from aerotri.deformation import restitution
 from aerotri.deformation.dem_window import dem_models
-from aerotri.deformation.orientation import Calibration, Orientation, calibrated_orientation
+from aerotri.deformation.orientation import Orientation, calibrated_orientation
 from aerotri.deformation.stereo_model import intersect, project
 from aerotri.functional_model.rotation import rotation_from_angles
+from aerotri.results.adjustment import Adjustment
 from aerotri.simulation import SimulationSpec, Truth
 from aerotri.simulation.projection import measured_positions
 from aerotri.simulation.rendering import make_scene
@@ -35,7 +36,7 @@ class EvenOdd:
 
 
 def even_against_odd(
-    calibrated: Calibration, plain: Calibration, spec: SimulationSpec, seed: int, truth: Truth
+    calibrated: Adjustment, plain: Adjustment, spec: SimulationSpec, seed: int, truth: Truth
 ) -> EvenOdd:
     """Compare the two DEMs over all fours of photographs that follow one another in a strip."""
     block = calibrated.local.block

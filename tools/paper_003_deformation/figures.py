@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from aerotri.deformation import Deformation
 from aerotri.deformation.outcome_json import contour_interval
 from aerotri.image_errors import ErrorField
-from aerotri.report.canvas import (
+from aerotri.report.plots.camera import seams
+from aerotri.report.plots.canvas import (
     GREY,
     INK,
     axes_at,
@@ -23,8 +24,7 @@ from aerotri.report.canvas import (
     styled,
     vectors,
 )
-from aerotri.report.plots_camera import seams
-from aerotri.report.plots_deformation import contour_symbols, draw_contours, panel_size
+from aerotri.report.plots.deformation import contour_symbols, draw_contours, panel_size
 
 PANEL, GAP, ABOVE = 4.6, 0.95, 0.62
 MOST_LINES = 45

@@ -17,7 +17,8 @@ from aerotri.functional_model.collinearity import linearise, predict
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.image_errors import image_groups
 from aerotri.image_errors.error_function import ErrorFunction, error_function
-from aerotri.pipeline import Adjustment, adjust_keeping_system
+from aerotri.pipeline import adjust_keeping_system
+from aerotri.results.adjustment import Adjustment
 from aerotri.simulation import Truth, parse_spec, simulate
 from aerotri.volume.accuracy import PARTS, boundary_variance
 from aerotri.volume.bases import level

@@ -102,8 +102,8 @@ def convert(
 ) -> None:
     """Convert between formats, or make a block of several files; adjusts first where the target needs it."""
     from aerotri.commands.convert import camera_spec, run_convert
-    from aerotri.formats.assemble import Statements
-    from aerotri.formats.project import Request
+    from aerotri.formats.assembly.assemble import Statements
+    from aerotri.formats.assembly.project import Request
 
     request = Request(
         source=source,
@@ -164,8 +164,8 @@ def tiepoints(
 ) -> None:
     """From photographs to a block: tie points, first orientation, control."""
     from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
-    from aerotri.formats.assemble import Statements
-    from aerotri.formats.camera_spec import CameraSpec
+    from aerotri.formats.assembly.assemble import Statements
+    from aerotri.formats.assembly.camera_spec import CameraSpec
 
     stated = Statements(
         crs=crs,

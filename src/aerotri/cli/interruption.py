@@ -49,7 +49,7 @@ def was_interrupted() -> bool:
 
 def message() -> str:
     """The line for the user: what was brought to its place before, if anything was."""
-    places = getattr(sys.modules.get("aerotri.formats.work_place"), "written", [])
+    places = getattr(sys.modules.get("aerotri.formats.files.work_place"), "written", [])
     if not places:
         return "aerotri: interrupted, nothing was written"
     return f"aerotri: interrupted, after {places[0]} was written" + (f" and {len(places) - 1} more" * (len(places) > 1))
@@ -69,7 +69,7 @@ def _unwind(number: int, frame: FrameType | None) -> None:
 
 def _end_now(number: int, frame: FrameType | None) -> NoReturn:
     _state["signal"] = number
-    work_place = sys.modules.get("aerotri.formats.work_place")
+    work_place = sys.modules.get("aerotri.formats.files.work_place")
     if work_place is not None and hasattr(work_place, "abandon"):
         work_place.abandon()
     try:

@@ -12,8 +12,8 @@ from aerotri.commands.console import Console
 from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
-    from aerotri.statistics.adjusted_block import AdjustedBlock, Outcome
-    from aerotri.statistics.free_verdict import FreeCheck
+    from aerotri.results.adjusted_block import AdjustedBlock, Outcome
+    from aerotri.strategies.free_stages import FreeCheck
 
 
 def run_adjust(
@@ -31,7 +31,7 @@ def run_adjust(
     console = Console(quiet=as_json)
     begun = time.perf_counter()
     from aerotri.coordinates.metric import in_metres
-    from aerotri.formats.block_folder import read_block
+    from aerotri.formats.block.folder import read_block
     from aerotri.observations.names import with_control_prefix
     from aerotri.public.checking import free_check, refuse_free_datum
 
@@ -54,7 +54,7 @@ def run_adjust(
     try:
         found = adjust(block, parameters=parameters, robust=robust, geoid=geoid, progress=console.stage)
     except AdjustmentFailedError as failure:
-        from aerotri.formats.result import outcome_json
+        from aerotri.formats.results.adjustment import outcome_json
 
         console.failure("\n  ".join([str(failure), *_causes(failure.outcome)]))
         if check_free:
@@ -78,7 +78,7 @@ def _causes(outcome: Outcome) -> list[str]:
 
 
 def _tell_free(checked: FreeCheck, as_json: bool, console: Console) -> None:
-    from aerotri.report.work_tables import free_check_lines
+    from aerotri.report.tables.work import free_check_lines
 
     if not as_json:
         console.lines(free_check_lines(checked))
@@ -94,11 +94,11 @@ def _tell(
     result: AdjustedBlock, target: Path, console: Console, as_json: bool, checked: FreeCheck | None = None
 ) -> None:
     if as_json:
-        from aerotri.formats.result import adjustment_json
+        from aerotri.formats.results.adjustment import adjustment_json
 
         print(json.dumps(adjustment_json(result), indent=2, ensure_ascii=False))
         return
-    from aerotri.report.tables import summary_lines
+    from aerotri.report.tables.adjustment import summary_lines
 
     console.lines(summary_lines(result))
     if checked is not None:

@@ -15,7 +15,7 @@ from aerotri.conventions import InputError
 from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
-    from aerotri.rasters import Grid
+    from aerotri.rasters.grids import Grid
     from aerotri.terrain.compare import Comparison, Heights
 
 OWN_NAMES = ("compare.json", "difference.tif", "plots")
@@ -61,7 +61,7 @@ def _compared(
     test: Path, control: Path, method: str, align: str, cell: float | None, stack: ExitStack, console: Console
 ) -> tuple[Comparison, int | None]:
     """The comparison, and the code of its CRS where that is known."""
-    from aerotri.rasters import cache_limited
+    from aerotri.rasters.grids import cache_limited
     from aerotri.terrain.compare import compare
 
     stack.enter_context(cache_limited())
@@ -81,8 +81,8 @@ def _compared(
 
 def _common_crs(*paths: Path) -> str | None:
     """Where a raster that does not count in metres is brought to: the CRS of the other one, else None."""
-    from aerotri.rasters import RasterReader
-    from aerotri.rasters_metric import metric_crs_for, units_of
+    from aerotri.rasters.grids import RasterReader
+    from aerotri.rasters.metric import metric_crs_for, units_of
 
     wanted = None
     for path in paths:
@@ -107,9 +107,9 @@ def _surface(
     ----------
     crs : 'EPSG:n' that a raster in degrees or feet is brought to; None: the UTM zone.
     """
-    from aerotri.formats.pickets import read_pickets
-    from aerotri.formats.point_cloud import read_point_cloud, refuse_cloud_units
-    from aerotri.rasters_metric import MetricReader
+    from aerotri.formats.results.pickets import read_pickets
+    from aerotri.formats.results.point_cloud import read_point_cloud, refuse_cloud_units
+    from aerotri.rasters.metric import MetricReader
     from aerotri.terrain.compare import FileHeights, PointHeights, RasterHeights
 
     if path.is_dir():
@@ -173,15 +173,15 @@ def comparison_json(found: Comparison, test: str, control: str, method: str) -> 
 
 
 def _write(target: Path, found: Comparison, content: dict[str, Any], title: str, epsg: int | None, plots: bool) -> None:
-    from aerotri.formats.atomic import atomic_folder
-    from aerotri.rasters import write_raster
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.rasters.grids import write_raster
 
     with atomic_folder(target, own=OWN_NAMES) as folder:
         crs = None if epsg is None else f"EPSG:{epsg}"
         write_raster(folder / "difference.tif", found.difference, found.grid, crs, "test − control, m")
         if plots:
-            from aerotri.report.plots_terrain import plot_comparison
-            from aerotri.report.rendering import save_plots
+            from aerotri.report.plots.rendering import save_plots
+            from aerotri.report.plots.terrain import plot_comparison
 
             save_plots({"difference": plot_comparison(found, title)}, folder / "plots")
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)

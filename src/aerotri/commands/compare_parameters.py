@@ -50,8 +50,8 @@ def run_compare_parameters(
 
 
 def _tell(found: ComparedParameters, target: Path, console: Console, as_json: bool) -> None:
-    from aerotri.report.parameter_tables import NOTE, comparison_json, comparison_table
-    from aerotri.report.terminal import table_lines
+    from aerotri.report.tables.parameters import NOTE, comparison_json, comparison_table
+    from aerotri.report.tables.terminal import table_lines
 
     if as_json:
         content = comparison_json(found.record) | {"choice": found.reason}

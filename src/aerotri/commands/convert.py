@@ -43,14 +43,14 @@ import numpy as np
 
 from aerotri.commands.console import Console
 from aerotri.conventions import FLIGHT_AXES, LARGEST, InputError
-from aerotri.formats.camera_spec import CameraSpec
-from aerotri.formats.text_lines import is_number
+from aerotri.formats.assembly.camera_spec import CameraSpec
+from aerotri.formats.text.text_lines import is_number
 from aerotri.public.folders import refuse_existing_file, refuse_foreign_entries
 
 if TYPE_CHECKING:
-    from aerotri.formats.oriented import OrientedBlock
-    from aerotri.formats.parts import Reading
-    from aerotri.formats.project import Request
+    from aerotri.formats.assembly.oriented import OrientedBlock
+    from aerotri.formats.assembly.parts import Reading
+    from aerotri.formats.assembly.project import Request
     from aerotri.observations import Block
 
 
@@ -127,8 +127,8 @@ def run_convert(request: Request, target: Path, to: str, as_json: bool, overwrit
 
 
 def _from_files(request: Request, target: Path, to: str) -> tuple[str, ...]:
+    from aerotri.formats.assembly.project import read_project
     from aerotri.formats.convert import BLOCK_WRITERS, ORIENTATION_WRITERS, write_any, write_oriented
-    from aerotri.formats.project import read_project
 
     if to == "block":
         request = replace(request, name=request.name or target.resolve().name)
@@ -154,9 +154,9 @@ def _about_held(block: Block) -> tuple[str, ...]:
 
 def _from_result(request: Request, target: Path, to: str) -> tuple[str, ...]:
     """Orientation and points of a result of `aerotri adjust`."""
-    from aerotri.formats.block_folder import read_block
+    from aerotri.formats.assembly.oriented import oriented_from_adjusted
+    from aerotri.formats.block.folder import read_block
     from aerotri.formats.convert import BLOCK_WRITERS, write_any, write_oriented
-    from aerotri.formats.oriented import oriented_from_adjusted
     from aerotri.opening import open_result
 
     if request != type(request)(request.source, request.name, stated=request.stated):
@@ -170,7 +170,7 @@ def _from_result(request: Request, target: Path, to: str) -> tuple[str, ...]:
 
 def _at_start_values(reading: Reading, to: str) -> tuple[OrientedBlock | None, tuple[str, ...]]:
     """The block at the orientations it came with; None where it has none and the format needs them."""
-    from aerotri.formats.oriented import OrientedBlock
+    from aerotri.formats.assembly.oriented import OrientedBlock
     from aerotri.functional_model.rotation import rotation_from_angles
 
     block = reading.block
@@ -185,7 +185,7 @@ def _at_start_values(reading: Reading, to: str) -> tuple[OrientedBlock | None, t
 
 
 def _with_points(reading: Reading) -> OrientedBlock | None:
-    from aerotri.formats.oriented import oriented_block
+    from aerotri.formats.assembly.oriented import oriented_block
 
     return None if reading.points is None else oriented_block(reading.block, reading.points)
 
@@ -199,7 +199,7 @@ def _adjusted(block: Block, request: Request) -> OrientedBlock:
         When that fails.
     """
     from aerotri.compiled import compilation_notice
-    from aerotri.formats.oriented import oriented_from_adjusted
+    from aerotri.formats.assembly.oriented import oriented_from_adjusted
     from aerotri.pipeline import AdjustmentFailedError, adjust_keeping_system
 
     if not len(block.image_points):

@@ -45,7 +45,7 @@ def _tell(found: Crosscheck, target: Path, console: Console, as_json: bool) -> N
 
         print(json.dumps(crosscheck_json(found.record), indent=2, ensure_ascii=False))
         return
-    from aerotri.report.plots_crosscheck import crosscheck_table
+    from aerotri.report.plots.crosscheck import crosscheck_table
     from aerotri.report.quality import printable
 
     table = crosscheck_table(found.record)

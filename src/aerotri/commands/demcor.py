@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from aerotri.deformation.dem_window import DemModels
     from aerotri.deformation.model_map import ModelMap
     from aerotri.deformation.orientation import Orientation
-    from aerotri.pipeline import Adjustment
-    from aerotri.rasters import RasterReader
+    from aerotri.rasters.grids import RasterReader
+    from aerotri.results.adjustment import Adjustment
 
 ABSORBED, RECORD = "absorbed", "demcor.json"
 
@@ -42,8 +42,8 @@ def run_demcor(
     from aerotri.deformation.absorbed import AbsorptionFailedError
     from aerotri.deformation.model_map import PolygonMap
     from aerotri.deformation.restitution import FREE, restitution
-    from aerotri.rasters import RasterReader, cache_limited
-    from aerotri.rasters_metric import refuse_other_units
+    from aerotri.rasters.grids import RasterReader, cache_limited
+    from aerotri.rasters.metric import refuse_other_units
 
     try:
         used = None if orientation in (None, ABSORBED) else _orientation(calibration, Path(str(orientation)), console)
@@ -86,8 +86,8 @@ def _model_map(
     pair: tuple[str, str] | None, models: Path | None, table: Path | None, reader: RasterReader, stack: ExitStack
 ) -> ModelMap:
     from aerotri.deformation.model_map import OneModel, number_map, read_number_table, read_polygons
-    from aerotri.polygons import VECTOR_ENDINGS
-    from aerotri.rasters import RasterReader
+    from aerotri.rasters.grids import RasterReader
+    from aerotri.vectors.polygons import VECTOR_ENDINGS
 
     if pair is not None:
         return OneModel(*pair)
@@ -137,8 +137,8 @@ def _table_of_images(calibration: Adjustment, path: Path):
     """A block with the photographs of a table: image, X0, Y0, Z0, omega, phi, kappa in degrees."""
     from dataclasses import replace
 
-    from aerotri.formats.table_checks import refuse_duplicates
-    from aerotri.formats.tables import Columns, read_table
+    from aerotri.formats.text.table_checks import refuse_duplicates
+    from aerotri.formats.text.tables import Columns, read_table
 
     numbers = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
     if not path.is_file():
@@ -162,8 +162,8 @@ def _corrected(
     from aerotri.adjustment.parallel import thread_count
     from aerotri.deformation.dem_correction import correct_dem
     from aerotri.deformation.outcome_json import correction_json
-    from aerotri.formats.atomic import atomic_file
-    from aerotri.rasters import NO_DATA, RasterWriter, write_raster
+    from aerotri.formats.files.atomic import atomic_file
+    from aerotri.rasters.grids import NO_DATA, RasterWriter, write_raster
 
     no_data = NO_DATA if reader.no_data is None else reader.no_data
     common = {"crs": reader.crs, "no_data": no_data, "options": reader.options, "threads": thread_count()}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from aerotri.commands.console import Console
 
 if TYPE_CHECKING:
-    from aerotri.statistics.adjusted_block import AdjustedBlock
+    from aerotri.results.adjusted_block import AdjustedBlock
 
 
 def run_diff(first: Path, second: Path, top: int, as_json: bool) -> int:
@@ -21,9 +21,9 @@ def run_diff(first: Path, second: Path, top: int, as_json: bool) -> int:
         Where a folder holds no result that can be read; the message names it.
     """
     from aerotri.public.changes import changes, refuse_negative
-    from aerotri.report.comparison_tables import SIGMA_NOTE, comparison_tables
     from aerotri.report.quality import printable
-    from aerotri.report.terminal import table_lines
+    from aerotri.report.tables.comparison import SIGMA_NOTE, comparison_tables
+    from aerotri.report.tables.terminal import table_lines
 
     refuse_negative(top)
     console = Console(quiet=as_json)

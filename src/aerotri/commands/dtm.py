@@ -15,7 +15,7 @@ from aerotri.conventions import InputError, stated_number
 from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
-    from aerotri.pipeline import Adjustment
+    from aerotri.results.adjustment import Adjustment
     from aerotri.terrain.dtm import TerrainOutcome, TerrainPlan
 
 OWN_NAMES = ("dtm.json", "pickets.parquet", "pickets.laz", "dsm.tif", "dtm.tif", "model.tif", "models.csv", "plots")
@@ -105,9 +105,9 @@ def make_plan(
     ------
     InputError
     """
-    from aerotri.formats.breaklines import breaklines_and_note
-    from aerotri.formats.photograph_files import match_files, photographs_in
-    from aerotri.rasters import horizontal_crs
+    from aerotri.formats.files.photograph_files import match_files, photographs_in
+    from aerotri.formats.foreign.breaklines import breaklines_and_note
+    from aerotri.rasters.grids import horizontal_crs
     from aerotri.terrain.dtm import TerrainPlan, chosen_rows
     from aerotri.terrain.pickets import Area
 
@@ -138,10 +138,10 @@ def make_plan(
 
 def write_terrain(target: Path, outcome: TerrainOutcome, calibration: Adjustment, plots: bool) -> dict[str, Any]:
     """Write all files whole or not at all; returns the content of dtm.json."""
-    from aerotri.formats.atomic import atomic_folder
-    from aerotri.formats.pickets import write_pickets
-    from aerotri.formats.point_cloud import write_point_cloud
-    from aerotri.rasters import horizontal_crs, write_raster, write_surface
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.formats.results.pickets import write_pickets
+    from aerotri.formats.results.point_cloud import write_point_cloud
+    from aerotri.rasters.grids import horizontal_crs, write_raster, write_surface
     from aerotri.terrain.dtm import terrain_json
     from aerotri.volume.shared import adjustment_key
 
@@ -159,8 +159,8 @@ def write_terrain(target: Path, outcome: TerrainOutcome, calibration: Adjustment
             write_raster(folder / "model.tif", outcome.number, outcome.dsm.grid, crs, "number of the model")
             _write_models(folder / "models.csv", p.names, outcome.models.pairs)
         if plots:
-            from aerotri.report.plots_terrain import plot_pickets, plot_surface
-            from aerotri.report.rendering import save_plots
+            from aerotri.report.plots.rendering import save_plots
+            from aerotri.report.plots.terrain import plot_pickets, plot_surface
 
             name = str(block.name)
             figures = {"surface": plot_surface(outcome, name), "pickets": plot_pickets(outcome, name)}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from aerotri.image_errors import ImageGroup
     from aerotri.image_errors.error_function import ErrorFunction
     from aerotri.image_errors.ideal_map import IdealMap
-    from aerotri.statistics.adjusted_block import AdjustedBlock
+    from aerotri.results.adjusted_block import AdjustedBlock
 
 
 ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff")
@@ -69,7 +69,7 @@ def run_imgeo(
     jobs = _jobs(adjusted, groups, photographs, out, options)
     used = sorted({job.group for job in jobs}) if jobs else range(len(groups))
     errors = {k: error_function(adjusted, groups[k]) for k in used}
-    from aerotri.formats.work_place import held
+    from aerotri.formats.files.work_place import held
 
     with held(out):
         record = export(adjusted, errors, out, options.resampling, [job.name for job in jobs], overwrite)
@@ -80,7 +80,7 @@ def run_imgeo(
 
 def _check_options(options: ImgeoOptions) -> None:
     from aerotri.image_errors.ideal_photographs import RESAMPLINGS
-    from aerotri.rasters_images import COMPRESSIONS
+    from aerotri.rasters.images import COMPRESSIONS
 
     for name, value, known in (
         ("resampling", options.resampling, RESAMPLINGS), ("compression", options.compression, COMPRESSIONS)
@@ -93,7 +93,7 @@ def _jobs(
     adjusted: AdjustedBlock, groups: tuple[ImageGroup, ...], photographs: list[Path], out: Path, options: ImgeoOptions
 ) -> list[Job]:
     """Which group every file belongs to, by its name; nothing is written before all are known."""
-    from aerotri.formats.photograph_files import match_files, photographs_in
+    from aerotri.formats.files.photograph_files import match_files, photographs_in
     from aerotri.image_errors.ideal_photographs import check_photograph, name_of
 
     block = adjusted.block
@@ -139,7 +139,7 @@ def _resample_all(
     jobs: list[Job], errors: dict[int, ErrorFunction], out: Path, options: ImgeoOptions, console: Console
 ) -> list[dict[str, Any]]:
     from aerotri.compiled import compilation_notice
-    from aerotri.formats.atomic import atomic_file
+    from aerotri.formats.files.atomic import atomic_file
     from aerotri.image_errors.ideal_map import ideal_map
     from aerotri.image_errors.ideal_photographs import ideal_photograph
 

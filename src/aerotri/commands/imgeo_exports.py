@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from aerotri.image_errors.error_exports import NearestLens
     from aerotri.image_errors.error_function import ErrorFunction
     from aerotri.observations import Camera
-    from aerotri.statistics.adjusted_block import AdjustedBlock
+    from aerotri.results.adjusted_block import AdjustedBlock
 
 SIGN = "measured = ideal + d; corrected = measured - d"
 RECORD = "imgeo.json"
@@ -45,9 +45,9 @@ def export(
     -------
     The record.
     """
-    from aerotri.formats.atomic import atomic_file
-    from aerotri.formats.result import outcome_json
-    from aerotri.formats.toml_text import toml_of
+    from aerotri.formats.files.atomic import atomic_file
+    from aerotri.formats.results.adjustment import outcome_json
+    from aerotri.formats.text.toml_text import toml_of
     from aerotri.image_errors.error_exports import ideal_camera, nearest_opencv
 
     cameras = _camera_names(errors)
@@ -170,9 +170,9 @@ def _correction_rows(adjusted: AdjustedBlock, errors: ErrorFunction) -> str:
 
 
 def _write_correction_raster(errors: ErrorFunction, path: Path) -> None:
-    from aerotri.formats.atomic import atomic_file
+    from aerotri.formats.files.atomic import atomic_file
     from aerotri.image_errors.error_exports import correction_raster
-    from aerotri.rasters_images import write_grid
+    from aerotri.rasters.images import write_grid
 
     camera = errors.camera
     values, cell = correction_raster(errors)
@@ -186,7 +186,7 @@ def _write_correction_raster(errors: ErrorFunction, path: Path) -> None:
 
 def _colmap_text(cameras: Mapping[int, tuple[str, Camera, str]]) -> str:
     """cameras.txt of COLMAP, of cameras with their names and a remark."""
-    from aerotri.formats.colmap import colmap_camera
+    from aerotri.formats.foreign.colmap import colmap_camera
 
     lines = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"]
     for number, (name, camera, remark) in enumerate(cameras.values(), start=1):
@@ -207,7 +207,7 @@ def plain(name: str) -> str:
 
 def write_record(record: Mapping[str, Any], out: Path) -> None:
     """imgeo.json."""
-    from aerotri.formats.atomic import atomic_file
+    from aerotri.formats.files.atomic import atomic_file
 
     text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
     with atomic_file(out / RECORD) as place:

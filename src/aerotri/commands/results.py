@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from aerotri.commands.console import Console
 
 if TYPE_CHECKING:
-    from aerotri.pipeline import Adjustment
+    from aerotri.results.adjustment import Adjustment
 
 
 def reopened(result: Path, console: Console) -> Adjustment:

@@ -146,8 +146,8 @@ def _called(step: Step, invoke: Invoke, first: bool, quiet: bool) -> Step:
 
 def write_report(content: dict[str, Any], out: Path) -> None:
     """The record and the page, each whole or not at all."""
-    from aerotri.formats.atomic import atomic_file
-    from aerotri.report.run_page import run_page
+    from aerotri.formats.files.atomic import atomic_file
+    from aerotri.report.pages.run import run_page
 
     with atomic_file(out / RECORD) as place:
         place.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")

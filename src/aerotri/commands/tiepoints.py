@@ -13,13 +13,13 @@ import numpy as np
 
 from aerotri.commands.console import Console
 from aerotri.conventions import InputError
-from aerotri.formats.assemble import Statements
-from aerotri.formats.block_writer import OWN_ENTRIES
-from aerotri.formats.camera_spec import CameraSpec
+from aerotri.formats.assembly.assemble import Statements
+from aerotri.formats.assembly.camera_spec import CameraSpec
+from aerotri.formats.block.writer import OWN_ENTRIES
 from aerotri.public.folders import refuse_foreign_entries, refuse_foreign_folder
 
 if TYPE_CHECKING:
-    from aerotri.formats.parts import PointList
+    from aerotri.formats.assembly.parts import PointList
     from aerotri.tie_points.photographs import PhotographSet, StatedCamera
     from aerotri.tie_points.photographs_to_block import Given, TiedBlock
 
@@ -53,7 +53,7 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
     ------
     InputError
     """
-    from aerotri.formats.work_place import held
+    from aerotri.formats.files.work_place import held
     from aerotri.tie_points.photographs_to_block import CACHE
 
     refuse_foreign_folder(out, RECORD, CACHE)
@@ -68,8 +68,8 @@ def _tied(folder: Path, out: Path, options: TiePointOptions, console: Console) -
     """Tie, write and tell; returns the content of tiepoints.json."""
     begun = time.perf_counter()
     from aerotri.compiled import compilation_notice
-    from aerotri.formats.atomic import atomic_folder
-    from aerotri.formats.block_writer import write_block
+    from aerotri.formats.block.writer import write_block
+    from aerotri.formats.files.atomic import atomic_folder
     from aerotri.tie_points.features import FeatureOptions
     from aerotri.tie_points.matching import MatchOptions
     from aerotri.tie_points.photographs import find_photographs
@@ -103,7 +103,7 @@ def _tied(folder: Path, out: Path, options: TiePointOptions, console: Console) -
 
 
 def _stated_camera(spec: CameraSpec) -> StatedCamera:
-    from aerotri.formats.camera_spec import cameras_of
+    from aerotri.formats.assembly.camera_spec import cameras_of
     from aerotri.tie_points.photographs import StatedCamera
 
     if spec.file is None:
@@ -113,7 +113,7 @@ def _stated_camera(spec: CameraSpec) -> StatedCamera:
 
 
 def _given(options: TiePointOptions) -> Given:
-    from aerotri.formats import kinds
+    from aerotri.formats.assembly import kinds
     from aerotri.tie_points.photographs_to_block import Given
 
     reading = kinds.ReadingOptions(kinds.axes_of(options.stated.crs))
@@ -158,9 +158,9 @@ def write_marks(
     ------
     InputError
     """
-    from aerotri.formats.atomic import atomic_folder
-    from aerotri.formats.table_writer import write_table
-    from aerotri.report.marking_page import marking_page
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.formats.text.table_writer import write_table
+    from aerotri.report.pages.marking import marking_page
     from aerotri.tie_points.control_marks import pieces, predict_marks
 
     marks = predict_marks(tied.block, control, tied.points, stated.geoid)

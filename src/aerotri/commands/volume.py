@@ -15,9 +15,9 @@ from aerotri.conventions import InputError
 from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
-    from aerotri.rasters import Grid, RasterReader
-    from aerotri.rasters_metric import MetricReader
-    from aerotri.report.plots_volume import ThicknessMap
+    from aerotri.rasters.grids import Grid, RasterReader
+    from aerotri.rasters.metric import MetricReader
+    from aerotri.report.plots.volume import ThicknessMap
     from aerotri.volume.accuracy import VolumeSigma
     from aerotri.volume.bases import Base
     from aerotri.volume.boundary import Boundary
@@ -99,9 +99,9 @@ def _computed(
     given: VolumeInput, plan: SectionPlan, sigma_options: SigmaOptions, target: Path, plots: bool, console: Console
 ) -> dict[str, Any]:
     """Compute and write; returns the content of volume.json."""
-    from aerotri.formats.atomic import atomic_folder
-    from aerotri.rasters import RasterWriter, cache_limited
-    from aerotri.rasters_metric import MetricReader
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.rasters.grids import RasterWriter, cache_limited
+    from aerotri.rasters.metric import MetricReader
     from aerotri.volume.bases import parse_base
     from aerotri.volume.boundary import boundary_of_grid, read_boundary
     from aerotri.volume.compute import compute_volumes
@@ -155,7 +155,7 @@ def _crs_of_result(result: Path | None) -> str | None:
     """The plan CRS of a result's block, None where there is no result or it is local."""
     import tomllib
 
-    from aerotri.rasters import horizontal_crs
+    from aerotri.rasters.grids import horizontal_crs
 
     if result is None:
         return None
@@ -168,7 +168,7 @@ def _crs_of_result(result: Path | None) -> str | None:
 
 def _other(path: str, reader: RasterReader) -> MetricReader:
     """The raster of a base, in the CRS of the surface."""
-    from aerotri.rasters_metric import MetricReader
+    from aerotri.rasters.metric import MetricReader
 
     other = MetricReader(path, target=None if reader.epsg is None else f"EPSG:{reader.epsg}")
     if other.epsg is not None and reader.epsg is not None and other.epsg != reader.epsg:
@@ -232,7 +232,7 @@ class _Thumbnail:
         np.add.at(self._count, at, 1.0)
 
     def map(self) -> ThicknessMap:
-        from aerotri.report.plots_volume import ThicknessMap
+        from aerotri.report.plots.volume import ThicknessMap
 
         with np.errstate(invalid="ignore", divide="ignore"):
             return ThicknessMap(self._grid, self._sum / self._count)
@@ -242,9 +242,9 @@ def _draw(
     folder: Path, content: dict[str, Any], volumes: Volumes, reader: RasterReader, base: Base, boundary: Boundary,
     thickness: ThicknessMap,
 ) -> None:  # fmt: skip
-    from aerotri.report.plots_volume import plot_budget, plot_section_areas, plot_section_profiles, plot_thickness
-    from aerotri.report.rendering import save_plots
-    from aerotri.report.volume_page import write_volume_page
+    from aerotri.report.pages.volume import write_volume_page
+    from aerotri.report.plots.rendering import save_plots
+    from aerotri.report.plots.volume import plot_budget, plot_section_areas, plot_section_profiles, plot_thickness
     from aerotri.volume.sections import chosen_profiles
 
     figures = {"thickness": plot_thickness(thickness, boundary, volumes, content)}

@@ -14,7 +14,7 @@ from aerotri.conventions import InputError
 
 if TYPE_CHECKING:
     from aerotri.commands.volume import VolumeInput
-    from aerotri.pipeline import Adjustment
+    from aerotri.results.adjustment import Adjustment
     from aerotri.volume.bases import Base, Surface
     from aerotri.volume.boundary import Boundary
     from aerotri.volume.parts import Part, SigmaOptions
@@ -77,7 +77,7 @@ def _part_of_file(
     """The share of pickets.parquet as `aerotri dtm` writes it: X, Y, Z, photographs, status, sZ_matching."""
     import pyarrow as pa
 
-    from aerotri.formats.parquet import load_parquet
+    from aerotri.formats.text.parquet import load_parquet
     from aerotri.terrain.tin import order_in_plan
     from aerotri.volume.functionals import triangulated
     from aerotri.volume.parts import matching_sigma_mm, part_of_pickets

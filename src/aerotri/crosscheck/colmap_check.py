@@ -28,11 +28,11 @@ from aerotri.crosscheck.comparison import (
 )
 from aerotri.crosscheck.freed import FreedBlock, freed_block
 from aerotri.crosscheck.start import displacement, intersect, typical_distance
-from aerotri.formats.colmap import COLMAP_FROM_CAMERA, point_numbers, write_colmap
-from aerotri.formats.oriented import OrientedBlock, oriented_from_adjusted
+from aerotri.formats.assembly.oriented import OrientedBlock, oriented_from_adjusted
+from aerotri.formats.foreign.colmap import COLMAP_FROM_CAMERA, point_numbers, write_colmap
 from aerotri.functional_model.rotation import angles_from_rotation, exponential, small_rotation_per_angle
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 PEER = "pycolmap"
 HELD_SHARE = 1e-4

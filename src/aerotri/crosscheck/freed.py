@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.formats.oriented import oriented_from_adjusted
+from aerotri.formats.assembly.oriented import oriented_from_adjusted
 from aerotri.observations import AdjustmentSettings, Block, Control, ImagePoints, Settings
-from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
 
 NO_CORRECTIONS = {"refraction": "off", "earth_curvature": "off"}
 LEAST_WEIGHT = 0.5

@@ -14,7 +14,7 @@ from aerotri.crosscheck.paper_rays import angles_of
 from aerotri.crosscheck.paper_system import PaperSolution, solve_normal_equations
 from aerotri.crosscheck.paper_unknowns import KnownSolution, Layout, lay_out, rotations
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock, SharedParameters
+from aerotri.results.adjusted_block import AdjustedBlock, SharedParameters
 
 PEER = "independent model"
 QUESTION = "all unknowns with the forward model written from the papers alone, self-calibration included"

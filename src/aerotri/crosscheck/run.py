@@ -7,7 +7,7 @@ from collections.abc import Callable
 from aerotri.crosscheck.comparison import CrosscheckResult, PeerCheck
 from aerotri.crosscheck.paper_check import check_with_paper
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 
 def crosscheck(

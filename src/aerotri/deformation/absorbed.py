@@ -19,8 +19,9 @@ from aerotri.adjustment.datum import restore_datum
 from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.unknowns import State, Unknowns
-from aerotri.deformation.orientation import Calibration, Orientation
+from aerotri.deformation.orientation import Orientation
 from aerotri.functional_model.observed_unknowns import Rows
+from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.covariance import cofactors
 
 N_INTERIOR = 3
@@ -61,7 +62,7 @@ class _NoiseFree:
         return replace(rows, gap=rows.gap - self.gap)
 
 
-def absorbed_orientation(calibration: Calibration, state: State | None = None) -> Absorbed:
+def absorbed_orientation(calibration: Adjustment, state: State | None = None) -> Absorbed:
     """Adjust the noise-free observations without additional parameters.
 
     Parameters
@@ -92,7 +93,7 @@ def absorbed_orientation(calibration: Calibration, state: State | None = None) -
     return Absorbed(_orientation(unknowns, adjusted), 1e3 * rms)
 
 
-def absorbed_partials(calibration: Calibration) -> np.ndarray:
+def absorbed_partials(calibration: Adjustment) -> np.ndarray:
     """How the absorbed orientation follows the additional parameters, −Q_xp·Q_pp⁻¹.
 
     Returns
@@ -123,13 +124,13 @@ def absorbed_partials(calibration: Calibration) -> np.ndarray:
     return out
 
 
-def additional_rows(calibration: Calibration) -> np.ndarray:
+def additional_rows(calibration: Adjustment) -> np.ndarray:
     """Rows of the additional parameters that were adjusted, in the record of the shared parameters."""
     p = calibration.local.parameters
     return np.flatnonzero((p.kinds == "additional") & np.isin(p.status, ("estimated", "weighted")))
 
 
-def shared_columns(calibration: Calibration) -> np.ndarray:
+def shared_columns(calibration: Adjustment) -> np.ndarray:
     """The shared unknowns of the system that `additional_rows` are."""
     shared, p = calibration.system.unknowns.shared, calibration.local.parameters
     place = {key: column for column, key in enumerate(zip(shared.names, shared.groups, strict=True))}

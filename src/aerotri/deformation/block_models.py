@@ -22,9 +22,9 @@ from aerotri.deformation.model_grid import (
     nodes_between,
     places_of,
 )
-from aerotri.deformation.orientation import Calibration
 from aerotri.deformation.restitution import Restitution
 from aerotri.deformation.stereo_model import StereoModel, deform_points, pair_model, seen_by_both
+from aerotri.results.adjustment import Adjustment
 
 SMALLEST_END_LAP = 0.2
 """Of two photographs following one another that are taken for a model: less is a gap or a turn."""
@@ -97,7 +97,7 @@ class BlockDeformation:
         return float(np.sqrt(sum(seam.count * seam.rms**2 for seam in self.seams) / count)) if count else np.nan
 
 
-def strip_pairs(calibration: Calibration, of: Restitution, step: int = 1) -> list[tuple[int, int]]:
+def strip_pairs(calibration: Adjustment, of: Restitution, step: int = 1) -> list[tuple[int, int]]:
     """Rows of the photographs of every model: along each strip every photograph with the `step`-th after it.
 
     Photographs without a named strip follow one another as in the table. Pairs that overlap by less than a fifth along
@@ -120,7 +120,7 @@ def strip_pairs(calibration: Calibration, of: Restitution, step: int = 1) -> lis
     return pairs
 
 
-def block_models(calibration: Calibration, of: Restitution, pairs: list[tuple[int, int]]) -> tuple[BlockModel, ...]:
+def block_models(calibration: Adjustment, of: Restitution, pairs: list[tuple[int, int]]) -> tuple[BlockModel, ...]:
     """The models of pairs of photographs."""
     places, names = places_of(calibration), calibration.local.block.images.names
     ground = float(np.nanmedian(calibration.local.points.xyz[:, 2]))
@@ -133,7 +133,7 @@ def block_models(calibration: Calibration, of: Restitution, pairs: list[tuple[in
 
 
 def deform_block(
-    calibration: Calibration,
+    calibration: Adjustment,
     of: Restitution,
     ground: Ground,
     spacing: float | None = None,

@@ -19,7 +19,7 @@ from aerotri.deformation.dem_window import CorrectedWindow, DemModels, added_sum
 from aerotri.deformation.model_map import ModelMap
 from aerotri.deformation.seam_steps import SeamSteps, added_steps, window_steps
 from aerotri.deformation.stereo_model import covariance_of, pair_model
-from aerotri.rasters import Grid, RasterReader, RasterWriter
+from aerotri.rasters.grids import Grid, RasterReader, RasterWriter
 
 WINDOW = 1024
 LARGEST_WINDOW_M = 2000.0

@@ -10,9 +10,10 @@ from aerotri.deformation import _kernels, _resample_kernels
 from aerotri.deformation.error_tables import ErrorTables, error_tables
 from aerotri.deformation.model_geometry import geometry_of
 from aerotri.deformation.model_grid import Places, mean_ground, pair_of, places_of
-from aerotri.deformation.orientation import Calibration, photo_rows, row_of_image
+from aerotri.deformation.orientation import photo_rows, row_of_image
 from aerotri.deformation.restitution import Restitution
-from aerotri.rasters import Grid
+from aerotri.rasters.grids import Grid
+from aerotri.results.adjustment import Adjustment
 
 FIT_TOLERANCE_M = 2e-4
 TABLE_TOLERANCE_M = 1e-4
@@ -137,7 +138,7 @@ def _corrected_part(dem: _kernels.Dem, models: _kernels.Models, halo: int) -> Co
     return CorrectedWindow(corrected.z, corrected.dz, corrected.sums, exact)
 
 
-def dem_models(calibration: Calibration, of: Restitution, names: tuple[tuple[str, str], ...]) -> DemModels:
+def dem_models(calibration: Adjustment, of: Restitution, names: tuple[tuple[str, str], ...]) -> DemModels:
     """The models of a DEM, by the names of their photographs (left, right).
 
     Raises

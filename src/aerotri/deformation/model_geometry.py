@@ -12,12 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.deformation.orientation import Calibration, Orientation
+from aerotri.deformation.orientation import Orientation
 from aerotri.deformation.restitution import Restitution
 from aerotri.deformation.stereo_model import StereoModel
 from aerotri.functional_model.rotation import exponential, logarithm
 from aerotri.image_errors import image_groups
 from aerotri.observations import Camera
+from aerotri.results.adjustment import Adjustment
 
 AXES = {"+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
 DEFAULT_AXIS = "+x"
@@ -86,7 +87,7 @@ def normal_geometry(camera: Camera, c: float, end_lap: float, height: float) -> 
 
 
 def normal_model(
-    calibration: Calibration, of: Restitution, end_lap: float, group: str | None = None, gsd: float | None = None
+    calibration: Adjustment, of: Restitution, end_lap: float, group: str | None = None, gsd: float | None = None
 ) -> tuple[StereoModel, ModelGeometry]:
     """The normal-case model of a group of photographs.
 
@@ -115,7 +116,7 @@ def normal_model(
     return StereoModel(names, (errors, errors), true, used, follows, of.covariance), geometry
 
 
-def _members(calibration: Calibration, of: Restitution, group: str | None) -> tuple[np.ndarray, int]:
+def _members(calibration: Adjustment, of: Restitution, group: str | None) -> tuple[np.ndarray, int]:
     """Rows of the oriented photographs of a group, and its number."""
     groups = image_groups(calibration.local.block)
     known = of.true.known & of.used.known

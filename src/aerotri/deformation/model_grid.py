@@ -10,7 +10,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.coordinates import LocalFrame
 from aerotri.deformation.model_geometry import ModelGeometry, geometry_of, normal_model
-from aerotri.deformation.orientation import Calibration, Orientation, row_of_image
+from aerotri.deformation.orientation import Orientation, row_of_image
 from aerotri.deformation.photo_errors import seams_mm
 from aerotri.deformation.restitution import Restitution
 from aerotri.deformation.stereo_model import (
@@ -21,7 +21,8 @@ from aerotri.deformation.stereo_model import (
     regions,
     seen_by_both,
 )
-from aerotri.rasters import RasterReader
+from aerotri.rasters.grids import RasterReader
+from aerotri.results.adjustment import Adjustment
 
 DEFAULT_NODES = 120
 """Nodes along the longer side of a model, about."""
@@ -144,7 +145,7 @@ class Places:
         return np.diagonal(covariance, axis1=1, axis2=2)
 
 
-def places_of(calibration: Calibration) -> Places:
+def places_of(calibration: Adjustment) -> Places:
     """Refuses a geographic CRS, whose degrees no grid of cells in metres fits.
 
     Raises
@@ -159,7 +160,7 @@ def places_of(calibration: Calibration) -> Places:
     return Places(frame)
 
 
-def pair_of(of: Restitution, calibration: Calibration, left: str, right: str) -> StereoModel:
+def pair_of(of: Restitution, calibration: Adjustment, left: str, right: str) -> StereoModel:
     """The model of two photographs of the block, by their names.
 
     Raises
@@ -180,13 +181,13 @@ def pair_of(of: Restitution, calibration: Calibration, left: str, right: str) ->
     return pair_model(of, (left, right), (rows[0], rows[1]))
 
 
-def mean_ground(calibration: Calibration) -> float:
+def mean_ground(calibration: Adjustment) -> float:
     """Median height of the object points, in the CRS of the block."""
     return float(np.nanmedian(calibration.result.points.xyz[:, 2]))
 
 
 def deform_pair(
-    calibration: Calibration, of: Restitution, names: tuple[str, str], ground: Ground, spacing: float | None = None
+    calibration: Adjustment, of: Restitution, names: tuple[str, str], ground: Ground, spacing: float | None = None
 ) -> Deformation:
     """The deformation of a pair of the block as flown.
 
@@ -215,7 +216,7 @@ def deform_pair(
 
 
 def deform_normal_case(
-    calibration: Calibration,
+    calibration: Adjustment,
     of: Restitution,
     end_lap: float,
     spacing: float | None = None,
@@ -293,7 +294,7 @@ def _round_length(length: float) -> float:
     return float(max(step for step in (1.0, 2.0, 5.0) if step * power <= length * (1.0 + 1e-9)) * power)
 
 
-def _level(calibration: Calibration, places: Places, model: StereoModel) -> float:
+def _level(calibration: Adjustment, places: Places, model: StereoModel) -> float:
     """Median height, in the CRS, of the object points that both photographs see; of all where they see none."""
     xyz = calibration.local.points.xyz
     known = np.flatnonzero(np.isfinite(xyz).all(axis=1))

@@ -16,9 +16,9 @@ import numpy as np
 from shapely.geometry import mapping
 
 from aerotri.conventions import InputError
-from aerotri.polygons import polygon_features
-from aerotri.rasters import Grid, RasterReader, rasterise
+from aerotri.rasters.grids import Grid, RasterReader, rasterise
 from aerotri.spreadsheet import with_formula
+from aerotri.vectors.polygons import polygon_features
 
 
 class ModelMap(Protocol):

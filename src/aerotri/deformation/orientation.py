@@ -3,36 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.solve import Solution
-from aerotri.coordinates import LocalFrame
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.image_errors import interior_elements
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock
-
-
-class Calibration(Protocol):
-    """A self-calibrated block with its equations: `pipeline.Adjustment`, seen from below.
-
-    result : in the block's CRS. local : in the local frame, where `system` and `solution` live. frame : that frame,
-    None for a block in local coordinates.
-    """
-
-    @property
-    def result(self) -> AdjustedBlock: ...
-    @property
-    def local(self) -> AdjustedBlock: ...
-    @property
-    def system(self) -> NormalSystem: ...
-    @property
-    def solution(self) -> Solution: ...
-    @property
-    def frame(self) -> LocalFrame | None: ...
+from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.adjustment import Adjustment
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +41,7 @@ class Orientation:
         return Orientation(self.centre[rows], self.rotation[rows], self.interior[rows])
 
 
-def calibrated_orientation(calibration: Calibration) -> Orientation:
+def calibrated_orientation(calibration: Adjustment) -> Orientation:
     """The orientation of all photographs of the block after its adjustment."""
     adjusted = calibration.local
     rotation = rotation_from_angles(adjusted.images.angles, adjusted.block.rotation)
@@ -76,7 +54,7 @@ def interior_of_images(adjusted: AdjustedBlock) -> np.ndarray:
     return of_camera[adjusted.block.images.camera]
 
 
-def given_orientation(calibration: Calibration, other: Block, angles: np.ndarray, centre: np.ndarray) -> Orientation:
+def given_orientation(calibration: Adjustment, other: Block, angles: np.ndarray, centre: np.ndarray) -> Orientation:
     """Orientation from elsewhere, by the names of the photographs, in the local frame.
 
     The interior orientation is that of the calibrated block.

@@ -41,7 +41,7 @@ from aerotri.deformation.dem_correction import DemOutcome
 from aerotri.deformation.dem_window import FIT_TOLERANCE_M, DemModels
 from aerotri.deformation.model_grid import Deformation
 from aerotri.deformation.restitution import SIGMA_INCLUDES
-from aerotri.rasters import Grid
+from aerotri.rasters.grids import Grid
 from aerotri.version import __version__
 
 WORST_SEAMS = 10

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.deformation.orientation import Calibration
 from aerotri.functional_model.additional_parameters import brown, lens
 from aerotri.image_errors import ImageGroup, image_groups
 from aerotri.image_errors.error_function import ErrorFunction, error_function
 from aerotri.image_errors.groups import parameters_of_group
 from aerotri.image_errors.tile_grid import seams_px, tiles_of
 from aerotri.observations import Camera
+from aerotri.results.adjustment import Adjustment
 
 LENS_STEP = 1e-6
 
@@ -80,7 +80,7 @@ class PhotoErrors:
         out[:, :, [self.column[names[k]] for k in chosen]] += basis[:, :, chosen]
 
 
-def photo_errors(calibration: Calibration, group: ImageGroup, rows: np.ndarray) -> PhotoErrors:
+def photo_errors(calibration: Adjustment, group: ImageGroup, rows: np.ndarray) -> PhotoErrors:
     """The image errors of a group.
 
     Parameters
@@ -93,7 +93,7 @@ def photo_errors(calibration: Calibration, group: ImageGroup, rows: np.ndarray) 
     return PhotoErrors(error_function(adjusted, group), column, len(rows))
 
 
-def errors_by_image(calibration: Calibration, rows: np.ndarray) -> tuple[tuple[PhotoErrors, ...], np.ndarray]:
+def errors_by_image(calibration: Adjustment, rows: np.ndarray) -> tuple[tuple[PhotoErrors, ...], np.ndarray]:
     """The image errors of all groups of the block, and (n,) which of them each photograph has."""
     groups = image_groups(calibration.local.block)
     number = np.zeros(len(calibration.local.block.images), dtype=np.int64)

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials, additional_rows
-from aerotri.deformation.orientation import Calibration, Orientation, calibrated_orientation
+from aerotri.deformation.orientation import Orientation, calibrated_orientation
 from aerotri.deformation.photo_errors import PhotoErrors, errors_by_image
+from aerotri.results.adjustment import Adjustment
 
 FREE, ABSORBED, GIVEN = "free", "absorbed", "given"
 VARIANTS = (FREE, ABSORBED)
@@ -52,7 +53,7 @@ class Restitution:
     covariance: np.ndarray
 
 
-def restitution(calibration: Calibration, variant: str = FREE, used: Orientation | None = None) -> Restitution:
+def restitution(calibration: Adjustment, variant: str = FREE, used: Orientation | None = None) -> Restitution:
     """The restitution of a block.
 
     Parameters

@@ -9,7 +9,7 @@ from scipy.special import gammaincinv
 
 from aerotri.diagnosis.finding import SIGNIFICANCE, Finding, Grade, chi_square_p, graded, metre_digits, times
 from aerotri.diagnosis.geometry import usual_distance
-from aerotri.statistics.adjusted_block import AdjustedBlock, GroundPointResults
+from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 
 ENOUGH_CHECK_POINTS = 30
 AT_CHECK_POINTS = "at check points"

@@ -39,7 +39,7 @@ from aerotri.diagnosis.trials import (
 from aerotri.functional_model.additional_parameters import AUTO
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 MOST_TRIED = 5
 """Hypotheses that are put to the proof by an adjustment."""

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import gammaincc, ndtri
 
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 Grade = Literal["accepted", "doubtful", "rejected"]
 GRADES: tuple[Grade, ...] = ("accepted", "doubtful", "rejected")

@@ -15,7 +15,7 @@ from aerotri.diagnosis.finding import (
     pixel_text,
     times,
 )
-from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
 from aerotri.statistics.observation_groups import GroupFit, group_fits
 
 POOR_FIT, NO_FIT = 2.0, 10.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from aerotri.diagnosis.finding import Finding, doubt, graded, some
 from aerotri.functional_model.rotation import rotation_from_angles
-from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
 
 SOME_BEHIND, MANY_BEHIND = 0.01, 0.10
 """Shares of the rays whose point lies behind the camera or far out: mismatches are few, a wrong block has many."""

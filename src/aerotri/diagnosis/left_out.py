@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.diagnosis.finding import Finding, doubt, graded, some
-from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
 
 SOME_PHOTOGRAPHS, MANY_PHOTOGRAPHS = 0.02, 0.25
 SOME_POINTS, MANY_POINTS = 0.10, 0.40

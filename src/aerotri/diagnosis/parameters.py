@@ -6,7 +6,7 @@ import numpy as np
 
 from aerotri.diagnosis.finding import Finding, critical_of_worst, doubt, graded, times
 from aerotri.observations import Camera
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 CHANGED = 0.20
 """Share by which a free principal distance may differ from the one stated; what EXIF says is nearer."""

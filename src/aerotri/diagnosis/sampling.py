@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 
 from aerotri.diagnosis.free_model import sub_block
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 MOST_PHOTOGRAPHS = 60
 MOST_RAYS = 12000

@@ -12,8 +12,8 @@ from aerotri.diagnosis.finding import GRADES
 from aerotri.diagnosis.hypothesis import Hypothesis
 from aerotri.diagnosis.verdict import judge
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock
-from aerotri.statistics.doubts import AdjustmentFailedError
+from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.failure import AdjustmentFailedError
 
 Adjust = Callable[[Block], AdjustedBlock]
 

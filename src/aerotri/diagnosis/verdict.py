@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from aerotri.diagnosis import check_points, fit, geometry, left_out, parameters
 from aerotri.diagnosis.finding import GRADES, Finding, Grade
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 Rule = Callable[[AdjustedBlock], list[Finding]]
 

@@ -12,24 +12,25 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.formats import block_writer, bundler, colmap, opensfm, patb
-from aerotri.formats.bal import is_bal, read_bal, write_bal
-from aerotri.formats.bingo import write_bingo
-from aerotri.formats.block_folder import read_block, write_block
-from aerotri.formats.bundler import is_bundler, read_bundler, write_bundler
-from aerotri.formats.colmap import is_colmap, read_colmap, write_colmap
-from aerotri.formats.dbat import read_dbat
-from aerotri.formats.dbat_script import is_dbat
-from aerotri.formats.ign import write_ign_opk
-from aerotri.formats.measured_lists import write_ign_app, write_ign_mes, write_odm_geo, write_pix4d_offset
-from aerotri.formats.metashape import write_metashape
-from aerotri.formats.odm import write_odm_gcp
-from aerotri.formats.opensfm import is_opensfm, read_opensfm, write_opensfm
-from aerotri.formats.oriented import OrientedBlock, oriented_block
-from aerotri.formats.parts import Reading
-from aerotri.formats.patb import write_patb
-from aerotri.formats.pix4d import write_pix4d_eo, write_pix4d_gcp, write_pix4d_geo
-from aerotri.formats.placing import in_local_frame
+from aerotri.formats.assembly.oriented import OrientedBlock, oriented_block
+from aerotri.formats.assembly.parts import Reading
+from aerotri.formats.assembly.placing import in_local_frame
+from aerotri.formats.block import writer as block_writer
+from aerotri.formats.block.folder import read_block, write_block
+from aerotri.formats.foreign import bundler, colmap, opensfm, patb
+from aerotri.formats.foreign.bal import is_bal, read_bal, write_bal
+from aerotri.formats.foreign.bingo import write_bingo
+from aerotri.formats.foreign.bundler import is_bundler, read_bundler, write_bundler
+from aerotri.formats.foreign.colmap import is_colmap, read_colmap, write_colmap
+from aerotri.formats.foreign.dbat import read_dbat
+from aerotri.formats.foreign.dbat_script import is_dbat
+from aerotri.formats.foreign.ign import write_ign_opk
+from aerotri.formats.foreign.measured_lists import write_ign_app, write_ign_mes, write_odm_geo, write_pix4d_offset
+from aerotri.formats.foreign.metashape import write_metashape
+from aerotri.formats.foreign.odm import write_odm_gcp
+from aerotri.formats.foreign.opensfm import is_opensfm, read_opensfm, write_opensfm
+from aerotri.formats.foreign.patb import write_patb
+from aerotri.formats.foreign.pix4d import write_pix4d_eo, write_pix4d_gcp, write_pix4d_geo
 from aerotri.observations import Block
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from aerotri.image_errors.field import CHI2_LIMIT, grid_nodes
 from aerotri.image_errors.groups import image_group
 from aerotri.observations import Camera
-from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
 
 LONGER_SIDE_CELLS = 20
 FEWEST_CELLS = 6

@@ -23,7 +23,7 @@ from aerotri.adjustment.shared_parameters import random_field
 from aerotri.functional_model.additional_parameters import Parameter, collocation, parameter_set
 from aerotri.image_errors.field import ErrorField, field_difference
 from aerotri.image_errors.groups import ImageGroup, image_groups
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 ALPHA = 0.01
 """Probability below which 'no change' is given up [C]."""

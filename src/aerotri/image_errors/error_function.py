@@ -16,7 +16,7 @@ from aerotri.functional_model.additional_parameters import brown, lens, paramete
 from aerotri.functional_model.additional_parameters.registry import ParameterSet
 from aerotri.image_errors.groups import ImageGroup, interior_elements, parameters_of_group
 from aerotri.observations import Camera
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 PIECE = 16384
 """Positions evaluated at a time, so that the patterns stay in the cache."""

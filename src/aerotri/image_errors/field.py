@@ -19,7 +19,7 @@ from aerotri.image_errors.groups import (
     parameters_of_group,
 )
 from aerotri.observations import Camera
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 CHI2_LIMIT = -2.0 * np.log(1.0 - 0.95)
 """95 % quantile of χ² with two degrees of freedom; the distribution function is 1 − exp(−χ²/2)."""

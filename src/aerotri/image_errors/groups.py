@@ -9,7 +9,7 @@ import numpy as np
 from aerotri.adjustment.shared_parameters import group_of_images
 from aerotri.observations import Block, Camera
 from aerotri.observations.block import INTERIOR_ELEMENTS
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from aerotri.conventions import InputError
 from aerotri.image_errors import _kernels
 from aerotri.image_errors.ideal_map import IdealMap
 from aerotri.observations import Camera
-from aerotri.rasters_images import Photograph, create_like, open_photograph
+from aerotri.rasters.images import Photograph, create_like, open_photograph
 
 RESAMPLINGS = ("bicubic", "lanczos")
 BAND_BYTES = 24 * 2**20

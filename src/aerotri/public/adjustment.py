@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     import numpy as np
 
     from aerotri.observations import Block
-    from aerotri.pipeline import Adjustment as Record
     from aerotri.public.covariance import Covariance
     from aerotri.public.plots import AdjustmentPlots
     from aerotri.public.table import Table
-    from aerotri.statistics.adjusted_block import AdjustedBlock
+    from aerotri.results.adjusted_block import AdjustedBlock
+    from aerotri.results.adjustment import Adjustment as Record
 
 Robust = Literal["off", "huber", "danish", "cauchy", "adaptive", "data-snooping"]
 Datum = Literal["control", "minimal", "inner", "fixed"]
@@ -198,7 +198,7 @@ class Adjustment:
 
     def summary(self) -> str:
         """The outcome in lines, as the command prints it."""
-        from aerotri.report.tables import summary_lines
+        from aerotri.report.tables.adjustment import summary_lines
 
         return "\n".join(summary_lines(self.adjusted))
 
@@ -309,7 +309,7 @@ def with_settings(block: Block, given: Mapping[str, object]) -> Block:
     """
     from dataclasses import replace
 
-    from aerotri.formats.block_settings import checked_adjustment_settings
+    from aerotri.formats.block.settings import checked_adjustment_settings
     from aerotri.functional_model.additional_parameters import parse_parameters
 
     changes = {name: value for name, value in given.items() if value is not None}

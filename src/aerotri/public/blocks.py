@@ -52,7 +52,7 @@ def read_block(folder: PathLike) -> Block:
     >>> len(block.images)
     12
     """
-    from aerotri.formats import block_folder
+    from aerotri.formats.block import folder as block_folder
 
     return block_folder.read_block(folder)
 
@@ -129,9 +129,9 @@ def read(
     InputError
         For whatever is missing, damaged or contradictory, naming the file.
     """
-    from aerotri.formats.assemble import Statements
-    from aerotri.formats.camera_spec import CameraSpec
-    from aerotri.formats.project import Request, read_project
+    from aerotri.formats.assembly.assemble import Statements
+    from aerotri.formats.assembly.camera_spec import CameraSpec
+    from aerotri.formats.assembly.project import Request, read_project
 
     spec = CameraSpec(camera, camera_name, camera_size, pixel_um, focal_length_mm, flight_axis, free_interior)
     stated = Statements(

@@ -17,7 +17,7 @@ from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.table import Table
 
 if TYPE_CHECKING:
-    from aerotri.statistics.adjusted_block import AdjustedBlock
+    from aerotri.results.adjusted_block import AdjustedBlock
     from aerotri.statistics.comparison import Comparison, Differences
 
 MOST_NAMED = 5
@@ -59,14 +59,14 @@ class ResultChanges:
         InputError
             For a negative number.
         """
-        from aerotri.report.comparison_tables import comparison_json
+        from aerotri.report.tables.comparison import comparison_json
 
         refuse_negative(top)
         return comparison_json(self.record, top)
 
     def _repr_html_(self) -> str:
         """The tables of the command, as a notebook shows them."""
-        from aerotri.report.comparison_tables import SIGMA_NOTE, comparison_tables
+        from aerotri.report.tables.comparison import SIGMA_NOTE, comparison_tables
 
         notes = "".join(f"<p>{escape(note)}</p>" for note in (SIGMA_NOTE, *self.record.notes))
         return f"<div>{notes}{''.join(map(_html, comparison_tables(self.record, MOST_NAMED)))}</div>"

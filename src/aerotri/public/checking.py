@@ -11,7 +11,7 @@ from aerotri.public.adjustment import Adjustment
 from aerotri.public.progress import ProgressLike, stage_report
 
 if TYPE_CHECKING:
-    from aerotri.statistics.free_verdict import FreeCheck
+    from aerotri.strategies.free_stages import FreeCheck
 
 
 def refuse_free_datum(block: Block) -> None:
@@ -52,7 +52,7 @@ def free_check(
     """
     from aerotri.coordinates.blocks import frame_of_block, transform_block
     from aerotri.pipeline import adjust
-    from aerotri.statistics.free_check import check_free
+    from aerotri.strategies.free_check import check_free
 
     refuse_free_datum(source.block if isinstance(source, Adjustment) else source)
     with stage_report(progress) as report:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from aerotri.crosscheck import CrosscheckResult
-    from aerotri.statistics.adjusted_block import AdjustedBlock
-    from aerotri.statistics.parameter_comparison import ParameterComparison
+    from aerotri.results.adjusted_block import AdjustedBlock
+    from aerotri.results.parameter_comparison import ParameterComparison
 
 COMPARISON_NAMES = ("compare_parameters.json", "compare_parameters.csv", "compare_parameters.png",
                     "compare_parameters.svg")  # fmt: skip
@@ -48,7 +48,7 @@ class ComparedParameters:
     @property
     def table(self) -> Table:
         """A row a set: the columns of compare_parameters.csv."""
-        from aerotri.report.parameter_tables import comparison_columns
+        from aerotri.report.tables.parameters import comparison_columns
 
         columns = {name: pa.array(np.asarray(values).tolist()) for name, values in
                    comparison_columns(self.record).items()}  # fmt: skip
@@ -56,7 +56,7 @@ class ComparedParameters:
 
     def plot(self) -> Figure:
         """Check points and predicted control of every set."""
-        from aerotri.report.plots_comparison import plot_comparison
+        from aerotri.report.plots.comparison import plot_comparison
 
         return plot_comparison(self.record)
 
@@ -68,9 +68,9 @@ class ComparedParameters:
         InputError
             When the folder holds other files, or cannot be written to.
         """
-        from aerotri.formats.atomic import atomic_folder
+        from aerotri.formats.files.atomic import atomic_folder
         from aerotri.public.saving import write_comparison_tables
-        from aerotri.report.plots import save_plots
+        from aerotri.report.plots.overview import save_plots
 
         target = Path(out)
         refuse_foreign_folder(target, COMPARISON_NAMES[0])
@@ -123,7 +123,7 @@ def compare_parameters(
     """
     from aerotri import pipeline
     from aerotri.functional_model.additional_parameters import AUTO, format_parameters, parse_parameters
-    from aerotri.statistics.parameter_choice import candidate_sets, choose
+    from aerotri.strategies.parameter_choice import candidate_sets, choose
 
     choices = [parse_parameters(spec) for spec in sets]
     if AUTO in choices:
@@ -169,7 +169,7 @@ class Crosscheck:
 
     def plot(self) -> Figure:
         """Differences of every peer over σ."""
-        from aerotri.report.plots_crosscheck import plot_crosscheck
+        from aerotri.report.plots.crosscheck import plot_crosscheck
 
         return plot_crosscheck(self.record)
 
@@ -182,10 +182,10 @@ class Crosscheck:
             When the folder holds other files, or cannot be written to.
         """
         from aerotri.crosscheck.outcome_json import crosscheck_json
-        from aerotri.formats.atomic import atomic_folder
+        from aerotri.formats.files.atomic import atomic_folder
         from aerotri.public.saving import write_json
-        from aerotri.report.html import Findings, write_report
-        from aerotri.report.plots import all_plots, save_plots
+        from aerotri.report.pages.adjustment import Findings, write_report
+        from aerotri.report.plots.overview import all_plots, save_plots
 
         target = Path(out)
         refuse_foreign_folder(target, CROSSCHECK_NAMES[0])

@@ -44,8 +44,8 @@ def convert(
     ...     len(aerotri.read_block(f"{place}/copy").images)
     12
     """
+    from aerotri.formats.assembly.oriented import oriented_from_adjusted
     from aerotri.formats.convert import BLOCK_WRITERS, write_any, write_oriented
-    from aerotri.formats.oriented import oriented_from_adjusted
 
     if isinstance(block, Adjustment):
         if to != "block" and to not in BLOCK_WRITERS:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from aerotri.pipeline import Adjustment
+    from aerotri.results.adjustment import Adjustment
     from aerotri.statistics.joint_covariance import Chosen
 
 MOST_SHOWN = 12
@@ -90,7 +90,7 @@ def covariance_of(adjustment: Adjustment, names: list[str]) -> Covariance:
 
 def _into_crs(adjustment: Adjustment, chosen: list[Chosen]) -> np.ndarray:
     """Partials of coordinates and angles in the CRS by those in the local frame."""
-    from aerotri.coordinates.blocks import orientation_partials
+    from aerotri.results.in_crs import orientation_partials
     from aerotri.statistics.joint_covariance import IMAGE, POINT
 
     frame, local = adjustment.frame, adjustment.local

@@ -19,7 +19,7 @@ def refuse_foreign_entries(folder: Path, own: Collection[str], overwrite: bool =
     ------
     InputError
     """
-    from aerotri.formats.ownership import foreign_files
+    from aerotri.formats.files.ownership import foreign_files
 
     found = [] if overwrite or not folder.is_dir() else foreign_files(folder, own)
     if found:

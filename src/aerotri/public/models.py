@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from aerotri.deformation.model_grid import Ground
     from aerotri.deformation.restitution import Restitution
-    from aerotri.pipeline import Adjustment as Record
+    from aerotri.results.adjustment import Adjustment as Record
 
 RECORD = "deform.json"
 OWN_NAMES = (
@@ -102,7 +102,7 @@ class ModelDeformation:
 
     def plot(self) -> Figure:
         """Contours of dZ over the model or the block."""
-        from aerotri.report.plots_deformation import plot_block_deformation, plot_deformation
+        from aerotri.report.plots.deformation import plot_block_deformation, plot_deformation
 
         if isinstance(self.record, BlockDeformation):
             return plot_block_deformation(self.record, self.block)
@@ -116,7 +116,7 @@ class ModelDeformation:
         InputError
             For a whole block.
         """
-        from aerotri.report.plots_deformation import plot_deformation_profile
+        from aerotri.report.plots.deformation import plot_deformation_profile
 
         if isinstance(self.record, BlockDeformation):
             raise InputError("profiles are drawn of one model", "choose a pair or an end lap")
@@ -240,8 +240,8 @@ def refuse_without_errors(models: Restitution, name: str) -> None:
 def _ground(record: Record, dem: str | os.PathLike | None, stack: ExitStack) -> tuple[Ground, tuple[str, ...]]:
     """The DEM, open as long as the stack, or the level of the object points; and what was done with it."""
     from aerotri.deformation.model_grid import DemGround, FlatGround, mean_ground
-    from aerotri.rasters import RasterReader, horizontal_crs
-    from aerotri.rasters_metric import MetricReader, refuse_other_units
+    from aerotri.rasters.grids import RasterReader, horizontal_crs
+    from aerotri.rasters.metric import MetricReader, refuse_other_units
 
     if dem is None:
         return FlatGround(mean_ground(record)), ()
@@ -261,7 +261,7 @@ def check_crs(record: Record, epsg: int | None, dem: Path) -> None:
     ------
     InputError
     """
-    from aerotri.rasters import horizontal_crs
+    from aerotri.rasters.grids import horizontal_crs
 
     own = horizontal_crs(record.result.block.crs)
     if own is not None and epsg is not None and own.upper() != f"EPSG:{epsg}":
@@ -269,9 +269,9 @@ def check_crs(record: Record, epsg: int | None, dem: Path) -> None:
 
 
 def _write(target: Path, found: ModelDeformation, plots: bool) -> None:
-    from aerotri.formats.atomic import atomic_folder
+    from aerotri.formats.files.atomic import atomic_folder
     from aerotri.public.saving import write_json
-    from aerotri.rasters import Grid, horizontal_crs, write_raster
+    from aerotri.rasters.grids import Grid, horizontal_crs, write_raster
 
     d = found.record
     crs = None if d.crs == "model" else horizontal_crs(d.crs)
@@ -284,7 +284,7 @@ def _write(target: Path, found: ModelDeformation, plots: bool) -> None:
             write_raster(folder / "model.tif", d.number.astype(np.int32), grid, crs, "number of the model")
             _write_tables(folder, d)
         if plots:
-            from aerotri.report.rendering import save_plots
+            from aerotri.report.plots.rendering import save_plots
 
             whole = isinstance(d, BlockDeformation)
             figures = {"block": found.plot()} if whole else {

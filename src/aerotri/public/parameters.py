@@ -70,8 +70,8 @@ def draw_parameters(out: str | os.PathLike, family: str | None = None) -> tuple[
     ('brown',)
     """
     from aerotri.functional_model.additional_parameters import FAMILIES
-    from aerotri.report.plots import save_plots
-    from aerotri.report.plots_parameters import plot_pattern_sheets
+    from aerotri.report.plots.overview import save_plots
+    from aerotri.report.plots.parameters import plot_pattern_sheets
     from aerotri.simulation.cameras import block_camera
     from aerotri.simulation.spec import CameraSpec
 

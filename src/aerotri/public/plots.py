@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from aerotri.statistics.adjusted_block import AdjustedBlock
+    from aerotri.results.adjusted_block import AdjustedBlock
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class AdjustmentPlots:
             For a group that the block does not have.
         """
         from aerotri.image_errors import field_on_grid
-        from aerotri.report.plots_camera import plot_systematic_errors
+        from aerotri.report.plots.camera import plot_systematic_errors
 
         field = field_on_grid(self.adjusted, *self._group(group, camera))
         return plot_systematic_errors(field, self.adjusted.block.name)
@@ -53,7 +53,7 @@ class AdjustmentPlots:
             For a group that the block does not have.
         """
         from aerotri.image_errors import averaged_residuals
-        from aerotri.report.plots_camera import plot_averaged_residuals
+        from aerotri.report.plots.camera import plot_averaged_residuals
 
         name, _, own = self._group(group, camera)
         found = averaged_residuals(self.adjusted, name, camera=own)
@@ -61,19 +61,19 @@ class AdjustmentPlots:
 
     def block_plan(self) -> Figure:
         """Photographs, strips, control and check points in plan."""
-        from aerotri.report.plots import plot_block_plan
+        from aerotri.report.plots.overview import plot_block_plan
 
         return plot_block_plan(self.adjusted)
 
     def ground_points(self) -> Figure:
         """Differences at control and check points as arrows."""
-        from aerotri.report.plots import plot_ground_points
+        from aerotri.report.plots.overview import plot_ground_points
 
         return plot_ground_points(self.adjusted)
 
     def residuals(self) -> Figure:
         """Histogram of the residuals of the image points beside the normal distribution."""
-        from aerotri.report.plots import plot_residual_histogram
+        from aerotri.report.plots.overview import plot_residual_histogram
 
         return plot_residual_histogram(self.adjusted)
 
@@ -86,7 +86,7 @@ class AdjustmentPlots:
             When there are fewer than two.
         """
         from aerotri.conventions import InputError
-        from aerotri.report.plots_residuals import correlated_parameters, plot_correlations
+        from aerotri.report.plots.residuals import correlated_parameters, plot_correlations
 
         if len(correlated_parameters(self.adjusted)) < 2:
             raise InputError("fewer than two parameters are shared by the rays", "adjust with additional parameters")
@@ -94,7 +94,7 @@ class AdjustmentPlots:
 
     def rays_per_point(self) -> Figure:
         """How many photographs the object points were measured in."""
-        from aerotri.report.plots import plot_rays_per_point
+        from aerotri.report.plots.overview import plot_rays_per_point
 
         return plot_rays_per_point(self.adjusted)
 
@@ -107,7 +107,7 @@ class AdjustmentPlots:
             When the external reliability was not computed.
         """
         from aerotri.conventions import InputError
-        from aerotri.report.plots import plot_reliability
+        from aerotri.report.plots.overview import plot_reliability
 
         if self.adjusted.effects is None:
             raise InputError("the external reliability was not computed for this block", "")
@@ -115,7 +115,7 @@ class AdjustmentPlots:
 
     def all(self) -> dict[str, Figure]:
         """Every plot of the report by the name of its file."""
-        from aerotri.report.plots import all_plots
+        from aerotri.report.plots.overview import all_plots
 
         return all_plots(self.adjusted)
 

@@ -8,23 +8,23 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.formats.atomic import atomic_folder
-from aerotri.formats.block_folder import write_block
-from aerotri.formats.result import write_csv, write_result
-from aerotri.formats.solution import write_solution
+from aerotri.formats.block.folder import write_block
+from aerotri.formats.files.atomic import atomic_folder
+from aerotri.formats.results.adjustment import write_csv, write_result
+from aerotri.formats.results.solution import write_solution
 from aerotri.image_errors import group_changes
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 
 if TYPE_CHECKING:
     from aerotri.diagnosis import Finding
+    from aerotri.diagnosis.work_list import WorkList
     from aerotri.image_errors import Change
-    from aerotri.pipeline import Adjustment
-    from aerotri.statistics.adjusted_block import AdjustedBlock
-    from aerotri.statistics.free_verdict import FreeCheck
-    from aerotri.statistics.parameter_comparison import ParameterComparison
+    from aerotri.results.adjusted_block import AdjustedBlock
+    from aerotri.results.adjustment import Adjustment
+    from aerotri.results.parameter_comparison import ParameterComparison
     from aerotri.statistics.parameter_effects import ParameterEffects
-    from aerotri.statistics.work_list import WorkList
+    from aerotri.strategies.free_stages import FreeCheck
 
 RECORD = "adjustment.json"
 RESULT_NAMES = (
@@ -53,8 +53,8 @@ class Evaluation:
 def evaluate(adjustment: Adjustment) -> Evaluation:
     """Compute what the report shows beside the tables."""
     from aerotri.diagnosis import findings
+    from aerotri.diagnosis.work_list import work_list
     from aerotri.statistics.parameter_effects import parameter_effects
-    from aerotri.statistics.work_list import work_list
 
     system, solution = adjustment.system, adjustment.solution
     effects = parameter_effects(adjustment.local, system, solution, system.factorise(solution.equations))
@@ -119,7 +119,7 @@ def write_json(path: Path, content: Any) -> None:
 
 def write_comparison_tables(comparison: ParameterComparison, folder: Path) -> None:
     """Write compare_parameters.json and compare_parameters.csv into a folder."""
-    from aerotri.report.parameter_tables import comparison_columns, comparison_json
+    from aerotri.report.tables.parameters import comparison_columns, comparison_json
 
     write_json(folder / "compare_parameters.json", comparison_json(comparison))
     write_csv(folder / "compare_parameters.csv", comparison_columns(comparison))
@@ -127,7 +127,7 @@ def write_comparison_tables(comparison: ParameterComparison, folder: Path) -> No
 
 def _write_parameter_tables(adjustment: Adjustment, folder: Path) -> None:
     """The differences between groups, and the sets that were compared, where there are any."""
-    from aerotri.report.parameter_tables import changes_columns, changes_json
+    from aerotri.report.tables.parameters import changes_columns, changes_json
 
     changes = group_changes(adjustment.result)
     if changes:
@@ -138,9 +138,9 @@ def _write_parameter_tables(adjustment: Adjustment, folder: Path) -> None:
 
 
 def _draw(adjustment: Adjustment, folder: Path, checked: FreeCheck | None) -> None:
-    from aerotri.report.html import Findings, write_report
-    from aerotri.report.plots import all_plots, save_plots
-    from aerotri.report.plots_comparison import plot_comparison
+    from aerotri.report.pages.adjustment import Findings, write_report
+    from aerotri.report.plots.comparison import plot_comparison
+    from aerotri.report.plots.overview import all_plots, save_plots
 
     found = evaluate(adjustment)
     figures = all_plots(adjustment.result, found.changes)

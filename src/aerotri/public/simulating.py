@@ -67,7 +67,7 @@ class SimulatedBlock:
             When the folder holds files of others, cannot be written to, or has too little room; for a photograph that
             the block does not have.
         """
-        from aerotri.formats.work_place import held
+        from aerotri.formats.files.work_place import held
         from aerotri.simulation.photograph_files import chosen_photographs
 
         target = Path(out)
@@ -87,7 +87,7 @@ class SimulatedBlock:
 
     def _write_block(self, target: Path, chosen: Sequence[int], overwrite: bool) -> None:
         """The block with its truth in one step; photographs of an older one go with it."""
-        from aerotri.formats.block_writer import OWN_ENTRIES
+        from aerotri.formats.block.writer import OWN_ENTRIES
         from aerotri.simulation import write_simulated
         from aerotri.simulation.photograph_files import PHOTOGRAPHS, RECORD, file_name, rendered_before
         from aerotri.simulation.truth import TRUTH

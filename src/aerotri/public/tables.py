@@ -7,16 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 import pyarrow as pa
 
-from aerotri.formats.reliability_columns import control_columns
-from aerotri.formats.result import (
+from aerotri.formats.results.adjustment import (
     ground_point_columns,
     image_columns,
     parameter_columns,
     point_columns,
     residual_table,
 )
+from aerotri.formats.results.reliability_columns import control_columns
 from aerotri.public.table import Table
-from aerotri.statistics.adjusted_block import AdjustedBlock, GroundPointResults
+from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 
 METRES = ("X", "Y", "Z", "X0", "Y0", "Z0", "sX", "sY", "sZ", "sX0", "sY0", "sZ0", "dX", "dY", "dZ")
 DEGREES = ("omega", "phi", "kappa", "s_omega", "s_phi", "s_kappa")

@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.statistics.free_verdict import FreeCheck, Stage, Suspect
+from aerotri.diagnosis.free_verdict import in_words
+from aerotri.strategies.free_stages import FreeCheck, Stage, Suspect
 
 
 def free_check_json(check: FreeCheck) -> dict[str, Any]:
     """A free check as plain values: metres, degrees (attitudes of suspects: rad), null where not known."""
     return {
         "verdict": check.verdict,
-        "sentence": check.sentence,
+        "sentence": in_words(check),
         "sigma0_free": _number(check.stages[0].sigma0),
         "sigma0_full": _number(check.sigma0_full),
         "spread_free": _number(check.spread),

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.formats.atomic import atomic_file
+from aerotri.formats.files.atomic import atomic_file
 from aerotri.observations import Block
-from aerotri.rasters_images import create_image
+from aerotri.rasters.images import create_image
 from aerotri.simulation.rendering import Scene, rendered_rows
 
 PHOTOGRAPHS, RECORD = "photographs", "rendered.json"

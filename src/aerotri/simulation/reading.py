@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from aerotri.conventions import InputError
-from aerotri.formats.toml_text import read_toml
+from aerotri.formats.text.toml_text import read_toml
 from aerotri.simulation import spec as spec_module
 from aerotri.simulation.spec import SimulationSpec, Table
 

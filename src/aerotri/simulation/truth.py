@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.formats.atomic import atomic_folder
+from aerotri.formats.files.atomic import atomic_folder
 from aerotri.observations import Block
 from aerotri.spreadsheet import plain_row
 
@@ -65,8 +65,8 @@ def write_simulated(
     Numbers are rounded to what they can mean, so that another processor writes the same.
     """
     # imported here: those who only simulate need no file formats
-    from aerotri.formats.block_folder import write_block
-    from aerotri.formats.block_writer import OWN_ENTRIES
+    from aerotri.formats.block.folder import write_block
+    from aerotri.formats.block.writer import OWN_ENTRIES
 
     # in one step: a block must never stand beside the truth of another one
     with atomic_folder(folder, own=(*OWN_ENTRIES, TRUTH), gone=gone) as place:

@@ -12,7 +12,7 @@ import numpy as np
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 SAMPLE = 20
 """Check points whose correlations stand for those of all."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from aerotri.observations import Block
 from aerotri.observations.block import INTERIOR_ELEMENTS
-from aerotri.statistics.adjusted_block import AdjustedBlock, GroundPointResults
+from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 from aerotri.statistics.ray_changes import RayChanges, compare_rays, rows_in_common
 
 SAME_COORDINATE = 1e-6

@@ -18,7 +18,7 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.unknowns import ORIENTATION_ELEMENTS, Unknowns
 from aerotri.functional_model.observed_unknowns import Rows
-from aerotri.statistics.adjusted_block import RayEffects
+from aerotri.results.adjusted_block import RayEffects
 from aerotri.statistics.covariance import Cofactors, InnerDatum, orientation_cofactors, to_angles
 from aerotri.statistics.reliability import detectable_share
 

@@ -14,7 +14,7 @@ import numpy as np
 from aerotri.adjustment.prepare import with_edits
 from aerotri.adjustment.shared_parameters import group_of_images
 from aerotri.observations import Block, Control, GnssIns
-from aerotri.statistics.adjusted_block import AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.statistics.outliers import spread, used_rays
 
 CONTROL_GROUPS = ("control plan", "control plan", "control height")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
 from aerotri.statistics.reliability import critical_value
 
 MEDIAN_OF_NORMAL = 0.6744897501960817

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from aerotri.statistics.adjusted_block import AdjustedBlock, SharedParameters
+from aerotri.results.adjusted_block import AdjustedBlock, SharedParameters
 from aerotri.statistics.covariance import correlations
 
 ORIENTATION = ("X0", "Y0", "Z0", "omega", "phi", "kappa")

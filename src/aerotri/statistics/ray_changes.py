@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
 
 SAME_PLACE_MM = 1e-4
 """Image coordinates closer than this are the same measurement."""

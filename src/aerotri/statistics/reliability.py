@@ -15,10 +15,8 @@ import numpy as np
 from scipy.stats import norm
 
 from aerotri.observations import Block
-from aerotri.statistics.adjusted_block import AdjustedBlock, Blunder, GroundPointResults, RayResults
-
-MIN_REDUNDANCY = 1e-6
-"""Redundancy number below which an observation is not controlled by others, and has no test."""
+from aerotri.results.adjusted_block import AdjustedBlock, Blunder, GroundPointResults, RayResults
+from aerotri.results.normalised import MIN_REDUNDANCY
 
 LISTED_BLUNDERS = 100
 
@@ -37,17 +35,6 @@ class Reliability:
     tau: np.ndarray
     detectable: np.ndarray
     external: np.ndarray
-
-
-def normalised_residuals(v: np.ndarray, sigma: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """w = −v/(σ·√r), σ a priori; NaN where r is practically zero.
-
-    Parameters
-    ----------
-    v, sigma : residual and its a-priori σ in one unit. r : redundancy number. Any common shape.
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(r > MIN_REDUNDANCY, -v / (sigma * np.sqrt(np.maximum(r, 0.0))), np.nan)
 
 
 def critical_value(alpha: float) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.statistics.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
 
 USED, SET_ASIDE = "used", "set aside"
 

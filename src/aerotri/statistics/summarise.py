@@ -14,7 +14,7 @@ from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.functional_model.additional_parameters import Parameter
 from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.functional_model.rotation import angles_from_rotation
-from aerotri.statistics.adjusted_block import (
+from aerotri.results.adjusted_block import (
     AdjustedBlock,
     GroundPointResults,
     ImageResults,
@@ -25,10 +25,11 @@ from aerotri.statistics.adjusted_block import (
     RayResults,
     SharedParameters,
 )
+from aerotri.results.normalised import normalised_residuals
 from aerotri.statistics.covariance import Cofactors, cofactors, correlations, orientation_cofactors, total_correlations
 from aerotri.statistics.external_reliability import ray_effects, row_effects
 from aerotri.statistics.held_control import HeldTests, held_tests
-from aerotri.statistics.reliability import detectable_share, normalised_residuals, suspected_blunders
+from aerotri.statistics.reliability import detectable_share, suspected_blunders
 
 OF_POINTS = ("point", "constraint")
 """Kinds of shared parameters that belong to object points and not to cameras or flights."""

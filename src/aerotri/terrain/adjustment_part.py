@@ -12,15 +12,15 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from aerotri.deformation.absorbed import additional_rows, shared_columns
 from aerotri.deformation.model_grid import places_of
-from aerotri.deformation.orientation import Calibration
 from aerotri.deformation.restitution import Restitution
 from aerotri.functional_model.collinearity import linearise
+from aerotri.results.adjustment import Adjustment
 from aerotri.terrain.pickets import Pickets
 
 MOST_PLACES, AT_A_TIME = 500, 100
 
 
-def adjustment_variances(calibration: Calibration, of: Restitution, rows: np.ndarray, pickets: Pickets) -> np.ndarray:
+def adjustment_variances(calibration: Adjustment, of: Restitution, rows: np.ndarray, pickets: Pickets) -> np.ndarray:
     """(n, 3) m², in the CRS, of pickets that were measured; NaN of others.
 
     Parameters
@@ -51,7 +51,7 @@ def adjustment_variances(calibration: Calibration, of: Restitution, rows: np.nda
     return out
 
 
-def _by_unknowns(calibration: Calibration, of: Restitution, rows, local: np.ndarray, photographs) -> np.ndarray:
+def _by_unknowns(calibration: Adjustment, of: Restitution, rows, local: np.ndarray, photographs) -> np.ndarray:
     """(n, 3, u) partials of intersected points by the unknowns of the reduced system."""
     u, state = calibration.system.unknowns, calibration.solution.state
     in_system = np.full(len(of.group), -1)

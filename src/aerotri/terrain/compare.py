@@ -17,7 +17,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.ndimage import map_coordinates
 
 from aerotri.conventions import InputError
-from aerotri.rasters import Grid, RasterReader
+from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.terrain.tin import Tin, triangulate
 
 METHODS = ("linear", "spline")

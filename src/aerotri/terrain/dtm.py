@@ -13,8 +13,8 @@ from aerotri.adjustment.track import along_strip
 from aerotri.conventions import InputError
 from aerotri.deformation.block_models import strip_pairs
 from aerotri.deformation.model_geometry import geometry_of
-from aerotri.deformation.orientation import Calibration
 from aerotri.deformation.stereo_model import pair_model
+from aerotri.results.adjustment import Adjustment
 from aerotri.terrain.adjustment_part import adjustment_variances
 from aerotri.terrain.error_pickets import with_error_pickets
 from aerotri.terrain.interval import interval_of_gsd, interval_of_surface, k_of_slope
@@ -86,7 +86,7 @@ class TerrainOutcome:
     photographs: Photographs
 
 
-def chosen_rows(calibration: Calibration, subset: str) -> np.ndarray:
+def chosen_rows(calibration: Adjustment, subset: str) -> np.ndarray:
     """Oriented photographs of the block: all, or every second one of each strip, from its first or its second on.
 
     They count along the flight, so that even and odd ones of a flight with 80 % end lap make blocks with 60 %.
@@ -106,7 +106,7 @@ def chosen_rows(calibration: Calibration, subset: str) -> np.ndarray:
     return found[oriented[found]]
 
 
-def make_terrain_model(calibration: Calibration, plan: TerrainPlan, report: Report | None = None) -> TerrainOutcome:
+def make_terrain_model(calibration: Adjustment, plan: TerrainPlan, report: Report | None = None) -> TerrainOutcome:
     """Measure pickets, find those in error, make surfaces.
 
     Raises
@@ -183,7 +183,7 @@ def base_ratio(photographs: Photographs, pickets: Pickets) -> float:
     return float(np.median(np.hypot(*(a - b)[:, :2].T) / height))
 
 
-def models_of(calibration: Calibration, photographs: Photographs, step: int | None = None) -> Models:
+def models_of(calibration: Adjustment, photographs: Photographs, step: int | None = None) -> Models:
     """The pairs that photographs make along their strips, at the step that comes nearest to 60 % end lap.
 
     Raises

@@ -17,10 +17,11 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.deformation.error_tables import ErrorTables, error_tables
 from aerotri.deformation.model_grid import Places, mean_ground, places_of
-from aerotri.deformation.orientation import Calibration, Orientation, photo_rows
+from aerotri.deformation.orientation import Orientation, photo_rows
 from aerotri.deformation.photo_errors import PhotoErrors
 from aerotri.deformation.restitution import FREE, Restitution, restitution
-from aerotri.rasters_images import open_photograph
+from aerotri.rasters.images import open_photograph
+from aerotri.results.adjustment import Adjustment
 from aerotri.terrain._view_kernels import View
 
 CACHE_BYTES = 3 << 30
@@ -193,7 +194,7 @@ class Site:
 
 
 def photographs_of(
-    calibration: Calibration, rows: np.ndarray, paths: Sequence[Path], ideal: bool = False
+    calibration: Adjustment, rows: np.ndarray, paths: Sequence[Path], ideal: bool = False
 ) -> Photographs:
     """Photographs of an adjusted block, their image errors being those of its additional parameters.
 

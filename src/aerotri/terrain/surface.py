@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation, distance_transform_edt, grey_opening
 
 from aerotri.memory import fitting, refuse_beyond_memory
-from aerotri.rasters import Grid
+from aerotri.rasters.grids import Grid
 from aerotri.terrain.tin import triangulate
 
 LONGEST_SIDE = 2.6

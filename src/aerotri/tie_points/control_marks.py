@@ -11,9 +11,9 @@ import numpy as np
 
 from aerotri.conventions import px_from_mm
 from aerotri.coordinates.blocks import frame_of_block
-from aerotri.formats import placing
-from aerotri.formats.names_match import match_photographs
-from aerotri.formats.parts import PointList
+from aerotri.formats.assembly import placing
+from aerotri.formats.assembly.names_match import match_photographs
+from aerotri.formats.assembly.parts import PointList
 from aerotri.functional_model.collinearity import interior_row, predict
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block

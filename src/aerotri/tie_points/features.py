@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.formats.atomic import atomic_file
+from aerotri.formats.files.atomic import atomic_file
 
 FIRST_PIXEL = 0.5
 CONTRAST_THRESHOLD, EDGE_THRESHOLD, LAYERS, SIGMA = 0.015, 10.0, 3, 1.6
@@ -129,7 +129,7 @@ def grey_8bit(path: Path) -> np.ndarray:
     ------
     InputError
     """
-    from aerotri.rasters_images import open_photograph
+    from aerotri.rasters.images import open_photograph
 
     with open_photograph(path) as photograph:
         pixels = photograph.read(0, photograph.rows)
@@ -166,7 +166,7 @@ def _key(path: Path, options: FeatureOptions) -> str:
 
 def _kept(path: Path, key: str) -> Features | None:
     """Features from disk, None where there are none or they belong to something else."""
-    from aerotri.formats.npz import read_kept
+    from aerotri.formats.files.npz import read_kept
 
     wanted = {"key": ("U", ()), "xy": ("f", (None, 2)), "descriptors": ("fiu", (None, 128)), "sigma_px": ("f", ())}
     kept = read_kept(path, wanted)

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import InputError, px_from_mm
-from aerotri.formats.colmap import COLMAP_FROM_CAMERA, SIGN
-from aerotri.formats.reprojection import ideal_tangents
+from aerotri.formats.assembly.reprojection import ideal_tangents
+from aerotri.formats.foreign.colmap import COLMAP_FROM_CAMERA, SIGN
 from aerotri.observations import Block, Camera, Prior
 
 LENS_IN_MAPPING = ("k1", "k2")

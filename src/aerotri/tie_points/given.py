@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from aerotri.coordinates.georeference import is_projected, utm_crs
-from aerotri.formats import assemble, placing
-from aerotri.formats.assemble_control import with_check_points, with_control
-from aerotri.formats.names_match import match_photographs
-from aerotri.formats.parts import OrientationList, PointList, PositionList, Reading, no_sigma
+from aerotri.formats.assembly import assemble, placing
+from aerotri.formats.assembly.assemble_control import with_check_points, with_control
+from aerotri.formats.assembly.names_match import match_photographs
+from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, Reading, no_sigma
 from aerotri.observations import Block
 from aerotri.tie_points.photographs import PhotographSet
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.adjustment.parallel import thread_count
-from aerotri.formats.atomic import atomic_file
+from aerotri.formats.files.atomic import atomic_file
 from aerotri.observations import Camera
 from aerotri.tie_points import _kernels
 from aerotri.tie_points.features import Features
@@ -174,7 +174,7 @@ def _kept(path: Path, sizes: Mapping[str, tuple[int, int]]) -> dict[str, np.ndar
     ----------
     sizes : numbers of features of the two photographs, by key.
     """
-    from aerotri.formats.npz import read_kept
+    from aerotri.formats.files.npz import read_kept
 
     found = {}
     for key, size in sizes.items():

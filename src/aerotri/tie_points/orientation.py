@@ -11,9 +11,9 @@ from aerotri.adjustment.track import strips_of_track
 from aerotri.conventions import InputError
 from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block
-from aerotri.formats import assemble
-from aerotri.formats.parts import OrientationList, PositionList, Reading, no_sigma
-from aerotri.formats.reprojection import reproject
+from aerotri.formats.assembly import assemble
+from aerotri.formats.assembly.parts import OrientationList, PositionList, Reading, no_sigma
+from aerotri.formats.assembly.reprojection import reproject
 from aerotri.functional_model.rotation import angles_from_rotation, exponential, rotation_from_angles
 from aerotri.observations import Block, Camera
 from aerotri.tie_points.first_orientation import Mapped, map_incrementally

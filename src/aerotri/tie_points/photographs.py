@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.formats.exif import PhotographTags, read_exif
-from aerotri.formats.parts import texts
-from aerotri.formats.photograph_files import files_of
+from aerotri.formats.assembly.parts import texts
+from aerotri.formats.files.photograph_files import files_of
+from aerotri.formats.foreign.exif import PhotographTags, read_exif
 from aerotri.observations import Camera, Prior
 
 ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff")

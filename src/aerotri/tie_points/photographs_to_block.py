@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError, mm_from_px
-from aerotri.formats import assemble
-from aerotri.formats.parts import PositionList, Reading, no_sigma
-from aerotri.formats.reprojection import reproject
+from aerotri.formats.assembly import assemble
+from aerotri.formats.assembly.parts import PositionList, Reading, no_sigma
+from aerotri.formats.assembly.reprojection import reproject
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Settings
 from aerotri.observations.block import GnssSettings
 from aerotri.tie_points.features import FeatureOptions, Features, features_of

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerotri.formats.reprojection import reproject
+from aerotri.formats.assembly.reprojection import reproject
 from aerotri.observations import Block
 
 ROUNDS = 6

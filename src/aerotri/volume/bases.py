@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from aerotri.conventions import InputError, stated_number
-from aerotri.rasters import Grid
+from aerotri.rasters.grids import Grid
 from aerotri.volume.boundary import Boundary
 
 MOST_NODES = 400

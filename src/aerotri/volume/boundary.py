@@ -11,9 +11,9 @@ from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
 from aerotri.conventions import InputError
-from aerotri.polygons import VECTOR_ENDINGS, placed, polygon_features, polygon_of_wkt, srid_of_wkt
-from aerotri.rasters import Grid, rasterise
-from aerotri.vector_crs import vector_system
+from aerotri.rasters.grids import Grid, rasterise
+from aerotri.vectors.crs import vector_system
+from aerotri.vectors.polygons import VECTOR_ENDINGS, placed, polygon_features, polygon_of_wkt, srid_of_wkt
 
 
 @dataclass(frozen=True, eq=False)

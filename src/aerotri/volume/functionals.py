@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from aerotri.rasters import Grid
+from aerotri.rasters.grids import Grid
 from aerotri.terrain.tin import corners_in_plan
 from aerotri.volume.bases import Base, SplineBase, Surface
 from aerotri.volume.boundary import Boundary

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.deformation.orientation import Calibration
-from aerotri.rasters import Grid
+from aerotri.rasters.grids import Grid
+from aerotri.results.adjustment import Adjustment
 from aerotri.volume.bases import Base, Surface
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.functionals import Functional, cell_volume, tin_volume
@@ -69,7 +69,7 @@ class Part:
     measured : what the surface was measured from; None where nobody asks for it.
     """
 
-    calibration: Calibration
+    calibration: Adjustment
     response: Response
     between: Between | None
     pickets: int
@@ -79,7 +79,7 @@ class Part:
 
 
 def part_of_cells(
-    calibration: Calibration, surface: Surface, boundary: Boundary, base: Base | None, options: SigmaOptions
+    calibration: Adjustment, surface: Surface, boundary: Boundary, base: Base | None, options: SigmaOptions
 ) -> Part:
     """The share of a surface whose cells are taken for its pickets, measured in the photographs nearest to them."""
     functional = cell_volume(surface, boundary, base)
@@ -98,7 +98,7 @@ def part_of_cells(
 
 
 def part_of_pickets(
-    calibration: Calibration, pickets: Pickets, triangles: np.ndarray, boundary: Boundary, base: Base | None,
+    calibration: Adjustment, pickets: Pickets, triangles: np.ndarray, boundary: Boundary, base: Base | None,
     options: SigmaOptions,
 ) -> Part:  # fmt: skip
     """The share of a TIN of pickets whose photographs are known."""
@@ -117,7 +117,7 @@ def part_of_pickets(
     return Part(calibration, response, between, len(pickets), len(pickets.image), unseen, measured)
 
 
-def matching_sigma_mm(calibration: Calibration, options: SigmaOptions) -> float:
+def matching_sigma_mm(calibration: Adjustment, options: SigmaOptions) -> float:
     """mm, of an image coordinate of a picket."""
     um = calibration.local.outcome.sigma0_um if options.matching_sigma_um is None else options.matching_sigma_um
     return 1e-3 * um

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.deformation.orientation import Calibration, calibrated_orientation
+from aerotri.deformation.orientation import calibrated_orientation
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.observations import Block
+from aerotri.results.adjustment import Adjustment
 from aerotri.volume import _response_kernels as _kernels
 
 CANDIDATES_EVERY = 64
@@ -71,7 +72,7 @@ def pickets_of_names(block: Block, xyz: np.ndarray, names: list[list[str]], sigm
 
 
 def pickets_where_seen(
-    calibration: Calibration, xyz: np.ndarray, sigma_mm: float, per_point: int = PER_POINT,
+    calibration: Adjustment, xyz: np.ndarray, sigma_mm: float, per_point: int = PER_POINT,
     noise_share: np.ndarray | None = None,
 ) -> tuple[Pickets, np.ndarray]:  # fmt: skip
     """Pickets at places of a surface, in the photographs nearest to them that see them.
@@ -122,7 +123,7 @@ def _candidates(local, number, orientation, half, known) -> tuple[np.ndarray, np
     return first, np.concatenate([*lists, np.zeros(0, np.int64)]).astype(np.int64)
 
 
-def height_cofactors(calibration: Calibration, pickets: Pickets) -> np.ndarray:
+def height_cofactors(calibration: Adjustment, pickets: Pickets) -> np.ndarray:
     """(k,) m², variance of the height of every picket from the σ of its rays, its orientation known."""
     local = pickets.xyz if calibration.frame is None else calibration.frame.to_local(pickets.xyz)
     orientation = calibrated_orientation(calibration)
@@ -139,7 +140,7 @@ def height_cofactors(calibration: Calibration, pickets: Pickets) -> np.ndarray:
     return np.linalg.inv(normal)[:, 2, 2]
 
 
-def with_height_sigmas(calibration: Calibration, pickets: Pickets, sigma: np.ndarray) -> Pickets:
+def with_height_sigmas(calibration: Adjustment, pickets: Pickets, sigma: np.ndarray) -> Pickets:
     """The pickets with the noise that their own σ of height state, (k,) m; NaN keeps what their rays give."""
     stated = sigma**2 / height_cofactors(calibration, pickets)
     return replace(pickets, noise_share=np.where(np.isfinite(sigma), stated, pickets.noise_share))

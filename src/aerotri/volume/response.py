@@ -20,13 +20,14 @@ from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.conventions import InputError
 from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials, additional_rows, shared_columns
-from aerotri.deformation.orientation import Calibration, calibrated_orientation
+from aerotri.deformation.orientation import calibrated_orientation
 from aerotri.deformation.photo_errors import PhotoErrors, errors_by_image, seams_mm
 from aerotri.functional_model.additional_parameters import Parameter
 from aerotri.functional_model.additional_parameters.registry import INTERIOR_FAMILIES
 from aerotri.functional_model.rotation import logarithm
 from aerotri.image_errors.tile_grid import Tile, tiles_of
 from aerotri.observations import Camera
+from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.covariance import inner_datum
 from aerotri.volume import _response_kernels as _kernels
 from aerotri.volume.pickets import Pickets
@@ -85,7 +86,7 @@ class _Nodes:
     of_group: list[slice]
 
 
-def respond(calibration: Calibration, pickets: Pickets, gradient: np.ndarray, corrected: bool = True) -> Response:
+def respond(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, corrected: bool = True) -> Response:
     """The response of a linear functional of pickets.
 
     Parameters
@@ -123,12 +124,12 @@ def respond(calibration: Calibration, pickets: Pickets, gradient: np.ndarray, co
     return Response(c, solved, variance, noise, by_eo, by_interior, by_parameters, error)
 
 
-def covariance(calibration: Calibration, first: Response, second: Response) -> float:
+def covariance(calibration: Adjustment, first: Response, second: Response) -> float:
     """Covariance that the adjustment brings to two functionals of one block."""
     return calibration.local.outcome.sigma0**2 * float(first.unknowns @ second.solved)
 
 
-def control_response(calibration: Calibration, response: Response) -> np.ndarray:
+def control_response(calibration: Adjustment, response: Response) -> np.ndarray:
     """(P, 3) ∂V by the given coordinates of the control points, in the order of the system's points."""
     system = calibration.system
     u = system.unknowns
@@ -140,7 +141,7 @@ def control_response(calibration: Calibration, response: Response) -> np.ndarray
     return u.prior_weight * points[:, :, 0]
 
 
-def systematic(calibration: Calibration, response: Response, variant: str = "free") -> Systematic:
+def systematic(calibration: Adjustment, response: Response, variant: str = "free") -> Systematic:
     """What the image errors in force do to the functional when the photographs were used uncorrected.
 
     Raises
@@ -165,7 +166,7 @@ def systematic(calibration: Calibration, response: Response, variant: str = "fre
     return Systematic(variant, value, float(np.sqrt(max(by_parameters @ q @ by_parameters, 0.0))))
 
 
-def _summed(calibration: Calibration, pickets: Pickets, gradient: np.ndarray, photos, nodes: _Nodes):
+def _summed(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, photos, nodes: _Nodes):
     """Sums over the pickets, in threads: by orientation, by interior elements, at the nodes, and the noise."""
     u = calibration.system.unknowns
     row_of = np.full(len(u.block.images), -1, np.int64)
@@ -194,7 +195,7 @@ def _summed(calibration: Calibration, pickets: Pickets, gradient: np.ndarray, ph
     return by_eo, by_interior, deposits, float(sum(out[3][0] for out in outs))
 
 
-def _in_frame(calibration: Calibration, xyz: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _in_frame(calibration: Adjustment, xyz: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places counted from the local origin, and the gradient along the axes there.
 
     The partials of the CRS are those in the middle of the pickets: they change by 1e-4 in a kilometre.
@@ -207,7 +208,7 @@ def _in_frame(calibration: Calibration, xyz: np.ndarray, gradient: np.ndarray) -
     return np.ascontiguousarray(local - origin), np.ascontiguousarray(gradient @ partials)
 
 
-def _in_unknowns(calibration: Calibration, by_eo, by_interior, by_parameters, corrected: bool) -> np.ndarray:
+def _in_unknowns(calibration: Adjustment, by_eo, by_interior, by_parameters, corrected: bool) -> np.ndarray:
     """c in the order of the reduced system; a parameter that is corrected for moves V against what its error does."""
     u, state = calibration.system.unknowns, calibration.solution.state
     turned = by_eo.copy()
@@ -224,7 +225,7 @@ def _in_unknowns(calibration: Calibration, by_eo, by_interior, by_parameters, co
     return np.concatenate([(turned * u.eo_free).ravel(), shared])
 
 
-def _inner_correction(calibration: Calibration, factor: Factor, c: np.ndarray) -> float:
+def _inner_correction(calibration: Adjustment, factor: Factor, c: np.ndarray) -> float:
     """What leads from the cofactor in the minimal datum to that in the inner one, see `statistics.covariance`."""
     system, solution = calibration.system, calibration.solution
     inner = inner_datum(system, solution.state, factor, solution.estimator)

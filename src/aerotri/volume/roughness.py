@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
-from aerotri.rasters import Grid
+from aerotri.rasters.grids import Grid
 from aerotri.volume.triangles import areas
 
 SMOOTHEST, ROUGHEST = 2.5, 0.05

@@ -12,7 +12,7 @@ import hashlib
 
 import numpy as np
 
-from aerotri.deformation.orientation import Calibration
+from aerotri.results.adjustment import Adjustment
 from aerotri.volume.parts import Measured, Part
 from aerotri.volume.pickets import Pickets
 from aerotri.volume.response import control_response, respond
@@ -22,7 +22,7 @@ SAME_PLACE_M = 1e-6
 """Pickets at one place with one height, in the same photographs, are the same measurement."""
 
 
-def adjustment_key(calibration: Calibration) -> str:
+def adjustment_key(calibration: Adjustment) -> str:
     """A short text that two adjustments have in common only when they are the same one."""
     system, state = calibration.system, calibration.solution.state
     digest = hashlib.sha256("\n".join(system.unknowns.block.images.names.astype(str)).encode())

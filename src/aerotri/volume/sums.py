@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.rasters import Grid
+from aerotri.rasters.grids import Grid
 from aerotri.volume import _kernels
 from aerotri.volume.bases import Base, Surface
 from aerotri.volume.boundary import Boundary

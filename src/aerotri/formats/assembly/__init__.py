@@ -1,0 +1,1 @@
+"""A block put together from several files."""

@@ -1,0 +1,104 @@
+"""Control and check points added to a block from a list of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.formats.assembly import placing
+from aerotri.formats.assembly.assemble import Statements, given_or_stated, padded, refuse_local
+from aerotri.formats.assembly.parts import PointList, Reading, no_sigma
+from aerotri.observations import Block, Control
+from aerotri.observations.names import in_words, prefix_of, quoted
+
+HEIGHTS = ("crs", "ellipsoidal")
+
+
+def with_control(reading: Reading, given: PointList, stated: Statements) -> Reading:
+    """Control points, beside those there are.
+
+    Raises
+    ------
+    InputError
+        When none of them is measured, one is there already, a standard deviation is missing, or the axes are exchanged.
+    """
+    block = reading.block
+    if not len(given.points):
+        raise InputError("holds no points", "give a row for each", given.path)
+    names = np.array([stated.control_prefix + name for name in given.points.tolist()], dtype=str)
+    place = {name: i for i, name in enumerate(block.points.tolist())}
+    measured = np.array([name in place for name in names.tolist()], bool)
+    if len(block.image_points) and not measured.any():
+        others = block.points.astype(str).tolist()
+        prefix = prefix_of(given.points.astype(str).tolist(), others)
+        remedy = "use the same names"
+        if prefix is not None:
+            remedy = f"state what stands before them: --control-prefix {quoted(prefix)}"
+        raise InputError(f"none of its points is measured: {in_words(names.tolist(), others)}", remedy, given.path)
+    messages = [*reading.messages, *given.messages]
+    if not measured.all() and len(block.image_points):
+        others = np.setdiff1d(block.points, names[measured]).astype(str).tolist()
+        missing = in_words(names[~measured].tolist(), others)
+        messages.append(f"{given.path.name}: {int((~measured).sum())} points are not measured: {missing}")
+    for name in names.tolist():
+        place.setdefault(name, len(place))
+    point = np.array([place[name] for name in names.tolist()], dtype=np.int64)
+    twice = np.isin(point, block.control.point)
+    if twice.any():
+        message = f"point '{names[np.flatnonzero(twice)[0]]}' has coordinates already"
+        raise InputError(message, "give them once", given.path)
+    xyz, said = _in_block(block, given, stated)
+    messages += said
+    observed = no_sigma(0) if block.gnss_ins is None else block.gnss_ins.xyz
+    placing.refuse_exchanged_axes(xyz, np.vstack([block.images.centre, observed]), given.path)
+    known = np.isfinite(xyz)
+    sigma = np.where(known, given.sigma, 1.0)
+    sigma = np.where(known, given_or_stated(sigma, stated.control_sigma_m, given.path, "--control-sigma-m"), np.nan)
+    old, points = block.control, np.array(list(place), dtype=str)
+    both = Control(
+        np.concatenate([old.point, point]),
+        np.vstack([old.xyz, xyz]),
+        np.vstack([old.sigma, sigma]),
+        np.concatenate([old.is_check, given.is_check]),
+    )
+    start = None if reading.points is None else padded(reading.points, len(points))
+    return Reading(replace(block, points=points, control=both), start, tuple(messages))
+
+
+def _in_block(block: Block, given: PointList, stated: Statements) -> tuple[np.ndarray, list[str]]:
+    """(k, 3) coordinates in the block's CRS, and what to say of it."""
+    if stated.control_heights not in HEIGHTS:
+        raise InputError(f"--control-heights {stated.control_heights}", f"it is {' or '.join(HEIGHTS)}")
+    if given.crs:
+        refuse_local(block, given.crs, given.path)
+        return placing.to_crs(given.xyz, given.crs, block.crs, stated.geoid), []
+    if "ellipsoidal" in (stated.control_heights, given.heights) and "+" in block.crs:
+        xyz = placing.from_ellipsoidal_heights(given.xyz, block.crs, stated.geoid)
+        return xyz, [f"{given.path.name}: ellipsoidal heights were brought to those of {block.crs}"]
+    if stated.control_heights == "ellipsoidal":
+        raise InputError(f"--control-heights ellipsoidal, but {block.crs} has no others", "leave it out")
+    return given.xyz, []
+
+
+def with_check_points(reading: Reading, names: tuple[str, ...], prefix: str = "") -> Reading:
+    """Control points made check points.
+
+    Raises
+    ------
+    InputError
+        For a name that is no control point.
+    """
+    if not names:
+        return reading
+    block = reading.block
+    control = block.points[block.control.point]
+    is_check = block.control.is_check.copy()
+    for name in names:
+        own = np.flatnonzero((control == name) | (control == prefix + name))
+        if not len(own):
+            known = ", ".join(control[:8].tolist())
+            raise InputError(f"--check {name}: there is no such control point", f"there are {known}")
+        is_check[own] = True
+    return replace(reading, block=replace(block, control=replace(block.control, is_check=is_check)))

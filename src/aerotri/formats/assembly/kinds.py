@@ -1,0 +1,177 @@
+"""The kinds of files a block is put together from, by what they hold: how they are told and read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, RayList
+from aerotri.formats.foreign.bingo import is_bingo, read_bingo
+from aerotri.formats.foreign.ign import is_ign_app, is_ign_mes, is_ign_opk, read_ign_app, read_ign_mes, read_ign_opk
+from aerotri.formats.foreign.metashape import is_metashape, read_metashape
+from aerotri.formats.foreign.named_lists import (
+    is_named_list,
+    is_named_orientations,
+    read_control_list,
+    read_named_orientations,
+    read_positions,
+)
+from aerotri.formats.foreign.odm import is_odm_gcp, is_odm_geo, read_odm_gcp, read_odm_geo
+from aerotri.formats.foreign.orientation_list import is_orientation_list, read_orientation_list
+from aerotri.formats.foreign.patb import (
+    ROTATIONS,
+    is_patb_con,
+    is_patb_im,
+    is_patb_ori,
+    read_patb_con,
+    read_patb_im,
+    read_patb_ori,
+)
+from aerotri.formats.foreign.pix4d import (
+    AXES,
+    is_pix4d_eo,
+    is_pix4d_gcp,
+    is_pix4d_geo,
+    read_pix4d_eo,
+    read_pix4d_gcp,
+    read_pix4d_geo,
+)
+
+
+@dataclass(frozen=True)
+class ReadingOptions:
+    """What single formats leave open.
+
+    Parameters
+    ----------
+    axes : 'xy' or 'yx', the order of coordinates in lists of Pix4D.
+    offset : (3,) m, added to orientations of Pix4D; None: nothing.
+    patb_rotation : see `patb.ROTATIONS`; None: settled by reprojection.
+    """
+
+    axes: str = "xy"
+    offset: np.ndarray | None = None
+    patb_rotation: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.axes not in AXES:
+            raise InputError(f"--axes {self.axes}", "it is xy or yx")
+        if self.patb_rotation is not None and self.patb_rotation not in ROTATIONS:
+            raise InputError(f"--patb-rotation {self.patb_rotation}", f"it is {' or '.join(ROTATIONS)}")
+
+
+Kinds = Mapping[str, tuple[Callable[[Path], bool], Callable[[Path, ReadingOptions], Any]]]
+RAYS: Kinds = {
+    "patb-im": (is_patb_im, lambda path, _: read_patb_im(path)),
+    "bingo": (is_bingo, lambda path, _: read_bingo(path)),
+    "ign-mes": (is_ign_mes, lambda path, _: read_ign_mes(path)),
+    "odm-gcp": (is_odm_gcp, lambda path, _: read_odm_gcp(path).rays),
+}
+ORIENTATIONS: Kinds = {
+    "pix4d-eo": (is_pix4d_eo, lambda path, options: read_pix4d_eo(path, options.offset)),
+    "metashape": (is_metashape, lambda path, _: read_metashape(path)),
+    "ign-opk": (is_ign_opk, lambda path, _: read_ign_opk(path)),
+    "patb-ori": (is_patb_ori, lambda path, options: read_patb_ori(path, options.patb_rotation)),
+    "opk-list": (is_orientation_list, lambda path, _: read_orientation_list(path)),
+    "opk-csv": (is_named_orientations, lambda path, _: read_named_orientations(path)),
+}
+POSITIONS: Kinds = {
+    "odm-geo": (is_odm_geo, lambda path, _: read_odm_geo(path)),
+    "csv": (is_named_list, lambda path, _: read_positions(path)),
+    "pix4d-geo": (is_pix4d_geo, lambda path, options: read_pix4d_geo(path, options.axes)),
+}
+CONTROL: Kinds = {
+    "odm-gcp": (is_odm_gcp, lambda path, _: read_odm_gcp(path)),
+    "csv": (is_named_list, lambda path, _: read_control_list(path)),
+    "pix4d-gcp": (is_pix4d_gcp, lambda path, options: read_pix4d_gcp(path, options.axes)),
+    "ign-app": (is_ign_app, lambda path, _: read_ign_app(path)),
+    "patb-con": (is_patb_con, lambda path, _: read_patb_con(path)),
+}
+
+
+def split_kind(text: str, *known: Mapping[str, Any]) -> tuple[str | None, Path]:
+    """Kind and path of ``kind:PATH``; no kind where what stands before the colon is none of the known."""
+    kind, colon, path = text.partition(":")
+    if colon and any(kind in kinds for kinds in known):
+        return kind, Path(path)
+    return None, Path(text)
+
+
+def kind_of(path: Path, kinds: Kinds) -> str | None:
+    """The kind of a file, None where it is none of these.
+
+    Raises
+    ------
+    InputError
+        When there is no such file.
+    """
+    if not path.exists():
+        raise InputError("there is no such file or folder", "check the path", path)
+    return next((name for name, (recognises, _) in kinds.items() if recognises(path)), None)
+
+
+def _read(text: str, kinds: Kinds, what: str, options: ReadingOptions) -> Any:
+    stated, path = split_kind(text, kinds)
+    kind = kind_of(path, kinds) if stated is None else stated
+    if kinds is ORIENTATIONS and kind != "pix4d-eo" and options.offset is not None:
+        raise InputError("is no orientation of Pix4D, to which an offset belongs", "leave --offset out", path)
+    if kind is None:
+        known = ", ".join(kinds)
+        raise InputError(f"is of no known kind of {what}", f"known are {known}; state it as kind:PATH", path)
+    if path.is_dir():
+        raise InputError(f"is a folder, not a file of {what}", "give the file", path)
+    return kinds[kind][1](path, options)
+
+
+def read_rays(text: str, options: ReadingOptions) -> RayList:
+    """Image points from ``PATH`` or ``kind:PATH``.
+
+    Raises
+    ------
+    InputError
+    """
+    return _read(text, RAYS, "image points", options)
+
+
+def read_orientations(text: str, options: ReadingOptions) -> OrientationList:
+    """Orientations from ``PATH`` or ``kind:PATH``.
+
+    Raises
+    ------
+    InputError
+    """
+    return _read(text, ORIENTATIONS, "orientations", options)
+
+
+def read_position_list(text: str, options: ReadingOptions) -> PositionList:
+    """Observed positions from ``PATH`` or ``kind:PATH``.
+
+    Raises
+    ------
+    InputError
+    """
+    return _read(text, POSITIONS, "positions", options)
+
+
+def read_control(text: str, options: ReadingOptions) -> PointList:
+    """Control points from ``PATH`` or ``kind:PATH``.
+
+    Raises
+    ------
+    InputError
+    """
+    return _read(text, CONTROL, "control points", options)
+
+
+def axes_of(crs: str) -> str:
+    """The usual order in lists without names: east before north, but latitude before longitude."""
+    from aerotri.coordinates.georeference import georeference
+
+    if not crs or crs == "local":
+        return "xy"
+    return "xy" if georeference(crs.partition("+")[0], np.zeros((0, 3))).is_projected else "yx"

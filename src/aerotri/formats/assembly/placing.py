@@ -1,0 +1,199 @@
+"""Coordinates and attitudes of files brought into the CRS of a block."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.coordinates import local_frame
+from aerotri.coordinates.blocks import frame_of_block, transform_block
+from aerotri.coordinates.georeference import CRS_PATTERN, CRS_REMEDY, Georeference, georeference
+from aerotri.formats.assembly.oriented import OrientedBlock
+from aerotri.formats.foreign.ign import without_linear_alteration
+
+NORTH_STEP_DEG = 1e-5
+"""Half the length of the piece of meridian that gives the direction of north in a grid: 1 m."""
+BODY = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+"""Between x forward, y right, z down and x right, y forward, z up; its own inverse."""
+FAR_M = 1e4
+NEARER = 0.1
+
+
+def horizontal_part(crs: str) -> str:
+    """The CRS without its height system."""
+    return crs.partition("+")[0]
+
+
+def known_crs(crs: str) -> str:
+    """A CRS as block.toml has it, '' or 'local' as they are.
+
+    Raises
+    ------
+    InputError
+        When PROJ does not know it, or a block cannot be in it; of a height system only the form is looked at.
+    """
+    if crs in ("", "local"):
+        return crs
+    georeference(horizontal_part(crs), np.zeros((0, 3)))
+    if not CRS_PATTERN.fullmatch(crs):
+        raise InputError(f"crs '{crs}' is not understood", CRS_REMEDY)
+    return crs.upper()
+
+
+def to_crs(xyz: np.ndarray, source: str, target: str, geoid: str | os.PathLike | None) -> np.ndarray:
+    """Coordinates of one CRS in another on the same datum.
+
+    Parameters
+    ----------
+    xyz : (n, 3) in `source`, NaN where unknown; a row with an unknown coordinate stays partly unknown.
+    geoid : grid for the heights of `target`, where PROJ does not have it.
+
+    Raises
+    ------
+    InputError
+        When the datums differ, since the shift between them would have to be chosen.
+    """
+    if source == target or not len(xyz):
+        return xyz
+    plan = np.isfinite(xyz[:, :2]).all(axis=1)
+    if not plan.all():
+        message = f"a point in {source} has no plan position and cannot be brought to {target}"
+        raise InputError(message, f"give it in {target}")
+    known = np.isfinite(xyz[:, 2])
+    here, plain = georeference(source, xyz), georeference(horizontal_part(target), xyz)
+    geographic = here.to_geographic(np.where(np.isnan(xyz), 0.0, xyz))
+    there = georeference(target, plain.from_geographic(geographic), geoid)
+    if _datum(here) != _datum(there):
+        remedy = f"transform the coordinates to {target} beforehand"
+        raise InputError(f"{source} and {target} are on different datums", remedy)
+    found = there.from_geographic(geographic)
+    return np.column_stack([found[:, :2], np.where(known, found[:, 2], np.nan)])
+
+
+def _datum(reference: Georeference) -> str:
+    target = reference.horizontal.target_crs
+    return "" if target is None or target.datum is None else target.datum.name.replace(" ensemble", "")
+
+
+def from_ellipsoidal_heights(xyz: np.ndarray, crs: str, geoid: str | os.PathLike | None) -> np.ndarray:
+    """Points in the plan coordinates of a CRS and ellipsoidal heights, with the heights of the CRS.
+
+    Parameters
+    ----------
+    xyz : (n, 3), NaN where unknown.
+
+    Raises
+    ------
+    InputError
+        When a point has a height but no plan position.
+    """
+    known = np.isfinite(xyz[:, 2])
+    if (known & ~np.isfinite(xyz[:, :2]).all(axis=1)).any():
+        raise InputError("a point has an ellipsoidal height but no plan position", f"give its height in {crs}")
+    if not known.any():
+        return xyz
+    found = xyz.copy()
+    plain = georeference(horizontal_part(crs), xyz[known])
+    reference = georeference(crs, xyz[known], geoid)
+    found[known, 2] = reference.from_geographic(plain.to_geographic(xyz[known]))[:, 2]
+    return found
+
+
+def rotation_from_yaw_pitch_roll(angles: np.ndarray, xyz: np.ndarray, crs: str) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations camera → grid of attitudes that count from true north.
+
+    With the axes of an aircraft x forward, y right, z down, R = Rz(yaw)·Ry(pitch)·Rx(roll) brings it to north, east,
+    down; the camera looks down and the top of its image forward. Grid north lies off true north by the convergence.
+
+    Parameters
+    ----------
+    angles : (n, 3) rad, yaw, pitch, roll. xyz : (n, 3) in `crs`.
+
+    Returns
+    -------
+    rotation : (n, 3, 3), NaN where an angle is.
+    convergence : (n,) rad, from grid north to true north, clockwise.
+    """
+    yaw, pitch, roll = np.asarray(angles, dtype=float).T
+    aircraft = _about(2, yaw) @ _about(1, pitch) @ _about(0, roll)
+    reference = georeference(horizontal_part(crs), xyz)
+    convergence = np.zeros(len(xyz))
+    if reference.is_projected:
+        place = reference.to_geographic(np.asarray(xyz, dtype=float))
+        step = np.array([0.0, NORTH_STEP_DEG, 0.0])
+        north = reference.from_geographic(place + step) - reference.from_geographic(place - step)
+        convergence = np.arctan2(north[:, 0], north[:, 1])
+    return _about(2, -convergence) @ (BODY @ aircraft @ BODY), convergence
+
+
+def _about(axis: int, angle: np.ndarray) -> np.ndarray:
+    """(n, 3, 3) rotations about an axis."""
+    matrix = np.zeros((len(angle), 3, 3))
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    matrix[:, axis, axis] = 1.0
+    matrix[:, i, i] = matrix[:, j, j] = np.cos(angle)
+    matrix[:, i, j], matrix[:, j, i] = -np.sin(angle), np.sin(angle)
+    return matrix
+
+
+def true_heights(centre: np.ndarray, crs: str, ground: float) -> np.ndarray:
+    """Projection centres whose heights were corrected for the scale of the projection, with their true heights.
+
+    Parameters
+    ----------
+    centre : (n, 3) in `crs`. ground : m, mean height of the ground.
+    """
+    frame = local_frame(horizontal_part(crs), centre)
+    on_ellipsoid = np.column_stack([centre[:, :2], np.zeros(len(centre))])
+    plan = frame.crs_per_local(frame.to_local(on_ellipsoid))[:, :2, :2]
+    scale = np.sqrt(np.abs(np.linalg.det(plan)))
+    return np.column_stack([centre[:, :2], without_linear_alteration(centre[:, 2], ground, scale)])
+
+
+def in_local_frame(oriented: OrientedBlock, geoid: str | os.PathLike | None = None) -> tuple[OrientedBlock, str]:
+    """A block with a CRS in its local topocentric frame, in which rays are straight, and where that is.
+
+    Raises
+    ------
+    InputError
+        When a grid for its heights is missing.
+    """
+    frame = frame_of_block(oriented.block, geoid)
+    there = oriented.oriented
+    rotation = oriented.rotation.copy()
+    rotation[there] = frame.axes_at(oriented.centre[there]) @ oriented.rotation[there]
+    local = replace(
+        oriented,
+        block=transform_block(oriented.block, frame),
+        centre=frame.to_local(oriented.centre),
+        rotation=rotation,
+        points=frame.to_local(oriented.points),
+    )
+    lon, lat, _ = frame.origin.tolist()
+    words = f"coordinates are local: east, north of the grid and up around longitude {lon:.9g}, latitude {lat:.9g}"
+    return local, f"{words} on the ellipsoid of {oriented.block.crs}"
+
+
+def refuse_exchanged_axes(points: np.ndarray, photographs: np.ndarray, file: os.PathLike) -> None:
+    """Refuse coordinates that lie far from the photographs, and near them once X and Y change places.
+
+    Parameters
+    ----------
+    points : (k, 3) m of `file`. photographs : (n, 3) m. NaN where unknown.
+
+    Raises
+    ------
+    InputError
+    """
+    one = points[np.isfinite(points[:, :2]).all(axis=1), :2]
+    other = photographs[np.isfinite(photographs[:, :2]).all(axis=1), :2]
+    if not len(one) or not len(other):
+        return
+    place, near = np.median(one, axis=0), np.median(other, axis=0)
+    apart, exchanged = np.linalg.norm(place - near), np.linalg.norm(place[::-1] - near)
+    if apart > FAR_M and exchanged < NEARER * apart:
+        message = f"lies {apart / 1e3:.0f} km from the photographs, {exchanged / 1e3:.3g} km with X and Y exchanged"
+        raise InputError(message, "state the order of the axes: --axes yx (or xy)", file)

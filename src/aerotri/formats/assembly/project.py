@@ -1,0 +1,289 @@
+"""A block from several files at once: image points from one, positions, control and orientations from others.
+
+The source is a whole block (`convert.READERS`), a reconstruction, a folder of IGN or PAT-B files, a file of image
+points, or a list of orientations (photographs alone). What else is given is added, in the order of `read_project`.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.coordinates.blocks import frame_of_block, transform_block
+from aerotri.formats import convert
+from aerotri.formats.assembly import kinds
+from aerotri.formats.assembly.assemble import Statements, with_crs, with_orientations, with_positions, with_rays
+from aerotri.formats.assembly.assemble_control import with_check_points, with_control
+from aerotri.formats.assembly.camera_spec import CameraSpec, camera_of_each, cameras_of
+from aerotri.formats.assembly.kinds import ReadingOptions
+from aerotri.formats.assembly.parts import OrientationList, PointList, RayList, Reading, no_sigma
+from aerotri.formats.assembly.reprojection import FEWEST, control_at_start, residuals_at_start
+from aerotri.formats.block.folder import read_block
+from aerotri.formats.foreign.bundler import read_bundler
+from aerotri.formats.foreign.colmap import read_colmap
+from aerotri.formats.foreign.ign import files_of, is_ign, is_ign_camera, read_ign_app, read_ign_camera, read_ign_mes
+from aerotri.formats.foreign.opensfm import read_opensfm
+from aerotri.formats.foreign.pix4d import read_pix4d_offset
+from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images
+
+FOLDERS = {"ign": "IGN", "patb": "PAT-B"}
+"""Kinds of folders whose files are parts."""
+UNKNOWN_PIXEL_UM = 1.0
+"""Size of a pixel where nothing tells it; a principal distance of 3000 pixels then reads 3 mm."""
+SHIFTS = ("off", "block", "strip")
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be read, and what the user states.
+
+    Parameters
+    ----------
+    source : PATH or kind:PATH; name : of the block.
+    image_points, orientation, positions, control : further files, PATH or kind:PATH, '' for none.
+    camera, stated : see there. check : control points that become check points.
+    axes, offset, patb_rotation : see `kinds.ReadingOptions`; offset is a file.
+    image_sigma_um, image_sigma_px : standard deviation of the image points; None: that of the source, or a pixel.
+    gnss_shift : 'off', 'block' or 'strip'; None: as the settings are.
+    """
+
+    source: str
+    name: str
+    image_points: tuple[str, ...] = ()
+    orientation: str = ""
+    positions: str = ""
+    control: str = ""
+    camera: CameraSpec = field(default_factory=CameraSpec)
+    stated: Statements = field(default_factory=Statements)
+    check: tuple[str, ...] = ()
+    axes: str | None = None
+    offset: str | os.PathLike | None = None
+    image_sigma_um: float | None = None
+    image_sigma_px: float | None = None
+    gnss_shift: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """What a source holds that is no whole block."""
+
+    rays: tuple[RayList, ...] = ()
+    orientations: OrientationList | None = None
+    control: tuple[PointList, ...] = ()
+    cameras: tuple[Camera, ...] = ()
+    messages: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
+
+
+def read_project(request: Request) -> Reading:
+    """The block of a request.
+
+    Raises
+    ------
+    InputError
+        For whatever is missing, damaged or contradictory, naming the file and, of lists, the line.
+    """
+    options = _options(request)
+    whole = _whole(request)
+    parts = _Parts() if whole is not None else _parts(request, options)
+    reading = whole if whole is not None else _begin(request, parts)
+    control = [*parts.control, *([kinds.read_control(request.control, options)] if request.control else [])]
+    positions = kinds.read_position_list(request.positions, options) if request.positions else None
+    told = [part.crs for part in (*control, *([positions] if positions else [])) if part.crs]
+    reading = with_crs(reading, request.stated.crs or (told[0] if told and reading.block.crs == "local" else ""))
+    extra = [kinds.read_rays(text, options) for text in request.image_points]
+    of_control = [part.rays for part in control if part.rays is not None and part.rays.path not in parts.files]
+    sigma_px = 1.0 if request.image_sigma_px is None else request.image_sigma_px
+    for rays in (*parts.rays, *extra, *of_control):
+        reading = with_rays(reading, rays, sigma_px)
+    if parts.orientations is not None:
+        reading = with_orientations(reading, parts.orientations, request.stated)
+    if request.orientation:
+        given = kinds.read_orientations(request.orientation, options)
+        reading = with_orientations(reading, given, request.stated)
+    if positions is not None:
+        reading = with_positions(reading, positions, request.stated)
+    for points in control:
+        reading = with_control(reading, points, request.stated)
+    reading = with_check_points(reading, request.check, request.stated.control_prefix)
+    return _finished(reading, request, whole is None)
+
+
+def _options(request: Request) -> ReadingOptions:
+    offset = None if request.offset is None else read_pix4d_offset(request.offset)
+    if not request.control and request.stated.control_prefix:
+        raise InputError("--control-prefix without control points", "give them: --control FILE")
+    axes = kinds.axes_of(request.stated.crs) if request.axes is None else request.axes
+    return ReadingOptions(axes, offset, request.stated.patb_rotation)
+
+
+def _whole(request: Request) -> Reading | None:
+    """The source as a whole block; None where it is made of parts."""
+    stated, path = kinds.split_kind(request.source, convert.READERS, FOLDERS, kinds.RAYS, kinds.ORIENTATIONS)
+    if not path.exists():
+        raise InputError("there is no such file or folder", "check the path", path)
+    kind = (
+        next((name for name, is_it in convert.RECOGNISERS.items() if is_it(path)), None) if stated is None else stated
+    )
+    if kind not in convert.READERS:
+        return None
+    pixel_um, size_px = request.camera.pixel_um, request.camera.size_px
+    if request.camera != CameraSpec(pixel_um=pixel_um, size_px=size_px):
+        raise InputError("has its cameras", "leave the camera out, but for the size of pixels", path)
+    if size_px is not None and kind != "bundler":
+        raise InputError("has its cameras", "leave --camera-size out", path)
+    said = () if pixel_um is not None else (f"a pixel counts as {UNKNOWN_PIXEL_UM:g} µm: state it with --pixel-um",)
+    if kind in ("bundler", "opensfm", "colmap"):
+        pixel_um = UNKNOWN_PIXEL_UM if pixel_um is None else pixel_um
+        if kind == "colmap":
+            block, points = read_colmap(path, pixel_um)
+            return Reading(block, points, said)
+        read = read_bundler(path, pixel_um, size_px) if kind == "bundler" else read_opensfm(path, pixel_um)
+        return replace(read, messages=(*read.messages, *said))
+    if pixel_um is not None:
+        raise InputError("has its cameras", "leave --pixel-um out", path)
+    if kind == "block":
+        return Reading(read_block(path, rays_needed=False))
+    block, points = convert.read_any(path, kind)
+    return Reading(block, points)
+
+
+def _parts(request: Request, options: ReadingOptions) -> _Parts:
+    stated, path = kinds.split_kind(request.source, FOLDERS, kinds.RAYS, kinds.ORIENTATIONS)
+    if path.is_dir():
+        if stated == "ign" or (stated is None and is_ign(path)):
+            return _ign(path, request)
+        if stated == "patb" or (stated is None and files_of(path, ".im")):
+            return _patb(path, options)
+        raise InputError(
+            "is a folder of no known format", f"known are {', '.join(convert.RECOGNISERS)}, ign, patb", path
+        )
+    kind = stated or kinds.kind_of(path, kinds.RAYS) or kinds.kind_of(path, kinds.ORIENTATIONS)
+    if kind in kinds.RAYS:
+        if kind == "odm-gcp":
+            control = kinds.read_control(f"odm-gcp:{path}", options)
+            rays = () if control.rays is None else (control.rays,)
+            return _Parts(rays, control=(control,), files=(path,))
+        return _Parts((kinds.read_rays(f"{kind}:{path}", options),))
+    if kind in kinds.ORIENTATIONS:
+        return _Parts(orientations=kinds.read_orientations(f"{kind}:{path}", options))
+    known = ", ".join((*convert.RECOGNISERS, *FOLDERS, *kinds.RAYS, *kinds.ORIENTATIONS))
+    raise InputError("is of no known format", f"known are {known}; state it as kind:PATH", path)
+
+
+def _ign(folder: Path, request: Request) -> _Parts:
+    """All files of IGN in a folder: one .OPK, and the .mes, .app and cameras beside it."""
+    orientations = _only_one(folder, ".opk")
+    pixel_um = UNKNOWN_PIXEL_UM if request.camera.pixel_um is None else request.camera.pixel_um
+    cameras = tuple(read_ign_camera(path, pixel_um) for path in files_of(folder, ".txt") if is_ign_camera(path))
+    if len({camera.name for camera in cameras}) < len(cameras):
+        raise InputError("two files describe the same camera", "keep one of them", folder)
+    rays = tuple(read_ign_mes(path) for path in files_of(folder, ".mes"))
+    control = tuple(read_ign_app(path) for path in files_of(folder, ".app"))
+    said = f"a pixel counts as {pixel_um:g} µm: state it with --pixel-um"
+    told = request.camera.pixel_um is not None or request.camera.describes_camera
+    list_of = kinds.read_orientations(f"ign-opk:{orientations}", ReadingOptions())
+    return _Parts(rays, list_of, control, cameras, () if told else (said,))
+
+
+def _patb(folder: Path, options: ReadingOptions) -> _Parts:
+    """The .im, .ori and .con file of a folder."""
+    paths = {ending: _only_one(folder, ending) if files_of(folder, ending) else None for ending in (".ori", ".con")}
+    rays = kinds.read_rays(f"patb-im:{_only_one(folder, '.im')}", options)
+    orientations = kinds.read_orientations(f"patb-ori:{paths['.ori']}", options) if paths[".ori"] else None
+    control = (kinds.read_control(f"patb-con:{paths['.con']}", options),) if paths[".con"] else ()
+    return _Parts((rays,), orientations, control)
+
+
+def _only_one(folder: Path, ending: str) -> Path:
+    found = files_of(folder, ending)
+    if len(found) != 1:
+        raise InputError(f"holds {len(found)} files {ending}", "name the one with its kind, or keep one", folder)
+    return found[0]
+
+
+def _begin(request: Request, parts: _Parts) -> Reading:
+    """A block of the photographs that the parts name, with their cameras."""
+    camera_of: dict[str, str] = {}
+    for part in (*parts.rays, *([parts.orientations] if parts.orientations is not None else [])):
+        for image, camera in zip(part.images.tolist(), part.cameras.tolist(), strict=True):
+            camera_of[image] = camera_of.get(image) or camera
+    if not camera_of:
+        raise InputError("holds no photographs", "give a file with some", request.source)
+    named = np.array(sorted({name for name in camera_of.values() if name}), dtype=str)
+    c_mm = np.concatenate([rays.focal_length_mm for rays in parts.rays]) if parts.rays else np.zeros(0)
+    try:
+        cameras = cameras_of(request.camera, parts.cameras, named, c_mm)
+        cameras, camera, said = camera_of_each(cameras, list(camera_of.values()))
+    except InputError as error:
+        raise InputError(error.message, error.remedy, error.file or Path(request.source), error.line) from error
+    count = len(camera_of)
+    images = Images(
+        names=np.array(list(camera_of), dtype=str),
+        camera=camera,
+        strip=np.full(count, ""),
+        centre=no_sigma(count),
+        angles=no_sigma(count),
+    )
+    nothing = np.zeros(0, np.int64)
+    rays = ImagePoints(nothing, nothing, np.zeros((0, 2)), np.zeros((0, 2)))
+    name = request.name or Path(request.source).stem
+    block = Block(name, cameras, images, np.zeros(0, "<U1"), rays)
+    return Reading(block, None, (*parts.messages, *said))
+
+
+def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
+    """Settings as stated, and how well image points fit the start values."""
+    block, messages = replace(reading.block, name=request.name or reading.block.name), list(reading.messages)
+    settings, rays = block.settings, block.image_points
+    pixel = np.array([camera.pixel_mm for camera in block.cameras])[block.images.camera[rays.image]]
+    sigma_um, sigma_px = request.image_sigma_um, request.image_sigma_px
+    if sigma_um is not None and sigma_px is not None:
+        raise InputError("--image-sigma-um and --image-sigma-px exclude each other", "state one of the two")
+    if sigma_um is None and (sigma_px is not None or is_new):
+        if sigma_px is None and len(rays):
+            messages.append("the standard deviation of image points is a pixel: state it with --image-sigma-px")
+        sigma_px = 1.0 if sigma_px is None else sigma_px
+        sigma_um = sigma_px * block.cameras[0].pixel_um
+        sigma = np.repeat(sigma_px * pixel[:, None], 2, axis=1)
+    else:
+        sigma = rays.sigma if sigma_um is None else np.full_like(rays.sigma, sigma_um * 1e-3)
+    if sigma_um is not None:
+        settings = replace(settings, image_sigma_um=sigma_um)
+    if is_new and not len(block.control) and block.gnss_ins is None:
+        settings = replace(settings, adjustment=AdjustmentSettings(datum="minimal"))
+    if request.gnss_shift is not None:
+        if request.gnss_shift not in SHIFTS:
+            raise InputError(f"--gnss-shift {request.gnss_shift}", f"it is {', '.join(SHIFTS)}")
+        settings = replace(settings, gnss=replace(settings.gnss, shift=request.gnss_shift))
+    elif request.positions and settings.gnss.shift != "off":
+        messages.append(f"the block lets GNSS positions be shifted ({settings.gnss.shift}): --gnss-shift off does not")
+    block = replace(block, settings=settings, image_points=replace(rays, sigma=sigma))
+    messages += fit_of_start_values(block, request.stated.geoid)
+    return replace(reading, block=block, messages=tuple(messages))
+
+
+def fit_of_start_values(block: Block, geoid: str | os.PathLike | None = None) -> list[str]:
+    """How well image points fit the orientations that were given, in words; nothing where there are none."""
+    start = np.column_stack([block.images.centre, block.images.angles])
+    known = np.asarray(np.isfinite(start).all(axis=1))
+    if not known.any() or not known[block.image_points.image].any():
+        return []
+    try:
+        local = block if block.crs == "local" else transform_block(block, frame_of_block(block, geoid))
+    except InputError as error:
+        return [f"how image points fit the orientations was not computed: {error}"]
+    found = residuals_at_start(local)
+    control = control_at_start(local)
+    said = []
+    if found.count >= FEWEST:
+        said.append(
+            f"image points fit the given orientations to {found.median_px:.3g} px (median of {found.count} rays)"
+        )
+    if len(control):
+        said.append(f"those of control points fit their coordinates to {np.median(control):.3g} px ({len(control)})")
+    return said

@@ -1,0 +1,1 @@
+"""The block folder: its settings, tables and points, read and written."""

@@ -1,0 +1,149 @@
+"""The tables of decisions and conditions of a block folder: edits and constraints."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.formats.text.csv_text import is_blank
+from aerotri.formats.text.table_checks import image_index, refuse_duplicates, sigma_columns
+from aerotri.formats.text.tables import Columns, Table, read_table
+from aerotri.observations import Control, ImagePoints, Images
+from aerotri.observations.block import CONSTRAINT_KINDS, EDIT_ACTIONS, Constraints, Edits
+
+EDIT_COLUMNS = Columns(text=("image", "point", "action"), optional_text=("reason",))
+CONSTRAINT_COLUMNS = Columns(text=("kind", "points"), numbers=("sigma",), optional_numbers=("value",))
+POINTS_NEEDED = {"vertical": 2, "horizontal": 2, "height_difference": 2, "distance": 2, "plane": 4, "line": 3}
+EXACTLY_TWO = ("height_difference", "distance")
+"""Kinds between two points, which have a value."""
+
+
+def read_edits(
+    path: Path | None, images: Images, points: np.ndarray, rays: ImagePoints, control: Control
+) -> Edits | None:
+    """The operator's decisions; None where there are none.
+
+    Parameters
+    ----------
+    points : (N,) str, the names of all points.
+    rays, control : what the decisions may refer to.
+
+    Raises
+    ------
+    InputError
+        With the line: an unknown action, photograph or point, a ray that was not measured, a role given to what is no
+        control point, the same decision twice.
+    """
+    if path is None or is_blank(path):
+        return None
+    table = read_table(path, EDIT_COLUMNS)
+    if not table.length:
+        return None
+    table.require("point", "action")
+    action = table.text["action"].rows()
+    _refuse(table, ~np.isin(action, EDIT_ACTIONS), "action", f"an action is {', '.join(EDIT_ACTIONS[:-1])} or control")
+    named = table.text["image"].rows() != ""
+    image = np.where(named, image_index(table, images, may_be_empty=True), -1)
+    point = _point_index(table, points)
+    role = np.flatnonzero(named & (action != "off"))
+    if len(role):
+        row = int(role[0])
+        raise table.error(row, f"action {action[row]} names an image", "leave image empty: it is the point's role")
+    stray = np.flatnonzero((action != "off") & ~np.isin(point, control.point))
+    if len(stray):
+        row = int(stray[0])
+        remedy = "roles are for points of control.csv"
+        raise table.error(row, f"point '{table.cell('point', row)}' is no control or check point", remedy)
+    measured = rays.image * np.int64(len(points)) + rays.point
+    missing = np.flatnonzero(named & ~np.isin(image * np.int64(len(points)) + point, measured))
+    if len(missing):
+        row = int(missing[0])
+        where = f"point '{table.cell('point', row)}' is not measured in image '{table.cell('image', row)}'"
+        raise table.error(row, where, "correct the names, or remove the row")
+    refuse_duplicates(table, (image + 1) * len(points) + point, lambda row: _about(table, row))
+    reason = table.text["reason"].rows() if "reason" in table.text else np.full(table.length, "")
+    return Edits(image, point, action, reason)
+
+
+def _about(table: Table, row: int) -> str:
+    image = table.cell("image", row)
+    point = f"a decision on point '{table.cell('point', row)}'"
+    return f"{point} in image '{image}'" if image else point
+
+
+def _refuse(table: Table, bad: np.ndarray, column: str, remedy: str) -> None:
+    rows = np.flatnonzero(bad)
+    if len(rows):
+        row = int(rows[0])
+        raise table.error(row, f"{column} = '{table.cell(column, row)[:60]}'", remedy)
+
+
+def _point_index(table: Table, points: np.ndarray) -> np.ndarray:
+    known = {name: i for i, name in enumerate(points.tolist())}
+    column = table.text["point"]
+    index = np.array([known.get(name, -1) for name in column.names.to_pylist()], dtype=np.int64)[column.index]
+    unknown = np.flatnonzero(index < 0)
+    if len(unknown):
+        row = int(unknown[0])
+        message = f"there is no point '{table.cell('point', row)}'"
+        raise table.error(row, message, "name a point of image_points or control, or remove the row")
+    return index
+
+
+def read_constraints(path: Path | None, points: np.ndarray) -> Constraints | None:
+    """Conditions between object points; None where there are none.
+
+    Parameters
+    ----------
+    points : (N,) str, the names of all points.
+
+    Raises
+    ------
+    InputError
+        With the line: an unknown kind or point, too few or too many points for the kind, a value missing or not
+        wanted, a standard deviation that is none.
+    """
+    if path is None or is_blank(path):
+        return None
+    table = read_table(path, CONSTRAINT_COLUMNS)
+    if not table.length:
+        return None
+    table.require("kind", "points")
+    kind = table.text["kind"].rows()
+    _refuse(table, ~np.isin(kind, CONSTRAINT_KINDS), "kind", f"known are {', '.join(CONSTRAINT_KINDS)}")
+    known = {name: i for i, name in enumerate(points.tolist())}
+    members = tuple(_members(table, row, kind[row], known) for row in range(table.length))
+    value = table.stack("value")[:, 0]
+    _check_values(table, kind, value)
+    everywhere = np.ones((table.length, 1), bool)
+    sigma = sigma_columns(table, ("sigma",), everywhere, np.full(1, np.nan), "give every condition its sigma, in m")
+    return Constraints(kind, members, value, sigma[:, 0])
+
+
+def _members(table: Table, row: int, kind: str, known: dict[str, int]) -> np.ndarray:
+    names = table.cell("points", row).split()
+    needed = POINTS_NEEDED[kind]
+    if len(names) < needed or (kind in EXACTLY_TWO and len(names) > needed):
+        most = "" if kind in EXACTLY_TWO else " or more"
+        raise table.error(row, f"{kind} has {len(names)} points", f"it needs {needed}{most}, separated by blanks")
+    for name in names:
+        if name not in known:
+            remedy = "name points of image_points or control"
+            raise table.error(row, f"there is no point '{name}'", remedy)
+    if len(set(names)) < len(names):
+        raise table.error(row, f"{kind} names a point twice", "name every point once")
+    return np.array([known[name] for name in names], dtype=np.int64)
+
+
+def _check_values(table: Table, kind: np.ndarray, value: np.ndarray) -> None:
+    wants = np.isin(kind, EXACTLY_TWO)
+    for bad, message, remedy in (
+        (wants & np.isnan(value), "has no value", "give it in metres"),
+        (~wants & ~np.isnan(value), "has a value", "leave value empty for this kind"),
+        ((kind == "distance") & (value <= 0.0), "is not positive", "a distance is greater than 0"),
+    ):
+        rows = np.flatnonzero(bad)
+        if len(rows):
+            row = int(rows[0])
+            raise table.error(row, f"{kind[row]} {message}", remedy)

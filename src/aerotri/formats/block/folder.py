@@ -1,0 +1,176 @@
+"""A block folder: block.toml and tables, read into a `Block` and checked to the last cell.
+
+The format stands in the README. Two keys of this program's own: ``[adjustment] datum_fixed = ["IMAGE:X0", …]`` names
+the orientation elements held by datum = "fixed"; ``[camera.<name>.lens]`` holds the forward lens parameters k1 k2 p1
+p2 k3 as `[camera.<name>.brown]` holds Brown's. Of scanned film see `scanned_film`.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerotri.conventions import RADIANS_PER, InputError
+from aerotri.formats.block.extras import read_constraints, read_edits
+from aerotri.formats.block.points import read_control, read_gnss_ins, read_image_points
+from aerotri.formats.block.scanned_film import read_fiducials
+from aerotri.formats.block.writer import write_block
+from aerotri.formats.text.table_checks import refuse_duplicates, three_or_none
+from aerotri.formats.text.tables import Columns, as_str_array, read_table
+from aerotri.observations import Block, Camera, Images
+
+if TYPE_CHECKING:
+    from aerotri.formats.block.settings import BlockToml
+
+__all__ = ["read_block", "write_block"]
+
+IMAGE_COLUMNS = Columns(
+    text=("image", "camera"),
+    optional_text=("strip",),
+    optional_numbers=("X0", "Y0", "Z0", "omega", "phi", "kappa"),
+    free_text=True,
+)
+
+
+def read_block(path: str | os.PathLike, rays_needed: bool = True) -> Block:
+    """A block from its folder.
+
+    Parameters
+    ----------
+    path : the folder, or its block.toml.
+    rays_needed : whether a block without image points is an error; photographs alone will do for what only needs them.
+
+    Returns
+    -------
+    The block; `points` holds the names of the image points in order of first appearance, then those of control points
+    that were never measured.
+
+    Raises
+    ------
+    InputError
+        With file, line, what is wrong and the remedy, for anything the format does not allow.
+    """
+    toml = _settings_file(Path(path))
+    folder = toml.parent
+    # pydantic is imported by the settings model only when a block is read
+    from aerotri.formats.block.settings import read_block_toml
+
+    settings = read_block_toml(toml)
+    cameras = settings.cameras()
+    model = settings.model
+    radians = RADIANS_PER[model.angle_unit]
+    images = _images(_required_table(folder, "images"), cameras, radians)
+    fiducials, fits = read_fiducials(_table_file(folder, "fiducials"), images, cameras)
+    if fiducials is not None and model.image_unit != "px":
+        message = f"image_unit = '{model.image_unit}', but fiducials.csv says the photographs are scans"
+        raise settings.error(("image_unit",), message, 'measure in pixels of the scan: image_unit = "px"')
+    table = _required_table(folder, "image_points")
+    rays = read_image_points(table, images, cameras, settings, fits, may_be_empty=not rays_needed)
+    control, names = read_control(_table_file(folder, "control"), rays.point_names, settings)
+    points = as_str_array(names)
+    block = Block(
+        name=folder.resolve().name if model.name is None else model.name,
+        cameras=cameras,
+        images=images,
+        points=points,
+        image_points=rays.image_points,
+        control=control,
+        gnss_ins=read_gnss_ins(_table_file(folder, "gnss_ins"), images, radians),
+        settings=settings.settings(rays.image_sigma_um),
+        crs=model.crs,
+        rotation=model.rotation,
+        edits=read_edits(_table_file(folder, "edits"), images, points, rays.image_points, control),
+        fiducials=fiducials,
+        constraints=read_constraints(_table_file(folder, "constraints"), points),
+        interior_fits=fits,
+    )
+    _check_names_in_settings(block, settings)
+    return block
+
+
+def _settings_file(path: Path) -> Path:
+    if path.is_dir():
+        path = path / "block.toml"
+    if not path.exists():
+        raise InputError(
+            "there is no block.toml" if path.name == "block.toml" else "there is no such file or folder",
+            "give the folder of a block, with block.toml, images.csv and image_points.csv in it",
+            path,
+        )
+    if path.suffix != ".toml":
+        raise InputError("is no block", "give the folder of a block or its block.toml", path)
+    return path
+
+
+def _required_table(folder: Path, name: str) -> Path:
+    path = _table_file(folder, name)
+    if path is None:
+        place = folder / f"{name}.csv"
+        raise InputError("is missing", f"a block needs a table {place.name} beside its block.toml", place)
+    return path
+
+
+def _table_file(folder: Path, name: str) -> Path | None:
+    """The table of a name as .csv or .parquet; None where there is none."""
+    found = [path for path in (folder / f"{name}.csv", folder / f"{name}.parquet") if path.exists()]
+    if len(found) > 1:
+        raise InputError(f"{name}.csv and {name}.parquet are both there", "remove one of them", folder / name)
+    return found[0] if found else None
+
+
+def _images(path: Path, cameras: tuple[Camera, ...], radians: float) -> Images:
+    table = read_table(path, IMAGE_COLUMNS)
+    table.require("image", "camera")
+    if not table.length:
+        raise InputError("holds no images", "give a row for every photograph", path)
+    refuse_duplicates(table, table.text["image"].index, lambda row: f"image '{table.cell('image', row)}'")
+    known = {camera.name: i for i, camera in enumerate(cameras)}
+    column = table.text["camera"]
+    code = np.array([known.get(name, -1) for name in column.names.to_pylist()])
+    camera = code[column.index]
+    unknown = np.flatnonzero(camera < 0)
+    if len(unknown):
+        row = int(unknown[0])
+        raise table.error(
+            row,
+            f"there is no camera '{table.cell('camera', row)}'",
+            f"block.toml has {', '.join(known)}; or add it there",
+        )
+    nothing = np.full(table.length, "", dtype="<U1")
+    grouping = {n: c.rows() for n, c in table.text.items() if n not in ("image", "camera", "strip")}
+    return Images(
+        names=table.text["image"].rows(),
+        camera=camera,
+        strip=table.text["strip"].rows() if "strip" in table.text else nothing,
+        centre=three_or_none(table, ("X0", "Y0", "Z0")),
+        angles=three_or_none(table, ("omega", "phi", "kappa")) * radians,
+        columns=grouping,
+    )
+
+
+def _check_names_in_settings(block: Block, settings: BlockToml) -> None:
+    """Names that the settings refer to: grouping column, datum points, images of a fixed datum."""
+    adjustment = block.settings.adjustment
+    groups = adjustment.parameter_groups
+    if groups not in ("camera", "block", "strip", *block.images.columns):
+        there = ", ".join(("camera", "block", "strip", *block.images.columns))
+        raise settings.error(
+            ("adjustment", "parameter_groups"), f"images.csv has no column '{groups}' to group by", f"there are {there}"
+        )
+    points = np.array(adjustment.datum_points, dtype=str)
+    missing = points[~np.isin(points, block.points)] if len(points) else points
+    if len(missing):
+        raise settings.error(
+            ("adjustment", "datum_points"),
+            f"there is no point '{missing[0]}'",
+            "name points of image_points or control",
+        )
+    known = set(block.images.names.tolist())
+    for image, _ in adjustment.datum_fixed:
+        if image not in known:
+            raise settings.error(
+                ("adjustment", "datum_fixed"), f"there is no image '{image}'", "name images of images.csv"
+            )

@@ -1,0 +1,169 @@
+"""Results appear whole or not at all: written to a hidden place beside their own, renamed at the end.
+
+A program that is killed leaves what was there before untouched, and at most a hidden folder beside it, which the next
+run that writes there removes. Files of the user are told from ours by a list of what was written (`ownership`).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+import shutil
+import sys
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from aerotri.conventions import InputError
+from aerotri.formats.files.ownership import carry_over, record_files
+from aerotri.formats.files.work_place import OLDER, work_place, written
+
+AT_FDCWD = -100
+RENAME_EXCHANGE = 2
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+LEAST_ROOM = 16384
+
+
+@contextmanager
+def atomic_file(target: str | os.PathLike) -> Iterator[Path]:
+    """A path to write to; the file takes the name `target` when the block ends without an error.
+
+    Parameters
+    ----------
+    target : the file to be; folders above it are made.
+
+    Yields
+    ------
+    A path on the same disk that does not exist yet, with the name of the target.
+
+    Raises
+    ------
+    InputError
+        When the place cannot be written to.
+    """
+    target = _place(target)
+    if target.is_dir():
+        raise InputError("is a folder, a file is to be written here", "give another name", target)
+    with _told_as_input_error(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with work_place(target) as place, _told_as_input_error(target):
+            yield place / target.name
+            _refuse_full(target)
+            os.replace(place / target.name, target)
+            written.append(target)
+
+
+@contextmanager
+def atomic_folder(
+    target: str | os.PathLike, own: Collection[str] | None = None, gone: Collection[str] = ()
+) -> Iterator[Path]:
+    """An empty folder to fill; it takes the name `target` when the block ends without an error.
+
+    An older folder of that name is exchanged for the new one in one step. What it holds besides (a user's notes beside
+    our tables, or in our folders) is carried over, never deleted.
+
+    Parameters
+    ----------
+    target : the folder to be; folders above it are made.
+    own : the names this writer gives. An older entry of such a name is dropped even when the new folder has none, so
+        that nothing old stands beside what is new. None: everything that the new folder lacks is carried over.
+    gone : relative paths of further files that are dropped.
+
+    Yields
+    ------
+    The new folder under its temporary name.
+
+    Raises
+    ------
+    InputError
+        When the place cannot be written to, or holds a file.
+    """
+    target = _place(target)
+    if target.exists() and not target.is_dir():
+        raise InputError("is a file, a folder is to be written here", "give another name", target)
+    with _told_as_input_error(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with work_place(target) as place, _told_as_input_error(target):
+            new = place / target.name
+            new.mkdir()
+            yield new
+            record_files(new)
+            _refuse_full(target)
+            if target.is_dir():
+                seen: set[Path] = set()
+                carry_over(target, new, own or (), gone, seen)
+                _exchange(new, target)
+                # what came while it was being carried over
+                carry_over(new, target, own or (), gone, seen)
+            else:
+                os.rename(new, target)
+            written.append(target)
+
+
+def _place(target: str | os.PathLike) -> Path:
+    """The target with links followed, so that a link stays a link."""
+    return Path(target).resolve()
+
+
+@contextmanager
+def _told_as_input_error(target: Path) -> Iterator[None]:
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        # GDAL has errors of its own for a disk that is full
+        if getattr(error, "errno", None) in NO_SPACE or _is_full(target.parent):
+            raise InputError("the disk is full", "free some space, or choose another place", target) from error
+        if not isinstance(error, OSError):
+            raise
+        raise InputError(
+            f"cannot be written: {error.strerror or error}",
+            "check permissions and free space, or choose another place",
+            target,
+        ) from error
+
+
+def _is_full(folder: Path) -> bool:
+    """Whether nothing more can be written there."""
+    try:
+        return shutil.disk_usage(folder).free < LEAST_ROOM
+    except OSError:
+        return False
+
+
+def _refuse_full(target: Path) -> None:
+    """GDAL closes a file that found no room without a word: nothing written with so little left is trusted.
+
+    Raises
+    ------
+    OSError
+    """
+    if _is_full(target.parent):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(target))
+
+
+def _exchange(new: Path, target: Path) -> None:
+    """Swap the two folders, in one step where the system can."""
+    if _exchange_in_one_step(new, target):
+        return
+    aside = new.with_name(OLDER)
+    os.rename(target, aside)
+    try:
+        os.rename(new, target)
+    except OSError:
+        os.rename(aside, target)
+        raise
+    os.rename(aside, new)
+
+
+def _exchange_in_one_step(temporary: Path, target: Path) -> bool:
+    """Linux' renameat2 with RENAME_EXCHANGE; False where it is missing or the file system refuses."""
+    if not sys.platform.startswith("linux"):
+        return False
+    try:
+        rename: Callable[..., int] = ctypes.CDLL(None, use_errno=True).renameat2
+    except (OSError, AttributeError):
+        return False
+    return rename(AT_FDCWD, os.fsencode(temporary), AT_FDCWD, os.fsencode(target), RENAME_EXCHANGE) == 0

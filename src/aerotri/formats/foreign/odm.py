@@ -1,0 +1,282 @@
+"""OpenDroneMap's gcp_list.txt and geo.txt.
+
+Both begin with the coordinate system: ``EPSG:n``, a PROJ string, or ``WGS84 UTM 16N``. gcp_list.txt then has
+``geo_x geo_y geo_z im_x im_y image [point] [extras]``, a row an image point; pixels count from 0 at the CENTRE of the
+upper left one, as OpenSfM takes them, so half a pixel is added. geo.txt has ``image geo_x geo_y [geo_z] [yaw] [pitch]
+[roll] [h_acc v_acc]``, angles in degrees, pitch 0 straight down [C]. Names with blanks stand in quotes, or tabs
+separate the entries; the name of an image ends where its file does.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.conventions import InputError, px_from_mm
+from aerotri.formats.assembly.losses import losses
+from aerotri.formats.assembly.parts import PointList, PositionList, RayList, no_sigma, texts
+from aerotri.formats.files.atomic import atomic_file
+from aerotri.formats.text.tables import SMALLEST_POSITIVE
+from aerotri.formats.text.text_lines import TextFile, check_words, first_lines, is_number
+from aerotri.observations import Block
+from aerotri.observations.names import ENDING
+
+FIRST_PIXEL = 0.5
+"""Position of the centre of the first pixel, which OpenSfM calls 0."""
+UNKNOWN = ("nan", "-nan")
+WIDTHS = (3, 4, 7, 9)
+"""Words of a row of geo.txt; what follows is the user's own."""
+
+
+def crs_of_header(text: str) -> str | None:
+    """'EPSG:n' of the first line of such a file, '' where it is a system that has no such name here, None for no CRS.
+
+    UTM and longitude/latitude are recognised in PROJ strings on WGS 84.
+    """
+    plain = text.strip()
+    if found := re.fullmatch(r"EPSG:(\d{1,6})", plain, re.IGNORECASE):
+        return f"EPSG:{found[1]}"
+    if found := re.fullmatch(r"WGS84\s+UTM\s+(\d{1,2})\s*([NS])", plain, re.IGNORECASE):
+        return _utm(int(found[1]), found[2].upper() == "S")
+    if not plain.startswith("+proj="):
+        return None
+    parts = [word.lstrip("+").partition("=") for word in plain.split()]
+    words = {key: value for key, _, value in parts}
+    if "WGS84" not in (words.get("datum"), words.get("ellps")) or words.get("units", "m") != "m":
+        return ""
+    if words["proj"] == "utm" and words.get("zone", "").isdigit():
+        return _utm(int(words["zone"]), "south" in words)
+    return "EPSG:4326" if words["proj"] in ("longlat", "latlong") else ""
+
+
+def _utm(zone: int, south: bool) -> str:
+    return f"EPSG:{(32700 if south else 32600) + zone}" if 1 <= zone <= 60 else ""
+
+
+def is_odm_gcp(path: Path) -> bool:
+    """Whether a file begins with a coordinate system and a row of five numbers and a name."""
+    lines = first_lines(path, 2)
+    words = _cells(lines[1], 5) if len(lines) > 1 else []
+    known = [is_number(word) or word.lower() in UNKNOWN for word in words[:5]]
+    return len(words) > 5 and crs_of_header(lines[0]) is not None and all(known)
+
+
+def is_odm_geo(path: Path) -> bool:
+    """Whether a file begins with a coordinate system, a name and two or more numbers."""
+    lines = first_lines(path, 2)
+    words = _cells(lines[1], 0) if len(lines) > 1 else []
+    return (
+        len(words) > 2
+        and crs_of_header(lines[0]) is not None
+        and not is_number(words[0])
+        and all(is_number(word) or word.lower() in UNKNOWN for word in words[1:4])
+    )
+
+
+def _cells(line: str, before: int) -> list[str]:
+    """The entries of a row with an image's name behind `before` numbers; names may have blanks.
+
+    A name with blanks stands in quotes, or tabs separate the entries; without either the image's name ends where its
+    file does.
+    """
+    if "\t" in line:
+        return [cell.strip().strip('"') for cell in line.split("\t")]
+    if '"' in line:
+        return [quoted or plain for quoted, plain in re.findall(r'"([^"]*)"|(\S+)', line)]
+    words = line.split()
+    end = next((k for k in range(before, len(words)) if ENDING.search(words[k])), before)
+    return [*words[:before], " ".join(words[before : end + 1]), *words[end + 1 :]]
+
+
+def _begin(path: Path, form: str) -> tuple[TextFile, str, tuple[str, ...]]:
+    """The file, its CRS, and a message where that has no name here."""
+    file = TextFile(path)
+    crs = crs_of_header(file.lines[0]) if len(file) else None
+    if crs is None:
+        raise file.error(0, "does not begin with a coordinate system", "the first line is EPSG:n, or WGS84 UTM 47N")
+    if len(file) < 2:
+        raise file.error(len(file), "has no rows", f"rows are: {form}")
+    return file, crs, () if crs else (f"{path.name}: '{file.lines[0][:80]}' is taken as it is: name it with --crs",)
+
+
+def read_odm_gcp(path: str | os.PathLike) -> PointList:
+    """Control points with their image points; a height of NaN is unknown.
+
+    Points without a name are told apart by their coordinates and called gcp1, gcp2 …
+
+    Raises
+    ------
+    InputError
+        With the line: no coordinate system, a row that is not of the form, a point with two places, a point twice in a
+        photograph.
+    """
+    form = "geo_x geo_y geo_z im_x im_y image [point]"
+    file, crs, messages = _begin(Path(path), form)
+    words, rows = [_cells(line, 5) for line in file.lines], list(range(1, len(file)))
+    for row in rows:
+        if len(words[row]) < 6:
+            raise file.error(row, f"the row has {len(file.lines[row].split())} entries", f"rows are: {form}")
+    heights = [words[row][2] for row in rows]
+    unknown = np.array([word.lower() in UNKNOWN for word in heights])
+    plain = [["0" if k == 2 and unknown[i] else words[row][k] for k in range(5)] for i, row in enumerate(rows)]
+    values = file.table(plain, rows, "value")
+    values[unknown, 2] = np.nan
+    images = [words[row][5] for row in rows]
+    names = _point_names(words, rows, values)
+    file.check_names(images, rows, "photograph")
+    file.check_names(names, rows, "point")
+    image_place: dict[str, int] = {}
+    place: dict[str, int] = {}
+    image = np.array([image_place.setdefault(name, len(image_place)) for name in images], dtype=np.int64)
+    point = np.array([place.setdefault(name, len(place)) for name in names], dtype=np.int64)
+    xyz = _places(file, rows, names, point, values[:, :3])
+    file.refuse_repeated([f"{p}' in photograph '{i}" for p, i in zip(names, images, strict=True)], rows, "point")
+    return PointList(
+        path=file.path,
+        points=texts(list(place)),
+        xyz=xyz,
+        sigma=no_sigma(len(xyz)),
+        is_check=np.zeros(len(xyz), bool),
+        crs=crs,
+        rays=RayList(
+            path=file.path,
+            images=texts(list(image_place)),
+            cameras=np.full(len(image_place), ""),
+            points=texts(list(place)),
+            image=image,
+            point=point,
+            xy=values[:, 3:] + FIRST_PIXEL,
+            unit="px",
+            focal_length_mm=np.full(len(image_place), np.nan),
+        ),
+        messages=(*messages, *_about_heights(file.path, xyz[:, 2], "points")),
+    )
+
+
+def _point_names(words: list[list[str]], rows: list[int], values: np.ndarray) -> list[str]:
+    made: dict[tuple[float, ...], str] = {}
+    names = []
+    for row, xyz in zip(rows, np.nan_to_num(values[:, :3]).tolist(), strict=True):
+        if len(words[row]) > 6:
+            names.append(words[row][6])
+        else:
+            names.append(made.setdefault(tuple(xyz), f"gcp{len(made) + 1}"))
+    return names
+
+
+def _places(file: TextFile, rows: list[int], names: list[str], point: np.ndarray, given: np.ndarray) -> np.ndarray:
+    """(N, 3) coordinates of the points, which all their rows have to repeat."""
+    _, first = np.unique(point, return_index=True)
+    xyz = given[first]
+    differs = np.flatnonzero((np.nan_to_num(given) != np.nan_to_num(xyz[point])).any(axis=1))
+    if len(differs):
+        row = int(differs[0])
+        line = file.numbers[rows[first[point[row]]]]
+        message = f"point '{names[row]}' has other coordinates than in line {line}"
+        raise file.error(rows[row], message, "a point has one place; give different points different names")
+    return xyz
+
+
+def _about_heights(path: Path, heights: np.ndarray, what: str) -> tuple[str, ...]:
+    zero, unknown = int(np.sum(heights == 0.0)), int(np.isnan(heights).sum())
+    said = []
+    if zero:
+        said.append(f"{path.name}: the height of {zero} {what} is 0 and taken as known: write NaN where it is not")
+    if unknown:
+        said.append(f"{path.name}: the height of {unknown} {what} is unknown")
+    return tuple(said)
+
+
+def read_odm_geo(path: str | os.PathLike) -> PositionList:
+    """Positions of photographs; photographs without a height are left out, since a position needs it.
+
+    Raises
+    ------
+    InputError
+        With the line: no coordinate system, a row that is not of the form, a photograph there twice.
+    """
+    form = "image geo_x geo_y [geo_z] [yaw pitch roll] [h_acc v_acc]"
+    file, crs, messages = _begin(Path(path), form)
+    words, rows = [_cells(line, 0) for line in file.lines], list(range(1, len(file)))
+    for row in rows:
+        if len(words[row]) < min(WIDTHS):
+            raise file.error(row, f"the row has {len(file.lines[row].split())} entries", f"rows are: {form}")
+    names = [words[row][0] for row in rows]
+    file.check_names(names, rows, "photograph")
+    file.refuse_repeated(names, rows, "photograph")
+    values, extra = np.full((len(rows), 8), np.nan), 0
+    for i, row in enumerate(rows):
+        width = max(width for width in WIDTHS if width <= len(words[row]))
+        extra += len(words[row]) > width
+        part = words[row][1:width]
+        known = [k for k, word in enumerate(part) if word.lower() not in UNKNOWN]
+        values[i, known] = file.values([part[k] for k in known], [row] * len(known), "value")
+    if np.isnan(values[:, :2]).any():
+        bad = int(np.flatnonzero(np.isnan(values[:, :2]).any(axis=1))[0])
+        raise file.error(rows[bad], "the plan position is missing", f"rows are: {form}")
+    accuracy = values[:, 6:8]
+    bad = np.flatnonzero((accuracy < SMALLEST_POSITIVE).any(axis=1))
+    if len(bad):
+        raise file.error(rows[int(bad[0])], "an accuracy is not greater than 0", "give a small one, in metres")
+    angles = np.radians(values[:, 3:6])
+    angles[np.isnan(angles).any(axis=1)] = np.nan
+    there = ~np.isnan(values[:, 2])
+    said = [*messages, *_about_heights(file.path, values[there, 2], "photographs")]
+    if not there.all():
+        said.append(f"{file.path.name}: {int((~there).sum())} positions without height were left out")
+    if extra:
+        said.append(f"{file.path.name}: what follows the known columns in {extra} rows was not carried over")
+    return PositionList(
+        file.path,
+        texts(names)[there],
+        values[there, :3],
+        accuracy[there][:, [0, 0, 1]],
+        angles[there],
+        crs,
+        tuple(said),
+    )
+
+
+def write_odm_gcp(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
+    """Write gcp_list.txt: the image points of control and check points; a height that is unknown as NaN.
+
+    Returns
+    -------
+    What could not be carried over, in words.
+
+    Raises
+    ------
+    InputError
+        When there are none, a name has a blank, or the block has no CRS.
+    """
+    rays, control = block.image_points, block.control
+    if block.crs == "local" or "+" in block.crs:
+        raise InputError(f"gcp_list.txt begins with a coordinate system, the block's is {block.crs}", "use EPSG:n")
+    row_of_point = np.full(len(block.points), -1)
+    row_of_point[control.point] = np.arange(len(control))
+    plan = np.isfinite(control.xyz[:, :2]).all(axis=1)
+    keep = np.flatnonzero((row_of_point[rays.point] >= 0) & np.append(plan, False)[row_of_point[rays.point]])
+    if not len(keep):
+        raise InputError(f"block '{block.name}' has no image points of control with a plan position", "add some")
+    check_words(block.images.names, "photograph", "gcp_list.txt")
+    check_words(block.points[control.point], "point", "gcp_list.txt")
+    with atomic_file(path) as place, place.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(f"{block.crs}\n")
+        for k in keep.tolist():
+            camera = block.cameras[block.images.camera[rays.image[k]]]
+            x, y = (px_from_mm(rays.xy[k], camera.size_px, camera.pixel_mm) - FIRST_PIXEL).tolist()
+            xyz = control.xyz[row_of_point[rays.point[k]]].tolist()
+            place_of_point = " ".join("NaN" if np.isnan(value) else f"{value:.6f}" for value in xyz)
+            image, point = block.images.names[rays.image[k]], block.points[rays.point[k]]
+            file.write(f"{place_of_point} {x:.6f} {y:.6f} {image} {point}\n")
+    others = len(rays) - len(keep)
+    lost = losses(block, "control", "check points", "image points", "crs")
+    checks = int(control.is_check.sum())
+    return (
+        *lost,
+        *((f"could not be carried over: {others} image points of other points",) if others else ()),
+        *((f"{checks} check points are written as any other: the format knows no roles",) if checks else ()),
+    )

@@ -1,0 +1,1 @@
+"""What the program writes about a block: results, solutions, surfaces; the one place that writes JSON."""

@@ -1,0 +1,87 @@
+"""Point clouds, LAS and LAZ; nothing else knows laspy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.formats.results.las_header import check_las
+from aerotri.vectors.geojson import LARGEST_M
+
+UNCLASSIFIED, GROUND = 1, 2
+SCALE_M = 0.001
+
+
+def write_point_cloud(path: Path, xyz: np.ndarray, sigma: np.ndarray, ground: np.ndarray, crs: str | None) -> None:
+    """Write points (n, 3) m as LAZ 1.4 with `sigma_z` (n,) m; what is ground (n,) bool has class 2."""
+    import laspy
+    from pyproj import CRS
+
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.offsets, header.scales = np.floor(xyz.min(axis=0)), np.full(3, SCALE_M)
+    header.add_extra_dim(laspy.ExtraBytesParams("sigma_z", "f4", "sigma of Z [m]"))
+    if crs is not None:
+        header.add_crs(CRS.from_user_input(crs))
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = xyz.T
+    cloud.classification = np.where(ground, GROUND, UNCLASSIFIED).astype(np.uint8)
+    cloud["sigma_z"] = sigma.astype(np.float32)
+    with path.open("wb") as file:
+        cloud.write(file, do_compress=True)
+
+
+def read_point_cloud(path: Path, parallel: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) m of a LAS or LAZ file and their classes (n,).
+
+    Parameters
+    ----------
+    parallel : whether LAZ is unpacked by several threads, which a forked process cannot.
+
+    Raises
+    ------
+    InputError
+    """
+    import laspy
+
+    check_las(path)
+    try:
+        backends = laspy.LazBackend.detect_available() if parallel else (laspy.LazBackend.Lazrs,)
+        cloud = laspy.read(path, laz_backend=backends)
+        xyz = np.column_stack([np.asarray(axis, dtype=float) for axis in (cloud.x, cloud.y, cloud.z)])
+        classes = np.asarray(cloud.classification)
+    except BaseException as error:
+        # laspy and lazrs raise whatever a damaged file leads to; a panic of lazrs is no Exception
+        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+            raise
+        raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
+    if not (np.abs(xyz) <= LARGEST_M).all():
+        raise InputError("has points at no possible place", "write the file anew, its scale or offset is damaged", path)
+    return xyz, classes
+
+
+def refuse_cloud_units(path: Path) -> None:
+    """Refuse a LAS or LAZ file whose CRS counts in degrees or feet.
+
+    Raises
+    ------
+    InputError
+    """
+    import laspy
+
+    check_las(path)
+    try:
+        with laspy.open(path) as file:
+            crs = file.header.parse_crs()
+    except Exception as error:  # as above
+        raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
+    if crs is None:
+        return
+    for axis in crs.axis_info:
+        if axis.unit_name not in ("metre", "meter", "unity"):
+            raise InputError(
+                f"is in {crs.name}, which counts {axis.name} in {axis.unit_name}",
+                "bring it to metres first: pdal translate IN OUT reprojection --filters.reprojection.out_srs=EPSG:…",
+                path,
+            )

@@ -1,0 +1,128 @@
+"""solution.npz: the final unknowns, from which any covariance can be had again without adjusting.
+
+Coordinates are kept as the adjustment had them, reduced to the local origin, so that nothing is lost in between.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.solve import Solution
+from aerotri.coordinates import LocalFrame
+from aerotri.formats.files.npz import Archive
+from aerotri.formats.results.solution_checks import SCHEMA, checked_values
+from aerotri.observations import Block
+from aerotri.results.adjusted_block import AdjustedBlock
+
+
+@dataclass(frozen=True, eq=False)
+class SavedSolution:
+    """What solution.npz holds; rows of photographs, points and rays as in the result's block.
+
+    Parameters
+    ----------
+    origin : (3,) m. rotation : (n, 3, 3). centre : (n, 3) m, points : (N, 3) m, from the origin; NaN if not adjusted.
+    shared : (s,) values, shared_names, shared_groups : (s,) str, shared_cofactor : (s, s), without σ̂0².
+    xy : (m, 2) mm, image points as adjusted, freed of refraction and earth curvature where the settings ask.
+    frame_origin : (3,) of the local frame, NaN for a block in local coordinates; geoid : its grid file, '' if none.
+    held : (k, 2) point and axis of coordinates held for the datum.
+    ray_status, weight : (m,).
+    components : the variance components as JSON, '' where there are none; the block has the σ they led to.
+    removals : the parameters that the selection took out, as JSON, '' where there are none.
+    verdict, reasons : of the outcome; '' in results of versions that did not judge.
+    """
+
+    origin: np.ndarray
+    rotation: np.ndarray
+    centre: np.ndarray
+    points: np.ndarray
+    shared: np.ndarray
+    shared_names: np.ndarray
+    shared_groups: np.ndarray
+    shared_cofactor: np.ndarray
+    xy: np.ndarray
+    frame_origin: np.ndarray
+    geoid: str
+    held: np.ndarray
+    ray_status: np.ndarray
+    weight: np.ndarray
+    estimator_code: int
+    estimator_limit: float
+    sigma0: float
+    status: str
+    iterations: int
+    warnings: tuple[str, ...]
+    components: str = ""
+    removals: str = ""
+    verdict: str = ""
+    reasons: tuple[str, ...] = ()
+
+
+def write_solution(
+    path: str | os.PathLike,
+    system: NormalSystem,
+    solution: Solution,
+    result: AdjustedBlock,
+    frame: LocalFrame | None = None,
+) -> None:
+    """Write solution.npz.
+
+    Parameters
+    ----------
+    result : in the frame of `system`. frame : the local frame of a block with a CRS.
+    """
+    u, state = system.unknowns, solution.state
+    n, count = len(u.block.images), len(u.block.points)
+    centre, rotation, points = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((count, 3), np.nan)
+    centre[u.images], rotation[u.images], points[u.points] = state.centre, state.rotation, state.points
+    row, axis = np.nonzero(~u.point_free)
+    there = np.flatnonzero(result.parameters.status != "removed")
+    np.savez_compressed(
+        path,
+        schema=SCHEMA,
+        origin=u.origin,
+        rotation=rotation,
+        centre=centre,
+        points=points,
+        shared=state.shared,
+        shared_names=np.array(u.shared.names, dtype=str),
+        shared_groups=np.array(u.shared.groups, dtype=str),
+        shared_cofactor=result.parameters.covariance[np.ix_(there, there)] / result.outcome.sigma0**2,
+        xy=u.block.image_points.xy,
+        frame_origin=np.full(3, np.nan) if frame is None else frame.origin,
+        geoid=np.array("" if frame is None or frame.geoid is None else os.fspath(frame.geoid)),
+        held=np.column_stack([u.points[row], axis]),
+        ray_status=result.rays.status,
+        weight=result.rays.weight,
+        estimator_code=solution.estimator.code,
+        estimator_limit=solution.estimator.limit,
+        sigma0=result.outcome.sigma0,
+        status=np.array(solution.status),
+        iterations=solution.iterations,
+        warnings=np.array(result.outcome.warnings, dtype=str),
+        verdict=np.array(result.outcome.verdict),
+        reasons=np.array(result.outcome.reasons, dtype=str),
+        removals=np.array(json.dumps([removal.as_dict() for removal in result.removals])),
+        components=np.array("" if result.components is None else result.components.to_json()),
+    )
+
+
+def read_solution(path: str | os.PathLike, block: Block | None = None) -> SavedSolution:
+    """Read solution.npz.
+
+    Parameters
+    ----------
+    block : that was adjusted, whose sizes the arrays must have; None: they only have to agree with one another.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, damaged, of another schema, or holds what no adjustment writes.
+    """
+    return SavedSolution(**checked_values(Archive(Path(path)), block))

@@ -1,0 +1,1 @@
+"""Text formats: CSV, TOML, XML and tables, checked line by line."""

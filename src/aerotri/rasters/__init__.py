@@ -1,0 +1,1 @@
+"""Rasters and photographs read and written by windows; nothing else knows rasterio."""

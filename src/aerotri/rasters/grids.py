@@ -1,0 +1,374 @@
+"""Reading and writing of rasters window by window; nothing else knows rasterio, which is imported when it is needed.
+
+Rasters are north-up: columns to the right, rows down. A value belongs to the centre of its cell. What is not known is
+NaN inside the program and the no-data value in a file.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from aerotri.conventions import InputError
+from aerotri.vectors.geojson import LARGEST_M
+
+NO_DATA = -9999.0
+"""Stands for what is not known in the files of this program."""
+CACHE_MB = 256
+"""Blocks that GDAL keeps: it would take a share of the machine's memory otherwise."""
+TILE = 512
+LEAST_ROOM = 16384
+SIGMA = "σ"
+"""The description of a band of σ begins with it."""
+DAMAGED = "write the file anew, it is damaged"
+KEPT_OPTIONS = ("compress", "predictor")
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The cells of a north-up raster.
+
+    Parameters
+    ----------
+    rows, columns : size.
+    left, top : outer edges of the first cell, in the unit of the coordinates.
+    cell_x, cell_y : size of a cell, both positive.
+    """
+
+    rows: int
+    columns: int
+    left: float
+    top: float
+    cell_x: float
+    cell_y: float
+
+    def x(self, column: ArrayLike) -> np.ndarray:
+        """Coordinate of the centres of columns; whole and broken numbers alike."""
+        return self.left + (np.asarray(column) + 0.5) * self.cell_x
+
+    def y(self, row: ArrayLike) -> np.ndarray:
+        """Coordinate of the centres of rows."""
+        return self.top - (np.asarray(row) + 0.5) * self.cell_y
+
+    def column(self, x: ArrayLike) -> np.ndarray:
+        """Broken number of the column whose centre is at x; the inverse of `x`."""
+        return (np.asarray(x) - self.left) / self.cell_x - 0.5
+
+    def row(self, y: ArrayLike) -> np.ndarray:
+        """The inverse of `y`."""
+        return (self.top - np.asarray(y)) / self.cell_y - 0.5
+
+    def window(self, row: int, column: int, rows: int, columns: int) -> Grid:
+        """The grid of some rows and columns."""
+        left, top = self.left + column * self.cell_x, self.top - row * self.cell_y
+        return Grid(rows, columns, left, top, self.cell_x, self.cell_y)
+
+    def between_centres(self) -> Grid:
+        """The grid whose cells have their corners at the centres of this one's."""
+        left, top = self.left + self.cell_x / 2.0, self.top - self.cell_y / 2.0
+        return Grid(self.rows - 1, self.columns - 1, left, top, self.cell_x, self.cell_y)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Outer edges: left, bottom, right, top."""
+        return (
+            self.left, self.top - self.rows * self.cell_y, self.left + self.columns * self.cell_x, self.top,
+        )  # fmt: skip
+
+    def coarser(self, cells: int) -> Grid:
+        """The grid with `cells` × `cells` cells made one; the last ones reach beyond the edge."""
+        rows, columns = -(-self.rows // cells), -(-self.columns // cells)
+        return Grid(rows, columns, self.left, self.top, self.cell_x * cells, self.cell_y * cells)
+
+    @classmethod
+    def of_nodes(cls, x: np.ndarray, y: np.ndarray) -> Grid:
+        """The grid whose cells have their centres at equally spaced nodes, x rising, y falling."""
+        cell_x, cell_y = float(x[-1] - x[0]) / (len(x) - 1), float(y[0] - y[-1]) / (len(y) - 1)
+        return cls(len(y), len(x), float(x[0]) - cell_x / 2.0, float(y[0]) + cell_y / 2.0, cell_x, cell_y)
+
+
+class RasterReader:
+    """A raster of one band, or a surface with its σ, open for reading; used as a context manager, from one thread.
+
+    Parameters
+    ----------
+    band : which is read: 1 the heights, 2 the σ of a file of `write_surface`.
+
+    Attributes
+    ----------
+    grid : its cells. dtype : float type in which it is delivered. no_data : its no-data value, None if it has none.
+    crs : rasterio's CRS or None. options : how the file is written, for a copy of the same kind.
+    """
+
+    def __init__(self, path: str | os.PathLike, band: int = 1):
+        import rasterio
+
+        self.path, self.band = Path(path), band
+        with _told(self.path, "is no raster", "give a GeoTIFF"), _quietly():
+            self._file = rasterio.open(self.path)
+        try:
+            with _told(self.path, "cannot be read", DAMAGED):
+                self._check()
+                self._look()
+        except InputError:
+            self._file.close()
+            raise
+
+    def _look(self) -> None:
+        t = self._file.transform
+        self.grid = Grid(self._file.height, self._file.width, t.c, t.f, t.a, -t.e)
+        given = np.dtype(self._file.dtypes[0])
+        self.dtype = given if given.kind == "f" and given.itemsize >= 4 else np.dtype(np.float32)
+        if given.kind in "iu" and given.itemsize > 2:
+            self.dtype = np.dtype(np.float64)
+        self.no_data: float | None = self._file.nodata
+        self.crs: Any = self._file.crs
+        self.options = {key: self._file.profile[key] for key in KEPT_OPTIONS if key in self._file.profile}
+        self._masked = self.no_data is None and "all_valid" not in {f.name for f in self._file.mask_flag_enums[0]}
+
+    def _check(self) -> None:
+        file = self._file
+        if file.count != 1 and not (file.count == 2 and str(file.descriptions[1]).startswith(SIGMA)):
+            raise InputError(f"has {file.count} bands", "give a raster with one band", self.path)
+        if self.band > file.count:
+            raise InputError("has no σ", "give a surface of `aerotri dtm`", self.path)
+        t = file.transform
+        if t.b or t.d or t.a <= 0.0 or t.e >= 0.0:
+            raise InputError("is turned, mirrored or without georeference", "give a north-up GeoTIFF", self.path)
+        if not all(abs(value) <= LARGEST_M for value in (t.a, t.c, t.e, t.f)):
+            raise InputError("lies at no possible place", "give a north-up GeoTIFF in metres", self.path)
+        if np.dtype(file.dtypes[0]).kind not in "iuf":
+            raise InputError(f"has values of type {file.dtypes[0]}", "give numbers", self.path)
+        if file.scales[0] != 1.0 or file.offsets[0] != 0.0:
+            raise InputError("has a scale or an offset", "write the values out (gdal_translate -unscale)", self.path)
+
+    @property
+    def epsg(self) -> int | None:
+        """Code of the CRS, of its plan where it has a height system too; None where it has none."""
+        if self.crs is None:
+            return None
+        with _told(self.path, "has a CRS that cannot be read", "write the file anew"):
+            code = self.crs.to_epsg()
+        if code is None:
+            from pyproj import CRS
+            from pyproj.exceptions import CRSError
+
+            try:
+                whole = CRS.from_wkt(self.crs.to_wkt())
+            except CRSError:
+                return None
+            code = whole.sub_crs_list[0].to_epsg() if whole.is_compound else None
+        return code
+
+    def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
+        """A window, (rows, columns) of `dtype`; NaN where nothing is known and beyond the edges."""
+        from rasterio.windows import Window
+
+        top, left = max(row, 0), max(column, 0)
+        bottom, right = min(row + rows, self.grid.rows), min(column + columns, self.grid.columns)
+        if bottom <= top or right <= left:
+            return np.full((rows, columns), np.nan, self.dtype)
+        values = self._values(Window(left, top, right - left, bottom - top))  # pyright: ignore[reportCallIssue]
+        if values.shape == (rows, columns):
+            return values
+        out = np.full((rows, columns), np.nan, self.dtype)
+        out[top - row : bottom - row, left - column : right - column] = values
+        return out
+
+    def _values(self, window) -> np.ndarray:
+        with _told(self.path, "cannot be read", DAMAGED):
+            raw = self._file.read(self.band, window=window)
+            mask = self._file.read_masks(self.band, window=window) if self._masked else None
+        values = raw.astype(self.dtype, copy=False)
+        if mask is not None:
+            values[mask == 0] = np.nan
+        elif self.no_data is not None and not np.isnan(self.no_data):
+            values[raw == float(self.no_data)] = np.nan
+        return values
+
+    def sample(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """(n,) bilinear values at places (n,); NaN where one of the four cells is not known.
+
+        The window around all places is read at once: call it for places near one another.
+        """
+        column, row = self.grid.column(x), self.grid.row(y)
+        out = np.full(len(column), np.nan)
+        there = (column >= 0.0) & (row >= 0.0) & (column <= self.grid.columns - 1) & (row <= self.grid.rows - 1)
+        if not there.any():
+            return out
+        first_row, first_column = int(row[there].min()), int(column[there].min())
+        size = int(row[there].max()) - first_row + 2, int(column[there].max()) - first_column + 2
+        window = self.read(first_row, first_column, *size).astype(float)
+        i, j = np.floor(row[there]).astype(int) - first_row, np.floor(column[there]).astype(int) - first_column
+        t, s = row[there] % 1.0, column[there] % 1.0
+        corners = (window[i, j], window[i, j + 1], window[i + 1, j], window[i + 1, j + 1])
+        weights = ((1.0 - t) * (1.0 - s), (1.0 - t) * s, t * (1.0 - s), t * s)
+        # a cell of no weight may be unknown: places on the last column have nothing to their right
+        out[there] = sum(np.where(w > 0.0, w * c, 0.0) for w, c in zip(weights, corners, strict=True))
+        return out
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._file.close()
+
+
+class RasterWriter:
+    """A raster of one band being written; used as a context manager, from one thread.
+
+    Parameters
+    ----------
+    crs : rasterio's CRS, a text such as 'EPSG:25832', or None.
+    options : creation options, such as those of a `RasterReader`. threads : for compression.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike,
+        grid: Grid,
+        dtype: np.dtype | type = np.float32,
+        crs: Any = None,
+        no_data: float | None = NO_DATA,
+        options: Mapping[str, Any] | None = None,
+        threads: int = 1,
+    ):
+        import rasterio
+
+        made: dict[str, Any] = {"tiled": True, "blockxsize": TILE, "blockysize": TILE, "bigtiff": "IF_SAFER"}
+        made |= dict(options or {})
+        if "compress" in made and threads > 1:
+            made["num_threads"] = threads
+        self.no_data = no_data
+        with _quietly():
+            self._file = rasterio.open(
+                path, "w", driver="GTiff", height=grid.rows, width=grid.columns, count=1, dtype=np.dtype(dtype),
+                crs=crs, transform=_transform(grid), nodata=no_data, **made,
+            )  # fmt: skip
+
+    def write(self, row: int, column: int, values: np.ndarray) -> None:
+        """Write a window from its upper left cell on; NaN becomes the no-data value, in `values` too."""
+        from rasterio.windows import Window
+
+        if self.no_data is not None and not np.isnan(self.no_data) and values.dtype.kind == "f":
+            np.copyto(values, self.no_data, where=np.isnan(values))
+        window = Window(column, row, values.shape[1], values.shape[0])  # pyright: ignore[reportCallIssue]
+        self._file.write(values, 1, window=window)
+
+    def describe(self, text: str) -> None:
+        """What the values are, for those who open the file."""
+        self._file.set_band_description(1, text)
+
+    def __enter__(self) -> RasterWriter:
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._file.close()
+
+
+def write_raster(path: str | os.PathLike, values: np.ndarray, grid: Grid, crs: Any = None, text: str = "") -> None:
+    """Write a whole raster (rows, columns); whole numbers as they are, others as float32 with no-data for NaN."""
+    whole = values.dtype.kind in "iu"
+    with RasterWriter(path, grid, values.dtype if whole else np.float32, crs, -1 if whole else NO_DATA) as writer:
+        if text:
+            writer.describe(text)
+        writer.write(0, 0, values if whole else values.astype(np.float32))
+
+
+def write_surface(path: str | os.PathLike, z: np.ndarray, sigma: np.ndarray, grid: Grid, crs: Any, text: str) -> None:
+    """Write heights and their σ (rows, columns) as the two bands of a cloud-optimised GeoTIFF; NaN is no-data."""
+    import rasterio.shutil
+
+    plain = Path(path).with_name(f"{Path(path).name}.plain")
+    made: dict[str, Any] = {"tiled": True, "blockxsize": TILE, "blockysize": TILE, "bigtiff": "IF_SAFER"}
+    try:
+        with _quietly():
+            with rasterio.open(
+                plain, "w", driver="GTiff", height=grid.rows, width=grid.columns, count=2, dtype=np.float32, crs=crs,
+                transform=_transform(grid), nodata=NO_DATA, **made,
+            ) as file:  # fmt: skip
+                for band, (values, what) in enumerate(((z, text), (sigma, f"{SIGMA} of {text}")), start=1):
+                    known = np.isfinite(z) & np.isfinite(values)
+                    file.write(np.where(known, values, NO_DATA).astype(np.float32), band)
+                    file.set_band_description(band, what)
+            rasterio.shutil.copy(plain, path, driver="COG", compress="DEFLATE", predictor="YES")
+    except Exception as error:
+        # GDAL closes a file that found no room without a word and fails when it reads it again
+        if shutil.disk_usage(plain.parent).free < LEAST_ROOM:
+            raise OSError(errno.ENOSPC, "No space left on device", str(plain)) from error
+        raise
+    finally:
+        plain.unlink(missing_ok=True)
+
+
+def horizontal_crs(crs: str) -> str | None:
+    """The CRS of a raster of a block: 'EPSG:25832' of 'EPSG:25832+7837', None for 'local'."""
+    return None if crs == "local" else crs.partition("+")[0]
+
+
+def cache_limited() -> Any:
+    """A context in which GDAL keeps `CACHE_MB` of blocks and no more."""
+    import rasterio
+
+    return rasterio.Env(GDAL_CACHEMAX=CACHE_MB)
+
+
+def rasterise(
+    shapes: Iterable[tuple[Mapping[str, Any], int]], grid: Grid, background: int = -1, touched: bool = False
+) -> np.ndarray:
+    """(rows, columns) int32: the number of the last polygon that holds the centre of a cell.
+
+    Parameters
+    ----------
+    shapes : pairs of a GeoJSON geometry and its number.
+    touched : every cell that a geometry touches counts, not only its centre.
+    """
+    from rasterio.features import rasterize
+
+    shapes = list(shapes)
+    if not shapes:
+        return np.full((grid.rows, grid.columns), background, np.int32)
+    shape = grid.rows, grid.columns
+    return rasterize(
+        shapes, out_shape=shape, fill=background, dtype=np.int32, transform=_transform(grid), all_touched=touched
+    )
+
+
+def _transform(grid: Grid) -> Any:
+    from rasterio import Affine
+
+    return Affine(grid.cell_x, 0.0, grid.left, 0.0, -grid.cell_y, grid.top)
+
+
+@contextmanager
+def _told(path: Path, what: str, remedy: str) -> Iterator[None]:
+    """What rasterio and GDAL raise over a damaged file as an error that names it."""
+    from rasterio._err import CPLE_BaseError
+    from rasterio.errors import RasterioError
+
+    try:
+        yield
+    except (RasterioError, CPLE_BaseError, OSError, ValueError, MemoryError, SystemError) as error:
+        short = (str(error.__cause__ or error).splitlines() or [""])[0][:200] or type(error).__name__
+        raise InputError(f"{what}: {short}", remedy, path) from error
+
+
+@contextmanager
+def _quietly() -> Iterator[None]:
+    """Without a warning for rasters of local blocks, which have no CRS, and for those that are refused anyway."""
+    from rasterio.errors import NotGeoreferencedWarning
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        yield

@@ -1,0 +1,212 @@
+"""Rasters of heights brought to metres: out of degrees or feet, by bilinear interpolation.
+
+What is in metres already is read as it is. Heights count in what the vertical part of the CRS says, else in what the
+file calls the unit of its band, else in metres; a plan in feet leaves that open, and the file has to say it.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.rasters.grids import NO_DATA, Grid, RasterReader
+
+if TYPE_CHECKING:
+    from pyproj import CRS
+
+METRE = 1.0
+UNITS = {
+    "m": METRE, "metre": METRE, "metres": METRE, "meter": METRE, "meters": METRE, "ft": 0.3048, "foot": 0.3048,
+    "feet": 0.3048, "international foot": 0.3048, "us survey foot": 1200.0 / 3937.0, "us-ft": 1200.0 / 3937.0,
+    "ftus": 1200.0 / 3937.0, "us_survey_foot": 1200.0 / 3937.0,
+}  # fmt: skip
+"""Metres of the units a band may name."""
+UNIT_REMEDY = 'say it in the file: gdal_edit.py -units "US survey foot" FILE, or -units m'
+
+
+@dataclass(frozen=True)
+class RasterUnits:
+    """What a raster counts in.
+
+    Parameters
+    ----------
+    plan : 'metre', or the unit of its X. height : metres in its unit of height, None where nobody says.
+    crs : its name and code, in words.
+    """
+
+    plan: str
+    height: float | None
+    crs: str
+
+    @property
+    def is_metric(self) -> bool:
+        return self.plan == "metre" and self.height == METRE
+
+
+class MetricReader(RasterReader):
+    """A raster in metres, whatever its file counts in.
+
+    Parameters
+    ----------
+    target : 'EPSG:n' in metres, where it is to be brought to when its own does not count metres; None: the UTM zone.
+
+    Attributes
+    ----------
+    note : a sentence about what was done, '' where nothing was.
+
+    Raises
+    ------
+    InputError
+        When the unit of the heights is not known.
+    """
+
+    note = ""
+
+    def __init__(self, path: str | os.PathLike, band: int = 1, target: str | None = None):
+        super().__init__(path, band)
+        self._source: Any = None
+        self._factor = METRE
+        try:
+            self._bring_to_metres(target)
+        except InputError:
+            self._file.close()
+            raise
+
+    def _bring_to_metres(self, target: str | None) -> None:
+        units = units_of(self)
+        if units.is_metric:
+            return
+        if units.height is None:
+            raise InputError(
+                f"is in {units.crs}, which counts in {units.plan}, and does not say what its heights count in",
+                UNIT_REMEDY, self.path,
+            )  # fmt: skip
+        self._factor = units.height
+        said = []
+        if units.plan != "metre":
+            target = target or metric_crs_for(self)
+            self._warp(target)
+            said.append(
+                f"brought from {units.crs}, which counts in {units.plan}, to {target} by bilinear interpolation, cells "
+                f"of {self.grid.cell_x:.4g} m"
+            )
+        if self._factor != METRE:
+            said.append(f"heights multiplied by {self._factor:.10g} to metres")
+            self.dtype = np.dtype(np.float64)
+        self.note = f"{self.path.name}: {'; '.join(said)}"
+
+    def _warp(self, target: str) -> None:
+        """Read through GDAL's warper from now on."""
+        from rasterio.enums import Resampling
+        from rasterio.errors import RasterioError
+        from rasterio.vrt import WarpedVRT
+
+        no_data = NO_DATA if self.no_data is None else self.no_data
+        try:
+            warped = WarpedVRT(
+                self._file, crs=target, resampling=Resampling.bilinear, nodata=no_data, dtype="float64"
+            )
+        except RasterioError as error:
+            raise InputError(f"cannot be brought to {target}: {error}", "check its CRS", self.path) from error
+        self._source, self._file = self._file, warped
+        t = warped.transform
+        self.grid = Grid(warped.height, warped.width, t.c, t.f, t.a, -t.e)
+        self.no_data, self.crs, self.options = no_data, warped.crs, {}
+        self.dtype, self._masked = np.dtype(np.float64), False
+
+    def _values(self, window) -> np.ndarray:
+        values = super()._values(window)
+        return values if self._factor == METRE else values * self._factor
+
+    def __exit__(self, kind, error, trace) -> None:
+        super().__exit__(kind, error, trace)
+        if self._source is not None:
+            self._source.close()
+
+
+def units_of(reader: RasterReader) -> RasterUnits:
+    """What a raster counts in; one without a CRS counts in metres, as local blocks do."""
+    named = (reader._file.units[reader.band - 1] or "").strip().lower()
+    of_band = UNITS.get(named)
+    if reader.crs is None:
+        return RasterUnits("metre", METRE if of_band is None else of_band, "no CRS")
+    whole = _crs_of(reader)
+    if whole is None:
+        return RasterUnits("metre", METRE if of_band is None else of_band, "a CRS of its own")
+    flat = whole.sub_crs_list[0] if whole.is_compound else whole
+    axis = flat.axis_info[0] if flat.axis_info else None
+    plan = "metre" if axis is None or (axis.unit_name in UNITS and UNITS[axis.unit_name] == METRE) else axis.unit_name
+    up = whole.axis_info[2:] if len(whole.axis_info) == 3 else []
+    height = up[0].unit_conversion_factor if up else of_band
+    if height is None and (flat.is_geographic or plan == "metre"):
+        height = METRE
+    code = flat.to_epsg()
+    return RasterUnits(plan, height, flat.name if code is None else f"EPSG:{code} ({flat.name})")
+
+
+def refuse_other_units(reader: RasterReader) -> None:
+    """Refuse a raster that does not count in metres, where it is to be written in its own cells.
+
+    Raises
+    ------
+    InputError
+    """
+    units = units_of(reader)
+    if units.is_metric:
+        return
+    if units.plan == "metre":
+        raise InputError(f"is in {units.crs}, with heights that do not count in metres",
+                         "bring them to metres first: gdal_calc.py, or gdalwarp -t_srs with a height system in metres",
+                         reader.path)  # fmt: skip
+    target = metric_crs_for(reader)
+    raise InputError(
+        f"is in {units.crs}, which counts in {units.plan}",
+        f"bring it to metres first: gdalwarp -r bilinear -t_srs {target} IN OUT", reader.path,
+    )  # fmt: skip
+
+
+def metric_crs_for(reader: RasterReader) -> str:
+    """'EPSG:n' of the UTM zone of the raster's middle, on its own datum where there is one, else on WGS 84."""
+    from pyproj import Transformer
+    from pyproj.aoi import AreaOfInterest
+    from pyproj.database import query_utm_crs_info
+
+    whole = _crs_of(reader)
+    left, bottom, right, top = reader.grid.bounds
+    x, y = (left + right) / 2.0, (bottom + top) / 2.0
+    if whole is None:
+        raise InputError("has no CRS that PROJ knows", "give it one: gdal_edit.py -a_srs", reader.path)
+    flat = whole.sub_crs_list[0] if whole.is_compound else whole
+    lon, lat = Transformer.from_crs(flat, "OGC:CRS84", always_xy=True).transform(x, y)
+    if not np.isfinite([lon, lat]).all():
+        raise InputError("lies outside the range of its CRS", "correct its georeference", reader.path)
+    area = AreaOfInterest(lon, lat, lon, lat)
+    geographic = flat.geodetic_crs
+    for name in ("WGS 84" if geographic is None else geographic.name, "WGS 84"):
+        found = query_utm_crs_info(datum_name=name, area_of_interest=area)
+        if found:
+            return f"EPSG:{found[0].code}"
+    zone = int((lon + 180.0) // 6.0) % 60 + 1
+    return f"EPSG:{(32600 if lat >= 0.0 else 32700) + zone}"
+
+
+def _crs_of(reader: RasterReader) -> CRS | None:
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError
+
+    try:
+        found = CRS.from_wkt(reader.crs.to_wkt())
+    except (CRSError, AttributeError):
+        return None
+    return found if found.is_projected or found.is_geographic or found.is_compound else None
+
+
+def is_metric_raster(path: str | os.PathLike) -> bool:
+    """Whether a raster counts in metres already."""
+    with RasterReader(Path(path)) as reader:
+        return units_of(reader).is_metric

@@ -1,0 +1,98 @@
+"""One self-contained page about a volume: the number, its σ, the budget, the map, the sections."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from aerotri.report.pages.adjustment import data_address
+from aerotri.report.plots.rendering import RenderedPlot
+from aerotri.report.quality import printable, two_digits, with_sigma
+
+CAPTIONS = {
+    "budget": (
+        "One standard deviation of each part alone, and of all together. The part of the adjustment holds the "
+        "correlation between all heights; it is found by one solution with the factor of the normal equations."
+    ),
+    "thickness": "Height of the surface over the base: brown is cut (above), blue is fill (below).",
+    "section_areas": "Areas of the cross sections; what lies between them is the rule's business.",
+    "section_profiles": "Three of the sections; their places are broken lines on the map.",
+}
+
+
+def volume_html(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot]) -> str:
+    """The page as text.
+
+    Parameters
+    ----------
+    content : of volume.json. plots : by the names of `CAPTIONS`, in the order of the page.
+    """
+    environment = Environment(
+        loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    return environment.get_template("volume.html.j2").render(
+        name=printable(content["dtm"]), base=printable(content["base"]["name"]),
+        boundary=printable(content["boundary"]["name"]), crs=content["crs"], cards=_cards(content),
+        warnings=[printable(text, 1000) for text in content["warnings"]], budget=_budget(content),
+        methods=_methods(content), version=content["aerotri"],
+        plots=[{"name": name, "source": data_address(plot), "caption": CAPTIONS[name]}
+               for name, plot in plots.items()],
+    )  # fmt: skip
+
+
+def write_volume_page(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot], path: Path) -> None:
+    """Write the page; arguments as in `volume_html`."""
+    path.write_text(volume_html(content, plots), encoding="utf-8")
+
+
+def _number(value: float) -> str:
+    text = f"{value:,.0f}" if abs(value) >= 100.0 else f"{value:.4g}"
+    return text.replace(",", "\u2009").replace("-", "−")
+
+
+def _cards(c: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    s = c["sigma"]
+    net = _number(c["net_m3"]) if s is None else with_sigma(c["net_m3"], s["sigma_m3"])
+    return [
+        ("Net", f"{net} m³", "cut less fill" + ("" if s is None else ", one standard deviation")),
+        ("Cut", _number(c["cut_m3"]) + " m³", f"above the base, on {_number(c['cut_area_m2'])} m²"),
+        ("Fill", _number(c["fill_m3"]) + " m³", f"below the base, on {_number(c['fill_area_m2'])} m²"),
+        ("Area", _number(c["boundary"]["area_m2"]) + " m²", f"{_number(c['no_data_area_m2'])} m² of it not known"),
+    ]
+
+
+def _budget(c: Mapping[str, Any]) -> str:
+    """The σ in words."""
+    s = c["sigma"]
+    if s is None:
+        return ""
+    largest = max(s["parts_m3"], key=s["parts_m3"].get)
+    known, wide = two_digits(s["sigma_m3"]), two_digits(1.96 * s["sigma_m3"])
+    text = (
+        f"The volume is known to {known} m³ (1 σ; 95 %: ± {wide} m³), as if the mean height were known to "
+        f"{two_digits(1e3 * s['sigma_mean_height_m'])} mm. The largest part is that of the {largest}. {s['pickets']} "
+        f"heights with {s['rays']} rays went into it."
+    )
+    bent = s["curvature"]
+    if bent is not None:
+        held, side = ("cut hills off", "more") if bent["value_m3"] >= 0.0 else ("fill hollows", "less")
+        text += (
+            f" Straight lines between the heights {held}: the ground is expected to hold "
+            f"{with_sigma(abs(bent['value_m3']), bent['sigma_m3'])} m³ {side}. The volume is that of the surface as "
+            "given, so this is not in it; its σ counts it as ground between the pickets."
+        )
+    if not s["systematic"]["variants"]:
+        return text + " No image errors were estimated, so what they do to the volume is not known."
+    return text
+
+
+def _methods(c: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    return [
+        (m["method"], _number(m["net_m3"]), _number(m["cut_m3"]), _number(m["fill_m3"]), _number(m["no_data_area_m2"]),
+         m["note"])
+        for m in c["methods"]
+    ]  # fmt: skip

@@ -1,0 +1,1 @@
+"""Plots: a result goes in, a figure comes out, nothing is saved."""

@@ -1,0 +1,69 @@
+"""All plots of an adjusted block. A plot function takes a result and returns a figure; it never saves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+
+from aerotri.image_errors import Change, averaged_residuals, field_on_grid, image_groups
+from aerotri.report.plots.block import plot_block_plan, plot_ground_points, plot_rays_per_point
+from aerotri.report.plots.camera import plot_averaged_residuals, plot_systematic_errors
+from aerotri.report.plots.panels import Panel, plot_panels
+from aerotri.report.plots.reliability import plot_reliability
+from aerotri.report.plots.rendering import save_plots
+from aerotri.report.plots.residuals import correlated_parameters, plot_correlations, plot_residual_histogram
+from aerotri.results.adjusted_block import AdjustedBlock
+
+__all__ = [
+    "all_plots",
+    "plot_averaged_residuals",
+    "plot_block_plan",
+    "plot_correlations",
+    "plot_ground_points",
+    "plot_rays_per_point",
+    "plot_reliability",
+    "plot_residual_histogram",
+    "plot_systematic_errors",
+    "save_plots",
+]
+
+MOST_GROUPS = 8
+
+
+def all_plots(adjusted: AdjustedBlock, changes: Sequence[Change] = ()) -> dict[str, Figure]:
+    """The figures of the report by a name fit for a file, in the order of the report.
+
+    Plots over the image format are drawn for the first eight image groups and numbered from the second on.
+
+    Parameters
+    ----------
+    changes : of the image errors between groups, as `group_changes` finds them.
+    """
+    name = adjusted.block.name
+    figures = {"block_plan": plot_block_plan(adjusted)}
+    if len(adjusted.control) or len(adjusted.check):
+        figures["ground_points"] = plot_ground_points(adjusted)
+    for number, group in enumerate(image_groups(adjusted.block)[:MOST_GROUPS], start=1):
+        suffix = "" if number == 1 else f"_{number}"
+        field = field_on_grid(adjusted, group.name, camera=group.camera.name)
+        if field.max > 0.0:
+            figures[f"systematic_errors{suffix}"] = plot_systematic_errors(field, name)
+        averaged = averaged_residuals(adjusted, group.name, camera=group.camera.name)
+        figures[f"averaged_residuals{suffix}"] = plot_averaged_residuals(averaged, name)
+    for number, change in enumerate(changes, start=1):
+        figures["change" if number == 1 else f"change_{number}"] = _plot_change(adjusted, change)
+    if len(correlated_parameters(adjusted)) >= 2:
+        figures["correlations"] = plot_correlations(adjusted)
+    figures["residual_histogram"] = plot_residual_histogram(adjusted)
+    figures["rays_per_point"] = plot_rays_per_point(adjusted)
+    if adjusted.effects is not None:
+        figures["reliability"] = plot_reliability(adjusted)
+    return figures
+
+
+def _plot_change(adjusted: AdjustedBlock, change: Change) -> Figure:
+    """Two groups and their difference, on one scale."""
+    fields = [field_on_grid(adjusted, group, camera=change.camera) for group in (change.first, change.second)]
+    title = f"Two groups – {adjusted.block.name}"
+    return plot_panels([Panel(field.group, field) for field in (*fields, change.field)], title)

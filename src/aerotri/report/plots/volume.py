@@ -1,0 +1,223 @@
+"""Plots of a volume: the map of cut and fill, the budget of its σ, its sections."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+from aerotri.rasters.grids import Grid
+from aerotri.report.plots.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, plain, styled
+from aerotri.report.quality import two_digits, with_sigma
+from aerotri.volume.accuracy import PARTS
+from aerotri.volume.boundary import Boundary
+from aerotri.volume.compute import Volumes
+from aerotri.volume.sections import Profile, Sections, direction_of
+
+HIGHEST = 6.4
+CUT, FILL = "#7a2e0e", "#0b3d6b"
+# light in the middle and equally dark at both ends: in black and white the bold zero line tells the sides apart
+COLOURS = LinearSegmentedColormap.from_list("cut_and_fill", [FILL, "#8fb4d6", "#ffffff", "#dfa684", CUT])
+WORDS = {
+    "adjustment": "adjustment (orientation, self-calibration; all heights correlated)",
+    "matching": "matching of the pickets",
+    "interpolation": "ground between the pickets",
+    "base": "base",
+    "boundary": "position of the boundary",
+}
+
+SYSTEMATIC = {
+    "free": "image errors uncorrected, calibrated orientation",
+    "absorbed": "image errors uncorrected, orientation without parameters",
+}
+BAR = 0.36
+
+
+@dataclass(frozen=True, eq=False)
+class ThicknessMap:
+    """Thickness (rows, columns) m on a grid coarse enough to be drawn; NaN outside and where not known."""
+
+    grid: Grid
+    thickness: np.ndarray
+
+
+@styled
+def plot_thickness(found: ThicknessMap, boundary: Boundary, volumes: Volumes, content: Mapping[str, Any]) -> Figure:
+    """Cut and fill as tones, zero as a bold line, the boundary, the sections' direction."""
+    left, bottom, right, top = boundary.polygon.bounds
+    margin = 0.04 * max(right - left, top - bottom)
+    ratio = (top - bottom + 2 * margin) / (right - left + 2 * margin)
+    width = min(WIDTH - 2.3, HIGHEST / ratio)
+    height = width * ratio
+    v = volumes.chosen
+    subtitle = (
+        f"surface less base: {plain(content['dtm'], 60)} over {plain(content['base']['name'], 60)}\n"
+        f"cut {_count(v.cut)} m³ on {_count(v.cut_area)} m², fill {_count(v.fill)} m³ on {_count(v.fill_area)} m²"
+    )
+    figure = new_figure(height + 1.95, "Cut and fill", subtitle)
+    axes = axes_at(figure, 0.95, 0.95, width, height)
+    finite = found.thickness[np.isfinite(found.thickness)]
+    size = max(float(np.abs(np.percentile(finite, [0.5, 99.5])).max()), 1e-6)
+    norm = TwoSlopeNorm(0.0, -size, size)
+    extent = found.grid.bounds
+    image = axes.imshow(found.thickness, cmap=COLOURS, norm=norm, interpolation="nearest", aspect="auto",
+                        extent=(extent[0], extent[2], extent[1], extent[3]), zorder=1)  # fmt: skip
+    if finite.min() < 0.0 < finite.max() and min(found.thickness.shape) > 1:
+        x, y = found.grid.x(np.arange(found.grid.columns)), found.grid.y(np.arange(found.grid.rows))
+        axes.contour(x, y, found.thickness, levels=[0.0], colors=INK, linewidths=1.0, zorder=2)
+    axes.add_collection(LineCollection(boundary.rings, colors=INK, linewidths=1.4, linestyles="-", zorder=3))
+    _section_marks(axes, volumes.sections, boundary)
+    axes.set_xlim(left - margin, right + margin)
+    axes.set_ylim(bottom - margin, top + margin)
+    _coordinates(axes, width, height, content["crs"])
+    scale = axes_at(figure, 0.95 + width + 0.15, 0.95, 0.16, height)
+    bar = figure.colorbar(image, cax=scale)
+    bar.set_label("surface − base [m]")
+    scale.set_ylim(0.0 if finite.min() >= 0.0 else -size, 0.0 if finite.max() <= 0.0 else size)
+    scale.yaxis.set_major_formatter(FuncFormatter(_minus))
+    handles = [Line2D([], [], color=INK, lw=1.4, label="boundary"),
+               Line2D([], [], color=GREY, lw=0.7, ls=(0, (4, 3)), label="sections drawn")]  # fmt: skip
+    if finite.min() < 0.0 < finite.max():
+        handles.append(Line2D([], [], color=INK, lw=1.0, label="surface on the base"))
+    figure.legend(handles=handles, loc="center left", bbox_to_anchor=(0.9 / WIDTH, 0.25 / (height + 1.95)), ncols=3)
+    return figure
+
+
+@styled
+def plot_budget(content: Mapping[str, Any]) -> Figure:
+    """The parts of σ as bars, the total below them; what is no chance apart, with a scale of its own."""
+    s = content["sigma"]
+    parts = [(WORDS[name], s["parts_m3"][name]) for name in PARTS]
+    parts.append(("together (root of the sum of squares)", s["sigma_m3"]))
+    apart = [] if s["curvature"] is None else [("ground beyond straight lines between heights", s["curvature"])]
+    apart += [(SYSTEMATIC[one["variant"]], one) for one in s["systematic"]["variants"]]
+    share = 100.0 * s["sigma_m3"] / max(abs(content["net_m3"]), 1e-9)
+    subtitle = (
+        f"net {with_sigma(content['net_m3'], s['sigma_m3'])} m³ (1 σ, {two_digits(share)} %), "
+        f"{two_digits(1e3 * s['sigma_mean_height_m'])} mm of mean height\n"
+    )
+    if apart:
+        held = "are in the volume, not in σ" if s["systematic"]["in_the_volume"] else "would have been, not in σ"
+        subtitle += f"hatched, on a scale of its own: what uncorrected image errors {held}"
+        subtitle += "" if s["curvature"] is None else "; what lines cut off, in σ"
+    upper, lower = BAR * len(parts), BAR * len(apart)
+    figure = new_figure(upper + 1.6 + (lower + 0.75 if apart else 0.0), "How sure the volume is", subtitle)
+    axes = axes_at(figure, 4.15, 0.6 + (lower + 0.75 if apart else 0.0), WIDTH - 5.35, upper)
+    texts = [_count(value) if value > 0.0 else "none stated" for _, value in parts]
+    if s["curvature"] is None:
+        texts[PARTS.index("interpolation")] = "not known"
+    texts[-1] = _count(s["sigma_m3"])
+    colours = [LIGHT] * len(PARTS) + [ACCENT]
+    _bars(axes, [name for name, _ in parts], [value for _, value in parts], texts, {"color": colours})
+    axes.set_xlabel("σ [m³]")
+    if apart:
+        below = axes_at(figure, 4.15, 0.6, WIDTH - 5.35, lower)
+        texts = [("+" if one["value_m3"] > 0.0 else "") + with_sigma(one["value_m3"], one["sigma_m3"])
+                 for _, one in apart]  # fmt: skip
+        hatched = {"color": "white", "edgecolor": INK, "hatch": "////", "lw": 0.8}
+        _bars(below, [name for name, _ in apart], [one["value_m3"] for _, one in apart], texts, hatched)
+        below.set_xlabel("change of the volume [m³]")
+    return figure
+
+
+def _bars(axes, labels: list[str], values: list[float], texts: list[str], style: dict[str, Any]) -> None:
+    """Bars across, the first on top, each with its number; the size counts, the sign stands in the number."""
+    at, size = -np.arange(len(labels)), np.abs(values)
+    axes.barh(at, size, height=0.62, zorder=2, **style)
+    for y, value, text in zip(at, size, texts, strict=True):
+        axes.text(value + 0.02 * size.max(), y, text, va="center", fontsize=8)
+    axes.set_yticks(at, labels)
+    axes.set_xlim(0.0, 1.35 * max(float(size.max()), 1e-9))
+    axes.set_ylim(-len(labels) + 0.4, 0.6)
+    axes.xaxis.set_major_locator(MaxNLocator(4))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: _count(value)))
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+
+
+@styled
+def plot_section_areas(sections: Sections, name: str) -> Figure:
+    """Cut up, fill down over the station."""
+    subtitle = f"{plain(name, 60)}; {len(sections.station)} sections every {sections.spacing:.4g} m, " + (
+        f"following one another towards {sections.azimuth:g}°"
+    )
+    figure = new_figure(3.2, "Areas of the cross sections", subtitle)
+    axes = axes_at(figure, 0.95, 0.62, WIDTH - 1.3, 1.75)
+    axes.fill_between(sections.station, sections.sums[:, 0], color="#dfa684", lw=0, zorder=1)
+    axes.fill_between(sections.station, -sections.sums[:, 1], color="#8fb4d6", lw=0, zorder=1)
+    axes.plot(sections.station, sections.sums[:, 0], color=CUT, marker=".", ms=3, zorder=2)
+    axes.plot(sections.station, -sections.sums[:, 1], color=FILL, marker=".", ms=3, ls="--", zorder=2)
+    axes.axhline(0.0, color=INK, lw=0.8)
+    axes.margins(x=0.01)
+    axes.set_xlabel("station [m]")
+    axes.set_ylabel("area [m²]")
+    axes.yaxis.set_major_formatter(FuncFormatter(_minus))
+    axes.spines[["top", "right"]].set_visible(False)
+    handles = [Line2D([], [], color=CUT, label="cut"), Line2D([], [], color=FILL, ls="--", label="fill (downwards)")]
+    figure.legend(handles=handles, loc="center left", bbox_to_anchor=(0.9 / WIDTH, 0.14 / 3.2), ncols=2)
+    return figure
+
+
+@styled
+def plot_section_profiles(profiles: Sequence[Profile], name: str) -> Figure:
+    """Some sections: the surface, the base, cut and fill between them inside the boundary."""
+    each = 1.55
+    height = each * len(profiles) + 1.35
+    figure = new_figure(height, "Cross sections", f"{plain(name, 60)}; heights and distances in m, heights exaggerated")
+    for k, p in enumerate(profiles):
+        axes = axes_at(figure, 0.95, height - 0.75 - (k + 1) * each + 0.45, WIDTH - 1.3, each - 0.55)
+        over, under = p.inside & (p.surface >= p.base), p.inside & (p.surface < p.base)
+        axes.fill_between(p.distance, p.base, p.surface, where=over.tolist(), color="#dfa684", lw=0, zorder=1)
+        axes.fill_between(p.distance, p.base, p.surface, where=under.tolist(), color="#8fb4d6", lw=0, hatch="///",
+                          edgecolor="white", zorder=1)  # fmt: skip
+        axes.plot(p.distance, p.surface, color=INK, lw=1.1, zorder=3)
+        axes.plot(p.distance, p.base, color=GREY, lw=1.0, ls="--", zorder=2)
+        axes.margins(x=0.01)
+        axes.set_title(f"station {p.station:.4g} m", fontsize=8.5, loc="left", pad=2)
+        axes.yaxis.set_major_locator(MaxNLocator(4))
+        axes.spines[["top", "right"]].set_visible(False)
+        if k == len(profiles) - 1:
+            axes.set_xlabel("distance [m]")
+    handles = [
+        Line2D([], [], color=INK, lw=1.1, label="surface"), Line2D([], [], color=GREY, ls="--", label="base"),
+        Patch(color="#dfa684", label="cut"), Patch(facecolor="#8fb4d6", edgecolor="white", hatch="///", label="fill"),
+    ]  # fmt: skip
+    figure.legend(handles=handles, loc="center left", bbox_to_anchor=(0.9 / WIDTH, 0.17 / height), ncols=4)
+    return figure
+
+
+def _section_marks(axes, sections: Sections, boundary: Boundary) -> None:
+    along = direction_of(sections.azimuth)
+    across = np.array([along[1], -along[0]])
+    reach = (np.concatenate(boundary.rings) - sections.origin) @ across
+    wanted = sections.station[-1] * np.array([0.25, 0.5, 0.75])
+    chosen = sections.station[np.unique(np.argmin(np.abs(sections.station[:, None] - wanted), axis=0))]
+    lines = [sections.origin + s * along + np.array([reach.min(), reach.max()])[:, None] * across for s in chosen]
+    axes.add_collection(LineCollection(lines, colors=GREY, linewidths=0.7, linestyles=[(0, (4, 3))], zorder=3))
+
+
+def _coordinates(axes, width: float, height: float, crs: str) -> None:
+    axes.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 1.1)), steps=[1, 2, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(max(2, int(height / 0.8)), steps=[1, 2, 5, 10]))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(_minus))
+    axes.set_xlabel("E [m]" if crs else "X [m]")
+    axes.set_ylabel("N [m]" if crs else "Y [m]")
+
+
+def _count(value: float) -> str:
+    """A number of cubic metres with thin spaces between thousands; small ones with three digits."""
+    text = f"{value:,.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
+    return text.replace(",", "\u2009").replace("-", "−")
+
+
+def _minus(value: float, _: int | None = None) -> str:
+    return f"{value:.10g}".replace("-", "−")

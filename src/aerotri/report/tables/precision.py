@@ -1,0 +1,122 @@
+"""Tables of how precise the unknowns are: means, error ellipsoids, correlations by name; what parameters change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from aerotri.report.quality import metre_digits
+from aerotri.report.tables.adjustment import Column, Table, table
+from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.statistics.parameter_effects import ParameterEffects
+from aerotri.statistics.precision import (
+    HIGH_CORRELATION,
+    NamedCorrelation,
+    centre_ellipsoids,
+    parameter_correlations,
+    photograph_correlations,
+    point_ellipsoids,
+    practical_precision,
+    theoretical_precision,
+)
+
+MOST_CORRELATIONS = 200
+NAMED_FROM = 0.7
+"""Correlation of shared parameters from which on a pair is named in the table [C]."""
+
+
+def precision(adjusted: AdjustedBlock) -> Table:
+    """Theoretical precision μ of the object points and practical precision at the check points."""
+    rows = [("theoretical, all points (μ = σ₀·√(tr Q/3n))", theoretical_precision(adjusted))]
+    for name, results in (("control", adjusted.control), ("check", adjusted.check)):
+        if len(results):
+            chosen = np.zeros(len(adjusted.block.points), bool)
+            chosen[results.point] = True
+            rows.append((f"theoretical, {name} points", theoretical_precision(adjusted, chosen)))
+    if len(adjusted.check):
+        rows.append(("practical: differences at check points, with the errors of the given coordinates",
+                     practical_precision(adjusted)))  # fmt: skip
+    form = f".{metre_digits(adjusted.points.sigma)}f"
+    return table(
+        "Precision of the object points",
+        (Column("precision"), [name for name, _ in rows]),
+        (Column("points", "", "d"), [one.count for _, one in rows]),
+        *((Column(axis, "m", form), [getattr(one, axis.lower()) for _, one in rows]) for axis in "XYZ"),
+        (Column("of a coordinate", "m", form), [one.mean for _, one in rows]),
+    )
+
+
+def ellipsoids(adjusted: AdjustedBlock) -> Table:
+    """Semi-axes of the standard ellipsoids of points and projection centres: median, 95 % quantile, the largest."""
+    form = f".{metre_digits(adjusted.points.sigma)}f"
+    rows = []
+    for what, found, names in (
+        ("object points", point_ellipsoids(adjusted), adjusted.block.points),
+        ("projection centres", centre_ellipsoids(adjusted), adjusted.block.images.names),
+    ):
+        axes = found.semi_axes
+        known = np.flatnonzero(np.isfinite(axes).all(axis=1))
+        if not len(known):
+            continue
+        largest = known[np.argmax(axes[known, 0])]
+        middle = np.median(axes[known], axis=0)
+        steep = float(np.median(np.degrees(found.elevation[known, 0])))
+        most = float(np.quantile(axes[known, 0], 0.95)), float(axes[largest, 0])
+        rows.append((what, len(known), *(float(value) for value in middle), steep, *most, str(names[largest])))
+    columns = (
+        Column("ellipsoids of"), Column("number", "", "d"), Column("a, median", "m", form),
+        Column("b, median", "m", form), Column("c, median", "m", form), Column("a rises by", "°", ".0f"),
+        Column("a, 95 % below", "m", form), Column("a, largest", "m", form), Column("at"),
+    )  # fmt: skip
+    return Table("Error ellipsoids (one σ, semi-axes a ≥ b ≥ c)", columns, tuple(rows))
+
+
+def correlations(adjusted: AdjustedBlock) -> Table:
+    """Pairs of shared parameters with a correlation of at least 0.7, the largest first."""
+    found = parameter_correlations(adjusted.parameters, NAMED_FROM, MOST_CORRELATIONS)
+    return _pairs(f"Correlations of parameters with |r| ≥ {NAMED_FROM:g}", found, photograph=False)
+
+
+def orientation_correlations(adjusted: AdjustedBlock) -> Table:
+    """Pairs of orientation elements of one photograph with a correlation of at least 0.95, the largest first."""
+    found = photograph_correlations(adjusted, HIGH_CORRELATION, MOST_CORRELATIONS)
+    return _pairs(f"Correlations within photographs with |r| ≥ {HIGH_CORRELATION:g}", found, photograph=True)
+
+
+def _pairs(title: str, found: Iterable[NamedCorrelation], photograph: bool) -> Table:
+    found = list(found)
+    if len(found) == MOST_CORRELATIONS:
+        title += f", the {MOST_CORRELATIONS} largest"
+    of_photograph = [(Column("photograph"), [one.photograph for one in found])] if photograph else []
+    return table(
+        title,
+        *of_photograph,
+        (Column("first"), [one.first for one in found]),
+        (Column("second"), [one.second for one in found]),
+        (Column("r", "", "+.3f"), [one.value for one in found]),
+    )
+
+
+def check_effects(effects: ParameterEffects, digits: int) -> Table:
+    """RMS at check points as adjusted, and with all, with a family, with one parameter left out."""
+    rows: list[tuple] = [("as adjusted", "", None, *_rms(effects.difference), None, "")]
+    before = _rms(effects.difference)
+    for one in effects.left_out:
+        rms = _rms(one.difference)
+        share = 100.0 * (np.hypot(np.hypot(*rms[:2]), rms[2]) / np.hypot(np.hypot(*before[:2]), before[2]) - 1.0)
+        label = {"all": "without any"}.get(one.label, f"without {one.label}")
+        rows.append((label, one.group, one.t, *rms, float(share), one.verdict))
+    form = f".{digits}f"
+    columns = (
+        Column("adjustment"), Column("group"), Column("t", "", ".1f"),
+        *(Column(f"RMS {axis}", "m", form) for axis in "XYZ"), Column("RMS grows by", "%", "+.1f"),
+        Column("the parameter"),
+    )  # fmt: skip
+    return Table("Check points with parameters left out", columns, tuple(rows))
+
+
+def _rms(difference: np.ndarray) -> tuple[float, float, float]:
+    with np.errstate(invalid="ignore"):
+        x, y, z = np.sqrt(np.nansum(difference**2, axis=0) / np.isfinite(difference).sum(axis=0))
+    return float(x), float(y), float(z)

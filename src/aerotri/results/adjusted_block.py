@@ -1,0 +1,293 @@
+"""The result of an adjustment: everything a later stage, a table or a plot needs, as one frozen record of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerotri.functional_model.additional_parameters import Parameter, is_grid
+from aerotri.observations import Block
+
+if TYPE_CHECKING:
+    from aerotri.results.removal import Removal
+    from aerotri.results.variance_components import VarianceComponents
+
+RAY_STATUS = (
+    "used", "one ray", "off", "no start value", "not finite", "removed", "weak point", "weak photograph",
+)  # fmt: skip
+"""Status of a ray: adjusted, or why it was left out; data snooping removes; a point is weak that its rays do not fix,
+a photograph that is tied too weakly. The records hold the index into this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """How the adjustment ended.
+
+    Parameters
+    ----------
+    status : 'converged', 'not converged' or 'rank deficient'.
+    message : the status in words, naming the culprit; '' when converged.
+    sigma0 : σ̂0, dimensionless; sigma0_um : the same times the a-priori σ of an image coordinate, µm.
+    vtpv : vᵀPv with the final weights.
+    observations, unknowns, conditions, redundancy : redundancy = observations − unknowns + conditions.
+    warnings : sentences the user should read.
+    verdict : 'accepted', 'doubtful' or 'rejected'; '' before it is judged. reasons : sentences, the gravest first.
+    timings_s : seconds by stage.
+    """
+
+    status: str
+    message: str
+    iterations: int
+    sigma0: float
+    sigma0_um: float
+    vtpv: float
+    observations: int
+    unknowns: int
+    conditions: int
+    redundancy: int
+    warnings: tuple[str, ...] = ()
+    timings_s: Mapping[str, float] = field(default_factory=dict)
+    verdict: str = ""
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ImageResults:
+    """Exterior orientation of the n photographs, in the block's object frame.
+
+    Parameters
+    ----------
+    centre : (n, 3) m.
+    angles : (n, 3) rad, ω, φ, κ in the block's order.
+    covariance : (n, 6, 6) of (X0, Y0, Z0, ω, φ, κ), m and rad, σ̂0² included; NaN where not available.
+    rays : (n,) rays used.
+    """
+
+    centre: np.ndarray
+    angles: np.ndarray
+    covariance: np.ndarray
+    rays: np.ndarray
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """(n, 6) m and rad."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+
+@dataclass(frozen=True, eq=False)
+class PointResults:
+    """The N object points of the block, NaN where a point could not be adjusted.
+
+    Parameters
+    ----------
+    xyz : (N, 3) m.
+    covariance : (N, 3, 3) m², σ̂0² included.
+    rays : (N,) rays used.
+    max_abs_w : (N,) largest |w| of the point's image coordinates.
+    """
+
+    xyz: np.ndarray
+    covariance: np.ndarray
+    rays: np.ndarray
+    max_abs_w: np.ndarray
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """(N, 3) m."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+
+@dataclass(frozen=True, eq=False)
+class RayResults:
+    """Residuals of the m rays in the order of `block.image_points`, NaN where a ray was not used.
+
+    Parameters
+    ----------
+    v : (m, 2) mm, adjusted minus measured, in the plane corrected for the systematic image errors.
+    r : (m, 2) redundancy numbers.
+    w : (m, 2) normalised residuals −v/(σ√r), σ a priori.
+    weight : (m,) robust factor, 1 when off.
+    status : (m,) index into `RAY_STATUS`.
+    """
+
+    v: np.ndarray
+    r: np.ndarray
+    w: np.ndarray
+    weight: np.ndarray
+    status: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class RayEffects:
+    """External reliability of the m rays: the greatest effect of errors that just stay undetected; see there.
+
+    Parameters
+    ----------
+    size : (m, 2) of the effects of x and y, over σ of the unknown; NaN where there is no test.
+    unknown : (m, 2) which: 0–2 X, Y, Z of the ray's point, 3–8 X0, Y0, Z0, ω, φ, κ of its photograph, 9 + k the shared
+        parameter k, −1 for none.
+    height : (m, 2) m, effect on Z of the ray's point.
+    shared : (s,) str, the shared parameters.
+    """
+
+    size: np.ndarray
+    unknown: np.ndarray
+    height: np.ndarray
+    shared: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class SharedParameters:
+    """Unknowns shared by many rays: interior orientation, additional parameters, GNSS shifts; s of them.
+
+    Parameters
+    ----------
+    names : (s,) str such as 'focal_length_mm', 'bluh.1', 'brown.K1', 'gnss.shift_X'.
+    groups : (s,) str, the camera, day or strip the parameter belongs to.
+    kinds : (s,) str, 'interior', 'additional', 'gnss' or 'ins'.
+    marks : (s,) str, P L D C of the family, '' otherwise.
+    value : (s,); covariance : (s, s), σ̂0² included. Units: mm for interior elements, as the family states otherwise.
+    max_correlation : (s,) the largest |r| with another shared parameter, signed; max_correlation_with : (s,) its name.
+    total_correlation : (s,) B = 1 − 1/(N_ii·Q_ii) with N reduced to the shared parameters.
+    status : (s,) str, 'estimated', 'weighted', 'fixed' or 'removed'; reason : (s,) str.
+    """
+
+    names: np.ndarray
+    groups: np.ndarray
+    kinds: np.ndarray
+    marks: np.ndarray
+    value: np.ndarray
+    covariance: np.ndarray
+    max_correlation: np.ndarray
+    max_correlation_with: np.ndarray
+    total_correlation: np.ndarray
+    status: np.ndarray
+    reason: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """(s,)."""
+        return np.sqrt(np.diagonal(self.covariance))
+
+    @property
+    def is_node(self) -> np.ndarray:
+        """(s,) bool, nodes of a grid or random field: none says anything on its own."""
+        return np.array([is_grid(Parameter.of(name).family) for name in self.names], dtype=bool)
+
+    @property
+    def t(self) -> np.ndarray:
+        """(s,) |value|/σ."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.abs(self.value) / self.sigma
+
+
+@dataclass(frozen=True, eq=False)
+class GroundPointResults:
+    """Control or check points, k of them; NaN in a coordinate that was not given.
+
+    Parameters
+    ----------
+    point : (k,) index into the block's point names.
+    difference : (k, 3) m, adjusted − given.
+    sigma : (k, 3) m of the adjusted coordinate, σ̂0 included.
+    r : (k, 3) redundancy numbers of the given coordinate (NaN for check points).
+    w : (k, 3) normalised: control −v/(σ√r); check points d/√(σ_adjusted² + σ_given²).
+    rays : (k,).
+    lone_sigma : (k, 3) m, of coordinates that are held (σ = 0), a priori, as all others predict them; NaN elsewhere.
+        Their r is 0, and w is (given − predicted)/lone_sigma: what −v/(σ√r) tends to with σ.
+    freedom : (3,) degrees of freedom of X, Y, Z of check points, see `check_freedom`; None where not computed.
+    """
+
+    point: np.ndarray
+    difference: np.ndarray
+    sigma: np.ndarray
+    r: np.ndarray
+    w: np.ndarray
+    rays: np.ndarray
+    lone_sigma: np.ndarray | None = None
+    freedom: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        return len(self.point)
+
+
+@dataclass(frozen=True, eq=False)
+class ObservationResults:
+    """Observations beside image points and control, o of them: GNSS, INS, conditions; in the local frame.
+
+    Parameters
+    ----------
+    group : (o,) str. label : (o,) str, the photograph or condition. component : (o,) str, such as X or omega.
+    v, sigma : (o,) m, rad for attitudes; sigma a priori. r : (o,) redundancy numbers. w : (o,) −v/(σ√r).
+    effect : (o,) greatest effect of an error that just stays undetected, over σ of the unknown; effect_on : (o,) str.
+    """
+
+    group: np.ndarray
+    label: np.ndarray
+    component: np.ndarray
+    v: np.ndarray
+    sigma: np.ndarray
+    r: np.ndarray
+    w: np.ndarray
+    effect: np.ndarray | None = None
+    effect_on: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        return len(self.group)
+
+
+@dataclass(frozen=True)
+class ObservationGroup:
+    """One group of observations: its share of the redundancy and how its residuals fit their σ.
+
+    `sigma_apriori` and `rms` in the unit of the group (µm for image points, rad for attitudes, m otherwise);
+    `sigma_aposteriori` is sigma_apriori·√(vᵀPv of the group / its redundancy).
+    """
+
+    name: str
+    count: int
+    sigma_apriori: float
+    rms: float
+    redundancy: float
+    sigma_aposteriori: float
+
+
+@dataclass(frozen=True)
+class Blunder:
+    """A suspected gross error in one image coordinate pair."""
+
+    image: str
+    point: str
+    w: float
+    estimated_mm: float
+    action: str
+
+
+@dataclass(frozen=True, eq=False)
+class AdjustedBlock:
+    """A block after its adjustment; what the later stages start from.
+
+    `components` is there where `variance_components = "on"`: `block` then has the σ they led to. `removals` are those
+    of the selection of additional parameters, in order; `parameters` has them too, behind the others.
+    """
+
+    block: Block
+    outcome: Outcome
+    images: ImageResults
+    points: PointResults
+    rays: RayResults
+    parameters: SharedParameters
+    control: GroundPointResults
+    check: GroundPointResults
+    groups: tuple[ObservationGroup, ...]
+    blunders: tuple[Blunder, ...] = ()
+    observations: ObservationResults | None = None
+    components: VarianceComponents | None = None
+    effects: RayEffects | None = None
+    removals: tuple[Removal, ...] = ()

@@ -1,0 +1,30 @@
+"""An adjustment whole: its result, and the equations and the solution that it came from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.solve import Solution
+from aerotri.coordinates import LocalFrame
+from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.parameter_comparison import ParameterComparison
+
+
+@dataclass(frozen=True, eq=False)
+class Adjustment:
+    """A result together with what it came from, for stages that need covariances beyond σ.
+
+    Parameters
+    ----------
+    result : in the block's CRS. local : the same in the local frame, where `system` and `solution` live.
+    frame : the local frame, None for a block in local coordinates.
+    compared : the sets of additional parameters that were compared where the choice was left to the program.
+    """
+
+    result: AdjustedBlock
+    local: AdjustedBlock
+    system: NormalSystem
+    solution: Solution
+    frame: LocalFrame | None = None
+    compared: ParameterComparison | None = None

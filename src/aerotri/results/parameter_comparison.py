@@ -1,0 +1,93 @@
+"""Sets of additional parameters compared in one block."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+BOUNDS = (0.975, 0.025)
+"""Of the confidence interval of an RMS, 95 %."""
+
+Choice = tuple[tuple[str, tuple[str, ...]], ...]
+"""Families and their parameters, as `parse_parameters` returns them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """Differences at k points that took no part, and their RMS with its confidence bounds.
+
+    Parameters
+    ----------
+    difference : (k, 3) m, NaN where there is none. rms, low, high : (3,) m; the bounds hold at 95 % for independent
+        normal differences. count : (3,).
+    """
+
+    difference: np.ndarray
+    rms: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    count: np.ndarray
+
+    @classmethod
+    def of(cls, difference: np.ndarray) -> Accuracy:
+        """From differences (k, 3) m."""
+        known = np.isfinite(difference)
+        count = known.sum(axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rms = np.sqrt(np.sum(np.where(known, difference, 0.0) ** 2, axis=0) / count)
+            low, high = (rms * np.sqrt(count / chi2.ppf(p, count)) for p in BOUNDS)
+        return cls(difference, rms, low, high, count)
+
+
+@dataclass(frozen=True, eq=False)
+class SetOutcome:
+    """What one set of additional parameters did.
+
+    Parameters
+    ----------
+    name : its specification. status : 'converged', or why there is nothing behind it.
+    count : parameters estimated, of all groups. effective : the same, with a random field's effective number.
+    significant : of them with t > 1.96.
+    sigma0, sigma0_um : σ̂0, and times the a-priori σ of an image coordinate.
+    aic, bic : see above. check, control : at check points; at control points predicted without themselves.
+    sigma_um, length_mm : of a random field, NaN elsewhere.
+    """
+
+    name: str
+    choice: Choice
+    status: str
+    count: int
+    effective: float
+    significant: int
+    sigma0: float
+    sigma0_um: float
+    aic: float
+    bic: float
+    check: Accuracy
+    control: Accuracy
+    sigma_um: float = float("nan")
+    length_mm: float = float("nan")
+
+    @property
+    def converged(self) -> bool:
+        return self.status == "converged"
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterComparison:
+    """The sets in the order asked for.
+
+    Parameters
+    ----------
+    block : its name. folds : control points were left out in as many parts; their number is the points' at most.
+    check_points, control_points : names of the points behind the differences.
+    """
+
+    block: str
+    outcomes: tuple[SetOutcome, ...]
+    folds: int
+    check_points: tuple[str, ...]
+    control_points: tuple[str, ...]
+    robust: str

@@ -1,0 +1,1 @@
+"""What adjusts again to find out: gross errors, sets of parameters, variance components, fields, a free check."""

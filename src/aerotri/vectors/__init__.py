@@ -1,0 +1,1 @@
+"""Vector files: polygons, lines and points with their coordinate system."""

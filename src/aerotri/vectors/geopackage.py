@@ -1,0 +1,164 @@
+"""Polygons and lines of GeoPackages: attributes, kind of geometry and coordinates, checked byte by byte."""
+
+from __future__ import annotations
+
+import sqlite3
+import struct
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.vectors.geojson import LARGEST_M
+
+ENVELOPE_BYTES = (0, 32, 48, 48, 64)
+"""Of a GeoPackage geometry, by the kind of envelope its header has [L: OGC 12-128]."""
+KINDS = {2: "LineString", 3: "Polygon", 5: "MultiLineString", 6: "MultiPolygon"}
+PARTS = {5: 2, 6: 3}
+"""What a geometry of several parts is made of [L: OGC 06-103]."""
+EXTRA_DIMENSIONS = {0: 0, 1: 1, 2: 1, 3: 2}
+STEPS, MOST_STEPS = 10_000, 100_000
+"""Instructions of the database between two counts, and counts until it is given up: a view may never end."""
+REMEDY = "write the GeoPackage anew"
+
+
+@dataclass(frozen=True)
+class GeoPackageFeature:
+    """A row: attributes by lower-case name, kind of its geometry ('' for none or another), lists of positions.
+
+    Parameters
+    ----------
+    parts : for each part its lines or rings, (k, 2) or (k, 3) m each.
+    """
+
+    properties: Mapping[str, Any]
+    kind: str
+    parts: list[list[np.ndarray]]
+
+
+def read_geopackage(path: Path) -> Iterator[tuple[str, int | None, Iterator[GeoPackageFeature]]]:
+    """Name, code of the CRS (None where not known) and rows of every layer with geometries.
+
+    Raises
+    ------
+    InputError
+    """
+    if not path.is_file():
+        raise InputError("there is no such file", "give a GeoPackage", path)
+    try:
+        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as database:
+            _limit(database)
+            for table, column, srs in _layers(database, path):
+                yield table, srs, _rows(database, table, column, path)
+    except (sqlite3.Error, OverflowError, UnicodeError, MemoryError) as error:
+        raise InputError(f"is no GeoPackage that can be read: {error}", REMEDY, path) from error
+
+
+def _limit(database: sqlite3.Connection) -> None:
+    counted = 0
+
+    def count() -> bool:
+        nonlocal counted
+        counted += 1
+        return counted > MOST_STEPS
+
+    database.set_progress_handler(count, STEPS)
+    database.execute("PRAGMA trusted_schema = OFF")
+
+
+def _layers(database: sqlite3.Connection, path: Path) -> list[tuple[str, str, int | None]]:
+    found = []
+    query = "SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns"
+    for table, column, srs in database.execute(query).fetchall():
+        if not isinstance(table, str) or not isinstance(column, str) or not isinstance(srs, int):
+            raise InputError("its list of layers is damaged", REMEDY, path)
+        found.append((table, column, srs if srs > 0 else None))
+    return found
+
+
+def _rows(database: sqlite3.Connection, table: str, column: str, path: Path) -> Iterator[GeoPackageFeature]:
+    try:
+        cursor = database.execute("SELECT * FROM " + '"' + table.replace('"', '""') + '"')
+        names = [entry[0] for entry in cursor.description]
+        if column not in names:
+            raise InputError(f"layer '{table}' has no column '{column}'", REMEDY, path)
+        at = names.index(column)
+        for number, row in enumerate(cursor, start=1):
+            properties = {names[k].lower(): value for k, value in enumerate(row) if k != at}
+            try:
+                kind, parts = _geometry(row[at])
+            except (ValueError, struct.error) as error:
+                raise InputError(f"the geometry of row {number} is damaged: {error}", REMEDY, path) from error
+            yield GeoPackageFeature(properties, kind, parts)
+    except (sqlite3.Error, OverflowError, UnicodeError, MemoryError) as error:
+        raise InputError(f"layer '{table}' cannot be read: {error}", REMEDY, path) from error
+
+
+def _geometry(blob: Any) -> tuple[str, list[list[np.ndarray]]]:
+    """Kind and parts of a geometry: a header, then WKB.
+
+    Raises
+    ------
+    ValueError, struct.error
+    """
+    if blob is None:
+        return "", []
+    if not isinstance(blob, bytes) or blob[:2] != b"GP" or len(blob) < 8:
+        raise ValueError("it is none of GeoPackage")
+    envelope = (blob[3] >> 1) & 7
+    if envelope >= len(ENVELOPE_BYTES):
+        raise ValueError("its header is unknown")
+    at = 8 + ENVELOPE_BYTES[envelope]
+    _, kind, _, count = _head(blob, at)
+    if kind not in KINDS:
+        return "other", []
+    if kind not in PARTS:
+        return KINDS[kind], [_part(blob, at)[0]]
+    parts, at = [], at + 9
+    for _ in range(count):
+        part, at = _part(blob, at, PARTS[kind])
+        parts.append(part)
+    return KINDS[kind], parts
+
+
+def _head(blob: bytes, at: int) -> tuple[str, int, int, int]:
+    """Byte order, kind, number of coordinates of a position, and the count behind them."""
+    if at >= len(blob):
+        raise ValueError("it is cut off")
+    order = "<" if blob[at] == 1 else ">"
+    code, count = struct.unpack_from(order + "II", blob, at + 1)
+    kind, dimensions = code & 0x0FFFFFFF, 2 + bool(code & 0x80000000) + bool(code & 0x40000000)
+    if kind >= 1000:
+        dimensions = 2 + EXTRA_DIMENSIONS.get(kind // 1000, 0)
+        kind = kind % 1000 if kind < 4000 else 0
+    return order, kind, dimensions, count
+
+
+def _part(blob: bytes, at: int, wanted: int | None = None) -> tuple[list[np.ndarray], int]:
+    """The line, or the rings, of one part, and the place behind it."""
+    order, kind, dimensions, count = _head(blob, at)
+    if wanted is not None and kind != wanted:
+        raise ValueError("a part is of another kind")
+    if KINDS.get(kind) == "LineString":
+        line, at = _positions(blob, at + 9, order, dimensions, count)
+        return [line], at
+    rings, at = [], at + 9
+    for _ in range(count):
+        (size,) = struct.unpack_from(order + "I", blob, at)
+        ring, at = _positions(blob, at + 4, order, dimensions, size)
+        rings.append(ring)
+    return rings, at
+
+
+def _positions(blob: bytes, at: int, order: str, dimensions: int, count: int) -> tuple[np.ndarray, int]:
+    end = at + 8 * dimensions * count
+    if end > len(blob):
+        raise ValueError("it announces more positions than it holds")
+    found = np.frombuffer(blob, order + "f8", dimensions * count, at).reshape(count, dimensions)[:, :3].astype(float)
+    if not (np.abs(found) <= LARGEST_M).all():
+        raise ValueError("a coordinate is not possible")
+    return found, end

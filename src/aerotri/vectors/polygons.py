@@ -1,0 +1,115 @@
+"""Polygons from GeoJSON, GeoPackage and WKT; heights of their corners are left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry import shape
+from shapely.geometry.base import BaseGeometry
+
+from aerotri.conventions import InputError
+from aerotri.vectors.crs import VectorSystem, system_of_geojson, vector_system
+from aerotri.vectors.geojson import LARGEST_M, crs_of_name, read_geojson
+from aerotri.vectors.geopackage import read_geopackage
+
+VECTOR_ENDINGS = (".geojson", ".json", ".gpkg")
+KINDS = ("Polygon", "MultiPolygon")
+WKT_REMEDY = "give POLYGON ((X Y, …)) or MULTIPOLYGON"
+
+Feature = tuple[Mapping[str, Any], BaseGeometry]
+
+
+def polygon_features(path: Path, epsg: int | None = None) -> tuple[list[Feature], str]:
+    """Attributes and polygons of GeoJSON or GeoPackage, in the order of the file, and a sentence about their CRS.
+
+    Parameters
+    ----------
+    epsg : code of the CRS they are wanted in; None when not known.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, or a feature is no polygon.
+    """
+    read = _gpkg_features if path.suffix.lower() == ".gpkg" else _geojson_features
+    found: list[Feature] = []
+    number = 0
+    try:
+        features, system = read(path, epsg)
+        for number, (properties, geometry) in enumerate(features, start=1):
+            if geometry is None or geometry.is_empty:
+                raise InputError(f"feature {number} is no polygon", "give polygons only", path)
+            found.append((properties, placed(shapely.force_2d(geometry), system, path)))
+    except (ValueError, shapely.errors.ShapelyError) as error:
+        # shapely refuses rings of too few corners
+        raise InputError(f"a feature is no polygon: {error}", "correct its rings", path) from error
+    return found, system.note
+
+
+def placed(geometry: BaseGeometry, system: VectorSystem, path: Path | None = None) -> BaseGeometry:
+    """A polygon in the CRS of the surface."""
+    if system.transformer is None:
+        return geometry
+    return shapely.transform(geometry, lambda xy: system.place(xy, path))
+
+
+def srid_of_wkt(text: str) -> str | None:
+    """The CRS that `SRID=…;` before a WKT text names, None where there is none."""
+    number = text.strip()[5:].partition(";")[0].strip() if text.strip().upper().startswith("SRID=") else ""
+    known = number.isascii() and number.isdigit() and len(number) < 9
+    return f"EPSG:{int(number)}" if known and int(number) > 0 else None
+
+
+def polygon_of_wkt(text: str, path: Path | None = None) -> BaseGeometry:
+    """The polygon or polygons of a WKT text, in its own coordinates; `SRID=…;` before it is passed over.
+
+    Raises
+    ------
+    InputError
+    """
+    plain = text.partition(";")[2] if text.upper().lstrip().startswith("SRID=") else text
+    if not plain.lstrip().upper().startswith(("POLYGON", "MULTIPOLYGON")):
+        raise InputError("is no polygon", WKT_REMEDY, path)
+    try:
+        # numbers beyond all bounds are refused below
+        with np.errstate(all="ignore"):
+            geometry = shapely.from_wkt(plain)
+    except shapely.errors.ShapelyError as error:
+        raise InputError(f"is no WKT: {str(error)[:200]}", WKT_REMEDY, path) from error
+    if geometry is None or geometry.geom_type not in KINDS or geometry.is_empty:
+        raise InputError("is no polygon", WKT_REMEDY, path)
+    if not (np.abs(shapely.get_coordinates(geometry)) <= LARGEST_M).all():
+        raise InputError("has a coordinate that is not possible", "give metres", path)
+    return shapely.force_2d(geometry)
+
+
+def _geojson_features(path: Path, epsg: int | None) -> tuple[Sequence[tuple[Mapping[str, Any], Any]], VectorSystem]:
+    name, read = read_geojson(path)
+    features = [
+        (one.properties, shape({"type": one.kind, "coordinates": one.coordinates}) if one.kind in KINDS else None)
+        for one in read
+    ]
+    xy = [shapely.get_coordinates(geometry) for _, geometry in features if geometry is not None]
+    places = np.concatenate(xy) if xy else np.zeros((0, 2))
+    return features, system_of_geojson(crs_of_name(name), places, epsg, path.name)
+
+
+def _gpkg_features(path: Path, epsg: int | None) -> tuple[Sequence[tuple[Mapping[str, Any], Any]], VectorSystem]:
+    layers, features, system = 0, [], VectorSystem()
+    for layers, (_, srs, rows) in enumerate(read_geopackage(path), start=1):
+        if layers > 1:
+            break
+        features = [(row.properties, _polygon(row.parts) if row.kind in KINDS else None) for row in rows]
+        system = vector_system(None if srs is None else f"EPSG:{srs}", epsg, path.name)
+    if layers != 1:
+        raise InputError(f"has {layers or 'no'} layers", "give a GeoPackage with one layer of polygons", path)
+    return features, system
+
+
+def _polygon(parts: list[list[np.ndarray]]) -> BaseGeometry:
+    polygons = [shapely.Polygon(rings[0], rings[1:]) if rings else shapely.Polygon() for rings in parts]
+    return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)

@@ -1,0 +1,201 @@
+"""Sets of additional parameters side by side: each as `adjust` has it, prediction of control against adjusting anew."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aerotri.functional_model.additional_parameters import AUTO, parse_parameters
+from aerotri.pipeline import adjust, adjust_keeping_system, compare_parameters
+from aerotri.report.tables.parameters import comparison_columns, comparison_json, comparison_table, verdict
+from aerotri.report.tables.terminal import table_lines
+from aerotri.results.parameter_comparison import Accuracy, ParameterComparison, SetOutcome
+from aerotri.strategies.control_prediction import folds_of, predict_control
+from aerotri.strategies.parameter_choice import Gain, candidate_sets, choose, gain, gains, measure, standings
+from aerotri.strategies.parameter_comparison import set_name
+from small_blocks import small_block, with_adjustment
+
+ERRORS = {"ucd": {"preset": "ultracam_d", "errors": {"physical": {"rms_um": 4.0, "seed": 2}}}}
+SETS = ("none", "bluh:1-12", "ebner", "collocation:5x4")
+
+
+@pytest.fixture(scope="module")
+def block():
+    control = {"distance_bases": 2.5, "sigma_m": [0.03, 0.03, 0.05], "check_points": 8}
+    return small_block(21, camera=ERRORS, control=control)[0]
+
+
+@pytest.fixture(scope="module")
+def compared(block):
+    return compare_parameters(block, [parse_parameters(spec) for spec in SETS])
+
+
+@pytest.mark.parametrize("folds", [4, 100])
+@pytest.mark.parametrize("parameters", ["none", "bluh:1-12"])
+def test_prediction_is_an_adjustment_without_the_fold(block, folds, parameters):
+    a = adjust_keeping_system(with_adjustment(block, additional_parameters=parse_parameters(parameters)))
+    factor = a.system.factorise(a.solution.equations)
+    found = predict_control(a.system, a.solution, factor, a.result.outcome.sigma0, folds)
+    control = block.control
+    for fold in (0, 1):
+        out = found.point[found.fold == fold]
+        is_check = control.is_check | np.isin(control.point, out)
+        again = adjust(replace(a.result.block, control=replace(control, is_check=is_check)))
+        row = {int(p): k for k, p in enumerate(again.check.point)}
+        at = [row[int(p)] for p in out]
+        own = found.fold == fold
+        sigma0 = again.outcome.sigma0 / a.result.outcome.sigma0
+        np.testing.assert_allclose(found.difference[own], again.check.difference[at], rtol=1e-3, atol=3e-4)
+        np.testing.assert_allclose(found.sigma[own] * sigma0, again.check.sigma[at], rtol=1e-3)
+
+
+def test_prediction_of_what_nothing_else_determines():
+    """Two control points of three left out together: the datum is gone, and the prediction with it."""
+    block = small_block(22, control={"distance_bases": 3.0, "sigma_m": [0.03, 0.03, 0.05]})[0]
+    a = adjust_keeping_system(block)
+    count = len(a.result.control)
+    factor = a.system.factorise(a.solution.equations)
+    found = predict_control(a.system, a.solution, factor, 1.0, 1)
+    assert len(found.point) == count
+    assert np.isnan(found.difference).all()
+
+
+def test_folds():
+    assert sorted(folds_of(np.arange(7), 100).tolist()) == list(range(7))
+    place = np.arange(23)
+    assert np.bincount(folds_of(place, 5)).tolist() == [5, 5, 5, 4, 4]
+    np.testing.assert_array_equal(folds_of(place, 5), folds_of(place, 5))
+    # the same points in other rows
+    np.testing.assert_array_equal(folds_of(place[::-1] * 3, 5), folds_of(place, 5)[::-1])
+
+
+def test_each_set_as_adjust_has_it(block, compared):
+    """Whatever was adjusted before: σ0, check points, count."""
+    for spec, outcome in zip(SETS, compared.outcomes, strict=True):
+        result = adjust(with_adjustment(block, additional_parameters=parse_parameters(spec)))
+        assert outcome.converged
+        assert outcome.sigma0 == pytest.approx(result.outcome.sigma0, rel=2e-3 if "coll" in spec else 1e-6)
+        atol = 3e-3 if "coll" in spec else 1e-5
+        np.testing.assert_allclose(outcome.check.difference, result.check.difference, atol=atol)
+        assert outcome.count == len(result.parameters)
+        if "coll" not in spec:
+            assert outcome.significant == (result.parameters.t > 1.96).sum()
+            assert outcome.effective == outcome.count
+    field = compared.outcomes[-1]
+    assert 0.0 < field.effective < field.count
+    assert field.length_mm > 0.0
+
+
+def test_information_criteria(block, compared):
+    """Ω and r of the adjustment without parameters, k more of them with a set."""
+    plain = adjust(block).outcome
+    outcome = compared.outcomes[1]
+    own = adjust(with_adjustment(block, additional_parameters=parse_parameters("bluh:1-12"))).outcome
+    r = plain.redundancy
+    assert compared.outcomes[0].aic == pytest.approx(r * np.log(plain.vtpv / r), rel=1e-6)
+    assert outcome.aic == pytest.approx(r * np.log(own.vtpv / r) + 24, rel=1e-6)
+    assert outcome.bic == pytest.approx(r * np.log(own.vtpv / r) + 12 * np.log(r), rel=1e-6)
+
+
+def test_tables(compared):
+    table = comparison_table(compared)
+    assert [row[0] for row in table.rows] == [o.name for o in compared.outcomes]
+    lines = table_lines(table)
+    assert len(lines) == 2 + len(SETS)
+    content = json.loads(json.dumps(comparison_json(compared), allow_nan=False))
+    assert [s["set"] for s in content["sets"]] == [o.name for o in compared.outcomes]
+    assert content["sets"][1]["check"]["rms"]["Z"] == pytest.approx(compared.outcomes[1].check.rms[2])
+    columns = comparison_columns(compared)
+    assert len({len(column) for column in columns.values()}) == 1
+
+
+def test_confidence_bounds():
+    """χ² of 8 differences: 2.18 and 17.53."""
+    accuracy = Accuracy.of(np.column_stack([np.ones(8), np.full(8, np.nan), np.arange(8.0)]))
+    assert accuracy.count.tolist() == [8, 0, 8]
+    assert accuracy.low[0] == pytest.approx(np.sqrt(8 / 17.535), rel=1e-3)
+    assert accuracy.high[0] == pytest.approx(np.sqrt(8 / 2.180), rel=1e-3)
+    assert np.isnan(accuracy.rms[1])
+
+
+def made_up(name: str, scale: float, count: int, bic: float, seed: int = 0, points: int = 40) -> SetOutcome:
+    """A set with differences of a given size at the control points, those of one seed all alike."""
+    d = Accuracy.of(scale * np.random.default_rng(seed).normal(size=(points, 3)))
+    choice = parse_parameters(name)
+    return SetOutcome(set_name(choice), choice, "converged", count, count, count, 1.0, 2.0, bic, bic, d, d)
+
+
+def comparison_of(*outcomes: SetOutcome) -> ParameterComparison:
+    names = tuple(str(k) for k in range(40))
+    return ParameterComparison("b", outcomes, 10, names, names, "off")
+
+
+def test_choice_of_the_one_that_predicts_better():
+    chosen = choose(comparison_of(made_up("none", 3.0, 0, 0.0), made_up("ebner", 1.0, 12, 500.0)))
+    assert chosen.name == "ebner:1-12"
+    assert "every other set predicts them worse" in chosen.reason
+
+
+def test_where_the_control_cannot_tell_the_residuals_do():
+    ebner, none = made_up("ebner", 1.0, 12, 100.0, seed=1), made_up("none", 9.0, 0, 0.0)
+    bluh = made_up("bluh", 1.001, 12, 50.0, seed=1)
+    wavy = bluh.control.difference + 0.05 * np.sin(np.arange(120.0)).reshape(40, 3)
+    chosen = choose(comparison_of(ebner, replace(bluh, control=replace(bluh.control, difference=wavy)), none))
+    assert chosen.name.startswith("bluh")
+    assert "residuals speak most" in chosen.reason
+
+
+def test_few_control_points_leave_it_to_bic():
+    chosen = choose(comparison_of(made_up("none", 1.0, 0, 9.0, points=3), made_up("ebner", 1.0, 12, 5.0, points=3)))
+    assert chosen.name == "ebner:1-12"
+    assert "BIC alone" in chosen.reason
+
+
+def test_gain_with_its_standard_error():
+    one, two = made_up("ebner", 0.8, 12, 0.0, seed=1), made_up("none", 1.0, 0, 0.0, seed=1)
+    found = gain(one, two, (one.control.difference, two.control.difference))
+    assert found.value == pytest.approx(0.2)
+    assert found.error < 1e-12
+    independent = made_up("none", 1.0, 0, 0.0, seed=2)
+    found = gain(one, independent, (one.control.difference, independent.control.difference))
+    assert 0.03 < found.error < 0.2
+    assert measure(np.array([[3.0, 1.0, 2.0], [-3.0, -1.0, -2.0]])) == pytest.approx(6.0 ** (1.0 / 3.0))
+
+
+def test_significant_but_useless_is_said():
+    base, useless = made_up("none", 1.0, 0, 5.0, seed=1), made_up("ebner", 1.0, 12, 0.0, seed=1)
+    comparison = comparison_of(base, useless, made_up("ebner:1-3", 1.1, 3, 0.0, seed=1), made_up("gruen", 0.5, 44, 0.0))
+    found, behind = gains(comparison)["ebner:1-12"], standings(comparison)["ebner:1-12"]
+    # nested are none and ebner:1-3, not gruen
+    assert found.against == "none"
+    assert behind.against == "gruen:all"
+    worse = "worse than gruen:all"
+    assert verdict(useless, found, behind) == f"significant but useless: no better than none; {worse}"
+    assert verdict(replace(useless, significant=1), found, behind) == f"no better than none; {worse}"
+    assert verdict(useless, Gain("none", 0.3, 0.1), Gain("gruen:all", -0.1, 0.1)) == "helps; as good as the best"
+    assert verdict(useless, None, Gain("ebner:1-12", 0.0, 0.0)) == "the best"
+
+
+def test_a_set_that_cannot_be_adjusted_is_named_and_the_others_go_on(block):
+    found = compare_parameters(block, [parse_parameters(spec) for spec in ("bluh:1-4", "dmc", "none")])
+    assert [o.converged for o in found.outcomes] == [True, False, True]
+    assert "camera model" in found.outcomes[1].status
+    assert comparison_table(found).rows[1][-1] == found.outcomes[1].status
+    json.dumps(comparison_json(found), allow_nan=False)
+
+
+def test_auto_adjusts_with_what_it_chooses(block):
+    found = adjust_keeping_system(with_adjustment(block, additional_parameters=AUTO))
+    assert found.compared is not None
+    assert len(found.compared.outcomes) == len(candidate_sets(block))
+    chosen = choose(found.compared)
+    assert set_name(found.result.block.settings.adjustment.additional_parameters) == chosen.name
+    assert found.result.outcome.warnings[0] == chosen.reason
+    plain = adjust(with_adjustment(block, additional_parameters=chosen.choice))
+    assert found.result.outcome.sigma0 == pytest.approx(plain.outcome.sigma0, rel=1e-9)
+    assert np.sqrt(np.mean(found.result.check.difference[:, 2] ** 2)) < 0.6 * np.sqrt(
+        np.mean(adjust(block).check.difference[:, 2] ** 2)
+    )
