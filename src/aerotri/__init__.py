@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from aerotri.public.simulating import example_flight as example_flight
     from aerotri.public.simulating import simulate as simulate
     from aerotri.public.table import Table as Table
+    from aerotri.public.tying import tie_points as tie_points
 
 
 _PLACES = {
@@ -54,6 +55,7 @@ _PLACES = {
     "read": "aerotri.public.blocks",
     "read_block": "aerotri.public.blocks",
     "simulate": "aerotri.public.simulating",
+    "tie_points": "aerotri.public.tying",
 }
 """Where every public name stands; imported when it is used, so that `import aerotri` is quick."""
 _MODULES = ("predict",)
@@ -79,6 +81,7 @@ __all__ = [
     "read",
     "read_block",
     "simulate",
+    "tie_points",
 ]
 
 

@@ -17,7 +17,7 @@ from aerotri.functional_model.rotation import rotation_from_angles
 
 MODULES = (
     "adjustment", "blocks", "changes", "comparing", "converting", "covariance", "models", "parameters", "predict",
-    "simulating", "table",
+    "simulating", "table", "tying",
 )  # fmt: skip
 HEAVY = ("numba", "scipy", "pyarrow", "matplotlib", "cv2", "pyproj", "rasterio", "pydantic")
 

@@ -275,3 +275,25 @@ def test_marking_page_is_named(files, tmp_path, capsys):
     run_tiepoints(files[0] / "photographs", tmp_path / "block", given, False)
     assert str(tmp_path / "block" / "control_marks" / "marking.html") in capsys.readouterr().out
     assert (tmp_path / "block" / "control_marks" / "marking.html").is_file()
+
+
+def test_the_same_from_python(files, tied, tmp_path, capsys):
+    """The verb of the package gives the block of the command, and what it says is one JSON."""
+    import aerotri
+
+    found = aerotri.tie_points(
+        files[0] / "photographs", control=files[0] / "gcp_list.txt", check=files[1], focal_length_mm=6.0, pixel_um=12.0,
+        control_sigma_m=(0.02, 0.02, 0.03), mark_sigma_px=MARK_SIGMA_PX, points=300, features=2000,
+        cache=tied / "tie_point_cache",
+    )  # fmt: skip
+    assert found.left_out == ()
+    assert found.points.shape == (len(found.block.points), 3)
+    folder = found.save(tmp_path / "block")
+    for name in ("images.csv", "image_points.csv", "control.csv", "control_marks/predicted.csv"):
+        assert (folder / name).read_bytes() == (tied / name).read_bytes()
+    assert "<td>EPSG:32632</td>" in found._repr_html_()
+    capsys.readouterr()
+    run_tiepoints(files[0] / "photographs", tied, options(files), True)
+    told, kept = (json.loads(text) for text in (capsys.readouterr().out, (folder / "tiepoints.json").read_text()))
+    assert told["rays"] == kept["rays"]
+    assert told["marking_page"] == str(tied / "control_marks" / "marking.html")

@@ -1,0 +1,263 @@
+"""From a folder of photographs to a block: tie points, first orientation, control."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerotri.public.blocks import PathLike
+from aerotri.public.folders import refuse_foreign_entries, refuse_foreign_folder
+from aerotri.public.progress import ProgressLike, StageReport, stage_report
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from aerotri.formats.camera_spec import CameraSpec
+    from aerotri.observations import Block
+    from aerotri.tie_points.given import Given
+    from aerotri.tie_points.photographs import PhotographSet
+    from aerotri.tie_points.photographs_to_block import Options, TiedBlock
+    from aerotri.tie_points.stated import GivenFiles
+
+RECORD = "tiepoints.json"
+Sigmas = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TiedPhotographs:
+    """Photographs tied to a block: what `aerotri.tie_points` returns.
+
+    Parameters
+    ----------
+    record : the block and how it was found. photographs : their files and cameras. given : what was read beside them.
+    seconds : that it took.
+    """
+
+    record: TiedBlock
+    photographs: PhotographSet
+    given: Given
+    seconds: float
+
+    @property
+    def block(self) -> Block:
+        """The block, with start values, as `aerotri.adjust` takes it."""
+        return self.record.block
+
+    @property
+    def points(self) -> np.ndarray:
+        """(N, 3) m, start values of its points; NaN where they are not known."""
+        return self.record.points
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Names of photographs that could not be tied."""
+        return self.record.left_out
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What was matched, assumed or left out, in sentences."""
+        return self.record.messages
+
+    def summary(self, folder: PathLike | None = None) -> dict[str, Any]:
+        """The content of tiepoints.json.
+
+        Parameters
+        ----------
+        folder : where it was saved, for the path of the page to mark control points in.
+        """
+        from aerotri.report.control_marks import MARKS, PAGE
+        from aerotri.tie_points.outcome_json import tie_points_json
+
+        page = "" if folder is None or self.given.control is None else str(Path(folder) / MARKS / PAGE)
+        return tie_points_json(self.record, self.seconds) | {"marking_page": page}
+
+    def save(self, out: PathLike, *, overwrite: bool = False, progress: ProgressLike = None) -> Path:
+        """Write the block's folder, tiepoints.json, and a page to mark control points in.
+
+        Parameters
+        ----------
+        out : folder; files of others stay.
+        overwrite : replace files that aerotri has not written, or that were changed since.
+        progress : see `aerotri.adjust`.
+
+        Returns
+        -------
+        Path of the folder.
+
+        Raises
+        ------
+        InputError
+            When the folder holds files of others, or cannot be written to.
+        """
+        from aerotri.formats.atomic import atomic_folder
+        from aerotri.formats.block_writer import OWN_ENTRIES, write_block
+        from aerotri.formats.work_place import held
+        from aerotri.public.saving import write_json
+        from aerotri.report.control_marks import MARKS, write_control_marks
+
+        target, given = Path(out), self.given
+        refuse_other_content(target, overwrite)
+        # in one step, so that block, marks and record belong together
+        own = (*OWN_ENTRIES, MARKS, RECORD)
+        with held(target), stage_report(progress) as report, atomic_folder(target, own=own) as place:
+            write_block(self.block, place)
+            if given.control is not None:
+                report.stage("control points in the photographs", None)
+                write_control_marks(self.record, given.control, self.photographs, given.stated.geoid, place / MARKS)
+            write_json(place / RECORD, self.summary(target))
+        return target
+
+    def __repr__(self) -> str:
+        s = self.summary()
+        return (
+            f"<aerotri.TiedPhotographs {self.block.name!r}: {s['photographs']} photographs, {s['tie_points']} tie "
+            f"points, {s['control']} control and {s['check']} check points>"
+        )
+
+    def _repr_html_(self) -> str:
+        """Counts and messages, as a notebook shows them."""
+        shown = ("crs", "photographs", "tie_points", "rays", "rays_per_point", "control", "check", "median_residual_px")
+        values = self.summary()
+        rows = "".join(
+            f"<tr><th>{name.replace('_', ' ')}</th><td>{escape(_text(values[name]))}</td></tr>" for name in shown
+        )
+        said = "".join(f"<li>{escape(text)}</li>" for text in self.messages)
+        return f"<div><table><caption>{escape(str(self.block.name))}</caption>{rows}</table><ul>{said}</ul></div>"
+
+
+def tie_points(
+    photographs: PathLike,
+    *,
+    control: PathLike | None = None,
+    check: tuple[str, ...] | list[str] = (),
+    positions: PathLike | None = None,
+    orientation: PathLike | None = None,
+    camera: PathLike | None = None,
+    focal_length_mm: float | None = None,
+    pixel_um: float | None = None,
+    free_interior: bool = False,
+    crs: str = "",
+    geoid: PathLike | None = None,
+    control_sigma_m: Sigmas | None = None,
+    control_prefix: str = "",
+    mark_sigma_px: float = 0.5,
+    positions_sigma_m: Sigmas | None = None,
+    orientation_sigma_m: Sigmas | None = None,
+    orientation_sigma_deg: Sigmas | None = None,
+    points: int = 1000,
+    features: int = 8000,
+    feature_size: int = 2000,
+    neighbours: int = 20,
+    seed: int = 1,
+    cache: PathLike | None = None,
+    progress: ProgressLike = None,
+) -> TiedPhotographs:
+    """From photographs to a block: tie points, first orientation, control.
+
+    Parameters
+    ----------
+    photographs : folder of photographs, JPEG or TIFF; subfolders too.
+    control : control points with their image points, gcp_list.txt; PATH, or kind:PATH where the kind cannot be told.
+    check : names of control points that become check points.
+    positions : of the photographs, in place of EXIF.
+    orientation : of the photographs; no first one is sought.
+    camera : file with the camera.
+    focal_length_mm : in place of EXIF.
+    pixel_um : size of a pixel, µm, in place of EXIF.
+    free_interior : the interior orientation of the camera file is unknown.
+    crs : coordinate system; that of the control where '', else UTM of EXIF.
+    geoid : grid of geoid undulations for its heights.
+    control_sigma_m : σ of X, Y, Z, m, of control points without one; 0: without error, held.
+    control_prefix : what image points have before the names of control points.
+    mark_sigma_px : σ of the image points of control, pixels.
+    positions_sigma_m : σ of X, Y, Z, m, of positions without one.
+    orientation_sigma_m : orientations are observations: σ of X, Y, Z, m.
+    orientation_sigma_deg : the same of ω, φ, κ, degrees.
+    points : tie points wanted in a photograph.
+    features : sought in a photograph.
+    feature_size : features are sought in photographs of this size, pixels.
+    neighbours : photographs that each is compared with, the nearest.
+    seed : the same seed gives the same block.
+    cache : folder to keep features and matches in for another time; a temporary one where None.
+    progress : see `aerotri.adjust`.
+
+    Returns
+    -------
+    TiedPhotographs
+
+    Raises
+    ------
+    InputError
+        When a file is damaged or contradictory, a camera is not known, or no photographs have points in common.
+
+    Examples
+    --------
+    >>> import aerotri
+    >>> tied = aerotri.tie_points("photographs", control="gcp_list.txt", check=["GCP7"])  # doctest: +SKIP
+    >>> result = aerotri.adjust(tied.block)  # doctest: +SKIP
+    """
+    begun = time.perf_counter()
+    from aerotri.formats.assemble import Statements
+    from aerotri.formats.camera_spec import CameraSpec
+    from aerotri.tie_points.features import FeatureOptions
+    from aerotri.tie_points.matching import MatchOptions
+    from aerotri.tie_points.photographs_to_block import Options
+    from aerotri.tie_points.stated import GivenFiles
+
+    stated = Statements(
+        crs=crs, geoid=geoid, control_sigma_m=control_sigma_m, positions_sigma_m=positions_sigma_m,
+        orientation_sigma_m=orientation_sigma_m, orientation_sigma_deg=orientation_sigma_deg,
+        control_prefix=control_prefix,
+    )  # fmt: skip
+    files = GivenFiles(_text_of(control), tuple(check), _text_of(positions), _text_of(orientation), stated)
+    spec = CameraSpec(camera, "", None, pixel_um, focal_length_mm, None, free_interior)
+    found = FeatureOptions(features, feature_size)
+    options = Options(found, MatchOptions(neighbours=neighbours, seed=seed), points)
+    with stage_report(progress) as report, ExitStack() as stack:
+        keep = Path(stack.enter_context(tempfile.TemporaryDirectory()) if cache is None else cache)
+        return _tied(Path(photographs), files, spec, mark_sigma_px, options, keep, report, begun)
+
+
+def _tied(
+    folder: Path, files: GivenFiles, camera: CameraSpec, mark_sigma_px: float, options: Options, cache: Path,
+    report: StageReport, begun: float,
+) -> TiedPhotographs:  # fmt: skip
+    from aerotri.compiled import compilation_notice
+    from aerotri.tie_points.photographs import find_photographs
+    from aerotri.tie_points.photographs_to_block import tie_photographs
+    from aerotri.tie_points.stated import read_given, stated_camera
+
+    photographs = find_photographs(folder, stated_camera(camera))
+    given = read_given(files, mark_sigma_px)
+    report.stage(compilation_notice() or "features of photographs", None)
+    tied = tie_photographs(photographs, given, options, cache, report.counted)
+    return TiedPhotographs(tied, photographs, given, time.perf_counter() - begun)
+
+
+def refuse_other_content(folder: Path, overwrite: bool) -> None:
+    """A block goes into an empty folder, or where one of this command is.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.formats.block_writer import OWN_ENTRIES
+    from aerotri.report.control_marks import MARKS
+    from aerotri.tie_points.photographs_to_block import CACHE
+
+    refuse_foreign_folder(folder, RECORD, CACHE)
+    refuse_foreign_entries(folder, (*OWN_ENTRIES, MARKS), overwrite)
+
+
+def _text_of(path: PathLike | None) -> str:
+    return "" if path is None else os.fspath(path)
+
+
+def _text(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

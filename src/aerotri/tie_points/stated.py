@@ -1,0 +1,93 @@
+"""What the user states beside the photographs, read from its files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.formats import kinds
+from aerotri.formats.assemble import Statements
+from aerotri.formats.camera_spec import CameraSpec, cameras_of
+from aerotri.formats.parts import PointList
+from aerotri.tie_points.given import Given
+from aerotri.tie_points.photographs import StatedCamera
+
+
+@dataclass(frozen=True)
+class GivenFiles:
+    """Files beside the photographs, PATH or kind:PATH, '' for none.
+
+    Parameters
+    ----------
+    control : control points, with their image points where they were marked.
+    check : names of those that are check points.
+    positions : of the photographs, in place of EXIF. orientation : in place of a first orientation.
+    """
+
+    control: str = ""
+    check: Sequence[str] = ()
+    positions: str = ""
+    orientation: str = ""
+    stated: Statements = field(default_factory=Statements)
+
+
+def stated_camera(spec: CameraSpec) -> StatedCamera:
+    """The cameras of a file, or what is stated in place of EXIF.
+
+    Raises
+    ------
+    InputError
+        When the file holds no camera.
+    """
+    if spec.file is None:
+        return StatedCamera((), spec.focal_length_mm, spec.pixel_um)
+    nothing = np.zeros(0)
+    return StatedCamera(cameras_of(spec, (), nothing.astype(str), nothing))
+
+
+def read_given(files: GivenFiles, mark_sigma_px: float) -> Given:
+    """Read the files.
+
+    Parameters
+    ----------
+    mark_sigma_px : σ of the image points of control.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read, or check points without control.
+    """
+    stated, reading = files.stated, kinds.ReadingOptions(kinds.axes_of(files.stated.crs))
+    if files.check and not files.control:
+        raise InputError("--check names control points, and there are none", "give them: --gcp gcp_list.txt")
+    control = None
+    if files.control:
+        control = _with_prefix(kinds.read_control(files.control, reading), stated.control_prefix)
+    return Given(
+        # the names have the prefix already
+        stated=replace(stated, control_prefix=""),
+        positions=kinds.read_position_list(files.positions, reading) if files.positions else None,
+        control=control,
+        check=tuple(_in_block(name, control, stated.control_prefix) for name in files.check),
+        orientation=kinds.read_orientations(files.orientation, reading) if files.orientation else None,
+        mark_sigma_px=mark_sigma_px,
+    )
+
+
+def _in_block(name: str, control: PointList | None, prefix: str) -> str:
+    """The name of a check point as the block has it, whether it was given with the prefix or without."""
+    known = () if control is None else control.points.tolist()
+    return prefix + name if name not in known and prefix + name in known else name
+
+
+def _with_prefix(control: PointList, prefix: str) -> PointList:
+    """The control points under the names they have in the block."""
+    if not prefix:
+        return control
+    rays = control.rays
+    if rays is not None:
+        rays = replace(rays, points=np.array([prefix + name for name in rays.points.tolist()], dtype=str))
+    return replace(control, points=np.array([prefix + name for name in control.points.tolist()], dtype=str), rays=rays)
