@@ -9,7 +9,9 @@
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from aerotri.version import __version__
@@ -83,6 +85,17 @@ __all__ = [
     "simulate",
     "tie_points",
 ]
+
+
+class _Package(ModuleType):
+    """Some functions have the name of the package below that does their work: the import of it leaves them alone."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name not in _PLACES or not isinstance(value, ModuleType) or name in _MODULES:
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
 
 
 def __getattr__(name: str) -> Any:

@@ -29,6 +29,19 @@ def test_import_is_light():
     assert done.stdout.strip() == "[]"
 
 
+def test_functions_keep_their_names():
+    """Packages of the same names, which do the work, are imported by their paths and hide no function."""
+    code = (
+        "import aerotri, aerotri.crosscheck, aerotri.tie_points.given, importlib\n"
+        "importlib.import_module('aerotri.crosscheck.start')\n"
+        "from aerotri.tie_points import tracks\n"
+        "names = 'crosscheck', 'tie_points', 'simulate'\n"
+        "print([callable(getattr(aerotri, name)) for name in names], tracks.__name__)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[True, True, True] aerotri.tie_points.tracks"
+
+
 def test_every_name_is_there():
     assert set(aerotri.__all__) <= set(dir(aerotri))
     for name in aerotri.__all__:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from aerotri.commands.console import Console
-from aerotri.formats.assemble import Statements
-from aerotri.formats.camera_spec import CameraSpec
+from aerotri.formats.assembly.assemble import Statements
+from aerotri.formats.assembly.camera_spec import CameraSpec
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
     ------
     InputError
     """
-    from aerotri.formats.work_place import held
+    from aerotri.formats.files.work_place import held
     from aerotri.public.tying import refuse_other_content, tie_points
     from aerotri.tie_points.photographs_to_block import CACHE
 

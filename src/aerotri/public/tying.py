@@ -18,7 +18,7 @@ from aerotri.public.progress import ProgressLike, StageReport, stage_report
 if TYPE_CHECKING:
     import numpy as np
 
-    from aerotri.formats.camera_spec import CameraSpec
+    from aerotri.formats.assembly.camera_spec import CameraSpec
     from aerotri.observations import Block
     from aerotri.tie_points.given import Given
     from aerotri.tie_points.photographs import PhotographSet
@@ -71,7 +71,7 @@ class TiedPhotographs:
         ----------
         folder : where it was saved, for the path of the page to mark control points in.
         """
-        from aerotri.report.control_marks import MARKS, PAGE
+        from aerotri.report.pages.control_marks import MARKS, PAGE
         from aerotri.tie_points.outcome_json import tie_points_json
 
         page = "" if folder is None or self.given.control is None else str(Path(folder) / MARKS / PAGE)
@@ -95,11 +95,11 @@ class TiedPhotographs:
         InputError
             When the folder holds files of others, or cannot be written to.
         """
-        from aerotri.formats.atomic import atomic_folder
-        from aerotri.formats.block_writer import OWN_ENTRIES, write_block
-        from aerotri.formats.work_place import held
+        from aerotri.formats.block.writer import OWN_ENTRIES, write_block
+        from aerotri.formats.files.atomic import atomic_folder
+        from aerotri.formats.files.work_place import held
         from aerotri.public.saving import write_json
-        from aerotri.report.control_marks import MARKS, write_control_marks
+        from aerotri.report.pages.control_marks import MARKS, write_control_marks
 
         target, given = Path(out), self.given
         refuse_other_content(target, overwrite)
@@ -203,8 +203,8 @@ def tie_points(
     >>> result = aerotri.adjust(tied.block)  # doctest: +SKIP
     """
     begun = time.perf_counter()
-    from aerotri.formats.assemble import Statements
-    from aerotri.formats.camera_spec import CameraSpec
+    from aerotri.formats.assembly.assemble import Statements
+    from aerotri.formats.assembly.camera_spec import CameraSpec
     from aerotri.tie_points.features import FeatureOptions
     from aerotri.tie_points.matching import MatchOptions
     from aerotri.tie_points.photographs_to_block import Options
@@ -247,8 +247,8 @@ def refuse_other_content(folder: Path, overwrite: bool) -> None:
     ------
     InputError
     """
-    from aerotri.formats.block_writer import OWN_ENTRIES
-    from aerotri.report.control_marks import MARKS
+    from aerotri.formats.block.writer import OWN_ENTRIES
+    from aerotri.report.pages.control_marks import MARKS
     from aerotri.tie_points.photographs_to_block import CACHE
 
     refuse_foreign_folder(folder, RECORD, CACHE)

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.formats import kinds
-from aerotri.formats.assemble import Statements
-from aerotri.formats.camera_spec import CameraSpec, cameras_of
-from aerotri.formats.parts import PointList
+from aerotri.formats.assembly import kinds
+from aerotri.formats.assembly.assemble import Statements
+from aerotri.formats.assembly.camera_spec import CameraSpec, cameras_of
+from aerotri.formats.assembly.parts import PointList
 from aerotri.tie_points.given import Given
 from aerotri.tie_points.photographs import StatedCamera
 

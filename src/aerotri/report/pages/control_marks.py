@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.formats.atomic import atomic_folder
-from aerotri.formats.parts import PointList
-from aerotri.formats.table_writer import write_table
-from aerotri.report.marking_page import marking_page
+from aerotri.formats.assembly.parts import PointList
+from aerotri.formats.files.atomic import atomic_folder
+from aerotri.formats.text.table_writer import write_table
+from aerotri.report.pages.marking import marking_page
 from aerotri.tie_points.control_marks import ControlMarks, Geoid, pieces, predict_marks
 from aerotri.tie_points.photographs import PhotographSet
 from aerotri.tie_points.photographs_to_block import TiedBlock
