@@ -1,7 +1,7 @@
 """Recovery of simulated truth: normalised errors near N(0, 1), per parameter; the findings of paper 003.
 
 Bounds of targets.md 2: over n seeds |mean z| < 3.3/√n and the variance of z within the 99.9 % χ² band, unknown by
-unknown; σ0² passes χ². At most 30 photographs here; the full counts run in tools/recovery.py.
+unknown; σ0² passes χ². At most 30 photographs here; the full counts run in tools/prove/recovery.py.
 """
 
 from dataclasses import replace

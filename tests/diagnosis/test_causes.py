@@ -30,7 +30,7 @@ FEW = (
     ("control", "strips without a common point"),
     ("track", "X and Y of GNSS exchanged"),
 )
-"""Kinds that run in the tests; tools/wrong_blocks.py runs all of them."""
+"""Kinds that run in the tests; tools/prove/wrong_blocks.py runs all of them."""
 
 
 @pytest.mark.parametrize(("geometry", "name"), FEW)

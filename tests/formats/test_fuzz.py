@@ -1,4 +1,4 @@
-"""Damaged files in every reader: a few of those that tools/fuzz.py makes, and the corpus beside the project."""
+"""Damaged files in every reader: a few of those that tools/prove/fuzz.py makes, and the corpus beside the project."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="inputs run in f
 
 @pytest.fixture(scope="module", autouse=True)
 def tools():
-    """The parts of tools/fuzz.py."""
+    """The parts of tools/prove/fuzz.py."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(ROOT / "tools"))
+        patch.syspath_prepend(str(ROOT / "tools" / "prove"))
         yield
 
 

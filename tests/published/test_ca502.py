@@ -1,4 +1,4 @@
-"""Five oblique heads with weak geometry, from the files alone; control left out in turn in tools/ca502.py."""
+"""Five oblique heads with weak geometry, from the files alone; control left out in turn in tools/prove/ca502.py."""
 
 import importlib.util
 
@@ -9,7 +9,7 @@ from aerotri.formats.results.adjustment import image_columns, point_columns
 from aerotri.pipeline import adjust
 from places import PROJECT
 
-TOOL = PROJECT / "tools" / "ca502.py"
+TOOL = PROJECT / "tools" / "prove" / "ca502.py"
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Paper 002 in short: its methods on a strip of 25 photographs; the full strip runs in tools/reproduce_paper_002.py."""
+"""Paper 002 in short: its methods on a strip of 25 photographs; whole in tools/reproduce/reproduce_paper_002.py."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SEEDS = range(1, 13)
 def strip():
     """The modules of the tool."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(PROJECT / "tools"))
+        patch.syspath_prepend(str(PROJECT / "tools" / "reproduce"))
         yield importlib.import_module("paper_002.strip")
 
 

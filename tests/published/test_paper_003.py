@@ -1,4 +1,4 @@
-"""Paper 003 in short: its UltraCamD and DMC over small blocks; the full ones run in tools/reproduce_paper_003.py."""
+"""Paper 003 in short: its UltraCamD and DMC over small blocks; at full size in tools/reproduce/reproduce_paper_003.py."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MODULES = ("cases", "runs", "table", "figures", "reports")
 def tool():
     """The modules of the tool by name."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(PROJECT / "tools"))
+        patch.syspath_prepend(str(PROJECT / "tools" / "reproduce"))
         yield {name: importlib.import_module(f"paper_003.{name}") for name in MODULES}
 
 

@@ -1,6 +1,6 @@
 """Data snooping by the bounds of targets.md 2: power, false alarms, gross errors in bulk, wrong control.
 
-At most 30 photographs and some seeds here; the full counts run in tools/recovery_blunders.py.
+At most 30 photographs and some seeds here; the full counts run in tools/prove/recovery_blunders.py.
 """
 
 from dataclasses import replace

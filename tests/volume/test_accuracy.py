@@ -32,7 +32,7 @@ RUNS = 10
 def proof():
     """The modules of the tool."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(PROJECT / "tools"))
+        patch.syspath_prepend(str(PROJECT / "tools" / "prove"))
         yield importlib.import_module("volume_proof.simulated")
 
 

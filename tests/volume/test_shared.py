@@ -29,7 +29,7 @@ def proof():
     import importlib
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(PROJECT / "tools"))
+        patch.syspath_prepend(str(PROJECT / "tools" / "prove"))
         yield importlib.import_module("volume_proof.simulated")
 
 

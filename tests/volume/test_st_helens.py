@@ -12,7 +12,7 @@ from places import PROJECT
 @pytest.fixture(scope="module")
 def tool():
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(PROJECT / "tools"))
+        patch.syspath_prepend(str(PROJECT / "tools" / "prove"))
         yield importlib.import_module("volume_st_helens")
 
 

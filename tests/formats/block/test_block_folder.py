@@ -207,7 +207,7 @@ def test_parquet_takes_the_types_programs_write(small_block):
 
 
 def test_many_rays_come_back(small_block, tmp_path):
-    """How long that takes is measured by tools/benchmark_reading.py."""
+    """How long that takes is measured by tools/benchmark/benchmark_reading.py."""
     block = _large(read_block(small_block()), 14_000)
     write_block(block, tmp_path / "large")
     assert_same_block(read_block(tmp_path / "large"), block)

@@ -1,6 +1,6 @@
 """Killed between any two operations on files: the older or the new result stands, whole; the next run tidies up.
 
-`tools/kill.py` does this to whole commands, a thousand times.
+`tools/prove/kill.py` does this to whole commands, a thousand times.
 """
 
 from __future__ import annotations

@@ -1,1 +1,0 @@
-"""Parts of tools/fuzz.py: seeds, mutations, readers, workers, table."""

@@ -1,0 +1,161 @@
+"""Five heads on one frame, oblique and weakly tied (CU-SBR CA502): the block, its adjustment, control left out in turn.
+
+The cameras of the frame are adjusted as independent ones. The nadir head is oriented along its track and adjusted by
+itself; the orientation of every exposure, turned by the nominal angles of the mounting, is the start of the other
+heads. Only the BINGO file, the GNSS positions, the control points and the nominal angles go in.
+
+Example: python tools/prove/ca502.py ../shared/data/ca502 --leave-out
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.formats.assembly.assemble import Statements
+from aerotri.formats.assembly.camera_spec import CameraSpec
+from aerotri.formats.assembly.project import Request, read_project
+from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
+from aerotri.observations import Block, GnssIns, ImagePoints
+from aerotri.pipeline import AdjustmentFailedError, adjust
+from aerotri.public.adjustment import with_settings
+from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.statistics.set_aside import counts_by_reason, photograph_reasons, point_reasons
+
+PARAMETERS, ROBUST = "brown:K1+K2+K3+P1+P2", "huber"
+FOCAL_MM = {"S": 28.0, "A": 43.0, "D": 43.0, "W": 43.0, "X": 43.0}
+NADIR = "S"
+MOUNTING_DEG = {"S": (0, 0, 0), "A": (0, 45, 90), "D": (0, -45, -90), "W": (45, 0, 0), "X": (-45, 0, 180)}
+"""Nominal omega, phi, kappa of the heads in the frame of the nadir head."""
+SIGMA_PX = 1.4
+"""σ of an image coordinate: half a pixel of matching and what a lens of this kind keeps for itself."""
+CAMERA = """[camera.{name}]
+model = "frame"
+size_px = [6000, 4000]
+pixel_um = 3.92
+focal_length_mm = {focal}
+[camera.{name}.interior]
+focal_length_mm = {{ value = {focal}, sigma = 0.5 }}
+x0_mm = {{ value = 0.0, sigma = 0.5 }}
+y0_mm = {{ value = 0.0, sigma = 0.5 }}
+"""
+
+
+def unoriented(folder: Path) -> Block:
+    """The block of the files alone, every head a camera of its own; the first letter of a photograph is its head."""
+    with tempfile.TemporaryDirectory() as place:
+        bingo, cameras = Path(place) / "tp_bingo.txt", Path(place) / "cameras.toml"
+        text = (folder / "tp_bingo.txt").read_text(encoding="utf-8")
+        bingo.write_text(re.sub(r"^([ADSWX])(\d+) H_\S+", r"\1\2 \1", text, flags=re.MULTILINE), encoding="utf-8")
+        parts = [CAMERA.format(name=name, focal=focal) for name, focal in FOCAL_MM.items()]
+        cameras.write_text("\n".join(parts), encoding="utf-8")
+        stated = Statements(crs="EPSG:32647", control_prefix="GCP_", control_sigma_m=(0.02, 0.02, 0.03))
+        request = Request(
+            name="ca502",
+            source=str(bingo), positions=str(folder / "gnss_positions.csv"),
+            control=str(folder / "control_points.csv"), camera=CameraSpec(file=cameras), stated=stated,
+            image_sigma_px=SIGMA_PX, gnss_shift="off",
+        )  # fmt: skip
+        block = read_project(request).block
+    return with_settings(block, {"additional_parameters": PARAMETERS, "robust": ROBUST})
+
+
+def part_of(block: Block, keep: np.ndarray) -> Block:
+    """The block of some photographs (n,) bool."""
+    row, images, rays, gnss = np.cumsum(keep) - 1, block.images, block.image_points, block.gnss_ins
+    own, observed = keep[rays.image], keep[gnss.image]
+    used = np.unique(images.camera[keep])
+    return replace(
+        block,
+        cameras=tuple(block.cameras[k] for k in used),
+        images=replace(
+            images, names=images.names[keep], camera=np.searchsorted(used, images.camera[keep]),
+            strip=images.strip[keep], centre=images.centre[keep], angles=images.angles[keep],
+        ),
+        image_points=ImagePoints(row[rays.image[own]], rays.point[own], rays.xy[own], rays.sigma[own]),
+        gnss_ins=GnssIns(
+            row[gnss.image[observed]], gnss.xyz[observed], gnss.sigma[observed], gnss.angles[observed],
+            gnss.angles_sigma[observed], gnss.time[observed],
+        ),
+    )  # fmt: skip
+
+
+def exposures(block: Block, first: int, count: int) -> Block:
+    """The block of some exposures in turn."""
+    number = np.array([int(name[1:]) for name in block.images.names.tolist()])
+    return part_of(block, np.isin(number, np.unique(number)[first : first + count]))
+
+
+def oriented(block: Block) -> Block:
+    """The block with start values: the nadir head as adjusted by itself, turned by the nominal mounting."""
+    names = block.images.names.tolist()
+    nadir = np.array([name[0] == NADIR for name in names])
+    of_nadir = adjust(part_of(block, nadir)).images
+    row = {name[1:]: k for k, name in enumerate(n for n in names if n[0] == NADIR)}
+    own = np.array([row.get(name[1:], -1) for name in names])
+    mounted = rotation_from_angles(np.radians([MOUNTING_DEG[name[0]] for name in names]))
+    rotation = rotation_from_angles(of_nadir.angles[own], block.rotation) @ mounted
+    rotation[own < 0] = np.nan
+    centre, angles = of_nadir.centre[own], angles_from_rotation(rotation, block.rotation)
+    centre[own < 0] = np.nan
+    return replace(block, images=replace(block.images, centre=centre, angles=angles))
+
+
+def left_out_in_turn(block: Block, full: AdjustedBlock) -> Iterator[tuple[str, AdjustedBlock | str]]:
+    """Every control point as a check point, from the orientation of the full adjustment; why where there is none."""
+    images = replace(block.images, centre=full.images.centre, angles=full.images.angles)
+    for k, point in enumerate(block.control.point):
+        is_check = block.control.is_check.copy()
+        is_check[k] = True
+        variant = replace(block, images=images, control=replace(block.control, is_check=is_check))
+        try:
+            yield str(block.points[point]), adjust(variant, given_points=full.points.xyz)
+        except AdjustmentFailedError as failure:
+            yield str(block.points[point]), failure.outcome.message
+
+
+def print_table(result: AdjustedBlock, seconds: float) -> None:
+    o = result.outcome
+    print("| status | iterations | seconds | σ0 µm | photographs | points | rays |\n|---|---|---|---|---|---|---|")
+    print(
+        f"| {o.status} | {o.iterations} | {seconds:.0f} | {o.sigma0_um:.2f} | {int((result.images.rays > 0).sum())} | "
+        f"{int((result.points.rays > 0).sum())} | {int((result.rays.status == 0).sum())} |\n"
+    )
+    print("| set aside | reason | count |\n|---|---|---|")
+    for what, reasons in (("photographs", photograph_reasons(result)), ("points", point_reasons(result))):
+        for reason, count in counts_by_reason(reasons).items():
+            print(f"| {what} | {reason} | {count} |")
+    print(f"\nVerdict: {o.verdict}; " + "; ".join(o.reasons) + "\n")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, help="folder of the data")
+    parser.add_argument("--exposures", type=int, default=10**6, help="the first ones only")
+    parser.add_argument("--leave-out", action="store_true", help="every control point in turn")
+    options = parser.parse_args()
+    block = oriented(exposures(unoriented(options.folder), 0, options.exposures))
+    started = time.perf_counter()
+    result = adjust(block)
+    print_table(result, time.perf_counter() - started)
+    if options.leave_out:
+        print("| left out | dX m | dY m | dZ m | d/σ X | d/σ Y | d/σ Z |\n|---|---|---|---|---|---|---|")
+        for name, found in left_out_in_turn(block, result):
+            if isinstance(found, str):
+                print(f"| {name} | {found} | | | | | |")
+                continue
+            d, s = found.check.difference[0], found.check.sigma[0]
+            cells = [f"{a:+.3f} ± {b:.3f}" for a, b in zip(d, s, strict=True)]
+            cells += [f"{a:+.1f}" for a in found.check.w[0]]
+            print("| " + " | ".join([name, *cells]) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

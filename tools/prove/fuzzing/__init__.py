@@ -1,0 +1,1 @@
+"""Parts of tools/prove/fuzz.py: seeds, mutations, readers, workers, table."""

@@ -1,0 +1,94 @@
+"""Leave-one-out over the control points of a block: what each would be without itself, with and without GNSS.
+
+Every control point in turn becomes a check point; the last lines take all control away. Prints a Markdown table.
+
+Example: python tools/prove/leave_one_out.py cu_sbr_p1 --parameters brown:K1+K2+K3+P1+P2 --robust huber
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.formats.block.folder import read_block
+from aerotri.observations import Block
+from aerotri.pipeline import AdjustmentFailedError, adjust
+from aerotri.public.adjustment import with_settings
+from aerotri.results.adjusted_block import AdjustedBlock
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of the table: what was left out, and how the check points came out (m)."""
+
+    control: str
+    left_out: str
+    result: AdjustedBlock | None
+    reason: str = ""
+
+    def cells(self) -> list[str]:
+        if self.result is None:
+            return [self.control, self.left_out, self.reason, "", "", "", ""]
+        check = self.result.check
+        difference = check.difference if len(check) == 1 else np.nanmean(check.difference, axis=0, keepdims=True)
+        sigma = check.sigma if len(check) == 1 else np.nanmean(check.sigma, axis=0, keepdims=True)
+        parameters = self.result.parameters
+        focal = np.flatnonzero(parameters.names == "focal_length_mm")
+        c = f"{parameters.value[focal[0]]:.4f} ± {parameters.sigma[focal[0]]:.4f}" if len(focal) else "held"
+        numbers = [f"{d:+.3f} ± {s:.3f}" for d, s in zip(difference[0], sigma[0], strict=True)]
+        return [self.control, self.left_out, *numbers, c, f"{self.result.outcome.sigma0_um:.2f}"]
+
+
+def with_check(block: Block, rows: np.ndarray) -> Block:
+    """The block with these control points as check points."""
+    is_check = block.control.is_check.copy()
+    is_check[rows] = True
+    return replace(block, control=replace(block.control, is_check=is_check))
+
+
+def line(name: str, block: Block, left_out: str, start: AdjustedBlock) -> Line:
+    """Adjust one variant from the orientation of the full adjustment."""
+    images = replace(block.images, centre=start.images.centre, angles=start.images.angles)
+    try:
+        return Line(name, left_out, adjust(replace(block, images=images), given_points=start.points.xyz))
+    except AdjustmentFailedError as failure:
+        return Line(name, left_out, None, failure.outcome.message)
+
+
+def lines(block: Block) -> list[Line]:
+    """All lines of the table."""
+    full = adjust(block)
+    control = np.flatnonzero(~block.control.is_check)
+    names = [str(block.points[block.control.point[k]]) for k in control]
+    variants = [("control and GNSS", block)] if block.gnss_ins is not None else []
+    variants.append(("control alone", replace(block, gnss_ins=None)))
+    table = []
+    for variant, of_variant in variants:
+        for k, name in zip(control, names, strict=True):
+            table.append(line(variant, with_check(of_variant, np.array([k])), name, full))
+    if block.gnss_ins is not None:
+        table.append(line("GNSS alone", with_check(block, control), "all (mean)", full))
+    return table
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("block", type=Path, help="block folder")
+    parser.add_argument("--parameters", help="additional parameters, in place of block.toml's")
+    parser.add_argument("--robust", help="robust estimator, in place of block.toml's")
+    options = parser.parse_args()
+    given = {"additional_parameters": options.parameters, "robust": options.robust}
+    table = lines(with_settings(read_block(options.block), given))
+    print("| datum | left out | dX m | dY m | dZ m | c mm | σ0 µm |\n|---|---|---|---|---|---|---|")
+    for entry in table:
+        print("| " + " | ".join(entry.cells()) + " |")
+    print()
+    for warning in table[-1].result.outcome.warnings if table[-1].result else ():
+        print(f"- {table[-1].control}: {warning}")
+
+
+if __name__ == "__main__":
+    main()

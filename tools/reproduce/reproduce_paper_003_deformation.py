@@ -1,0 +1,96 @@
+"""Figures 16 to 20 of paper 003 in our form: what image errors do to models, by end lap, camera and parameters.
+
+Prints Markdown tables; with --out also writes paper_003_deformation.md and three pictures there. The last answer stands
+in tools/results/paper_003_deformation.md.
+
+Example: python tools/reproduce/reproduce_paper_003_deformation.py --out results
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from aerotri.deformation import deform_normal_case, restitution
+from aerotri.functional_model.additional_parameters import parse_parameters
+from aerotri.image_errors import ErrorField, field_on_grid
+from aerotri.observations import Block
+from aerotri.pipeline import adjust_keeping_system
+from aerotri.results.adjustment import Adjustment
+from aerotri.simulation import simulate
+from paper_003_deformation.cases import cases
+from paper_003_deformation.even_odd import EvenOdd, even_against_odd
+from paper_003_deformation.figures import deformation_figure, errors_and_deformation, interval_of
+from paper_003_deformation.table import Row, markdown
+
+SEED = 1
+
+
+def main() -> None:
+    """Simulate, adjust, deform; print the answer, write it where asked."""
+    options = _options()
+    rows: list[Row] = []
+    fields: dict[tuple[str, str], ErrorField] = {}
+    compared: list[tuple[str, EvenOdd]] = []
+    for case in cases():
+        print(f"{case.title} …", file=sys.stderr)
+        block, truth = simulate(case.spec, SEED)
+        plain = _adjusted(block, "none") if case.key == "ultracam_d" else None
+        for heading, parameters in case.sets:
+            found = _adjusted(block, parameters)
+            of = restitution(found)
+            fields[case.key, heading] = field_on_grid(found.local, found.local.block.cameras[0].name)
+            rows += [Row(case, heading, p, deform_normal_case(found, of, p.end_lap)) for p in case.pictures]
+            if plain is not None:
+                compared.append((heading, even_against_odd(found, plain, case.spec, SEED, truth)))
+    text = markdown(rows, compared, cases()[0].spec.flight.end_lap)
+    print(text, end="")
+    if options.out is not None:
+        options.out.mkdir(parents=True, exist_ok=True)
+        (options.out / "paper_003_deformation.md").write_text(text, encoding="utf-8")
+        _draw(options.out, rows, fields)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--out", type=Path, help="folder for paper_003_deformation.md and the pictures")
+    return parser.parse_args()
+
+
+def _adjusted(block: Block, parameters: str) -> Adjustment:
+    chosen = replace(block.settings.adjustment, additional_parameters=parse_parameters(parameters))
+    return adjust_keeping_system(replace(block, settings=replace(block.settings, adjustment=chosen)))
+
+
+def _draw(folder: Path, rows: list[Row], fields: dict[tuple[str, str], ErrorField]) -> None:
+    ultracam, dmc, film = cases()
+    subtitle = "Simulated block, image errors from physics; normal case over level ground, variant free."
+    panels = []
+    for picture in ultracam.pictures:
+        own = [row for row in rows if row.case.key == ultracam.key and row.picture == picture]
+        interval = max(interval_of(row.deformation, picture.interval_cm) for row in own)
+        panels.append([(_caption(row), row.deformation, interval) for row in own])
+    figure = deformation_figure("Figures 16, 17, 18: UltraCamD, DSK-Saar", subtitle, panels)
+    figure.savefig(folder / "paper_003_deformation.png", dpi=110)
+    for case, name in ((dmc, "dmc"), (film, "rmk")):
+        own = [row for row in rows if row.case.key == case.key]
+        title = f"Figure {case.pictures[0].number}: {case.title}"
+        figure = errors_and_deformation(title, subtitle, [_with_field(row, own, fields) for row in own])
+        figure.savefig(folder / f"paper_003_deformation_{name}.png", dpi=110)
+
+
+def _with_field(row: Row, own: list[Row], fields: dict[tuple[str, str], ErrorField]):
+    """Of all sets of a camera the same interval, as the paper has it."""
+    interval = max(interval_of(r.deformation, r.picture.interval_cm) for r in own)
+    return _caption(row), fields[row.case.key, row.parameters], row.deformation, interval
+
+
+def _caption(row: Row) -> str:
+    g = row.deformation.geometry
+    return f"{row.picture.number}  parameters {row.parameters}; end lap {100 * g.end_lap:.1f} %, h/b {g.h_over_b:.2f}"
+
+
+if __name__ == "__main__":
+    main()
