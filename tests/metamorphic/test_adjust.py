@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from transformations import about_z, both, largest_difference, moved, numbers_of, permuted, renamed, same
 
-from aerotri.functional_model.additional_parameters import parse_parameters
+from aerotri import pipeline
+from aerotri.functional_model.additional_parameters import AUTO, parse_parameters
 from aerotri.observations import GnssSettings
 from aerotri.observations.block import Edits
 from aerotri.pipeline import adjust
@@ -142,6 +143,25 @@ def test_variance_components():
         assert two.components is not None
         for component, other in zip(one.components.components, two.components.components, strict=True):
             assert other.freedom == pytest.approx(component.freedom, rel=1e-7)
+
+
+def few_sets(monkeypatch, order=1):
+    """The choice among four sets, in their order or the other way round."""
+    specs = ("none", "bluh:1-12", "brown", "ebner")[::order]
+    monkeypatch.setattr(pipeline, "candidate_sets", lambda block: tuple(parse_parameters(spec) for spec in specs))
+
+
+def test_parameters_chosen_by_the_program(monkeypatch):
+    """`--parameters auto`: the same set for the same reason, from sets tried in any order."""
+    block = with_adjustment(small_block(3, **ERRING)[0], additional_parameters=AUTO)
+    few_sets(monkeypatch)
+    before = numbers_of(adjust(block), same(block))
+    (chosen,) = (said for said in before.words["warnings"] if "additional parameters chosen" in said)
+    assert "chosen: none" not in chosen
+    for name, change in {"rows and names": ROWS, "shift": SHIFT}.items():
+        few_sets(monkeypatch, -1)
+        changed = change(block)
+        assert_same(before, numbers_of(adjust(changed.block), changed), ALL, name)
 
 
 def test_general_turn():

@@ -1,4 +1,4 @@
-"""Crosscheck, simulate and predict: other rows, names and units, and what is found is the same."""
+"""Crosscheck, simulate, predict and parameters: other rows, names and units, and what is found is the same."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 from transformations import about_z, both, moved, permuted, renamed, same
 
+from aerotri.commands.parameters import run_parameters
 from aerotri.commands.predict import AttitudeDesign, run_predict_attitude, run_predict_volume
 from aerotri.commands.predict_interval import IntervalQuestion, run_predict_interval
 from aerotri.crosscheck import crosscheck
+from aerotri.functional_model import additional_parameters
+from aerotri.functional_model.additional_parameters import FAMILIES, description, registry
+from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES, default_items, parameter_set
 from aerotri.pipeline import adjust
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.designs import VolumeDesign
@@ -139,3 +143,54 @@ def test_picket_interval_in_another_unit(capsys):
     for kind, found in one["interval_m"].items():
         assert four["interval_m"][kind] == pytest.approx([2.0 * v for v in found], rel=1e-12)
         assert scanned["interval_m"][kind] == pytest.approx(found, rel=1e-12)
+
+
+def listed(capsys, family=None):
+    capsys.readouterr()
+    run_parameters(None, family, True)
+    return json.loads(capsys.readouterr().out)
+
+
+def test_families_listed_in_any_order(capsys, monkeypatch):
+    """The families last first, and one by one: the same lines of every family."""
+    lines = listed(capsys)
+    names = list(dict.fromkeys(line["family"] for line in lines))
+    assert len(names) == len(FAMILIES) > 10
+    by_family = {name: [line for line in lines if line["family"] == name] for name in names}
+    assert {name: listed(capsys, name) for name in reversed(names)} == by_family
+    turned = dict(reversed(FAMILIES.items()))
+    for module in (additional_parameters, description, registry):
+        monkeypatch.setattr(module, "FAMILIES", turned)
+    assert listed(capsys) == [line for name in reversed(names) for line in by_family[name]]
+
+
+def test_families_drawn_in_any_order(capsys, monkeypatch, tmp_path):
+    """Each picture is the same whichever was drawn before it."""
+    few = {name: FAMILIES[name] for name in ("ebner", "gruen", "brown")}
+    for folder, families in (("one", few), ("other", dict(reversed(few.items())))):
+        monkeypatch.setattr(additional_parameters, "FAMILIES", families)
+        run_parameters(tmp_path / folder, None, True)
+    run_parameters(tmp_path / "alone", "gruen", True)
+    drawn = [{p.name: p.read_bytes() for p in (tmp_path / f).iterdir()} for f in ("one", "other", "alone")]
+    assert len(drawn[0]) >= 3
+    assert drawn[1] == drawn[0]
+    assert drawn[2].items() <= drawn[0].items()
+    capsys.readouterr()
+
+
+def test_patterns_of_items_in_any_order():
+    """Items of a set in another order, or named twice, are the same set with the same patterns."""
+    camera = small_block(3)[0].cameras[0]
+    xy = np.random.default_rng(1).uniform(-30.0, 30.0, (40, 2))
+    for family in LINEAR_FAMILIES:
+        if not LINEAR_FAMILIES[family].fits(camera):
+            continue
+        items = default_items(family)
+        one, other = parameter_set(family, items, camera), parameter_set(family, (*items[::-1], *items[:2]), camera)
+        assert one.items == other.items
+        np.testing.assert_array_equal(one.basis(*xy.T), other.basis(*xy.T))
+        # a part of the items has the same patterns as within the whole, but where parameters share one pattern
+        if not LINEAR_FAMILIES[family].is_grid:
+            few = parameter_set(family, items[1:6][::-1], camera)
+            rows = [one.items.index(item) for item in few.items]
+            np.testing.assert_array_equal(few.basis(*xy.T), one.basis(*xy.T)[:, :, rows])

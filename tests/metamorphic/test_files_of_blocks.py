@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from transformations import both, by_names, largest_difference, numbers_of, permuted, renamed, same, with_names
 
+from aerotri import pipeline
 from aerotri.formats.assembly.assemble import Statements
 from aerotri.formats.assembly.camera_spec import CameraSpec
 from aerotri.formats.assembly.oriented import oriented_block
@@ -17,8 +18,9 @@ from aerotri.formats.convert import read_any, write_any, write_oriented
 from aerotri.formats.foreign.bingo import write_bingo
 from aerotri.formats.foreign.metashape import write_metashape
 from aerotri.formats.foreign.pix4d import write_pix4d_gcp, write_pix4d_geo
+from aerotri.functional_model.additional_parameters import AUTO, parse_parameters
 from aerotri.pipeline import adjust
-from small_blocks import small_block
+from small_blocks import small_block, with_adjustment
 
 ALL = 1e-9
 """σ, by which results of files that say the same may differ."""
@@ -105,6 +107,25 @@ def test_image_points_in_several_files(measured, tmp_path):
             split = assembled(folder, 3, block, order)
             assert len(split.image_points) == len(rays)
             assert_same(before, adjust(split), by_names(whole, split), ALL, name)
+
+
+def test_parameters_chosen_for_split_files(measured, tmp_path, monkeypatch):
+    """`--parameters auto` for a block whose image points come from three files."""
+    block, result, _ = measured
+    sets = tuple(parse_parameters(spec) for spec in ("none", "bluh:1-12", "ebner"))
+    monkeypatch.setattr(pipeline, "candidate_sets", lambda block: sets)
+    rows = np.arange(len(block.image_points))
+    rng = np.random.default_rng(9)
+    found = []
+    for name, parts in {"whole": [rows], "split": [rng.permutation(rows[rows % 3 == k]) for k in range(3)]}.items():
+        read = assembled(written_lists(block, result, tmp_path / name, parts), len(parts), block)
+        found.append(with_adjustment(read, additional_parameters=AUTO))
+    whole, split = found
+    before, changed = numbers_of(adjust(whole), same(whole)), by_names(whole, split)
+    after = adjust(split)
+    assert_same(before, after, changed, ALL, "split")
+    assert sorted(after.outcome.warnings) == before.words["warnings"]
+    assert any("additional parameters chosen" in said for said in after.outcome.warnings)
 
 
 @pytest.mark.parametrize("tables", ["csv", "parquet"])

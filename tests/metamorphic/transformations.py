@@ -158,16 +158,26 @@ def renamed(block: Block) -> Changed:
     return replace(same(with_names(block, names)), names=names)
 
 
-def by_names(block: Block, other: Block) -> Changed:
-    """The other block as one of the same names in other rows."""
-    place = {name: k for k, name in enumerate(other.images.names.tolist())}
-    image = np.array([place[name] for name in block.images.names.tolist()])
-    place = {name: k for k, name in enumerate(other.points.tolist())}
-    point = np.array([place[name] for name in block.points.tolist()])
+def by_names(
+    block: Block, other: Block, names: Mapping[str, str] | None = None, frame: Similarity | None = None
+) -> Changed:
+    """The other block as one of the same names in other rows.
+
+    Parameters
+    ----------
+    names : new names by old ones, where they are not the same. frame : from the old block's to the other's.
+    """
+    names = names or {}
+
+    def rows(own: np.ndarray, there: np.ndarray) -> np.ndarray:
+        place = {name: k for k, name in enumerate(there.tolist())}
+        return np.array([place[names.get(name, name)] for name in own.tolist()])
+
+    image, point = rows(block.images.names, other.images.names), rows(block.points, other.points)
     a, b = block.image_points, other.image_points
     place = {pair: k for k, pair in enumerate(zip(b.image.tolist(), b.point.tolist(), strict=True))}
     ray = np.array([place[i, p] for i, p in zip(image[a.image].tolist(), point[a.point].tolist(), strict=True)])
-    return Changed(other, image, point, ray, Similarity.none(), {})
+    return Changed(other, image, point, ray, frame or Similarity.none(), names)
 
 
 def with_names(block: Block, names: Mapping[str, str]) -> Block:

@@ -88,3 +88,14 @@ def test_neighbours():
     """On a line the two nearest; a photograph without a position is compared with all others."""
     place = np.array([[0.0, 0], [1, 0], [2.1, 0], [np.nan, np.nan], [9, 0]])
     assert neighbours(place, 1) == [(0, 1), (0, 3), (1, 2), (1, 3), (2, 3), (2, 4), (3, 4)]
+
+
+def test_neighbours_equally_far_away():
+    """On a grid the first of those as far away as the last, wherever the grid lies and however it is turned."""
+    grid = 100.0 * np.array([[i, j] for i in range(5) for j in range(6)])
+    pairs = neighbours(grid, 6)
+    assert max(sum(k in pair for pair in pairs) for k in range(30)) >= 6
+    angle = 0.7
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    for moved in (grid + [5e5, 5.3e6], 10.0 * grid @ turn.T, grid @ turn.T + [3e5, 4e6]):
+        assert neighbours(moved, 6) == pairs

@@ -15,6 +15,7 @@ from aerotri.simulation import parse_spec, simulate
 from aerotri.tie_points.control_marks import predict_marks
 from aerotri.tie_points.first_orientation import map_incrementally
 from aerotri.tie_points.georeferencing import place
+from aerotri.tie_points.given import Given
 from aerotri.tie_points.verification import rays_that_meet
 
 CAMERA = {
@@ -183,3 +184,48 @@ def test_two_photographs_are_enough(simulated):
     turn = mapped.rotation[0].T @ mapped.rotation[1]
     given = rotation_from_angles(truth.angles[:2], block.rotation)
     assert np.abs(turn - given[0].T @ given[1]).max() < 0.02
+
+
+def test_photographs_that_are_lost_are_tried_again(simulated, mapped, monkeypatch):
+    """A principal distance gone astray at the first pair ends the orientation; held, it goes on, and stays free."""
+    from aerotri.tie_points import orientation
+
+    block = simulated[0]
+    tried = []
+
+    def map_incrementally(given, seed, report=None):
+        tried.append(given.cameras[0].interior["focal_length_mm"].kind)
+        if tried[-1] == "free":
+            centre = mapped.centre.copy()
+            centre[2:] = np.nan
+            return replace(mapped, centre=centre)
+        return mapped
+
+    monkeypatch.setattr(orientation, "map_incrementally", map_incrementally)
+    found = orientation.orient(without_control(block), Given(), "local", None, 5, lambda *_: None)
+    assert tried == ["free", "fixed"]
+    assert np.isfinite(found.centre).all()
+    assert found.cameras[0].interior["focal_length_mm"] == block.cameras[0].interior["focal_length_mm"]
+    assert found.cameras[0].lens == mapped.cameras[0].lens
+
+
+def without_control(block):
+    nothing = no_sigma(0)
+    empty = replace(block.control, point=np.zeros(0, np.int64), xyz=nothing, sigma=nothing, is_check=np.zeros(0, bool))
+    return replace(block, control=empty, gnss_ins=None)
+
+
+@pytest.mark.parametrize("count", [7, 25])
+def test_place_of_points_in_any_order(count):
+    """All triples of few points, and drawn ones of many, with blunders among them: the same to the last bit."""
+    rng = np.random.default_rng(count)
+    source = rng.normal(0.0, 50.0, (count, 3))
+    turn = exponential(np.array([0.3, -0.2, 1.1]))
+    target = 3.0 * source @ turn.T + [100.0, 200.0, 30.0] + rng.normal(0.0, 0.5, (count, 3))
+    target[:2] += 300.0
+    sigma = rng.uniform(0.3, 0.8, count)
+    one, order = place(source, target, sigma), rng.permutation(count)
+    other = place(source[order], target[order], sigma[order])
+    np.testing.assert_array_equal(other(source), one(source))
+    np.testing.assert_array_equal(other.misfit, one.misfit[order])
+    assert one.misfit[2:].max() < 3.0 < one.misfit[:2].min()

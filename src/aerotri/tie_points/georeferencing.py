@@ -61,6 +61,9 @@ def place(
         raise InputError(
             f"{len(source)} points place no block", "give three control points, or positions of the photographs"
         )
+    # triples are drawn by place: the same points in another order, or another frame, have to give the same
+    order = np.lexsort(source.T)
+    source, target, sigma = source[order], target[order], sigma[order]
     weight = 1.0 / sigma**2
     if is_line(target):
         if looking is None:
@@ -77,7 +80,7 @@ def place(
         robust = weight.copy()
         robust[:count] /= 1.0 + (relative / (TUNING * spread)) ** 2
         scale, rotation, translation = _similarity(source, target, robust)
-    return Placement(scale, rotation, translation, misfit[:count])
+    return Placement(scale, rotation, translation, misfit[np.argsort(order)])
 
 
 def is_line(xyz: np.ndarray) -> bool:

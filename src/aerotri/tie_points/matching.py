@@ -26,6 +26,8 @@ ROWS = 1024
 """Descriptors compared at a time."""
 FIRST_LOOK, FEWEST_AT_FIRST = 2000, 6
 """Pairs whose first features, so many of each, have fewer matches than this are taken as apart (Wu 2013)."""
+SAME_DISTANCE = 1e-6
+"""Relative difference of two distances below which rounding decides which is the longer."""
 Report = Callable[[int, int], None]
 
 
@@ -62,6 +64,8 @@ class PairMatches:
 def neighbours(position: np.ndarray, count: int) -> list[tuple[int, int]]:
     """Pairs of photographs to compare, each with the `count` nearest to it in plan.
 
+    Of photographs equally far away, as on the grid of a flight plan, those that come first are taken.
+
     Parameters
     ----------
     position : (n, 2) or (n, 3) m; NaN where not known: such a photograph is compared with every other.
@@ -72,10 +76,28 @@ def neighbours(position: np.ndarray, count: int) -> list[tuple[int, int]]:
     if len(rows) > 1:
         from scipy.spatial import KDTree
 
-        nearest = KDTree(position[rows, :2]).query(position[rows, :2], min(count + 1, len(rows)))[1]
-        for i, near in zip(rows.tolist(), np.atleast_2d(nearest), strict=True):
-            pairs |= {(min(i, j), max(i, j)) for j in rows[near].tolist() if j != i}
+        # twice as many and a few: among these are those as far away as the last
+        asked = min(2 * count + 8, len(rows))
+        distance, nearest = KDTree(position[rows, :2]).query(position[rows, :2], asked)
+        for number, (far, near) in enumerate(zip(distance, nearest, strict=True)):
+            own = _first_of_equal(far[near != number], near[near != number], count)
+            pairs |= {(min(i, j), max(i, j)) for i, j in ((int(rows[number]), int(rows[k])) for k in own)}
     return sorted(pairs)
+
+
+def _first_of_equal(distance: np.ndarray, index: np.ndarray, count: int) -> np.ndarray:
+    """The `count` nearest; of those as far away as the last, the ones with the smallest index.
+
+    Parameters
+    ----------
+    distance, index : (k,) the distance ascending.
+    """
+    if len(index) <= count:
+        return index
+    last = distance[count - 1]
+    nearer = index[distance < last * (1.0 - SAME_DISTANCE)]
+    equal = np.sort(index[np.abs(distance - last) <= last * SAME_DISTANCE])
+    return np.concatenate([nearer, equal[: count - len(nearer)]])
 
 
 def match_all(

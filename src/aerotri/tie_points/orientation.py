@@ -24,6 +24,8 @@ LEAST_SIGMA_M = 1e-3
 """Stands for less, 0 too, in the weights of control for a first orientation."""
 SHORTEST_STRIP = 3.0
 """Photographs a strip has on average, where the track is one."""
+MOST_LOST = 0.1
+"""Share of the photographs without an orientation beyond which it is tried with the principal distance held."""
 PLAUSIBLE = 0.1
 """Part by which a principal distance may differ from that of EXIF, which is rounded, before it is not believed."""
 Progress = Callable[[str, int, int], None]
@@ -42,6 +44,12 @@ class Oriented:
 
     def block_of(self, block: Block) -> Block:
         return replace(block, cameras=self.cameras)
+
+    def in_order(self, rows: np.ndarray, cameras: tuple[Camera, ...]) -> Oriented:
+        """The photographs in another order (n,), and the cameras in the order of others of the same names."""
+        own = {camera.name: camera for camera in self.cameras}
+        cameras = tuple(own.get(camera.name, camera) for camera in cameras)
+        return replace(self, centre=self.centre[rows], rotation=self.rotation[rows], cameras=cameras)
 
     def kept(self, keep: np.ndarray) -> Oriented:
         return replace(self, centre=self.centre[keep], rotation=self.rotation[keep])
@@ -69,13 +77,43 @@ def orient(
     def report(done: int) -> None:
         progress("first orientation", min(done, count), count)
 
-    mapped, said = map_incrementally(bare, seed, report=report), ()
+    mapped, said = _with_most_photographs(bare, map_incrementally(bare, seed, report=report), seed, report), ()
     if not is_held_by_control(reading.block):
         cameras, said = _plausible(bare.cameras, mapped.cameras)
         mapped = map_incrementally(replace(bare, cameras=cameras), seed, report=report) if said else mapped
     frame = None if crs == "local" else frame_of_block(reading.block, given.stated.geoid)
     oriented = _placed(reading.block, mapped, frame, seed)
     return replace(oriented, messages=(*oriented.messages, *said))
+
+
+def _with_most_photographs(bare: Block, mapped: Mapped, seed: int, report: Callable[[int], None]) -> Mapped:
+    """The first orientation, or where it lost photographs that with the principal distance held, if it has more.
+
+    Two vertical photographs hardly determine the principal distance. A pair of them that is taken far off by it does
+    not fit the third, and there the orientation ends. The distance stays an unknown of the adjustment.
+    """
+    tied = np.bincount(bare.image_points.image, minlength=len(bare.images)) > 0
+    lost = int((tied & np.isnan(mapped.centre[:, 0])).sum())
+    if lost <= MOST_LOST * tied.sum():
+        return mapped
+    held = tuple(_with_held_distance(camera) for camera in bare.cameras)
+    if held == bare.cameras:
+        return mapped
+    try:
+        again = map_incrementally(replace(bare, cameras=held), seed, report=report)
+    except InputError:
+        return mapped
+    if np.isnan(again.centre[:, 0]).sum() >= np.isnan(mapped.centre[:, 0]).sum():
+        return mapped
+    pairs = zip(bare.cameras, again.cameras, strict=True)
+    return replace(again, cameras=tuple(replace(camera, lens=found.lens) for camera, found in pairs))
+
+
+def _with_held_distance(camera: Camera) -> Camera:
+    stated = camera.interior["focal_length_mm"]
+    if stated.kind != "free":
+        return camera
+    return replace(camera, interior={**camera.interior, "focal_length_mm": replace(stated, fixed=True)})
 
 
 def _plausible(stated: tuple[Camera, ...], found: tuple[Camera, ...]) -> tuple[tuple[Camera, ...], tuple[str, ...]]:
@@ -94,8 +132,7 @@ def _plausible(stated: tuple[Camera, ...], found: tuple[Camera, ...]) -> tuple[t
                 f"{100 * (ratio - 1):+.0f} % off what is stated: it is held at {camera.focal_length_mm:.4g} mm, "
                 "and heights above the ground hang on that; control points determine it"
             )
-            held = {"focal_length_mm": replace(camera.interior["focal_length_mm"], fixed=True)}
-            camera = replace(camera, interior={**camera.interior, **held})
+            camera = _with_held_distance(camera)
         cameras.append(camera)
     return tuple(cameras), tuple(said)
 

@@ -43,6 +43,20 @@ class PhotographSet:
     def __len__(self) -> int:
         return len(self.paths)
 
+    def in_order(self, rows: np.ndarray) -> PhotographSet:
+        """The photographs in another order (n,), their cameras in the order in which these use them."""
+        camera = self.camera[rows]
+        used = list(dict.fromkeys(camera.tolist()))
+        return PhotographSet(
+            paths=tuple(self.paths[k] for k in rows.tolist()),
+            names=self.names[rows],
+            cameras=tuple(self.cameras[c] for c in used),
+            camera=np.array([used.index(c) for c in camera.tolist()], dtype=np.int64),
+            lon_lat_height=self.lon_lat_height[rows],
+            sigma_m=self.sigma_m[rows],
+            ellipsoidal=self.ellipsoidal[rows],
+        )
+
 
 @dataclass(frozen=True)
 class StatedCamera:

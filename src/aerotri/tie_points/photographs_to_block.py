@@ -16,7 +16,7 @@ from aerotri.observations.block import GnssSettings
 from aerotri.tie_points.features import FeatureOptions, Features, features_of
 from aerotri.tie_points.given import Given, approximate_places, complete, crs_of, is_observed, positions_in
 from aerotri.tie_points.matching import MatchOptions, match_all, neighbours
-from aerotri.tie_points.orientation import Progress, in_frame, orient, with_start_values
+from aerotri.tie_points.orientation import Oriented, Progress, in_frame, orient, with_start_values
 from aerotri.tie_points.photographs import LENS, PhotographSet
 from aerotri.tie_points.tracks import Tracks, join_matches, thin
 from aerotri.tie_points.verification import rays_that_meet
@@ -60,6 +60,9 @@ def tie_photographs(
 ) -> TiedBlock:
     """From photographs to a block.
 
+    Matching, drawing and mapping run through the photographs in an order of their features, so that what comes out
+    does not hang on the names of files; the block has the photographs by name again.
+
     Parameters
     ----------
     cache : folder of features and matches, which are taken from there where they are the same.
@@ -72,15 +75,11 @@ def tie_photographs(
     positions, said = positions_in(photographs, given, crs)
     _refuse_bad_lists(photographs, given, crs, positions)
     features = _features(photographs, options.features, cache, progress)
-    tracks, pairs = _tracks(
-        photographs, features, approximate_places(photographs, positions, given), options, cache, progress
+    order = _order_of(features)
+    tracks, oriented, pairs = _oriented_tracks(
+        photographs.in_order(order), [features[k] for k in order], given, crs, positions, options, cache, progress
     )
-    size = np.array([photographs.cameras[c].size_px for c in photographs.camera], dtype=float)
-    tracks = thin(tracks, _xy(tracks, features), size, MORE_TRACKS * options.points)
-    bare = _bare_block(photographs, photographs.cameras, tracks, features)
-    oriented = orient(bare, given, crs, positions, options.matches.seed, progress)
-    tracks = tracks.chosen(rays_that_meet(oriented.block_of(bare), oriented.centre, oriented.rotation))
-    tracks = thin(tracks, _xy(tracks, features), size, options.points)
+    tracks, oriented = tracks.with_images(order), oriented.in_order(np.argsort(order), photographs.cameras)
     keep = np.bincount(tracks.image, minlength=len(photographs)) > 0
     block = _bare_block(photographs, oriented.cameras, tracks, features, keep)
     reading = complete(replace(Reading(block), messages=said), given, crs, positions)
@@ -100,6 +99,26 @@ def tie_photographs(
             f"the standard deviation of tie points is {sigma_px:.2f} px, as they fit one another",
         ),
     )
+
+
+def _order_of(features: list[Features]) -> np.ndarray:
+    """(n,) photographs in an order that hangs on what they show alone; files that show the same stay as they are."""
+    return np.array(sorted(range(len(features)), key=lambda k: features[k].digest), dtype=np.int64)
+
+
+def _oriented_tracks(
+    photographs: PhotographSet, features: list[Features], given: Given, crs: str, positions: PositionList | None,
+    options: Options, cache: Path, progress: Progress,
+) -> tuple[Tracks, Oriented, tuple[int, int]]:  # fmt: skip
+    """Tracks whose rays meet, the orientation, and how many pairs were matched and are tied."""
+    places = approximate_places(photographs, positions, given)
+    tracks, pairs = _tracks(photographs, features, places, options, cache, progress)
+    size = np.array([photographs.cameras[c].size_px for c in photographs.camera], dtype=float)
+    tracks = thin(tracks, _xy(tracks, features), size, MORE_TRACKS * options.points)
+    bare = _bare_block(photographs, photographs.cameras, tracks, features)
+    oriented = orient(bare, given, crs, positions, options.matches.seed, progress)
+    tracks = tracks.chosen(rays_that_meet(oriented.block_of(bare), oriented.centre, oriented.rotation))
+    return thin(tracks, _xy(tracks, features), size, options.points), oriented, pairs
 
 
 def _refuse_bad_lists(photographs: PhotographSet, given: Given, crs: str, positions: PositionList | None) -> None:

@@ -37,6 +37,16 @@ class Tracks:
         """(m,) the track of every ray."""
         return np.repeat(np.arange(len(self)), self.length)
 
+    def with_images(self, image: np.ndarray) -> Tracks:
+        """The tracks with their photographs numbered otherwise; rays of a track stand in the order of the numbers.
+
+        Parameters
+        ----------
+        image : (n,) new number of every photograph.
+        """
+        order = np.lexsort((image[self.image], self.of_ray))
+        return Tracks(self.start, image[self.image][order], self.feature[order])
+
     def chosen(self, rays: np.ndarray) -> Tracks:
         """The tracks of the rays (m,) bool that are left, those with two or more."""
         counts = np.bincount(self.of_ray[rays], minlength=len(self))
