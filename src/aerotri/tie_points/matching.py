@@ -79,7 +79,7 @@ def neighbours(position: np.ndarray, count: int) -> list[tuple[int, int]]:
         # twice as many and a few: among these are those as far away as the last
         asked = min(2 * count + 8, len(rows))
         distance, nearest = KDTree(position[rows, :2]).query(position[rows, :2], asked)
-        for number, (far, near) in enumerate(zip(distance, nearest, strict=True)):
+        for number, (far, near) in enumerate(zip(np.atleast_2d(distance), np.atleast_2d(nearest), strict=True)):
             own = _first_of_equal(far[near != number], near[near != number], count)
             pairs |= {(min(i, j), max(i, j)) for i, j in ((int(rows[number]), int(rows[k])) for k in own)}
     return sorted(pairs)
