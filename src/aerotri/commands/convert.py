@@ -37,7 +37,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -45,13 +45,9 @@ from aerotri.commands.console import Console
 from aerotri.conventions import FLIGHT_AXES, LARGEST, InputError
 from aerotri.formats.assembly.camera_spec import CameraSpec
 from aerotri.formats.text.text_lines import is_number
-from aerotri.public.folders import refuse_existing_file, refuse_foreign_entries
 
 if TYPE_CHECKING:
-    from aerotri.formats.assembly.oriented import OrientedBlock
-    from aerotri.formats.assembly.parts import Reading
     from aerotri.formats.assembly.project import Request
-    from aerotri.observations import Block
 
 
 def three_values(text: str, option: str, may_be_zero: bool = False) -> tuple[float, float, float] | None:
@@ -98,118 +94,21 @@ def camera_spec(
     return CameraSpec(file, name, size_px, pixel_um, focal_length_mm, flight_axis, free)
 
 
-def run_convert(request: Request, target: Path, to: str, as_json: bool, overwrite: bool = False) -> None:
+def run_convert(request: Request, target: Path, to: Any, as_json: bool, overwrite: bool = False) -> None:
     """Convert; arguments as on the command line.
 
     Raises
     ------
     InputError
     """
-    from aerotri.formats.convert import FOLDER_TARGETS, TARGETS
+    from aerotri.public.blocks import read_request
+    from aerotri.public.converting import convert, name_of_target, refuse_target
 
-    if to not in TARGETS:
-        raise InputError(f"'{to}' is not a format that is written", f"known are {', '.join(TARGETS)}")
-    source = Path(request.source)
-    if target.resolve() == source.resolve():
-        raise InputError("source and target are the same", "choose another target", target)
-    if to in FOLDER_TARGETS:
-        refuse_foreign_entries(target, FOLDER_TARGETS[to], overwrite)
-    else:
-        refuse_existing_file(target, overwrite)
-    is_result = (source / "solution.npz").is_file()
-    messages = _from_result(request, target, to) if is_result else _from_files(request, target, to)
+    refuse_target(request.source, target, to, overwrite)
+    found = read_request(replace(request, name=request.name or name_of_target(target, to)))
+    geoid, tell = request.stated.geoid, Console().stage
+    messages = [*found.messages, *convert(found, target, to, geoid=geoid, overwrite=overwrite, progress=tell)]
     if as_json:
-        print(json.dumps({"target": str(target), "format": to, "messages": list(messages)}, ensure_ascii=False))
+        print(json.dumps({"target": str(target), "format": to, "messages": messages}, ensure_ascii=False))
         return
-    for sentence in messages:
-        print(sentence)
-    print(f"Written to {target}")
-
-
-def _from_files(request: Request, target: Path, to: str) -> tuple[str, ...]:
-    from aerotri.formats.assembly.project import read_project
-    from aerotri.formats.convert import BLOCK_WRITERS, ORIENTATION_WRITERS, write_any, write_oriented
-
-    if to == "block":
-        request = replace(request, name=request.name or target.resolve().name)
-    reading = read_project(request)
-    geoid = request.stated.geoid
-    reading = replace(reading, messages=(*reading.messages, *_about_held(reading.block)))
-    if to == "block" or to in BLOCK_WRITERS:
-        return (*reading.messages, *write_any(reading.block, target, to, reading.points))
-    if to in ORIENTATION_WRITERS:
-        oriented, said = _at_start_values(reading, to)
-    else:
-        oriented, said = _with_points(reading), ()
-    if oriented is None:
-        oriented = _adjusted(reading.block, request)
-    return (*reading.messages, *said, *write_oriented(oriented, target, to, geoid))
-
-
-def _about_held(block: Block) -> tuple[str, ...]:
-    """A sentence about control without error."""
-    count = int((block.control.sigma[~block.control.is_check] == 0.0).sum())
-    return (f"{count} coordinates of control points have σ = 0: an adjustment holds them",) if count else ()
-
-
-def _from_result(request: Request, target: Path, to: str) -> tuple[str, ...]:
-    """Orientation and points of a result of `aerotri adjust`."""
-    from aerotri.formats.assembly.oriented import oriented_from_adjusted
-    from aerotri.formats.block.folder import read_block
-    from aerotri.formats.convert import BLOCK_WRITERS, write_any, write_oriented
-    from aerotri.opening import open_result
-
-    if request != type(request)(request.source, request.name, stated=request.stated):
-        raise InputError("a result is whole", "leave out what would add to it", request.source)
-    source = Path(request.source)
-    block = read_block(source / "block")
-    if to == "block" or to in BLOCK_WRITERS:
-        return write_any(block, target, to)
-    return write_oriented(oriented_from_adjusted(open_result(source).result), target, to, request.stated.geoid)
-
-
-def _at_start_values(reading: Reading, to: str) -> tuple[OrientedBlock | None, tuple[str, ...]]:
-    """The block at the orientations it came with; None where it has none and the format needs them."""
-    from aerotri.formats.assembly.oriented import OrientedBlock
-    from aerotri.functional_model.rotation import rotation_from_angles
-
-    block = reading.block
-    rotation = rotation_from_angles(block.images.angles, block.rotation)
-    unknown = np.full((len(block.points), 3), np.nan)
-    points = unknown if reading.points is None else reading.points
-    used = np.ones(len(block.image_points), bool)
-    oriented = OrientedBlock(block, block.images.centre, rotation, points, used)
-    if oriented.oriented.any():
-        return oriented, ("orientations are those that the files gave, not adjusted",)
-    return (oriented, ()) if to == "patb" else (None, ())
-
-
-def _with_points(reading: Reading) -> OrientedBlock | None:
-    from aerotri.formats.assembly.oriented import oriented_block
-
-    return None if reading.points is None else oriented_block(reading.block, reading.points)
-
-
-def _adjusted(block: Block, request: Request) -> OrientedBlock:
-    """The block adjusted for the purpose.
-
-    Raises
-    ------
-    InputError
-        When that fails.
-    """
-    from aerotri.compiled import compilation_notice
-    from aerotri.formats.assembly.oriented import oriented_from_adjusted
-    from aerotri.pipeline import AdjustmentFailedError, adjust_keeping_system
-
-    if not len(block.image_points):
-        raise InputError("holds no image points", "the target needs object points", request.source)
-    console = Console()
-    console.progress(compilation_notice())
-    try:
-        done = adjust_keeping_system(block, console.iteration, geoid=request.stated.geoid)
-    except AdjustmentFailedError as failure:
-        raise InputError(
-            f"the block has to be adjusted first, and that failed: {failure}", "mend the block", request.source
-        ) from None
-    return oriented_from_adjusted(done.result)
+    print("\n".join([*messages, f"Written to {target}"]))

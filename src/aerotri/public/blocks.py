@@ -5,15 +5,25 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from aerotri.conventions import InputError
 from aerotri.observations import Block
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from aerotri.formats.assembly.project import Request
+
 PathLike = str | os.PathLike
+Sigmas = tuple[float, float, float]
 GnssShift = Literal["off", "block", "strip"]
+FlightAxis = Literal["+x", "-x", "+y", "-y"]
+ControlHeights = Literal["crs", "ellipsoidal"]
+Axes = Literal["xy", "yx"]
+PatbRotation = Literal["camera-to-object", "object-to-camera"]
 
 
 def as_block(block: Block | PathLike) -> Block:
@@ -57,7 +67,7 @@ def read_block(folder: PathLike) -> Block:
     return block_folder.read_block(folder)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ReadBlock:
     """A block from files of other programs.
 
@@ -66,16 +76,33 @@ class ReadBlock:
     block : what was read.
     points : (N, 3) m, object points that came along, as start values; None where none did.
     messages : what was matched, assumed or left out, in sentences.
+    source : what was read, as it was stated.
+    is_result : whether that is the folder of a result; its block is the one that was adjusted.
     """
 
     block: Block
     points: np.ndarray | None
     messages: tuple[str, ...]
+    source: str = ""
+    is_result: bool = False
+
+    def __repr__(self) -> str:
+        block = self.block
+        return (
+            f"<aerotri.ReadBlock {block.name!r}: {len(block.images)} photographs, {len(block.image_points)} image "
+            f"points of {len(block.points)} points>"
+        )
+
+    def _repr_html_(self) -> str:
+        """What was read, and what is to be known about it."""
+        said = "".join(f"<li>{escape(text)}</li>" for text in self.messages)
+        return f"<div><b>{escape(repr(self)[1:-1])}</b><ul>{said}</ul></div>"
 
 
 def read(
     source: PathLike,
     *,
+    name: str = "",
     image_points: Sequence[PathLike] = (),
     positions: PathLike | None = None,
     control: PathLike | None = None,
@@ -87,14 +114,22 @@ def read(
     camera_size: tuple[int, int] | None = None,
     pixel_um: float | None = None,
     focal_length_mm: float | None = None,
-    flight_axis: Literal["+x", "-x", "+y", "-y"] | None = None,
+    flight_axis: FlightAxis | None = None,
     free_interior: bool = False,
+    image_sigma_um: float | None = None,
     image_sigma_px: float | None = None,
     control_prefix: str = "",
-    control_sigma_m: tuple[float, float, float] | None = None,
-    positions_sigma_m: tuple[float, float, float] | None = None,
+    control_sigma_m: Sigmas | None = None,
+    control_heights: ControlHeights = "crs",
+    positions_sigma_m: Sigmas | None = None,
+    orientation_sigma_m: Sigmas | None = None,
+    orientation_sigma_deg: Sigmas | None = None,
     gnss_shift: GnssShift | None = None,
     geoid: PathLike | None = None,
+    axes: Axes | None = None,
+    offset: PathLike | None = None,
+    patb_rotation: PatbRotation | None = None,
+    linear_alteration_m: float | None = None,
 ) -> ReadBlock:
     """A block from files of other programs; several files make one block.
 
@@ -102,8 +137,10 @@ def read(
     ----------
     source : block, result, DBAT, BAL, COLMAP, Bundler, OpenSfM, a folder of IGN or PAT-B files, image points (BINGO,
         .im, .mes, gcp_list.txt) or a list of orientations; PATH, or kind:PATH where the kind cannot be told.
+    name : of the block; that of the source where ''.
     image_points : more files of image points.
-    positions : observed positions of the photographs. control : control points.
+    positions : observed positions of the photographs.
+    control : control points.
     orientation : start values of the orientations.
     check : names of control points that become check points.
     crs : coordinate system, such as 'EPSG:32647' or 'EPSG:25832+7837'.
@@ -114,11 +151,21 @@ def read(
     focal_length_mm : principal distance.
     flight_axis : image axis that points along the flight.
     free_interior : principal distance and principal point are unknowns.
-    image_sigma_px : σ of image coordinates, pixels.
+    image_sigma_um : σ of image coordinates, µm.
+    image_sigma_px : the same in pixels.
     control_prefix : what image points have before the names of control points.
-    control_sigma_m, positions_sigma_m : σ of X, Y, Z, m, where the files give none.
+    control_sigma_m : σ of X, Y, Z, m, of control points where the files give none; 0: without error, held.
+    control_heights : 'ellipsoidal' where the list has such heights and the coordinate system others.
+    positions_sigma_m : σ of X, Y, Z, m, of positions where the files give none.
+    orientation_sigma_m : orientations are observations: σ of X, Y, Z, m.
+    orientation_sigma_deg : the same of ω, φ, κ, degrees.
     gnss_shift : estimate a shift of the GNSS positions, of the block or of every strip.
     geoid : grid of geoid undulations for heights of the coordinate system.
+    axes : order of coordinates in lists of Pix4D; as the coordinate system has them where None.
+    offset : _offset.xyz of Pix4D, added to orientations.
+    patb_rotation : meaning of the matrices of an .ori file; told by the image points where None.
+    linear_alteration_m : m, mean height of the ground, where heights of orientations are corrected for the scale of the
+        projection.
 
     Returns
     -------
@@ -131,32 +178,56 @@ def read(
     """
     from aerotri.formats.assembly.assemble import Statements
     from aerotri.formats.assembly.camera_spec import CameraSpec
-    from aerotri.formats.assembly.project import Request, read_project
+    from aerotri.formats.assembly.project import Request
 
-    spec = CameraSpec(camera, camera_name, camera_size, pixel_um, focal_length_mm, flight_axis, free_interior)
     stated = Statements(
         crs=crs,
         geoid=geoid,
         control_sigma_m=control_sigma_m,
         positions_sigma_m=positions_sigma_m,
+        orientation_sigma_m=orientation_sigma_m,
+        orientation_sigma_deg=orientation_sigma_deg,
         control_prefix=control_prefix,
+        control_heights=control_heights,
+        linear_alteration_m=linear_alteration_m,
+        patb_rotation=patb_rotation,
     )
     request = Request(
-        source=_text(source),
-        name="",
-        image_points=tuple(_text(path) for path in image_points),
-        orientation=_text(orientation),
-        positions=_text(positions),
-        control=_text(control),
-        camera=spec,
+        source=text_of_path(source),
+        name=name,
+        image_points=tuple(text_of_path(path) for path in image_points),
+        orientation=text_of_path(orientation),
+        positions=text_of_path(positions),
+        control=text_of_path(control),
+        camera=CameraSpec(camera, camera_name, camera_size, pixel_um, focal_length_mm, flight_axis, free_interior),
         stated=stated,
         check=tuple(check),
+        axes=axes,
+        offset=offset,
+        image_sigma_um=image_sigma_um,
         image_sigma_px=image_sigma_px,
         gnss_shift=gnss_shift,
     )
-    reading = read_project(request)
-    return ReadBlock(reading.block, reading.points, tuple(reading.messages))
+    return read_request(request)
 
 
-def _text(path: PathLike | None) -> str:
+def read_request(request: Request) -> ReadBlock:
+    """As `read`, with everything that is stated in one record.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.formats.assembly.project import read_project
+
+    if not (Path(request.source) / "solution.npz").is_file():
+        reading = read_project(request)
+        return ReadBlock(reading.block, reading.points, tuple(reading.messages), request.source)
+    if request != type(request)(request.source, request.name, stated=request.stated):
+        raise InputError("a result is whole", "leave out what would add to it", request.source)
+    return ReadBlock(read_block(Path(request.source) / "block"), None, (), request.source, is_result=True)
+
+
+def text_of_path(path: PathLike | None) -> str:
+    """A path as text, which may say its kind; '' for None."""
     return "" if path is None else os.fspath(path)

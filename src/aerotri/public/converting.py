@@ -3,37 +3,58 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
+from aerotri.conventions import InputError
 from aerotri.observations import Block
 from aerotri.public.adjustment import Adjustment
-from aerotri.public.blocks import PathLike, read
+from aerotri.public.blocks import PathLike, ReadBlock, read, text_of_path
+from aerotri.public.folders import refuse_existing_file, refuse_foreign_entries
+from aerotri.public.progress import ProgressLike, StageReport, stage_report
 
 if TYPE_CHECKING:
-    import numpy as np
+    from aerotri.formats.assembly.oriented import OrientedBlock
+
+Target = Literal[
+    "block", "bal", "colmap", "colmap-text", "bundler", "opensfm", "metashape", "opk", "pix4d-eo", "ign", "patb",
+    "bingo", "pix4d-gcp", "pix4d-geo", "pix4d-offset", "odm-gcp", "odm-geo", "ign-mes", "ign-app",
+]  # fmt: skip
 
 
 def convert(
-    block: Block | Adjustment | PathLike, out: PathLike, to: str = "block", points: np.ndarray | None = None
+    source: Block | Adjustment | ReadBlock | PathLike,
+    out: PathLike,
+    to: Target = "block",
+    *,
+    points: np.ndarray | None = None,
+    geoid: PathLike | None = None,
+    overwrite: bool = False,
+    progress: ProgressLike = None,
 ) -> tuple[str, ...]:
     """Write a block or a result, in our format or in that of another program.
 
     Parameters
     ----------
-    block : a block, written at its start values; a result, written as adjusted; or files that `read` reads.
+    source : a result, or the folder of one, written as adjusted; a block, or files that `aerotri.read` reads, written
+        at its start values, and adjusted for the purpose where the target needs object points that it does not have.
     out : file or folder to write.
-    to : 'block', 'bal', 'colmap', … as `aerotri convert --to` has them.
+    to : format to write.
     points : (N, 3) m, object points of a block, for formats that hold them.
+    geoid : grid of geoid undulations for heights of the coordinate system.
+    overwrite : replace files that aerotri has not written, or that were changed since.
+    progress : see `aerotri.adjust`.
 
     Returns
     -------
     tuple of str
-        What the target cannot hold, in sentences.
+        What the target cannot hold, in sentences; of files that are read here, what was matched or assumed as well.
 
     Raises
     ------
     InputError
-        For a format that is not known, or a block that it cannot hold at all.
+        For a format that is not known, a block that it cannot hold at all, or files of others at its place.
 
     Examples
     --------
@@ -44,14 +65,123 @@ def convert(
     ...     len(aerotri.read_block(f"{place}/copy").images)
     12
     """
+    target, said = Path(out), ()
+    refuse_target(_place(source), target, to, overwrite)
+    if not isinstance(source, (Block, Adjustment, ReadBlock)):
+        source = read(source, name=name_of_target(target, to))
+        said = source.messages
+    if isinstance(source, Block):
+        source = ReadBlock(source, points, ())
+    with stage_report(progress) as report:
+        if isinstance(source, Adjustment) or source.is_result:
+            return (*said, *_write_result(source, target, to, geoid))
+        return (*said, *_write_block(source, target, to, geoid, report))
+
+
+def name_of_target(target: Path, to: Target) -> str:
+    """A block is called as the folder it is written to."""
+    return target.resolve().name if to == "block" else ""
+
+
+def refuse_target(source: str, target: Path, to: str, overwrite: bool) -> None:
+    """Refuse, before anything is read, what cannot be written.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.formats.convert import FOLDER_TARGETS, TARGETS
+
+    if to not in TARGETS:
+        raise InputError(f"'{to}' is not a format that is written", f"known are {', '.join(TARGETS)}")
+    if source and target.resolve() == Path(source).resolve():
+        raise InputError("source and target are the same", "choose another target", target)
+    if to in FOLDER_TARGETS:
+        refuse_foreign_entries(target, FOLDER_TARGETS[to], overwrite)
+    else:
+        refuse_existing_file(target, overwrite)
+
+
+def _place(source: Block | Adjustment | ReadBlock | PathLike) -> str:
+    """Where the source comes from; '' where it is in memory."""
+    if isinstance(source, (Block, Adjustment)):
+        return ""
+    return source.source if isinstance(source, ReadBlock) else text_of_path(source)
+
+
+def _write_result(source: Adjustment | ReadBlock, target: Path, to: Target, geoid: PathLike | None) -> tuple[str, ...]:
+    """Orientation and points as adjusted; what was measured, as it was measured."""
     from aerotri.formats.assembly.oriented import oriented_from_adjusted
     from aerotri.formats.convert import BLOCK_WRITERS, write_any, write_oriented
+    from aerotri.opening import open_result
 
-    if isinstance(block, Adjustment):
-        if to != "block" and to not in BLOCK_WRITERS:
-            return tuple(write_oriented(oriented_from_adjusted(block.adjusted), Path(out), to))
-        block = block.block
-    elif not isinstance(block, Block):
-        found = read(block)
-        block, points = found.block, found.points if points is None else points
-    return tuple(write_any(block, Path(out), to, points))
+    if to == "block" or to in BLOCK_WRITERS:
+        return tuple(write_any(source.block, target, to))
+    adjusted = source.adjusted if isinstance(source, Adjustment) else open_result(source.source).result
+    return tuple(write_oriented(oriented_from_adjusted(adjusted), target, to, geoid))
+
+
+def _write_block(
+    reading: ReadBlock, target: Path, to: Target, geoid: PathLike | None, report: StageReport
+) -> tuple[str, ...]:
+    from aerotri.formats.assembly.oriented import oriented_block
+    from aerotri.formats.convert import BLOCK_WRITERS, ORIENTATION_WRITERS, write_any, write_oriented
+
+    block, points, said = reading.block, reading.points, _about_held(reading.block)
+    if to == "block" or to in BLOCK_WRITERS:
+        return (*said, *write_any(block, target, to, points))
+    if to in ORIENTATION_WRITERS:
+        oriented, at_start = _at_start_values(block, points, to)
+        said = (*said, *at_start)
+    else:
+        oriented = None if points is None else oriented_block(block, points)
+    if oriented is None:
+        oriented = _adjusted(reading, geoid, report)
+    return (*said, *write_oriented(oriented, target, to, geoid))
+
+
+def _about_held(block: Block) -> tuple[str, ...]:
+    """A sentence about control without error."""
+    count = int((block.control.sigma[~block.control.is_check] == 0.0).sum())
+    return (f"{count} coordinates of control points have σ = 0: an adjustment holds them",) if count else ()
+
+
+def _at_start_values(
+    block: Block, points: np.ndarray | None, to: Target
+) -> tuple[OrientedBlock | None, tuple[str, ...]]:
+    """The block at the orientations it came with; None where it has none and the format needs them."""
+    from aerotri.formats.assembly.oriented import OrientedBlock
+    from aerotri.functional_model.rotation import rotation_from_angles
+
+    rotation = rotation_from_angles(block.images.angles, block.rotation)
+    known = np.full((len(block.points), 3), np.nan) if points is None else points
+    used = np.ones(len(block.image_points), bool)
+    oriented = OrientedBlock(block, block.images.centre, rotation, known, used)
+    if oriented.oriented.any():
+        return oriented, ("orientations are those that the files gave, not adjusted",)
+    return (oriented, ()) if to == "patb" else (None, ())
+
+
+def _adjusted(reading: ReadBlock, geoid: PathLike | None, report: StageReport) -> OrientedBlock:
+    """The block adjusted for the purpose.
+
+    Raises
+    ------
+    InputError
+        When that fails.
+    """
+    from aerotri.compiled import compilation_notice
+    from aerotri.formats.assembly.oriented import oriented_from_adjusted
+    from aerotri.pipeline import AdjustmentFailedError, adjust_keeping_system
+
+    source = reading.source or None
+    if not len(reading.block.image_points):
+        raise InputError("holds no image points", "the target needs object points", source)
+    report.stage(compilation_notice() or "adjusting", None)
+    try:
+        done = adjust_keeping_system(reading.block, report.iteration, geoid=geoid)
+    except AdjustmentFailedError as failure:
+        raise InputError(
+            f"the block has to be adjusted first, and that failed: {failure}", "mend the block", source
+        ) from None
+    return oriented_from_adjusted(done.result)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 import time
 from contextlib import ExitStack
@@ -11,7 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.public.blocks import PathLike
+from aerotri.public.blocks import PathLike, Sigmas, text_of_path
 from aerotri.public.folders import refuse_foreign_entries, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
     from aerotri.tie_points.stated import GivenFiles
 
 RECORD = "tiepoints.json"
-Sigmas = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -215,7 +213,7 @@ def tie_points(
         orientation_sigma_m=orientation_sigma_m, orientation_sigma_deg=orientation_sigma_deg,
         control_prefix=control_prefix,
     )  # fmt: skip
-    files = GivenFiles(_text_of(control), tuple(check), _text_of(positions), _text_of(orientation), stated)
+    files = GivenFiles(text_of_path(control), tuple(check), text_of_path(positions), text_of_path(orientation), stated)
     spec = CameraSpec(camera, "", None, pixel_um, focal_length_mm, None, free_interior)
     found = FeatureOptions(features, feature_size)
     options = Options(found, MatchOptions(neighbours=neighbours, seed=seed), points)
@@ -253,10 +251,6 @@ def refuse_other_content(folder: Path, overwrite: bool) -> None:
 
     refuse_foreign_folder(folder, RECORD, CACHE)
     refuse_foreign_entries(folder, (*OWN_ENTRIES, MARKS), overwrite)
-
-
-def _text_of(path: PathLike | None) -> str:
-    return "" if path is None else os.fspath(path)
 
 
 def _text(value: Any) -> str:
