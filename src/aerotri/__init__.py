@@ -34,7 +34,9 @@ if TYPE_CHECKING:
     from aerotri.public.models import deform as deform
     from aerotri.public.simulating import example_flight as example_flight
     from aerotri.public.simulating import simulate as simulate
+    from aerotri.public.surfaces import Surface as Surface
     from aerotri.public.table import Table as Table
+    from aerotri.public.terrain import terrain as terrain
     from aerotri.public.tying import tie_points as tie_points
 
 
@@ -44,6 +46,7 @@ _PLACES = {
     "Block": "aerotri.observations",
     "Covariance": "aerotri.public.covariance",
     "InputError": "aerotri.conventions",
+    "Surface": "aerotri.public.surfaces",
     "Table": "aerotri.public.table",
     "changes": "aerotri.public.changes",
     "compare_parameters": "aerotri.public.comparing",
@@ -58,6 +61,7 @@ _PLACES = {
     "read_block": "aerotri.public.blocks",
     "simulate": "aerotri.public.simulating",
     "tie_points": "aerotri.public.tying",
+    "terrain": "aerotri.public.terrain",
 }
 """Where every public name stands; imported when it is used, so that `import aerotri` is quick."""
 _MODULES = ("predict",)
@@ -69,6 +73,7 @@ __all__ = [
     "Block",
     "Covariance",
     "InputError",
+    "Surface",
     "Table",
     "__version__",
     "adjust",
@@ -83,6 +88,7 @@ __all__ = [
     "read",
     "read_block",
     "simulate",
+    "terrain",
     "tie_points",
 ]
 

@@ -26,8 +26,7 @@ from aerotri.rasters.grids import Grid, RasterReader, write_raster
 from aerotri.rasters.metric import MetricReader, refuse_other_units, units_of
 from aerotri.vectors.polygons import polygon_features
 from aerotri.volume.boundary import read_boundary
-from aerotri.volume.compute import SectionPlan
-from aerotri.volume.parts import SigmaOptions
+from aerotri.volume.settings import SectionPlan, SigmaOptions
 from dense_algebra import TINY
 from small_blocks import small_block
 

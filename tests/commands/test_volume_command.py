@@ -16,8 +16,7 @@ from aerotri.conventions import InputError
 from aerotri.formats.block.folder import write_block
 from aerotri.rasters.grids import Grid, RasterReader, write_raster
 from aerotri.volume.accuracy import PARTS
-from aerotri.volume.compute import SectionPlan
-from aerotri.volume.parts import SigmaOptions
+from aerotri.volume.settings import SectionPlan, SigmaOptions
 from small_blocks import small_block
 
 CELL, COUNT = 4.0, 80

@@ -16,14 +16,14 @@ from typer.testing import CliRunner
 from aerotri.cli import app
 from aerotri.commands.adjust import run_adjust
 from aerotri.commands.demcor import beside, run_demcor
-from aerotri.commands.dtm import DtmOptions, run_dtm
+from aerotri.commands.dtm import run_dtm
 from aerotri.commands.volume import VolumeInput, run_volume
 from aerotri.formats.block.folder import read_block, write_block
 from aerotri.formats.results.pickets import read_pickets
 from aerotri.pipeline import adjust
 from aerotri.rasters.grids import Grid, RasterReader, write_raster
-from aerotri.volume.compute import SectionPlan
-from aerotri.volume.parts import SigmaOptions
+from aerotri.terrain.settings import TerrainSettings
+from aerotri.volume.settings import SectionPlan, SigmaOptions
 from small_blocks import ERRING, small_block
 
 SHIFT = np.array([512.0, -256.0, 64.0])
@@ -227,8 +227,8 @@ def test_dtm(tmp_path):
         for path in (tmp_path / "flown" / "photographs").iterdir():
             shutil.copy(path, here / "photographs" / f"{changed.name(path.stem)}.tif")
         result = adjusted(changed.block, here)
-        options = DtmOptions(interval=10.0, area=(-70.0, -70.0, 70.0, 70.0), plots=False)
-        assert run_dtm(result, [here / "photographs"], here / "dtm", options, True) == 0
+        settings = TerrainSettings(interval=10.0, area=(-70.0, -70.0, 70.0, 70.0))
+        assert run_dtm(result, [here / "photographs"], here / "dtm", settings, False, True) == 0
         table = read_pickets(here / "dtm" / "pickets.parquet")
         found[name] = (in_order(table, changed), values(here / "dtm" / "dsm.tif"))
     (table, dsm), *others = found.values()

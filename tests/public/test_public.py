@@ -17,7 +17,7 @@ from aerotri.functional_model.rotation import rotation_from_angles
 
 MODULES = (
     "adjustment", "blocks", "changes", "comparing", "converting", "covariance", "models", "parameters", "predict",
-    "simulating", "table", "tying",
+    "simulating", "surfaces", "table", "tying",
 )  # fmt: skip
 HEAVY = ("numba", "scipy", "pyarrow", "matplotlib", "cv2", "pyproj", "rasterio", "pydantic")
 
@@ -247,3 +247,13 @@ def test_prediction_of_a_volume_is_told_by_the_best_way():
     assert both.table["by"].tolist()[-1] == "simulated flight, adjusted"
     for shown in (theory, aerotri.predict.attitude(1.0, 5.0)):
         assert "<table>" in shown._repr_html_()
+def test_functions_stay_beside_parts_of_their_name():
+    """Importing a part of the package does not put it in the place of the function that is called as it is."""
+    code = """
+import aerotri, aerotri.terrain.settings, aerotri.crosscheck.comparison, aerotri.volume.settings
+import types
+from aerotri.volume.settings import METHODS
+print([name for name in aerotri.__all__ if isinstance(getattr(aerotri, name), types.ModuleType)])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "['predict']"

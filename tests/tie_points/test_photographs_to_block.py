@@ -193,10 +193,11 @@ def test_photographs_that_say_nothing(files, tmp_path):
 
 def test_subfolders_blanks_and_a_list_without_crs(files, tmp_path):
     """Photographs in two folders, two of them of one name; marks of names with blanks; dtm and imgeo find them."""
-    from aerotri.commands.dtm import DtmOptions, make_plan
     from aerotri.commands.imgeo import ImgeoOptions, run_imgeo
     from aerotri.commands.results import reopened
     from aerotri.formats.files.photograph_files import files_of
+    from aerotri.public.terrain import terrain_plan
+    from aerotri.terrain.settings import TerrainSettings
 
     folder, photographs = tmp_path / "flight", sorted((files[0] / "photographs").iterdir())
     called = {}
@@ -222,7 +223,7 @@ def test_subfolders_blanks_and_a_list_without_crs(files, tmp_path):
     assert len(files_of(folder, (".tif", ".jpg"))) == len(photographs)
     assert run_adjust(out, tmp_path / "result", None, None, None, False, True) == 0
     calibration = reopened(tmp_path / "result", Console(quiet=True))
-    assert len(make_plan(calibration, [folder], DtmOptions()).rows) == len(photographs)
+    assert len(terrain_plan(calibration, [folder], TerrainSettings())[0].rows) == len(photographs)
     run_imgeo(tmp_path / "result", [folder / "day 1", folder / "day 2"], tmp_path / "ideal", ImgeoOptions(), True)
     written = (tmp_path / "ideal").rglob("photo*.tif")
     assert {path.relative_to(tmp_path / "ideal").as_posix() for path in written} == set(called.values())

@@ -9,7 +9,8 @@ import shapely
 from aerotri.rasters.grids import Grid, RasterReader, write_raster
 from aerotri.volume.bases import PlaneBase, SurfaceBase, level, plane_through, spline_through
 from aerotri.volume.boundary import Boundary, boundary_of, boundary_of_grid
-from aerotri.volume.sections import RULES, cross_sections, section_volume
+from aerotri.volume.sections import cross_sections, section_volume
+from aerotri.volume.settings import RULES
 from aerotri.volume.sums import raster_volumes
 from aerotri.volume.triangles import prism_sums
 

@@ -14,9 +14,10 @@ from aerotri.volume.accuracy import volume_sigma
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import boundary_of
 from aerotri.volume.functionals import tin_volume, triangulated
-from aerotri.volume.parts import Measured, Part, SigmaOptions, part_of_pickets
+from aerotri.volume.parts import Measured, Part, part_of_pickets
 from aerotri.volume.pickets import pickets_where_seen
 from aerotri.volume.response import respond
+from aerotri.volume.settings import SigmaOptions
 from aerotri.volume.shared import adjustment_key, difference_part, same_adjustment
 from places import PROJECT
 

@@ -30,12 +30,13 @@ import cv2
 import numpy as np
 
 from aerotri.commands.console import Console
-from aerotri.commands.dtm import DtmOptions, make_plan
 from aerotri.commands.results import reopened
+from aerotri.public.terrain import terrain_plan
 from aerotri.terrain._plan_kernels import Nodes, Plan
 from aerotri.terrain._search_kernels import find_heights
 from aerotri.terrain._view_kernels import parallax_per_metre, photo_place
 from aerotri.terrain.photographs import photographs_of, site_at
+from aerotri.terrain.settings import TerrainSettings
 
 POSTS, HALF_RANGE, ROUNDS = 17, 8, 5
 
@@ -43,7 +44,7 @@ POSTS, HALF_RANGE, ROUNDS = 17, 8, 5
 def prepare(result: Path, folder: Path, count: int):
     """View, nodes (n, 3), pairs (n, 2), ranges and post size of nodes in the middle of the block."""
     calibration = reopened(result, Console(quiet=True))
-    plan = make_plan(calibration, [folder], DtmOptions())
+    plan, _ = terrain_plan(calibration, [folder], TerrainSettings())
     photographs = photographs_of(calibration, plan.rows, plan.paths)
     known = calibration.result.points.xyz
     middle, gsd = np.nanmedian(known, axis=0), float(np.median(photographs.gsd))

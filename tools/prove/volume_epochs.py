@@ -25,9 +25,10 @@ from aerotri.simulation import Truth, parse_spec, simulate
 from aerotri.volume.accuracy import volume_sigma
 from aerotri.volume.bases import level
 from aerotri.volume.functionals import tin_volume, triangulated
-from aerotri.volume.parts import Part, SigmaOptions
+from aerotri.volume.parts import Part
 from aerotri.volume.pickets import pickets_where_seen
 from aerotri.volume.response import respond
+from aerotri.volume.settings import SigmaOptions
 from volume_monte_carlo import HEADER, row
 from volume_proof.simulated import MATCHING_UM, PARAMETERS, SPEC, measured_pickets
 from volume_proof.sites import LEVEL, Site, make_site

@@ -33,7 +33,7 @@ from scipy.stats import chi2
 from shapely import Polygon
 
 from aerotri.commands.adjust import run_adjust
-from aerotri.commands.dtm import DtmOptions, run_dtm
+from aerotri.commands.dtm import run_dtm
 from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
 from aerotri.commands.volume import VolumeInput, run_volume
 from aerotri.formats.assembly.assemble import Statements
@@ -41,10 +41,10 @@ from aerotri.formats.assembly.camera_spec import CameraSpec
 from aerotri.simulation import parse_spec
 from aerotri.simulation.random_streams import stream
 from aerotri.simulation.terrain import make_terrain
+from aerotri.terrain.settings import TerrainSettings
 from aerotri.volume.bases import quadrature_of
 from aerotri.volume.boundary import Boundary, boundary_of
-from aerotri.volume.compute import SectionPlan
-from aerotri.volume.parts import SigmaOptions
+from aerotri.volume.settings import SectionPlan, SigmaOptions
 from photographs_to_block import SPEC, write_files
 
 PLAN = SPEC | {
@@ -101,7 +101,8 @@ def one(folder: Path, seed: int, boundary: Boundary) -> Outcome:
     with contextlib.redirect_stdout(io.StringIO()):
         run_tiepoints(folder / "photographs", folder / "block", options, True)
         run_adjust(folder / "block", folder / "result", None, None, None, False, True)
-        run_dtm(folder / "result", [folder / "photographs"], folder / "dtm", DtmOptions(interval=INTERVAL), True)
+        settings = TerrainSettings(interval=INTERVAL)
+        run_dtm(folder / "result", [folder / "photographs"], folder / "dtm", settings, True, True)
         run_volume(given, SectionPlan(), SigmaOptions(), folder / "volume", True, True)
     content = json.loads((folder / "volume" / "volume.json").read_text(encoding="utf-8"))
     s = content["sigma"]

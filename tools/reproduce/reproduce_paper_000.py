@@ -21,8 +21,9 @@ from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import Boundary, boundary_of
 from aerotri.volume.functionals import tin_volume, triangulated
-from aerotri.volume.sections import RULES, cross_sections, section_volume
+from aerotri.volume.sections import cross_sections, section_volume
 from aerotri.volume.sensitivity import SECOND, Pair, explicit, explicit_partials, rigorous, rigorous_partials
+from aerotri.volume.settings import RULES
 
 # Table 1 of the paper
 PAIR = Pair(

@@ -51,7 +51,6 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from aerotri.commands.adjust import run_adjust
 from aerotri.commands.console import Console
 from aerotri.commands.demcor import run_demcor
-from aerotri.commands.dtm import DtmOptions, make_plan, write_terrain
 from aerotri.commands.imgeo import ImgeoOptions, run_imgeo
 from aerotri.commands.results import reopened
 from aerotri.commands.simulate import run_simulate
@@ -60,6 +59,8 @@ from aerotri.deformation.model_map import read_number_table
 from aerotri.deformation.photo_errors import seams_mm
 from aerotri.deformation.restitution import ABSORBED, restitution
 from aerotri.functional_model.additional_parameters import parameter_set, parse_parameters
+from aerotri.public.adjustment import Adjustment
+from aerotri.public.terrain import terrain
 from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.report.plots.canvas import WIDTH, axes_at, new_figure, styled
 from aerotri.report.plots.rendering import save_plots
@@ -67,12 +68,12 @@ from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.camera_errors.lens import format_grid
 from aerotri.simulation.rendering import RenderOptions
 from aerotri.simulation.simulate import true_image_errors
-from aerotri.terrain.dtm import make_terrain_model
+from aerotri.terrain.settings import TerrainSettings
 
 SUBSETS = ("even", "odd")
 PIXELS, PIXEL_UM, GSD_M, TRUE_GSD_M = (575, 375), 180.0, 1.8, 0.09
 ERROR_PX, TIE_SIGMA_PX, INTERVAL_PX, TIES, SEED = 0.45, 0.1, 12.0, 1000, 11
-WINDOW_PX = DtmOptions().window
+WINDOW_PX = TerrainSettings().window
 SETS = {"1–12, 42–73": "bluh:1-12,ultracam_d:42-73", "42–73, field": "ultracam_d:42-73,collocation"}
 """The paper's parameters, and the tiles with a random field, which knows no lens."""
 TRUE_SET, EXACT = "1–12, 42–73", 0.02
@@ -195,12 +196,11 @@ def match(here: Path, result: str, name: str, photographs: str = "block/photogra
         target = here / f"{name}_{subset}"
         if (target / "dtm.json").exists():
             continue
-        options = DtmOptions(
-            interval=INTERVAL_PX * GSD_M, cell=INTERVAL_PX * GSD_M, pairs=True, step=1, subset=subset, edge=0.02,
-            ideal=ideal,
+        model = terrain(
+            Adjustment(calibration), here / photographs, interval=INTERVAL_PX * GSD_M, cell=INTERVAL_PX * GSD_M,
+            pairs=True, step=1, subset=subset, edge=0.02, ideal=ideal,
         )  # fmt: skip
-        plan = make_plan(calibration, [here / photographs], options)
-        write_terrain(target, make_terrain_model(calibration, plan), calibration, False)
+        model.save(target, plots=False)
     return common([here / f"{name}_{subset}" / "dsm.tif" for subset in SUBSETS])
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import typer
 
 from aerotri.cli.app import app, predict
 from aerotri.cli.options import Json, ResultFolder
+from aerotri.terrain.settings import DEFAULTS, FEWEST_PHOTOGRAPHS, LARGEST_EDGE, MOST_PHOTOGRAPHS, TerrainSettings
 
 
 @app.command(epilog="Example: aerotri dtm saar_result photographs --out saar_dtm --interval 5")
@@ -26,19 +27,24 @@ def dtm(
     step: Annotated[
         int | None, typer.Option(min=1, help="With --pairs: pair a photograph with the STEP-th after it.")
     ] = None,
-    subset: Annotated[str, typer.Option(help="all, or even or odd photographs of every strip.")] = "all",
+    subset: Annotated[str, typer.Option(help="all, or even or odd photographs of every strip.")] = DEFAULTS.subset,
     area: Annotated[
         tuple[float, float, float, float] | None, typer.Option(help="X Y of the lower left, X Y of the upper right.")
     ] = None,
-    window: Annotated[int, typer.Option(help="Pixels a side of the windows that are matched, odd.")] = 17,
-    threshold: Annotated[float, typer.Option(min=0.0, max=1.0, help="Correlation from which a match counts.")] = 0.90,
+    window: Annotated[int, typer.Option(help="Pixels a side of the windows that are matched, odd.")] = DEFAULTS.window,
+    threshold: Annotated[float, typer.Option(min=0.0, max=1.0, help="Correlation from which a match counts.")] = (
+        DEFAULTS.threshold
+    ),
     agreeing: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="The same of three photographs and more whose rays meet; 1: never.")
-    ] = 0.50,
+    ] = DEFAULTS.agreeing,
     edge: Annotated[
-        float | None, typer.Option(min=0.0, max=0.4, help="Share of the format at its edge not used; 0.02, pairs 0.10.")
+        float | None,
+        typer.Option(min=0.0, max=LARGEST_EDGE, help="Share of the format at its edge not used; 0.02, pairs 0.10."),
     ] = None,
-    most_photographs: Annotated[int, typer.Option(min=2, max=20, help="Photographs of a picket, at most.")] = 8,
+    most_photographs: Annotated[
+        int, typer.Option(min=FEWEST_PHOTOGRAPHS, max=MOST_PHOTOGRAPHS, help="Photographs of a picket, at most.")
+    ] = DEFAULTS.most_photographs,
     breaklines: Annotated[Path | None, typer.Option(help="Lines with heights: .gpkg, .geojson or .dxf.")] = None,
     ideal: Annotated[
         bool, typer.Option("--ideal", help="The photographs are those of imgeo, free of image errors.")
@@ -47,13 +53,13 @@ def dtm(
     json_: Json = False,
 ) -> None:
     """Pickets by image matching with σ, error pickets, and the surfaces they make with and without objects."""
-    from aerotri.commands.dtm import DtmOptions, metres_or_auto, run_dtm
+    from aerotri.commands.dtm import metres_or_auto, run_dtm
 
-    options = DtmOptions(
-        metres_or_auto(interval), cell, pairs, step, subset, area, window, threshold, agreeing, edge, most_photographs,
-        breaklines, ideal, plots,
+    settings = TerrainSettings(
+        metres_or_auto(interval), cell, pairs, step, cast(Any, subset), area, window, threshold, agreeing, edge,
+        most_photographs, breaklines, ideal,
     )  # fmt: skip
-    raise typer.Exit(run_dtm(result, photographs, out, options, json_))
+    raise typer.Exit(run_dtm(result, photographs, out, settings, plots, json_))
 
 
 @app.command(epilog="Example: aerotri compare saar_dtm/dtm.tif laser.laz --align shift --out difference")

@@ -54,8 +54,7 @@ def volume(
 ) -> None:
     """A volume, cut and fill, and how sure it is: σ with every part named."""
     from aerotri.commands.volume import VolumeInput, run_volume
-    from aerotri.volume.compute import SectionPlan
-    from aerotri.volume.parts import SigmaOptions
+    from aerotri.volume.settings import SectionPlan, SigmaOptions
 
     given = VolumeInput(dtm, base, boundary, method, adjustment, pickets, base_adjustment, base_pickets)
     options = SigmaOptions(

@@ -68,16 +68,16 @@ def _by_formula(gsd: float, k: float | None) -> dict[str, Any]:
 
 
 def _by_pilot(question: IntervalQuestion, console: Console) -> dict[str, Any]:
-    from aerotri.commands.dtm import DtmOptions, make_plan
     from aerotri.commands.results import reopened
+    from aerotri.public.terrain import terrain_plan
     from aerotri.terrain.dtm import make_terrain_model, typical_slope
     from aerotri.terrain.interval import interval_of_gsd, k_of_slope
     from aerotri.terrain.photographs import photographs_of
     from aerotri.terrain.pickets import footprint
+    from aerotri.terrain.settings import TerrainSettings
 
     calibration = reopened(Path(str(question.pilot)), console)
-    options = DtmOptions(area=question.area)
-    plan = make_plan(calibration, list(question.photographs), options)
+    plan, _ = terrain_plan(calibration, list(question.photographs), TerrainSettings(area=question.area))
     photographs = photographs_of(calibration, plan.rows, plan.paths)
     gsd = float(np.median(photographs.gsd))
     k, _ = k_of_slope(typical_slope(calibration.result.points.xyz))
@@ -88,7 +88,7 @@ def _by_pilot(question: IntervalQuestion, console: Console) -> dict[str, Any]:
         middle, half = 0.5 * (whole.low + whole.high), 0.5 * MIDDLE * (whole.high - whole.low)
         low, high = middle - half, middle + half
         area = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
-    plan = make_plan(calibration, list(question.photographs), DtmOptions(interval=interval, area=area))
+    plan, _ = terrain_plan(calibration, list(question.photographs), TerrainSettings(interval=interval, area=area))
     outcome = make_terrain_model(calibration, plan, console.work)
     console.lines([])
     pilot = pilot_of(outcome.pickets, interval, question.tolerance)

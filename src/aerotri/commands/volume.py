@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from aerotri.volume.bases import Base
     from aerotri.volume.boundary import Boundary
     from aerotri.volume.compute import SectionPlan, Volumes
-    from aerotri.volume.parts import SigmaOptions
+    from aerotri.volume.settings import SigmaOptions
 
 OWN_NAMES = ("volume.json", "thickness.tif", "sections.csv", "plots", "volume.html")
 MOST_MAP_CELLS = 500

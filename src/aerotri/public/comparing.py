@@ -184,6 +184,7 @@ class Crosscheck:
         from aerotri.crosscheck.outcome_json import crosscheck_json
         from aerotri.formats.files.atomic import atomic_folder
         from aerotri.public.saving import write_json
+        from aerotri.public.tables import write_rows
         from aerotri.report.pages.adjustment import Findings, write_report
         from aerotri.report.plots.overview import all_plots, save_plots
 
@@ -193,23 +194,12 @@ class Crosscheck:
             drawn = save_plots({"crosscheck": self.plot()}, folder / "plots")
             plots = {**all_plots(self.adjusted), **drawn}
             write_report(self.adjusted, plots, folder / "report.html", Findings(crosscheck=self.record))
-            _write_rows(self.table, folder / "crosscheck.csv")
+            write_rows(self.table, folder / "crosscheck.csv")
             write_json(folder / "crosscheck.json", crosscheck_json(self.record))
         return target
 
     def _repr_html_(self) -> str:
         return f"<div><p>{self.sentence}</p>{self.table._repr_html_()}</div>"
-
-
-def _write_rows(table: Table, path: Path) -> None:
-    import csv
-
-    from aerotri.spreadsheet import plain_row
-
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(table.columns)
-        writer.writerows(plain_row(row.values()) for row in table.arrow.to_pylist())
 
 
 def crosscheck(source: Adjustment | Block | str | os.PathLike, progress: ProgressLike = None) -> Crosscheck:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -61,6 +62,18 @@ def groups_table(adjusted: AdjustedBlock) -> Table:
     names = ("name", "count", "sigma_apriori", "rms", "redundancy", "sigma_aposteriori")
     columns = {name: np.array([getattr(group, name) for group in adjusted.groups]) for name in names}
     return _table("groups of observations", columns)
+
+
+def write_rows(table: Table, path: Path) -> None:
+    """Write a table as CSV; names that a spreadsheet would run as formulas are marked."""
+    import csv
+
+    from aerotri.spreadsheet import plain_row
+
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(table.columns)
+        writer.writerows(plain_row(row.values()) for row in table.arrow.to_pylist())
 
 
 def _ground(adjusted: AdjustedBlock, results: GroundPointResults) -> dict[str, np.ndarray]:

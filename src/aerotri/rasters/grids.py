@@ -10,7 +10,7 @@ import errno
 import os
 import shutil
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,6 +98,32 @@ class Grid:
         return cls(len(y), len(x), float(x[0]) - cell_x / 2.0, float(y[0]) + cell_y / 2.0, cell_x, cell_y)
 
 
+def bilinear(
+    read: Callable[[int, int, int, int], np.ndarray], grid: Grid, x: np.ndarray, y: np.ndarray
+) -> np.ndarray:
+    """(n,) values at places (n,), linear between the four cells around; NaN where one of these is not known.
+
+    Parameters
+    ----------
+    read : a window by its first row and column and its size.
+    """
+    column, row = grid.column(x), grid.row(y)
+    out = np.full(len(column), np.nan)
+    there = (column >= 0.0) & (row >= 0.0) & (column <= grid.columns - 1) & (row <= grid.rows - 1)
+    if not there.any():
+        return out
+    first_row, first_column = int(row[there].min()), int(column[there].min())
+    size = int(row[there].max()) - first_row + 2, int(column[there].max()) - first_column + 2
+    window = read(first_row, first_column, *size).astype(float)
+    i, j = np.floor(row[there]).astype(int) - first_row, np.floor(column[there]).astype(int) - first_column
+    t, s = row[there] % 1.0, column[there] % 1.0
+    corners = (window[i, j], window[i, j + 1], window[i + 1, j], window[i + 1, j + 1])
+    weights = ((1.0 - t) * (1.0 - s), (1.0 - t) * s, t * (1.0 - s), t * s)
+    # a cell of no weight may be unknown: places on the last column have nothing to their right
+    out[there] = sum(np.where(w > 0.0, w * c, 0.0) for w, c in zip(weights, corners, strict=True))
+    return out
+
+
 class RasterReader:
     """A raster of one band, or a surface with its σ, open for reading; used as a context manager, from one thread.
 
@@ -108,7 +134,8 @@ class RasterReader:
     Attributes
     ----------
     grid : its cells. dtype : float type in which it is delivered. no_data : its no-data value, None if it has none.
-    crs : rasterio's CRS or None. options : how the file is written, for a copy of the same kind.
+    crs : rasterio's CRS or None. bands : how many there are. options : how the file is written, for a copy of the same
+    kind.
     """
 
     def __init__(self, path: str | os.PathLike, band: int = 1):
@@ -134,6 +161,7 @@ class RasterReader:
             self.dtype = np.dtype(np.float64)
         self.no_data: float | None = self._file.nodata
         self.crs: Any = self._file.crs
+        self.bands = self._file.count
         self.options = {key: self._file.profile[key] for key in KEPT_OPTIONS if key in self._file.profile}
         self._masked = self.no_data is None and "all_valid" not in {f.name for f in self._file.mask_flag_enums[0]}
 
@@ -202,21 +230,7 @@ class RasterReader:
 
         The window around all places is read at once: call it for places near one another.
         """
-        column, row = self.grid.column(x), self.grid.row(y)
-        out = np.full(len(column), np.nan)
-        there = (column >= 0.0) & (row >= 0.0) & (column <= self.grid.columns - 1) & (row <= self.grid.rows - 1)
-        if not there.any():
-            return out
-        first_row, first_column = int(row[there].min()), int(column[there].min())
-        size = int(row[there].max()) - first_row + 2, int(column[there].max()) - first_column + 2
-        window = self.read(first_row, first_column, *size).astype(float)
-        i, j = np.floor(row[there]).astype(int) - first_row, np.floor(column[there]).astype(int) - first_column
-        t, s = row[there] % 1.0, column[there] % 1.0
-        corners = (window[i, j], window[i, j + 1], window[i + 1, j], window[i + 1, j + 1])
-        weights = ((1.0 - t) * (1.0 - s), (1.0 - t) * s, t * (1.0 - s), t * s)
-        # a cell of no weight may be unknown: places on the last column have nothing to their right
-        out[there] = sum(np.where(w > 0.0, w * c, 0.0) for w, c in zip(weights, corners, strict=True))
-        return out
+        return bilinear(self.read, self.grid, x, y)
 
     def __enter__(self) -> Self:
         return self

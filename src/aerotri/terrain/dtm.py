@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from aerotri.terrain.error_pickets import with_error_pickets
 from aerotri.terrain.interval import interval_of_gsd, interval_of_surface, k_of_slope
 from aerotri.terrain.matching import measure
 from aerotri.terrain.photographs import Photographs, photographs_of
-from aerotri.terrain.picket_status import PicketStatus
 from aerotri.terrain.pickets import Area, MatchOptions, Models, Pickets, footprint
 from aerotri.terrain.surface import Surface, grid_over, ground_cells, interpolation_error, surface_of
 
@@ -249,42 +247,3 @@ def _model_numbers(dsm: Surface, pickets: Pickets) -> np.ndarray:
     nearest = np.asarray(KDTree(pickets.xyz[own, :2]).query(cells)[1])
     number = pickets.model[own][nearest].reshape(dsm.z.shape).astype(np.int32)
     return np.where(np.isfinite(dsm.z), number, -1).astype(np.int32)
-
-
-def terrain_json(outcome: TerrainOutcome, block: str, crs: str) -> dict[str, Any]:
-    """The content of dtm.json."""
-    from aerotri.version import __version__
-
-    o, p = outcome, outcome.pickets
-    count = np.bincount(p.status, minlength=len(PicketStatus))
-    holes = count[PicketStatus.LOW_CORRELATION : PicketStatus.BACKWARD]
-    own = p.accepted
-    matching, adjustment = p.covariance[own, 2, 2], o.adjustment[own, 2]
-    seen = int(len(p) - count[1])
-    pixel = 1.0 / o.photographs.sensor[0, 2]
-    return {
-        "aerotri": __version__, "block": block, "crs": crs, "photographs": len(p.names),
-        "gsd_m": float(np.median(o.photographs.gsd)), "interval_m": o.interval, "interval_source": o.interval_source,
-        "cell_m": o.cell,
-        "pickets": {
-            "nodes": len(p), "seen": seen, "accepted": int(own.sum()), "errors": int(p.errors.sum()),
-            "stepped_aside": int((own & (p.tries > 0)).sum()), "holes": int(holes.sum()),
-            "rays_mean": float((p.photographs[own] >= 0).sum(axis=1).mean()),
-        },
-        "status": {status.text: int(n) for status, n in zip(PicketStatus, count, strict=True)},
-        "sigma_Z_m": {
-            "median": float(np.median(np.sqrt(matching + adjustment))), "matching": float(np.median(np.sqrt(matching))),
-            "adjustment": float(np.median(np.sqrt(adjustment))), "interpolation": o.interpolation,
-        },
-        "ray_sigma_px": float(_ray_sigma_mm(o) / pixel), "sigma0_rays": float(np.nan_to_num(p.sigma0)),
-        "ground_share": float(o.ground[own].mean()),
-    }  # fmt: skip
-
-
-def _ray_sigma_mm(o: TerrainOutcome) -> float:
-    """Median σ of a matched image coordinate along the base, from σ of the heights: σ_Z·b/h·c/h/√2."""
-    p = o.pickets
-    own = p.accepted
-    height = np.median(o.photographs.centres[:, 2]) - np.median(p.xyz[own, 2])
-    sigma = np.median(np.sqrt(p.covariance[own, 2, 2])) * base_ratio(o.photographs, p)
-    return float(sigma * np.median(o.photographs.orientation.interior[:, 0]) / height / np.sqrt(2.0))

@@ -9,9 +9,10 @@ import shapely
 
 from aerotri.volume.bases import Base, PlaneBase, SplineBase, Surface, quadrature_of, sampled
 from aerotri.volume.boundary import Boundary, boundary_of
-from aerotri.volume.parts import Part, SigmaOptions
+from aerotri.volume.parts import Part
 from aerotri.volume.response import Systematic, systematic
 from aerotri.volume.roughness import Between, roughness_of_cells
+from aerotri.volume.settings import SigmaOptions
 from aerotri.volume.shared import difference_part, same_adjustment, shared_control_covariance, shared_in_words
 from aerotri.volume.sums import cells_within
 

@@ -11,10 +11,10 @@ from aerotri.conventions import InputError
 from aerotri.volume.bases import Base, Surface
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.quantity import Volume, no_data_note
-from aerotri.volume.sections import RULES, Sections, cross_sections, section_volume
+from aerotri.volume.sections import Sections, cross_sections, section_volume
+from aerotri.volume.settings import METHOD, METHODS, RULES, SECTIONS, SectionPlan
 from aerotri.volume.sums import RasterVolumes, Window, raster_volumes
 
-METHODS = ("prisms", "grid", *RULES)
 DEFAULT_SECTIONS = 20
 """Intervals between sections where no spacing is given, along the boundary's extent; more where cells are finer."""
 SPREAD = 0.005
@@ -39,20 +39,12 @@ class Volumes:
     warnings: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class SectionPlan:
-    """spacing : m, None for a round number. azimuth : degrees in which the sections follow one another."""
-
-    spacing: float | None = None
-    azimuth: float = 0.0
-
-
 def compute_volumes(
     surface: Surface,
     base: Base,
     boundary: Boundary,
-    method: str = "prisms",
-    plan: SectionPlan = SectionPlan(),
+    method: str = METHOD,
+    plan: SectionPlan = SECTIONS,
     keep: Callable[[Window], None] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Volumes:

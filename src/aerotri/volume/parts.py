@@ -11,8 +11,14 @@ from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume.bases import Base, Surface
 from aerotri.volume.boundary import Boundary
-from aerotri.volume.functionals import Functional, cell_volume, tin_volume
-from aerotri.volume.pickets import PER_POINT, Pickets, pickets_where_seen
+from aerotri.volume.functionals import Functional, cell_volume, tin_volume, triangulated
+from aerotri.volume.pickets import (
+    MeasuredPickets,
+    Pickets,
+    pickets_of_names,
+    pickets_where_seen,
+    with_height_sigmas,
+)
 from aerotri.volume.response import Response, respond
 from aerotri.volume.roughness import (
     Between,
@@ -22,32 +28,13 @@ from aerotri.volume.roughness import (
     roughness_of_cells,
     roughness_of_pickets,
 )
+from aerotri.volume.settings import SigmaOptions
 from aerotri.volume.sums import cells_within
 from aerotri.volume.triangles import areas, cut_to
 
 LATTICE_PATCH = 16
 PATCH_CELLS = 512
 """Cells a side of the part of a raster whose roughness is taken."""
-
-
-@dataclass(frozen=True)
-class SigmaOptions:
-    """What is known beside the adjustment.
-
-    Parameters
-    ----------
-    matching_sigma_um : of an image coordinate of a picket; None: σ̂0 of the adjustment's image coordinates.
-    matching_window_m : side of the matching window on the ground, within which neighbouring cells share their noise.
-    per_point : photographs a cell is measured in. base_sigma : m, common to the whole base.
-    boundary_sigma : m, of either coordinate of every corner. corrected : the photographs were corrected.
-    """
-
-    matching_sigma_um: float | None = None
-    matching_window_m: float = 0.0
-    per_point: int = PER_POINT
-    base_sigma: float = 0.0
-    boundary_sigma: float = 0.0
-    corrected: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +102,24 @@ def part_of_pickets(
     unseen = max(boundary.area - float(pieces.area.sum()), 0.0)
     measured = Measured(pickets, functional.gradient)
     return Part(calibration, response, between, len(pickets), len(pickets.image), unseen, measured)
+
+
+def part_of_measured(
+    calibration: Adjustment, measured: MeasuredPickets, boundary: Boundary, base: Base | None, options: SigmaOptions
+) -> Part:
+    """The share of a TIN of pickets as measured; their stated σ counts unless the options state one.
+
+    Raises
+    ------
+    InputError
+        When a photograph is not in the block.
+    """
+    pickets = pickets_of_names(
+        calibration.result.block, measured.xyz, measured.photographs, matching_sigma_mm(calibration, options)
+    )
+    if options.matching_sigma_um is None and measured.sigma_z is not None:
+        pickets = with_height_sigmas(calibration, pickets, measured.sigma_z)
+    return part_of_pickets(calibration, pickets, triangulated(pickets.xyz), boundary, base, options)
 
 
 def matching_sigma_mm(calibration: Adjustment, options: SigmaOptions) -> float:

@@ -12,11 +12,10 @@ from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.observations import Block
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume import _response_kernels as _kernels
+from aerotri.volume.settings import PER_POINT
 
 CANDIDATES_EVERY = 64
 """Points of a row that share one list of photographs to look into."""
-PER_POINT = 2
-"""Photographs a point of a surface is taken to be measured in where its own are not known: the nearest model [C]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +46,21 @@ class Pickets:
         start = np.concatenate([[0], np.cumsum(count)])
         rays = np.repeat(self.start[rows] - start[:-1], count) + np.arange(start[-1])
         return Pickets(self.xyz[rows], start, self.image[rays], self.sigma_mm[rays], self.noise_share[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPickets:
+    """Pickets as `aerotri dtm` delivers them.
+
+    Parameters
+    ----------
+    xyz : (k, 3) m in the CRS of the block. photographs : their names for each.
+    sigma_z : (k,) m, σ of the height by matching alone; None where not stated.
+    """
+
+    xyz: np.ndarray
+    photographs: list[list[str]]
+    sigma_z: np.ndarray | None = None
 
 
 def pickets_of_names(block: Block, xyz: np.ndarray, names: list[list[str]], sigma_mm: np.ndarray | float) -> Pickets:

@@ -18,7 +18,6 @@ from aerotri.volume.bases import Base, Surface, sampled
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.quantity import Volume
 
-RULES = ("trapezoidal", "simpson", "simpson38")
 INSET = 1e-9
 """Of the extent: the outermost sections lie so much inside, where the boundary has a length along them."""
 PIECES_AT_ONCE = 4096

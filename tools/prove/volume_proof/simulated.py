@@ -24,10 +24,11 @@ from aerotri.volume.accuracy import PARTS, boundary_variance
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import Boundary, boundary_of
 from aerotri.volume.functionals import tin_volume, triangulated
-from aerotri.volume.parts import SigmaOptions, part_of_pickets
+from aerotri.volume.parts import part_of_pickets
 from aerotri.volume.pickets import Pickets, pickets_where_seen
 from aerotri.volume.response import respond
 from aerotri.volume.roughness import Between
+from aerotri.volume.settings import SigmaOptions
 from volume_proof.sites import LEVEL, Site
 
 SPEC = {

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +26,11 @@ from aerotri.conventions import InputError
 from aerotri.formats.text.parquet import load_parquet
 from aerotri.terrain.picket_status import PicketStatus
 from aerotri.terrain.pickets import Pickets
+from aerotri.terrain.tin import order_in_plan
+from aerotri.volume.pickets import MeasuredPickets
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 NUMBERS = ("node_X", "node_Y", "X", "Y", "Z", "sX", "sY", "sZ", "sX_matching", "sY_matching", "sZ_matching",
            "correlation")  # fmt: skip
@@ -52,15 +58,14 @@ class PicketTable:
         return self.status == PicketStatus.ACCEPTED.text
 
 
-def write_pickets(path: Path, pickets: Pickets, adjustment: np.ndarray) -> None:
-    """Write pickets.parquet.
+def picket_columns(pickets: Pickets, adjustment: np.ndarray) -> pa.Table:
+    """The columns of pickets.parquet.
 
     Parameters
     ----------
     adjustment : (n, 3) m², variances that the adjustment adds to those of matching.
     """
     import pyarrow as pa
-    from pyarrow import parquet
 
     p, matching = pickets, pickets.sigma
     sigma = np.sqrt(matching**2 + adjustment)
@@ -73,7 +78,47 @@ def write_pickets(path: Path, pickets: Pickets, adjustment: np.ndarray) -> None:
     columns["status"] = pa.array([PicketStatus(k).text for k in p.status.tolist()])
     columns["steps_aside"] = pa.array(p.tries.astype(np.int32))
     columns["model"] = pa.array(p.model.astype(np.int32))
-    parquet.write_table(pa.table(columns), path)
+    return pa.table(columns)
+
+
+def write_pickets(path: Path, pickets: Pickets, adjustment: np.ndarray) -> None:
+    """Write pickets.parquet; arguments as of `picket_columns`."""
+    from pyarrow import parquet
+
+    parquet.write_table(picket_columns(pickets, adjustment), path)
+
+
+def measured_pickets(table: pa.Table, path: Path | None = None) -> MeasuredPickets:
+    """The pickets of a table that were accepted, for σ of a volume: X, Y, Z, photographs, status, sZ_matching.
+
+    Parameters
+    ----------
+    table : the columns; status and sZ_matching may be missing. path : file they come from, for messages.
+
+    Raises
+    ------
+    InputError
+        When a column is missing, or hardly a picket was accepted.
+    """
+    import pyarrow as pa
+
+    for name in ("X", "Y", "Z", "photographs"):
+        if name not in table.column_names:
+            raise InputError(f"has no column '{name}'", "give pickets.parquet of `aerotri dtm`", path)
+    xyz = np.column_stack([table.column(axis).cast(pa.float64()).to_numpy() for axis in "XYZ"])
+    names = table.column("photographs").to_pylist()
+    used = np.isfinite(xyz).all(axis=1) & (np.array([len(own or ()) for own in names]) >= 2)
+    if "status" in table.column_names:
+        used &= np.array(table.column("status").to_pylist(), dtype=str) == "accepted"
+    if used.sum() < 3:
+        raise InputError("has hardly a picket that was accepted", "measure again", path)
+    rows = np.flatnonzero(used)
+    # what is drawn of them at random must not hang on the order of the file
+    rows = rows[order_in_plan(xyz[rows])]
+    stated = None
+    if "sZ_matching" in table.column_names:
+        stated = table.column("sZ_matching").cast(pa.float64()).to_numpy()[rows]
+    return MeasuredPickets(xyz[rows], [[str(name) for name in names[k]] for k in rows], stated)
 
 
 def read_pickets(path: Path) -> PicketTable:

@@ -37,7 +37,6 @@ ERROR_MARKS = {
 }  # fmt: skip
 
 
-@styled
 def plot_surface(outcome: TerrainOutcome, block_name: str) -> Figure:
     """The surface with objects, lit from the north-west, and the σ of its cells."""
     o = outcome
@@ -47,27 +46,57 @@ def plot_surface(outcome: TerrainOutcome, block_name: str) -> Figure:
         f"{length_text(float(f'{o.cell:.3g}'))}; heights {np.nanmin(z):.1f} … {np.nanmax(z):.1f} m\n"
         f"σ of the heights: median {np.nanmedian(o.dsm.sigma):.3f} m; white: no pickets"
     )
-    width, height = _size(o.dsm.grid, (WIDTH - 3.3) / 2.0)
-    figure = new_figure(height + 1.75, f"Surface – {plain(block_name)}", subtitle)
+    return _plot_heights(o.dsm.grid, z, o.dsm.sigma, block_name, subtitle, o.photographs.places.frame is None)
+
+
+def plot_heights(grid: Grid, z: np.ndarray, sigma: np.ndarray | None, name: str, is_local: bool) -> Figure:
+    """A surface lit from the north-west, and the σ of its cells where it is known.
+
+    Parameters
+    ----------
+    z, sigma : (rows, columns) m, NaN where not known.
+    """
+    known = f"; σ: median {np.nanmedian(sigma):.3f} m" if sigma is not None else ""
+    subtitle = (
+        f"{grid.rows} × {grid.columns} cells of {length_text(float(f'{grid.cell_x:.3g}'))}; heights "
+        f"{np.nanmin(z):.1f} … {np.nanmax(z):.1f} m{known}; white: not known"
+    )
+    return _plot_heights(grid, z, sigma, name, subtitle, is_local)
+
+
+@styled
+def _plot_heights(
+    grid: Grid, z: np.ndarray, sigma: np.ndarray | None, name: str, subtitle: str, is_local: bool
+) -> Figure:
+    width, height = _size(grid, WIDTH - 1.4 if sigma is None else (WIDTH - 3.3) / 2.0)
+    figure = new_figure(height + 1.75, f"Surface – {plain(name)}", subtitle)
     left = axes_at(figure, 0.75, 0.75, width, height)
     every = _every(z)
     shown = z[::every, ::every]
     light = LightSource(315, 45)
     filled = np.where(np.isfinite(shown), shown, np.nanmedian(z))
-    shade = light.hillshade(filled, vert_exag=_exaggeration(filled), dx=o.cell * every, dy=o.cell * every)
+    step = grid.cell_x * every
+    shade = light.hillshade(filled, vert_exag=_exaggeration(filled), dx=step, dy=step)
     shade = np.where(np.isfinite(shown), shade, 1.0)
-    left.imshow(shade, cmap="gray", vmin=0.0, vmax=1.0, extent=_extent(o.dsm.grid), interpolation="nearest")
-    _contours(left, o.dsm.grid, z)
-    _coordinates(left, width, height, local=o.photographs.places.frame is None)
-    right = axes_at(figure, 0.75 + width + 0.75, 0.75, width, height)
-    sigma = o.dsm.sigma[::every, ::every]
-    low, high = np.nanpercentile(sigma, [1, 99])
-    image = right.imshow(sigma, cmap="Greys", vmin=low, vmax=high, extent=_extent(o.dsm.grid), interpolation="nearest")
-    _coordinates(right, width, height, local=o.photographs.places.frame is None)
-    right.set_ylabel("")
-    scale = axes_at(figure, 0.75 + 2 * width + 0.9, 0.75, 0.14, height)
-    figure.colorbar(image, cax=scale).set_label("σ of Z [m]")
+    left.imshow(shade, cmap="gray", vmin=0.0, vmax=1.0, extent=_extent(grid), interpolation="nearest")
+    _contours(left, grid, z)
+    _coordinates(left, width, height, local=is_local)
+    if sigma is not None:
+        _plot_sigma(figure, 0.75 + width + 0.75, (width, height), grid, sigma[::every, ::every], is_local)
     return figure
+
+
+def _plot_sigma(
+    figure: Figure, place: float, size: tuple[float, float], grid: Grid, sigma: np.ndarray, is_local: bool
+) -> None:
+    """σ of the heights as grey tones, from `place` on; inches."""
+    right = axes_at(figure, place, 0.75, *size)
+    low, high = np.nanpercentile(sigma, [1, 99])
+    image = right.imshow(sigma, cmap="Greys", vmin=low, vmax=high, extent=_extent(grid), interpolation="nearest")
+    _coordinates(right, *size, local=is_local)
+    right.set_ylabel("")
+    scale = axes_at(figure, place + size[0] + 0.15, 0.75, 0.14, size[1])
+    figure.colorbar(image, cax=scale).set_label("σ of Z [m]")
 
 
 @styled

@@ -1,0 +1,56 @@
+"""A raster in memory, for what else reads rasters window by window from a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from aerotri.rasters.grids import Grid, bilinear
+
+
+class HeldRaster:
+    """Heights in memory, read as they would be from the file they are written to: with 32 bit.
+
+    Parameters
+    ----------
+    values : (rows, columns) m, NaN where not known.
+    crs : 'EPSG:n', None for a local one.
+    name : stands for that of the file.
+
+    Attributes
+    ----------
+    grid, crs, path, note : as of a `MetricReader`; there is nothing to note.
+    """
+
+    note = ""
+
+    def __init__(self, values: np.ndarray, grid: Grid, crs: str | None, name: str):
+        self.grid, self.crs, self.path = grid, crs, Path(name)
+        self.values = values.astype(np.float32)
+
+    @property
+    def epsg(self) -> int | None:
+        """Code of the CRS, None where it has none."""
+        authority, _, code = (self.crs or "").partition(":")
+        return int(code) if authority.upper() == "EPSG" and code.isdigit() else None
+
+    def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
+        """A window, (rows, columns) float32; NaN where nothing is known and beyond the edges."""
+        top, left = max(row, 0), max(column, 0)
+        bottom, right = min(row + rows, self.grid.rows), min(column + columns, self.grid.columns)
+        out = np.full((rows, columns), np.nan, np.float32)
+        if bottom > top and right > left:
+            out[top - row : bottom - row, left - column : right - column] = self.values[top:bottom, left:right]
+        return out
+
+    def sample(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """(n,) bilinear values at places (n,); NaN where one of the four cells is not known."""
+        return bilinear(self.read, self.grid, x, y)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        pass
