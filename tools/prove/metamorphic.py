@@ -1,7 +1,8 @@
 """The random field of the image error under other rows, names and in another frame: what takes too long for the tests.
 
 A block of 23 photographs whose camera errs by physics, adjusted with a random field of a given or an estimated σ and
-length, alone and with additional parameters. Printed are the largest differences of the results over their σ.
+length, alone and with additional parameters, and with the set that the program chooses. Printed are the largest
+differences of the results over their σ.
 
 Example: python tools/prove/metamorphic.py --seed 3
 """
@@ -28,6 +29,7 @@ CASES = {
     "field of given σ and length": ("collocation:5x4", GIVEN),
     "field, BLUH 1–12": ("bluh:1-12,collocation:5x4", GIVEN),
     "field estimated from the block": ("collocation:5x4", CollocationSettings()),
+    "set chosen by the program": ("auto", CollocationSettings()),
 }
 CHANGES = {
     "rows and names": both(permuted(2), renamed),
