@@ -16,8 +16,8 @@ from aerotri import InputError
 from aerotri.functional_model.rotation import rotation_from_angles
 
 MODULES = (
-    "adjustment", "blocks", "changes", "comparing", "converting", "covariance", "models", "parameters", "predict",
-    "simulating", "surfaces", "table", "tying",
+    "adjustment", "blocks", "changes", "comparing", "converting", "covariance", "models", "parameters",
+    "picket_interval", "predict", "simulating", "surfaces", "table", "tying",
 )  # fmt: skip
 HEAVY = ("numba", "scipy", "pyarrow", "matplotlib", "cv2", "pyproj", "rasterio", "pydantic")
 

@@ -1,4 +1,4 @@
-"""What a flight will give, before it is flown: accuracy of volumes, attitude that they tolerate.
+"""What a flight will give, before it is flown: accuracy of volumes, attitude that they tolerate, interval of points.
 
 >>> from aerotri import predict
 >>> flight = predict.volume(height=1500.0, length=9000.0, width=3600.0, bridging=3600.0)
@@ -15,12 +15,15 @@ import numpy as np
 import pyarrow as pa
 
 from aerotri.conventions import InputError
+from aerotri.public.picket_interval import picket_interval
 from aerotri.public.table import Table
 from aerotri.simulation.designs import SIGMA0_SHARE, VolumeDesign, volume_flight
 
 if TYPE_CHECKING:
     from aerotri.volume.sensitivity import AttitudeTolerance
     from aerotri.volume.theory import Prediction
+
+__all__ = ["attitude", "picket_interval", "volume"]
 
 SITE_PLACES, MOST_MODELS = 41, 100_000
 AREA_SHARE = 0.96

@@ -237,7 +237,7 @@ def terrain(
     settings = TerrainSettings(
         interval, cell, pairs, step, subset, area, window, threshold, agreeing, edge, most_photographs, lines, ideal
     )
-    return measure_terrain(result, _paths(photographs), settings, progress)
+    return measure_terrain(result, paths_of(photographs), settings, progress)
 
 
 def measure_terrain(
@@ -297,7 +297,8 @@ def terrain_plan(
     return plan, (note,) if note else ()
 
 
-def _paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
+def paths_of(given: PathLike | Sequence[PathLike]) -> list[Path]:
+    """A folder or file, or several."""
     return [Path(given)] if isinstance(given, str | os.PathLike) else [Path(path) for path in given]
 
 
