@@ -23,6 +23,7 @@ from aerotri.cli.options import (
     SystemOfPhotographs,
 )
 from aerotri.conventions import InputError
+from aerotri.tie_points.settings import DEFAULTS, LEAST
 
 
 @app.command(epilog="Example: aerotri simulate blocks/frederiksstad_ultracam/simulation.toml --out demo --seed 1")
@@ -150,15 +151,25 @@ def tiepoints(
     geoid: GeoidOfSystem = None,
     control_sigma_m: ControlSigma = "",
     control_prefix: ControlPrefix = "",
-    mark_sigma_px: Annotated[float, typer.Option(min=1e-3, help="σ of the image points of control.")] = 0.5,
+    mark_sigma_px: Annotated[
+        float, typer.Option(min=LEAST["mark_sigma_px"], help="σ of the image points of control.")
+    ] = DEFAULTS.mark_sigma_px,
     positions_sigma_m: PositionsSigma = "",
     orientation_sigma_m: OrientationSigma = "",
     orientation_sigma_deg: AnglesSigma = "",
-    points: Annotated[int, typer.Option(min=10, help="Tie points wanted in a photograph.")] = 1000,
-    features: Annotated[int, typer.Option(min=100, help="Features sought in a photograph.")] = 8000,
-    feature_size: Annotated[int, typer.Option(min=300, help="Features are sought in photographs of this size.")] = 2000,
-    neighbours: Annotated[int, typer.Option(min=1, help="Photographs each is compared with, the nearest.")] = 20,
-    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same block.")] = 1,
+    points: Annotated[
+        int, typer.Option(min=LEAST["points"], help="Tie points wanted in a photograph.")
+    ] = DEFAULTS.points,
+    features: Annotated[
+        int, typer.Option(min=LEAST["features"], help="Features sought in a photograph.")
+    ] = DEFAULTS.features,
+    feature_size: Annotated[
+        int, typer.Option(min=LEAST["feature_size"], help="Features are sought in photographs of this size.")
+    ] = DEFAULTS.feature_size,
+    neighbours: Annotated[
+        int, typer.Option(min=LEAST["neighbours"], help="Photographs each is compared with, the nearest.")
+    ] = DEFAULTS.neighbours,
+    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same block.")] = DEFAULTS.seed,
     overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:

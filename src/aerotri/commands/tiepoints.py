@@ -10,6 +10,7 @@ from typing import Any
 from aerotri.commands.console import Console
 from aerotri.formats.assembly.assemble import Statements
 from aerotri.formats.assembly.camera_spec import CameraSpec
+from aerotri.tie_points.settings import DEFAULTS
 
 
 @dataclass(frozen=True)
@@ -22,12 +23,12 @@ class TiePointOptions:
     orientation: str = ""
     camera: CameraSpec = field(default_factory=CameraSpec)
     stated: Statements = field(default_factory=Statements)
-    mark_sigma_px: float = 0.5
-    points: int = 1000
-    features: int = 8000
-    feature_size_px: int = 2000
-    neighbours: int = 20
-    seed: int = 1
+    mark_sigma_px: float = DEFAULTS.mark_sigma_px
+    points: int = DEFAULTS.points
+    features: int = DEFAULTS.features
+    feature_size_px: int = DEFAULTS.feature_size
+    neighbours: int = DEFAULTS.neighbours
+    seed: int = DEFAULTS.seed
 
 
 def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bool, overwrite: bool = False) -> None:

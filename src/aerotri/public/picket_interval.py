@@ -117,6 +117,8 @@ def picket_interval(
     """
     from aerotri.public.terrain import paths_of
 
+    if any(value is not None and not value > 0.0 for value in (scan_um, scale, gsd, k, tolerance)):
+        raise InputError("sizes have to be positive", "give micrometres and metres")
     files = paths_of(photographs)
     stated = stated_gsd(scan_um, scale, gsd, pilot is not None, bool(files))
     if stated is not None:

@@ -243,7 +243,7 @@ def attitude(
     """
     from aerotri.volume.sensitivity import SECOND, attitude_tolerance, vertical_pair
 
-    if min(height, base, focal_length, *site, thickness) <= 0.0:
+    if min(height, base, focal_length, *site, thickness, tolerance) <= 0.0:
         raise InputError("sizes have to be positive", "give metres and millimetres")
     places, area = _places(site, offset), site[0] * site[1]
     limit = tolerance / 100.0 * area * thickness

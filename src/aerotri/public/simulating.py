@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aerotri.conventions import InputError
 from aerotri.observations import Block
 from aerotri.public.blocks import PathLike
 from aerotri.public.folders import refuse_existing_file, refuse_foreign_entries
@@ -14,6 +15,8 @@ from aerotri.public.progress import ProgressLike, stage_report
 
 if TYPE_CHECKING:
     from aerotri.simulation import SimulationSpec, Truth
+
+MOST_BLUR_PX, MOST_NOISE = 20.0, 20_000.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,6 +73,9 @@ class SimulatedBlock:
         from aerotri.formats.files.work_place import held
         from aerotri.simulation.photograph_files import chosen_photographs
 
+        if not (0.0 <= blur_px <= MOST_BLUR_PX and 0.0 <= noise <= MOST_NOISE):
+            raise InputError(f"blur_px {blur_px:g} or noise {noise:g} is not possible",
+                             f"give 0 to {MOST_BLUR_PX:g} px and 0 to {MOST_NOISE:g}")  # fmt: skip
         target = Path(out)
         chosen = chosen_photographs(self.block, only) if photographs else []
         with held(target), stage_report(progress) as report:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from aerotri.public.blocks import PathLike, Sigmas, text_of_path
 from aerotri.public.folders import refuse_foreign_entries, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.tie_points.settings import DEFAULTS, TiePointSettings
 
 if TYPE_CHECKING:
     import numpy as np
@@ -144,15 +145,15 @@ def tie_points(
     geoid: PathLike | None = None,
     control_sigma_m: Sigmas | None = None,
     control_prefix: str = "",
-    mark_sigma_px: float = 0.5,
+    mark_sigma_px: float = DEFAULTS.mark_sigma_px,
     positions_sigma_m: Sigmas | None = None,
     orientation_sigma_m: Sigmas | None = None,
     orientation_sigma_deg: Sigmas | None = None,
-    points: int = 1000,
-    features: int = 8000,
-    feature_size: int = 2000,
-    neighbours: int = 20,
-    seed: int = 1,
+    points: int = DEFAULTS.points,
+    features: int = DEFAULTS.features,
+    feature_size: int = DEFAULTS.feature_size,
+    neighbours: int = DEFAULTS.neighbours,
+    seed: int = DEFAULTS.seed,
     cache: PathLike | None = None,
     progress: ProgressLike = None,
 ) -> TiedPhotographs:
@@ -201,6 +202,7 @@ def tie_points(
     >>> result = aerotri.adjust(tied.block)  # doctest: +SKIP
     """
     begun = time.perf_counter()
+    TiePointSettings(mark_sigma_px, points, features, feature_size, neighbours, seed).check()
     from aerotri.formats.assembly.assemble import Statements
     from aerotri.formats.assembly.camera_spec import CameraSpec
     from aerotri.tie_points.features import FeatureOptions

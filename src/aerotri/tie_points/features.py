@@ -15,6 +15,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.files.atomic import atomic_file
+from aerotri.tie_points.settings import DEFAULTS
 
 FIRST_PIXEL = 0.5
 CONTRAST_THRESHOLD, EDGE_THRESHOLD, LAYERS, SIGMA = 0.015, 10.0, 3, 1.6
@@ -61,8 +62,8 @@ class FeatureOptions:
     sigma_px : standard deviation of a coordinate, in pixels of the photograph they were sought in.
     """
 
-    count: int = 8000
-    longest_px: int = 2000
+    count: int = DEFAULTS.features
+    longest_px: int = DEFAULTS.feature_size
     sigma_px: float = 0.5
 
 

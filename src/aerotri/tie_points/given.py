@@ -13,6 +13,7 @@ from aerotri.formats.assembly.names_match import match_photographs
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, Reading, no_sigma
 from aerotri.observations import Block
 from aerotri.tie_points.photographs import PhotographSet
+from aerotri.tie_points.settings import DEFAULTS
 
 NEAR_M = 20_000.0
 """Distance from the photographs within which coordinates are taken for those of their UTM zone."""
@@ -36,7 +37,7 @@ class Given:
     control: PointList | None = None
     check: tuple[str, ...] = ()
     orientation: OrientationList | None = None
-    mark_sigma_px: float = 0.5
+    mark_sigma_px: float = DEFAULTS.mark_sigma_px
 
 
 def crs_of(photographs: PhotographSet, given: Given) -> str:

@@ -21,6 +21,7 @@ from aerotri.observations import Camera
 from aerotri.tie_points import _kernels
 from aerotri.tie_points.features import Features
 from aerotri.tie_points.first_orientation import pinhole, two_view_inliers
+from aerotri.tie_points.settings import DEFAULTS
 
 ROWS = 1024
 """Descriptors compared at a time."""
@@ -45,7 +46,7 @@ class MatchOptions:
     seed : of random sampling.
     """
 
-    neighbours: int = 20
+    neighbours: int = DEFAULTS.neighbours
     ratio: float = 0.8
     tolerance_px: float = 4.0
     fewest: int = 15

@@ -18,6 +18,7 @@ from aerotri.tie_points.given import Given, approximate_places, complete, crs_of
 from aerotri.tie_points.matching import MatchOptions, match_all, neighbours
 from aerotri.tie_points.orientation import Oriented, Progress, in_frame, orient, with_start_values
 from aerotri.tie_points.photographs import LENS, PhotographSet
+from aerotri.tie_points.settings import DEFAULTS
 from aerotri.tie_points.tracks import Tracks, join_matches, thin
 from aerotri.tie_points.verification import rays_that_meet
 
@@ -33,7 +34,7 @@ class Options:
 
     features: FeatureOptions = field(default_factory=FeatureOptions)
     matches: MatchOptions = field(default_factory=MatchOptions)
-    points: int = 1000
+    points: int = DEFAULTS.points
 
 
 @dataclass(frozen=True, eq=False)
