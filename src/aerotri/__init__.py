@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from aerotri.public.table import Table as Table
     from aerotri.public.terrain import terrain as terrain
     from aerotri.public.tying import tie_points as tie_points
+    from aerotri.public.volume import volume as volume
 
 
 _PLACES = {
@@ -60,8 +61,9 @@ _PLACES = {
     "read": "aerotri.public.blocks",
     "read_block": "aerotri.public.blocks",
     "simulate": "aerotri.public.simulating",
-    "tie_points": "aerotri.public.tying",
     "terrain": "aerotri.public.terrain",
+    "tie_points": "aerotri.public.tying",
+    "volume": "aerotri.public.volume",
 }
 """Where every public name stands; imported when it is used, so that `import aerotri` is quick."""
 _MODULES = ("predict",)
@@ -90,6 +92,7 @@ __all__ = [
     "simulate",
     "terrain",
     "tie_points",
+    "volume",
 ]
 
 

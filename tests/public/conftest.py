@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from photographed import PLAN
 
 import aerotri
 
@@ -15,3 +16,14 @@ def flight():
 @pytest.fixture(scope="session")
 def result(flight):
     return aerotri.adjust(flight.block, parameters="brown:K1+K2")
+
+
+@pytest.fixture(scope="session")
+def measured(tmp_path_factory):
+    """The photographs of a tiny flight, its adjustment, its terrain model, and where the latter is saved."""
+    folder = tmp_path_factory.mktemp("terrain")
+    flight = aerotri.simulate(PLAN, seed=3)
+    flight.save(folder / "flown", photographs=True)
+    result = aerotri.adjust(flight.block, parameters="bluh:1-2")
+    model = aerotri.terrain(result, folder / "flown" / "photographs", interval=20.0, pairs=True)
+    return folder / "flown" / "photographs", result, model, model.save(folder / "dtm")

@@ -16,9 +16,22 @@ from aerotri import InputError
 from aerotri.functional_model.rotation import rotation_from_angles
 
 MODULES = (
-    "adjustment", "blocks", "changes", "comparing", "converting", "covariance", "models", "parameters",
-    "picket_interval", "predict", "simulating", "surfaces", "table", "tying",
-)  # fmt: skip
+    "adjustment",
+    "blocks",
+    "changes",
+    "comparing",
+    "converting",
+    "covariance",
+    "models",
+    "parameters",
+    "picket_interval",
+    "predict",
+    "simulating",
+    "surfaces",
+    "table",
+    "tying",
+    "volume",
+)
 HEAVY = ("numba", "scipy", "pyarrow", "matplotlib", "cv2", "pyproj", "rasterio", "pydantic")
 
 

@@ -13,26 +13,6 @@ import aerotri
 from aerotri import InputError
 from aerotri.rasters.grids import Grid, RasterReader, write_raster
 
-PLAN = {
-    "name": "tiny",
-    "camera": {"cam": {"preset": "ultracam_d", "size_px": [575, 375], "pixel_um": 180.0}},
-    "flight": {"gsd_m": 1.0, "strips": 1, "images_per_strip": 3, "end_lap": 0.6, "heading_deg": 30.0},
-    "terrain": {"kind": "undulating", "height_m": 100.0, "relief_rms_m": 10.0, "wavelength_m": 400.0},
-    "tie_points": {"per_image": 60, "probability": 0.9, "sigma_um": 9.0},
-    "control": {"distance_bases": 1.0, "sigma_m": [0.05, 0.05, 0.05]},
-}
-
-
-@pytest.fixture(scope="module")
-def measured(tmp_path_factory):
-    """The photographs of a tiny flight, its adjustment, its terrain model, and where the latter is saved."""
-    folder = tmp_path_factory.mktemp("terrain")
-    flight = aerotri.simulate(PLAN, seed=3)
-    flight.save(folder / "flown", photographs=True)
-    result = aerotri.adjust(flight.block)
-    model = aerotri.terrain(result, folder / "flown" / "photographs", interval=20.0, pairs=True)
-    return folder / "flown" / "photographs", result, model, model.save(folder / "dtm")
-
 
 def test_the_model_is_that_of_its_files(measured):
     import pyarrow.csv

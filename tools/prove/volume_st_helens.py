@@ -21,11 +21,12 @@ from matplotlib.figure import Figure
 from scipy import ndimage
 
 from aerotri.rasters.grids import Grid, RasterReader
-from aerotri.report.plots.volume import ThicknessMap, plot_thickness
+from aerotri.report.plots.volume import plot_thickness
 from aerotri.volume.bases import SurfaceBase
 from aerotri.volume.boundary import boundary_of
 from aerotri.volume.compute import Volumes, compute_volumes
 from aerotri.volume.settings import SectionPlan
+from aerotri.volume.thickness import ThicknessMap
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "st_helens"
 BEFORE, EPOCHS = "2000_09_25", ("2004_10_04", "2004_10_13", "2005_01_03")

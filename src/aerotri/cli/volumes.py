@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import typer
 
 from aerotri.cli.app import app, predict
 from aerotri.cli.options import Json
+from aerotri.volume.settings import BASE, METHOD, SECTIONS, SIGMA, SectionPlan, SigmaOptions
 
 
 @app.command(epilog="Example: aerotri volume dtm.tif --boundary pile.gpkg --base boundary --adjustment saar_result")
@@ -20,15 +21,17 @@ def volume(
             help="level:HEIGHT, plane:X,Y,Z;X,Y,Z;X,Y,Z, plane (fitted to the boundary), boundary (spline through it), "
             "lowest (level of its lowest point), or another raster."
         ),
-    ] = "boundary",
+    ] = BASE,
     boundary: Annotated[
         str | None, typer.Option(help="GeoPackage, GeoJSON, WKT file or WKT text; the whole surface without.")
     ] = None,
     method: Annotated[
         str, typer.Option(help="The one that counts: prisms, grid, trapezoidal, simpson, simpson38.")
-    ] = "prisms",
+    ] = METHOD,
     section_spacing: Annotated[float | None, typer.Option(min=1e-6, help="Metres between sections.")] = None,
-    azimuth: Annotated[float, typer.Option(help="Degrees from north, in which sections follow one another.")] = 0.0,
+    azimuth: Annotated[float, typer.Option(help="Degrees from north, in which sections follow one another.")] = (
+        SECTIONS.azimuth
+    ),
     adjustment: Annotated[
         Path | None, typer.Option(help="Result folder the surface was measured with; gives the volume its σ.")
     ] = None,
@@ -42,9 +45,13 @@ def volume(
     ] = None,
     matching_window: Annotated[
         float, typer.Option(min=0.0, help="Side of the matching window on the ground, m; its cells share noise.")
-    ] = 0.0,
-    base_sigma: Annotated[float, typer.Option(min=0.0, help="σ of the base's height, m, common to all of it.")] = 0.0,
-    boundary_sigma: Annotated[float, typer.Option(min=0.0, help="σ of a corner of the boundary, m.")] = 0.0,
+    ] = SIGMA.matching_window_m,
+    base_sigma: Annotated[float, typer.Option(min=0.0, help="σ of the base's height, m, common to all of it.")] = (
+        SIGMA.base_sigma
+    ),
+    boundary_sigma: Annotated[float, typer.Option(min=0.0, help="σ of a corner of the boundary, m.")] = (
+        SIGMA.boundary_sigma
+    ),
     uncorrected: Annotated[
         bool, typer.Option("--uncorrected", help="The photographs were measured with their image errors in them.")
     ] = False,
@@ -54,9 +61,8 @@ def volume(
 ) -> None:
     """A volume, cut and fill, and how sure it is: σ with every part named."""
     from aerotri.commands.volume import VolumeInput, run_volume
-    from aerotri.volume.settings import SectionPlan, SigmaOptions
 
-    given = VolumeInput(dtm, base, boundary, method, adjustment, pickets, base_adjustment, base_pickets)
+    given = VolumeInput(dtm, base, boundary, cast(Any, method), adjustment, pickets, base_adjustment, base_pickets)
     options = SigmaOptions(
         matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma,
         corrected=not uncorrected,

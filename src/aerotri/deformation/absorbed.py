@@ -19,6 +19,7 @@ from aerotri.adjustment.datum import restore_datum
 from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.unknowns import State, Unknowns
+from aerotri.conventions import InputError
 from aerotri.deformation.orientation import Orientation
 from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.results.adjustment import Adjustment
@@ -28,7 +29,7 @@ N_INTERIOR = 3
 MAX_ITERATIONS = 50
 
 
-class AbsorptionFailedError(Exception):
+class AbsorptionFailedError(InputError):
     """The adjustment without additional parameters has no result."""
 
 

@@ -16,6 +16,8 @@ MOST_NODES = 400
 """Places along the boundary a spline goes through."""
 LATTICE = 129
 """Nodes a side of the lattice on which a spline is kept for evaluation at any number of cells."""
+WORDS = ("plane", "boundary", "lowest")
+"""Bases that follow from the surface along the boundary."""
 PANELS = 24
 """Quadrature points across the boundary's extent for the integral of a spline."""
 
@@ -187,18 +189,21 @@ def sampled(surface: Surface, x: np.ndarray, y: np.ndarray, piece: int = 256) ->
     return np.concatenate(parts) if parts else np.zeros(0)
 
 
-def parse_base(text: str, surface: Surface, boundary: Boundary, open_raster) -> Base:
-    """The base of a command line: a height, 'level:H', 'plane:X,Y,Z;X,Y,Z;X,Y,Z', 'plane', 'boundary', or a raster.
+def is_raster(text: str) -> bool:
+    """Whether a text names the file of another surface, and is none that `parse_base` takes."""
+    kind, _, rest = text.partition(":")
+    return not (not _is_word(text) or text in WORDS or kind == "level" or (kind == "plane" and rest))
+
+
+def parse_base(text: str, surface: Surface, boundary: Boundary) -> Base:
+    """The base that a text tells: a height, 'level:H', 'plane:X,Y,Z;X,Y,Z;X,Y,Z', 'plane', 'boundary' or 'lowest'.
 
     'lowest' is the lowest height along the boundary [C]; 'plane' is fitted to the boundary.
-
-    Parameters
-    ----------
-    open_raster : opens the file of another surface.
 
     Raises
     ------
     InputError
+        When the text is none of these.
     """
     kind, _, rest = text.partition(":")
     try:
@@ -219,7 +224,7 @@ def parse_base(text: str, surface: Surface, boundary: Boundary, open_raster) -> 
         return spline_through(surface, boundary)
     if text == "lowest":
         return level(float(boundary_heights(surface, boundary)[:, 2].min()))
-    return SurfaceBase(text.rsplit("/", 1)[-1], open_raster(text))
+    raise InputError(f"'{text}' is no base", f"give a height, {', '.join(WORDS)} or plane:X,Y,Z;X,Y,Z;X,Y,Z")
 
 
 def _is_word(text: str) -> bool:

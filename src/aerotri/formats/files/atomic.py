@@ -101,6 +101,26 @@ def atomic_folder(
             written.append(target)
 
 
+@contextmanager
+def room_beside(target: str | os.PathLike) -> Iterator[Path]:
+    """A hidden folder beside a target, for what is too large to be held until it is written there; then removed.
+
+    Parameters
+    ----------
+    target : file or folder to be; folders above it are made. `atomic_file` and `atomic_folder` may write it meanwhile.
+
+    Raises
+    ------
+    InputError
+        When the place cannot be written to.
+    """
+    target = _place(target)
+    with _told_as_input_error(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with work_place(target) as place, _told_as_input_error(target):
+            yield place
+
+
 def _place(target: str | os.PathLike) -> Path:
     """The target with links followed, so that a link stays a link."""
     return Path(target).resolve()

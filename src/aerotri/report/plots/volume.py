@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,13 +13,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from aerotri.rasters.grids import Grid
 from aerotri.report.plots.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, plain, styled
 from aerotri.report.quality import two_digits, with_sigma
 from aerotri.volume.accuracy import PARTS
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.compute import Volumes
 from aerotri.volume.sections import Profile, Sections, direction_of
+from aerotri.volume.thickness import ThicknessMap
 
 HIGHEST = 6.4
 CUT, FILL = "#7a2e0e", "#0b3d6b"
@@ -39,14 +38,6 @@ SYSTEMATIC = {
     "absorbed": "image errors uncorrected, orientation without parameters",
 }
 BAR = 0.36
-
-
-@dataclass(frozen=True, eq=False)
-class ThicknessMap:
-    """Thickness (rows, columns) m on a grid coarse enough to be drawn; NaN outside and where not known."""
-
-    grid: Grid
-    thickness: np.ndarray
 
 
 @styled

@@ -1,0 +1,216 @@
+"""A volume between a surface and a base, and how sure it is."""
+
+from __future__ import annotations
+
+import os
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeGuard
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.formats.files.spool import Spool
+from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.public.volume_result import THICKNESS, MeasuredVolume
+from aerotri.public.volume_sigma import MeasuredSurface, StatedAdjustment, sigma_of_volume
+from aerotri.volume.settings import BASE, METHOD, SECTIONS, SIGMA, Method, SectionPlan, SigmaOptions
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+    from aerotri.public.adjustment import Adjustment
+    from aerotri.public.surfaces import Reader, SurfaceLike
+    from aerotri.public.table import Table
+    from aerotri.volume.bases import Base
+    from aerotri.volume.boundary import Boundary
+    from aerotri.volume.compute import Volumes
+    from aerotri.volume.thickness import ThicknessMap
+
+PathLike = str | os.PathLike
+
+
+def volume(
+    surface: SurfaceLike,
+    boundary: BaseGeometry | PathLike | None = None,
+    *,
+    base: SurfaceLike | float = BASE,
+    method: Method = METHOD,
+    section_spacing: float | None = SECTIONS.spacing,
+    azimuth: float = SECTIONS.azimuth,
+    adjustment: Adjustment | PathLike | None = None,
+    pickets: Table | PathLike | None = None,
+    base_adjustment: Adjustment | PathLike | None = None,
+    base_pickets: Table | PathLike | None = None,
+    matching_sigma_um: float | None = SIGMA.matching_sigma_um,
+    matching_window: float = SIGMA.matching_window_m,
+    base_sigma: float = SIGMA.base_sigma,
+    boundary_sigma: float = SIGMA.boundary_sigma,
+    corrected: bool = SIGMA.corrected,
+    scratch: PathLike | None = None,
+    progress: ProgressLike = None,
+) -> MeasuredVolume:
+    """The volume between a surface and a base, cut and fill, by several methods; with an adjustment its σ.
+
+    Parameters
+    ----------
+    surface : raster of heights, or what `aerotri.terrain` returned: its surface with objects, and its pickets for σ.
+    boundary : GeoPackage, GeoJSON or WKT file, WKT text, or a shapely polygon; the whole surface where None.
+    base : height in m, 'level:H', 'plane:X,Y,Z;X,Y,Z;X,Y,Z', 'plane' (fitted to the boundary), 'boundary' (spline
+        through it), 'lowest' (level of its lowest point), or another surface.
+    method : the one that counts; all are computed.
+    section_spacing : m between cross sections; a round number where None.
+    azimuth : degrees from north, in which sections follow one another.
+    adjustment : result the surface was measured with; without it there is no σ.
+    pickets : pickets.parquet or its table; without, every cell is taken for a point that was measured.
+    base_adjustment : result of a base that is a surface.
+    base_pickets : pickets of a base that is a surface.
+    matching_sigma_um : µm, σ of an image coordinate of a picket; that of the adjustment where None.
+    matching_window : m, side of the matching window on the ground; its cells share noise.
+    base_sigma : m, σ of the height of the base, common to all of it.
+    boundary_sigma : m, σ of either coordinate of a corner of the boundary.
+    corrected : the photographs were corrected for their image errors.
+    scratch : folder for the raster of the thickness until it is saved; the temporary one of the system where None.
+    progress : as of `aerotri.adjust`.
+
+    Returns
+    -------
+    MeasuredVolume
+
+    Raises
+    ------
+    InputError
+        For a setting that makes no sense, files that cannot be read, or surfaces and boundary that do not meet.
+
+    Examples
+    --------
+    >>> import aerotri, numpy as np
+    >>> hill = aerotri.Surface.of_array(100.0 + np.full((20, 20), 3.0), left=0.0, top=40.0, cell=2.0)
+    >>> found = aerotri.volume(hill, "POLYGON ((10 10, 30 10, 30 30, 10 30, 10 10))", base=100.0)
+    >>> f"{found.net:.1f} m³ on {found.area:.1f} m²"
+    '1200.0 m³ on 400.0 m²'
+    """
+    _refuse_contradictions(adjustment, pickets, base_adjustment, base_pickets)
+    top, below = MeasuredSurface(surface, _stated(adjustment), pickets), None
+    if is_surface(base):
+        below = MeasuredSurface(base, _stated(base_adjustment), base_pickets)
+    elif base_adjustment is not None or base_pickets is not None:
+        raise InputError("base_adjustment and base_pickets need a surface as base", "give its raster as base")
+    options = SigmaOptions(
+        matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma, corrected=corrected
+    )
+    asked = _Asked(top, below, base, boundary, method, SectionPlan(section_spacing, azimuth), options)
+    with stage_report(progress) as report, ExitStack() as stack:
+        return _compute(asked, Spool(scratch), stack, report)
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What is to be computed, as stated."""
+
+    top: MeasuredSurface
+    below: MeasuredSurface | None
+    base: SurfaceLike | float
+    boundary: BaseGeometry | PathLike | None
+    method: Method
+    plan: SectionPlan
+    options: SigmaOptions
+
+
+def is_surface(base: SurfaceLike | float) -> TypeGuard[SurfaceLike]:
+    """Whether a base is a surface: neither told in words nor by its height."""
+    from aerotri.volume.bases import is_raster
+
+    return is_raster(base) if isinstance(base, str) else not isinstance(base, int | float)
+
+
+def _refuse_contradictions(adjustment, pickets, base_adjustment, base_pickets) -> None:
+    if adjustment is None and not (pickets is None and base_adjustment is None and base_pickets is None):
+        raise InputError("pickets, base_pickets and base_adjustment belong to an adjustment", "give the adjustment")
+
+
+def _stated(adjustment: Adjustment | PathLike | None) -> StatedAdjustment | None:
+    return None if adjustment is None else StatedAdjustment(adjustment)
+
+
+def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport) -> MeasuredVolume:
+    from aerotri.rasters.grids import cache_limited
+    from aerotri.volume.outcome_json import Sources, volume_json
+    from aerotri.volume.sections import chosen_profiles
+
+    top, below = asked.top, asked.below
+    stack.enter_context(cache_limited())
+    reader = stack.enter_context(top.surface.reader(top.adjustment.crs if top.adjustment else None))
+    boundary = _boundary(asked.boundary, reader)
+    others: list[Reader] = []
+    base = _base(asked.base, below, reader, boundary, stack, others)
+    volumes, thickness = _volumes(reader, base, boundary, asked, spool, report)
+    sigma, notes = None, ()
+    if top.adjustment is not None:
+        report.stage("σ of the volume", None)
+        sigma, notes = sigma_of_volume(top, below, reader, base, boundary, asked.options)
+    crs = "" if reader.epsg is None else f"EPSG:{reader.epsg}"
+    named = (top.adjustment.name, top.name_of_points) if top.adjustment else ("", "")
+    content = volume_json(volumes, base, boundary, Sources(reader.path.name, crs, *named), sigma)
+    said = (reader.note, *(other.note for other in others), boundary.note)
+    content["warnings"] = [*(text for text in said if text), *content["warnings"]]
+    profiles = chosen_profiles(reader, base, boundary, volumes.sections)
+    return MeasuredVolume(volumes, boundary, content, thickness, profiles, spool, notes)
+
+
+def _boundary(stated: BaseGeometry | PathLike | None, reader: Reader) -> Boundary:
+    from shapely.geometry.base import BaseGeometry
+
+    from aerotri.volume.boundary import boundary_of, boundary_of_grid, read_boundary
+
+    if stated is None:
+        return boundary_of_grid(reader.grid)
+    if isinstance(stated, BaseGeometry):
+        return boundary_of(stated, "the polygon given")
+    return read_boundary(os.fspath(stated), reader.epsg)
+
+
+def _base(
+    stated: SurfaceLike | float, below: MeasuredSurface | None, reader: Reader, boundary: Boundary, stack: ExitStack,
+    others: list[Reader],
+) -> Base:  # fmt: skip
+    """The base; the raster of one that is a surface is open as long as the stack, in the CRS of the surface."""
+    from aerotri.volume.bases import SurfaceBase, level, parse_base
+
+    if isinstance(stated, int | float):
+        return level(float(stated))
+    if below is None:
+        return parse_base(str(stated), reader, boundary)
+    other = stack.enter_context(below.surface.reader(None if reader.epsg is None else f"EPSG:{reader.epsg}"))
+    if other.epsg is not None and reader.epsg is not None and other.epsg != reader.epsg:
+        message = f"is in EPSG:{other.epsg}, the surface in EPSG:{reader.epsg}"
+        raise InputError(message, "bring it into one CRS", other.path)
+    others.append(other)
+    return SurfaceBase(below.surface.label, other)
+
+
+def _volumes(
+    reader: Reader, base: Base, boundary: Boundary, asked: _Asked, spool: Spool, report: StageReport
+) -> tuple[Volumes, ThicknessMap]:
+    """All methods, the raster of the thickness on the way, and its map."""
+    from aerotri.rasters.grids import RasterWriter
+    from aerotri.volume.compute import compute_volumes
+    from aerotri.volume.sums import Window, cells_within
+    from aerotri.volume.thickness import ThicknessMeans
+
+    row, column, rows, columns = cells_within(reader.grid, boundary)
+    if not rows or not columns:
+        raise InputError("the boundary does not meet the surface", "check the CRS of both", reader.path)
+    part = reader.grid.window(row, column, rows, columns)
+    means = ThicknessMeans(part)
+    with RasterWriter(spool.folder / THICKNESS, part, crs=reader.crs, options={"compress": "deflate"}) as writer:
+        writer.describe("surface − base, m")
+
+        def keep(window: Window) -> None:
+            inside = np.where(window.part > 0.0, window.thickness, np.nan)
+            means.add(window.row - row, window.column - column, inside)
+            writer.write(window.row - row, window.column - column, inside.astype(np.float32))
+
+        volumes = compute_volumes(reader, base, boundary, asked.method, asked.plan, keep, report.counted)
+    spool.refuse_full()
+    return volumes, means.map()

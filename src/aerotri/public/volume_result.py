@@ -1,0 +1,235 @@
+"""A volume as a notebook sees it: numbers, σ, tables, plots, and a folder to keep it in."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerotri.conventions import InputError
+from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.surfaces import Surface
+from aerotri.public.table import Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from aerotri.formats.files.spool import Spool
+    from aerotri.volume.boundary import Boundary
+    from aerotri.volume.compute import Volumes
+    from aerotri.volume.sections import Profile
+    from aerotri.volume.thickness import ThicknessMap
+
+RECORD, THICKNESS = "volume.json", "thickness.tif"
+OWN_NAMES = (RECORD, THICKNESS, "sections.csv", "plots", "volume.html")
+NO_SIGMA = "the volume has no σ", "give the adjustment that the surface was measured with"
+
+
+@dataclass(frozen=True, eq=False)
+class VolumePlots:
+    """Plots of a volume, each a matplotlib Figure.
+
+    Parameters
+    ----------
+    volumes : by every method. boundary : of the volume. summary : content of volume.json.
+    map : the thickness, coarse. profiles : sections to draw.
+    """
+
+    volumes: Volumes
+    boundary: Boundary
+    summary: dict[str, Any]
+    map: ThicknessMap
+    profiles: list[Profile]
+
+    def thickness(self) -> Figure:
+        """Map of cut and fill."""
+        from aerotri.report.plots.volume import plot_thickness
+
+        return plot_thickness(self.map, self.boundary, self.volumes, self.summary)
+
+    def budget(self) -> Figure:
+        """The parts of σ.
+
+        Raises
+        ------
+        InputError
+            For a volume without an adjustment, which has no σ.
+        """
+        from aerotri.report.plots.volume import plot_budget
+
+        if self.summary["sigma"] is None:
+            raise InputError(*NO_SIGMA)
+        return plot_budget(self.summary)
+
+    def section_areas(self) -> Figure:
+        """Areas of the cross sections."""
+        from aerotri.report.plots.volume import plot_section_areas
+
+        return plot_section_areas(self.volumes.sections, self.summary["dtm"])
+
+    def section_profiles(self) -> Figure:
+        """Surface and base along three of the sections."""
+        from aerotri.report.plots.volume import plot_section_profiles
+
+        return plot_section_profiles(self.profiles, self.summary["dtm"])
+
+    def all(self) -> dict[str, Figure]:
+        """Every plot of the page by the name of its file."""
+        budget = {} if self.summary["sigma"] is None else {"budget": self.budget()}
+        return {
+            "thickness": self.thickness(), **budget, "section_areas": self.section_areas(),
+            "section_profiles": self.section_profiles(),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MeasuredVolume:
+    """What `aerotri.volume` returns: cut, fill and net, σ with its parts, sections and a map.
+
+    Parameters
+    ----------
+    record : the volumes by every method, as records.
+    boundary : of the volume.
+    summary : content of volume.json.
+    map : the thickness, coarse. profiles : sections to draw.
+    spool : holds the raster of the thickness until it is saved.
+    notes : doubts about the adjustments, in sentences.
+    """
+
+    record: Volumes
+    boundary: Boundary
+    summary: dict[str, Any]
+    map: ThicknessMap
+    profiles: list[Profile]
+    spool: Spool
+    notes: tuple[str, ...] = ()
+
+    @property
+    def net(self) -> float:
+        """m³, cut less fill."""
+        return self.record.chosen.net
+
+    @property
+    def cut(self) -> float:
+        """m³ above the base."""
+        return self.record.chosen.cut
+
+    @property
+    def fill(self) -> float:
+        """m³ below the base."""
+        return self.record.chosen.fill
+
+    @property
+    def area(self) -> float:
+        """m², inside the boundary."""
+        return self.boundary.area
+
+    @property
+    def sigma(self) -> float | None:
+        """m³, one standard deviation of net; None without an adjustment."""
+        return None if self.summary["sigma"] is None else self.summary["sigma"]["sigma_m3"]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What else the user should read, in sentences."""
+        return tuple(self.summary["warnings"])
+
+    @cached_property
+    def parts(self) -> Table:
+        """The parts of σ, each alone, m³: adjustment, matching, interpolation, base, boundary.
+
+        Raises
+        ------
+        InputError
+            For a volume without an adjustment, which has no σ.
+        """
+        if self.summary["sigma"] is None:
+            raise InputError(*NO_SIGMA)
+        parts = self.summary["sigma"]["parts_m3"]
+        return _table("parts of σ", {"part": list(parts), "sigma_m3": list(parts.values())}, {"sigma_m3": "m³"})
+
+    @cached_property
+    def methods(self) -> Table:
+        """The volume by every method, m³ and m²."""
+        rows = self.summary["methods"]
+        units = {name: "m³" if name.endswith("m3") else "m²" for name in rows[0] if name not in ("method", "note")}
+        return _table("methods", {name: [row[name] for row in rows] for name in rows[0]}, units)
+
+    @cached_property
+    def sections(self) -> Table:
+        """The cross sections: the columns of sections.csv; m and m²."""
+        s = self.record.sections
+        names = ("cut_area_m2", "fill_area_m2", "cut_length_m", "fill_length_m", "no_data_length_m")
+        columns = {"station_m": s.station, **{name: s.sums[:, k] for k, name in enumerate(names)}}
+        return _table("sections", columns, {name: "m²" if name.endswith("m2") else "m" for name in columns})
+
+    @property
+    def thickness(self) -> Surface:
+        """Surface less base inside the boundary, a raster on disk as long as this volume is in use."""
+        return Surface(self.spool.folder / THICKNESS)
+
+    @property
+    def plot(self) -> VolumePlots:
+        """Plots, each a matplotlib Figure."""
+        return VolumePlots(self.record, self.boundary, self.summary, self.map, self.profiles)
+
+    def save(self, out: str | os.PathLike, plots: bool = True) -> Path:
+        """Write volume.json, the raster of the thickness, the sections, the plots and the page into a folder.
+
+        Parameters
+        ----------
+        out : folder; an older result there is replaced in one step. plots : draw the plots and the page.
+
+        Returns
+        -------
+        Path of the folder.
+
+        Raises
+        ------
+        InputError
+            When the folder holds other files, or cannot be written to.
+        """
+        target = Path(out)
+        refuse_foreign_folder(target, RECORD)
+        _write(target, self, plots)
+        return target
+
+    def __repr__(self) -> str:
+        sure = "" if self.sigma is None else f" ± {self.sigma:.4g}"
+        return f"<aerotri volume of {self.summary['dtm']!r}: net {self.net:.6g}{sure} m³>"
+
+    def _repr_html_(self) -> str:
+        s = self.summary
+        sure = "" if self.sigma is None else f" ± {self.sigma:.4g} (1 σ)"
+        said = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
+        parts = "" if self.sigma is None else self.parts._repr_html_()
+        return (
+            f"<div><b>{escape(s['dtm'])}: net {self.net:.6g} m³{sure}</b>, cut {self.cut:.6g}, fill {self.fill:.6g} m³ "
+            f"over {escape(s['base']['name'])}, {self.area:.6g} m² inside {escape(s['boundary']['name'])}"
+            f"{f'<ul>{said}</ul>' if said else ''}{parts}</div>"
+        )
+
+
+def _table(name: str, columns: dict[str, Any], units: dict[str, str]) -> Table:
+    import pyarrow as pa
+
+    return Table(name, pa.table(columns), units)
+
+
+def _write(target: Path, found: MeasuredVolume, plots: bool) -> None:
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.public.saving import write_json
+    from aerotri.public.tables import write_rows
+
+    with atomic_folder(target, own=OWN_NAMES) as folder:
+        found.spool.give(THICKNESS, folder / THICKNESS)
+        write_rows(found.sections, folder / "sections.csv")
+        if plots:
+            from aerotri.report.pages.volume import write_volume_page
+            from aerotri.report.plots.rendering import save_plots
+
+            write_volume_page(found.summary, save_plots(found.plot.all(), folder / "plots"), folder / "volume.html")
+        write_json(folder / RECORD, found.summary)
