@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.conventions import InputError
 from aerotri.formats.block.folder import read_block
 from aerotri.formats.results.solution import SavedSolution, read_solution
 from aerotri.observations import Block
 from aerotri.pipeline import AdjustmentFailedError, reopen
-from aerotri.results.adjusted_block import RAY_STATUS
 from aerotri.results.adjustment import Adjustment
 
 REMEDY = "give the folder that `aerotri adjust` wrote, or adjust the block again"
@@ -50,7 +50,7 @@ def open_result(folder: str | os.PathLike) -> Adjustment:
 def _check_rays(block: Block, saved: SavedSolution, path: Path) -> None:
     """Every ray that was used has a photograph and a point that were adjusted; what is held was measured."""
     rays = block.image_points
-    used = saved.ray_status == RAY_STATUS.index("used")
+    used = saved.ray_status == RayStatus.USED
     for good, what in (
         (bool(used.any()), "no ray is used"),
         (bool(np.isfinite(saved.centre[rays.image[used]]).all()), "a ray is used, its photograph is not adjusted"),

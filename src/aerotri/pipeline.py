@@ -13,10 +13,11 @@ import numpy as np
 from aerotri.adjustment.datum import FREEDOMS, nothing_holds, restore_datum
 from aerotri.adjustment.defects import checked_factor, point_without_rays_enough
 from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.prepare import NoStartValuesError, build_system, prepare
+from aerotri.adjustment.prepare import NoStartValuesError, prepare
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import StartValues
 from aerotri.adjustment.weak_geometry import minimise_tied
 from aerotri.conventions import InputError
@@ -195,7 +196,7 @@ def compare_parameters(
     if block.crs != "local":
         block = transform_block(block, frame_of_block(block, geoid))
     prepared = prepare(block)
-    if nothing_holds(prepared.system):
+    if nothing_holds(prepared.system.unknowns, prepared.system.extras):
         raise failure(prepared.system, "rank deficient", f"the datum is free in {', '.join(FREEDOMS)}")
     return compare_sets(prepared, choices, folds, SolveOptions(settings.max_iterations, robust, report), progress)
 
@@ -283,7 +284,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     _refuse_other_parameters(system, saved)
     state = replace(state, shared=saved.shared)
     estimator = Estimator(saved.estimator_code, saved.estimator_limit)
-    system.refresh_motions(state)
+    system = system.with_motions_at(state)
     equations = system.assemble(state, 0.0, estimator)
     solution = Solution(saved.status, state, equations, estimator, saved.iterations)
     factor = _factor(system, solution)
@@ -314,7 +315,7 @@ def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray 
     prepared = prepare(block, given_points)
     system, state = prepared.system, prepared.state
     started = time.perf_counter()
-    if nothing_holds(system):
+    if nothing_holds(system.unknowns, system.extras):
         free = f"the datum is free in {', '.join(FREEDOMS)}"
         raise failure(system, "rank deficient", defects_in_words(system, [free]))
     settings = block.settings.adjustment
@@ -337,10 +338,10 @@ def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray 
         prepared, solution, removals = selected.prepared, selected.solution, selected.removals
         system, state = prepared.system, prepared.state
     block = with_findings_of(block, system.unknowns.block)
-    if settings.datum in ("minimal", "inner"):
-        system.refresh_motions(solution.state)
-        moved = restore_datum(system.unknowns, solution.state, state.points)
-        system.refresh_motions(moved)
+    if settings.is_free:
+        free = system.with_motions_at(solution.state).unknowns
+        moved = restore_datum(free, solution.state, state.points)
+        system = system.with_motions_at(moved)
         solution = replace(solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator))
     factor = _factor(system, solution)
     solved = time.perf_counter()

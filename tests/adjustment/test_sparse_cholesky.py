@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aerotri.adjustment.sparse_cholesky import BorderedMatrix, NotPositiveDefiniteError, Symbolic
+from aerotri.adjustment.sparse_cholesky import BorderedMatrix, NotPositiveDefiniteError, StaleFactorError, Symbolic
 
 
 def random_bordered(n, n_border, seed, ties=2.6):
@@ -103,3 +103,18 @@ def test_memory_is_predicted_and_refused(monkeypatch):
     monkeypatch.setattr(parallel, "available_bytes", lambda: symbolic.bytes_needed - 1)
     with pytest.raises(InputError, match="the normal equations of 60 photographs need"):
         random_bordered(60, 3, seed=1)
+
+
+def test_a_factor_refuses_to_answer_for_another_matrix():
+    """Factors share the memory of their `Symbolic`: after the next factorisation the older one would answer wrongly."""
+    n = 2
+    symbolic = Symbolic(n, np.arange(n), np.arange(n), np.array([[0.0, 0.0], [1.0, 0.0]]), 0)
+    blocks = np.tile(np.eye(6), (n, 1, 1))
+    nothing = np.zeros((n, 0, 6)), np.zeros((0, 0))
+    older = symbolic.factorise(BorderedMatrix(2.0 * blocks, *nothing))
+    assert np.allclose(older.solve(np.ones(6 * n)), 0.5)
+    newer = symbolic.factorise(BorderedMatrix(4.0 * blocks, *nothing))
+    for ask in (lambda: older.solve(np.ones(6 * n)), older.inverse_on_pattern, older.border_inverse):
+        with pytest.raises(StaleFactorError, match="factorise anew"):
+            ask()
+    assert np.allclose(newer.solve(np.ones(6 * n)), 0.25)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from aerotri.adjustment.prepare import prepare
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.adjustment.robust import LEAST_SQUARES
 from aerotri.formats.results.adjustment import image_columns, point_columns
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import ImagePoints
 from aerotri.pipeline import adjust
-from aerotri.results.adjusted_block import RAY_STATUS
 from small_blocks import small_block, with_adjustment
 
 
@@ -48,7 +48,7 @@ def test_photograph_with_few_rays(count, robust):
     assert columns["status"][4] == "set aside"
     assert columns["reason"][4] == "too weakly tied to the others"
     assert (np.delete(columns["status"], 4) == "used").all()
-    assert (result.rays.status[weak.image_points.image == 4] == RAY_STATUS.index("weak photograph")).all()
+    assert (result.rays.status[weak.image_points.image == 4] == RayStatus.WEAK_PHOTOGRAPH).all()
     others = np.arange(len(block.images)) != 4
     np.testing.assert_allclose(result.images.centre[others], without.images.centre[others], atol=1e-5)
     assert result.outcome.redundancy == without.outcome.redundancy

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials, additional_rows
 from aerotri.deformation.model_geometry import normal_model
 from aerotri.deformation.model_grid import mean_ground, pair_of
@@ -14,7 +15,6 @@ from aerotri.deformation.restitution import restitution
 from aerotri.deformation.stereo_model import covariance_of, deform_points, intersect, measured
 from aerotri.functional_model.rotation import logarithm
 from aerotri.pipeline import adjust_keeping_system
-from aerotri.results.adjusted_block import RAY_STATUS
 from small_blocks import small_block, with_adjustment
 
 DRAWS = {"free": 200, "absorbed": 30}
@@ -38,7 +38,7 @@ def with_values(calibration, value):
 def noise_free(calibration):
     """The block as its own adjustment has it: every observation l + v; taken off without additional parameters."""
     adjusted = calibration.local
-    block, used = adjusted.block, adjusted.rays.status == RAY_STATUS.index("used")
+    block, used = adjusted.block, adjusted.rays.status == RayStatus.USED
     xy = block.image_points.xy + np.where(used[:, None], adjusted.rays.v, 0.0)
     control = np.where(np.isfinite(block.control.xyz), adjusted.points.xyz[block.control.point], np.nan)
     images = replace(block.images, centre=adjusted.images.centre, angles=adjusted.images.angles)

@@ -1,4 +1,4 @@
-"""Paper 003 in short: its UltraCamD and DMC over small blocks; at full size in tools/reproduce/reproduce_paper_003.py."""
+"""Paper 003 in short: its UltraCamD and DMC over small blocks; whole in tools/reproduce/reproduce_paper_003.py."""
 
 from __future__ import annotations
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom, poisson
 
-from aerotri.adjustment.prepare import REMOVED, prepare
+from aerotri.adjustment.prepare import prepare
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.adjustment.solve import SolveOptions, minimise
 from aerotri.formats.block.folder import read_block, write_block
 from aerotri.formats.results.solution import read_solution, write_solution
@@ -42,7 +43,7 @@ def snooped(block):
 
 
 def removed(result):
-    return result.rays.status == REMOVED
+    return result.rays.status == RayStatus.REMOVED
 
 
 def orientation(result):

@@ -46,9 +46,10 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import binom
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.observations import Block
 from aerotri.pipeline import adjust
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.simulation import Truth, parse_spec, read_spec, simulate
 from aerotri.simulation.spec import SimulationSpec
 from aerotri.statistics.reliability import critical_value, noncentrality, ray_reliability
@@ -95,7 +96,7 @@ def with_method(block: Block, method: str) -> Block:
 
 def flagged(result: AdjustedBlock) -> np.ndarray:
     """(m,) rays taken for gross errors."""
-    return (result.rays.status == RAY_STATUS.index("removed")) | (np.nan_to_num(result.rays.weight, nan=1.0) < 0.5)
+    return (result.rays.status == RayStatus.REMOVED) | (np.nan_to_num(result.rays.weight, nan=1.0) < 0.5)
 
 
 def single_blunders(seeds: Iterable[int]) -> list[str]:

@@ -1,6 +1,6 @@
 """Kernels of the covariance: points and rays from the inverse on the pattern of the reduced normal matrix.
 
-Arguments as in `_kernels`; inverse : blocks (nb, 6, 6), border (n, s, 6), corner (s, s) of the inverse on the pattern.
+Their arguments are described in `kernel_records`.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.adjustment._point_kernels import E, linearise_point, reduce_point
+from aerotri.adjustment.kernel_records import Coupling
 from aerotri.compiled import kernel
 
 
@@ -22,48 +23,43 @@ def solve_lower_transposed(lower, rhs):
 
 
 @kernel
-def point_cofactors(
-    first, last, rays, pattern, table, state, estimator, limit, inverse, cofactor, redundancy, residual, weight, work
-):
+def point_cofactors(first, last, problem, inverse, cofactor, redundancy, work):
     """Cofactors (P, 3, 3) of points first..last and redundancy numbers (m, 2) of their rays."""
-    start, image = rays[0], rays[1]
-    h, h_shared = coupling_scratch(work)
+    start, image = problem.rays.start, problem.rays.image
+    coupling = coupling_scratch(work)
     lower, misclosure = np.zeros((3, 3)), np.zeros(3)
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        _, n_union = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
-        reduce_point(p, n_rays, n_union, table, state[2], 0.0, work, lower, misclosure)
-        couple_point(p, rays, pattern, inverse, n_union, lower, work, h, h_shared, cofactor[p])
+        _, n_union = linearise_point(p, problem, work)
+        reduce_point(p, n_rays, n_union, problem, work, lower, misclosure)
+        couple_point(p, problem, inverse, n_union, lower, work, coupling)
+        for a in range(3):
+            for b in range(3):
+                cofactor[p, a, b] = coupling.q_pp[a, b]
         for q in range(n_rays):
             for row in range(2):
-                explained = row_cofactor(q, row, row, image[start[p] + q], inverse, work, h, h_shared, cofactor[p])
+                explained = row_cofactor(q, row, row, image[start[p] + q], inverse, work, coupling)
                 redundancy[start[p] + q, row] = 1.0 - explained
 
 
 @kernel
 def coupling_scratch(work):
-    """H over the photographs (rays, 6, 3) and shared parameters (s, 3) of a point, to be filled by `couple_point`."""
-    return np.empty((work[0].shape[0], E, 3)), np.empty((len(work[6]), 3))
+    """Room for what `couple_point` fills in."""
+    return Coupling(np.empty((work.by_eo.shape[0], E, 3)), np.empty((len(work.union), 3)), np.empty((3, 3)))
 
 
 @kernel
-def couple_point(p, rays, pattern, inverse, n_union, lower, work, h, h_shared, q_pp):
+def couple_point(p, problem, inverse, n_union, lower, work, coupling):
     """G in place of L⁻¹·N_pr in `work`, H and Q_pp of point p.
 
     With the point eliminated, x_p = N⁻¹(b − N_pr·x_r), G = N⁻¹·N_pr and H = Q_rr·Gᵀ: Q_pp = N⁻¹ + G·H, Q_rp = −H.
     """
-    start, image = rays[0], rays[1]
-    pair_start, pair_block = pattern
-    blocks, border, corner = inverse
-    n_rays = start[p + 1] - start[p]
-    union, couple, couple_shared = work[6], work[8], work[9]
+    couple, couple_shared, h, h_shared = work.couple, work.couple_shared, coupling.h, coupling.h_shared
+    n_rays = problem.rays.start[p + 1] - problem.rays.start[p]
     for q in range(n_rays):
         solve_lower_transposed(lower, couple[q])
     solve_lower_transposed(lower, couple_shared[:, :n_union])
-    _coupled_cofactors(
-        start[p], n_rays, n_union, image, pair_start[p], pair_block, blocks, border, corner, couple, couple_shared,
-        union, h, h_shared,
-    )  # fmt: skip
+    _coupled_cofactors(p, n_union, problem, inverse, work, coupling)
     own = np.eye(3)
     _solve_lower(lower, own)
     solve_lower_transposed(lower, own)
@@ -75,17 +71,19 @@ def couple_point(p, rays, pattern, inverse, n_union, lower, work, h, h_shared, q
                     value += couple[q, a, t] * h[q, t, b]
             for t in range(n_union):
                 value += couple_shared[a, t] * h_shared[t, b]
-            q_pp[a, b] = value
+            coupling.q_pp[a, b] = value
 
 
 @kernel
-def row_cofactor(q, row, other, i, inverse, work, h, h_shared, q_pp):
+def row_cofactor(q, row, other, i, inverse, work, coupling):
     """Cofactor between the predictions of the coordinates `row` and `other` of ray q in photograph i.
 
     Rows (a_r, a_p) and (b_r, b_p) have a_r·Q_rr·b_rᵀ − a_r·H·b_pᵀ − a_p·Hᵀ·b_rᵀ + a_p·Q_pp·b_pᵀ.
     """
-    blocks, border, corner = inverse
-    by_eo, by_pt, by_sh, _, columns, n_columns, union, _, _, _, _, _ = work
+    blocks, border, corner = inverse.blocks, inverse.border, inverse.corner
+    by_eo, by_pt, by_sh = work.by_eo, work.by_pt, work.by_sh
+    columns, n_columns, union = work.columns, work.n_columns, work.union
+    h, h_shared, q_pp = coupling.h, coupling.h_shared, coupling.q_pp
     a_p, b_p = by_pt[q, row], by_pt[q, other]
     explained = 0.0
     for a in range(E):
@@ -125,10 +123,12 @@ def _solve_lower(lower, rhs):
 
 
 @kernel
-def _coupled_cofactors(
-    first_ray, n_rays, n_union, image, pair, pair_block, blocks, border, corner, g, g_shared, union, h, h_shared
-):
-    """H = Q_rr·Gᵀ over the photographs (n_rays, 6, 3) and the shared parameters (n_union, 3) of one point."""
+def _coupled_cofactors(p, n_union, problem, inverse, work, coupling):
+    """H = Q_rr·Gᵀ over the photographs and the shared parameters of point p; G lies in the couplings of `work`."""
+    start, image, pair_block = problem.rays.start, problem.rays.image, problem.pairs.block
+    blocks, border, corner = inverse.blocks, inverse.border, inverse.corner
+    union, g, g_shared, h, h_shared = work.union, work.couple, work.couple_shared, coupling.h, coupling.h_shared
+    first_ray, n_rays, pair = start[p], start[p + 1] - start[p], problem.pairs.start[p]
     for t in range(n_union):
         for b in range(3):
             value = 0.0
@@ -166,20 +166,18 @@ def _coupled_cofactors(
 
 
 @kernel
-def reduce_point_sides(
-    first, last, rays, table, state, estimator, limit, sides, right, right_shared, residual, weight, work
-):
+def reduce_point_sides(first, last, problem, sides, right, right_shared, work):
     """Right sides of the reduced system for right sides of the points: right −= N_rp·N_pp⁻¹·side.
 
     sides : (P, 3, k); right : (n, 6, k); right_shared : (s, k).
     """
-    start, image = rays[0], rays[1]
-    union, couple, couple_shared = work[6], work[8], work[9]
+    start, image = problem.rays.start, problem.rays.image
+    union, couple, couple_shared = work.union, work.couple, work.couple_shared
     lower, misclosure = np.zeros((3, 3)), np.zeros(3)
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        _, n_union = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
-        reduce_point(p, n_rays, n_union, table, state[2], 0.0, work, lower, misclosure)
+        _, n_union = linearise_point(p, problem, work)
+        reduce_point(p, n_rays, n_union, problem, work, lower, misclosure)
         side = sides[p].copy()
         _solve_lower(lower, side)
         for k in range(side.shape[1]):
@@ -194,17 +192,15 @@ def reduce_point_sides(
 
 
 @kernel
-def expand_point_sides(
-    first, last, rays, table, state, estimator, limit, sides, x, x_shared, x_points, residual, weight, work
-):
-    """Solution of the points for right sides of the points: x_p = N_pp⁻¹(side − N_pr·x_r), (P, 3, k)."""
-    start, image = rays[0], rays[1]
-    union, couple, couple_shared = work[6], work[8], work[9]
+def expand_point_sides(first, last, problem, sides, x, work):
+    """Solution of the points, out, for right sides of the points (P, 3, k): x_p = N_pp⁻¹(side − N_pr·x_r)."""
+    start, image = problem.rays.start, problem.rays.image
+    union, couple, couple_shared = work.union, work.couple, work.couple_shared
     lower, misclosure = np.zeros((3, 3)), np.zeros(3)
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        _, n_union = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
-        reduce_point(p, n_rays, n_union, table, state[2], 0.0, work, lower, misclosure)
+        _, n_union = linearise_point(p, problem, work)
+        reduce_point(p, n_rays, n_union, problem, work, lower, misclosure)
         side = sides[p].copy()
         _solve_lower(lower, side)
         for k in range(side.shape[1]):
@@ -212,11 +208,11 @@ def expand_point_sides(
                 for q in range(n_rays):
                     i = image[start[p] + q]
                     for t in range(E):
-                        side[a, k] -= couple[q, a, t] * x[i, t, k]
+                        side[a, k] -= couple[q, a, t] * x.images[i, t, k]
                 for t in range(n_union):
-                    side[a, k] -= couple_shared[a, t] * x_shared[union[t], k]
+                    side[a, k] -= couple_shared[a, t] * x.shared[union[t], k]
         solve_lower_transposed(lower, side)
         # by elements: assigning a slice costs seconds of compilation
         for a in range(3):
             for k in range(side.shape[1]):
-                x_points[p, a, k] = side[a, k]
+                x.points[p, a, k] = side[a, k]

@@ -15,12 +15,14 @@ B = 6
 
 
 @kernel
-def scatter_blocks(block, local_row, local_col, flipped, blocks, block_row, block_col, scale, own, rows, top, low):
+def scatter_blocks(places, matrix, front):
     """Scaled matrix blocks into a front, the photograph eliminated later giving the row.
 
     `flipped` says that the stored block has the earlier photograph as its row, so that it goes in transposed.
-    own, rows : scalar sizes of the front.
     """
+    block, local_row, local_col, flipped = places.block, places.local_row, places.local_col, places.flipped
+    blocks, block_row, block_col, scale = matrix.blocks, matrix.row, matrix.col, matrix.scale
+    own, rows, top, low = front.own, front.rows, front.top, front.low
     for k in range(len(block)):
         b = block[k]
         i, j = block_row[b], block_col[b]
@@ -50,12 +52,12 @@ def scatter_border(images, border, scale, border_scale, rows, low):
 
 
 @kernel
-def extend_add(update, place, n_own, n_border, n_rows, top, low, rest):
+def extend_add(update, place, n_own, n_border, front, rest):
     """A child's update matrix added to its parent's front.
 
-    place : the parent's positions of the child's row photographs. n_own, n_rows : photographs of the parent.
+    place : the parent's positions of the child's row photographs. n_own : photographs of the parent's own.
     """
-    own, rows = B * n_own, B * n_rows + n_border
+    own, rows, top, low = front.own, front.rows, front.top, front.low
     child = B * len(place) + n_border
     for bj in range(len(place)):
         pj = place[bj]
@@ -126,8 +128,11 @@ def extract_lower(top, low, rest, n_own, place, n_border, out):
 
 
 @kernel
-def gather_blocks(block, local_row, local_col, flipped, top, low, own, rows, block_row, block_col, scale, blocks):
+def gather_blocks(places, front, matrix):
     """The inverse's blocks out of a front, scaled back; the reverse of `scatter_blocks`."""
+    block, local_row, local_col, flipped = places.block, places.local_row, places.local_col, places.flipped
+    blocks, block_row, block_col, scale = matrix.blocks, matrix.row, matrix.col, matrix.scale
+    own, rows, top, low = front.own, front.rows, front.top, front.low
     for k in range(len(block)):
         b = block[k]
         i, j = block_row[b], block_col[b]

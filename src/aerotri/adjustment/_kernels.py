@@ -1,14 +1,7 @@
 """Kernels over object points: normal equations with the points eliminated, and back substitution.
 
 All take a range of points, so that a fixed number of chunks runs in parallel threads and sums repeat bit for bit.
-Rays lie in point order and, within a point, by photograph. `rays`, `pattern`, `table` and `state` are tuples:
-
-rays    : start (P+1), image (m), lens_row (m), xy (m, 2), inv_sigma (m, 2), ap_index (m, ka), ap_value (m, 2, ka)
-pattern : pair_start (P+1), pair_block (·) block of every pair of rays of a point, first ray's photograph < second's
-table   : lens_columns (L, 15) shared parameter or −1, eo_free (n, 6) 1 or 0, turn (n, 3, 3) basis of small rotations,
-          prior_xyz, prior_weight, point_free (P, 3), kept (P) first shared parameter of a point not eliminated or −1
-state   : rotation (n, 3, 3), centre (n, 3), points (P, 3), interior (L, 15), shared (s)
-work    : scratch of one thread, see `_point_kernels.scratch`
+Their arguments are described in `kernel_records`.
 """
 
 from __future__ import annotations
@@ -17,7 +10,6 @@ import numpy as np
 
 from aerotri.adjustment._point_kernels import E, linearise_point, point_normals, reduce_point, solve_transposed
 from aerotri.compiled import inlined, kernel
-from aerotri.functional_model._kernels import predict_ray
 
 
 @inlined
@@ -75,30 +67,27 @@ def subtract_border(rows, union, n_union, c, couple_shared):
 
 
 @kernel
-def assemble(
-    first, last, rays, pattern, table, state, damping, estimator, limit, offsets, sums, residual, weight, work
-):
+def assemble(first, last, problem, offsets, sums, work):
     """Reduced normal equations of points first..last, added to `sums`.
 
-    sums : diagonal (ni, 6, 6), pairs (no, 6, 6), border (ni, s, 6), corner (s, s), right (ni, 6), right_shared (s),
-        squares (ni, 6) and squares_shared (s) of the columns before the points are eliminated, of the photographs and
-        pairs this range of points touches; `offsets` are the numbers of the first of each. Of the corner each element
-        is added on one side of the diagonal, whichever.
+    offsets : the numbers of the first photograph and of the first pair in `sums`.
 
     Returns the cost, the part of the Newton decrement that belongs to the points, and the number of a point that its
     rays do not determine (−1 when all are).
     """
-    start, image = rays[0], rays[1]
-    pair_start, pair_block = pattern
-    diagonal, pairs, border, corner, right, right_shared, squares, squares_shared = sums
+    start, image = problem.rays.start, problem.rays.image
+    pair_start, pair_block = problem.pairs.start, problem.pairs.block
+    diagonal, pairs, border, corner = sums.diagonal, sums.pairs, sums.border, sums.corner
+    right, right_shared, squares, squares_shared = sums.right, sums.right_shared, sums.squares, sums.squares_shared
     first_image, first_pair = offsets
-    by_eo, _, by_sh, whitened, columns, n_columns, union, _, couple, couple_shared, _, _ = work
+    by_eo, by_sh, whitened, columns, n_columns = work.by_eo, work.by_sh, work.whitened, work.columns, work.n_columns
+    union, couple, couple_shared = work.union, work.couple, work.couple_shared
     lower, misclosure = np.zeros((3, 3)), np.zeros(3)
     cost, decrement, undetermined = 0.0, 0.0, -1
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        ray_cost, n_union = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
-        prior_cost, ok = reduce_point(p, n_rays, n_union, table, state[2], damping, work, lower, misclosure)
+        ray_cost, n_union = linearise_point(p, problem, work)
+        prior_cost, ok = reduce_point(p, n_rays, n_union, problem, work, lower, misclosure)
         if not ok:
             undetermined = p
         cost += ray_cost + prior_cost
@@ -135,21 +124,20 @@ def assemble(
 
 
 @kernel
-def reduce_right_side(
-    first, last, rays, table, state, damping, estimator, limit, first_image, right, right_shared, residual, weight, work
-):
+def reduce_right_side(first, last, problem, first_image, right, right_shared, work):
     """The right side alone of `assemble`: what is left of every misclosure when the point has taken its own step.
 
     right (ni, 6), right_shared (s) are added to. Returns as `assemble` does.
     """
-    start, image = rays[0], rays[1]
-    by_eo, by_pt, by_sh, whitened, columns, n_columns, union = work[:7]
+    start, image = problem.rays.start, problem.rays.image
+    by_eo, by_pt, by_sh, whitened = work.by_eo, work.by_pt, work.by_sh, work.whitened
+    columns, n_columns, union = work.columns, work.n_columns, work.union
     lower, d = np.zeros((3, 3)), np.zeros(3)
     cost, decrement, undetermined = 0.0, 0.0, -1
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        ray_cost, _ = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
-        prior_cost, ok = point_normals(p, n_rays, table, state[2], damping, work, lower, d)
+        ray_cost, _ = linearise_point(p, problem, work)
+        prior_cost, ok = point_normals(p, n_rays, problem, problem.damping, work, lower, d)
         if not ok:
             undetermined = p
         cost += ray_cost + prior_cost
@@ -168,56 +156,56 @@ def reduce_right_side(
 
 
 @kernel
-def back_substitute(
-    first, last, rays, table, state, damping, estimator, limit, step, step_shared, step_points, residual, weight, work
-):
-    """Steps of the points first..last (P, 3) from those of the photographs (n, 6) and shared parameters (s).
+def back_substitute(first, last, problem, step, work):
+    """Steps of the points first..last (P, 3), out, from those of the photographs (n, 6) and shared parameters (s,).
 
     Each ray's misclosure is shortened by what the photograph and the shared parameters explain; what is left belongs to
     the point.
     """
-    start, image = rays[0], rays[1]
-    by_eo, by_sh, whitened, columns, n_columns, union = work[0], work[2], work[3], work[4], work[5], work[6]
+    start, image = problem.rays.start, problem.rays.image
+    by_eo, by_sh, whitened = work.by_eo, work.by_sh, work.whitened
+    columns, n_columns, union = work.columns, work.n_columns, work.union
     lower, d = np.zeros((3, 3)), np.zeros(3)
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
+        linearise_point(p, problem, work)
         for q in range(n_rays):
             i = image[start[p] + q]
             for row in range(2):
                 explained = 0.0
                 for t in range(E):
-                    explained += by_eo[q, row, t] * step[i, t]
+                    explained += by_eo[q, row, t] * step.images[i, t]
                 for t in range(n_columns[q]):
-                    explained += by_sh[q, row, t] * step_shared[union[columns[q, t]]]
+                    explained += by_sh[q, row, t] * step.shared[union[columns[q, t]]]
                 whitened[q, row] -= explained
-        point_normals(p, n_rays, table, state[2], damping, work, lower, d)
+        point_normals(p, n_rays, problem, problem.damping, work, lower, d)
         solve_transposed(lower, d)
         for a in range(3):
-            step_points[p, a] = d[a]
+            step.points[p, a] = d[a]
 
 
 @kernel
-def settle_points(first, last, rays, table, state, estimator, limit, rounds, residual, weight, work):
+def settle_points(first, last, problem, rounds, work):
     """Move the points first..last, in place, to where their rays want them while the photographs stand still.
 
     Each point goes its own damped way and only downhill.
     """
-    start, points, prior_xyz, prior_weight = rays[0], state[2], table[3], table[4]
+    start, points = problem.rays.start, problem.values.points
+    prior_xyz, prior_weight = problem.table.prior_xyz, problem.table.prior_weight
     lower, d, old = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        before, _ = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
+        before, _ = linearise_point(p, problem, work)
         for a in range(3):
             before += prior_weight[p, a] * (prior_xyz[p, a] - points[p, a]) ** 2
         damping = 1e-4
         for _ in range(rounds):
-            point_normals(p, n_rays, table, points, damping, work, lower, d)
+            point_normals(p, n_rays, problem, damping, work, lower, d)
             solve_transposed(lower, d)
             for a in range(3):
                 old[a] = points[p, a]
                 points[p, a] += d[a]
-            after, _ = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
+            after, _ = linearise_point(p, problem, work)
             for a in range(3):
                 after += prior_weight[p, a] * (prior_xyz[p, a] - points[p, a]) ** 2
             if after < before:
@@ -230,20 +218,4 @@ def settle_points(first, last, rays, table, state, estimator, limit, rounds, res
                 for a in range(3):
                     points[p, a] = old[a]
                 damping *= 30.0
-                linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
-
-
-@kernel
-def residuals(first, last, rays, state, residual):
-    """Measured minus predicted (mm) of the rays of points first..last."""
-    start, image, lens_row, xy, _, ap_index, ap_value = rays
-    rotation, centre, points, interior, shared = state
-    prediction = np.empty(2)
-    for p in range(first, last):
-        for ray in range(start[p], start[p + 1]):
-            i = image[ray]
-            predict_ray(rotation[i], centre[i], points[p], interior[lens_row[ray]], xy[ray, 0], xy[ray, 1], prediction)
-            for t in range(ap_index.shape[1]):
-                prediction[0] += ap_value[ray, 0, t] * shared[ap_index[ray, t]]
-                prediction[1] += ap_value[ray, 1, t] * shared[ap_index[ray, t]]
-            residual[ray, 0], residual[ray, 1] = xy[ray, 0] - prediction[0], xy[ray, 1] - prediction[1]
+                linearise_point(p, problem, work)

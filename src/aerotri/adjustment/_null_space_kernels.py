@@ -1,6 +1,6 @@
 """Kernels that measure directions in the space of all unknowns: their effect on the observations, and their size.
 
-Arguments as in `_kernels`.
+Their arguments are described in `kernel_records`.
 """
 
 from __future__ import annotations
@@ -12,21 +12,21 @@ from aerotri.compiled import kernel
 
 
 @kernel
-def add_products(
-    first, last, rays, table, state, estimator, limit, images, shared, points, effect, size, residual, weight, work
-):
+def add_products(first, last, problem, directions, effect, size, work):
     """Products of k directions over the rays and observed coordinates of points first..last.
 
-    images (n, 6, k), shared (s, k), points (P, 3, k) : the directions. effect (k, k) : VᵀAᵀA·V, size (k, k) : VᵀD·V,
+    directions : images (n, 6, k), shared (s, k), points (P, 3, k). effect (k, k) : VᵀAᵀA·V, size (k, k) : VᵀD·V,
     D the squares of the points' columns; both are added to.
     """
-    start, image = rays[0], rays[1]
-    prior_weight, point_free = table[4], table[5]
-    by_eo, by_pt, by_sh, _, columns, n_columns, union = work[:7]
+    start, image = problem.rays.start, problem.rays.image
+    prior_weight, point_free = problem.table.prior_weight, problem.table.point_free
+    images, shared, points = directions.images, directions.shared, directions.points
+    by_eo, by_pt, by_sh = work.by_eo, work.by_pt, work.by_sh
+    columns, n_columns, union = work.columns, work.n_columns, work.union
     count = points.shape[2]
     value, square = np.zeros(count), np.zeros(3)
     for p in range(first, last):
-        linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
+        linearise_point(p, problem, work)
         for t in range(3):
             square[t] = prior_weight[p, t] * point_free[p, t]
         for q in range(start[p + 1] - start[p]):

@@ -1,6 +1,6 @@
 """Kernels of one object point: partials of its rays, its own normals, and its elimination.
 
-The tuples `rays`, `table`, `state` and `work` are described in `_kernels`.
+`problem` and `work` are described in `kernel_records`.
 """
 
 from __future__ import annotations
@@ -9,8 +9,9 @@ import numpy as np
 
 from aerotri.adjustment._intersection_kernels import smallest_eigenvalue
 from aerotri.adjustment._robust_kernels import robust_factor
+from aerotri.adjustment.kernel_records import Work
 from aerotri.compiled import inlined, kernel
-from aerotri.functional_model._kernels import linearise_ray
+from aerotri.functional_model._kernels import RayPartials, linearise_ray
 
 E = 6
 MIN_PIVOT = 1e-14
@@ -19,7 +20,7 @@ MIN_PIVOT = 1e-14
 @kernel
 def scratch(max_rays, max_columns, n_shared):
     """Arrays one thread needs for a point: whitened partials of its rays, their columns, and the point's own 3 × ·."""
-    return (
+    return Work(
         np.empty((max_rays, 2, E)),
         np.empty((max_rays, 2, 3)),
         np.empty((max_rays, 2, max_columns)),
@@ -36,22 +37,28 @@ def scratch(max_rays, max_columns, n_shared):
 
 
 @kernel
-def linearise_point(p, rays, table, state, estimator, limit, weight, residual, work):
-    """Whitened partials and misclosures of the rays of point p into `work`; its residuals (mm) and weights out.
+def linearise_point(p, problem, work):
+    """Whitened partials and misclosures of the rays of point p into `work`; its residuals and weights out.
 
     Returns the cost of its rays and the number of shared parameters that act on them.
     """
-    start, image, lens_row, xy, inv_sigma, ap_index, ap_value = rays
-    lens_columns, eo_free, turn, _, _, point_free, kept = table
-    rotation, centre, points, interior, shared = state
-    by_eo, by_pt, by_sh, whitened, columns, n_columns, union, place, _, _, by_interior, prediction = work
+    rays, table, values = problem.rays, problem.table, problem.values
+    residual, weight = problem.residual, problem.weight
+    start, image, xy, inv_sigma = rays.start, rays.image, rays.xy, rays.inv_sigma
+    ap_index, ap_value = rays.ap_index, rays.ap_value
+    lens_columns, eo_free, turn, point_free, kept = (
+        table.lens_columns, table.eo_free, table.turn, table.point_free, table.kept,
+    )  # fmt: skip
+    by_eo, by_pt, by_sh, whitened = work.by_eo, work.by_pt, work.by_sh, work.whitened
+    columns, n_columns, union, place = work.columns, work.n_columns, work.union, work.place
+    shared, by_interior, prediction = values.shared, work.by_interior, work.prediction
     cost, n_union = 0.0, 0
     for q in range(start[p + 1] - start[p]):
         ray = start[p] + q
-        i, lens = image[ray], lens_row[ray]
+        i, lens = image[ray], rays.lens_row[ray]
         linearise_ray(
-            rotation[i], centre[i], points[p], interior[lens], xy[ray, 0], xy[ray, 1], prediction, by_eo[q], by_pt[q],
-            by_interior,
+            values.rotation[i], values.centre[i], values.points[p], values.interior[lens], xy[ray, 0], xy[ray, 1],
+            RayPartials(prediction, by_eo[q], by_pt[q], by_interior),
         )  # fmt: skip
         n = 0
         for t in range(15):
@@ -74,7 +81,7 @@ def linearise_point(p, rays, table, state, estimator, limit, weight, residual, w
         n_columns[q] = n
         residual[ray, 0], residual[ray, 1] = xy[ray, 0] - prediction[0], xy[ray, 1] - prediction[1]
         ex, ey = residual[ray, 0] * inv_sigma[ray, 0], residual[ray, 1] * inv_sigma[ray, 1]
-        factor, ray_cost = robust_factor(np.sqrt(ex * ex + ey * ey), estimator, limit)
+        factor, ray_cost = robust_factor(np.sqrt(ex * ex + ey * ey), problem.estimator, problem.limit)
         weight[ray] = factor
         cost += ray_cost
         for row in range(2):
@@ -102,13 +109,13 @@ def linearise_point(p, rays, table, state, estimator, limit, weight, residual, w
 
 
 @kernel
-def point_normals(p, n_rays, table, points, damping, work, lower, misclosure):
+def point_normals(p, n_rays, problem, damping, work, lower, misclosure):
     """Cholesky factor L of the 3 × 3 normals of point p into `lower`, L⁻¹·(right side) into `misclosure`.
 
     Returns the cost of the coordinates observed, and False where the rays do not determine the point.
     """
-    _, _, _, prior_xyz, prior_weight, point_free, _ = table
-    by_pt, whitened = work[1], work[3]
+    table, points, by_pt, whitened = problem.table, problem.values.points, work.by_pt, work.whitened
+    prior_xyz, prior_weight, point_free = table.prior_xyz, table.prior_weight, table.point_free
     cost = 0.0
     n00, n10, n11, n20, n21, n22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     y0, y1, y2 = 0.0, 0.0, 0.0
@@ -166,10 +173,11 @@ def solve_transposed(lower, d):
 
 
 @kernel
-def reduce_point(p, n_rays, n_union, table, points, damping, work, lower, misclosure):
+def reduce_point(p, n_rays, n_union, problem, work, lower, misclosure):
     """Eliminate point p: `point_normals`, and the couplings L⁻¹·N_pe and L⁻¹·N_ps into `work`."""
-    by_eo, by_pt, by_sh, _, columns, n_columns, _, _, couple, couple_shared, _, _ = work
-    cost, ok = point_normals(p, n_rays, table, points, damping, work, lower, misclosure)
+    by_eo, by_pt, by_sh, columns, n_columns = work.by_eo, work.by_pt, work.by_sh, work.columns, work.n_columns
+    couple, couple_shared = work.couple, work.couple_shared
+    cost, ok = point_normals(p, n_rays, problem, problem.damping, work, lower, misclosure)
     for t in range(n_union):
         for a in range(3):
             couple_shared[a, t] = 0.0
@@ -196,17 +204,17 @@ def reduce_point(p, n_rays, n_union, table, points, damping, work, lower, misclo
 
 
 @kernel
-def looseness(first, last, rays, table, state, estimator, limit, residual, weight, work, loose):
+def looseness(first, last, problem, work, loose):
     """σ of the points first..last in their worst direction over the distance to their nearest photograph.
 
     Of the point's own weighted 3 × 3 normals, the photographs held; a held or kept point has 0. loose : (P,) out.
     """
-    start, image = rays[0], rays[1]
-    _, _, _, _, prior_weight, point_free, _ = table
-    centre, points = state[1], state[2]
-    by_pt, normal = work[1], np.empty((3, 3))
+    start, image = problem.rays.start, problem.rays.image
+    prior_weight, point_free = problem.table.prior_weight, problem.table.point_free
+    centre, points = problem.values.centre, problem.values.points
+    by_pt, normal = work.by_pt, np.empty((3, 3))
     for p in range(first, last):
-        linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
+        linearise_point(p, problem, work)
         normal[:] = 0.0
         nearest = np.inf
         for q in range(start[p + 1] - start[p]):

@@ -1,6 +1,6 @@
 """Kernels of reliability: tests of rays that are switched off, effects of undetected errors on the unknowns.
 
-Arguments as in `_kernels` and `_covariance_kernels`.
+Their arguments are described in `kernel_records`.
 """
 
 from __future__ import annotations
@@ -9,68 +9,66 @@ import numpy as np
 
 from aerotri.adjustment._covariance_kernels import couple_point, coupling_scratch, row_cofactor
 from aerotri.adjustment._point_kernels import E, linearise_point, reduce_point
-from aerotri.adjustment._robust_kernels import NONE
+from aerotri.adjustment.kernel_records import RowPlace
 from aerotri.compiled import kernel
 
 
 @kernel
-def predicted_cofactors(
-    first, last, rays, full, pattern, table, state, inverse, cofactor, predicted, residual, weight, work
-):
+def predicted_cofactors(first, last, problem, full, inverse, cofactors, work):
     """Cofactors (P, 3, 3) of points first..last and (m, 3) of the predictions of x with x, x with y, y with y.
 
-    rays : as adjusted, 1/σ of rays switched off set to 0; full : the same with the 1/σ that all would have.
+    problem : as adjusted, 1/σ of rays switched off set to 0; full : the same with the 1/σ that all would have.
+    cofactors : the two, out.
     """
-    start, image = rays[0], rays[1]
-    h, h_shared = coupling_scratch(work)
+    start, image = problem.rays.start, problem.rays.image
+    cofactor, predicted = cofactors
+    coupling = coupling_scratch(work)
     lower, misclosure = np.zeros((3, 3)), np.zeros(3)
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        _, n_union = linearise_point(p, rays, table, state, NONE, 0.0, weight, residual, work)
-        reduce_point(p, n_rays, n_union, table, state[2], 0.0, work, lower, misclosure)
-        couple_point(p, rays, pattern, inverse, n_union, lower, work, h, h_shared, cofactor[p])
-        linearise_point(p, full, table, state, NONE, 0.0, weight, residual, work)
+        _, n_union = linearise_point(p, problem, work)
+        reduce_point(p, n_rays, n_union, problem, work, lower, misclosure)
+        couple_point(p, problem, inverse, n_union, lower, work, coupling)
+        for a in range(3):
+            for b in range(3):
+                cofactor[p, a, b] = coupling.q_pp[a, b]
+        linearise_point(p, full, work)
         for q in range(n_rays):
             for k in range(3):
                 predicted[start[p] + q, k] = row_cofactor(
-                    q, k // 2, (k + 1) // 2, image[start[p] + q], inverse, work, h, h_shared, cofactor[p]
+                    q, k // 2, (k + 1) // 2, image[start[p] + q], inverse, work, coupling
                 )
 
 
 @kernel
-def ray_effects(
-    first, last, rays, pattern, table, state, estimator, limit, inverse, datum, scale, size, unknown, height, residual,
-    weight, work,
-):  # fmt: skip
+def ray_effects(first, last, problem, inverse, measures, effects, work):
     """Which unknown an error of each coordinate of the rays of points first..last changes most, and by how much.
 
     An error of one σ changes the unknowns by ∇x = Q·aᵀ, a the whitened row of the coordinate. Looked at are the
     unknowns that the ray itself depends on: its point, its photograph, the shared parameters that act on it.
 
-    datum : motions of photographs (n, 6, d), shared (s, d), points (P, 3, d), and the columns Q·Aᵀ of the same shapes,
-        of a block in an inner datum: ∇x − G·(A·∇x); d = 0 for the others.
-    scale : to_angles (n, 3, 3) from the rotation unknowns to ω, φ, κ; 1/σ of photographs (n, 6), shared (s), points
-        (P, 3), 0 for an unknown that is held.
-    size : (m, 2) out, the largest |∇x|/σ. unknown : (m, 2) out, which: 0–2 of the point, 3–8 of the photograph, from 9
-        on a shared parameter, −1 for none. height : (m, 2) out, ∇Z of the point, m.
+    Of a block in an inner datum ∇x − G·(A·∇x).
+
+    measures : `Datum` and `Scale`. effects : out.
     """
-    start, image = rays[0], rays[1]
-    kept = table[6]
-    to_angles, per_image, per_shared, per_point = scale
-    columns, n_columns, union = work[4], work[5], work[6]
-    h, h_shared = coupling_scratch(work)
-    lower, misclosure, q_pp = np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))
-    change = np.empty(9 + len(work[4][0]))
+    start, image, kept = problem.rays.start, problem.rays.image, problem.table.kept
+    datum, scale = measures
+    to_angles, per_image, per_shared, per_point = scale.to_angles, scale.per_image, scale.per_shared, scale.per_point
+    columns, n_columns, union = work.columns, work.n_columns, work.union
+    size, unknown, height = effects.size, effects.unknown, effects.height
+    coupling = coupling_scratch(work)
+    lower, misclosure = np.zeros((3, 3)), np.zeros(3)
+    change = np.empty(9 + columns.shape[1])
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        _, n_union = linearise_point(p, rays, table, state, estimator, limit, weight, residual, work)
-        reduce_point(p, n_rays, n_union, table, state[2], 0.0, work, lower, misclosure)
-        couple_point(p, rays, pattern, inverse, n_union, lower, work, h, h_shared, q_pp)
+        _, n_union = linearise_point(p, problem, work)
+        reduce_point(p, n_rays, n_union, problem, work, lower, misclosure)
+        couple_point(p, problem, inverse, n_union, lower, work, coupling)
         for q in range(n_rays):
             ray = start[p] + q
             i = image[ray]
             for row in range(2):
-                row_changes(q, row, p, i, inverse, datum, work, h, h_shared, q_pp, change)
+                row_changes(RowPlace(q, row, p, i), inverse, datum, work, coupling, change)
                 w0, w1, w2 = change[6], change[7], change[8]
                 largest, which, up = 0.0, -1, change[2]
                 for t in range(9 + n_columns[q]):
@@ -93,12 +91,15 @@ def ray_effects(
 
 
 @kernel
-def row_changes(q, row, p, i, inverse, datum, work, h, h_shared, q_pp, change):
+def row_changes(place, inverse, datum, work, coupling, change):
     """∇x = Q·aᵀ of one row: the point's three, the photograph's six unknowns, the shared parameters of the ray."""
-    blocks, border, corner = inverse
-    by_eo, by_pt, by_sh, _, columns, n_columns, union, _, _, _, _, _ = work
-    g_images, g_shared, g_points, qa_images, qa_shared, qa_points = datum
-    a_r, a_p, a_s, n = by_eo[q, row], by_pt[q, row], by_sh[q, row], n_columns[q]
+    q, row, p, i = place.q, place.row, place.point, place.image
+    blocks, border, corner = inverse.blocks, inverse.border, inverse.corner
+    columns, union = work.columns, work.union
+    h, h_shared, q_pp = coupling.h, coupling.h_shared, coupling.q_pp
+    g_images, g_shared, g_points = datum.images, datum.shared, datum.points
+    qa_images, qa_shared, qa_points = datum.qa_images, datum.qa_shared, datum.qa_points
+    a_r, a_p, a_s, n = work.by_eo[q, row], work.by_pt[q, row], work.by_sh[q, row], work.n_columns[q]
     for b in range(3):
         value = 0.0
         for a in range(3):

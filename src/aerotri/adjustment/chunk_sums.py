@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerotri.adjustment.kernel_records import Sums
 from aerotri.adjustment.unknowns import Unknowns
 from aerotri.functional_model.observed_unknowns import Rows
 
@@ -19,7 +20,7 @@ class ChunkSums:
         self._pairs = slice(int(pair.min()), int(pair.max()) + 1) if len(pair) else slice(n, n)
         n_images, n_pairs = self._images.stop - self._images.start, self._pairs.stop - self._pairs.start
         self.offsets = (self._images.start, self._pairs.start)
-        self._arrays = (
+        self._sums = Sums(
             np.empty((n_images, 6, 6)),
             np.empty((n_pairs, 6, 6)),
             np.empty((n_images, n_shared, 6)),
@@ -30,35 +31,35 @@ class ChunkSums:
             np.empty(n_shared),
         )
 
-    def cleared(self) -> tuple[np.ndarray, ...]:
+    def cleared(self) -> Sums:
         """The arrays, set to zero."""
-        for array in self._arrays:
+        for array in self._sums:
             array.fill(0.0)
-        return self._arrays
+        return self._sums
 
-    def cleared_right(self) -> tuple[np.ndarray, ...]:
+    def cleared_right(self) -> tuple[np.ndarray, np.ndarray]:
         """The arrays of the right side, set to zero."""
-        for array in self._arrays[4:6]:
+        right = self._sums.right, self._sums.right_shared
+        for array in right:
             array.fill(0.0)
-        return self._arrays[4:6]
+        return right
 
     def add_matrix_to(self, blocks, border, corner) -> None:
         """Add to the matrix of all chunks."""
-        diagonal, pairs, own_border, own_corner = self._arrays[:4]
-        blocks[self._images] += diagonal
-        blocks[self._pairs] += pairs
-        border[self._images] += own_border
-        corner += own_corner
+        blocks[self._images] += self._sums.diagonal
+        blocks[self._pairs] += self._sums.pairs
+        border[self._images] += self._sums.border
+        corner += self._sums.corner
 
     def add_squares_to(self, squares, squares_shared) -> None:
         """Add to the squares of the columns, before points are eliminated, of all chunks."""
-        squares[self._images] += self._arrays[6]
-        squares_shared += self._arrays[7]
+        squares[self._images] += self._sums.squares
+        squares_shared += self._sums.squares_shared
 
     def add_right_to(self, right, right_shared) -> None:
         """Add to the right side of all chunks."""
-        right[self._images] += self._arrays[4]
-        right_shared += self._arrays[5]
+        right[self._images] += self._sums.right
+        right_shared += self._sums.right_shared
 
 
 def add_squares(rows: Rows, blocks: np.ndarray, border: np.ndarray, corner: np.ndarray) -> None:

@@ -9,23 +9,30 @@ values; covariances follow by the S-transformation [L: Baarda 1973; Teunissen 19
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg import qr
 from scipy.spatial import ConvexHull, QhullError
 
 from aerotri.adjustment.unknowns import FreeMotions, State, Step, Unknowns
+from aerotri.functional_model.observed_unknowns import CentreObservations, Rows
 from aerotri.functional_model.rotation import cross_matrix, exponential
-
-if TYPE_CHECKING:
-    from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
 
 FREEDOMS = ("X", "Y", "Z", "ω", "φ", "κ", "scale")
 FOLLOWING = ("gnss", "ins", "constraint")
 """Kinds of shared parameters that may move with the whole block."""
 NOTICED = 1e-7
 """Share of the largest effect below which an observation does not notice a motion."""
+
+
+class ExtraObservations(Protocol):
+    """Observations beside the image points: they linearise themselves."""
+
+    @property
+    def count(self) -> int: ...
+
+    def rows(self, centre: np.ndarray, rotation: np.ndarray, shared: np.ndarray) -> Rows: ...
 
 
 def spread_points(points: np.ndarray, rays: np.ndarray) -> tuple[int, int, int]:
@@ -180,11 +187,15 @@ def restore_datum(unknowns: Unknowns, state: State, reference: np.ndarray) -> St
     return state
 
 
-def nothing_holds(system: NormalSystem) -> bool:
+def observes_centres(extras: Sequence[ExtraObservations]) -> bool:
+    """Whether projection centres were observed."""
+    return any(isinstance(extra, CentreObservations) for extra in extras)
+
+
+def nothing_holds(unknowns: Unknowns, extras: Sequence[ExtraObservations]) -> bool:
     """Whether nothing observed or held ties the block to the object frame."""
-    u = system.unknowns
-    held = not u.eo_free.all() or u.point_held.any()
-    return not held and not system.observes_centres and not (u.prior_weight > 0.0).any()
+    held = not unknowns.eo_free.all() or unknowns.point_held.any()
+    return not held and not observes_centres(extras) and not (unknowns.prior_weight > 0.0).any()
 
 
 def control_share(unknowns: Unknowns, state: State) -> float:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.adjustment.normal_equations import ExtraObservations
+from aerotri.adjustment.datum import ExtraObservations
 from aerotri.adjustment.unknowns import State, Unknowns, keep_points
 from aerotri.conventions import InputError
 from aerotri.functional_model.constraints import NO_BASIS, Constraint, ConstraintObservations, flat_basis

@@ -5,29 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
 from aerotri.adjustment import _covariance_kernels, _kernels, _point_kernels
 from aerotri.adjustment.chunk_sums import ChunkSums, add_gaps, add_own_squares, add_squares
-from aerotri.adjustment.datum import free_motions
+from aerotri.adjustment.datum import ExtraObservations, free_motions, observes_centres
 from aerotri.adjustment.field_prior import FieldPrior, field_prior
+from aerotri.adjustment.kernel_records import Directions, Inverse, Pairs, Problem, Table, Values
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, InverseOnPattern, Symbolic
 from aerotri.adjustment.unknowns import State, Step, Unknowns
-from aerotri.functional_model.observed_unknowns import CentreObservations, Rows
+from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.observations import CollocationSettings
-
-
-class ExtraObservations(Protocol):
-    """Observations beside the image points: they linearise themselves."""
-
-    @property
-    def count(self) -> int: ...
-
-    def rows(self, centre: np.ndarray, rotation: np.ndarray, shared: np.ndarray) -> Rows: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,42 +107,34 @@ class NormalSystem:
         most = int((u.lens.columns >= 0).sum(axis=1).max(initial=0)) + u.rays.ap_index.shape[1] + 3
         return _point_kernels.scratch(self._max_rays, max(most, 1), len(u.shared))
 
-    def _table(self, state: State):
+    def problem(self, state: State, estimator: Estimator, damping: float = 0.0) -> Problem:
+        """What the kernels are given at `state`; its residuals and weights are filled in by them."""
         u = self.unknowns
-        return (
-            u.lens.columns,
-            u.eo_free.astype(float),
-            u.turn(state),
-            u.prior_xyz,
-            self._point_prior,
-            u.point_free.astype(float),
-            u.kept,
-        )
-
-    def _state(self, state: State):
-        return (
-            np.ascontiguousarray(state.rotation),
-            state.centre,
-            state.points,
-            self.unknowns.interior(state),
-            state.shared,
-        )
+        m = len(u.rays.image)
+        return Problem(
+            rays=u.rays.arrays(),
+            pairs=Pairs(u.pair_start, u.pair_block),
+            table=Table(
+                u.lens.columns, u.eo_free.astype(float), u.turn(state), u.prior_xyz, self._point_prior,
+                u.point_free.astype(float), u.kept,
+            ),
+            values=Values(
+                np.ascontiguousarray(state.rotation), state.centre, state.points, u.interior(state), state.shared
+            ),
+            estimator=estimator.code,
+            limit=float(estimator.limit),
+            damping=float(damping),
+            residual=np.empty((m, 2)),
+            weight=np.empty(m),
+        )  # fmt: skip
 
     def assemble(self, state: State, damping: float, estimator: Estimator) -> NormalEquations:
         """Normal equations at `state`; `damping` λ multiplies every diagonal element by 1 + λ."""
-        u = self.unknowns
-        m = len(u.rays.image)
-        residual, weight = np.empty((m, 2)), np.empty(m)
-        rays, table, kernel_state = u.rays.as_tuple(), self._table(state), self._state(state)
-        pattern = (u.pair_start, u.pair_block)
+        u, problem = self.unknowns, self.problem(state, estimator, damping)
 
         def chunk(k: int):
             sums = self._sums[k]
-            first, last = self._bounds[k]
-            return _kernels.assemble(
-                first, last, rays, pattern, table, kernel_state, damping, estimator.code, estimator.limit,
-                sums.offsets, sums.cleared(), residual, weight, self._work(),
-            )  # fmt: skip
+            return _kernels.assemble(*self._bounds[k], problem, sums.offsets, sums.cleared(), self._work())
 
         outcomes = run_chunks(chunk, len(self._bounds))
         n, s = len(u.images), len(u.shared)
@@ -174,29 +157,24 @@ class NormalSystem:
         diagonal = np.arange(6)
         blocks[: len(u.images), diagonal, diagonal] *= 1.0 + damping
         corner[np.diag_indices_from(corner)] *= 1.0 + damping
-        side = self._summed(state, rows, outcomes, residual, weight)
+        side = self._summed(state, rows, outcomes, problem)
         whole = np.concatenate([squares.ravel(), squares_shared]) * (1.0 + damping)
         return NormalEquations(**side.__dict__, matrix=BorderedMatrix(blocks, border, corner), diagonal=whole)
 
     def right_side(self, state: State, estimator: Estimator) -> RightSide:
         """The right side of the undamped equations at `state` and the cost there: a third of the work of `assemble`."""
-        u = self.unknowns
-        m = len(u.rays.image)
-        residual, weight = np.empty((m, 2)), np.empty(m)
-        rays, table, kernel_state = u.rays.as_tuple(), self._table(state), self._state(state)
+        problem = self.problem(state, estimator)
 
         def chunk(k: int):
             sums = self._sums[k]
-            first, last = self._bounds[k]
             return _kernels.reduce_right_side(
-                first, last, rays, table, kernel_state, 0.0, estimator.code, estimator.limit,
-                sums.offsets[0], *sums.cleared_right(), residual, weight, self._work(),
-            )  # fmt: skip
+                *self._bounds[k], problem, sums.offsets[0], *sums.cleared_right(), self._work()
+            )
 
         outcomes = run_chunks(chunk, len(self._bounds))
-        return self._summed(state, self.whitened_rows(state), outcomes, residual, weight)
+        return self._summed(state, self.whitened_rows(state), outcomes, problem)
 
-    def _summed(self, state: State, rows: list[Rows], outcomes: list, residual, weight) -> RightSide:
+    def _summed(self, state: State, rows: list[Rows], outcomes: list, problem: Problem) -> RightSide:
         """Chunks, observations beside the image points and observed shared parameters together."""
         right, right_shared = np.zeros((len(self.unknowns.images), 6)), np.zeros(len(self.unknowns.shared))
         for sums in self._sums:
@@ -214,15 +192,15 @@ class NormalSystem:
             right=np.concatenate([right.ravel(), right_shared]),
             cost=float(cost + np.sum(self._prior_weight * gap**2)),
             point_decrement=float(sum(o[1] for o in outcomes)),
-            residual=residual,
-            weight=weight,
+            residual=problem.residual,
+            weight=problem.weight,
             undetermined=max(o[2] for o in outcomes),
         )
 
     def whitened_rows(self, state: State) -> list[Rows]:
         """The observations beside the image points, linearised at `state` and divided by σ, in the unknowns' axes."""
         out = []
-        turn = self._table(state)[2]
+        turn = self.unknowns.turn(state)
         for extra in self.extras:
             rows = extra.rows(state.centre, state.rotation, state.shared)
             by_image = rows.by_image.copy()
@@ -261,82 +239,61 @@ class NormalSystem:
             total += shared[field.columns].T @ field.weight @ shared[field.columns]
         return total
 
-    def refresh_motions(self, state: State) -> None:
-        """Linearise anew, at `state`, what the observations leave free of a block in a minimal or inner datum."""
-        if self.unknowns.block.settings.adjustment.datum in ("minimal", "inner"):
-            self.unknowns = replace(self.unknowns, motions=free_motions(self.unknowns, self.extras, state))
+    def with_motions_at(self, state: State) -> NormalSystem:
+        """The system with what the observations leave free of a free block linearised at `state`."""
+        if not self.unknowns.block.settings.adjustment.is_free:
+            return self
+        other = copy(self)
+        other.unknowns = replace(self.unknowns, motions=free_motions(self.unknowns, self.extras, state))
+        return other
 
     @property
     def observes_centres(self) -> bool:
         """Whether projection centres were observed."""
-        return any(isinstance(extra, CentreObservations) for extra in self.extras)
+        return observes_centres(self.extras)
 
-    def back_substitute(self, state: State, x: np.ndarray, damping: float, equations: RightSide, estimator):
+    def back_substitute(self, state: State, x: np.ndarray, damping: float, estimator: Estimator) -> Step:
         """The full step from the solution x (6·n + s,) of the reduced equations."""
         u = self.unknowns
         n = 6 * len(u.images)
         images, shared = np.ascontiguousarray(x[:n].reshape(-1, 6)), np.ascontiguousarray(x[n:])
         points = np.empty((len(u.points), 3))
-        rays, table, kernel_state = u.rays.as_tuple(), self._table(state), self._state(state)
-
-        def chunk(k: int):
-            first, last = self._bounds[k]
-            _kernels.back_substitute(
-                first, last, rays, table, kernel_state, damping, estimator.code, estimator.limit, images, shared,
-                points, equations.residual, equations.weight, self._work(),
-            )  # fmt: skip
-
-        run_chunks(chunk, len(self._bounds))
+        problem = self.problem(state, estimator, damping)
+        step = Directions(images, shared, points)
+        run_chunks(
+            lambda k: _kernels.back_substitute(*self._bounds[k], problem, step, self._work()), len(self._bounds)
+        )
         return Step(images, shared, points)
 
     def settle_points(self, state: State, estimator: Estimator, rounds: int = 8) -> State:
         """The state with every point moved, on its own and only downhill, to where its rays want it."""
         settled = replace(state, points=state.points.copy())
-        residual, weight = np.empty((len(self.unknowns.rays.image), 2)), np.empty(len(self.unknowns.rays.image))
-        rays, table, kernel_state = self.unknowns.rays.as_tuple(), self._table(state), self._state(settled)
-
-        def chunk(k: int):
-            first, last = self._bounds[k]
-            _kernels.settle_points(
-                first, last, rays, table, kernel_state, estimator.code, estimator.limit, rounds, residual, weight,
-                self._work(),
-            )  # fmt: skip
-
-        run_chunks(chunk, len(self._bounds))
+        problem = self.problem(settled, estimator)
+        run_chunks(
+            lambda k: _kernels.settle_points(*self._bounds[k], problem, rounds, self._work()), len(self._bounds)
+        )
         return settled
 
     def looseness(self, state: State, estimator: Estimator) -> np.ndarray:
         """(P,) σ of every point in its worst direction over its distance, the photographs held; see the kernel."""
-        loose, m = np.empty(len(self.unknowns.points)), len(self.unknowns.rays.image)
-        residual, weight = np.empty((m, 2)), np.empty(m)
-        rays, table, kernel_state = self.unknowns.rays.as_tuple(), self._table(state), self._state(state)
-
-        def chunk(k: int):
-            _point_kernels.looseness(
-                *self._bounds[k], rays, table, kernel_state, estimator.code, estimator.limit, residual, weight,
-                self._work(), loose,
-            )  # fmt: skip
-
-        run_chunks(chunk, len(self._bounds))
+        loose = np.empty(len(self.unknowns.points))
+        self.over_points(
+            self.problem(state, estimator),
+            lambda first, last, problem, work: _point_kernels.looseness(first, last, problem, work, loose),
+        )
         return loose
 
     def point_cofactors(self, state: State, inverse: InverseOnPattern, estimator: Estimator):
         """Cofactors of the points (P, 3, 3) and redundancy numbers of the rays (m, 2), in the order of `unknowns`."""
         u = self.unknowns
-        m = len(u.rays.image)
-        cofactor, redundancy = np.empty((len(u.points), 3, 3)), np.empty((m, 2))
-        residual, weight = np.empty((m, 2)), np.empty(m)
-        rays, table, kernel_state = u.rays.as_tuple(), self._table(state), self._state(state)
-        parts = (inverse.blocks, inverse.border, inverse.corner)
-
-        def chunk(k: int):
-            first, last = self._bounds[k]
-            _covariance_kernels.point_cofactors(
-                first, last, rays, (u.pair_start, u.pair_block), table, kernel_state, estimator.code, estimator.limit,
-                parts, cofactor, redundancy, residual, weight, self._work(),
-            )  # fmt: skip
-
-        run_chunks(chunk, len(self._bounds))
+        cofactor, redundancy = np.empty((len(u.points), 3, 3)), np.empty((len(u.rays.image), 2))
+        parts = Inverse(inverse.blocks, inverse.border, inverse.corner)
+        self.over_points(
+            self.problem(state, estimator),
+            lambda first, last, problem, work: _covariance_kernels.point_cofactors(
+                first, last, problem, parts, cofactor, redundancy, work
+            ),
+        )
         held = u.point_held
         cofactor[held] = 0.0
         np.swapaxes(cofactor, 1, 2)[held] = 0.0
@@ -344,11 +301,9 @@ class NormalSystem:
             cofactor[row] = inverse.corner[np.ix_(columns, columns)]
         return cofactor, redundancy
 
-    def over_points(self, state: State, kernel: Callable[..., object]) -> None:
-        """kernel(first, last, rays, pattern, table, state, work) over ranges of points, in threads."""
-        u = self.unknowns
-        arguments = u.rays.as_tuple(), (u.pair_start, u.pair_block), self._table(state), self._state(state)
-        run_chunks(lambda k: kernel(*self._bounds[k], *arguments, self._work()), len(self._bounds))
+    def over_points(self, problem: Problem, kernel: Callable[..., object]) -> None:
+        """kernel(first, last, problem, work) over ranges of points, in threads."""
+        run_chunks(lambda k: kernel(*self._bounds[k], problem, self._work()), len(self._bounds))
 
     def without(self, rays_off: np.ndarray, control_off: np.ndarray) -> NormalSystem:
         """The same system with rays (m,) bool and the given coordinates of points (P,) bool switched off.
@@ -389,14 +344,11 @@ class NormalSystem:
         u = self.unknowns
         n, s, k = len(u.images), len(u.shared), sides.shape[2]
         free = np.ascontiguousarray(sides * u.point_free[:, :, None])
-        residual, weight = np.empty((len(u.rays.image), 2)), np.empty(len(u.rays.image))
-        common = (u.rays.as_tuple(), self._table(state), self._state(state), estimator.code, estimator.limit, free)
+        problem = self.problem(state, estimator)
         rights = [(np.zeros((n, 6, k)), np.zeros((s, k))) for _ in self._bounds]
 
         def reduce(c: int):
-            _covariance_kernels.reduce_point_sides(
-                *self._bounds[c], *common, *rights[c], residual, weight, self._work()
-            )
+            _covariance_kernels.reduce_point_sides(*self._bounds[c], problem, free, *rights[c], self._work())
 
         run_chunks(reduce, len(self._bounds))
         right = np.concatenate(
@@ -416,15 +368,13 @@ class NormalSystem:
         u = self.unknowns
         points = np.empty((len(u.points), 3, sides.shape[2]))
         free = np.ascontiguousarray(sides * u.point_free[:, :, None])
-        residual, weight = np.empty((len(u.rays.image), 2)), np.empty(len(u.rays.image))
-        common = (u.rays.as_tuple(), self._table(state), self._state(state), estimator.code, estimator.limit, free)
-
-        def expand(c: int):
-            _covariance_kernels.expand_point_sides(
-                *self._bounds[c], *common, images, shared, points, residual, weight, self._work()
-            )
-
-        run_chunks(expand, len(self._bounds))
+        solution = Directions(images, shared, points)
+        self.over_points(
+            self.problem(state, estimator),
+            lambda first, last, problem, work: _covariance_kernels.expand_point_sides(
+                first, last, problem, free, solution, work
+            ),
+        )
         points *= u.point_free[:, :, None]
         points[u.kept_rows] = shared[u.kept_columns]
         return points

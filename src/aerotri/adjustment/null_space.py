@@ -12,6 +12,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from aerotri.adjustment._null_space_kernels import add_products
+from aerotri.adjustment.kernel_records import Directions
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor
@@ -108,18 +109,14 @@ def products(
     images = np.ascontiguousarray(directions[: 6 * n].reshape(n, 6, k))
     shared = np.ascontiguousarray(directions[6 * n :])
     points = system.expand_sides(state, images, shared, np.zeros((len(u.points), 3, k)), estimator)
-    residual, weight = np.empty((len(u.rays.image), 2)), np.empty(len(u.rays.image))
     sums: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
-    def chunk(first, last, rays, _, table, values, work):
+    def chunk(first, last, problem, work):
         own = np.zeros((k, k)), np.zeros((k, k))
-        add_products(
-            first, last, rays, table, values, estimator.code, estimator.limit, images, shared, points, *own, residual,
-            weight, work,
-        )  # fmt: skip
+        add_products(first, last, problem, Directions(images, shared, points), *own, work)
         sums[first] = own
 
-    system.over_points(state, chunk)
+    system.over_points(system.problem(state, estimator), chunk)
     effect = np.sum([sums[first][0] for first in sorted(sums)], axis=0) + system.products_beside(state, images, shared)
     size = np.sum([sums[first][1] for first in sorted(sums)], axis=0)
     return effect, size + directions.T @ (equations.diagonal[:, None] * directions)

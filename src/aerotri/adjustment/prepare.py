@@ -6,30 +6,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.adjustment.datum import free_motions, minimal_coordinates
-from aerotri.adjustment.extra_observations import extra_observations
-from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.ray_status import ray_status
 from aerotri.adjustment.robust import STAGES
 from aerotri.adjustment.start_values import start_values
+from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import (
     ORIENTATION_ELEMENTS,
     StartValues,
     State,
     Unknowns,
-    build_unknowns,
-    hold_orientation,
-    hold_points,
 )
 from aerotri.conventions import InputError
 from aerotri.functional_model.atmosphere import corrected_image_points
 from aerotri.observations import Block
 from aerotri.observations.names import partnerless_in_words
-
-USED, ONE_RAY, OFF, NO_START, NOT_FINITE, REMOVED, WEAK_POINT, WEAK_PHOTOGRAPH = range(8)
-"""Status of a ray; the words stand in `statistics.adjusted_block.RAY_STATUS`."""
-
-
-WEAK_ENDINGS = (" too weakly tied to the others, set aside", " not fixed in distance by their rays, set aside")
 
 
 class NoStartValuesError(InputError):
@@ -90,23 +81,6 @@ def _freed_of_the_air(block: Block, start: StartValues) -> Block:
     return replace(block, image_points=replace(block.image_points, xy=xy))
 
 
-def build_system(
-    block: Block, start: StartValues, status: np.ndarray, held: list[tuple[int, int]] | None = None
-) -> tuple[NormalSystem, State]:
-    """The normal system of the rays that take part, and its start state.
-
-    Parameters
-    ----------
-    status : (m,) of the rays. held : (row of the block's points, axis) of coordinates held for a minimal or inner
-        datum; chosen anew where None.
-    """
-    unknowns, state = build_unknowns(block, start, status == USED)
-    unknowns, extras = extra_observations(unknowns, state)
-    state = replace(state, shared=np.array(unknowns.shared.start, dtype=float))
-    unknowns = _with_datum(unknowns, state, extras, held)
-    return NormalSystem(unknowns, extras, state.centre[:, :2]), state
-
-
 def check_settings(block: Block) -> None:
     """Refuse what is not built, rather than pass over it.
 
@@ -164,82 +138,3 @@ def with_edits(block: Block) -> tuple[Block, np.ndarray]:
     return replace(block, control=replace(control, xyz=xyz, is_check=is_check)), off
 
 
-def ray_status(block: Block, start: StartValues, off: np.ndarray | None = None) -> tuple[np.ndarray, list[str]]:
-    """Status of every ray, and sentences about those left out; `off` (m,) bool are switched off by the operator.
-
-    A point needs two rays, or one ray and enough known coordinates; a photograph needs start values.
-    """
-    rays = block.image_points
-    status = np.full(len(rays), USED, dtype=np.int8)
-    status[~np.isfinite(start.centre[rays.image, 0])] = NO_START
-    if off is not None:
-        status[off] = OFF
-    status = with_lonely_rays(block, status)
-    status[(status == USED) & ~np.isfinite(start.points[rays.point, 0])] = NO_START
-    warnings = []
-    photos = np.setdiff1d(np.unique(rays.image), np.unique(rays.image[status == USED]))
-    photos = np.union1d(photos, np.flatnonzero(~np.isfinite(start.centre[:, 0])))
-    no_rays = np.setdiff1d(np.arange(len(block.images)), np.unique(rays.image))
-    if len(no_rays):
-        warnings.append(f"{some_names(block.images.names[no_rays], 'photograph')} without image points, left out")
-    photos = np.setdiff1d(photos, no_rays)
-    if len(photos):
-        warnings.append(
-            f"{some_names(block.images.names[photos], 'photograph')} without start values or usable points, left out"
-        )
-    for code, words in ((ONE_RAY, "measured in one photograph only"), (NO_START, "whose rays do not intersect")):
-        points = np.unique(rays.point[(status == code) & np.isfinite(start.centre[rays.image, 0])])
-        if len(points):
-            warnings.append(f"{some_names(block.points[points], 'point')} {words}, left out")
-    return status, warnings
-
-
-def with_lonely_rays(block: Block, status: np.ndarray) -> np.ndarray:
-    """The status of rays (m,) with those that are alone in their point `ONE_RAY`.
-
-    A point needs two rays, or one ray and enough known coordinates.
-    """
-    rays, status = block.image_points, status.copy()
-    known = np.zeros(len(block.points), dtype=np.int64)
-    if block.settings.adjustment.datum == "control":
-        control = ~block.control.is_check
-        known[block.control.point[control]] = np.isfinite(block.control.xyz[control]).sum(axis=1)
-    usable = status == USED
-    count = np.bincount(rays.point[usable], minlength=len(block.points))
-    weak = (2 * count + known < 4) | ((count == 1) & (known < 3))
-    status[usable & weak[rays.point]] = ONE_RAY
-    return status
-
-
-def with_weak_words(block: Block, status: np.ndarray, warnings: tuple[str, ...]) -> tuple[str, ...]:
-    """The warnings with sentences about points and photographs that were set aside for their geometry."""
-    rays = block.image_points
-    kept = [said for said in warnings if not said.endswith(WEAK_ENDINGS)]
-    weak = np.unique(rays.image[status == WEAK_PHOTOGRAPH])
-    if len(weak):
-        kept.append(f"{some_names(block.images.names[weak], 'photograph')}{WEAK_ENDINGS[0]}")
-    weak = np.setdiff1d(rays.point[status == WEAK_POINT], rays.point[status == USED])
-    if len(weak):
-        kept.append(f"{some_names(block.points[weak], 'point')}{WEAK_ENDINGS[1]}")
-    return tuple(kept)
-
-
-def some_names(names: np.ndarray, noun: str) -> str:
-    shown = ", ".join(str(name) for name in names[:5])
-    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
-    return f"{len(names)} {noun}{'s' if len(names) > 1 else ''} ({shown}{more})"
-
-
-def _with_datum(
-    unknowns: Unknowns, state: State, extras: list[ExtraObservations], held: list[tuple[int, int]] | None
-) -> Unknowns:
-    settings = unknowns.block.settings.adjustment
-    if settings.datum == "fixed":
-        return hold_orientation(unknowns, settings.datum_fixed)
-    if settings.datum in ("minimal", "inner"):
-        unknowns = replace(unknowns, motions=free_motions(unknowns, extras, state))
-        if held is None:
-            return hold_points(unknowns, minimal_coordinates(unknowns, state))
-        row = {int(point): k for k, point in enumerate(unknowns.points)}
-        return hold_points(unknowns, [(row[point], axis) for point, axis in held])
-    return unknowns

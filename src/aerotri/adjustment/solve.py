@@ -318,7 +318,7 @@ def _trial(
     """The step by this factor; with secants an undamped one heeds them, and the points are led to their minimum."""
     x = secants.solve(factor, damped.right) if secants is not None and damping == 0.0 else factor.solve(damped.right)
     decrement = float(x @ damped.right) + damped.point_decrement
-    move = _whole_step(system, state, x, damped, estimator, damping)
+    move = _whole_step(system, state, x, estimator, damping)
     if move is None:
         return None
     there = system.unknowns.advance(state, move)
@@ -328,11 +328,11 @@ def _trial(
 
 
 def _whole_step(
-    system: NormalSystem, state: State, x: np.ndarray, side: RightSide, estimator: Estimator, damping: float
+    system: NormalSystem, state: State, x: np.ndarray, estimator: Estimator, damping: float
 ) -> Step | None:
     """The step of all unknowns from the solution x of the reduced equations; None where it is not a number."""
-    move = system.back_substitute(state, x, damping, side, estimator)
-    free = system.unknowns.block.settings.adjustment.datum in ("minimal", "inner")
+    move = system.back_substitute(state, x, damping, estimator)
+    free = system.unknowns.block.settings.adjustment.is_free
     if free and system.unknowns.motions.count:
         move = without_motion(system.unknowns, state, move)
     finite = all(np.isfinite(part).all() for part in (move.images, move.shared, move.points))
@@ -365,7 +365,7 @@ def _followed(
         x = first.factor.solve(side.right)
         next_decrement = abs(float(x @ side.right) + side.point_decrement)
         contraction = next_decrement / max(abs(decrement), 1e-300)
-        move = _whole_step(system, state, x, side, LEAST_SQUARES, 0.0) if contraction <= SLOWEST_CONTRACTION else None
+        move = _whole_step(system, state, x, LEAST_SQUARES, 0.0) if contraction <= SLOWEST_CONTRACTION else None
         if move is None:
             break
         settled = _is_negligible(next_decrement * SLOWEST_CONTRACTION, side.cost, redundancy)

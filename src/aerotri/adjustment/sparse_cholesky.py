@@ -17,6 +17,7 @@ from scipy.linalg.lapack import dpotrf, dpotri  # pyright: ignore[reportAttribut
 
 from aerotri.adjustment import _factor_kernels as _kernels
 from aerotri.adjustment.dissection import Tree, dissect
+from aerotri.adjustment.kernel_records import Front, FrontBlocks, MatrixBlocks
 from aerotri.adjustment.parallel import blas_threads, refuse_more_than_there_is
 
 B = 6
@@ -28,6 +29,10 @@ PIVOT_LIMIT = 1e-13
 
 class NotPositiveDefiniteError(Exception):
     """The matrix is singular within rounding."""
+
+
+class StaleFactorError(RuntimeError):
+    """The factor's place was taken by that of another matrix."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +56,7 @@ class _Front:
 
     columns, rows : scalar indices into the elimination-ordered vector.
     n_own, n_rows : number of photographs in either.
-    block, local_row, local_col, flipped : the matrix blocks that begin here, with their places in the front.
+    blocks : the matrix blocks that begin here, with their places in the front.
     place : position of each row photograph in the parent's front.
     """
 
@@ -59,10 +64,7 @@ class _Front:
     n_own: int
     rows: np.ndarray
     scalar_rows: np.ndarray
-    block: np.ndarray
-    local_row: np.ndarray
-    local_col: np.ndarray
-    flipped: np.ndarray
+    blocks: FrontBlocks
     place: np.ndarray
     parent: int
     depth: int
@@ -87,6 +89,7 @@ class Symbolic:
         self.rank = np.empty(n, dtype=np.int64)
         self.rank[self.tree.order] = np.arange(n)
         self.fronts = self._fronts(self.tree)
+        self._factorised = 0
         self._allocate()
 
     @property
@@ -134,10 +137,9 @@ class Symbolic:
                     n_own=int(end - first),
                     rows=rows,
                     scalar_rows=scalar,
-                    block=block,
-                    local_row=np.searchsorted(local, high[block]),
-                    local_col=low[block] - first,
-                    flipped=flipped[block],
+                    blocks=FrontBlocks(
+                        block, np.searchsorted(local, high[block]), low[block] - first, flipped[block]
+                    ),
                     place=np.zeros(0, np.int64),
                     parent=int(tree.parent[k]),
                     depth=int(tree.depth[k]),
@@ -209,6 +211,7 @@ class Symbolic:
         NotPositiveDefiniteError
             When a pivot is not positive or drowns in rounding.
         """
+        self._factorised += 1
         scale = self._scale(matrix)
         by_image = np.ascontiguousarray(scale[: B * self.n].reshape(self.n, B)[self.rank])
         by_border = scale[B * self.n :]
@@ -229,17 +232,16 @@ class Symbolic:
             flat_top, flat_low, flat_rest = _flat(top), _flat(low), _flat(rest)
             for part in (flat_top, flat_low, flat_rest):
                 part.fill(0.0)
+            dense = Front(len(top), len(low), flat_top, flat_low)
             _kernels.scatter_blocks(
-                front.block, front.local_row, front.local_col, front.flipped, matrix.blocks, self.block_row,
-                self.block_col, by_image, len(top), len(low), flat_top, flat_low,
-            )  # fmt: skip
+                front.blocks, MatrixBlocks(matrix.blocks, self.block_row, self.block_col, by_image), dense
+            )
             own = self.tree.order[front.first : front.first + front.n_own]
             _kernels.scatter_border(own, matrix.border, by_image, by_border, len(low), flat_low)
             for child in children[k]:
                 _kernels.extend_add(
-                    _flat(self.update(child)), self.fronts[child].place, front.n_own, self.n_border, len(front.rows),
-                    flat_top, flat_low, flat_rest,
-                )  # fmt: skip
+                    _flat(self.update(child)), self.fronts[child].place, front.n_own, self.n_border, dense, flat_rest
+                )
             if front.n_own:
                 smallest = min(smallest, _eliminate(top, low, rest))
             if front.parent >= 0:
@@ -294,7 +296,21 @@ class Factor:
     """
 
     def __init__(self, symbolic: Symbolic, scale: np.ndarray, smallest_pivot: float):
-        self._symbolic, self._scale, self.smallest_pivot = symbolic, scale, smallest_pivot
+        self._of, self._scale, self.smallest_pivot = symbolic, scale, smallest_pivot
+        self._number = symbolic._factorised
+
+    @property
+    def _symbolic(self) -> Symbolic:
+        """Where the factor stands.
+
+        Raises
+        ------
+        StaleFactorError
+            When another matrix was factorised there since.
+        """
+        if self._number != self._of._factorised:
+            raise StaleFactorError("another matrix was factorised in the place of this factor: factorise anew")
+        return self._of
 
     def _permutation(self) -> np.ndarray:
         s = self._symbolic
@@ -374,8 +390,8 @@ class Factor:
             top, low, _ = parts = self._inverse_front(k, buffers, out.corner)
             own = s.tree.order[front.first : front.first + front.n_own]
             _kernels.gather_blocks(
-                front.block, front.local_row, front.local_col, front.flipped, _flat(top), _flat(low), len(top),
-                len(low), s.block_row, s.block_col, by_image, out.blocks,
+                front.blocks, Front(len(top), len(low), _flat(top), _flat(low)),
+                MatrixBlocks(out.blocks, s.block_row, s.block_col, by_image),
             )  # fmt: skip
             _kernels.gather_border(own, _flat(low), len(low), by_image, by_border, out.border)
             buffers[front.depth].parts = parts

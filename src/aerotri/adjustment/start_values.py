@@ -11,6 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment import _intersection_kernels
+from aerotri.adjustment.ray_status import RayStatus, ray_status
+from aerotri.adjustment.solve import SolveOptions, minimise
+from aerotri.adjustment.system import build_system
 from aerotri.adjustment.track import AXIS_ANGLE, headings, order_of_exposure, strips_of_track, vertical_rotations
 from aerotri.adjustment.unknowns import StartValues
 from aerotri.functional_model.additional_parameters import brown, lens
@@ -203,9 +206,6 @@ def refine(block: Block, origin, rotation, centre, points, iterations: int = 6, 
     Without additional parameters; in the datum of `centres` where they are given, of the control where there is enough
     of it, else of seven coordinates.
     """
-    from aerotri.adjustment.prepare import USED, build_system, ray_status
-    from aerotri.adjustment.solve import SolveOptions, minimise
-
     start = StartValues(origin, rotation, centre, points)
     controlled = int(np.isfinite(points[block.control.point[~block.control.is_check], 0]).sum()) >= MIN_RESECTION_POINTS
     datums = ("control", "minimal") if controlled else ("minimal",)
@@ -218,10 +218,10 @@ def refine(block: Block, origin, rotation, centre, points, iterations: int = 6, 
             settings=replace(block.settings, adjustment=settings, gnss=GnssSettings(shift="off")),
         )
         status, _ = ray_status(bare, start)
-        if (status == USED).sum() < 10:
+        if (status == RayStatus.USED).sum() < 10:
             return
         system, state = build_system(bare, start, status)
-        redundancy = max(2 * int((status == USED).sum()) - system.unknowns.count, 1)
+        redundancy = max(2 * int((status == RayStatus.USED).sum()) - system.unknowns.count, 1)
         solution = minimise(system, state, redundancy, SolveOptions(iterations, "huber"))
         if not solution.defects:
             break

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment import _pairs
+from aerotri.adjustment.kernel_records import RayArrays
 from aerotri.adjustment.shared_parameters import LensTable, SharedList, lens_table, linear_columns
 from aerotri.functional_model.rotation import (
     angles_from_rotation,
@@ -51,7 +52,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays in point order and, within a point, by photograph; see `_kernels`. `source` is their row in the block."""
+    """Rays as `kernel_records` describes them; `source` is their row in the block."""
 
     start: np.ndarray
     image: np.ndarray
@@ -62,8 +63,9 @@ class Rays:
     ap_value: np.ndarray
     source: np.ndarray
 
-    def as_tuple(self):
-        return (
+    def arrays(self) -> RayArrays:
+        """As kernels take them."""
+        return RayArrays(
             self.start, self.image, self.lens_row, self.xy, self.inv_sigma, self.ap_index, self.ap_value,
         )  # fmt: skip
 

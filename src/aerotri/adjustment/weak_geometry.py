@@ -21,18 +21,12 @@ import numpy as np
 
 from aerotri.adjustment.carry_over import reference_state, start_values_at, with_shared
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
-from aerotri.adjustment.prepare import (
-    USED,
-    WEAK_PHOTOGRAPH,
-    WEAK_POINT,
-    Prepared,
-    build_system,
-    with_lonely_rays,
-    with_weak_words,
-)
+from aerotri.adjustment.prepare import Prepared
+from aerotri.adjustment.ray_status import RayStatus, with_lonely_rays, with_weak_words
 from aerotri.adjustment.robust import Estimator, normalised_lengths, scale_of
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, NotPositiveDefiniteError
+from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import State, Unknowns
 
 LOOSE = 1.0 / 3.0
@@ -185,9 +179,9 @@ def set_aside(prepared: Prepared, state: State, photographs: np.ndarray, points:
     """
     u, rays = prepared.system.unknowns, prepared.system.unknowns.block.image_points
     status = prepared.ray_status.copy()
-    used = status == USED
-    status[used & np.isin(rays.point, u.points[points])] = WEAK_POINT
-    status[used & np.isin(rays.image, u.images[photographs])] = WEAK_PHOTOGRAPH
+    used = status == RayStatus.USED
+    status[used & np.isin(rays.point, u.points[points])] = RayStatus.WEAK_POINT
+    status[used & np.isin(rays.image, u.images[photographs])] = RayStatus.WEAK_PHOTOGRAPH
     status = with_lonely_rays(u.block, status)
     warnings = with_weak_words(u.block, status, prepared.warnings)
     system, start = build_system(u.block, start_values_at(u, state), status)

@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.formats.assembly.oriented import oriented_from_adjusted
 from aerotri.observations import AdjustmentSettings, Block, Control, ImagePoints, Settings
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 NO_CORRECTIONS = {"refraction": "off", "earth_curvature": "off"}
 LEAST_WEIGHT = 0.5
@@ -33,7 +34,7 @@ def as_adjusted(local: AdjustedBlock, measured: Block) -> AdjustedBlock:
 
 def used_rays(adjusted: AdjustedBlock) -> np.ndarray:
     """(m,) bool, the rays that took part."""
-    return adjusted.rays.status == RAY_STATUS.index("used")
+    return adjusted.rays.status == RayStatus.USED
 
 
 def with_fixed_weights(adjusted: AdjustedBlock) -> Block:

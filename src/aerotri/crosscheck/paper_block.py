@@ -172,7 +172,7 @@ def paper_block(
 
 def _refuse_unknown(block: Block) -> None:
     settings, observed = block.settings, block.gnss_ins
-    free = settings.adjustment.datum in ("minimal", "inner")
+    free = settings.adjustment.is_free
     families = {family for family, _ in settings.adjustment.additional_parameters}
     unknown = sorted(families - set(LINEAR) - {"brown", "lens"})
     refused = [

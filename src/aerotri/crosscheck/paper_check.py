@@ -80,7 +80,7 @@ def _notes(adjusted: AdjustedBlock, solution: PaperSolution) -> list[str]:
     notes = []
     if solution.solver == "SciPy":
         notes.append("pyceres is not installed: solved by SciPy's sparse factor (pip install 'aerotri[ceres]')")
-    if adjusted.block.settings.adjustment.datum in ("minimal", "inner"):
+    if adjusted.block.settings.adjustment.is_free:
         notes.append("datum: seven point coordinates held at our values")
     return notes
 
@@ -106,7 +106,7 @@ def _known(adjusted: AdjustedBlock, paper: PaperBlock) -> KnownSolution:
         angles=adjusted.images.angles[paper.images],
         points=adjusted.points.xyz[paper.points] - paper.origin,
         held_poses=held,
-        datum_free=settings.datum in ("minimal", "inner"),
+        datum_free=settings.is_free,
     )
 
 

@@ -87,8 +87,8 @@ def absorbed_orientation(calibration: Adjustment, state: State | None = None) ->
         reason = "; ".join(found.defects) or f"no convergence within {found.iterations} iterations"
         raise AbsorptionFailedError(f"the adjustment without additional parameters is {found.status}: {reason}")
     adjusted = found.state
-    if unknowns.block.settings.adjustment.datum in ("minimal", "inner"):
-        plain.refresh_motions(adjusted)
+    if unknowns.block.settings.adjustment.is_free:
+        plain = plain.with_motions_at(adjusted)
         adjusted = restore_datum(plain.unknowns, adjusted, start.points)
     rms = float(np.sqrt(np.mean(found.equations.residual**2)))
     return Absorbed(_orientation(unknowns, adjusted), 1e3 * rms)

@@ -47,7 +47,7 @@ def defects_in_words(system: NormalSystem, defects: list[str] | tuple[str, ...])
     if block.settings.adjustment.datum != "control" or "datum" not in text:
         return text
     lonely = "".join(f". {sentence}" for sentence in partnerless_in_words(block))
-    if nothing_holds(system):
+    if nothing_holds(system.unknowns, system.extras):
         return f'no control: {text}. Give control points, or set datum = "minimal" or "inner"{lonely}'
     return f"too little control: {text}{lonely}"
 

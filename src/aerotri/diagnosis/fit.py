@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import gammaincinv, ndtri
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.diagnosis.finding import (
     SIGNIFICANCE,
     Finding,
@@ -15,7 +16,7 @@ from aerotri.diagnosis.finding import (
     pixel_text,
     times,
 )
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.statistics.observation_groups import GroupFit, group_fits
 
 POOR_FIT, NO_FIT = 2.0, 10.0
@@ -151,7 +152,7 @@ def of_large_residuals(adjusted: AdjustedBlock) -> list[Finding]:
     """Image coordinates beyond the test, and how many chance leaves there."""
     settings = adjusted.block.settings.adjustment
     critical = float(-ndtri(settings.alpha / 2.0))
-    w = np.abs(adjusted.rays.w[adjusted.rays.status == RAY_STATUS.index("used")])
+    w = np.abs(adjusted.rays.w[adjusted.rays.status == RayStatus.USED])
     w = w[np.isfinite(w)]
     beyond = int(np.sum(w > critical))
     chance = settings.alpha * w.size

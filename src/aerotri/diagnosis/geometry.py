@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.diagnosis.finding import Finding, doubt, graded, some
 from aerotri.functional_model.rotation import rotation_from_angles
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 SOME_BEHIND, MANY_BEHIND = 0.01, 0.10
 """Shares of the rays whose point lies behind the camera or far out: mismatches are few, a wrong block has many."""
@@ -27,7 +28,7 @@ def depths(adjusted: AdjustedBlock) -> np.ndarray:
     rotation = rotation_from_angles(adjusted.images.angles, adjusted.block.rotation)
     reach = adjusted.points.xyz[rays.point] - adjusted.images.centre[rays.image]
     depth = -np.einsum("mi,mi->m", rotation[rays.image, :, 2], reach)
-    return np.where(adjusted.rays.status == RAY_STATUS.index("used"), depth, np.nan)
+    return np.where(adjusted.rays.status == RayStatus.USED, depth, np.nan)
 
 
 def usual_distance(adjusted: AdjustedBlock) -> float:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.diagnosis.finding import Finding, doubt, graded, some
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 SOME_PHOTOGRAPHS, MANY_PHOTOGRAPHS = 0.02, 0.25
 SOME_POINTS, MANY_POINTS = 0.10, 0.40
@@ -30,7 +31,7 @@ def of_photographs(adjusted: AdjustedBlock) -> list[Finding]:
 def of_points(adjusted: AdjustedBlock) -> list[Finding]:
     """Points measured in two photographs or more that were not adjusted; not those that the operator took out."""
     rays, status = adjusted.block.image_points, adjusted.rays.status
-    asked = status != RAY_STATUS.index("off")
+    asked = status != RayStatus.OFF
     pairs = np.unique(np.column_stack([rays.point[asked], rays.image[asked]]), axis=0)
     measured = np.flatnonzero(np.bincount(pairs[:, 0], minlength=len(adjusted.block.points)) >= 2)
     gone = measured[~np.isfinite(adjusted.points.xyz[measured, 0])]
@@ -43,8 +44,8 @@ def of_points(adjusted: AdjustedBlock) -> list[Finding]:
 def of_rays(adjusted: AdjustedBlock) -> list[Finding]:
     """Rays that data snooping removed or a robust estimator gave no weight."""
     status, weight = adjusted.rays.status, adjusted.rays.weight
-    removed = status == RAY_STATUS.index("removed")
-    used = status == RAY_STATUS.index("used")
+    removed = status == RayStatus.REMOVED
+    used = status == RayStatus.USED
     gone = int(removed.sum()) + int(np.sum(weight[used] < TURNED_DOWN))
     count = int(removed.sum() + used.sum())
     value = f"{gone} of {count}"

@@ -5,9 +5,39 @@ Columns of every table of interior elements: c, x0, y0, K1, K2, K3, P1, P2, b1, 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+
 from aerotri.compiled import kernel
 
 N_INTERIOR = 15
+
+
+class RayPartials(NamedTuple):
+    """Image coordinates and their partials, out, of a ray; with m before every shape, of m rays.
+
+    Parameters
+    ----------
+    prediction : (2,) mm.
+    by_orientation : (2, 6) by (X0, Y0, Z0) and by the small rotation δ about the object axes.
+    by_point : (2, 3) by (X, Y, Z).
+    by_interior : (2, 15) by the columns of `interior`.
+    """
+
+    prediction: np.ndarray
+    by_orientation: np.ndarray
+    by_point: np.ndarray
+    by_interior: np.ndarray
+
+
+class RayList(NamedTuple):
+    """m rays: photograph, point and set of interior elements (m,), and the measured position xy (m, 2) mm."""
+
+    image: np.ndarray
+    point: np.ndarray
+    lens_row: np.ndarray
+    xy: np.ndarray
 
 
 @kernel
@@ -42,15 +72,10 @@ def predict_ray(rotation, centre, point, interior, x, y, prediction):
 
 
 @kernel
-def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orientation, by_point, by_interior):
-    """As `predict_ray`, with the partials; they share their intermediates.
-
-    Parameters
-    ----------
-    by_orientation : (2, 6) out, by (X0, Y0, Z0) and by the small rotation δ about the object axes.
-    by_point : (2, 3) out, by (X, Y, Z).
-    by_interior : (2, 15) out, by the columns of `interior`.
-    """
+def linearise_ray(rotation, centre, point, interior, x, y, partials):
+    """As `predict_ray`, with the partials; they share their intermediates. partials : `RayPartials`, out."""
+    prediction, by_orientation = partials.prediction, partials.by_orientation
+    by_point, by_interior = partials.by_point, partials.by_interior
     dx, dy, dz = point[0] - centre[0], point[1] - centre[1], point[2] - centre[2]
     u1 = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
     u2 = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
@@ -117,34 +142,27 @@ def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orient
 
 
 @kernel
-def predict_rays(rotation, centre, points, interior, image, point, lens_row, xy, prediction):
+def predict_rays(rotation, centre, points, interior, rays, prediction):
     """`predict_ray` over m rays.
 
     Parameters
     ----------
-    rotation : (n, 3, 3); centre : (n, 3); points : (N, 3); interior : (L, 15).
-    image, point, lens_row : (m,) rows of the tables above; xy : (m, 2) mm.
-    prediction : (m, 2) out.
+    rotation : (n, 3, 3); centre : (n, 3); points : (p, 3); interior : (l, 15).
+    rays : `RayList`. prediction : (m, 2) out.
     """
+    image, point, lens_row, xy = rays.image, rays.point, rays.lens_row, rays.xy
     for k in range(len(image)):
         i = image[k]
         predict_ray(rotation[i], centre[i], points[point[k]], interior[lens_row[k]], xy[k, 0], xy[k, 1], prediction[k])
 
 
 @kernel
-def linearise_rays(rotation, centre, points, interior, image, point, lens_row, xy, prediction, by_eo, by_pt, by_in):
-    """`linearise_ray` over m rays; outputs (m, 2), (m, 2, 6), (m, 2, 3), (m, 2, 15)."""
+def linearise_rays(rotation, centre, points, interior, rays, partials):
+    """`linearise_ray` over m rays. rays : `RayList`. partials : `RayPartials`, out, m before every shape."""
+    image, point, lens_row, xy = rays.image, rays.point, rays.lens_row, rays.xy
     for k in range(len(image)):
         i = image[k]
-        linearise_ray(
-            rotation[i],
-            centre[i],
-            points[point[k]],
-            interior[lens_row[k]],
-            xy[k, 0],
-            xy[k, 1],
-            prediction[k],
-            by_eo[k],
-            by_pt[k],
-            by_in[k],
+        own = RayPartials(
+            partials.prediction[k], partials.by_orientation[k], partials.by_point[k], partials.by_interior[k]
         )
+        linearise_ray(rotation[i], centre[i], points[point[k]], interior[lens_row[k]], xy[k, 0], xy[k, 1], own)

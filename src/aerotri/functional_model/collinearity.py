@@ -6,25 +6,17 @@ additional parameters are added by the caller, since their columns do not change
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from aerotri.functional_model import _kernels
+from aerotri.functional_model._kernels import RayList, RayPartials
 from aerotri.observations import Camera
 from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
 
 INTERIOR_COLUMNS = INTERIOR_ELEMENTS + tuple(f"brown.{n}" for n in BROWN_NAMES) + tuple(f"lens.{n}" for n in LENS_NAMES)
 
 
-@dataclass(frozen=True, eq=False)
-class RayPartials:
-    """Prediction (m, 2) mm and its partials by orientation (m, 2, 6), point (m, 2, 3) and interior (m, 2, 15)."""
 
-    prediction: np.ndarray
-    by_orientation: np.ndarray
-    by_point: np.ndarray
-    by_interior: np.ndarray
 
 
 def interior_row(camera: Camera) -> np.ndarray:
@@ -49,7 +41,7 @@ def predict(rotation, centre, points, interior, image, point, lens_row, xy) -> n
     (m, 2) mm.
     """
     prediction = np.empty((len(image), 2))
-    _kernels.predict_rays(rotation, centre, points, interior, image, point, lens_row, xy, prediction)
+    _kernels.predict_rays(rotation, centre, points, interior, RayList(image, point, lens_row, xy), prediction)
     return prediction
 
 
@@ -57,18 +49,5 @@ def linearise(rotation, centre, points, interior, image, point, lens_row, xy) ->
     """Prediction and analytic partials; arguments as in `predict`."""
     m = len(image)
     out = RayPartials(np.empty((m, 2)), np.empty((m, 2, 6)), np.empty((m, 2, 3)), np.empty((m, 2, 15)))
-    _kernels.linearise_rays(
-        rotation,
-        centre,
-        points,
-        interior,
-        image,
-        point,
-        lens_row,
-        xy,
-        out.prediction,
-        out.by_orientation,
-        out.by_point,
-        out.by_interior,
-    )
+    _kernels.linearise_rays(rotation, centre, points, interior, RayList(image, point, lens_row, xy), out)
     return out

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.image_errors.field import CHI2_LIMIT, grid_nodes
 from aerotri.image_errors.groups import image_group
 from aerotri.observations import Camera
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 LONGER_SIDE_CELLS = 20
 FEWEST_CELLS = 6
@@ -90,7 +91,7 @@ def averaged_residuals(
     """
     block = adjusted.block
     images = image_group(block, group, camera)
-    rays = images.images[block.image_points.image] & (adjusted.rays.status == RAY_STATUS.index("used"))
+    rays = images.images[block.image_points.image] & (adjusted.rays.status == RayStatus.USED)
     rays &= np.isfinite(adjusted.rays.v).all(axis=1) & (adjusted.rays.weight > 0.0)
     xy, remaining, weight = block.image_points.xy[rays], -adjusted.rays.v[rays], adjusted.rays.weight[rays]
     longer = _cells_for(len(xy), images.camera, n_min)

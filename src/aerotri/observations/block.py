@@ -279,6 +279,11 @@ class AdjustmentSettings:
     power: float = 0.80
     max_iterations: int = 30
 
+    @property
+    def is_free(self) -> bool:
+        """Whether control is compared only, and what the observations leave free is fixed by a datum of its own."""
+        return self.datum in ("minimal", "inner")
+
 
 @dataclass(frozen=True)
 class GnssSettings:

@@ -15,11 +15,6 @@ if TYPE_CHECKING:
     from aerotri.results.removal import Removal
     from aerotri.results.variance_components import VarianceComponents
 
-RAY_STATUS = (
-    "used", "one ray", "off", "no start value", "not finite", "removed", "weak point", "weak photograph",
-)  # fmt: skip
-"""Status of a ray: adjusted, or why it was left out; data snooping removes; a point is weak that its rays do not fix,
-a photograph that is tied too weakly. The records hold the index into this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +105,7 @@ class RayResults:
     r : (m, 2) redundancy numbers.
     w : (m, 2) normalised residuals −v/(σ√r), σ a priori.
     weight : (m,) robust factor, 1 when off.
-    status : (m,) index into `RAY_STATUS`.
+    status : (m,) `RayStatus`.
     """
 
     v: np.ndarray

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from aerotri.adjustment import _reliability_kernels
+from aerotri.adjustment.kernel_records import Datum, Effects, Inverse, Scale
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.unknowns import ORIENTATION_ELEMENTS, Unknowns
@@ -31,18 +32,17 @@ def ray_effects(system: NormalSystem, solution: Solution, q: Cofactors) -> RayEf
     u, state, estimator = system.unknowns, solution.state, solution.estimator
     m = len(u.rays.image)
     size, unknown, height = np.empty((m, 2)), np.empty((m, 2), dtype=np.int32), np.empty((m, 2))
-    residual, weight = np.empty((m, 2)), np.empty(m)
-    inverse = q.inverse.blocks, q.inverse.border, q.inverse.corner
-    scale, datum = _scale(system, solution, q), _datum(u, q.inner)
+    inverse = Inverse(q.inverse.blocks, q.inverse.border, q.inverse.corner)
+    measures, found = (_datum(u, q.inner), _scale(system, solution, q)), Effects(size, unknown, height)
+    problem = system.problem(state, estimator)
     system.over_points(
-        state,
-        lambda first, last, rays, pattern, table, values, work: _reliability_kernels.ray_effects(
-            first, last, rays, pattern, table, values, estimator.code, estimator.limit, inverse, datum, scale, size,
-            unknown, height, residual, weight, work,
+        problem,
+        lambda first, last, problem, work: _reliability_kernels.ray_effects(
+            first, last, problem, inverse, measures, found, work
         ),
-    )  # fmt: skip
+    )
     settings = u.block.settings.adjustment
-    error = detectable_share(q.ray_redundancy, settings.alpha, settings.power) * np.sqrt(weight)[:, None]
+    error = detectable_share(q.ray_redundancy, settings.alpha, settings.power) * np.sqrt(problem.weight)[:, None]
     count = len(u.block.image_points)
     effects = RayEffects(
         np.full((count, 2), np.nan), np.full((count, 2), -1, np.int32), np.full((count, 2), np.nan), shared_labels(u)
@@ -109,12 +109,12 @@ def row_effects(system: NormalSystem, solution: Solution, q: Cofactors, rows: Ro
     return np.where(on != "", size, np.nan), on
 
 
-def _scale(system: NormalSystem, solution: Solution, q: Cofactors):
+def _scale(system: NormalSystem, solution: Solution, q: Cofactors) -> Scale:
     u, state = system.unknowns, solution.state
     of_points = _inverse_sigma(q.points)
     # these stand with the shared parameters
     of_points[u.kept_rows] = 0.0
-    return (
+    return Scale(
         np.ascontiguousarray(to_angles(u, state)),
         _inverse_sigma(orientation_cofactors(u, state, q.images)),
         _inverse_sigma(q.shared[None])[0],
@@ -122,13 +122,13 @@ def _scale(system: NormalSystem, solution: Solution, q: Cofactors):
     )
 
 
-def _datum(unknowns: Unknowns, inner: InnerDatum | None):
+def _datum(unknowns: Unknowns, inner: InnerDatum | None) -> Datum:
     if inner is None:
         n, s, count = len(unknowns.images), len(unknowns.shared), len(unknowns.points)
         none = np.zeros((n, 6, 0)), np.zeros((s, 0)), np.zeros((count, 3, 0))
-        return (*none, *none)
+        return Datum(*none, *none)
     parts = inner.images, inner.shared, inner.points, inner.q_images, inner.q_shared, inner.q_points
-    return tuple(np.ascontiguousarray(part) for part in parts)
+    return Datum(*(np.ascontiguousarray(part) for part in parts))
 
 
 def _inverse_sigma(cofactor: np.ndarray) -> np.ndarray:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.observations import Block
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.statistics.reliability import critical_value
 
 MEDIAN_OF_NORMAL = 0.6744897501960817
@@ -63,7 +64,7 @@ def pixel_mm_of_rays(block: Block) -> np.ndarray:
 
 def used_rays(adjusted: AdjustedBlock) -> np.ndarray:
     """(m,) bool."""
-    return adjusted.rays.status == RAY_STATUS.index("used")
+    return adjusted.rays.status == RayStatus.USED
 
 
 def judge_rays(adjusted: AdjustedBlock) -> RayTests:

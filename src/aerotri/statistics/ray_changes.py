@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.adjustment.ray_status import RAY_STATUS
+from aerotri.results.adjusted_block import AdjustedBlock
 
 SAME_PLACE_MM = 1e-4
 """Image coordinates closer than this are the same measurement."""

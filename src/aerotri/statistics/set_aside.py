@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.adjustment.ray_status import RAY_STATUS
+from aerotri.results.adjusted_block import AdjustedBlock
 
 USED, SET_ASIDE = "used", "set aside"
 

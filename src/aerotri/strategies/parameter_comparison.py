@@ -22,9 +22,10 @@ import numpy as np
 from aerotri.adjustment.carry_over import start_values_at, with_shared
 from aerotri.adjustment.defects import checked_factor
 from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.prepare import Prepared, build_system
+from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import State, Unknowns
 from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import format_parameters

@@ -9,7 +9,9 @@ import numpy as np
 
 from aerotri.adjustment.carry_over import start_values_at
 from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.prepare import ONE_RAY, REMOVED, Prepared, build_system, with_edits
+from aerotri.adjustment.prepare import Prepared, with_edits
+from aerotri.adjustment.ray_status import RayStatus
+from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import State
 from aerotri.functional_model.observed_unknowns import CentreObservations
 from aerotri.observations import Block, GnssIns
@@ -57,15 +59,15 @@ def listed(system: NormalSystem, gone: Switches, found: Found) -> tuple[Blunder,
 def without_removed(prepared: Prepared, state: State, switches: Switches) -> Prepared:
     """The block prepared anew without what is switched off, beginning where the adjustment stands.
 
-    A removed ray has the status `REMOVED`, one that is left alone in its point `ONE_RAY`; a removed control point is a
+    A removed ray has the status REMOVED, one that is left alone in its point ONE_RAY; a removed control point is a
     check point; removed positions and attitudes are not observed. Coordinates held for the datum stay the same ones as
     long as their points do.
     """
     u = prepared.system.unknowns
     taking_part = participants(u, switches).rays
     status = prepared.ray_status.copy()
-    status[u.rays.source[~taking_part]] = ONE_RAY
-    status[u.rays.source[~switches.rays]] = REMOVED
+    status[u.rays.source[~taking_part]] = RayStatus.ONE_RAY
+    status[u.rays.source[~switches.rays]] = RayStatus.REMOVED
     rows, axes = np.nonzero(u.point_held)
     still_there = np.isin(rows, ray_points(u)[taking_part]).all()
     held = list(zip(u.points[rows].tolist(), axes.tolist(), strict=True)) if len(rows) and still_there else None

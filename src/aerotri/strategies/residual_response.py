@@ -88,7 +88,7 @@ class ResidualResponse:
         # points that are not eliminated stand with the shared parameters
         columns = 6 * len(u.images) + u.kept_columns
         right[columns] += (root * of_points)[u.kept_rows]
-        step = system.back_substitute(state, self._factor.solve(right), 0.0, equations, LEAST_SQUARES)
+        step = system.back_substitute(state, self._factor.solve(right), 0.0, LEAST_SQUARES)
         there = u.advance(state, step)
         residual = system.assemble(there, 0.0, LEAST_SQUARES).residual
         gaps = [rows.gap + part for rows, part in zip(system.whitened_rows(there), of_rows, strict=True)]

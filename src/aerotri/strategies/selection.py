@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment.carry_over import reference_state, start_values_at, with_shared
-from aerotri.adjustment.prepare import Prepared, build_system
+from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
+from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import Unknowns
 from aerotri.functional_model.additional_parameters import Parameter, is_grid
 from aerotri.observations import Block

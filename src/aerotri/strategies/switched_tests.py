@@ -16,7 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment import _reliability_kernels
+from aerotri.adjustment.kernel_records import Inverse
 from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
+from aerotri.adjustment.robust import LEAST_SQUARES
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import InverseOnPattern
 from aerotri.adjustment.unknowns import State, Unknowns
@@ -175,12 +177,12 @@ def _predictions(system: NormalSystem, switched: NormalSystem, state: State, inv
     u = system.unknowns
     m = len(u.rays.image)
     points, predicted = np.empty((len(u.points), 3, 3)), np.empty((m, 3))
-    residual, weight = np.empty((m, 2)), np.empty(m)
-    full, parts = u.rays.as_tuple(), (inverse.blocks, inverse.border, inverse.corner)
+    problem, parts = switched.problem(state, LEAST_SQUARES), Inverse(inverse.blocks, inverse.border, inverse.corner)
+    full = problem._replace(rays=u.rays.arrays())
     switched.over_points(
-        state,
-        lambda first, last, rays, pattern, table, values, work: _reliability_kernels.predicted_cofactors(
-            first, last, rays, full, pattern, table, values, parts, points, predicted, residual, weight, work
+        problem,
+        lambda first, last, problem, work: _reliability_kernels.predicted_cofactors(
+            first, last, problem, full, parts, (points, predicted), work
         ),
     )
     for row, columns in zip(u.kept_rows, u.kept_columns, strict=True):

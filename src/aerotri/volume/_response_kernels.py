@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.compiled import kernel
-from aerotri.functional_model._kernels import linearise_ray, predict_ray
+from aerotri.functional_model._kernels import RayPartials, linearise_ray, predict_ray
 
 
 @kernel
@@ -60,7 +60,8 @@ def respond(first, last, start, image, inv_sigma, points, gradient, noise_share,
                 for _ in range(3):
                     predict_ray(rotation[i], centre[i], points[p], row, x, y, at[r])
                     x, y = at[r, 0], at[r, 1]
-            linearise_ray(rotation[i], centre[i], points[p], row, x, y, at[r], by_eo[r], by_pt[r], by_in[r])
+            partials = RayPartials(at[r], by_eo[r], by_pt[r], by_in[r])
+            linearise_ray(rotation[i], centre[i], points[p], row, x, y, partials)
             weight = inv_sigma[start[p] + r] ** 2
             for a in range(3):
                 for b in range(3):

@@ -16,8 +16,9 @@ from scipy.sparse import coo_matrix, csc_matrix
 from adjusting.blocks import common_start, load_block, spec_of
 from adjusting.ours import WARM_UP, start_values, with_parameters
 from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.prepare import build_system, ray_status
+from aerotri.adjustment.ray_status import ray_status
 from aerotri.adjustment.robust import LEAST_SQUARES
+from aerotri.adjustment.system import build_system
 
 B = 6
 REPEATS = 5

@@ -9,9 +9,10 @@ from typing import Any
 from adjusting.blocks import Start, common_start, load_block, spec_of
 from adjusting.child import Memory, Timer
 from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.prepare import build_system, ray_status
+from aerotri.adjustment.ray_status import ray_status
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.start_values import local_origin
+from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import StartValues
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.observations import Block
@@ -65,7 +66,7 @@ def _gauss_newton(system: NormalSystem, solution: Solution) -> None:
     """One whole iteration, with a factor of its own."""
     equations = system.assemble(solution.state, 0.0, solution.estimator)
     x = system.factorise(equations).solve(equations.right)
-    step = system.back_substitute(solution.state, x, 0.0, equations, solution.estimator)
+    step = system.back_substitute(solution.state, x, 0.0, solution.estimator)
     system.unknowns.advance(solution.state, step)
 
 

@@ -185,7 +185,7 @@ def of_json(raw: bytes, rng: random.Random) -> bytes:
         opening, closing = rng.choice((("[", "]"), ('{"a":', "}")))
         depth = rng.choice((500, 1500, 100_000))
         nested = opening * depth + "1" + closing * depth
-        return _replaced(NUMBER, text, rng, nested).encode()
+        return _replaced(NUMBER, text, rng, nested).encode("utf-8", "surrogatepass")
     return text.encode("utf-8", "surrogatepass")
 
 
@@ -230,19 +230,19 @@ def of_xml(raw: bytes, rng: random.Random) -> bytes:
         try:
             return text.encode(rng.choice((declared, "utf-8")), "replace")
         except LookupError:
-            return text.encode()
+            return text.encode("utf-8", "surrogatepass")
     if kind == 1:
         doctype = rng.choice(('<!DOCTYPE a SYSTEM "file:///etc/passwd">', "<!doctype a>"))
-        return text.replace("?>", "?>" + doctype, 1).encode()
+        return text.replace("?>", "?>" + doctype, 1).encode("utf-8", "surrogatepass")
     if kind == 2:
         depth = rng.choice((500, 50_000))
-        return _replaced(NUMBER, text, rng, "<a>" * depth + "</a>" * depth).encode()
+        return _replaced(NUMBER, text, rng, "<a>" * depth + "</a>" * depth).encode("utf-8", "surrogatepass")
     if kind in (3, 4, 5):
         elements = list(re.finditer(r"<(\w+)[^<>]*>[^<]*</\1>", text))
         if elements:
             place = rng.choice(elements)
             other = rng.choice((*(one.group() for one in rng.sample(elements, min(3, len(elements)))), "", "<a/>"))
-            return (text[: place.start()] + other + text[place.end() :]).encode()
+            return (text[: place.start()] + other + text[place.end() :]).encode("utf-8", "surrogatepass")
     return of_text(raw, rng)
 
 
@@ -259,9 +259,9 @@ def of_toml(raw: bytes, rng: random.Random) -> bytes:
         places = list(re.finditer(r"= *(.*)", text))
         if places:
             place = rng.choice(places)
-            return (text[: place.start(1)] + rng.choice(values) + text[place.end(1) :]).encode()
+            return (text[: place.start(1)] + rng.choice(values) + text[place.end(1) :]).encode("utf-8", "surrogatepass")
     if rng.random() < 0.1:
-        return (text + "\n" + "a." * rng.choice((100, 20_000)) + "b = 1\n").encode()
+        return (text + "\n" + "a." * rng.choice((100, 20_000)) + "b = 1\n").encode("utf-8", "surrogatepass")
     return of_text(raw, rng)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import brown, parameter_sets
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -131,7 +132,6 @@ def oriented_from_adjusted(adjusted: AdjustedBlock) -> OrientedBlock:
     """A block after its adjustment, with a camera for every group of images that has parameters of its own."""
     # imported here: who converts blocks without results need not wait for it
     from aerotri.image_errors import image_groups
-    from aerotri.results.adjusted_block import RAY_STATUS
 
     block, rays = adjusted.block, adjusted.block.image_points
     groups = image_groups(block)
@@ -150,7 +150,7 @@ def oriented_from_adjusted(adjusted: AdjustedBlock) -> OrientedBlock:
         adjusted.images.centre,
         rotation_from_angles(adjusted.images.angles, block.rotation),
         adjusted.points.xyz,
-        adjusted.rays.status == RAY_STATUS.index("used"),
+        adjusted.rays.status == RayStatus.USED,
         errors if errors.any() else None,
     )
 

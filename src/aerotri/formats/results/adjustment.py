@@ -16,13 +16,14 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.adjustment.ray_status import RAY_STATUS, RayStatus
 from aerotri.conventions import MGON_PER_RADIAN
 from aerotri.formats.results.reliability_columns import control_columns, observation_columns, ray_columns
 from aerotri.formats.text.table_writer import with_plain_texts
 from aerotri.image_errors import interior_elements
 from aerotri.observations import Block
 from aerotri.observations.block import INTERIOR_ELEMENTS
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock, GroundPointResults, Outcome
+from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Outcome
 from aerotri.statistics.set_aside import photograph_reasons, point_reasons, status_columns
 
 NEEDS_QUOTES = re.compile(r'[,"\r\n#]')
@@ -161,7 +162,7 @@ def residual_table(adjusted: AdjustedBlock):
     import pyarrow as pa
 
     block, rays, measured = adjusted.block, adjusted.rays, adjusted.block.image_points
-    used = (rays.status == RAY_STATUS.index("used"))[:, None]
+    used = (rays.status == RayStatus.USED)[:, None]
     numbers = _split(("x", "y"), measured.xy)
     for name, values in (("v", rays.v), ("r", rays.r), ("w", rays.w)):
         numbers |= _split((f"{name}x", f"{name}y"), np.where(used, values, np.nan))

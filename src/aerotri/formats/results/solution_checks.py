@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from aerotri.adjustment._robust_kernels import ADAPTIVE, ADAPTIVE_STEPS
+from aerotri.adjustment.ray_status import RAY_STATUS
 from aerotri.adjustment.robust import CODES, WIDEST
 from aerotri.formats.files.npz import Archive, Shape
 from aerotri.observations import Block
-from aerotri.results.adjusted_block import RAY_STATUS
 from aerotri.results.removal import Removal
 from aerotri.results.variance_components import ChiSquareTest, VarianceComponent
 

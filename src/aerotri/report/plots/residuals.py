@@ -8,8 +8,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.report.plots.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, plain, styled
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 
 BINS = 60
 MOST_PARAMETERS = 90
@@ -23,7 +24,7 @@ def plot_residual_histogram(adjusted: AdjustedBlock) -> Figure:
     A residual varies by σ̂0·√r, not by σ̂0: part of every error is absorbed by the unknowns. The curve has σ̂0·√r̄, r̄ the
     mean redundancy number; σ̂0 itself is marked.
     """
-    used = adjusted.rays.status == RAY_STATUS.index("used")
+    used = adjusted.rays.status == RayStatus.USED
     v = 1e3 * adjusted.rays.v[used]
     v = v[np.isfinite(v).all(axis=1)]
     r = adjusted.rays.r[used]

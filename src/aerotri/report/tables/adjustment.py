@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.adjustment.ray_status import RayStatus
 from aerotri.conventions import MGON_PER_RADIAN
 from aerotri.functional_model.additional_parameters import Parameter, format_parameters
 from aerotri.functional_model.additional_parameters import unit_of as unit_of_parameter
@@ -14,7 +15,7 @@ from aerotri.functional_model.additional_parameters.family import NO_UNIT
 from aerotri.image_errors import interior_elements, largest_effects
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.report.quality import asprs_warning, ground_statistics, metre_digits, pixel_text, printable
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock, GroundPointResults, Outcome
+from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Outcome
 
 TOP_RESIDUALS = 30
 TOP_WEAK = 15
@@ -71,7 +72,7 @@ def table(title: str, *columns: tuple[Column, Any]) -> Table:
 def summary(adjusted: AdjustedBlock) -> Table:
     """What was adjusted, and with which settings."""
     block, o, a = adjusted.block, adjusted.outcome, adjusted.block.settings.adjustment
-    used = int(np.sum(adjusted.rays.status == RAY_STATUS.index("used")))
+    used = int(np.sum(adjusted.rays.status == RayStatus.USED))
     families = format_parameters(a.additional_parameters)
     cameras = ", ".join(f"{c.name} ({c.model})" for c in block.cameras)
     gnss = 0 if block.gnss_ins is None else len(block.gnss_ins)
@@ -325,7 +326,7 @@ def verdict_lines(outcome: Outcome) -> list[str]:
 def summary_lines(adjusted: AdjustedBlock) -> list[str]:
     """The result in a few lines of plain text for a terminal; names may hold any printable character, also brackets."""
     o, p = adjusted.outcome, adjusted.parameters
-    used = int(np.sum(adjusted.rays.status == RAY_STATUS.index("used")))
+    used = int(np.sum(adjusted.rays.status == RayStatus.USED))
     left_out = len(adjusted.rays.status) - used
     lines = [
         *verdict_lines(o),

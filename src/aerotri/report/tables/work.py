@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerotri.adjustment.ray_status import RAY_STATUS
 from aerotri.conventions import MGON_PER_RADIAN
 from aerotri.diagnosis.control_rays import control_rays
 from aerotri.diagnosis.free_verdict import in_words, suspect_text
@@ -11,7 +12,7 @@ from aerotri.diagnosis.work_items import KINDS, PRIORITIES
 from aerotri.diagnosis.work_list import WorkList
 from aerotri.report.quality import metre_digits
 from aerotri.report.tables.adjustment import MOST_ROWS, Column, Table, table
-from aerotri.results.adjusted_block import RAY_STATUS, AdjustedBlock
+from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.strategies.free_stages import FreeCheck
 
 KIND_TITLES = {

@@ -1,0 +1,243 @@
+"""What kernels are given, by name: the rays, what is estimated of them, where the unknowns stand, room to work in.
+
+m rays lie in point order and, within a point, by photograph; P points, n photographs, L sets of interior elements, s
+shared parameters.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class RayArrays(NamedTuple):
+    """The rays.
+
+    Parameters
+    ----------
+    start : (P + 1,) first ray of every point.
+    image : (m,) photograph. lens_row : (m,) set of interior elements.
+    xy : (m, 2) mm, as measured.
+    inv_sigma : (m, 2) 1/mm.
+    ap_index : (m, ka) shared parameters that act on the ray as additional parameters.
+    ap_value : (m, 2, ka) their partials.
+    """
+
+    start: np.ndarray
+    image: np.ndarray
+    lens_row: np.ndarray
+    xy: np.ndarray
+    inv_sigma: np.ndarray
+    ap_index: np.ndarray
+    ap_value: np.ndarray
+
+
+class Pairs(NamedTuple):
+    """The blocks of pairs of photographs: `start` (P + 1,) first pair of every point, `block` its number.
+
+    Of two rays of a point the photograph of the first has the smaller number.
+    """
+
+    start: np.ndarray
+    block: np.ndarray
+
+
+class Table(NamedTuple):
+    """What is estimated, and what is known beforehand.
+
+    Parameters
+    ----------
+    lens_columns : (L, 15) shared parameter of every interior element, −1 where it is none.
+    eo_free : (n, 6) 1 or 0.
+    turn : (n, 3, 3) basis of the small rotations.
+    prior_xyz : (P, 3) m. prior_weight : (P, 3) 1/m², 0 where nothing is known.
+    point_free : (P, 3) 1 or 0.
+    kept : (P,) first shared parameter of a point that is not eliminated, −1 otherwise.
+    """
+
+    lens_columns: np.ndarray
+    eo_free: np.ndarray
+    turn: np.ndarray
+    prior_xyz: np.ndarray
+    prior_weight: np.ndarray
+    point_free: np.ndarray
+    kept: np.ndarray
+
+
+class Values(NamedTuple):
+    """Where the unknowns stand: rotation (n, 3, 3), centre (n, 3), points (P, 3), interior (L, 15), shared (s,)."""
+
+    rotation: np.ndarray
+    centre: np.ndarray
+    points: np.ndarray
+    interior: np.ndarray
+    shared: np.ndarray
+
+
+class Problem(NamedTuple):
+    """All that the equations of a point depend on, and the residuals and weights that its rays get.
+
+    Parameters
+    ----------
+    estimator, limit : code and limit of the robust estimator.
+    damping : λ, every diagonal element is multiplied by 1 + λ.
+    residual : (m, 2) mm, out. weight : (m,) out.
+    """
+
+    rays: RayArrays
+    pairs: Pairs
+    table: Table
+    values: Values
+    estimator: int
+    limit: float
+    damping: float
+    residual: np.ndarray
+    weight: np.ndarray
+
+
+class Work(NamedTuple):
+    """Room of one thread for one point of up to q rays, see `_point_kernels.scratch`.
+
+    Parameters
+    ----------
+    by_eo, by_pt, by_sh : (q, 2, ·) whitened partials by orientation, point and shared parameters.
+    whitened : (q, 2) misclosures over σ.
+    columns, n_columns : (q, ·) shared parameters of every ray, and how many; places in `union`.
+    union, place : (s,) the shared parameters of the point, and where each stands among them.
+    couple, couple_shared : (q, 3, 6) and (3, s), L⁻¹·N_pe and L⁻¹·N_ps.
+    by_interior, prediction : (2, 15) and (2,) of one ray.
+    """
+
+    by_eo: np.ndarray
+    by_pt: np.ndarray
+    by_sh: np.ndarray
+    whitened: np.ndarray
+    columns: np.ndarray
+    n_columns: np.ndarray
+    union: np.ndarray
+    place: np.ndarray
+    couple: np.ndarray
+    couple_shared: np.ndarray
+    by_interior: np.ndarray
+    prediction: np.ndarray
+
+
+class Sums(NamedTuple):
+    """Normal equations of a range of points, over the ni photographs and no pairs of them that it touches.
+
+    Parameters
+    ----------
+    diagonal : (ni, 6, 6). pairs : (no, 6, 6). border : (ni, s, 6). corner : (s, s), of which each element is added on
+        one side of the diagonal, whichever. right : (ni, 6). right_shared : (s,).
+    squares, squares_shared : (ni, 6) and (s,) of the columns, before the points are eliminated.
+    """
+
+    diagonal: np.ndarray
+    pairs: np.ndarray
+    border: np.ndarray
+    corner: np.ndarray
+    right: np.ndarray
+    right_shared: np.ndarray
+    squares: np.ndarray
+    squares_shared: np.ndarray
+
+
+class Directions(NamedTuple):
+    """Steps, right sides or solutions: images (n, 6, ·), shared (s, ·), points (P, 3, ·)."""
+
+    images: np.ndarray
+    shared: np.ndarray
+    points: np.ndarray
+
+
+class Inverse(NamedTuple):
+    """The inverse on the pattern of the reduced normal matrix: blocks (nb, 6, 6), border (n, s, 6), corner (s, s)."""
+
+    blocks: np.ndarray
+    border: np.ndarray
+    corner: np.ndarray
+
+
+class Coupling(NamedTuple):
+    """Of one point: H over its photographs (q, 6, 3) and shared parameters (s, 3), and Q_pp (3, 3)."""
+
+    h: np.ndarray
+    h_shared: np.ndarray
+    q_pp: np.ndarray
+
+
+class Datum(NamedTuple):
+    """The S-transformation to an inner datum of d motions: G and the columns Q·Aᵀ; d = 0 in other datums.
+
+    images, qa_images : (n, 6, d). shared, qa_shared : (s, d). points, qa_points : (P, 3, d).
+    """
+
+    images: np.ndarray
+    shared: np.ndarray
+    points: np.ndarray
+    qa_images: np.ndarray
+    qa_shared: np.ndarray
+    qa_points: np.ndarray
+
+
+class Scale(NamedTuple):
+    """What effects are measured by.
+
+    Parameters
+    ----------
+    to_angles : (n, 3, 3) from the rotation unknowns to ω, φ, κ.
+    per_image, per_shared, per_point : 1/σ (n, 6), (s,), (P, 3), 0 for an unknown that is held.
+    """
+
+    to_angles: np.ndarray
+    per_image: np.ndarray
+    per_shared: np.ndarray
+    per_point: np.ndarray
+
+
+class Effects(NamedTuple):
+    """Of every ray, out: size (m, 2) of the largest effect over σ, which unknown (m, 2), height (m, 2) m.
+
+    Unknowns: 0–2 of the point, 3–8 of the photograph, from 9 on a shared parameter, −1 none.
+    """
+
+    size: np.ndarray
+    unknown: np.ndarray
+    height: np.ndarray
+
+
+class RowPlace(NamedTuple):
+    """One coordinate of a ray: the ray's number within its point, 0 for x or 1 for y, the point, the photograph."""
+
+    q: int
+    row: int
+    point: int
+    image: int
+
+
+class FrontBlocks(NamedTuple):
+    """The matrix blocks that begin in a front, and their places there; see `sparse_cholesky`."""
+
+    block: np.ndarray
+    local_row: np.ndarray
+    local_col: np.ndarray
+    flipped: np.ndarray
+
+
+class MatrixBlocks(NamedTuple):
+    """Blocks (nb, 6, 6) of a matrix, their photographs, and the scale (n, 6) of its rows and columns."""
+
+    blocks: np.ndarray
+    row: np.ndarray
+    col: np.ndarray
+    scale: np.ndarray
+
+
+class Front(NamedTuple):
+    """A dense front: its two flat panels in Fortran order, and how many rows each has."""
+
+    own: int
+    rows: int
+    top: np.ndarray
+    low: np.ndarray
