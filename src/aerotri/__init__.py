@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from aerotri.public.models import deform as deform
     from aerotri.public.simulating import example_flight as example_flight
     from aerotri.public.simulating import simulate as simulate
+    from aerotri.public.surface_comparison import compare as compare
     from aerotri.public.surfaces import Surface as Surface
     from aerotri.public.table import Table as Table
     from aerotri.public.terrain import terrain as terrain
@@ -50,6 +51,7 @@ _PLACES = {
     "Surface": "aerotri.public.surfaces",
     "Table": "aerotri.public.table",
     "changes": "aerotri.public.changes",
+    "compare": "aerotri.public.surface_comparison",
     "compare_parameters": "aerotri.public.comparing",
     "crosscheck": "aerotri.public.comparing",
     "deform": "aerotri.public.models",
@@ -80,6 +82,7 @@ __all__ = [
     "__version__",
     "adjust",
     "changes",
+    "compare",
     "compare_parameters",
     "convert",
     "crosscheck",

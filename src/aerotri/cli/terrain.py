@@ -9,7 +9,15 @@ import typer
 
 from aerotri.cli.app import app, predict
 from aerotri.cli.options import Json, ResultFolder
-from aerotri.terrain.settings import DEFAULTS, FEWEST_PHOTOGRAPHS, LARGEST_EDGE, MOST_PHOTOGRAPHS, TerrainSettings
+from aerotri.terrain.settings import (
+    ALIGNMENT,
+    DEFAULTS,
+    FEWEST_PHOTOGRAPHS,
+    INTERPOLATION,
+    LARGEST_EDGE,
+    MOST_PHOTOGRAPHS,
+    TerrainSettings,
+)
 
 
 @app.command(epilog="Example: aerotri dtm saar_result photographs --out saar_dtm --interval 5")
@@ -67,8 +75,8 @@ def compare(
     test: Annotated[Path, typer.Argument(help="Surface to judge: GeoTIFF, LAZ, pickets.parquet, or a folder of dtm.")],
     control: Annotated[Path, typer.Argument(help="Control surface of the same kinds.")],
     out: Annotated[Path | None, typer.Option(help="Folder to write; default TEST_comparison here.")] = None,
-    method: Annotated[str, typer.Option(help="Interpolation of both: linear or spline.")] = "linear",
-    align: Annotated[str, typer.Option(help="Move the first onto the second: none, shift or rigid.")] = "none",
+    method: Annotated[str, typer.Option(help="Interpolation of both: linear or spline.")] = INTERPOLATION,
+    align: Annotated[str, typer.Option(help="Move the first onto the second: none, shift or rigid.")] = ALIGNMENT,
     cell: Annotated[float | None, typer.Option(min=1e-6, help="Cell of the differences, m.")] = None,
     plots: Annotated[bool, typer.Option(help="Draw map and histogram.")] = True,
     json_: Json = False,
@@ -76,7 +84,7 @@ def compare(
     """Differences of two surfaces: RMSE, bias, NMAD, LE90, map and histogram."""
     from aerotri.commands.compare import run_compare
 
-    run_compare(test, control, out, method, align, cell, plots, json_)
+    run_compare(test, control, out, cast(Any, method), cast(Any, align), cell, plots, json_)
 
 
 @predict.command("picket-interval", epilog="Example: aerotri predict picket-interval --scan-um 28 --scale 7000")

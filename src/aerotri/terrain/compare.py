@@ -18,10 +18,11 @@ from scipy.ndimage import map_coordinates
 
 from aerotri.conventions import InputError
 from aerotri.rasters.grids import Grid, RasterReader
+from aerotri.rasters.held import HeldRaster
+from aerotri.terrain.settings import ALIGNMENT, INTERPOLATION
+from aerotri.terrain.surface import grid_over
 from aerotri.terrain.tin import Tin, triangulate
 
-METHODS = ("linear", "spline")
-ALIGNMENTS = ("none", "shift", "rigid")
 NMAD = 1.4826
 LARGEST_SIDE = 8.0
 SPLINE_NEIGHBOURS = 24
@@ -31,6 +32,10 @@ MOST_ALIGNED = 200_000
 FEWEST = 20
 PART_CELLS = 16_000_000
 AXES = np.eye(2)
+MOST_CELLS = 10_000
+"""A side of the grid of differences has at most so many, however fine the surfaces are."""
+BYTES_OF_CELL = 64
+"""Of the grid of differences: places, heights of both, and what the statistics sort."""
 
 
 class Heights(Protocol):
@@ -61,7 +66,7 @@ class RasterHeights:
 class FileHeights:
     """Heights of a raster that is too large to be held: read where they are asked for."""
 
-    reader: RasterReader
+    reader: RasterReader | HeldRaster
 
     def at(self, xy: np.ndarray, method: str) -> np.ndarray:
         """Bilinear as `RasterHeights`, of the part of the file around the places."""
@@ -171,6 +176,20 @@ class Comparison:
         return text
 
 
+def common_grid(one: np.ndarray, other: np.ndarray, cell: float) -> Grid:
+    """Cells whose centres are multiples of the cell, where both areas (2, 2) m reach.
+
+    Raises
+    ------
+    InputError
+        When the areas do not meet, or the grid does not fit into memory.
+    """
+    low, high = np.maximum(one[0], other[0]), np.minimum(one[1], other[1])
+    if (low >= high).any():
+        raise InputError("the surfaces have no place in common", "check their coordinate systems")
+    return grid_over(np.array([low, high]), max(cell, float((high - low).max()) / MOST_CELLS), BYTES_OF_CELL)
+
+
 def statistics_of(difference: np.ndarray) -> Statistics:
     """Of all that is known.
 
@@ -190,15 +209,15 @@ def statistics_of(difference: np.ndarray) -> Statistics:
 
 
 def compare(
-    test: Heights, control: Heights, grid: Grid, method: str = "linear", alignment: str = "none",
+    test: Heights, control: Heights, grid: Grid, method: str = INTERPOLATION, alignment: str = ALIGNMENT,
     report: Callable[[int, int], None] | None = None,
 ) -> Comparison:  # fmt: skip
     """Differences of two surfaces on a grid.
 
     Parameters
     ----------
-    method : of `METHODS`, the interpolation of both.
-    alignment : of `ALIGNMENTS`; 'shift' in X, Y, Z [L: Nuth & Kääb 2011], 'rigid' with three rotations besides
+    method : of `settings.INTERPOLATIONS`, the interpolation of both.
+    alignment : of `settings.ALIGNMENTS`; 'shift' in X, Y, Z [L: Nuth & Kääb 2011], 'rigid' with three rotations besides
         [L: Gruen & Akca 2005, least squares surface matching].
     report : called with the parts that are done and all there are, where a surface is read part by part.
 

@@ -1,11 +1,13 @@
-"""Surfaces for machines: dtm.json."""
+"""Surfaces and their comparison for machines: dtm.json, compare.json."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from aerotri.terrain.compare import Comparison
 from aerotri.terrain.dtm import TerrainOutcome, base_ratio
 from aerotri.terrain.picket_status import PicketStatus
 from aerotri.version import __version__
@@ -46,3 +48,16 @@ def _ray_sigma_mm(o: TerrainOutcome) -> float:
     height = np.median(o.photographs.centres[:, 2]) - np.median(p.xyz[own, 2])
     sigma = np.median(np.sqrt(p.covariance[own, 2, 2])) * base_ratio(o.photographs, p)
     return float(sigma * np.median(o.photographs.orientation.interior[:, 0]) / height / np.sqrt(2.0))
+
+
+def comparison_json(found: Comparison, test: str, control: str, method: str) -> dict[str, Any]:
+    """The content of compare.json."""
+    a = found.alignment
+    moved = None
+    if a is not None:
+        moved = {"kind": a.kind, "shift_m": a.shift.tolist(), "rotation_rad": a.rotation.tolist(),
+                 "about_m": a.middle.tolist()}  # fmt: skip
+    return {
+        "aerotri": __version__, "test": test, "control": control, "method": method, "cell_m": found.grid.cell_x,
+        "difference_m": asdict(found.statistics), "coverage": found.coverage, "alignment": moved,
+    }  # fmt: skip

@@ -1,4 +1,4 @@
-"""What a user may say about the measuring of a surface, with what holds where nothing is said."""
+"""What a user may say about measuring and comparing surfaces, with what holds where nothing is said."""
 
 from __future__ import annotations
 
@@ -10,6 +10,12 @@ from aerotri.conventions import LARGEST, InputError
 
 Subset = Literal["all", "even", "odd"]
 SUBSETS: tuple[Subset, ...] = get_args(Subset)
+Interpolation = Literal["linear", "spline"]
+INTERPOLATIONS: tuple[Interpolation, ...] = get_args(Interpolation)
+Movement = Literal["none", "shift", "rigid"]
+ALIGNMENTS: tuple[Movement, ...] = get_args(Movement)
+INTERPOLATION, ALIGNMENT = INTERPOLATIONS[0], ALIGNMENTS[0]
+"""Of surfaces that are compared, where nothing is stated."""
 EDGE, EDGE_OF_PAIRS = 0.02, 0.10
 """Share of the format at its edge not used: of pairs as Tran (2007) has it; where more vouch for a picket, less."""
 LARGEST_EDGE = 0.4

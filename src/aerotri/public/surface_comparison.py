@@ -1,0 +1,240 @@
+"""A surface against a control surface: differences cell by cell, and what follows from them."""
+
+from __future__ import annotations
+
+import os
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.progress import ProgressLike, stage_report
+from aerotri.public.surfaces import Surface, as_surface
+from aerotri.public.table import Table
+from aerotri.terrain.settings import ALIGNMENT, ALIGNMENTS, INTERPOLATION, INTERPOLATIONS, Interpolation, Movement
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from aerotri.formats.files.heights import HeightSource
+    from aerotri.public.surfaces import SurfaceLike
+    from aerotri.terrain.compare import Comparison
+
+RECORD = "compare.json"
+OWN_NAMES = (RECORD, "difference.tif", "plots")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceComparison:
+    """What `aerotri.compare` returns: differences test − control, m.
+
+    Parameters
+    ----------
+    record : the differences as an array, with their statistics.
+    test, control : names of the surfaces. method : how both were interpolated.
+    crs : 'EPSG:n', None where not known.
+    notes : what was done to bring the surfaces to metres, in sentences.
+    """
+
+    record: Comparison
+    test: str
+    control: str
+    method: str
+    crs: str | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def rmse(self) -> float:
+        """m, root of the mean square of all differences."""
+        return self.record.statistics.rmse
+
+    @property
+    def bias(self) -> float:
+        """m, mean of the differences."""
+        return self.record.statistics.bias
+
+    @property
+    def nmad(self) -> float:
+        """m, 1.4826 times the median of |difference − median|: the σ of a distribution with gross errors."""
+        return self.record.statistics.nmad
+
+    @property
+    def coverage(self) -> float:
+        """Share of the control surface that the test surface covers, 0 … 1."""
+        return self.record.coverage
+
+    @cached_property
+    def statistics(self) -> Table:
+        """Count, RMSE, bias, median, standard deviation, NMAD, LE90 and largest difference, m, in one row."""
+        import pyarrow as pa
+
+        values = asdict(self.record.statistics)
+        columns = {name: [value] for name, value in values.items()}
+        return Table("differences", pa.table(columns), {name: "m" for name in values if name != "count"})
+
+    @cached_property
+    def difference(self) -> Surface:
+        """The differences, m, as a surface; NaN where either has none."""
+        from aerotri.terrain.surface import Surface as Heights
+
+        d = self.record.difference
+        return Surface(Heights(self.record.grid, d, np.full_like(d, np.nan)), self.crs, "difference.tif")
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The content of compare.json."""
+        from aerotri.terrain.outcome_json import comparison_json
+
+        return comparison_json(self.record, self.test, self.control, self.method)
+
+    def plot(self) -> Figure:
+        """The differences as a map and as a histogram."""
+        from aerotri.report.plots.terrain import plot_comparison
+
+        return plot_comparison(self.record, f"{self.test} − {self.control}")
+
+    def save(self, out: str | os.PathLike, plots: bool = True) -> Path:
+        """Write compare.json, the raster of the differences and the plot into a folder.
+
+        Parameters
+        ----------
+        out : folder; an older comparison there is replaced in one step. plots : draw map and histogram.
+
+        Returns
+        -------
+        Path of the folder.
+
+        Raises
+        ------
+        InputError
+            When the folder holds other files, or cannot be written to.
+        """
+        target = Path(out)
+        refuse_foreign_folder(target, RECORD)
+        _write(target, self, plots)
+        return target
+
+    def __repr__(self) -> str:
+        return f"<aerotri comparison {self.test!r} − {self.control!r}: RMSE {self.rmse:.3g} m, NMAD {self.nmad:.3g} m>"
+
+    def _repr_html_(self) -> str:
+        moved = f"<p>{escape(self.record.alignment_text)}</p>" if self.record.alignment_text else ""
+        return (
+            f"<div><b>{escape(self.test)} − {escape(self.control)}</b>, {100.0 * self.coverage:.1f} % of the control "
+            f"covered{moved}{self.statistics._repr_html_()}</div>"
+        )
+
+
+def compare(
+    test: SurfaceLike,
+    control: SurfaceLike,
+    *,
+    method: Interpolation = INTERPOLATION,
+    align: Movement = ALIGNMENT,
+    cell: float | None = None,
+    progress: ProgressLike = None,
+) -> SurfaceComparison:
+    """Differences of two surfaces, both interpolated to the same places in the same way.
+
+    Parameters
+    ----------
+    test : surface to judge: GeoTIFF, LAZ, pickets.parquet, folder of `aerotri dtm`, or a surface in memory.
+    control : surface of the same kinds that it is held against.
+    method : interpolation of both.
+    align : move the first onto the second before: not at all, by a shift in X, Y, Z, or turned as well.
+    cell : m, of the differences; the larger one of both where None.
+    progress : as of `aerotri.adjust`.
+
+    Returns
+    -------
+    SurfaceComparison
+
+    Raises
+    ------
+    InputError
+        When a file cannot be read, or the surfaces have no place in common.
+
+    Examples
+    --------
+    >>> import aerotri, numpy as np
+    >>> x = np.linspace(0.0, 3.0, 50)
+    >>> hills = aerotri.Surface.of_array(np.sin(x)[:, None] + np.cos(x), left=0.0, top=100.0, cell=2.0)
+    >>> higher = aerotri.Surface.of_array(hills.z + 0.25, left=0.0, top=100.0, cell=2.0)
+    >>> found = aerotri.compare(higher, hills)
+    >>> round(found.bias, 3), round(found.nmad, 3)
+    (0.25, 0.0)
+    """
+    from aerotri.rasters.grids import cache_limited
+    from aerotri.terrain.compare import common_grid
+    from aerotri.terrain.compare import compare as differences
+
+    _check(method, align)
+    with stage_report(progress) as report, ExitStack() as stack:
+        report.stage("reading", None)
+        stack.enter_context(cache_limited())
+        one, other = _sources(test, control, stack)
+        if one.epsg is not None and other.epsg is not None and one.epsg != other.epsg:
+            message = f"is in EPSG:{one.epsg}, the control in EPSG:{other.epsg}"
+            raise InputError(message, "bring them into one CRS", _name(test))
+        grid = common_grid(one.area, other.area, cell or max(one.cell, other.cell))
+        report.stage("comparing", None)
+        found = differences(
+            one.heights, other.heights, grid, method, align, lambda k, n: report.counted("comparing", k, n)
+        )
+    epsg = one.epsg or other.epsg
+    notes = tuple(source.note for source in (one, other) if source.note)
+    return SurfaceComparison(
+        found, _name(test), _name(control), method, None if epsg is None else f"EPSG:{epsg}", notes
+    )
+
+
+def _check(method: str, align: str) -> None:
+    for name, value, known in (("method", method, INTERPOLATIONS), ("alignment", align, ALIGNMENTS)):
+        if value not in known:
+            raise InputError(f"there is no {name} '{value}'", f"choose one of {', '.join(known)}")
+
+
+def _name(surface: SurfaceLike) -> str:
+    return Path(surface).name if isinstance(surface, str | os.PathLike) else as_surface(surface).label
+
+
+def _sources(test: SurfaceLike, control: SurfaceLike, stack: ExitStack) -> tuple[HeightSource, HeightSource]:
+    """Both surfaces; one that does not count in metres is brought to the CRS of the other."""
+    from aerotri.formats.files.heights import common_crs, heights_of_file, heights_of_raster
+
+    both = (test, control)
+    files = [_file(one) for one in both]
+    held = [as_surface(one).crs for one, path in zip(both, files, strict=True) if path is None]
+    crs = next(filter(None, held), None) or common_crs(*(path for path in files if path is not None))
+    found = [
+        heights_of_raster(stack.enter_context(as_surface(one).reader())) if path is None
+        else heights_of_file(path, stack, crs)
+        for one, path in zip(both, files, strict=True)
+    ]  # fmt: skip
+    return found[0], found[1]
+
+
+def _file(surface: SurfaceLike) -> Path | None:
+    """The file or folder of a surface, None for one in memory."""
+    return Path(surface) if isinstance(surface, str | os.PathLike) else as_surface(surface).path
+
+
+def _write(target: Path, found: SurfaceComparison, plots: bool) -> None:
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.public.saving import write_json
+    from aerotri.rasters.grids import write_raster
+
+    c = found.record
+    with atomic_folder(target, own=OWN_NAMES) as folder:
+        write_raster(folder / "difference.tif", c.difference, c.grid, found.crs, "test − control, m")
+        if plots:
+            from aerotri.report.plots.rendering import save_plots
+
+            save_plots({"difference": found.plot()}, folder / "plots")
+        write_json(folder / RECORD, found.summary)

@@ -1,0 +1,102 @@
+"""Surfaces compared from Python: known differences, the same from memory as from files, one CRS."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from pyproj import Transformer
+
+import aerotri
+from aerotri import InputError
+
+LEFT, TOP, CELL = 499_999.0, 5_450_001.0, 2.0
+"""m; centres of cells are multiples of the cell, as those of the differences."""
+
+
+def hills(x, y):
+    return 100.0 + 8.0 * np.sin(x / 23.0) * np.cos(y / 31.0) + 5.0 * np.cos((x + y) / 40.0)
+
+
+@pytest.fixture(scope="module")
+def control():
+    x, y = np.meshgrid(LEFT + CELL * (np.arange(120) + 0.5), TOP - CELL * (np.arange(100) + 0.5))
+    return aerotri.Surface.of_array(hills(x, y), left=LEFT, top=TOP, cell=CELL, crs="EPSG:32632", name="hills")
+
+
+def raised(surface, by):
+    return replace(surface, source=replace(surface.source, z=surface.z + by), name="raised")
+
+
+def test_a_known_difference(control):
+    noise = np.random.default_rng(3).normal(0.3, 0.2, control.z.shape)
+    found = aerotri.compare(raised(control, noise), control)
+    # heights have 32 bit
+    assert found.bias == pytest.approx(noise.mean(), abs=1e-4)
+    assert found.rmse == pytest.approx(np.sqrt(np.mean(noise**2)), abs=1e-4)
+    assert found.nmad == pytest.approx(0.2, rel=0.05)
+    assert found.coverage == 1.0
+    assert found.statistics["count"][0] == np.isfinite(found.difference.z).sum()
+    assert (found.test, found.control) == ("raised", "hills")
+
+
+def test_from_memory_as_from_files(control, tmp_path):
+    test = raised(control, 0.5)
+    one, other = test.save(tmp_path / "one.tif"), control.save(tmp_path / "other.tif")
+    held, read = aerotri.compare(test, control), aerotri.compare(one, str(other))
+    mixed = aerotri.compare(aerotri.Surface(one), control)
+    for found in (read, mixed):
+        np.testing.assert_array_equal(found.difference.z, held.difference.z)
+        assert found.crs == "EPSG:32632"
+    folder = held.save(tmp_path / "out")
+    assert json.loads((folder / "compare.json").read_text(encoding="utf-8")) == held.summary
+    saved = aerotri.Surface(folder / "difference.tif").z
+    np.testing.assert_array_equal(saved.astype(np.float32), held.difference.z.astype(np.float32))
+    assert isinstance(held.plot(), Figure)
+    assert "RMSE" in repr(held)
+    assert "covered" in held._repr_html_()
+
+
+def test_a_shift_is_found(control):
+    x, y = np.meshgrid(LEFT + CELL * (np.arange(120) + 0.5), TOP - CELL * (np.arange(100) + 0.5))
+    moved = aerotri.Surface.of_array(hills(x + 1.5, y) + 0.7, left=LEFT, top=TOP, cell=CELL, crs="EPSG:32632")
+    found = aerotri.compare(moved, control, align="shift")
+    np.testing.assert_allclose(found.summary["alignment"]["shift_m"], [1.5, 0.0, -0.7], atol=0.02)
+    assert found.rmse < 0.05 < 0.5 < aerotri.compare(moved, control).rmse
+
+
+def test_a_raster_in_degrees_is_brought_to_the_surface_in_memory(control, tmp_path):
+    """Also where its own UTM zone is another one."""
+    to_utm = Transformer.from_crs("EPSG:4326", "EPSG:32632", always_xy=True)
+    lon, lat = to_utm.transform(LEFT + 20.0, TOP - 20.0, direction="INVERSE")
+    step = 2e-5
+    x, y = to_utm.transform(*np.meshgrid(lon + step * (np.arange(70) + 0.5), lat - step * (np.arange(60) + 0.5)))
+    degrees = aerotri.Surface.of_array(hills(x, y), left=lon, top=lat, cell=step, crs="EPSG:4326", name="degrees")
+    path = degrees.save(tmp_path / "degrees.tif")
+    for pair in ((path, control), (control, path)):
+        found = aerotri.compare(*pair)
+        assert found.rmse < 0.05
+        assert any("brought from EPSG:4326" in note for note in found.notes)
+
+
+def test_surfaces_of_a_terrain_model(measured):
+    _, _, model, folder = measured
+    found = aerotri.compare(model, folder)
+    assert found.rmse == 0.0
+    assert aerotri.compare(model.dtm, folder / "pickets.parquet", cell=10.0).nmad < 0.2
+
+
+def test_what_makes_no_sense(control, tmp_path):
+    far = replace(control, source=replace(control.source, grid=replace(control.grid, left=0.0)))
+    for match, pair, options in (
+        ("no method 'cubic'", (control, control), {"method": "cubic"}),
+        ("no alignment 'turn'", (control, control), {"align": "turn"}),
+        ("no place in common", (control, far), {}),
+        ("no such file", (tmp_path / "nowhere.tif", control), {}),
+        ("raised: is in EPSG:32633", (replace(raised(control, 1.0), crs="EPSG:32633"), control), {}),
+    ):
+        with pytest.raises(InputError, match=match):
+            aerotri.compare(*pair, **options)
