@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from aerotri.public.converting import convert as convert
     from aerotri.public.covariance import Covariance as Covariance
     from aerotri.public.models import deform as deform
+    from aerotri.public.running import run as run
     from aerotri.public.simulating import example_flight as example_flight
     from aerotri.public.simulating import simulate as simulate
     from aerotri.public.surface_comparison import compare as compare
@@ -62,6 +63,7 @@ _PLACES = {
     "predict": "aerotri.public.predict",
     "read": "aerotri.public.blocks",
     "read_block": "aerotri.public.blocks",
+    "run": "aerotri.public.running",
     "simulate": "aerotri.public.simulating",
     "terrain": "aerotri.public.terrain",
     "tie_points": "aerotri.public.tying",
@@ -92,6 +94,7 @@ __all__ = [
     "predict",
     "read",
     "read_block",
+    "run",
     "simulate",
     "terrain",
     "tie_points",

@@ -1,136 +1,74 @@
-"""`aerotri run`: every step in its turn, what is missing named, one report."""
+"""`aerotri run`: what the command prints of every step, and its exit codes."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
+from test_cli import run
 
-from aerotri.cli.run import command_names, invoke
 from aerotri.commands.run import run_all
 from aerotri.conventions import InputError
 from aerotri.formats.block.writer import write_block
+from chain_of_fakes import Fakes, ends_of
 from small_blocks import small_block
 
-ALL = ("tiepoints", "adjust", "dtm", "volume")
+
+@pytest.fixture(scope="module")
+def block_folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run") / "in"
+    write_block(small_block()[0], folder)
+    return folder
 
 
-def steps(out):
-    return {
-        step["name"]: (step["status"], step["reason"]) for step in json.loads((out / "run.json").read_text())["steps"]
-    }
-
-
-def test_block_is_adjusted_and_terrain_named(tmp_path, capsys):
+def test_block_is_adjusted_and_terrain_named(block_folder, tmp_path):
     """The real adjustment of a small block; its page stands in the one report, unable to run anything."""
-    write_block(small_block()[0], tmp_path / "in")
-    passed_on = {"adjust": ("--parameters", "none")}
-    assert run_all(tmp_path / "in", tmp_path / "out", passed_on, invoke, command_names(), True) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["report"] == str(tmp_path / "out" / "report.html")
-    assert steps(tmp_path / "out")["adjust"] == ("done", "")
-    assert steps(tmp_path / "out")["dtm"] == ("left out", "it needs photographs, and a block was given")
-    page = (tmp_path / "out" / "report.html").read_text()
+    out = tmp_path / "out"
+    done = run("run", block_folder, "--out", out, "--parameters", "none", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["report"] == str(out / "report.html")
+    assert ends_of(out)["adjust"] == ("done", "")
+    assert ends_of(out)["dtm"] == ("left out", "it needs photographs, and a block was given")
+    page = (out / "report.html").read_text(encoding="utf-8")
     assert page.count("<iframe sandbox srcdoc=") == 1
     assert "&lt;h2" in page
     assert "<script" not in page
 
 
-def test_steps_follow_one_another(tmp_path, capsys):
-    """Arguments are those of a command line; a step without its command is left out and named."""
+def test_every_step_is_told(block_folder, tmp_path, capsys):
+    """The command line of the step, what its command prints, and a line a step at the end."""
+    assert run_all(block_folder, tmp_path / "out", {"parameters": "none", "plots": False}, False) == 0
+    told = capsys.readouterr().out.splitlines()
+    result = tmp_path / "out" / "result"
+    assert told[0] == f"── Adjustment: aerotri adjust {block_folder} --out {result} --parameters none --no-plots"
+    assert told[1] == "verdict: accepted"
+    assert f"Written to {result}" in told
+    assert told[-4] == "──" or told[-5] == "──"
+    assert "Terrain left out: it needs photographs, and a block was given" in told
+    assert told[-1] == f"Report: {tmp_path / 'out' / 'report.html'}"
+
+
+def test_a_block_that_cannot_be_adjusted_is_told(block_folder, tmp_path, capsys):
+    """Why there is no result, and exit code 1; the report names the step."""
+    block = small_block()[0]
+    alone = replace(block, control=replace(block.control, is_check=np.ones(len(block.control), bool)))
+    write_block(alone, tmp_path / "free")
+    assert run_all(tmp_path / "free", tmp_path / "out", {}, False) == 1
+    told = capsys.readouterr()
+    assert "the datum is free" in told.err
+    assert "Adjustment failed: aerotri adjust ended with 1" in told.out
+    assert ends_of(tmp_path / "out")["adjust"] == ("failed", "aerotri adjust ended with 1")
+
+
+def test_bad_input_ends_the_run(tmp_path, monkeypatch):
+    """Of the first step it is bad input of the run: exit code 2, and no record of a run."""
     (tmp_path / "photographs").mkdir()
-    called = []
-
-    def invoke(arguments):
-        called.append(arguments)
-        return 0
-
-    out = tmp_path / "out"
-    passed_on = {"tiepoints": ("--seed", "4"), "dtm": ("--interval", "auto")}
-    assert run_all(tmp_path / "photographs", out, passed_on, invoke, ALL, False) == 0
-    assert called == [
-        ["tiepoints", str(tmp_path / "photographs"), "--out", str(out / "block"), "--seed", "4"],
-        ["adjust", str(out / "block"), "--out", str(out / "result")],
-        ["dtm", str(out / "result"), str(tmp_path / "photographs"), "--out", str(out / "dtm"), "--interval", "auto"],
-    ]
-    passed_on = {"volume": ("--boundary", "pile.gpkg")}
-    assert run_all(tmp_path / "photographs", out, passed_on, invoke, ALL, True) == 0
-    dtm, result = str(out / "dtm"), str(out / "result")
-    assert called[-1] == [
-        "volume", f"{dtm}/dsm.tif", "--adjustment", result, "--pickets", f"{dtm}/pickets.parquet",
-        "--out", str(out / "volume"), "--boundary", "pile.gpkg",
-    ]  # fmt: skip
-    capsys.readouterr()
-    assert run_all(tmp_path / "photographs", out, {}, invoke, ("tiepoints", "adjust"), False) == 0
-    assert steps(out)["dtm"] == ("left out", "this installation has no command 'dtm'")
-    assert "Terrain left out: this installation has no command 'dtm'" in capsys.readouterr().out
-
-
-def test_a_step_that_fails_ends_the_run(tmp_path, capsys):
-    """What was done stays and is told; bad input of the first step is bad input of the run."""
-    (tmp_path / "photographs").mkdir()
-
-    def adjust_fails(arguments):
-        return 1 if arguments[0] == "adjust" else 0
-
-    out = tmp_path / "out"
-    assert run_all(tmp_path / "photographs", out, {}, adjust_fails, ALL, True) == 1
-    assert steps(out) == {
-        "tiepoints": ("done", ""),
-        "adjust": ("failed", "aerotri adjust ended with 1"),
-        "dtm": ("left out", "adjust is missing"),
-        "volume": ("left out", "no --boundary was given"),
-    }
-
-    def refuses(arguments):
-        if arguments[0] != "tiepoints":
-            raise InputError("too little ground", "give more")
-        return 0
-
-    assert run_all(tmp_path / "photographs", out, {}, refuses, ALL, True) == 1
-    assert steps(out)["adjust"] == ("failed", "too little ground — give more")
-    with pytest.raises(InputError, match="photographs"):
-        run_all(tmp_path / "photographs", tmp_path / "o2", {}, lambda arguments: invoke(arguments), ALL, True)
-    with pytest.raises(InputError, match="neither"):
-        run_all(tmp_path / "nothing", out, {}, refuses, ALL, True)
-
-
-def test_names_cannot_run_anything(tmp_path):
-    folder = tmp_path / "<img src=x onerror=alert(1)>"
-    folder.mkdir()
-
-    def invoke(arguments):
-        if arguments[0] == "tiepoints":
-            (tmp_path / "out" / "block").mkdir(parents=True)
-            (tmp_path / "out" / "block" / "tiepoints.json").write_text(
-                '{"messages": ["<script>x</script>"], "rays": 12}'
-            )
-        return 0
-
-    run_all(folder, tmp_path / "out", {}, invoke, ("tiepoints",), True)
-    page = (tmp_path / "out" / "report.html").read_text()
-    assert "<img src=x" not in page
-    assert "<script>x" not in page
-    assert "<td>12</td>" in page
-
-
-def test_nothing_is_built_on_a_rejected_adjustment(tmp_path):
-    """What the adjustment wrote is to be looked at; only --go-on builds on it."""
-    (tmp_path / "photographs").mkdir()
-    out, called = tmp_path / "out", []
-
-    def rejects(arguments):
-        called.append(arguments[0])
-        if arguments[0] != "adjust":
-            return 0
-        (out / "result").mkdir(parents=True, exist_ok=True)
-        content = {"verdict": "rejected", "reasons": ["σ₀ is 522"], "message": ""}
-        (out / "result" / "adjustment.json").write_text(json.dumps(content))
-        return 1
-
-    assert run_all(tmp_path / "photographs", out, {}, rejects, ALL, True) == 1
-    assert called == ["tiepoints", "adjust"]
-    assert steps(out)["adjust"] == ("failed", "rejected: σ₀ is 522")
-    assert steps(out)["dtm"] == ("left out", "adjust is rejected; --go-on builds on it all the same")
-    assert run_all(tmp_path / "photographs", out, {}, rejects, ALL, True, go_on=True) == 1
-    assert called[2:] == ["tiepoints", "adjust", "dtm"]
+    Fakes(monkeypatch).ends["tie_points"] = InputError("2 photographs", "give more")
+    with pytest.raises(InputError, match="2 photographs"):
+        run_all(tmp_path / "photographs", tmp_path / "out", {}, True)
+    done = run("run", tmp_path / "photographs", "--out", tmp_path / "out", "--focal-length-mm", "x")
+    assert done.returncode == 2
+    assert "--focal-length-mm" in done.stderr
+    assert not (tmp_path / "out" / "run.json").exists()

@@ -16,10 +16,9 @@ import numpy as np
 import pytest
 from transformations import Similarity, about_z, by_names, largest_difference, numbers_of
 
-from aerotri.cli.run import command_names, invoke
+import aerotri
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
-from aerotri.commands.run import run_all
 from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
 from aerotri.coordinates import local_frame
 from aerotri.formats.assembly.assemble import Statements
@@ -190,21 +189,15 @@ def runs(flown, tmp_path_factory):
         corners = middle + shift[:2] + np.array([[-15, -12], [14, -10], [12, 15], [-13, 11]])
         order = range(4) if name == "old" else (2, 1, 0, 3)
         ring = ", ".join("{} {}".format(*corners[k].tolist()) for k in (*order, order[0]))
-        given = [
-            "--gcp", str(write_gcp_list(flown, here / "gcp_list.txt", lists)), "--control-sigma-m", "0.02,0.02,0.03",
-            "--positions", str(write_positions(flown, here / "positions.csv", lists)),
-            "--focal-length-mm", "6", "--pixel-um", "14.4", "--features", str(FEATURES),
-        ]  # fmt: skip
-        for check in flown.check_points():
-            given += ["--check", lists.name(check)]
-        passed_on = {
-            "tiepoints": tuple(given),
-            "adjust": ("--no-plots",),
-            "dtm": ("--interval", "4", "--no-plots"),
-            "volume": ("--boundary", f"POLYGON (({ring}))", "--base", "lowest", "--no-plots"),
-        }
-        source = copy_photographs(flown, here / "photographs", lists)
-        assert run_all(source, here / "out", passed_on, invoke, command_names(), True) == 0
+        project = aerotri.run(
+            copy_photographs(flown, here / "photographs", lists), here / "out",
+            control=write_gcp_list(flown, here / "gcp_list.txt", lists), control_sigma_m=(0.02, 0.02, 0.03),
+            check=[lists.name(check) for check in flown.check_points()],
+            positions=write_positions(flown, here / "positions.csv", lists), focal_length_mm=6.0, pixel_um=14.4,
+            interval=4.0, boundary=f"POLYGON (({ring}))", base="lowest", plots=False,
+            further={"tie_points": {"features": FEATURES}, "terrain": {"plots": False}, "volume": {"plots": False}},
+        )  # fmt: skip
+        assert project.complete
         found[name] = (here / "out", lists)
     return found
 

@@ -33,8 +33,9 @@ from pathlib import Path
 
 import numpy as np
 
+import aerotri
+from aerotri.cli.app import invoke
 from aerotri.commands.adjust import run_adjust
-from aerotri.commands.run import run_all
 from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
 from aerotri.conventions import px_from_mm
 from aerotri.formats.assembly.assemble import Statements
@@ -100,11 +101,8 @@ def rendered(folder: Path, seed: int) -> tuple[dict, np.ndarray, np.ndarray]:
 
 def brighton(folder: Path, data: Path) -> list[str]:
     """One command, and what it says; its surface against that of another program, `model.laz`."""
-    from aerotri.cli.run import command_names, invoke
-
     begun, cpu = time.perf_counter(), time.process_time()
-    with contextlib.redirect_stdout(io.StringIO()):
-        run_all(data / "images", folder, {}, invoke, command_names(), True)
+    aerotri.run(data / "images", folder)
     seconds, cpu = time.perf_counter() - begun, time.process_time() - cpu
     import pyarrow.parquet as pq
 

@@ -29,6 +29,17 @@ predict = Program(help="What a flight will give, before it is flown.", no_args_i
 app.add_typer(predict, name="predict")
 
 
+def invoke(arguments: list[str]) -> int:
+    """Exit code of a command line, run in this process.
+
+    Raises
+    ------
+    InputError
+    """
+    ended = typer.main.get_command(app).main(arguments, prog_name="aerotri", standalone_mode=False)
+    return ended if isinstance(ended, int) else 0
+
+
 @app.callback(invoke_without_command=True)
 def version(show: Annotated[bool, typer.Option("--version", help="Print the version.")] = False) -> None:
     if show:

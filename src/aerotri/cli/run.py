@@ -1,4 +1,4 @@
-"""Command line of everything together: each step is a command line of its own."""
+"""Command line of everything together."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from aerotri.cli.options import (
     PhotographPositions,
     SystemOfPhotographs,
 )
+from aerotri.tie_points.settings import DEFAULTS
 
 
 @app.command(epilog="Example: aerotri run photographs --out project --gcp gcp_list.txt --control-sigma-m 0.02")
@@ -29,11 +30,11 @@ def run(
     control_prefix: ControlPrefix = "",
     positions: PhotographPositions = "",
     camera: Annotated[str, typer.Option(help="Camera: [camera.NAME] tables (.toml), orthority.")] = "",
-    focal_length_mm: Annotated[str, typer.Option(help="In place of EXIF.")] = "",
-    pixel_um: Annotated[str, typer.Option(help="Size of a pixel, µm, in place of EXIF.")] = "",
+    focal_length_mm: Annotated[float | None, typer.Option(min=1e-6, help="In place of EXIF.")] = None,
+    pixel_um: Annotated[float | None, typer.Option(min=1e-6, help="Size of a pixel, µm, in place of EXIF.")] = None,
     crs: SystemOfPhotographs = "",
     geoid: Annotated[str, typer.Option(help="Geoid grid for its heights.")] = "",
-    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same result.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same result.")] = DEFAULTS.seed,
     parameters: Annotated[str, typer.Option(help="Additional parameters of the adjustment.")] = "",
     interval: Annotated[str, typer.Option(help="Interval of the pickets of the DTM, or auto.")] = "",
     boundary: Annotated[str, typer.Option(help="Of a volume: GeoPackage, GeoJSON or WKT; no volume without.")] = "",
@@ -43,36 +44,16 @@ def run(
     json_: Json = False,
 ) -> None:
     """Everything: photographs to tie points, adjustment, terrain and volume, with one report."""
+    from aerotri.commands.convert import three_values
+    from aerotri.commands.dtm import metres_or_auto
     from aerotri.commands.run import run_all
 
-    def given(**values: str) -> tuple[str, ...]:
-        return tuple(word for name, value in values.items() if value for word in (f"--{name.replace('_', '-')}", value))
-
-    passed_on = {
-        "tiepoints": given(
-            gcp=gcp, control_sigma_m=control_sigma_m, control_prefix=control_prefix if gcp else "",
-            positions=positions, camera=camera,
-            focal_length_mm=focal_length_mm, pixel_um=pixel_um, crs=crs, geoid=geoid, seed=str(seed),
-        ) + tuple(word for name in check or () for word in ("--check", name)),
-        "adjust": given(parameters=parameters, geoid=geoid, control_prefix="" if gcp else control_prefix)
-        + (() if plots else ("--no-plots",)),
-        "dtm": given(interval=interval),
-        "volume": given(boundary=boundary, base=base) if boundary else (),
+    settings = {
+        "control": gcp, "check": check or (), "control_prefix": control_prefix,
+        "control_sigma_m": three_values(control_sigma_m, "--control-sigma-m", may_be_zero=True),
+        "positions": positions, "camera": camera, "focal_length_mm": focal_length_mm, "pixel_um": pixel_um, "crs": crs,
+        "geoid": geoid, "seed": seed, "parameters": parameters,
+        "interval": metres_or_auto(interval) if interval else None,
+        "boundary": boundary, "base": base, "plots": plots, "go_on": go_on,
     }  # fmt: skip
-    raise typer.Exit(run_all(source, out, passed_on, invoke, command_names(), json_, go_on))
-
-
-def command_names() -> set[str]:
-    """Names of the commands there are."""
-    return {info.name or info.callback.__name__ for info in app.registered_commands if info.callback is not None}
-
-
-def invoke(arguments: list[str]) -> int:
-    """Exit code of a command line of this program.
-
-    Raises
-    ------
-    InputError
-    """
-    ended = typer.main.get_command(app).main(arguments, prog_name="aerotri", standalone_mode=False)
-    return ended if isinstance(ended, int) else 0
+    raise typer.Exit(run_all(source, out, settings, json_))

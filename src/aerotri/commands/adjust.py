@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,8 @@ from aerotri.commands.console import Console
 from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
-    from aerotri.results.adjusted_block import AdjustedBlock, Outcome
+    from aerotri.results.adjusted_block import AdjustedBlock
+    from aerotri.results.failure import AdjustmentFailedError
     from aerotri.strategies.free_stages import FreeCheck
 
 
@@ -30,12 +30,10 @@ def run_adjust(
     """Exit code of the command: 0 when converged and not rejected, 1 otherwise; arguments as on the command line."""
     console = Console(quiet=as_json)
     begun = time.perf_counter()
-    from aerotri.coordinates.metric import in_metres
-    from aerotri.formats.block.folder import read_block
-    from aerotri.observations.names import with_control_prefix
+    from aerotri.public.adjusting import read_in_metres, with_read_time
     from aerotri.public.checking import free_check, refuse_free_datum
 
-    block, note = in_metres(with_control_prefix(read_block(path), control_prefix), geoid)
+    block, note = read_in_metres(path, control_prefix, geoid)
     if note:
         console.note(note)
     if check_free:
@@ -45,10 +43,10 @@ def run_adjust(
     refuse_foreign_folder(target, "adjustment.json")
 
     from aerotri.compiled import compilation_notice
-    from aerotri.pipeline import AdjustmentFailedError
     from aerotri.public.adjustment import adjust
     from aerotri.public.progress import StageReport
     from aerotri.public.saving import write_adjustment
+    from aerotri.results.failure import AdjustmentFailedError
 
     console.progress(compilation_notice())
     try:
@@ -56,25 +54,26 @@ def run_adjust(
     except AdjustmentFailedError as failure:
         from aerotri.formats.results.adjustment import outcome_json
 
-        console.failure("\n  ".join([str(failure), *_causes(failure.outcome)]))
+        console.failure(failure_text(failure))
         if check_free:
             _tell_free(free_check(block, geoid=geoid, progress=console.stage), as_json, console)
         if as_json:
             print(json.dumps(outcome_json(block, failure.outcome), indent=2, ensure_ascii=False))
         return 1
     checked = free_check(found, progress=console.stage) if check_free else None
-    outcome = found.adjusted.outcome
-    timed = replace(found.adjusted, outcome=replace(outcome, timings_s={"read": read_s, **outcome.timings_s}))
-    result = write_adjustment(replace(found.record, result=timed), target, plots, StageReport(console.stage), checked)
+    timed = with_read_time(found, read_s).record
+    result = write_adjustment(timed, target, plots, StageReport(console.stage), checked)
     _tell(result, target, console, as_json, checked)
     return 1 if result.outcome.status != "converged" or result.outcome.verdict == "rejected" else 0
 
 
-def _causes(outcome: Outcome) -> list[str]:
-    """The reasons of a failure beside its message, which is printed already."""
+def failure_text(failure: AdjustmentFailedError) -> str:
+    """Why there is no result, with all reasons."""
     from aerotri.report.quality import printable
 
-    return [f"because {printable(reason, 500)}" for reason in outcome.reasons if reason != outcome.message]
+    outcome = failure.outcome
+    causes = [f"because {printable(reason, 500)}" for reason in outcome.reasons if reason != outcome.message]
+    return "\n  ".join([str(failure), *causes])
 
 
 def _tell_free(checked: FreeCheck, as_json: bool, console: Console) -> None:
@@ -90,18 +89,20 @@ def folder_name(path: Path) -> str:
     return (folder.parent if folder.is_file() else folder).name
 
 
-def _tell(
-    result: AdjustedBlock, target: Path, console: Console, as_json: bool, checked: FreeCheck | None = None
-) -> None:
+def _tell(result: AdjustedBlock, target: Path, console: Console, as_json: bool, checked: FreeCheck | None) -> None:
     if as_json:
         from aerotri.formats.results.adjustment import adjustment_json
 
         print(json.dumps(adjustment_json(result), indent=2, ensure_ascii=False))
         return
-    from aerotri.report.tables.adjustment import summary_lines
+    console.lines(outcome_lines(result, target, checked))
 
-    console.lines(summary_lines(result))
-    if checked is not None:
-        _tell_free(checked, as_json, console)
+
+def outcome_lines(result: AdjustedBlock, target: Path, checked: FreeCheck | None = None) -> list[str]:
+    """What the user reads of a result and of its free check."""
+    from aerotri.report.tables.adjustment import summary_lines
+    from aerotri.report.tables.work import free_check_lines
+
     report = target / "report.html"
-    console.lines([f"Written to {target}" + (f", report: {report}" if report.exists() else "")])
+    free = [] if checked is None else free_check_lines(checked)
+    return [*summary_lines(result), *free, f"Written to {target}" + (f", report: {report}" if report.exists() else "")]

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError, stated_number
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.terrain.settings import TerrainSettings
+
+if TYPE_CHECKING:
+    from aerotri.public.terrain import TerrainModel
 
 
 def metres_or_auto(text: str) -> float | None:
@@ -45,8 +48,13 @@ def run_dtm(
     if as_json:
         print(json.dumps(found.summary, indent=2, ensure_ascii=False))
     else:
-        console.lines([*(f"note: {note}" for note in found.notes), *_summary(found.summary), f"Written to {target}"])
+        console.lines(outcome_lines(found, target))
     return 0
+
+
+def outcome_lines(found: TerrainModel, target: Path) -> list[str]:
+    """What the user reads of the surface."""
+    return [*(f"note: {note}" for note in found.notes), *_summary(found.summary), f"Written to {target}"]
 
 
 def _summary(content: dict[str, Any]) -> list[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from aerotri.commands.console import Console
 
 if TYPE_CHECKING:
+    from aerotri.public.adjustment import Adjustment as Opened
     from aerotri.results.adjustment import Adjustment
 
 
@@ -23,9 +24,13 @@ def reopened(result: Path, console: Console) -> Adjustment:
     from aerotri.public.adjustment import open_result
 
     console.progress(compilation_notice())
-    found = open_result(result).record
-    outcome = found.result.outcome
-    if outcome.verdict != "accepted":
-        console.failure(f"{result}: the adjustment is {outcome.verdict}: {outcome.reasons[0]}")
-    return found
+    found = open_result(result)
+    said = doubt(result, found)
+    if said:
+        console.failure(said)
+    return found.record
 
+
+def doubt(folder: Path, result: Opened) -> str:
+    """A sentence when a result is not simply accepted, '' else."""
+    return "" if result.verdict == "accepted" else f"{folder}: the adjustment is {result.verdict}: {result.reasons[0]}"

@@ -60,12 +60,14 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
     if as_json:
         print(json.dumps(content, ensure_ascii=False))
     else:
-        console.lines([*content["messages"], *_lines(content), f"Written to {out}"])
+        console.lines(outcome_lines(content, out))
 
 
-def _lines(content: dict[str, Any]) -> list[str]:
+def outcome_lines(content: dict[str, Any], out: Path) -> list[str]:
+    """What the user reads of the block and of the page to mark control points in."""
     pairs, per = content["pairs"], content["points_per_photograph"]
     said = [
+        *content["messages"],
         f"{content['photographs']} photographs in {content['crs']}, {pairs['tied']} of {pairs['compared']} pairs tied: "
         f"{content['tie_points']} tie points with {content['rays_per_point']:.1f} rays, "
         f"{per['median']:.0f} in a photograph ({per['smallest']} at least)",
@@ -77,4 +79,4 @@ def _lines(content: dict[str, Any]) -> list[str]:
         said.append(f"control points in the photographs: {done} in {content['marking_page']}")
     if content["left_out"]:
         said.append(f"could not be tied and left out: {', '.join(content['left_out'])}")
-    return said
+    return [*said, f"Written to {out}"]

@@ -42,9 +42,7 @@ class VolumeInput:
                 "--pickets, --base-pickets and --base-adjustment belong to --adjustment", "give the adjustment"
             )
         if not is_surface(self.base) and (self.base_adjustment is not None or self.base_pickets is not None):
-            raise InputError(
-                "--base-adjustment and --base-pickets need a surface as base", "give its raster as --base"
-            )
+            raise InputError("--base-adjustment and --base-pickets need a surface as base", "give its raster as --base")
 
 
 def run_volume(
@@ -82,11 +80,12 @@ def run_volume(
     if as_json:
         print(json.dumps(found.summary, indent=2, ensure_ascii=False))
     else:
-        console.lines([*_summary(found.summary), f"Written to {target}"])
+        console.lines(outcome_lines(found.summary, target))
     return 0
 
 
-def _summary(content: dict[str, Any]) -> list[str]:
+def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
+    """What the user reads of the volume."""
     c, s = content, content["sigma"]
     sure = "" if s is None else f" ± {s['sigma_m3']:.4g} (1 σ)"
     lines = [
@@ -106,4 +105,4 @@ def _summary(content: dict[str, Any]) -> list[str]:
                 f"systematic, {one['variant']} orientation: {where} {one['value_m3']:+.4g} ± {one['sigma_m3']:.2g} m³"
             )
     lines += [f"  {one['method']:<24} net {one['net_m3']:.6g} m³" for one in c["methods"]]
-    return lines + [f"note: {text}" for text in c["warnings"]]
+    return [*lines, *(f"note: {text}" for text in c["warnings"]), f"Written to {target}"]

@@ -125,7 +125,7 @@ def call_of(arguments: list[str]) -> None:
         exec(READERS[arguments[1]], place)
         place["read"](Path(arguments[2]))
         return
-    from aerotri.cli.run import invoke
+    from aerotri.cli.app import invoke
 
     invoke(arguments)
 

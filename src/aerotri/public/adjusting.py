@@ -1,0 +1,87 @@
+"""A block's folder adjusted into the folder of a result."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerotri.public.adjustment import Adjustment, adjust
+from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.progress import StageReport
+from aerotri.public.saving import RECORD, write_adjustment
+
+if TYPE_CHECKING:
+    import os
+
+    from aerotri.observations import Block
+    from aerotri.public.progress import Progress
+
+
+def read_in_metres(folder: Path, control_prefix: str = "", geoid: str | os.PathLike | None = None) -> tuple[Block, str]:
+    """A block from its folder, in a coordinate system that counts in metres; and what was done for that.
+
+    Parameters
+    ----------
+    folder : of the block, or its block.toml.
+    control_prefix : what image points have before the names of control points.
+    geoid : grid of geoid undulations for a coordinate system that has none of its own.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.coordinates.metric import in_metres
+    from aerotri.formats.block.folder import read_block
+    from aerotri.observations.names import with_control_prefix
+
+    return in_metres(with_control_prefix(read_block(folder), control_prefix), geoid)
+
+
+def with_read_time(found: Adjustment, seconds: float) -> Adjustment:
+    """The result with the time that reading took among its timings."""
+    result = found.adjusted
+    outcome = replace(result.outcome, timings_s={"read": seconds, **result.outcome.timings_s})
+    return replace(found, record=replace(found.record, result=replace(result, outcome=outcome)))
+
+
+def adjust_folder(
+    folder: Path,
+    out: Path,
+    *,
+    progress: Progress,
+    plots: bool = True,
+    control_prefix: str = "",
+    geoid: str | os.PathLike | None = None,
+    **settings: Any,
+) -> Adjustment:
+    """Read, adjust, and write the result.
+
+    Parameters
+    ----------
+    folder : of the block. out : of the result.
+    progress : takes (stage, share).
+    plots : draw the plots and the report.
+    control_prefix, geoid : see `read_in_metres`.
+    settings : as of `aerotri.adjust`.
+
+    Returns
+    -------
+    Adjustment
+        As it was adjusted, whatever its verdict.
+
+    Raises
+    ------
+    InputError
+        When the block makes no sense, or the folder holds other files.
+    AdjustmentFailedError
+        When the observations do not determine the unknowns.
+    """
+    begun = time.perf_counter()
+    block, note = read_in_metres(folder, control_prefix, geoid)
+    seconds = time.perf_counter() - begun
+    refuse_foreign_folder(out, RECORD)
+    found = with_read_time(adjust(block, geoid=geoid, progress=progress, **settings), seconds)
+    write_adjustment(found.record, out, plots, StageReport(progress))
+    return replace(found, notes=(note,)) if note else found

@@ -1,0 +1,106 @@
+"""The steps of a run: what each does, where it writes, and how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from aerotri.conventions import InputError
+
+RECORD, REPORT = "run.json", "report.html"
+BLOCK, RESULT, DTM, VOLUME = "block", "result", "dtm", "volume"
+Verb = Literal["tie_points", "adjust", "terrain", "volume"]
+OPTIONS = {"control": "gcp"}
+"""Options of the command line whose names differ from the settings'."""
+NEEDS_PHOTOGRAPHS = "it needs photographs, and a block was given"
+NO_BOUNDARY = "no --boundary was given"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step: the command line that does the same, where it writes, what it is about, and how it ended.
+
+    Parameters
+    ----------
+    name : of its command. folder : in that of the run. what : for people.
+    arguments : of the command line.
+    status : '' before it ended, 'done', 'failed' or 'left out'.
+    reason : why, where it is not done.
+    seconds : that it took.
+    """
+
+    name: str
+    folder: str
+    what: str
+    arguments: tuple[str, ...]
+    status: str = ""
+    reason: str = ""
+    seconds: float = 0.0
+
+
+def is_block(source: Path) -> bool:
+    """Whether a run begins with a block, not with photographs."""
+    return source.name == "block.toml" or (source / "block.toml").is_file()
+
+
+def steps_of(source: Path, out: Path, settings: Mapping[Verb, Mapping[str, Any]]) -> dict[Verb, Step]:
+    """What there is to do, in its order.
+
+    Parameters
+    ----------
+    settings : of every verb, by the names of its arguments.
+
+    Raises
+    ------
+    InputError
+        When there is nothing to begin with.
+    """
+    if not is_block(source) and not source.is_dir():
+        raise InputError("is neither a folder of photographs nor a block", "give the folder", source)
+    block, result, dtm, volume = (str(out / name) for name in (BLOCK, RESULT, DTM, VOLUME))
+    on_surface = (f"{dtm}/dsm.tif", "--adjustment", result, "--pickets", f"{dtm}/pickets.parquet")
+    begun = str(source) if is_block(source) else block
+    steps: dict[Verb, Step] = {
+        "tie_points": Step("tiepoints", BLOCK, "Tie points", ("tiepoints", str(source), "--out", block)),
+        "adjust": Step("adjust", RESULT, "Adjustment", ("adjust", begun, "--out", result)),
+        "terrain": Step("dtm", DTM, "Terrain", ("dtm", result, str(source), "--out", dtm)),
+        "volume": Step("volume", VOLUME, "Volume", ("volume", *on_surface, "--out", volume)),
+    }
+    if is_block(source):
+        del steps["tie_points"]
+        for verb in ("terrain", "volume"):
+            steps[verb] = replace(steps[verb], status="left out", reason=NEEDS_PHOTOGRAPHS)
+    elif not settings["volume"].get("boundary"):
+        steps["volume"] = replace(steps["volume"], status="left out", reason=NO_BOUNDARY)
+    return {
+        verb: replace(step, arguments=step.arguments + command_line(settings[verb])) for verb, step in steps.items()
+    }
+
+
+def command_line(settings: Mapping[str, Any]) -> tuple[str, ...]:
+    """Settings as options of a command line; what is not given has none."""
+    words: list[str] = []
+    for name, value in settings.items():
+        option = f"--{OPTIONS.get(name, name).replace('_', '-')}"
+        if name == "plots":
+            words += [] if value else ["--no-plots"]
+        elif name == "check":
+            words += [word for one in value for word in (option, str(one))]
+        elif not is_missing(value):
+            words += [option, _text(value)]
+    return tuple(words)
+
+
+def is_missing(value: Any) -> bool:
+    """Whether a setting is not given."""
+    return value is None or (isinstance(value, str | tuple | list) and len(value) == 0)
+
+
+def _text(value: Any) -> str:
+    """A value as a user would write it; one number for three that are alike."""
+    if isinstance(value, tuple | list):
+        values = list(value)
+        return ",".join(map(_text, values[:1] if len(set(values)) == 1 else values))
+    return f"{value!r}".removesuffix(".0") if isinstance(value, float) else str(value)

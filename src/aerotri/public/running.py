@@ -1,0 +1,312 @@
+"""Everything from photographs, or a block, to terrain and volume: one folder, one report."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerotri.conventions import InputError
+from aerotri.deformation.absorbed import AbsorptionFailedError
+from aerotri.public.blocks import PathLike, Sigmas
+from aerotri.public.progress import Progress, ProgressLike, StageReport, stage_report
+from aerotri.public.run_steps import BLOCK, DTM, RECORD, REPORT, RESULT, Step, Verb, is_block, is_missing, steps_of
+from aerotri.results.failure import AdjustmentFailedError
+from aerotri.tie_points.settings import DEFAULTS
+
+if TYPE_CHECKING:
+    from aerotri.observations import Block
+    from aerotri.public.adjustment import Adjustment
+    from aerotri.public.terrain import TerrainModel
+    from aerotri.public.tying import TiedPhotographs
+    from aerotri.public.volume_result import MeasuredVolume
+
+OnStep = Callable[[Step, object], None]
+
+
+@dataclass(eq=False, repr=False)
+class Project:
+    """What `aerotri.run` made: the results of its steps, None for those that were left out or failed.
+
+    Parameters
+    ----------
+    folder : where everything was written.
+    source : what it began with.
+    steps : each with how it ended.
+    tied : the photographs tied. adjustment : also where it was rejected. surface : the terrain. volume : over it.
+    seconds : that it took.
+    """
+
+    folder: Path
+    source: Path
+    steps: list[Step] = field(default_factory=list)
+    tied: TiedPhotographs | None = None
+    adjustment: Adjustment | None = None
+    surface: TerrainModel | None = None
+    volume: MeasuredVolume | None = None
+    seconds: float = 0.0
+
+    @property
+    def block(self) -> Block | None:
+        """The block as it was adjusted; that of the tie points where it was not."""
+        if self.adjustment is not None:
+            return self.adjustment.block
+        return None if self.tied is None else self.tied.block
+
+    @property
+    def verdict(self) -> str:
+        """'accepted', 'doubtful' or 'rejected' by the adjustment; 'failed' where there is none."""
+        return "failed" if self.adjustment is None else self.adjustment.verdict
+
+    @property
+    def complete(self) -> bool:
+        """Whether no step failed."""
+        return not any(step.status == "failed" for step in self.steps)
+
+    @property
+    def report(self) -> Path:
+        """The page about all steps."""
+        return self.folder / REPORT
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The content of run.json."""
+        return {"source": str(self.source), "steps": [asdict(step) for step in self.steps],
+                "seconds": round(self.seconds, 1), "report": str(self.report)}  # fmt: skip
+
+    def __repr__(self) -> str:
+        done = ", ".join(f"{step.what.lower()} {step.status}" for step in self.steps)
+        return f"<aerotri.Project in '{self.folder}': {self.verdict}; {done}>"
+
+    def _repr_html_(self) -> str:
+        """The steps, and what the adjustment found, as a notebook shows them."""
+        rows = "".join(
+            f"<tr><td>{escape(step.what)}</td><td>{escape(step.status)}</td><td>{step.seconds:.0f} s</td>"
+            f"<td>{escape(step.reason or str(self.folder / step.folder))}</td></tr>"
+            for step in self.steps
+        )
+        shown = [one._repr_html_() for one in (self.adjustment, self.surface, self.volume) if one is not None]
+        return f"<div><table><caption>{escape(self.verdict)}</caption>{rows}</table>{''.join(shown)}</div>"
+
+
+def run(
+    source: PathLike,
+    out: PathLike | None = None,
+    *,
+    control: PathLike | None = None,
+    check: Sequence[str] = (),
+    control_sigma_m: Sigmas | None = None,
+    control_prefix: str = "",
+    positions: PathLike | None = None,
+    camera: PathLike | None = None,
+    focal_length_mm: float | None = None,
+    pixel_um: float | None = None,
+    crs: str = "",
+    geoid: PathLike | None = None,
+    seed: int = DEFAULTS.seed,
+    parameters: str | None = None,
+    interval: float | None = None,
+    boundary: Any = None,
+    base: Any = None,
+    plots: bool = True,
+    go_on: bool = False,
+    further: Mapping[Verb, Mapping[str, Any]] | None = None,
+    on_step: OnStep | None = None,
+    progress: ProgressLike = None,
+) -> Project:
+    """Everything: photographs to tie points, adjustment, terrain and volume, with one report.
+
+    Parameters
+    ----------
+    source : folder of photographs, or a block, which is adjusted alone.
+    out : folder to write, with a folder a step; NAME_project in the current folder where None.
+    control : control points with their image points, gcp_list.txt.
+    check : names of control points that become check points.
+    control_sigma_m : σ of X, Y, Z, m, of control points without one; 0: without error, held.
+    control_prefix : what image points have before the names of control points.
+    positions : of the photographs, in place of EXIF.
+    camera : file with the camera.
+    focal_length_mm : in place of EXIF.
+    pixel_um : size of a pixel, µm, in place of EXIF.
+    crs : coordinate system; that of the control where '', else UTM of EXIF.
+    geoid : grid of geoid undulations for its heights.
+    seed : the same seed gives the same result.
+    parameters : additional parameters of the adjustment, see `aerotri.adjust`.
+    interval : m between the points of the terrain (pickets); from the GSD and the relief where None.
+    boundary : of a volume, see `aerotri.volume`; no volume where None.
+    base : of the volume, see `aerotri.volume`.
+    plots : draw the plots of the adjustment.
+    go_on : go on after an adjustment that was rejected.
+    further : more settings of a step by the name of its verb, {'terrain': {'window': 21}}.
+    on_step : takes each step when it begins, with None, and when it ended, with what it gave or why it failed.
+    progress : see `aerotri.adjust`.
+
+    Returns
+    -------
+    Project
+        Look at its `verdict` first. A step that fails is told there; nothing is built on it.
+
+    Raises
+    ------
+    InputError
+        When there is nothing to begin with, or the first step refuses its input.
+
+    Examples
+    --------
+    >>> import aerotri, tempfile
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     block = aerotri.simulate(aerotri.example_flight(), seed=1).save(f"{place}/block")
+    ...     project = aerotri.run(block, f"{place}/project", parameters="none", plots=False)
+    >>> project.verdict, [step.status for step in project.steps]
+    ('accepted', ['done', 'left out', 'left out'])
+    """
+    marked = not is_missing(control)
+    settings: dict[Verb, dict[str, Any]] = {
+        "tie_points": {
+            "control": control, "control_sigma_m": control_sigma_m, "control_prefix": control_prefix if marked else "",
+            "positions": positions, "camera": camera, "focal_length_mm": focal_length_mm, "pixel_um": pixel_um,
+            "crs": crs, "geoid": geoid, "seed": seed, "check": tuple(check),
+        },
+        "adjust": {
+            "parameters": parameters, "geoid": geoid, "control_prefix": "" if marked else control_prefix,
+            "plots": plots,
+        },
+        "terrain": {"interval": interval},
+        "volume": {"boundary": boundary, "base": base} if not is_missing(boundary) else {},
+    }  # fmt: skip
+    for verb, more in (further or {}).items():
+        settings[verb] |= more
+    place = Path(source)
+    target = Path(f"{place.resolve().name}_project" if out is None else out)
+    with stage_report(progress) as report:
+        return _Chain(Project(target, place), settings, go_on, on_step, report).run()
+
+
+class _Chain:
+    """The steps one after another, each on what those before it gave.
+
+    Parameters
+    ----------
+    project : to be filled. settings : of every verb.
+    """
+
+    def __init__(
+        self, project: Project, settings: Mapping[Verb, Mapping[str, Any]], go_on: bool, on_step: OnStep | None,
+        report: StageReport,
+    ):  # fmt: skip
+        self._project, self._settings, self._go_on = project, settings, go_on
+        self._tell: OnStep = on_step or (lambda step, outcome: None)
+        self._progress: Progress = report.stage
+
+    def run(self) -> Project:
+        """The project, with its record and its report written."""
+        project, begun, missing = self._project, time.perf_counter(), ""
+        for verb, step in steps_of(project.source, project.folder, self._settings).items():
+            if not step.status and missing:
+                step = replace(step, status="left out", reason=missing)
+            if not step.status:
+                step, ending = self._done(verb, step)
+                missing = missing or ending
+            project.steps.append(step)
+        project.seconds = time.perf_counter() - begun
+        write_report(project.summary, project.folder)
+        return project
+
+    def _done(self, verb: Verb, step: Step) -> tuple[Step, str]:
+        """The step as it ended; and why nothing can be built on it, '' where it can."""
+        self._tell(step, None)
+        begun, ending = time.perf_counter(), ""
+        try:
+            outcome: Any = getattr(self, f"_{verb}")(self._project.folder / step.folder)
+            step = replace(step, status="done")
+        except (AdjustmentFailedError, AbsorptionFailedError) as error:
+            # all is well with the input, but the equations have no solution
+            outcome, ending = error, "is missing"
+            step = replace(step, status="failed", reason=f"aerotri {step.name} ended with 1")
+        except InputError as error:
+            if not self._project.steps:
+                raise
+            outcome, ending = error, "is missing"
+            step = replace(step, status="failed", reason=str(error))
+        if verb == "adjust" and step.status == "done" and not is_usable(outcome):
+            o = outcome.adjusted.outcome
+            ending = "" if self._go_on else "is rejected; --go-on builds on it all the same"
+            step = replace(step, status="failed", reason=f"{o.verdict}: {next(iter(o.reasons), o.message)}")
+        step = replace(step, seconds=round(time.perf_counter() - begun, 1))
+        self._tell(step, outcome)
+        return step, f"{step.name} {ending}" if ending else ""
+
+    def _given(self, verb: Verb) -> tuple[dict[str, Any], bool]:
+        """The settings of a verb that are stated, and whether to draw."""
+        settings = {name: value for name, value in self._settings[verb].items() if not is_missing(value)}
+        return settings, settings.pop("plots", True)
+
+    def _tie_points(self, folder: Path) -> TiedPhotographs:
+        from aerotri.formats.files.work_place import held
+        from aerotri.public.tying import refuse_other_content, tie_points
+        from aerotri.tie_points.photographs_to_block import CACHE
+
+        settings, _ = self._given("tie_points")
+        refuse_other_content(folder, overwrite=False)
+        with held(folder):
+            tied = tie_points(self._project.source, **settings, cache=folder / CACHE, progress=self._progress)
+            tied.save(folder, progress=self._progress)
+        self._project.tied = tied
+        return tied
+
+    def _adjust(self, folder: Path) -> Adjustment:
+        from aerotri.public.adjusting import adjust_folder
+
+        (settings, plots), source = self._given("adjust"), self._project.source
+        begin = source if is_block(source) else self._project.folder / BLOCK
+        found = adjust_folder(begin, folder, plots=plots, progress=self._progress, **settings)
+        self._project.adjustment = found
+        return found
+
+    def _terrain(self, folder: Path) -> TerrainModel:
+        from aerotri.public.folders import refuse_foreign_folder
+        from aerotri.public.terrain import RECORD as DTM_RECORD
+        from aerotri.public.terrain import terrain
+
+        settings, plots = self._given("terrain")
+        refuse_foreign_folder(folder, DTM_RECORD)
+        result = self._project.folder / RESULT
+        found = terrain(result, self._project.source, progress=self._progress, **settings)
+        found.save(folder, plots)
+        self._project.surface = found
+        return found
+
+    def _volume(self, folder: Path) -> MeasuredVolume:
+        from aerotri.public.folders import refuse_foreign_folder
+        from aerotri.public.volume import volume
+        from aerotri.public.volume_result import RECORD as VOLUME_RECORD
+
+        (settings, plots), place = self._given("volume"), self._project.folder
+        refuse_foreign_folder(folder, VOLUME_RECORD)
+        found = volume(
+            place / DTM / "dsm.tif", adjustment=place / RESULT, pickets=place / DTM / "pickets.parquet",
+            progress=self._progress, **settings,
+        )  # fmt: skip
+        found.save(folder, plots)
+        self._project.volume = found
+        return found
+
+
+def is_usable(result: Adjustment) -> bool:
+    """Whether a result has converged and is not rejected."""
+    return result.status == "converged" and result.verdict != "rejected"
+
+
+def write_report(content: Mapping[str, Any], folder: Path) -> None:
+    """The record and the page, each whole or not at all."""
+    from aerotri.formats.files.atomic import atomic_file
+    from aerotri.report.pages.run import run_page
+
+    with atomic_file(folder / RECORD) as place:
+        place.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    with atomic_file(folder / REPORT) as place:
+        place.write_text(run_page(dict(content), folder), encoding="utf-8")

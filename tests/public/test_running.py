@@ -1,0 +1,116 @@
+"""`aerotri.run`: every step in its turn, what is missing named, one report."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import aerotri
+from aerotri import InputError
+from aerotri.public.run_steps import command_line
+from chain_of_fakes import Fakes, ends_of
+
+
+@pytest.fixture
+def fakes(monkeypatch):
+    return Fakes(monkeypatch)
+
+
+@pytest.fixture
+def photographs(tmp_path):
+    (tmp_path / "photographs").mkdir()
+    return tmp_path / "photographs"
+
+
+def test_a_block_is_adjusted(flight, tmp_path):
+    """The real adjustment of a small block; terrain and volume need photographs."""
+    told = []
+    project = aerotri.run(flight.save(tmp_path / "in"), tmp_path / "out", parameters="brown:K1", plots=False,
+                          on_step=lambda step, outcome: told.append((step.name, step.status)))  # fmt: skip
+    assert told == [("adjust", ""), ("adjust", "done")]
+    assert (project.verdict, project.complete) == ("accepted", True)
+    assert project.surface is project.volume is project.tied is None
+    assert project.adjustment.parameters["name"].tolist() == ["brown.K1"]
+    assert len(project.block.images) == len(flight.block.images)
+    again = aerotri.open_result(project.folder / "result")
+    assert again.sigma0 == pytest.approx(project.adjustment.sigma0, rel=1e-9)
+    assert ends_of(project.folder)["dtm"] == ("left out", "it needs photographs, and a block was given")
+    assert "Terrain" in project._repr_html_()
+
+
+def test_steps_follow_one_another(fakes, photographs, tmp_path):
+    """Every verb with its settings, on what those before it wrote; the record tells the command lines."""
+    out = tmp_path / "out"
+    project = aerotri.run(
+        photographs, out, control="gcp_list.txt", check=["K1"], control_sigma_m=(0.02, 0.02, 0.03), control_prefix="G",
+        focal_length_mm=8.8, seed=4, interval=5.0, boundary="pile.gpkg", base="lowest",
+        further={"tie_points": {"features": 2000}, "volume": {"plots": False}},
+    )  # fmt: skip
+    tie, adjust, terrain, volume = fakes.called
+    assert tie[1] == (str(photographs),)
+    assert (tie[2]["control"], tie[2]["features"], tie[2]["seed"]) == ("gcp_list.txt", 2000, 4)
+    assert adjust == ("adjust", (str(out / "block"), str(out / "result")), {"plots": True})
+    assert "camera" not in tie[2]
+    assert terrain == ("terrain", (str(out / "result"), str(photographs)), {"interval": 5.0})
+    assert volume[1] == (str(out / "dtm" / "dsm.tif"),)
+    assert (volume[2]["boundary"], volume[2]["base"]) == ("pile.gpkg", "lowest")
+    assert volume[2]["adjustment"] == out / "result"
+    lines = [step["arguments"] for step in json.loads((out / "run.json").read_text())["steps"]]
+    assert lines[0] == [
+        "tiepoints", str(photographs), "--out", str(out / "block"), "--gcp", "gcp_list.txt", "--control-sigma-m",
+        "0.02,0.02,0.03", "--control-prefix", "G", "--focal-length-mm", "8.8", "--seed", "4", "--check", "K1",
+        "--features", "2000",
+    ]  # fmt: skip
+    assert lines[1] == ["adjust", str(out / "block"), "--out", str(out / "result")]
+    assert lines[3][-5:] == ["--boundary", "pile.gpkg", "--base", "lowest", "--no-plots"]
+    assert project.block == "adjusted"
+    assert project.volume is not None
+
+
+def test_settings_as_a_command_line():
+    settings = {"control_sigma_m": (0.1, 0.1, 0.1), "pixel_um": 6.0, "crs": "", "check": (), "plots": True}
+    assert command_line(settings) == ("--control-sigma-m", "0.1", "--pixel-um", "6")
+
+
+def test_a_step_that_fails_ends_the_run(fakes, photographs, tmp_path):
+    """What was done stays and is told; bad input of the first step is bad input of the run."""
+    out = tmp_path / "out"
+    fakes.ends["adjust"] = InputError("too little ground", "give more")
+    project = aerotri.run(photographs, out)
+    assert ends_of(out) == {
+        "tiepoints": ("done", ""),
+        "adjust": ("failed", "too little ground — give more"),
+        "dtm": ("left out", "adjust is missing"),
+        "volume": ("left out", "no --boundary was given"),
+    }
+    assert (project.verdict, project.complete, project.block) == ("failed", False, "a block")
+    fakes.ends["tie_points"] = InputError("2 photographs", "give more")
+    with pytest.raises(InputError, match="2 photographs"):
+        aerotri.run(photographs, out)
+    with pytest.raises(InputError, match="neither"):
+        aerotri.run(tmp_path / "nothing", out)
+
+
+def test_nothing_is_built_on_a_rejected_adjustment(fakes, photographs, tmp_path):
+    """What the adjustment wrote is to be looked at; only go_on builds on it."""
+    out = tmp_path / "out"
+    fakes.ends["adjust"] = "rejected"
+    project = aerotri.run(photographs, out)
+    assert fakes.verbs == ["tie_points", "adjust"]
+    assert ends_of(out)["adjust"] == ("failed", "rejected: σ₀ is 522")
+    assert ends_of(out)["dtm"] == ("left out", "adjust is rejected; --go-on builds on it all the same")
+    assert project.verdict == "rejected"
+    assert not aerotri.run(photographs, out, go_on=True).complete
+    assert fakes.verbs[2:] == ["tie_points", "adjust", "terrain"]
+
+
+def test_names_cannot_run_anything(fakes, tmp_path):
+    folder = tmp_path / "<img src=x onerror=alert(1)>"
+    folder.mkdir()
+    project = aerotri.run(folder, tmp_path / "out")
+    page = project.report.read_text(encoding="utf-8")
+    for shown in (page, project._repr_html_()):
+        assert "<img src=x" not in shown
+        assert "<script>x" not in shown
+    assert "<td>12</td>" in page
