@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from aerotri.public.comparing import crosscheck as crosscheck
     from aerotri.public.converting import convert as convert
     from aerotri.public.covariance import Covariance as Covariance
+    from aerotri.public.dem import correct_dem as correct_dem
     from aerotri.public.models import deform as deform
     from aerotri.public.running import run as run
     from aerotri.public.simulating import example_flight as example_flight
@@ -54,6 +55,7 @@ _PLACES = {
     "changes": "aerotri.public.changes",
     "compare": "aerotri.public.surface_comparison",
     "compare_parameters": "aerotri.public.comparing",
+    "correct_dem": "aerotri.public.dem",
     "crosscheck": "aerotri.public.comparing",
     "deform": "aerotri.public.models",
     "adjust": "aerotri.public.adjustment",
@@ -87,6 +89,7 @@ __all__ = [
     "compare",
     "compare_parameters",
     "convert",
+    "correct_dem",
     "crosscheck",
     "deform",
     "example_flight",

@@ -12,7 +12,7 @@ import rasterio
 
 from aerotri.commands.console import Console
 from aerotri.commands.deform import DeformOptions, run_deform
-from aerotri.commands.demcor import beside, run_demcor
+from aerotri.commands.demcor import run_demcor
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
 from aerotri.deformation import restitution
@@ -20,6 +20,7 @@ from aerotri.deformation.block_models import block_models, nearest_models, strip
 from aerotri.deformation.model_grid import Places, mean_ground, pair_of
 from aerotri.deformation.orientation import calibrated_orientation
 from aerotri.deformation.stereo_model import covariance_of, deform_points
+from aerotri.public.dem import beside
 from aerotri.rasters.grids import Grid, RasterReader, write_raster
 from wrong_dems import Terrain, cells, middle_of, square_grid, write_dem, wrong_heights
 from wrong_dems import beside as next_to

@@ -15,12 +15,13 @@ from typer.testing import CliRunner
 
 from aerotri.cli import app
 from aerotri.commands.adjust import run_adjust
-from aerotri.commands.demcor import beside, run_demcor
+from aerotri.commands.demcor import run_demcor
 from aerotri.commands.dtm import run_dtm
 from aerotri.commands.volume import VolumeInput, run_volume
 from aerotri.formats.block.folder import read_block, write_block
 from aerotri.formats.results.pickets import read_pickets
 from aerotri.pipeline import adjust
+from aerotri.public.dem import beside
 from aerotri.rasters.grids import Grid, RasterReader, write_raster
 from aerotri.terrain.settings import TerrainSettings
 from aerotri.volume.settings import SectionPlan, SigmaOptions

@@ -22,6 +22,7 @@ MODULES = (
     "comparing",
     "converting",
     "covariance",
+    "dem",
     "models",
     "parameters",
     "picket_interval",

@@ -20,6 +20,7 @@ from aerotri.deformation.model_map import ModelMap
 from aerotri.deformation.seam_steps import SeamSteps, added_steps, window_steps
 from aerotri.deformation.stereo_model import covariance_of, pair_model
 from aerotri.rasters.grids import Grid, RasterReader, RasterWriter
+from aerotri.rasters.held import HeldRaster
 
 WINDOW = 1024
 LARGEST_WINDOW_M = 2000.0
@@ -65,7 +66,7 @@ class _Task:
 def correct_dem(
     models: DemModels,
     numbers: ModelMap,
-    reader: RasterReader,
+    reader: RasterReader | HeldRaster,
     writer: RasterWriter,
     dz_writer: RasterWriter,
     report: Callable[[float], None] | None = None,
@@ -85,8 +86,9 @@ class _Correction:
     """One run over a DEM: what is on its way and what has been summed up."""
 
     def __init__(
-        self, models: DemModels, numbers: ModelMap, reader: RasterReader, writer: RasterWriter, dz_writer: RasterWriter
-    ):
+        self, models: DemModels, numbers: ModelMap, reader: RasterReader | HeldRaster, writer: RasterWriter,
+        dz_writer: RasterWriter,
+    ):  # fmt: skip
         self._models, self._numbers, self._reader = models, numbers, reader
         self._writer, self._dz_writer = writer, dz_writer
         self._halo = self._widest = halo_for(models, reader.grid)

@@ -17,6 +17,7 @@ from shapely.geometry import mapping
 
 from aerotri.conventions import InputError
 from aerotri.rasters.grids import Grid, RasterReader, rasterise
+from aerotri.rasters.held import HeldRaster
 from aerotri.spreadsheet import with_formula
 from aerotri.vectors.polygons import polygon_features
 
@@ -69,7 +70,7 @@ class NumberMap:
 
     names: tuple[tuple[str, str], ...]
     known: np.ndarray
-    reader: RasterReader
+    reader: RasterReader | HeldRaster
 
     def numbers(self, grid: Grid, row: int, column: int, rows: int, columns: int) -> np.ndarray:
         """(rows, columns); −1 where the raster has another number or none."""
@@ -140,7 +141,13 @@ def read_number_table(path: Path) -> dict[int, tuple[str, str]]:
     return out
 
 
-def number_map(reader: RasterReader, table: Mapping[int, tuple[str, str]]) -> NumberMap:
+def table_beside(models: Path) -> Path:
+    """The table of a raster of models: NAME.csv, else models.csv."""
+    own = models.with_suffix(".csv")
+    return own if own.exists() else models.with_name("models.csv")
+
+
+def number_map(reader: RasterReader | HeldRaster, table: Mapping[int, tuple[str, str]]) -> NumberMap:
     """The map of a raster of numbers and its table."""
     known = sorted(table)
     return NumberMap(tuple(table[number] for number in known), np.array(known), reader)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,6 +77,16 @@ def given_orientation(calibration: Adjustment, other: Block, angles: np.ndarray,
     )
     out.centre[there], out.rotation[there] = centre[rows[there]], rotation[rows[there]]
     return out
+
+
+def orientation_of_result(calibration: Adjustment, other: Adjustment) -> Orientation:
+    """Orientation and interior orientation of another result in the same CRS, by the names of the photographs."""
+    images = other.result.images
+    found = given_orientation(calibration, other.result.block, images.angles, images.centre)
+    row = {str(name): k for k, name in enumerate(other.local.block.images.names)}
+    rows = np.array([row.get(str(name), -1) for name in calibration.local.block.images.names])
+    interior = np.where(rows[:, None] >= 0, interior_of_images(other.local)[rows], np.nan)
+    return replace(found, interior=np.where(np.isfinite(interior), interior, found.interior))
 
 
 def photo_rows(orientation: Orientation, local: np.ndarray, axes: np.ndarray) -> np.ndarray:

@@ -37,6 +37,7 @@ class Adjustment:
     ----------
     record : the numbers of the result together with the equations they come from.
     notes : what was done with the input before, in sentences.
+    folder : that it was opened from, None for a new one.
 
     Examples
     --------
@@ -50,6 +51,7 @@ class Adjustment:
 
     record: Record
     notes: tuple[str, ...] = ()
+    folder: Path | None = None
 
     @property
     def adjusted(self) -> AdjustedBlock:
@@ -357,4 +359,4 @@ def open_result(folder: str | os.PathLike, progress: ProgressLike = None) -> Adj
     if crs != "local" and not is_projected(crs):
         remedy = "adjust the block again: `aerotri adjust` brings it to metres"
         raise InputError(f"the result is in {crs}, which counts in degrees", remedy, folder)
-    return Adjustment(found)
+    return Adjustment(found, folder=Path(folder))

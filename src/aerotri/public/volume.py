@@ -12,8 +12,9 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.formats.files.spool import Spool
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.public.stated import StatedAdjustment
 from aerotri.public.volume_result import THICKNESS, MeasuredVolume
-from aerotri.public.volume_sigma import MeasuredSurface, StatedAdjustment, sigma_of_volume
+from aerotri.public.volume_sigma import MeasuredSurface, sigma_of_volume
 from aerotri.volume.settings import BASE, METHOD, SECTIONS, SIGMA, Method, SectionPlan, SigmaOptions
 
 if TYPE_CHECKING:

@@ -21,14 +21,16 @@ class HeldRaster:
 
     Attributes
     ----------
-    grid, crs, path, note : as of a `MetricReader`; there is nothing to note.
+    grid, crs, path, note, dtype, no_data, options : as of a `MetricReader`; there is nothing to note.
     """
 
     note = ""
+    dtype = np.dtype(np.float32)
+    no_data: float | None = None
 
     def __init__(self, values: np.ndarray, grid: Grid, crs: str | None, name: str):
         self.grid, self.crs, self.path = grid, crs, Path(name)
-        self.values = values.astype(np.float32)
+        self.values, self.options = values.astype(np.float32), {}
 
     @property
     def epsg(self) -> int | None:
