@@ -10,11 +10,11 @@ import numpy as np
 
 from aerotri.adjustment import _covariance_kernels, _kernels, _point_kernels
 from aerotri.adjustment.chunk_sums import ChunkSums, add_gaps, add_own_squares, add_squares
-from aerotri.adjustment.datum import ExtraObservations, free_motions, observes_centres
+from aerotri.adjustment.datum import ExtraObservations, free_motions, observes_centres, without_motion
 from aerotri.adjustment.field_prior import FieldPrior, field_prior
 from aerotri.adjustment.kernel_records import Directions, Inverse, Pairs, Problem, Table, Values
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
-from aerotri.adjustment.robust import Estimator
+from aerotri.adjustment.robust import Estimator, normalised_lengths
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, InverseOnPattern, Symbolic
 from aerotri.adjustment.unknowns import State, Step, Unknowns
 from aerotri.functional_model.observed_unknowns import Rows
@@ -264,6 +264,21 @@ class NormalSystem:
             lambda k: _kernels.back_substitute(*self._bounds[k], problem, step, self._work()), len(self._bounds)
         )
         return Step(images, shared, points)
+
+    def whole_step(self, state: State, x: np.ndarray, damping: float, estimator: Estimator) -> Step | None:
+        """The step of all unknowns from the solution x (6·n + s,) of the reduced equations; None if not a number.
+
+        Of a free block without the motion of the whole.
+        """
+        step, u = self.back_substitute(state, x, damping, estimator), self.unknowns
+        if u.block.settings.adjustment.is_free and u.motions.count:
+            step = without_motion(u, state, step)
+        finite = all(np.isfinite(part).all() for part in (step.images, step.shared, step.points))
+        return step if finite else None
+
+    def residual_lengths(self, equations: RightSide) -> np.ndarray:
+        """(m,) lengths of the residuals of the rays, each coordinate divided by its a-priori σ."""
+        return normalised_lengths(equations.residual, self.unknowns.rays.inv_sigma)
 
     def settle_points(self, state: State, estimator: Estimator, rounds: int = 8) -> State:
         """The state with every point moved, on its own and only downhill, to where its rays want it."""

@@ -7,6 +7,8 @@ time, and every pixel gets the weights of its own exact position.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from aerotri.compiled import inlined, kernel
@@ -20,6 +22,66 @@ SINES = np.sin(np.pi * (2.0 - np.arange(6)) / 3.0)
 LANCZOS_DRIFT = 1.0 / 8.0
 """Pixels by which the source position may drift within a run whose Lanczos weights are a parabola through those of its
 start, middle and end: wrong by less than 3e-4 then."""
+
+
+class Sampling(NamedTuple):
+    """What is sampled, and how.
+
+    Parameters
+    ----------
+    pixels : (·, columns + 2·PAD) rows of the image from `first_row` on, of the type of the sums.
+    size : (2,) rows and columns of the image.
+    limits : (3,) smallest and largest value of a pixel, and the value outside the image; of the type of the sums.
+    is_integer : pixels are rounded. lanczos : six by six taps, else four by four.
+    weights : (7, 6) room, of the type of the sums. scratch : (3, 6) room of double precision.
+    """
+
+    pixels: np.ndarray
+    first_row: int
+    size: np.ndarray
+    limits: np.ndarray
+    is_integer: bool
+    lanczos: bool
+    weights: np.ndarray
+    scratch: np.ndarray
+
+
+class Run(NamedTuple):
+    """n pixels of a row from `column` on, whose source position changes linearly.
+
+    Parameters
+    ----------
+    x, y : source column and row of the first pixel, 0 the centre of the first one; dx, dy : their change from pixel to
+        pixel, dx less 1.
+    """
+
+    row: int
+    column: int
+    n: int
+    x: float
+    dx: float
+    y: float
+    dy: float
+
+
+class Tile(NamedTuple):
+    """A piece of the image over which displacements are continuous.
+
+    Parameters
+    ----------
+    nodes : (k, l, 2) px, source less output position (column, row) at nodes every `step` pixels, from pixel `origin`
+        (2,) = row, column on.
+    begin, end : (rows of the output,) first column of the tile and the one after its last.
+    top, bottom : (columns,) first row of the tile and the one after its last.
+    """
+
+    nodes: np.ndarray
+    origin: np.ndarray
+    step: int
+    begin: np.ndarray
+    end: np.ndarray
+    top: np.ndarray
+    bottom: np.ndarray
 
 
 @inlined
@@ -46,17 +108,20 @@ def _four(source, row, c, a):
 
 
 @kernel
-def cubic_run(source, first, out, to, n, x, dx, y, dy, low, high, is_integer):
+def cubic_run(sampling, first, out, to, n):
     """A run of n pixels from four by four taps.
 
     Parameters
     ----------
-    source : (rows, columns) of the type of the sums. first : row and column of the first tap of the first pixel.
+    sampling : `Sampling`; the last row of its weights holds x, dx, y, dy: the place of the first pixel between its
+        inner taps, and its change from pixel to pixel.
+    first : row and column of the first tap of the first pixel.
     out : (rows, columns). to : row and column of the first pixel. Rows and columns are unsigned numbers, which the
         compiler need not look up from the end of the array.
-    x, y : place of the first pixel between its inner taps; dx, dy : its change from pixel to pixel; low, high :
-        smallest and largest value of a pixel; all of the type of the sums.
     """
+    # numbers of their own, since the tables might, for all the compiler knows, lie in the output
+    source, is_integer, low, high = sampling.pixels, sampling.is_integer, sampling.limits[0], sampling.limits[1]
+    x, dx, y, dy = sampling.weights[6, 0], sampling.weights[6, 1], sampling.weights[6, 2], sampling.weights[6, 3]
     r0, c0 = first
     r1, r2, r3 = r0 + ONE, r0 + TWO, r0 + THREE
     row, column = to
@@ -116,14 +181,14 @@ def _sum(source, row, c, a):
 
 
 @kernel
-def lanczos_run(source, first, out, to, n, weights, low, high, is_integer):
+def lanczos_run(sampling, first, out, to, n):
     """As `cubic_run` from six by six taps.
 
-    Parameters
-    ----------
-    weights : (6, 6) of the columns, three rows as `lanczos_parabola` gives them, and of the rows.
+    The weights of `sampling` are those of the columns, three rows as `lanczos_parabola` gives them, and of the rows.
     """
-    # numbers of their own, since the table might, for all the compiler knows, lie in the output
+    # numbers of their own, since the tables might, for all the compiler knows, lie in the output
+    source, weights, is_integer = sampling.pixels, sampling.weights, sampling.is_integer
+    low, high = sampling.limits[0], sampling.limits[1]
     a0, a1, a2 = _six(weights, 0), _six(weights, 1), _six(weights, 2)
     b0, b1, b2 = _six(weights, 3), _six(weights, 4), _six(weights, 5)
     r0, c0 = first
@@ -139,23 +204,19 @@ def lanczos_run(source, first, out, to, n, weights, low, high, is_integer):
 
 
 @kernel
-def simple_run(source, source_row, out, r, first, n, x, dx, y, dy, size, limits, weights, is_integer):
-    """A bicubic run that stays between the same rows and columns well inside the image, as most do; else False.
-
-    Arguments as in `resample_run`.
-    """
+def simple_run(sampling, out, run):
+    """A bicubic run that stays between the same rows and columns well inside the image, as most do; else False."""
+    n, x, dx, y, dy, size = run.n, run.x, run.dx, run.y, run.dy, sampling.size
     column, row = int(np.floor(x)), int(np.floor(y))
     if int(np.floor(x + (n - 1) * (1.0 + dx))) != column + n - 1 or int(np.floor(y + (n - 1) * dy)) != row:
         return False
     if column < 0 or row < 0 or column + n >= size[1] or row >= size[0] - 1:
         return False
     # through the table, since that makes them numbers of the type of the sums
+    weights = sampling.weights
     weights[6, 0], weights[6, 1], weights[6, 2], weights[6, 3] = x - column, dx, y - row, dy
-    at = np.uintp(row - 1 - source_row), np.uintp(column - 1 + PAD)
-    cubic_run(
-        source, at, out, (np.uintp(r), np.uintp(first)), np.uintp(n), weights[6, 0], weights[6, 1], weights[6, 2],
-        weights[6, 3], limits[0], limits[1], is_integer,
-    )  # fmt: skip
+    at = np.uintp(row - 1 - sampling.first_row), np.uintp(column - 1 + PAD)
+    cubic_run(sampling, at, out, (np.uintp(run.row), np.uintp(run.column)), np.uintp(n))
     return True
 
 
@@ -170,21 +231,11 @@ def _stay(place, change):
 
 
 @kernel
-def resample_run(
-    source, source_row, out, r, first, n, x, dx, y, dy, size, limits, weights, scratch, is_integer, lanczos
-):  # fmt: skip
-    """A run of n pixels whose source position changes linearly.
-
-    Parameters
-    ----------
-    source : rows of the image from `source_row` on, `PAD` columns more on either side.
-    out : (rows, columns); r, first : row and column of the first pixel.
-    x, y : source column and row of the first pixel, 0 the centre of the first one; dx, dy : their change from pixel to
-        pixel, dx less 1.
-    size : (2,) rows and columns of the image.
-    limits : (3,) smallest and largest value of a pixel, and the value outside the image.
-    weights : (7, 6) scratch, as limits and source of the type of the sums. scratch : (3, 6) of double precision.
-    """
+def resample_run(sampling, out, run):
+    """A run of pixels whose source position changes linearly; out : (rows, columns)."""
+    size, limits, weights, scratch = sampling.size, sampling.limits, sampling.weights, sampling.scratch
+    source_row, lanczos = sampling.first_row, sampling.lanczos
+    r, first, n, x, dx, y, dy = run.row, run.column, run.n, run.x, run.dx, run.y, run.dy
     done = 0
     longest = int(min(LANCZOS_DRIFT / (max(abs(dx), abs(dy)) + 1e-30), LONGEST)) + 1 if lanczos else n
     while done < n:
@@ -204,13 +255,10 @@ def resample_run(
             if lanczos:
                 lanczos_parabola(x - column, dx, many, scratch, weights, 0)
                 lanczos_parabola(y - row, dy, many, scratch, weights, 3)
-                lanczos_run(source, at, out, to, np.uintp(many), weights, limits[0], limits[1], is_integer)
+                lanczos_run(sampling, at, out, to, np.uintp(many))
             else:
                 weights[6, 0], weights[6, 1], weights[6, 2], weights[6, 3] = x - column, dx, y - row, dy
-                cubic_run(
-                    source, at, out, to, np.uintp(many), weights[6, 0], weights[6, 1], weights[6, 2], weights[6, 3],
-                    limits[0], limits[1], is_integer,
-                )  # fmt: skip
+                cubic_run(sampling, at, out, to, np.uintp(many))
         if column < 0 or row < 0 or column + many >= size[1] or row >= size[0] - 1:
             for k in range(many):
                 u, v = x + k * (1.0 + dx), y + k * dy
@@ -222,21 +270,10 @@ def resample_run(
 
 
 @kernel
-def resample_tile(
-    source, source_row, out, out_row, nodes, origin, step, begin, end, top, bottom, size, limits, weights, scratch,
-    is_integer, lanczos,
-):  # fmt: skip
-    """The pixels of some rows that belong to one tile.
-
-    Parameters
-    ----------
-    source, source_row, size, limits, weights, scratch : as in `resample_run`.
-    out : rows of the output from `out_row` on.
-    nodes : (k, l, 2) px, source less output position (column, row) at nodes every `step` pixels, from pixel `origin`
-        (2,) = row, column on.
-    begin, end : (rows of out,) first column of the tile and the one after its last.
-    top, bottom : (columns,) first row of the tile and the one after its last.
-    """
+def resample_tile(sampling, out, out_row, tile):
+    """The pixels of some rows that belong to one tile; out : rows of the output from `out_row` on."""
+    nodes, origin, step = tile.nodes, tile.origin, tile.step
+    begin, end, top, bottom = tile.begin, tile.end, tile.top, tile.bottom
     highest, lowest = top.max(), bottom.min()
     cells = nodes.shape[1] - 1
     line = np.empty((cells + 1, 2))
@@ -263,14 +300,9 @@ def resample_tile(
             dx, dy = (line[j + 1, 0] - line[j, 0]) / step, (line[j + 1, 1] - line[j, 1]) / step
             x = column + line[j, 0] + (column - first) * dx
             y = row + line[j, 1] + (column - first) * dy
-            n = stop - column
-            if lanczos or not simple_run(
-                source, source_row, out, r, column, n, x, dx, y, dy, size, limits, weights, is_integer
-            ):
-                resample_run(
-                    source, source_row, out, r, column, n, x, dx, y, dy, size, limits, weights, scratch, is_integer,
-                    lanczos,
-                )  # fmt: skip
+            run = Run(r, column, stop - column, x, dx, y, dy)
+            if sampling.lanczos or not simple_run(sampling, out, run):
+                resample_run(sampling, out, run)
             column = stop
             if column >= first + step and j < cells - 1:
                 j += 1

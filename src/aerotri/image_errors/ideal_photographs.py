@@ -119,17 +119,20 @@ class _Tasks:
     ) -> None:
         whole_numbers = self.out.dtype.kind in "iu" if whole_numbers is None else whole_numbers
         ideal, rows = self.ideal, slice(first, first + len(out))
-        limit, weights, scratch = np.array(limits, source.dtype), np.empty((7, 6), source.dtype), np.empty((3, 6))
         low, _ = ideal.source_rows(first, rows.stop)
+        sampling = _kernels.Sampling(
+            source, low, np.array(ideal.size), np.array(limits, source.dtype), whole_numbers, self.lanczos,
+            np.empty((7, 6), source.dtype), np.empty((3, 6)),
+        )  # fmt: skip
         for i, line in enumerate(ideal.tiles):
             if ideal.rows[i].min() >= rows.stop or ideal.rows[i + 1].max() <= first:
                 continue
             for j, grid in enumerate(line):
-                _kernels.resample_tile(
-                    source, low, out, first, grid.nodes, np.array([grid.row, grid.column]), grid.step,
-                    ideal.columns[j, rows], ideal.columns[j + 1, rows], ideal.rows[i], ideal.rows[i + 1],
-                    np.array(ideal.size), limit, weights, scratch, whole_numbers, self.lanczos,
+                tile = _kernels.Tile(
+                    grid.nodes, np.array([grid.row, grid.column]), grid.step, ideal.columns[j, rows],
+                    ideal.columns[j + 1, rows], ideal.rows[i], ideal.rows[i + 1],
                 )  # fmt: skip
+                _kernels.resample_tile(sampling, out, first, tile)
 
 
 def _is(pixels: np.ndarray, value: float) -> np.ndarray:

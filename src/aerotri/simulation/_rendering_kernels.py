@@ -2,12 +2,31 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from aerotri.compiled import inlined, kernel
 
 M1, M2, M3 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 S27, S30, S31, S40 = np.uint64(27), np.uint64(30), np.uint64(31), np.uint64(40)
+
+
+class LatticeArrays(NamedTuple):
+    """(k, l) coefficients of nodes from (row, column) on; node (i, j) lies at Y = i·spacing, X = j·spacing, m."""
+
+    values: np.ndarray
+    row: int
+    column: int
+    spacing: float
+
+
+class PixelPlaces(NamedTuple):
+    """(m, n, 2) m, X and Y of pixels every `step` from pixel `origin` (2,) = row, column on, linear between."""
+
+    nodes: np.ndarray
+    origin: np.ndarray
+    step: int
 
 
 @inlined
@@ -77,15 +96,17 @@ def _spline(t):
 
 
 @kernel
-def texture_of_pixels(lattice, row, column, spacing, nodes, origin, step, first_row, first_column, out):
+def texture_of_pixels(lattice, places, first, out):
     """The surface at the ground positions of pixels.
 
     Parameters
     ----------
-    lattice : (k, l) coefficients of nodes from (row, column) on; node (i, j) lies at Y = i·spacing, X = j·spacing.
-    nodes : (m, n, 2) m, X and Y of pixels every `step` from pixel `origin` (2,) = row, column on, linear between.
-    out : (rows, columns) out, pixels from (first_row, first_column) on.
+    lattice : `LatticeArrays`. places : `PixelPlaces`.
+    out : (rows, columns) out, pixels from `first` = (row, column) on.
     """
+    nodes, origin, step = places.nodes, places.origin, places.step
+    values, row, column, spacing = lattice.values, lattice.row, lattice.column, lattice.spacing
+    first_row, first_column = first
     for r in range(out.shape[0]):
         at = first_row + r - origin[0]
         i = min(max(at // step, 0), nodes.shape[0] - 2)
@@ -103,6 +124,6 @@ def texture_of_pixels(lattice, row, column, spacing, nodes, origin, step, first_
             a, b = _spline(np.float32(u - k)), _spline(np.float32(v - m))
             value = np.float32(0.0)
             for q in range(4):
-                line = lattice[m - 1 + q]
+                line = values[m - 1 + q]
                 value += b[q] * (a[0] * line[k - 1] + a[1] * line[k] + a[2] * line[k + 1] + a[3] * line[k + 2])
             out[r, c] = value

@@ -191,8 +191,8 @@ class _View:
         lattice = self.scene.texture.lattice(*grid.bounds((row, row + size[0] - 1), (column, column + size[1] - 1)))
         out = np.empty(size, np.float32)
         kernels.texture_of_pixels(
-            lattice.values, lattice.row, lattice.column, lattice.spacing,
-            grid.nodes, np.array([grid.row, grid.column]), grid.step, row, column, out,
+            kernels.LatticeArrays(lattice.values, lattice.row, lattice.column, lattice.spacing),
+            kernels.PixelPlaces(grid.nodes, np.array([grid.row, grid.column]), grid.step), (row, column), out,
         )  # fmt: skip
         out = np.float32(options.mean) * (1.0 + np.float32(options.contrast) * out)
         self._signalise(grid, row, column, out)

@@ -31,12 +31,14 @@ def two_best(similarity, first_row, row_best, row_two, column_best, column_two):
 
 
 @kernel
-def thin_tracks(order, start, image, cell, cells_of_image, share, wanted, keep):
+def thin_tracks(order, start, rays, cells_of_image, least, keep):
     """Take tracks in their order while one of their cells, or the whole of one of their photographs, lacks points.
 
-    order (t,) tracks; start (t + 1,) into the rays image (m,) and cell (m,); cells_of_image (n, c) points taken so far,
-    to begin with 0; share of a cell; wanted of a photograph in the second round; keep (t,) bool, the outcome.
+    order (t,) tracks; start (t + 1,) into the rays: their image (m,) and cell (m,); cells_of_image (n, c) points taken
+    so far, to begin with 0; least points of a cell, and of a photograph in the second round; keep (t,) bool, out.
     """
+    image, cell = rays
+    share, wanted = least
     total = np.zeros(cells_of_image.shape[0], np.int64)
     for second in (False, True):
         for k in range(len(order)):

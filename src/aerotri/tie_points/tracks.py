@@ -103,5 +103,5 @@ def thin(tracks: Tracks, xy: np.ndarray, size_px: np.ndarray, wanted: int, cells
     keep = np.zeros(len(tracks), bool)
     share = -(-wanted // int(along.prod(axis=1).max()))
     taken = np.zeros((len(size_px), cells * cells), np.int64)
-    _kernels.thin_tracks(order, tracks.start, tracks.image, cell, taken, share, wanted, keep)
+    _kernels.thin_tracks(order, tracks.start, (tracks.image, cell), taken, (share, wanted), keep)
     return tracks.chosen(keep[tracks.of_ray])

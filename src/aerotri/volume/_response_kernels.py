@@ -1,12 +1,8 @@
-"""Kernels of the response of a height functional to the orientation: scalar functions without checks or objects.
-
-photos   : rotation (n, 3, 3), centre (n, 3), interior (L, 15), lens_row (n), source (n) group of image errors
-tiles    : edges (S, 2, 2) mm, x and y of the seams, rising, ∞ where there is none; meta (S, 3, 3, 7) of every tile
-           (column, row from below): offset into nodes, nodes along x and y, x and y of the first node, nodes per mm
-out      : by_eo (n, 6), by_interior (L, 15), nodes (·, 2), noise (1,)
-"""
+"""Kernels of the response of a height functional to the orientation: scalar functions without checks or objects."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,9 +10,67 @@ from aerotri.compiled import kernel
 from aerotri.functional_model._kernels import RayPartials, linearise_ray, predict_ray
 
 
+class PhotoArrays(NamedTuple):
+    """n photographs; `lens_row` and `source` say which interior elements and which group of image errors are theirs."""
+
+    rotation: np.ndarray
+    centre: np.ndarray
+    interior: np.ndarray
+    lens_row: np.ndarray
+    source: np.ndarray
+
+
+class Tiles(NamedTuple):
+    """The tiles of S groups of image errors.
+
+    Parameters
+    ----------
+    edges : (S, 2, 2) mm, x and y of the seams, rising, ∞ where there is none.
+    meta : (S, 3, 3, 7) of every tile (column, row from below): offset into the nodes, nodes along x and y, x and y of
+        the first node, nodes per mm.
+    """
+
+    edges: np.ndarray
+    meta: np.ndarray
+
+
+class PicketArrays(NamedTuple):
+    """k pickets, r rays: start (k + 1), image (r), inv_sigma (r) 1/mm, points, gradient (k, 3), noise_share (k).
+
+    gradient : of the functional by X, Y, Z of the picket.
+    """
+
+    start: np.ndarray
+    image: np.ndarray
+    inv_sigma: np.ndarray
+    points: np.ndarray
+    gradient: np.ndarray
+    noise_share: np.ndarray
+
+
+class ResponseSums(NamedTuple):
+    """Sums of the response, out: by_eo (n, 6), by_interior (L, 15), nodes (·, 2), noise (1,)."""
+
+    by_eo: np.ndarray
+    by_interior: np.ndarray
+    nodes: np.ndarray
+    noise: np.ndarray
+
+
+class Views(NamedTuple):
+    """What n photographs see: rotation (n, 3, 3), centre (n, 3), interior (n, 3) c, x0, y0 and half format (n, 2) mm."""
+
+    rotation: np.ndarray
+    centre: np.ndarray
+    interior: np.ndarray
+    half: np.ndarray
+
+
 @kernel
-def deposit(s, x, y, f0, f1, edges, meta, nodes):
-    """Spread (f0, f1) over the four nodes around an image position, never across a seam."""
+def deposit(s, x, y, force, tiles, nodes):
+    """Spread a force (2) over the four nodes around an image position, never across a seam."""
+    edges, meta = tiles.edges, tiles.meta
+    f0, f1 = force
     i = int(x >= edges[s, 0, 0]) + int(x >= edges[s, 0, 1])
     j = int(y >= edges[s, 1, 0]) + int(y >= edges[s, 1, 1])
     nx, ny = int(meta[s, i, j, 1]), int(meta[s, i, j, 2])
@@ -32,15 +86,15 @@ def deposit(s, x, y, f0, f1, edges, meta, nodes):
 
 
 @kernel
-def respond(first, last, start, image, inv_sigma, points, gradient, noise_share, photos, tiles, out):
+def respond(first, last, pickets, photos, tiles, out):
     """Add pickets first..last: f = W·A·N⁻¹·g of every ray; by_eo −= Bᵀf, nodes += f, noise += share·gᵀN⁻¹g.
 
-    start (k + 1), image (r), inv_sigma (r) 1/mm, points and gradient (k, 3). Returns the row of a picket whose rays do
-    not determine it, −1 if there is none.
+    Returns the row of a picket whose rays do not determine it, −1 if there is none.
     """
-    rotation, centre, interior, lens_row, source = photos
-    edges, meta = tiles
-    by_eo_sum, by_interior_sum, nodes, noise = out
+    start, image, inv_sigma, points = pickets.start, pickets.image, pickets.inv_sigma, pickets.points
+    gradient, noise_share = pickets.gradient, pickets.noise_share
+    rotation, centre, interior, lens_row = photos.rotation, photos.centre, photos.interior, photos.lens_row
+    by_eo_sum, by_interior_sum, nodes, noise = out.by_eo, out.by_interior, out.nodes, out.noise
     most = 1
     for p in range(first, last):
         most = max(most, start[p + 1] - start[p])
@@ -89,17 +143,17 @@ def respond(first, last, start, image, inv_sigma, points, gradient, noise_share,
                 by_eo_sum[i, t] -= by_eo[r, 0, t] * f0 + by_eo[r, 1, t] * f1
             for t in range(15):
                 by_interior_sum[lens_row[i], t] -= by_in[r, 0, t] * f0 + by_in[r, 1, t] * f1
-            deposit(source[i], at[r, 0], at[r, 1], f0, f1, edges, meta, nodes)
+            deposit(photos.source[i], at[r, 0], at[r, 1], (f0, f1), tiles, nodes)
     return -1
 
 
 @kernel
-def nearest_photographs(points, block, first, candidate, rotation, centre, interior, half, chosen):
+def nearest_photographs(points, block, first, candidate, views, chosen):
     """The photographs that see each point and whose centres are nearest to it in plan; −1 where there are fewer.
 
-    points (k, 3); block (k) of candidates: candidate[first[b] : first[b + 1]]. interior (n, 3) c, x0, y0 and half
-    (n, 2) mm of every photograph; chosen (k, m) out.
+    points (k, 3); block (k) of candidates: candidate[first[b] : first[b + 1]]; chosen (k, m) out.
     """
+    rotation, centre, interior, half = views.rotation, views.centre, views.interior, views.half
     m = chosen.shape[1]
     distance = np.empty(m)
     for p in range(len(points)):

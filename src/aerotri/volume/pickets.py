@@ -108,8 +108,12 @@ def pickets_where_seen(
     first, candidate = _candidates(local, number, orientation, half, known)
     chosen = np.empty((len(local), per_point), np.int64)
     _kernels.nearest_photographs(
-        local, number, first, candidate, np.ascontiguousarray(orientation.rotation),
-        np.ascontiguousarray(orientation.centre), np.ascontiguousarray(orientation.interior), half, chosen,
+        local, number, first, candidate,
+        _kernels.Views(
+            np.ascontiguousarray(orientation.rotation), np.ascontiguousarray(orientation.centre),
+            np.ascontiguousarray(orientation.interior), half,
+        ),
+        chosen,
     )  # fmt: skip
     seen = chosen[:, -1] >= 0
     image = chosen[seen].ravel()

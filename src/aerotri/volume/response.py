@@ -78,10 +78,10 @@ class Systematic:
 class _Nodes:
     """Nodes over the tiles of every group of image errors; see `_response_kernels`.
 
-    tables : edges and meta. xy : (·, 2) mm, just inside their tiles. of_group : nodes of every group.
+    tiles : see there. xy : (·, 2) mm, just inside their tiles. of_group : nodes of every group.
     """
 
-    tables: tuple[np.ndarray, np.ndarray]
+    tiles: _kernels.Tiles
     xy: np.ndarray
     of_group: list[slice]
 
@@ -104,7 +104,7 @@ def respond(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, cor
     rows = additional_rows(calibration)
     errors, number = errors_by_image(calibration, rows)
     nodes = _nodes_of(errors)
-    photos = (
+    photos = _kernels.PhotoArrays(
         np.ascontiguousarray(state.rotation), state.centre, u.interior(state), u.lens.of_image, number[u.images],
     )  # fmt: skip
     by_eo, by_interior, deposits, noise = _summed(calibration, pickets, gradient, photos, nodes)
@@ -166,7 +166,9 @@ def systematic(calibration: Adjustment, response: Response, variant: str = "free
     return Systematic(variant, value, float(np.sqrt(max(by_parameters @ q @ by_parameters, 0.0))))
 
 
-def _summed(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, photos, nodes: _Nodes):
+def _summed(
+    calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, photos: _kernels.PhotoArrays, nodes: _Nodes
+):
     """Sums over the pickets, in threads: by orientation, by interior elements, at the nodes, and the noise."""
     u = calibration.system.unknowns
     row_of = np.full(len(u.block.images), -1, np.int64)
@@ -177,16 +179,18 @@ def _summed(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, pho
         raise InputError(f"a picket was measured in '{name}', which was not adjusted", "leave it out")
     points, along = _in_frame(calibration, pickets.xyz, np.asarray(gradient, dtype=float))
     bounds = chunk_bounds(np.diff(pickets.start).astype(float))
+    arrays = _kernels.PicketArrays(
+        pickets.start, image, 1.0 / pickets.sigma_mm, points, along, pickets.noise_share
+    )
     outs = [
-        (np.zeros((len(u.images), 6)), np.zeros((len(u.lens.base), 15)), np.zeros((len(nodes.xy), 2)), np.zeros(1))
+        _kernels.ResponseSums(
+            np.zeros((len(u.images), 6)), np.zeros((len(u.lens.base), 15)), np.zeros((len(nodes.xy), 2)), np.zeros(1)
+        )
         for _ in bounds
     ]
 
     def chunk(k: int) -> int:
-        return _kernels.respond(
-            *bounds[k], pickets.start, image, 1.0 / pickets.sigma_mm, points, along, pickets.noise_share, photos,
-            nodes.tables, outs[k],
-        )  # fmt: skip
+        return _kernels.respond(*bounds[k], arrays, photos, nodes.tiles, outs[k])
 
     worst = max(run_chunks(chunk, len(bounds)), default=-1)
     if worst >= 0:
@@ -254,7 +258,7 @@ def _nodes_of(errors: tuple[PhotoErrors, ...]) -> _Nodes:
                 parts.append(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
                 count += nodes * nodes
         of_group.append(slice(begun, count))
-    return _Nodes((edges, meta), np.concatenate(parts), of_group)
+    return _Nodes(_kernels.Tiles(edges, meta), np.concatenate(parts), of_group)
 
 
 def _nodes_over(tile: Tile, camera: Camera, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,168 @@
+"""Steps of the adjustment: solved for, tried, and made to lead downhill."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aerotri.adjustment.damping import LAST_DAMPING, Damping
+from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.robust import Estimator
+from aerotri.adjustment.secants import Secants
+from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
+from aerotri.adjustment.unknowns import State, Step
+
+COST_TOLERANCE = 1e-9
+"""Relative growth of the cost that is taken for rounding: the sum over up to 10⁸ residuals has no more digits."""
+
+LEAST_GAIN = 0.25
+"""Gain over promise below which an undamped step is not trusted [L: the quarter of trust region methods, Nocedal and
+Wright, Numerical optimization, 2006, algorithm 4.1]."""
+
+FAR_OFF = -3.0
+"""Gain over promise below which a step went so far that it tells nothing of the curvature where it began."""
+
+SUSPECT_PIVOT = 1e-11
+"""Pivot (relative to a unit diagonal) below which a factor serves for one step only: a hundred times what is taken for
+rounding (`sparse_cholesky.PIVOT_LIMIT`)."""
+
+LEAST_RATIO, LONGEST_STRETCH = 0.5, 5.0
+"""Contraction from which on a step of re-weighting is lengthened: a faster one needs none. And the most it is
+lengthened by: beyond a contraction of .8 the ratio of two steps is too uncertain to go by."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where the adjustment stands: the state, the undamped equations there, and the estimator of their weights."""
+
+    state: State
+    equations: NormalEquations
+    estimator: Estimator
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A step that was tried: the place it leads to, the decrement it promised, and what it was solved with."""
+
+    place: Place
+    decrement: float
+    factor: Factor
+    move: Step
+    points_settled: bool = False
+
+    @property
+    def equations(self) -> NormalEquations:
+        return self.place.equations
+
+    @property
+    def is_suspect(self) -> bool:
+        return self.factor.smallest_pivot < SUSPECT_PIVOT
+
+    @property
+    def is_within_scatter(self) -> bool:
+        """Whether the whole step is no longer than the unknowns scatter, so that its factor serves for the next."""
+        return abs(self.decrement) <= self.equations.cost and not self.is_suspect
+
+    @property
+    def reduced(self) -> np.ndarray:
+        """(6·n + s,) the step of photographs and shared parameters."""
+        return np.concatenate([self.move.images.ravel(), self.move.shared])
+
+    def improves(self, before: NormalEquations) -> bool:
+        """Whether the cost is no higher; at the minimum it stands still within rounding."""
+        return bool(np.isfinite(self.equations.cost)) and self.equations.cost <= before.cost * (1.0 + COST_TOLERANCE)
+
+    def keeps_promise(self, before: NormalEquations) -> bool:
+        """Whether it gains at least a share of what photographs and shared parameters promised, within rounding."""
+        gain, promised = before.cost - self.equations.cost, float(self.reduced @ before.right)
+        return self.improves(before) and gain >= LEAST_GAIN * promised - COST_TOLERANCE * before.cost
+
+    def gain_ratio(self, before: NormalEquations) -> float:
+        """The gain over the gain promised, 1 at most."""
+        return min((before.cost - self.equations.cost) / max(self.decrement, 1e-300), 1.0)
+
+
+def take_step(system: NormalSystem, at: Place, damping: float, secants: Secants | None) -> Trial | None:
+    """Solve for a step and go there; None where the equations are singular."""
+    damped = at.equations if damping == 0.0 else system.assemble(at.state, damping, at.estimator)
+    try:
+        factor = system.factorise(damped)
+    except NotPositiveDefiniteError:
+        return None
+    return _tried(system, replace(at, equations=damped), factor, damping, secants)
+
+
+def until_better(
+    system: NormalSystem, at: Place, step: Trial | None, damping: Damping, secants: Secants | None
+) -> tuple[Trial | None, Damping]:
+    """The step, damped more and more until it improves; None where none does."""
+    if step is not None and secants is not None and damping.value == 0.0:
+        step = _trustworthy(system, at, step, secants)
+    while step is None or not step.improves(at.equations):
+        if step is not None and secants is None:
+            step = _with_settled_points(system, step)
+            if step.improves(at.equations):
+                break
+        damping = damping.raised()
+        if damping.value > LAST_DAMPING:
+            return None, damping
+        step = take_step(system, at, damping.value, secants)
+    return step, damping
+
+
+def stretched(system: NormalSystem, at: Place, step: Trial, last_decrement: float) -> Trial:
+    """A step of re-weighting, lengthened to where its slow contraction would lead it, if that is further down.
+
+    Steps that shrink by a factor ρ each sum up to 1/(1 − ρ) of the first (Aitken).
+    """
+    ratio = np.sqrt(abs(step.decrement) / last_decrement) if 0.0 < last_decrement < np.inf else 0.0
+    if not LEAST_RATIO < ratio < 1.0:
+        return step
+    factor = min(1.0 / (1.0 - ratio), LONGEST_STRETCH)
+    move = Step(factor * step.move.images, factor * step.move.shared, factor * step.move.points)
+    there = place_at(system, system.unknowns.advance(at.state, move), at.estimator)
+    return replace(step, place=there) if there.equations.cost < step.equations.cost else step
+
+
+def place_at(system: NormalSystem, state: State, estimator: Estimator) -> Place:
+    """The place of a state, its equations assembled."""
+    return Place(state, system.assemble(state, 0.0, estimator), estimator)
+
+
+def _tried(system: NormalSystem, at: Place, factor: Factor, damping: float, secants: Secants | None) -> Trial | None:
+    """The step by this factor; with secants an undamped one heeds them, and the points are led to their minimum."""
+    right = at.equations.right
+    x = secants.solve(factor, right) if secants is not None and damping == 0.0 else factor.solve(right)
+    decrement = float(x @ right) + at.equations.point_decrement
+    move = system.whole_step(at.state, x, damping, at.estimator)
+    if move is None:
+        return None
+    there = system.unknowns.advance(at.state, move)
+    if secants is not None:
+        there = system.settle_points(there, at.estimator)
+    return Trial(place_at(system, there, at.estimator), decrement, factor, move, secants is not None)
+
+
+def _trustworthy(system: NormalSystem, at: Place, step: Trial, secants: Secants) -> Trial | None:
+    """An undamped step that keeps enough of its promise; None where it has to be damped.
+
+    One that does not is taken anew, first with what it told itself about the curvature, then with the normal matrix
+    alone.
+    """
+    tried: Trial | None = step
+    learns = len(secants) > 0 and step.gain_ratio(at.equations) > FAR_OFF
+    if not step.keeps_promise(at.equations) and learns:
+        secants.learn(step.reduced, at.equations.right, step.equations.right)
+        tried = _tried(system, at, step.factor, 0.0, secants)
+    if (tried is None or not tried.keeps_promise(at.equations)) and len(secants):
+        secants.forget()
+        tried = _tried(system, at, step.factor, 0.0, secants)
+    return tried if tried is not None and tried.keeps_promise(at.equations) else None
+
+
+def _with_settled_points(system: NormalSystem, step: Trial) -> Trial:
+    """A step too long for some points (weak rays, gross errors), with these led back to their own minimum."""
+    estimator = step.place.estimator
+    state = system.settle_points(step.place.state, estimator)
+    return replace(step, place=place_at(system, state, estimator), points_settled=True)
