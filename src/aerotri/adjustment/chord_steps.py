@@ -29,9 +29,7 @@ class Followed:
     settled: bool = False
 
 
-def follow(
-    system: NormalSystem, first: Trial, redundancy: int, most: int, say: Callable[[float], None]
-) -> Followed:
+def follow(system: NormalSystem, first: Trial, redundancy: int, most: int, say: Callable[[float], None]) -> Followed:
     """Steps of least squares with the factor of the step before, as long as each is a tenth of the last or less.
 
     Parameters

@@ -260,9 +260,7 @@ class NormalSystem:
         points = np.empty((len(u.points), 3))
         problem = self.problem(state, estimator, damping)
         step = Directions(images, shared, points)
-        run_chunks(
-            lambda k: _kernels.back_substitute(*self._bounds[k], problem, step, self._work()), len(self._bounds)
-        )
+        run_chunks(lambda k: _kernels.back_substitute(*self._bounds[k], problem, step, self._work()), len(self._bounds))
         return Step(images, shared, points)
 
     def whole_step(self, state: State, x: np.ndarray, damping: float, estimator: Estimator) -> Step | None:
@@ -284,9 +282,7 @@ class NormalSystem:
         """The state with every point moved, on its own and only downhill, to where its rays want it."""
         settled = replace(state, points=state.points.copy())
         problem = self.problem(settled, estimator)
-        run_chunks(
-            lambda k: _kernels.settle_points(*self._bounds[k], problem, rounds, self._work()), len(self._bounds)
-        )
+        run_chunks(lambda k: _kernels.settle_points(*self._bounds[k], problem, rounds, self._work()), len(self._bounds))
         return settled
 
     def looseness(self, state: State, estimator: Estimator) -> np.ndarray:

@@ -136,5 +136,3 @@ def with_edits(block: Block) -> tuple[Block, np.ndarray]:
         else:
             xyz[row[point]] = np.nan
     return replace(block, control=replace(control, xyz=xyz, is_check=is_check)), off
-
-

@@ -218,9 +218,7 @@ def _checked(
     return (replace(step, factor=factor) if step and factor else step), None
 
 
-def _is_stopped(
-    system: NormalSystem, at: Place, options: SolveOptions, iteration: int, suspect: bool = False
-) -> bool:
+def _is_stopped(system: NormalSystem, at: Place, options: SolveOptions, iteration: int, suspect: bool = False) -> bool:
     asked = options.inspect
     return asked is not None and asked(system, at.state, at.equations, at.estimator, iteration, suspect)
 

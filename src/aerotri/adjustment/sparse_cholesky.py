@@ -137,9 +137,7 @@ class Symbolic:
                     n_own=int(end - first),
                     rows=rows,
                     scalar_rows=scalar,
-                    blocks=FrontBlocks(
-                        block, np.searchsorted(local, high[block]), low[block] - first, flipped[block]
-                    ),
+                    blocks=FrontBlocks(block, np.searchsorted(local, high[block]), low[block] - first, flipped[block]),
                     place=np.zeros(0, np.int64),
                     parent=int(tree.parent[k]),
                     depth=int(tree.depth[k]),

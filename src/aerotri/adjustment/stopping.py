@@ -33,9 +33,7 @@ ROUNDING = 1e-13
 """Decrement over cost that is rounding: some hundred units in the last place."""
 
 
-def is_settled(
-    at: Place, step: Trial, redundancy: int, robust_tolerance: float | None, last_decrement: float
-) -> bool:
+def is_settled(at: Place, step: Trial, redundancy: int, robust_tolerance: float | None, last_decrement: float) -> bool:
     """Whether the step just taken from `at` was the last that matters.
 
     The decrement of the next step is foretold from how the last pair of undamped steps contracted. Re-weighting

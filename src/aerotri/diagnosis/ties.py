@@ -71,9 +71,7 @@ def _parts(common, there: np.ndarray) -> list[Cut]:
     _, label = connected_components(common, directed=False)
     sizes = np.bincount(label[there], minlength=label.max(initial=0) + 1)
     largest = int(np.argmax(sizes))
-    return [
-        Cut(np.flatnonzero(there & (label == k)), 0) for k in np.flatnonzero(sizes) if k != largest
-    ]
+    return [Cut(np.flatnonzero(there & (label == k)), 0) for k in np.flatnonzero(sizes) if k != largest]
 
 
 def _cuts(common, sees, fewest: int) -> list[Cut]:

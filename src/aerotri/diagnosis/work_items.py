@@ -154,7 +154,5 @@ def _observations(adjusted: AdjustedBlock, scale: float) -> list[WorkItem]:
         what = f"{observed.group[row]} {observed.component[row]}: adjusted − observed {v}, w {observed.w[row]:+.1f}"
         hint = "look at the observation and its σ; at shift and drift where many are listed"
         priority = 1 if size[row] > sure else 3
-        items.append(
-            WorkItem(priority, "observation", str(observed.label[row]), what, float(size[row] / limit), hint)
-        )
+        items.append(WorkItem(priority, "observation", str(observed.label[row]), what, float(size[row] / limit), hint))
     return items

@@ -16,9 +16,6 @@ from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAME
 INTERIOR_COLUMNS = INTERIOR_ELEMENTS + tuple(f"brown.{n}" for n in BROWN_NAMES) + tuple(f"lens.{n}" for n in LENS_NAMES)
 
 
-
-
-
 def interior_row(camera: Camera) -> np.ndarray:
     """(15,) start values of a camera's interior elements and lens parameters."""
     row = [camera.interior[name].value for name in INTERIOR_ELEMENTS]

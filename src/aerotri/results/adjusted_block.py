@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from aerotri.results.variance_components import VarianceComponents
 
 
-
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """How the adjustment ended.

@@ -16,6 +16,7 @@ from aerotri.results.normalised import normalised_residuals
 SINGULAR = 1e-9
 """Determinant of the partials by the angles below which ω, φ, κ cannot be told apart."""
 
+
 def transform_result(adjusted: AdjustedBlock, block: Block, frame: LocalFrame) -> AdjustedBlock:
     """The result of `transform_block(block, frame)`, brought into the CRS of `block`.
 

@@ -71,8 +71,11 @@ def _clustered(
 ) -> np.ndarray:
     """Around the nodes of a pattern in each image, as Gruber laid them out; the nodes of overlapping images meet."""
     nodes = float(np.prod(spec.pattern))
-    _refuse_too_many(nodes * (len(flown) if spec.distribution == "nodes" else 1.0), "nodes of tie points",
-                     "lower 'tie_points.pattern'")
+    _refuse_too_many(
+        nodes * (len(flown) if spec.distribution == "nodes" else 1.0),
+        "nodes of tie points",
+        "lower 'tie_points.pattern'",
+    )
     if spec.distribution == "nodes":
         cells = len(flown) * spec.pattern[0] * spec.pattern[1]
         order = np.concatenate([rng.permutation(cells) for _ in range(-(-count // cells))])[:count]
@@ -148,8 +151,11 @@ def lay_out_control(spec: ControlSpec, frame: FlightFrame, base_m: float, rng: n
     """
     half = frame.half_axes + np.array([0.0, CONTROL_REACH * frame.footprint[1] / 2.0])
     mesh = np.inf if spec.distance_bases is None else spec.distance_bases * base_m
-    _refuse_too_many(float((2.0 * half / mesh + 2.0).prod()) + CHECK_SURPLUS * spec.check_points,
-                     "control and check points", "raise 'control.distance_bases' or lower 'control.check_points'")
+    _refuse_too_many(
+        float((2.0 * half / mesh + 2.0).prod()) + CHECK_SURPLUS * spec.check_points,
+        "control and check points",
+        "raise 'control.distance_bases' or lower 'control.check_points'",
+    )
     if spec.positions:
         control = (2.0 * np.array(spec.positions) - 1.0) * half
     elif spec.distance_bases is not None:

@@ -57,9 +57,7 @@ class Truth:
 TRUTH = "truth"
 
 
-def write_simulated(
-    folder: str | os.PathLike, block: Block, truth: Truth, gone: Collection[str] = ()
-) -> None:
+def write_simulated(folder: str | os.PathLike, block: Block, truth: Truth, gone: Collection[str] = ()) -> None:
     """Write the block's folder and, under `truth/`, what is behind it; other files stay but for `gone`.
 
     Numbers are rounded to what they can mean, so that another processor writes the same.

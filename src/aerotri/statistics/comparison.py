@@ -292,9 +292,7 @@ def _parameters(first: AdjustedBlock, second: AdjustedBlock) -> tuple[ParameterC
         kind_two, after, sigma_after = two.get((group, name), nothing)
         held = not (np.isfinite(sigma_before) or np.isfinite(sigma_after))
         if not held or before != after:
-            changes.append(
-                ParameterChange(name, group, kind_two or kind_one, before, after, sigma_before, sigma_after)
-            )
+            changes.append(ParameterChange(name, group, kind_two or kind_one, before, after, sigma_before, sigma_after))
     return tuple(changes)
 
 

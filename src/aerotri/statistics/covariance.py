@@ -110,9 +110,7 @@ def transform_datum(minimal: Cofactors, inner: InnerDatum) -> Cofactors:
         images=_transformed(minimal.images, inner.images, inner.q_images, inner.both),
         shared=_transformed(minimal.shared[None], inner.shared[None], inner.q_shared[None], inner.both)[0],
         points=_transformed(minimal.points, inner.points, inner.q_points, inner.both),
-        image_shared=minimal.image_shared
-        - mixed
-        + np.einsum("nia,ab,sb->nis", inner.images, inner.both, inner.shared),
+        image_shared=minimal.image_shared - mixed + np.einsum("nia,ab,sb->nis", inner.images, inner.both, inner.shared),
         inner=inner,
     )
 

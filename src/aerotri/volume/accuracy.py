@@ -156,14 +156,10 @@ def _base_variance(base: Base, boundary: Boundary, surface: Surface, options: Si
         return stated
     places, weight = quadrature_of(boundary)
     xy = np.concatenate([places, base.xy])
-    return stated + max(
-        float(roughness.contrast_variance(xy, np.concatenate([weight, -base.integral]))), 0.0
-    )
+    return stated + max(float(roughness.contrast_variance(xy, np.concatenate([weight, -base.integral]))), 0.0)
 
 
-def _notes(
-    part: Part, base_part: Part | None, base: Base, ground: float, options: SigmaOptions
-) -> tuple[str, ...]:
+def _notes(part: Part, base_part: Part | None, base: Base, ground: float, options: SigmaOptions) -> tuple[str, ...]:
     notes = []
     if part.unseen > 0.0:
         notes.append(f"{part.unseen:.4g} m² are seen by too few photographs of the block and are in no part of σ")

@@ -215,9 +215,7 @@ def parse_base(text: str, surface: Surface, boundary: Boundary) -> Base:
                 raise ValueError
             return plane_through(points, "plane through given points")
     except ValueError:
-        raise InputError(
-            f"--base '{text}' is not understood", "give level:HEIGHT or plane:X,Y,Z;X,Y,Z;X,Y,Z"
-        ) from None
+        raise InputError(f"--base '{text}' is not understood", "give level:HEIGHT or plane:X,Y,Z;X,Y,Z;X,Y,Z") from None
     if text == "plane":
         return plane_through(boundary_heights(surface, boundary), "plane fitted to the boundary")
     if text == "boundary":
@@ -245,7 +243,5 @@ def _along(ring: np.ndarray, spacing: float) -> np.ndarray:
 
 def _spline_terms(at: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """(n, k + 3): −ρ to every node, then 1, x, y."""
-    squared = np.maximum(
-        np.sum(at**2, axis=1)[:, None] - 2.0 * at @ nodes.T + np.sum(nodes**2, axis=1)[None, :], 0.0
-    )
+    squared = np.maximum(np.sum(at**2, axis=1)[:, None] - 2.0 * at @ nodes.T + np.sum(nodes**2, axis=1)[None, :], 0.0)
     return np.column_stack([-np.sqrt(squared), np.ones(len(at)), at])

@@ -114,8 +114,7 @@ def cell_volume(surface: Surface, boundary: Boundary, base: Base | None = None) 
     size = max(factor, 1024 // factor * factor)
     extra = _spline_cells(surface.grid, base)
     parts = [
-        _window_cells(surface, boundary, extra, window, factor)
-        for window in windows(surface.grid, boundary, size)
+        _window_cells(surface, boundary, extra, window, factor) for window in windows(surface.grid, boundary, size)
     ]
     xyz, gradient, share = (np.concatenate([part[k] for part in parts]) for k in range(3))
     return Functional(xyz, gradient, share)

@@ -134,8 +134,7 @@ def _candidates(local, number, orientation, half, known) -> tuple[np.ndarray, np
     angle = np.minimum(np.arctan(np.hypot(*half[known].T) / orientation.interior[known, 0]) + tilt, 1.4)
     reach = np.tan(angle) * np.maximum(orientation.centre[known, 2] - bottom, 0.0)
     lists = [
-        known[np.linalg.norm(orientation.centre[known, :2] - middle[k], axis=1) <= reach + size[k]]
-        for k in range(runs)
+        known[np.linalg.norm(orientation.centre[known, :2] - middle[k], axis=1) <= reach + size[k]] for k in range(runs)
     ]
     first = np.concatenate([[0], np.cumsum([len(own) for own in lists])]).astype(np.int64)
     return first, np.concatenate([*lists, np.zeros(0, np.int64)]).astype(np.int64)

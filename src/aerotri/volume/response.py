@@ -179,9 +179,7 @@ def _summed(
         raise InputError(f"a picket was measured in '{name}', which was not adjusted", "leave it out")
     points, along = _in_frame(calibration, pickets.xyz, np.asarray(gradient, dtype=float))
     bounds = chunk_bounds(np.diff(pickets.start).astype(float))
-    arrays = _kernels.PicketArrays(
-        pickets.start, image, 1.0 / pickets.sigma_mm, points, along, pickets.noise_share
-    )
+    arrays = _kernels.PicketArrays(pickets.start, image, 1.0 / pickets.sigma_mm, points, along, pickets.noise_share)
     outs = [
         _kernels.ResponseSums(
             np.zeros((len(u.images), 6)), np.zeros((len(u.lens.base), 15)), np.zeros((len(nodes.xy), 2)), np.zeros(1)

@@ -51,9 +51,7 @@ def difference_part(surface: Part, base: Part, corrected: bool) -> tuple[Part, f
     response = respond(surface.calibration, joint.pickets, joint.gradient, corrected)
     between = _difference_between(surface.between, base.between, common)
     rays = len(joint.pickets.image)
-    part = Part(
-        surface.calibration, response, between, len(joint.pickets), rays, surface.unseen + base.unseen, joint
-    )
+    part = Part(surface.calibration, response, between, len(joint.pickets), rays, surface.unseen + base.unseen, joint)
     return part, float(min(common))
 
 
