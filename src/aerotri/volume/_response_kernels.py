@@ -58,7 +58,7 @@ class ResponseSums(NamedTuple):
 
 
 class Views(NamedTuple):
-    """What n photographs see: rotation (n, 3, 3), centre (n, 3), interior (n, 3) c, x0, y0 and half format (n, 2) mm."""
+    """n photographs: rotation (n, 3, 3), centre (n, 3), interior (n, 3) c, x0, y0 and half a format (n, 2) mm."""
 
     rotation: np.ndarray
     centre: np.ndarray
