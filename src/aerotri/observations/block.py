@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -331,7 +332,7 @@ class Settings:
     earth_curvature: str = "off"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Block:
     """Everything that was measured of one block, with the settings of its adjustment.
 
@@ -362,3 +363,29 @@ class Block:
     fiducials: Fiducials | None = None
     constraints: Constraints | None = None
     interior_fits: Mapping[int, Any] = field(default_factory=dict)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many there are of what a block holds."""
+        is_check = self.control.is_check
+        return {
+            "photographs": len(self.images),
+            "image points": len(self.image_points),
+            "object points": len(self.points),
+            "control points": int((~is_check).sum()),
+            "check points": int(is_check.sum()),
+            "observed positions or attitudes": 0 if self.gnss_ins is None else len(self.gnss_ins),
+        }
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{count} {what}" for what, count in self.counts.items() if count)
+        return f"<aerotri.Block {self.name!r}: {counts}>"
+
+    def _repr_html_(self) -> str:
+        """What the block holds, as a notebook shows it."""
+        cameras = ", ".join(
+            f"{c.name} ({c.size_px[0]} × {c.size_px[1]}, {c.focal_length_mm:g} mm)" for c in self.cameras
+        )
+        facts = {**self.counts, "cameras": cameras, "coordinate system": self.crs}
+        rows = "".join(f"<tr><th>{what}</th><td>{escape(str(value))}</td></tr>" for what, value in facts.items())
+        return f"<table><caption>{escape(str(self.name))}</caption>{rows}</table>"

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 Progress = Callable[[str, float | None], None]
 """Takes (stage, share): what is being done, and how far it is, 0 … 1, None where that is not known."""
 ProgressLike = Progress | bool | None
+BAR_WIDTH, BETWEEN_S = 30, 0.2
+"""Of the bar in a notebook: characters, and seconds between two states of one stage."""
 
 
 class StageReport:
@@ -52,10 +57,41 @@ def stage_report(progress: ProgressLike) -> Iterator[StageReport]:
     if callable(progress):
         yield StageReport(progress)
     elif progress:
-        with _bar() as tell:
+        with _notebook_bar() if _is_notebook() else _bar() as tell:
             yield StageReport(tell)
     else:
         yield StageReport(None)
+
+
+def _is_notebook() -> bool:
+    """Whether this runs in the kernel of a notebook, where a terminal's bar is not seen."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    return hasattr(shell, "kernel")
+
+
+@contextmanager
+def _notebook_bar() -> Iterator[Progress]:
+    """A line that is written anew as the work goes on, and is taken away at the end."""
+    display = import_module("IPython.display")
+    line, shown, at = display.display(display.Pretty(""), display_id=True), "", 0.0
+
+    def tell(stage: str, share: float | None) -> None:
+        nonlocal shown, at
+        now = time.monotonic()
+        if stage != shown or now - at > BETWEEN_S:
+            shown, at = stage, now
+            line.update(display.Pretty(stage if share is None else _drawn(stage, share)))
+
+    try:
+        yield tell
+    finally:
+        line.update(display.Pretty(""))
+
+
+def _drawn(stage: str, share: float) -> str:
+    """'rendering ████····  50 %'"""
+    full = round(BAR_WIDTH * min(max(share, 0.0), 1.0))
+    return f"{stage} {'█' * full}{'·' * (BAR_WIDTH - full)} {100.0 * share:3.0f} %"
 
 
 @contextmanager

@@ -8,6 +8,8 @@ shape, darkness and line style, colour only helps.
 from __future__ import annotations
 
 import functools
+import io
+import warnings
 from collections.abc import Callable
 from typing import Any, cast
 
@@ -64,9 +66,21 @@ def styled(plot: Callable[..., Figure]) -> Callable[..., Figure]:
     return wrapper
 
 
+class ShownFigure(Figure):
+    """A figure that a notebook shows, whether pyplot was imported there or not."""
+
+    def _repr_png_(self) -> bytes:
+        file = io.BytesIO()
+        with matplotlib.rc_context(cast(Any, STYLE)), warnings.catch_warnings():
+            # a script the font has no letters for shows boxes
+            warnings.filterwarnings("ignore", message="Glyph .* missing from")
+            self.savefig(file, format="png")
+        return file.getvalue()
+
+
 def new_figure(height: float, title: str, subtitle: str = "", width: float = WIDTH) -> Figure:
     """A figure of a size in inches with a title and a line of explanation at its upper left."""
-    figure = Figure(figsize=(width, height))
+    figure = ShownFigure(figsize=(width, height))
     figure.text(0.2 / width, 1 - 0.17 / height, title, fontsize=11.5, weight="bold", va="top")
     figure.text(0.2 / width, 1 - 0.41 / height, subtitle, fontsize=8.5, color=GREY, va="top", linespacing=1.35)
     return figure
