@@ -27,6 +27,7 @@ MODULES = (
     "parameters",
     "picket_interval",
     "predict",
+    "running",
     "simulating",
     "surface_comparison",
     "surfaces",

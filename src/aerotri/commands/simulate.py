@@ -37,18 +37,10 @@ def run_simulate(
 
     console = Console(quiet=as_json)
     flight = simulate(spec, seed)
-    block, wanted = flight.block, render is not None
+    wanted, counts = render is not None, flight.summary
     looks = {} if render is None else {"targets": render.targets, "blur_px": render.blur_px, "noise": render.noise}
     flight.save(out, photographs=wanted, only=only, overwrite=overwrite, progress=console.stage, **looks)
-    counts: dict[str, Any] = {
-        "block": block.name,
-        "images": len(block.images),
-        "image_points": len(block.image_points),
-        "points": len(block.points),
-        "control": int((~block.control.is_check).sum()),
-        "check": int(block.control.is_check.sum()),
-    }
-    rendered = (len(dict.fromkeys(only)) or len(block.images)) if wanted else 0
+    rendered = (len(dict.fromkeys(only)) or counts["images"]) if wanted else 0
     if wanted:
         counts["rendered"] = rendered
     if as_json:

@@ -35,6 +35,19 @@ class SimulatedBlock:
     plan: SimulationSpec
     seed: int
 
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What the command prints as JSON: how much was measured."""
+        is_check = self.block.control.is_check
+        return {
+            "block": self.block.name,
+            "images": len(self.block.images),
+            "image_points": len(self.block.image_points),
+            "points": len(self.block.points),
+            "control": int((~is_check).sum()),
+            "check": int(is_check.sum()),
+        }
+
     def save(
         self,
         out: PathLike,

@@ -1,0 +1,36 @@
+"""The command line and the Python package mean the same where nothing is said."""
+
+from __future__ import annotations
+
+from inspect import Parameter, signature
+
+import pytest
+
+import aerotri
+from aerotri.cli import adjusting, blocks, run, terrain, volumes
+from aerotri.public.simulating import SimulatedBlock
+
+NOTHING = (None, "", (), [], "auto")
+PAIRS = {
+    "simulate": (blocks.simulate, SimulatedBlock.save),
+    "seed of simulate": (blocks.simulate, aerotri.simulate),
+    "convert": (blocks.convert, aerotri.read),
+    "tiepoints": (blocks.tiepoints, aerotri.tie_points),
+    "compare-parameters": (adjusting.compare_parameters, aerotri.compare_parameters),
+    "dtm": (terrain.dtm, aerotri.terrain),
+    "volume": (volumes.volume, aerotri.volume),
+    "predict volume": (volumes.predict_volume, aerotri.predict.volume),
+    "predict attitude": (volumes.predict_attitude, aerotri.predict.attitude),
+    "predict picket-interval": (terrain.predict_picket_interval, aerotri.predict.picket_interval),
+    "run": (run.run, aerotri.run),
+}
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_defaults_are_those_of_the_function(name):
+    command, function = (signature(one).parameters for one in PAIRS[name])
+    common = [key for key in command if key in function and command[key].default is not Parameter.empty]
+    assert common
+    for key in common:
+        stated = [one[key].default for one in (command, function)]
+        assert stated[0] == stated[1] or all(value in NOTHING for value in stated), (key, stated)
