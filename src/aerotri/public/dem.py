@@ -295,7 +295,7 @@ def _correct(
     """Correct and write the rasters; returns the content of the JSON file."""
     from aerotri.adjustment.parallel import thread_count
     from aerotri.deformation import dem_correction
-    from aerotri.deformation.outcome_json import correction_json
+    from aerotri.formats.results.deformation import correction_json
     from aerotri.rasters.grids import NO_DATA, RasterWriter, write_raster
 
     no_data = NO_DATA if reader.no_data is None else reader.no_data

@@ -79,7 +79,7 @@ class ModelDeformation:
     @property
     def summary(self) -> dict[str, Any]:
         """The content of deform.json: extremes, RMS, height-to-base ratio, cm per µm."""
-        from aerotri.deformation.outcome_json import block_deformation_json, deformation_json
+        from aerotri.formats.results.deformation import block_deformation_json, deformation_json
 
         if isinstance(self.record, BlockDeformation):
             return block_deformation_json(self.record, self.block)

@@ -103,7 +103,7 @@ def write_adjustment(
             timings["plots"] = time.perf_counter() - begun
         result = replace(result, outcome=replace(result.outcome, timings_s=timings))
         if checked is not None:
-            from aerotri.report.free_check_json import free_check_json
+            from aerotri.formats.results.free_check import free_check_json
 
             write_json(folder / "check_free.json", free_check_json(checked))
         _write_parameter_tables(adjustment, folder)

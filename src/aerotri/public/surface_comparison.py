@@ -89,7 +89,7 @@ class SurfaceComparison:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The content of compare.json."""
-        from aerotri.terrain.outcome_json import comparison_json
+        from aerotri.formats.results.terrain import comparison_json
 
         return comparison_json(self.record, self.test, self.control, self.method)
 

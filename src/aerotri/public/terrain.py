@@ -118,7 +118,7 @@ class TerrainModel:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The content of dtm.json: interval, counts of pickets, σ."""
-        from aerotri.terrain.outcome_json import terrain_json
+        from aerotri.formats.results.terrain import terrain_json
 
         return terrain_json(self.record, self.block, self.crs) | {"adjustment": self.adjustment}
 

@@ -135,8 +135,8 @@ def _stated(adjustment: Adjustment | PathLike | None) -> StatedAdjustment | None
 
 
 def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport) -> MeasuredVolume:
+    from aerotri.formats.results.volume import Sources, volume_json
     from aerotri.rasters.grids import cache_limited
-    from aerotri.volume.outcome_json import Sources, volume_json
     from aerotri.volume.sections import chosen_profiles
 
     top, below = asked.top, asked.below

@@ -10,7 +10,7 @@ from matplotlib.contour import ContourSet
 
 from aerotri.deformation import Deformation
 from aerotri.deformation.model_geometry import ModelGeometry
-from aerotri.deformation.outcome_json import contour_interval
+from aerotri.formats.results.deformation import contour_interval
 from aerotri.report.plots.deformation import plot_deformation, plot_deformation_profile
 
 

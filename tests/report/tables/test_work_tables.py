@@ -9,7 +9,7 @@ import pytest
 
 from aerotri.diagnosis.free_verdict import in_words
 from aerotri.diagnosis.work_list import WorkItem, WorkList
-from aerotri.report.free_check_json import free_check_json
+from aerotri.formats.results.free_check import free_check_json
 from aerotri.report.pages.adjustment import Findings, report_html
 from aerotri.report.tables import comparison as comparison_tables
 from aerotri.report.tables import work as work_tables

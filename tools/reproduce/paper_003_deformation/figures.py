@@ -10,7 +10,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from aerotri.deformation import Deformation
-from aerotri.deformation.outcome_json import contour_interval
+from aerotri.formats.results.deformation import contour_interval
 from aerotri.image_errors import ErrorField
 from aerotri.report.plots.camera import seams
 from aerotri.report.plots.canvas import (

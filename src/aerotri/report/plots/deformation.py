@@ -14,7 +14,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from aerotri.deformation.block_models import BlockDeformation
 from aerotri.deformation.model_grid import Deformation
-from aerotri.deformation.outcome_json import contour_interval, worst_seams
+from aerotri.formats.results.deformation import contour_interval, worst_seams
 from aerotri.report.plots.canvas import (
     ACCENT,
     GREY,
