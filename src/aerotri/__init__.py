@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from aerotri.public.converting import convert as convert
     from aerotri.public.covariance import Covariance as Covariance
     from aerotri.public.dem import correct_dem as correct_dem
+    from aerotri.public.ideal import ideal_photographs as ideal_photographs
     from aerotri.public.models import deform as deform
     from aerotri.public.running import run as run
     from aerotri.public.simulating import example_flight as example_flight
@@ -61,6 +62,7 @@ _PLACES = {
     "adjust": "aerotri.public.adjustment",
     "convert": "aerotri.public.converting",
     "example_flight": "aerotri.public.simulating",
+    "ideal_photographs": "aerotri.public.ideal",
     "open_result": "aerotri.public.adjustment",
     "predict": "aerotri.public.predict",
     "read": "aerotri.public.blocks",
@@ -93,6 +95,7 @@ __all__ = [
     "crosscheck",
     "deform",
     "example_flight",
+    "ideal_photographs",
     "open_result",
     "predict",
     "read",

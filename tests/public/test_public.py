@@ -23,6 +23,7 @@ MODULES = (
     "converting",
     "covariance",
     "dem",
+    "ideal",
     "models",
     "parameters",
     "picket_interval",

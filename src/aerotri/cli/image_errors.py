@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import typer
 
 from aerotri.cli.app import app
 from aerotri.cli.options import Json, Overwrite, ResultFolder
+from aerotri.rasters.photograph_settings import COMPRESSION, RESAMPLING
 
 
 @app.command(epilog="Example: aerotri deform saar_result --end-lap 0.663 --variant absorbed --out saar_deformation")
@@ -85,8 +86,8 @@ def imgeo(
         list[Path] | None, typer.Argument(help="TIFF or JPEG files, named as in the block; none: the exports alone.")
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("ideal"),
-    resampling: Annotated[str, typer.Option(help="bicubic or lanczos.")] = "bicubic",
-    compression: Annotated[str, typer.Option(help="keep, deflate, lzw, zstd or none.")] = "keep",
+    resampling: Annotated[str, typer.Option(help="bicubic or lanczos.")] = RESAMPLING,
+    compression: Annotated[str, typer.Option(help="keep, deflate, lzw, zstd or none.")] = COMPRESSION,
     group: Annotated[
         str | None, typer.Option(help="Parameter group (camera, day) of photographs that are not in the block.")
     ] = None,
@@ -96,4 +97,5 @@ def imgeo(
     """Photographs without systematic image errors, their camera, and the errors for other programs."""
     from aerotri.commands.imgeo import ImgeoOptions, run_imgeo
 
-    run_imgeo(result, photographs or [], out, ImgeoOptions(resampling, compression, group), json_, overwrite)
+    options = ImgeoOptions(cast(Any, resampling), cast(Any, compression), group)
+    run_imgeo(result, photographs or [], out, options, json_, overwrite)

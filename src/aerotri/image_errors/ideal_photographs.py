@@ -20,8 +20,8 @@ from aerotri.image_errors import _kernels
 from aerotri.image_errors.ideal_map import IdealMap
 from aerotri.observations import Camera
 from aerotri.rasters.images import Photograph, create_like, open_photograph
+from aerotri.rasters.photograph_settings import COMPRESSION, RESAMPLING, RESAMPLINGS
 
-RESAMPLINGS = ("bicubic", "lanczos")
 BAND_BYTES = 24 * 2**20
 """Size of the rows, all bands, resampled at a time."""
 TASK_ROWS = 32
@@ -46,7 +46,7 @@ def resample(
     rows: tuple[int, int],
     ideal: IdealMap,
     kind: PixelType,
-    method: str = "bicubic",
+    method: str = RESAMPLING,
     pool: ThreadPoolExecutor | None = None,
 ) -> np.ndarray:
     """Rows of the ideal photograph.
@@ -56,7 +56,7 @@ def resample(
     source : (bands, k, columns) rows of the measured photograph from `source_row` on, at least those that
         `IdealMap.source_rows` names within the image.
     rows : first and one after the last.
-    method : of `RESAMPLINGS`.
+    method : of `photograph_settings.RESAMPLINGS`.
     pool : threads to work in; the pixels do not depend on it.
 
     Returns
@@ -143,8 +143,8 @@ def ideal_photograph(
     source: str | os.PathLike,
     target: str | os.PathLike,
     ideal: IdealMap,
-    method: str = "bicubic",
-    compression: str = "keep",
+    method: str = RESAMPLING,
+    compression: str = COMPRESSION,
     report: Report | None = None,
 ) -> tuple[str, ...]:
     """Resample one file into another, by rows: memory does not depend on its size.

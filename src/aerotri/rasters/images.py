@@ -23,12 +23,12 @@ from rasterio.transform import Affine
 from rasterio.windows import Window
 
 from aerotri.conventions import InputError
+from aerotri.rasters.photograph_settings import COMPRESSION
 
 DRIVERS = {b"II*\0": "GTiff", b"MM\0*": "GTiff", b"II+\0": "GTiff", b"MM\0+": "GTiff", b"\xff\xd8\xff": "JPEG"}
 """By the first bytes of a file, TIFF and BigTIFF in both byte orders, and JPEG."""
 LOSSLESS = {"lzw", "deflate", "zstd", "lzma", "packbits", "none"}
 PREDICTED = {"lzw", "deflate", "zstd"}
-COMPRESSIONS = ("keep", "deflate", "lzw", "zstd", "none")
 TILE_PX = 512
 SETTINGS = {"GDAL_ERROR_ON_LIBJPEG_WARNING": "YES", "GDAL_CACHEMAX": 128, "GDAL_TIFF_INTERNAL_MASK": "YES"}
 """A truncated JPEG is an error, not a grey lower half."""
@@ -214,12 +214,12 @@ def create_image(
 
 
 @contextmanager
-def create_like(path: str | os.PathLike, photograph: Photograph, compression: str = "keep") -> Iterator[RowWriter]:
+def create_like(path: str | os.PathLike, photograph: Photograph, compression: str = COMPRESSION) -> Iterator[RowWriter]:
     """A tiled TIFF with everything of a photograph but its pixels.
 
     Parameters
     ----------
-    compression : 'keep', or one of `COMPRESSIONS`; a lossy one is never kept, DEFLATE stands in.
+    compression : 'keep', or one of `photograph_settings.COMPRESSIONS`; a lossy one is never kept, DEFLATE stands in.
     """
     source = photograph.dataset
     options = _layout(photograph) | _compression(photograph, compression) | _georeference(source)

@@ -1,17 +1,16 @@
-"""What `aerotri imgeo` writes beside the photographs: the ideal camera, and the image errors for other programs."""
+"""Beside photographs without image errors: the ideal camera, and the image errors for other programs."""
 
 from __future__ import annotations
 
 import csv
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from aerotri.public.folders import refuse_existing_file
 
 if TYPE_CHECKING:
     from aerotri.image_errors.error_exports import NearestLens
@@ -30,22 +29,50 @@ camera,group,tile,column,row,x,y,dx,dy,sx,sy
 """
 
 
-def export(
-    adjusted: AdjustedBlock, errors: Mapping[int, ErrorFunction], out: Path, resampling: str,
-    photographs: Sequence[str] = (), overwrite: bool = False,
-) -> dict[str, Any]:  # fmt: skip
-    """Write cameras and correction grids, and the record of the run without its photographs.
+@dataclass(frozen=True, eq=False)
+class Exports:
+    """What is written beside the photographs.
+
+    Parameters
+    ----------
+    record : of imgeo.json, without photographs and files. texts : content of text files by their names.
+    rasters : image errors by the names of the rasters that hold them.
+    """
+
+    record: dict[str, Any]
+    texts: dict[str, str]
+    rasters: dict[str, ErrorFunction]
+
+    @property
+    def names(self) -> list[str]:
+        """Of all files but the record."""
+        return [*self.rasters, *self.texts]
+
+    def write(self, out: Path) -> None:
+        """Write the rasters and the texts into a folder, each whole or not at all.
+
+        Raises
+        ------
+        InputError
+            When the folder cannot be written to.
+        """
+        from aerotri.formats.files.atomic import atomic_file
+
+        for name, function in self.rasters.items():
+            _write_correction_raster(function, out / name)
+        for name, text in self.texts.items():
+            with atomic_file(out / name) as place:
+                place.write_text(text, encoding="utf-8")
+
+
+def exports_of(adjusted: AdjustedBlock, errors: Mapping[int, ErrorFunction], resampling: str) -> Exports:
+    """Cameras and correction grids.
 
     Parameters
     ----------
     errors : of the groups in use, by their number in the block.
-    photographs : names of the files that will follow. overwrite : whether files of others may be replaced.
-
-    Returns
-    -------
-    The record.
+    resampling : of the photographs, for the record.
     """
-    from aerotri.formats.files.atomic import atomic_file
     from aerotri.formats.results.adjustment import outcome_json
     from aerotri.formats.text.toml_text import toml_of
     from aerotri.image_errors.error_exports import ideal_camera, nearest_opencv
@@ -72,22 +99,10 @@ def export(
             {k: (cameras[k], ideal_camera(function), "no image errors") for k, function in errors.items()}
         ),
     }
-    record["files"] = [*rasters, *texts, *photographs]
-    older = _older_files(out)
-    for name in record["files"]:
-        if name not in older:
-            refuse_existing_file(out / name, overwrite)
-    # first, so that a run after one that was killed knows what is ours
-    write_record({**record, "files": list(dict.fromkeys([*record["files"], *older]))}, out)
-    for name, function in rasters.items():
-        _write_correction_raster(function, out / name)
-    for name, text in texts.items():
-        with atomic_file(out / name) as place:
-            place.write_text(text, encoding="utf-8")
-    return record
+    return Exports(record, texts, rasters)
 
 
-def _older_files(out: Path) -> set[str]:
+def older_files(out: Path) -> set[str]:
     """What the record of an older run in this folder says it has written."""
     try:
         record = json.loads((out / RECORD).read_text(encoding="utf-8"))
@@ -191,7 +206,7 @@ def _colmap_text(cameras: Mapping[int, tuple[str, Camera, str]]) -> str:
     lines = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"]
     for number, (name, camera, remark) in enumerate(cameras.values(), start=1):
         model, values = colmap_camera(camera)
-        lines.append(f"# {number}: {plain(name)}, {remark}")
+        lines.append(f"# {number}: {one_line(name)}, {remark}")
         lines.append(" ".join([str(number), model, *(str(n) for n in camera.size_px), *(repr(v) for v in values)]))
     return "\n".join(lines) + "\n"
 
@@ -200,15 +215,6 @@ def _left(nearest: NearestLens) -> str:
     return f"as measured; the model leaves {nearest.rms_mm * 1e3:.2f} um RMS, {nearest.max_mm * 1e3:.2f} um at most"
 
 
-def plain(name: str) -> str:
+def one_line(name: str) -> str:
     """A name that cannot end its line."""
     return "".join(c if c.isprintable() else " " for c in name)
-
-
-def write_record(record: Mapping[str, Any], out: Path) -> None:
-    """imgeo.json."""
-    from aerotri.formats.files.atomic import atomic_file
-
-    text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
-    with atomic_file(out / RECORD) as place:
-        place.write_text(text + "\n", encoding="utf-8")

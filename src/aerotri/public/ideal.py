@@ -1,0 +1,271 @@
+"""Photographs without systematic image errors, their camera, and the errors for other programs."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerotri.conventions import InputError
+from aerotri.public.adjustment import Adjustment
+from aerotri.public.folders import refuse_existing_file, refuse_foreign_folder
+from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.public.stated import StatedAdjustment
+from aerotri.public.table import Table
+from aerotri.rasters.photograph_settings import (
+    COMPRESSION,
+    COMPRESSIONS,
+    RESAMPLING,
+    RESAMPLINGS,
+    Compression,
+    Resampling,
+)
+
+if TYPE_CHECKING:
+    from aerotri.formats.results.image_errors import Exports
+    from aerotri.image_errors import ImageGroup
+    from aerotri.image_errors.error_function import ErrorFunction
+    from aerotri.image_errors.ideal_map import IdealMap
+    from aerotri.observations import Block, Camera
+
+PathLike = str | os.PathLike
+ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff")
+UNITS = {"focal_length_mm": "mm", "x0_mm": "mm", "y0_mm": "mm", "d_rms_um": "µm", "d_max_um": "µm", "seconds": "s"}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class IdealPhotographs:
+    """What `aerotri.ideal_photographs` wrote, and the cameras of the new photographs.
+
+    Parameters
+    ----------
+    folder : where the photographs, the cameras and the image errors stand.
+    summary : content of imgeo.json. cameras : of the photographs without image errors, by their names.
+    """
+
+    folder: Path
+    summary: dict[str, Any]
+    cameras: dict[str, Camera]
+
+    @cached_property
+    def groups(self) -> Table:
+        """Every group's camera and the size of its image errors, with what simpler models leave of them, µm."""
+        rows = []
+        for group in self.summary["groups"]:
+            left = {f"{near['model'].lower()}_leaves_rms_um": near["remaining_rms_um"] for near in group["nearest"]}
+            rows.append({name: value for name, value in group.items() if name != "nearest"} | left)
+        return _table("groups", rows, UNITS | {name: "µm" for name in rows[0] if name.endswith("_um")})
+
+    @cached_property
+    def photographs(self) -> Table:
+        """The photographs written, with their group and what could not be carried over."""
+        rows = [{**one, "left_out": ", ".join(one["left_out"])} for one in self.summary["photographs"]]
+        return _table("photographs", rows, UNITS, ("file", "written", "group", "left_out", "seconds"))
+
+    def __repr__(self) -> str:
+        return f"<aerotri ideal photographs in {self.folder}: {len(self.summary['photographs'])}>"
+
+    def _repr_html_(self) -> str:
+        shown = self.photographs._repr_html_() if self.summary["photographs"] else ""
+        return f"<div><b>{escape(str(self.folder))}</b>{self.groups._repr_html_()}{shown}</div>"
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """A photograph to resample: its file, its group by number, and the name of what is written."""
+
+    source: Path
+    group: int
+    name: str
+
+
+def ideal_photographs(
+    result: Adjustment | PathLike,
+    photographs: PathLike | Sequence[PathLike] = (),
+    out: PathLike = "ideal",
+    *,
+    resampling: Resampling = RESAMPLING,
+    compression: Compression = COMPRESSION,
+    group: str | None = None,
+    overwrite: bool = False,
+    progress: ProgressLike = None,
+) -> IdealPhotographs:
+    """Write photographs without systematic image errors, their camera, and the errors for other programs.
+
+    Parameters
+    ----------
+    result : an adjustment, or the folder of one.
+    photographs : TIFF or JPEG files named as in the block, or folders of them; none: cameras and errors alone.
+    out : folder to write.
+    resampling : of the grey values.
+    compression : of the files; a lossy one is not kept.
+    group : parameter group (camera, day) of photographs that are not in the block.
+    overwrite : replace files that aerotri has not written, or that were changed since.
+    progress : as of `aerotri.adjust`.
+
+    Returns
+    -------
+    IdealPhotographs
+
+    Raises
+    ------
+    InputError
+        For a file that is no photograph of the block or its camera, or a folder that holds other files; nothing is
+        written before all files are known.
+
+    Examples
+    --------
+    >>> import aerotri, tempfile
+    >>> result = aerotri.adjust(aerotri.simulate(aerotri.example_flight(), seed=1).block, parameters="brown:K1+K2")
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     found = aerotri.ideal_photographs(result, out=f"{place}/ideal")
+    >>> found.groups.columns[:4]
+    ('group', 'camera', 'ideal_camera', 'focal_length_mm')
+    """
+    from aerotri.formats.files.work_place import held
+    from aerotri.formats.results.image_errors import RECORD, exports_of
+    from aerotri.image_errors import image_groups
+    from aerotri.image_errors.error_exports import ideal_camera
+    from aerotri.image_errors.error_function import error_function
+
+    folder = Path(out)
+    _check(resampling, compression)
+    refuse_foreign_folder(folder, RECORD)
+    adjusted = StatedAdjustment(result).record.result
+    groups = image_groups(adjusted.block)
+    jobs = _jobs(adjusted.block, groups, _paths(photographs), folder, group)
+    used = sorted({job.group for job in jobs}) if jobs else range(len(groups))
+    errors = {k: error_function(adjusted, groups[k]) for k in used}
+    with held(folder), stage_report(progress) as report:
+        exports = exports_of(adjusted, errors, resampling)
+        record = _write_exports(exports, folder, [job.name for job in jobs], overwrite)
+        record["photographs"] = _resample_all(jobs, errors, folder, (resampling, compression), report)
+        _write_record(record, folder)
+    names = [entry["ideal_camera"] for entry in record["groups"]]
+    return IdealPhotographs(
+        folder, record, {name: ideal_camera(errors[k]) for name, k in zip(names, errors, strict=True)}
+    )
+
+
+def _check(resampling: str, compression: str) -> None:
+    for name, value, known in (
+        ("resampling", resampling, RESAMPLINGS), ("compression", compression, COMPRESSIONS)
+    ):  # fmt: skip
+        if value not in known:
+            raise InputError(f"there is no {name} '{value}'", f"choose one of {', '.join(known)}")
+
+
+def _paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
+    return [Path(given)] if isinstance(given, str | os.PathLike) else [Path(path) for path in given]
+
+
+def _jobs(
+    block: Block, groups: tuple[ImageGroup, ...], photographs: list[Path], out: Path, group: str | None
+) -> list[_Job]:
+    """Which group every file belongs to, by its name; nothing is written before all are known."""
+    from aerotri.formats.files.photograph_files import match_files, photographs_in
+    from aerotri.image_errors.ideal_photographs import check_photograph, name_of
+
+    photographs = list(dict.fromkeys(photographs_in(photographs, ENDINGS)))
+    jobs, taken = [], {}
+    for path, row in zip(photographs, match_files(photographs, block.images.names).tolist(), strict=True):
+        if row in block.interior_fits:
+            raise InputError(
+                "is scanned film, whose interior orientation imgeo does not resample", "use the correction grid", path
+            )
+        number = _named_group(groups, group, path) if row < 0 else _group_of(groups, row)
+        check_photograph(path, groups[number].camera)
+        # in the subfolder that the block knows the photograph by
+        within = Path(str(block.images.names[row])).parent if row >= 0 else Path()
+        name = (within / name_of(path)).as_posix() if not within.is_absolute() else name_of(path)
+        if name in taken:
+            raise InputError(f"'{name}' would be written twice, for {taken[name]} too", "give other names", path)
+        if (out / name).exists() and (out / name).samefile(path):
+            raise InputError("would be overwritten by its own correction", "choose another --out", path)
+        taken[name] = path
+        jobs.append(_Job(path, number, name))
+    return jobs
+
+
+def _group_of(groups: tuple[ImageGroup, ...], row: int) -> int:
+    return next(k for k, group in enumerate(groups) if group.images[row])
+
+
+def _named_group(groups: tuple[ImageGroup, ...], name: str | None, path: Path) -> int:
+    known = ", ".join(dict.fromkeys(group.name for group in groups))
+    if name is None:
+        raise InputError(
+            "is no photograph of the block", f"name the file as the photograph, or state --group ({known})", path
+        )
+    found = [k for k, group in enumerate(groups) if group.name == name]
+    if len(found) != 1:
+        problem = "several cameras belong to" if found else "there is no"
+        raise InputError(f"{problem} group '{name}'", f"groups are {known}", path)
+    return found[0]
+
+
+def _write_exports(exports: Exports, out: Path, photographs: list[str], overwrite: bool) -> dict[str, Any]:
+    """Write cameras and image errors; the record of the run, without its photographs so far."""
+    from aerotri.formats.results.image_errors import older_files
+
+    record = {**exports.record, "files": [*exports.names, *photographs]}
+    older = older_files(out)
+    for name in record["files"]:
+        if name not in older:
+            refuse_existing_file(out / name, overwrite)
+    # first, so that a run after one that was killed knows what is ours
+    _write_record({**record, "files": list(dict.fromkeys([*record["files"], *older]))}, out)
+    exports.write(out)
+    return record
+
+
+def _write_record(record: dict[str, Any], out: Path) -> None:
+    from aerotri.formats.files.atomic import atomic_file
+    from aerotri.formats.results.image_errors import RECORD
+    from aerotri.public.saving import write_json
+
+    with atomic_file(out / RECORD) as place:
+        write_json(place, record)
+
+
+def _resample_all(
+    jobs: list[_Job], errors: dict[int, ErrorFunction], out: Path, how: tuple[Resampling, Compression],
+    report: StageReport,
+) -> list[dict[str, Any]]:  # fmt: skip
+    from aerotri.compiled import compilation_notice
+    from aerotri.formats.files.atomic import atomic_file
+    from aerotri.image_errors.ideal_map import ideal_map
+    from aerotri.image_errors.ideal_photographs import ideal_photograph
+
+    if jobs and compilation_notice():
+        report.stage(compilation_notice(), None)
+    maps: dict[int, IdealMap] = {}
+    done = []
+    for number, job in enumerate(jobs):
+        if job.group not in maps:
+            maps[job.group] = ideal_map(errors[job.group])
+
+        def told(share: float, number: int = number) -> None:
+            report.stage("correcting", (number + share) / len(jobs))
+
+        started = time.perf_counter()
+        (out / job.name).parent.mkdir(parents=True, exist_ok=True)
+        with atomic_file(out / job.name) as place:
+            lost = ideal_photograph(job.source, place, maps[job.group], *how, told)
+        done.append({
+            "file": str(job.source), "written": job.name, "group": errors[job.group].group,
+            "left_out": list(lost), "seconds": round(time.perf_counter() - started, 3),
+        })  # fmt: skip
+    return done
+
+
+def _table(name: str, rows: list[dict[str, Any]], units: dict[str, str], columns: Sequence[str] = ()) -> Table:
+    import pyarrow as pa
+
+    names = columns or tuple(rows[0])
+    return Table(name, pa.table({column: [row[column] for row in rows] for column in names}), units)
