@@ -15,6 +15,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.formats.files.spool import Spool
 from aerotri.public.adjustment import Adjustment
+from aerotri.public.blocks import PathLike
 from aerotri.public.folders import refuse_existing_file
 from aerotri.public.models import ModelDeformation, check_crs, refuse_without_errors
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
 
     Reader = RasterReader | HeldRaster
 
-PathLike = str | os.PathLike
 ABSORBED, RECORD = "absorbed", "demcor.json"
 DEM, DZ, SIGMA_DZ = "dem.tif", "dZ.tif", "sigma_dZ.tif"
 Absorbed = Literal["absorbed"]
@@ -178,17 +178,17 @@ def correct_dem(
     with stage_report(progress) as report, ExitStack() as stack:
         record = stated.record
         used, doubt = _orientation(record, orientation)
-        of = restitution(record, ABSORBED if orientation == ABSORBED else FREE, used)
+        photographs = restitution(record, ABSORBED if orientation == ABSORBED else FREE, used)
         if used is None:
-            refuse_without_errors(of, stated.name)
+            refuse_without_errors(photographs, stated.name)
         stack.enter_context(cache_limited())
         reader = _reader(dem, stack)
         check_crs(record, reader.epsg, reader.path)
         numbers = OneModel(*pair) if pair is not None else _model_map(models, model_table, reader, stack)
-        said = numbers.note if isinstance(numbers, PolygonMap) else ""
-        models_of_dem = dem_models(record, of, numbers.names)
+        crs_note = numbers.note if isinstance(numbers, PolygonMap) else ""
+        models_of_dem = dem_models(record, photographs, numbers.names)
         content = _correct(models_of_dem, numbers, reader, str(record.result.block.name), spool, report)
-    return CorrectedDem(content, as_surface(dem).path, spool, tuple(text for text in (doubt, said) if text))
+    return CorrectedDem(content, as_surface(dem).path, spool, tuple(text for text in (doubt, crs_note) if text))
 
 
 def refuse_foreign_files(out: Path, overwrite: bool = False) -> None:
@@ -316,9 +316,9 @@ def _correct(
 
 def _refuse_nothing(outcome: DemOutcome, models: DemModels, dem: Path) -> None:
     if not outcome.sums[0]:
-        said = "has no data" if not outcome.sums[2] else "lies outside the models"
+        problem = "has no data" if not outcome.sums[2] else "lies outside the models"
         names = ", ".join(models.names[0])
-        raise InputError(f"{said}: nothing to correct", f"check the CRS and the photographs ({names} …)", dem)
+        raise InputError(f"{problem}: nothing to correct", f"check the CRS and the photographs ({names} …)", dem)
 
 
 def _write(out: Path, found: CorrectedDem) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import os
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from aerotri.conventions import InputError
@@ -50,3 +51,8 @@ def refuse_foreign_folder(folder: Path, *own: str) -> None:
     """
     if folder.is_dir() and any(folder.iterdir()) and not any((folder / name).exists() for name in own):
         raise InputError(f"'{folder}' holds other files", "choose another --out, or an empty folder")
+
+
+def paths_of(given: str | os.PathLike | Sequence[str | os.PathLike]) -> list[Path]:
+    """One path or several, as a list."""
+    return [Path(given)] if isinstance(given, str | os.PathLike) else [Path(path) for path in given]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import InputError
 from aerotri.public.adjustment import Adjustment
-from aerotri.public.folders import refuse_existing_file, refuse_foreign_folder
+from aerotri.public.blocks import PathLike
+from aerotri.public.folders import paths_of, refuse_existing_file, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.stated import StatedAdjustment
 from aerotri.public.table import Table
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from aerotri.image_errors.ideal_map import IdealMap
     from aerotri.observations import Block, Camera
 
-PathLike = str | os.PathLike
 ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff")
 UNITS = {"focal_length_mm": "mm", "x0_mm": "mm", "y0_mm": "mm", "d_rms_um": "µm", "d_max_um": "µm", "seconds": "s"}
 
@@ -138,7 +137,7 @@ def ideal_photographs(
     refuse_foreign_folder(folder, RECORD)
     adjusted = StatedAdjustment(result).record.result
     groups = image_groups(adjusted.block)
-    jobs = _jobs(adjusted.block, groups, _paths(photographs), folder, group)
+    jobs = _jobs(adjusted.block, groups, paths_of(photographs), folder, group)
     used = sorted({job.group for job in jobs}) if jobs else range(len(groups))
     errors = {k: error_function(adjusted, groups[k]) for k in used}
     with held(folder), stage_report(progress) as report:
@@ -158,10 +157,6 @@ def _check(resampling: str, compression: str) -> None:
     ):  # fmt: skip
         if value not in known:
             raise InputError(f"there is no {name} '{value}'", f"choose one of {', '.join(known)}")
-
-
-def _paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
-    return [Path(given)] if isinstance(given, str | os.PathLike) else [Path(path) for path in given]
 
 
 def _jobs(

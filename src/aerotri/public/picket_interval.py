@@ -115,7 +115,7 @@ def picket_interval(
     >>> [round(width, 1) for width in found.by_formula["plain"]]
     [42.1, 46.5]
     """
-    from aerotri.public.terrain import paths_of
+    from aerotri.public.folders import paths_of
 
     if any(value is not None and not value > 0.0 for value in (scan_um, scale, gsd, k, tolerance)):
         raise InputError("sizes have to be positive", "give micrometres and metres")

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.public.adjustment import Adjustment, open_result
+from aerotri.public.blocks import PathLike
 
 if TYPE_CHECKING:
     from aerotri.results.adjustment import Adjustment as Record
 
-PathLike = str | os.PathLike
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +13,8 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.public.adjustment import Adjustment, open_result
-from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.blocks import PathLike
+from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.surfaces import Surface, dataset_of
 from aerotri.public.table import Table
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from aerotri.results.adjustment import Adjustment as Record
     from aerotri.terrain.dtm import TerrainOutcome, TerrainPlan
 
-PathLike = str | os.PathLike
 RECORD = "dtm.json"
 OWN_NAMES = (RECORD, "pickets.parquet", "pickets.laz", "dsm.tif", "dtm.tif", "model.tif", "models.csv", "plots")
 ENDINGS = (".tif", ".tiff", ".jpg", ".jpeg")
@@ -295,11 +294,6 @@ def terrain_plan(
         most_photographs=s.most_photographs, breaklines=lines, ideal=s.ideal,
     )  # fmt: skip
     return plan, (note,) if note else ()
-
-
-def paths_of(given: PathLike | Sequence[PathLike]) -> list[Path]:
-    """A folder or file, or several."""
-    return [Path(given)] if isinstance(given, str | os.PathLike) else [Path(path) for path in given]
 
 
 def _write(target: Path, model: TerrainModel, plots: bool) -> None:

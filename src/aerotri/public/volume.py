@@ -11,6 +11,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.files.spool import Spool
+from aerotri.public.blocks import PathLike
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.stated import StatedAdjustment
 from aerotri.public.volume_result import THICKNESS, MeasuredVolume
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from aerotri.volume.compute import Volumes
     from aerotri.volume.thickness import ThicknessMap
 
-PathLike = str | os.PathLike
 
 
 def volume(
@@ -151,10 +151,10 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
         report.stage("σ of the volume", None)
         sigma, notes = sigma_of_volume(top, below, reader, base, boundary, asked.options)
     crs = "" if reader.epsg is None else f"EPSG:{reader.epsg}"
-    named = (top.adjustment.name, top.name_of_points) if top.adjustment else ("", "")
-    content = volume_json(volumes, base, boundary, Sources(reader.path.name, crs, *named), sigma)
-    said = (reader.note, *(other.note for other in others), boundary.note)
-    content["warnings"] = [*(text for text in said if text), *content["warnings"]]
+    measured_with = (top.adjustment.name, top.name_of_points) if top.adjustment else ("", "")
+    content = volume_json(volumes, base, boundary, Sources(reader.path.name, crs, *measured_with), sigma)
+    crs_notes = (reader.note, *(other.note for other in others), boundary.note)
+    content["warnings"] = [*(text for text in crs_notes if text), *content["warnings"]]
     profiles = chosen_profiles(reader, base, boundary, volumes.sections)
     return MeasuredVolume(volumes, boundary, content, thickness, profiles, spool, notes)
 

@@ -204,12 +204,12 @@ class MeasuredVolume:
     def _repr_html_(self) -> str:
         s = self.summary
         sure = "" if self.sigma is None else f" ± {self.sigma:.4g} (1 σ)"
-        said = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
+        warnings = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
         parts = "" if self.sigma is None else self.parts._repr_html_()
         return (
             f"<div><b>{escape(s['dtm'])}: net {self.net:.6g} m³{sure}</b>, cut {self.cut:.6g}, fill {self.fill:.6g} m³ "
             f"over {escape(s['base']['name'])}, {self.area:.6g} m² inside {escape(s['boundary']['name'])}"
-            f"{f'<ul>{said}</ul>' if said else ''}{parts}</div>"
+            f"{f'<ul>{warnings}</ul>' if warnings else ''}{parts}</div>"
         )
 
 

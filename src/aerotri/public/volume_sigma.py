@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.conventions import InputError
+from aerotri.public.blocks import PathLike
 from aerotri.public.models import check_crs
 from aerotri.public.stated import StatedAdjustment
 from aerotri.public.surfaces import Surface, as_surface
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from aerotri.volume.parts import Part
     from aerotri.volume.settings import SigmaOptions
 
-PathLike = str | os.PathLike
 
 
 @dataclass(frozen=True, eq=False)
