@@ -24,6 +24,8 @@ import numpy as np
 RADIANS_PER = {"deg": np.pi / 180.0, "gon": np.pi / 200.0, "rad": 1.0}
 MGON_PER_RADIAN = 200.0e3 / np.pi
 FLIGHT_AXES = ("+x", "-x", "+y", "-y")
+FilePath = str | os.PathLike[str]
+"""What names a file or a folder."""
 
 
 class InputError(Exception):
@@ -36,7 +38,7 @@ class InputError(Exception):
     file, line : where, when known. Lines count from 1.
     """
 
-    def __init__(self, message: str, remedy: str = "", file: str | os.PathLike | None = None, line: int | None = None):
+    def __init__(self, message: str, remedy: str = "", file: FilePath | None = None, line: int | None = None):
         self.message, self.remedy, self.file, self.line = message, remedy, file, line
         super().__init__(str(self))
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
 from aerotri.adjustment.ray_status import RayStatus
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.block.folder import read_block
 from aerotri.formats.results.solution import SavedSolution, read_solution
 from aerotri.observations import Block
@@ -20,7 +19,7 @@ SAME_SIGMA0 = 1e-5
 """Relative difference of σ0 when a result is linearised again: far above rounding, far below any change of a file."""
 
 
-def open_result(folder: str | os.PathLike) -> Adjustment:
+def open_result(folder: FilePath) -> Adjustment:
     """The adjustment of a result folder, linearised and factorised once.
 
     Raises

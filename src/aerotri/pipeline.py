@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -20,7 +19,7 @@ from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import StartValues
 from aerotri.adjustment.weak_geometry import minimise_tied
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block
 from aerotri.coordinates.metric import outside_in_words
 from aerotri.diagnosis import diagnose, judge
@@ -82,7 +81,7 @@ def adjust_keeping_system(
     block: Block,
     report: Report | None = None,
     given_points: np.ndarray | None = None,
-    geoid: str | os.PathLike | None = None,
+    geoid: FilePath | None = None,
 ) -> Adjustment:
     """As `adjust`, with the equations and the solution beside the result.
 
@@ -101,7 +100,7 @@ def adjust_keeping_system(
 def adjust_and_explain(
     block: Block,
     report: Report | None = None,
-    geoid: str | os.PathLike | None = None,
+    geoid: FilePath | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> Adjustment:
     """As `adjust_keeping_system`; where the block is not accepted, what explains it stands first among the reasons.
@@ -127,7 +126,7 @@ def adjust_and_explain(
 
 
 def _causes(
-    block: Block, found: Adjustment | None, geoid: str | os.PathLike | None, say: Callable[[str], None]
+    block: Block, found: Adjustment | None, geoid: FilePath | None, say: Callable[[str], None]
 ) -> tuple[str, ...]:
     """The usual mistake that explains a block, in words; nothing where none does."""
     say("looking for what explains it")
@@ -160,7 +159,7 @@ def _with_outcome(found: Adjustment, outcome: Outcome) -> Adjustment:
 
 
 def _adjust_with_chosen_parameters(
-    block: Block, report: Report | None, given_points: np.ndarray | None, geoid: str | os.PathLike | None
+    block: Block, report: Report | None, given_points: np.ndarray | None, geoid: FilePath | None
 ) -> Adjustment:
     compared = compare_parameters(block, candidate_sets(block), geoid=geoid, report=report)
     chosen = choose(compared)
@@ -176,7 +175,7 @@ def compare_parameters(
     block: Block,
     choices: Sequence[Choice],
     folds: int = FOLDS,
-    geoid: str | os.PathLike | None = None,
+    geoid: FilePath | None = None,
     progress: Progress | None = None,
     report: Report | None = None,
 ) -> ParameterComparison:
@@ -202,7 +201,7 @@ def compare_parameters(
 
 
 def _adjust_in_frame(
-    block: Block, report: Report | None, given_points: np.ndarray | None, geoid: str | os.PathLike | None
+    block: Block, report: Report | None, given_points: np.ndarray | None, geoid: FilePath | None
 ) -> Adjustment:
     if block.crs == "local":
         return _adjust_local(block, report, given_points)
@@ -228,7 +227,7 @@ def _adjust_in_frame(
 
 
 def _with_variance_components(
-    block: Block, first: Adjustment, report: Report | None, geoid: str | os.PathLike | None
+    block: Block, first: Adjustment, report: Report | None, geoid: FilePath | None
 ) -> Adjustment:
     """The adjustment with the σ of every group estimated; the block of the result has these σ."""
     latest, used = first, block

@@ -8,21 +8,18 @@ tilt of the vertical within the block: 0.0016 rad at 10 km from the origin.
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates.local_frame import LocalFrame, local_frame
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Block, Control, GnssIns, Images
 from aerotri.observations.block import Constraints
 
 
-def frame_of_block(
-    block: Block, geoid: str | os.PathLike | None = None, origin: np.ndarray | None = None
-) -> LocalFrame:
+def frame_of_block(block: Block, geoid: FilePath | None = None, origin: np.ndarray | None = None) -> LocalFrame:
     """The local frame of a block with a CRS: around its control points, projection centres and GNSS positions.
 
     Parameters

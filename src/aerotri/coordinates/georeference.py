@@ -7,7 +7,6 @@ says, for which PROJ needs a grid, or a geoid file takes its place. Never a heig
 
 from __future__ import annotations
 
-import os
 import re
 import warnings
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 
 if TYPE_CHECKING:
     from pyproj import CRS, Transformer
@@ -89,7 +88,7 @@ class Georeference:
         )
 
 
-def georeference(crs: str, around: np.ndarray, geoid: str | os.PathLike | None = None) -> Georeference:
+def georeference(crs: str, around: np.ndarray, geoid: FilePath | None = None) -> Georeference:
     """Tie a CRS to its ellipsoid.
 
     Parameters

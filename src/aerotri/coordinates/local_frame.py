@@ -11,13 +11,12 @@ ellipsoidal normal, all at that place [C]. Neither the scale of the projection n
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates.georeference import CRS_REMEDY, Georeference, georeference
 
 STEP_M = 100.0
@@ -138,7 +137,7 @@ class LocalFrame:
 
 
 def local_frame(
-    crs: str, around: np.ndarray, geoid: str | os.PathLike | None = None, origin: np.ndarray | None = None
+    crs: str, around: np.ndarray, geoid: FilePath | None = None, origin: np.ndarray | None = None
 ) -> LocalFrame:
     """The local frame of a block.
 

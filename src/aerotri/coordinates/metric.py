@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates.blocks import frame_of_block
 from aerotri.coordinates.georeference import area_of_use, is_projected, utm_on_datum
 from aerotri.coordinates.local_frame import LocalFrame, local_frame
@@ -18,7 +17,7 @@ OUTSIDE_DEG = 1.0
 """Degrees beyond the area of use of a CRS that nobody is told of: strips beside a zone are common."""
 
 
-def in_metres(block: Block, geoid: str | os.PathLike | None = None) -> tuple[Block, str]:
+def in_metres(block: Block, geoid: FilePath | None = None) -> tuple[Block, str]:
     """A block in a geographic CRS in the UTM zone of its datum, with the heights it has, and a sentence about it.
 
     Positions are transformed exactly, attitudes turn from geographic to grid north, σ from east and north to the axes

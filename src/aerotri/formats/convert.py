@@ -5,13 +5,12 @@ Whole blocks are read here; blocks that are put together from several files, in 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.oriented import OrientedBlock, oriented_block
 from aerotri.formats.assembly.parts import Reading
 from aerotri.formats.assembly.placing import in_local_frame
@@ -100,7 +99,7 @@ FOLDER_TARGETS: Mapping[str, tuple[str, ...]] = {
 TARGETS = ("block", *WRITERS, *ORIENTATION_WRITERS, *BLOCK_WRITERS)
 
 
-def detect_format(path: str | os.PathLike) -> str:
+def detect_format(path: FilePath) -> str:
     """The name of the format a file or folder holds.
 
     Raises
@@ -117,7 +116,7 @@ def detect_format(path: str | os.PathLike) -> str:
     raise InputError("is of no known format", f"known are {', '.join(RECOGNISERS)}; or name the format", path)
 
 
-def read_any(path: str | os.PathLike, format: str | None = None) -> tuple[Block, np.ndarray | None]:
+def read_any(path: FilePath, format: str | None = None) -> tuple[Block, np.ndarray | None]:
     """A block of any format that is read.
 
     Parameters
@@ -140,9 +139,7 @@ def read_any(path: str | os.PathLike, format: str | None = None) -> tuple[Block,
     return READERS[name](Path(path))
 
 
-def write_any(
-    block: Block, path: str | os.PathLike, format: str = "block", points: np.ndarray | None = None
-) -> tuple[str, ...]:
+def write_any(block: Block, path: FilePath, format: str = "block", points: np.ndarray | None = None) -> tuple[str, ...]:
     """Write a block in a format, at its start values where the format holds orientations.
 
     Parameters
@@ -174,7 +171,7 @@ def write_any(
 
 
 def write_oriented(
-    oriented: OrientedBlock, path: str | os.PathLike, format: str, geoid: str | os.PathLike | None = None
+    oriented: OrientedBlock, path: FilePath, format: str, geoid: FilePath | None = None
 ) -> tuple[str, ...]:
     """Write orientations in a format that holds them; see `oriented_from_adjusted` for results.
 

@@ -6,7 +6,6 @@ nothing is interpolated but the grey values under the kernel.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.adjustment.parallel import thread_count
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.image_errors import _kernels
 from aerotri.image_errors.ideal_map import IdealMap
 from aerotri.observations import Camera
@@ -140,8 +139,8 @@ def _is(pixels: np.ndarray, value: float) -> np.ndarray:
 
 
 def ideal_photograph(
-    source: str | os.PathLike,
-    target: str | os.PathLike,
+    source: FilePath,
+    target: FilePath,
     ideal: IdealMap,
     method: str = RESAMPLING,
     compression: str = COMPRESSION,
@@ -175,7 +174,7 @@ def ideal_photograph(
         return photograph.left_out()
 
 
-def check_photograph(path: str | os.PathLike, camera: Camera) -> None:
+def check_photograph(path: FilePath, camera: Camera) -> None:
     """Whether a file can be opened and is a photograph of a camera.
 
     Raises

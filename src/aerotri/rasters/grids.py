@@ -7,7 +7,6 @@ NaN inside the program and the no-data value in a file.
 from __future__ import annotations
 
 import errno
-import os
 import shutil
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -20,7 +19,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.vectors.geojson import LARGEST_M
 
 NO_DATA = -9999.0
@@ -98,9 +97,7 @@ class Grid:
         return cls(len(y), len(x), float(x[0]) - cell_x / 2.0, float(y[0]) + cell_y / 2.0, cell_x, cell_y)
 
 
-def bilinear(
-    read: Callable[[int, int, int, int], np.ndarray], grid: Grid, x: np.ndarray, y: np.ndarray
-) -> np.ndarray:
+def bilinear(read: Callable[[int, int, int, int], np.ndarray], grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(n,) values at places (n,), linear between the four cells around; NaN where one of these is not known.
 
     Parameters
@@ -138,7 +135,7 @@ class RasterReader:
     kind.
     """
 
-    def __init__(self, path: str | os.PathLike, band: int = 1):
+    def __init__(self, path: FilePath, band: int = 1):
         import rasterio
 
         self.path, self.band = Path(path), band
@@ -250,7 +247,7 @@ class RasterWriter:
 
     def __init__(
         self,
-        path: str | os.PathLike,
+        path: FilePath,
         grid: Grid,
         dtype: np.dtype | type = np.float32,
         crs: Any = None,
@@ -291,7 +288,7 @@ class RasterWriter:
         self._file.close()
 
 
-def write_raster(path: str | os.PathLike, values: np.ndarray, grid: Grid, crs: Any = None, text: str = "") -> None:
+def write_raster(path: FilePath, values: np.ndarray, grid: Grid, crs: Any = None, text: str = "") -> None:
     """Write a whole raster (rows, columns); whole numbers as they are, others as float32 with no-data for NaN."""
     whole = values.dtype.kind in "iu"
     with RasterWriter(path, grid, values.dtype if whole else np.float32, crs, -1 if whole else NO_DATA) as writer:
@@ -300,7 +297,7 @@ def write_raster(path: str | os.PathLike, values: np.ndarray, grid: Grid, crs: A
         writer.write(0, 0, values if whole else values.astype(np.float32))
 
 
-def write_surface(path: str | os.PathLike, z: np.ndarray, sigma: np.ndarray, grid: Grid, crs: Any, text: str) -> None:
+def write_surface(path: FilePath, z: np.ndarray, sigma: np.ndarray, grid: Grid, crs: Any, text: str) -> None:
     """Write heights and their σ (rows, columns) as the two bands of a cloud-optimised GeoTIFF; NaN is no-data."""
     import rasterio.shutil
 

@@ -6,7 +6,6 @@ error that names it: nothing is filled in.
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -22,7 +21,7 @@ from rasterio.errors import NotGeoreferencedWarning, RasterioError
 from rasterio.transform import Affine
 from rasterio.windows import Window
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.rasters.photograph_settings import COMPRESSION
 
 DRIVERS = {b"II*\0": "GTiff", b"MM\0*": "GTiff", b"II+\0": "GTiff", b"MM\0+": "GTiff", b"\xff\xd8\xff": "JPEG"}
@@ -103,7 +102,7 @@ class Photograph:
 
 
 @contextmanager
-def open_photograph(path: str | os.PathLike) -> Iterator[Photograph]:
+def open_photograph(path: FilePath) -> Iterator[Photograph]:
     """A TIFF or JPEG file to read from.
 
     Raises
@@ -183,7 +182,7 @@ def _unwritten(path: Path, error: BaseException) -> InputError:
 
 @contextmanager
 def create_image(
-    path: str | os.PathLike, columns: int, rows: int, bands: int, dtype: str, **options: Any
+    path: FilePath, columns: int, rows: int, bands: int, dtype: str, **options: Any
 ) -> Iterator[RowWriter]:
     """A tiled TIFF to write to, rows from the top; the caller sees to its name once it is whole.
 
@@ -214,7 +213,7 @@ def create_image(
 
 
 @contextmanager
-def create_like(path: str | os.PathLike, photograph: Photograph, compression: str = COMPRESSION) -> Iterator[RowWriter]:
+def create_like(path: FilePath, photograph: Photograph, compression: str = COMPRESSION) -> Iterator[RowWriter]:
     """A tiled TIFF with everything of a photograph but its pixels.
 
     Parameters
@@ -307,7 +306,7 @@ def _without_statistics(tags: Mapping[str, str]) -> dict[str, str]:
 
 
 def write_grid(
-    path: str | os.PathLike,
+    path: FilePath,
     values: np.ndarray,
     upper_left: tuple[float, float],
     cell: float,

@@ -6,14 +6,13 @@ file calls the unit of its band, else in metres; a plan in feet leaves that open
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.rasters.grids import NO_DATA, Grid, RasterReader
 
 if TYPE_CHECKING:
@@ -67,7 +66,7 @@ class MetricReader(RasterReader):
 
     note = ""
 
-    def __init__(self, path: str | os.PathLike, band: int = 1, target: str | None = None):
+    def __init__(self, path: FilePath, band: int = 1, target: str | None = None):
         super().__init__(path, band)
         self._source: Any = None
         self._factor = METRE
@@ -108,9 +107,7 @@ class MetricReader(RasterReader):
 
         no_data = NO_DATA if self.no_data is None else self.no_data
         try:
-            warped = WarpedVRT(
-                self._file, crs=target, resampling=Resampling.bilinear, nodata=no_data, dtype="float64"
-            )
+            warped = WarpedVRT(self._file, crs=target, resampling=Resampling.bilinear, nodata=no_data, dtype="float64")
         except RasterioError as error:
             raise InputError(f"cannot be brought to {target}: {error}", "check its CRS", self.path) from error
         self._source, self._file = self._file, warped
@@ -206,7 +203,7 @@ def _crs_of(reader: RasterReader) -> CRS | None:
     return found if found.is_projected or found.is_geographic or found.is_compound else None
 
 
-def is_metric_raster(path: str | os.PathLike) -> bool:
+def is_metric_raster(path: FilePath) -> bool:
     """Whether a raster counts in metres already."""
     with RasterReader(Path(path)) as reader:
         return units_of(reader).is_metric

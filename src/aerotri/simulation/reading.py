@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Mapping
 from difflib import get_close_matches
@@ -11,13 +10,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.text.toml_text import read_toml
 from aerotri.simulation import spec as spec_module
 from aerotri.simulation.spec import SimulationSpec, Table
 
 
-def read_spec(path: str | os.PathLike) -> SimulationSpec:
+def read_spec(path: FilePath) -> SimulationSpec:
     """The spec of a `simulation.toml`.
 
     Raises
@@ -32,7 +31,7 @@ def read_spec(path: str | os.PathLike) -> SimulationSpec:
     return parse_spec(data, path, text)
 
 
-def parse_spec(data: Mapping[str, Any], file: str | os.PathLike | None = None, text: str = "") -> SimulationSpec:
+def parse_spec(data: Mapping[str, Any], file: FilePath | None = None, text: str = "") -> SimulationSpec:
     """The spec of nested tables, as TOML gives them.
 
     Parameters

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from aerotri.conventions import FilePath
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.observations import Block
 from aerotri.spreadsheet import plain_row
@@ -57,7 +57,7 @@ class Truth:
 TRUTH = "truth"
 
 
-def write_simulated(folder: str | os.PathLike, block: Block, truth: Truth, gone: Collection[str] = ()) -> None:
+def write_simulated(folder: FilePath, block: Block, truth: Truth, gone: Collection[str] = ()) -> None:
     """Write the block's folder and, under `truth/`, what is behind it; other files stay but for `gone`.
 
     Numbers are rounded to what they can mean, so that another processor writes the same.
@@ -72,7 +72,7 @@ def write_simulated(folder: str | os.PathLike, block: Block, truth: Truth, gone:
         write_truth(place, block, truth)
 
 
-def write_truth(folder: str | os.PathLike, block: Block, truth: Truth) -> None:
+def write_truth(folder: FilePath, block: Block, truth: Truth) -> None:
     """Write `truth/` of a block's folder: images, points, additional_parameters, cameras, image_errors, gross_errors,
     control_blunders (.csv). Metres, millimetres in the image, degrees.
     """

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import px_from_mm
+from aerotri.conventions import FilePath, px_from_mm
 from aerotri.coordinates.blocks import frame_of_block
 from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.names_match import match_photographs
@@ -18,7 +17,7 @@ from aerotri.functional_model.collinearity import interior_row, predict
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block
 
-Geoid = str | os.PathLike | None
+Geoid = FilePath | None
 HALF_SIZE_PX, LARGEST_HALF_PX = 80, 400
 """Half the side of a piece where control holds the block, and the largest where positions alone do."""
 BROWN_ROUNDS = 5
@@ -49,9 +48,7 @@ class ControlMarks:
         return len(self.point)
 
 
-def predict_marks(
-    block: Block, given: PointList, ground: np.ndarray, geoid: str | os.PathLike | None = None
-) -> ControlMarks:
+def predict_marks(block: Block, given: PointList, ground: np.ndarray, geoid: FilePath | None = None) -> ControlMarks:
     """Control points wherever the orientation of the photographs says they are, inside of the format.
 
     Parameters
@@ -75,7 +72,7 @@ def predict_marks(
 
 
 def _projected(
-    block: Block, xyz: np.ndarray, point: np.ndarray, image: np.ndarray, geoid: str | os.PathLike | None
+    block: Block, xyz: np.ndarray, point: np.ndarray, image: np.ndarray, geoid: FilePath | None
 ) -> np.ndarray:
     """(k, 2) px, NaN behind the camera."""
     rotation, centre = rotation_from_angles(block.images.angles, block.rotation), block.images.centre

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.conventions import InputError, mm_from_px
+from aerotri.conventions import FilePath, InputError, mm_from_px
 from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.names_match import match_photographs
 from aerotri.formats.assembly.parts import OrientationList, PositionList, RayList, Reading, no_sigma
@@ -42,7 +42,7 @@ class Statements:
     """
 
     crs: str = ""
-    geoid: str | os.PathLike | None = None
+    geoid: FilePath | None = None
     control_sigma_m: tuple[float, float, float] | None = None
     positions_sigma_m: tuple[float, float, float] | None = None
     orientation_sigma_m: tuple[float, float, float] | None = None
@@ -213,7 +213,7 @@ def _observed(block: Block, rows: np.ndarray, stated: Statements) -> Block:
     return replace(block, gnss_ins=observed, settings=settings)
 
 
-def _refuse_strangers(names: np.ndarray, index: np.ndarray, block: Block, file: os.PathLike) -> None:
+def _refuse_strangers(names: np.ndarray, index: np.ndarray, block: Block, file: os.PathLike[str]) -> None:
     if not len(names):
         raise InputError("holds no photographs", "give a row for each", file)
     if not (index >= 0).any():
@@ -272,7 +272,7 @@ def with_positions(reading: Reading, given: PositionList, stated: Statements) ->
     return replace(reading, block=replace(block, gnss_ins=observed, images=images), messages=(*messages, *said))
 
 
-def refuse_local(block: Block, crs: str, file: os.PathLike) -> None:
+def refuse_local(block: Block, crs: str, file: os.PathLike[str]) -> None:
     """Refuse coordinates of a CRS for a block that has none.
 
     Raises
@@ -284,7 +284,7 @@ def refuse_local(block: Block, crs: str, file: os.PathLike) -> None:
 
 
 def given_or_stated(
-    sigma: np.ndarray, stated: tuple[float, float, float] | None, file: os.PathLike, option: str
+    sigma: np.ndarray, stated: tuple[float, float, float] | None, file: os.PathLike[str], option: str
 ) -> np.ndarray:
     """(n, 3) σ of a file, else the one stated by an option.
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.foreign.bingo import format_in_name
 from aerotri.formats.foreign.ign import is_ign_camera, read_ign_camera
 from aerotri.formats.foreign.orientation_list import is_ortho_camera, read_ortho_camera
@@ -32,7 +31,7 @@ class CameraSpec:
     free : whether focal length and principal point are unknowns, with what is stated as start values.
     """
 
-    file: str | os.PathLike | None = None
+    file: FilePath | None = None
     name: str = ""
     size_px: tuple[int, int] | None = None
     pixel_um: float | None = None

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates import local_frame
 from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.coordinates.georeference import CRS_PATTERN, CRS_REMEDY, Georeference, georeference
@@ -43,7 +43,7 @@ def known_crs(crs: str) -> str:
     return crs.upper()
 
 
-def to_crs(xyz: np.ndarray, source: str, target: str, geoid: str | os.PathLike | None) -> np.ndarray:
+def to_crs(xyz: np.ndarray, source: str, target: str, geoid: FilePath | None) -> np.ndarray:
     """Coordinates of one CRS in another on the same datum.
 
     Parameters
@@ -78,7 +78,7 @@ def _datum(reference: Georeference) -> str:
     return "" if target is None or target.datum is None else target.datum.name.replace(" ensemble", "")
 
 
-def from_ellipsoidal_heights(xyz: np.ndarray, crs: str, geoid: str | os.PathLike | None) -> np.ndarray:
+def from_ellipsoidal_heights(xyz: np.ndarray, crs: str, geoid: FilePath | None) -> np.ndarray:
     """Points in the plan coordinates of a CRS and ellipsoidal heights, with the heights of the CRS.
 
     Parameters
@@ -153,7 +153,7 @@ def true_heights(centre: np.ndarray, crs: str, ground: float) -> np.ndarray:
     return np.column_stack([centre[:, :2], without_linear_alteration(centre[:, 2], ground, scale)])
 
 
-def in_local_frame(oriented: OrientedBlock, geoid: str | os.PathLike | None = None) -> tuple[OrientedBlock, str]:
+def in_local_frame(oriented: OrientedBlock, geoid: FilePath | None = None) -> tuple[OrientedBlock, str]:
     """A block with a CRS in its local topocentric frame, in which rays are straight, and where that is.
 
     Raises
@@ -177,7 +177,7 @@ def in_local_frame(oriented: OrientedBlock, geoid: str | os.PathLike | None = No
     return local, f"{words} on the ellipsoid of {oriented.block.crs}"
 
 
-def refuse_exchanged_axes(points: np.ndarray, photographs: np.ndarray, file: os.PathLike) -> None:
+def refuse_exchanged_axes(points: np.ndarray, photographs: np.ndarray, file: os.PathLike[str]) -> None:
     """Refuse coordinates that lie far from the photographs, and near them once X and Y change places.
 
     Parameters

@@ -6,13 +6,12 @@ points, or a list of orientations (photographs alone). What else is given is add
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.formats import convert
 from aerotri.formats.assembly import kinds
@@ -61,7 +60,7 @@ class Request:
     stated: Statements = field(default_factory=Statements)
     check: tuple[str, ...] = ()
     axes: str | None = None
-    offset: str | os.PathLike | None = None
+    offset: FilePath | None = None
     image_sigma_um: float | None = None
     image_sigma_px: float | None = None
     gnss_shift: str | None = None
@@ -267,7 +266,7 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
     return replace(reading, block=block, messages=tuple(messages))
 
 
-def fit_of_start_values(block: Block, geoid: str | os.PathLike | None = None) -> list[str]:
+def fit_of_start_values(block: Block, geoid: FilePath | None = None) -> list[str]:
     """How well image points fit the orientations that were given, in words; nothing where there are none."""
     start = np.column_stack([block.images.centre, block.images.angles])
     known = np.asarray(np.isfinite(start).all(axis=1))

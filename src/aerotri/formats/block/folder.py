@@ -7,13 +7,12 @@ p2 k3 as `[camera.<name>.brown]` holds Brown's. Of scanned film see `scanned_fil
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aerotri.conventions import RADIANS_PER, InputError
+from aerotri.conventions import RADIANS_PER, FilePath, InputError
 from aerotri.formats.block.extras import read_constraints, read_edits
 from aerotri.formats.block.points import read_control, read_gnss_ins, read_image_points
 from aerotri.formats.block.scanned_film import read_fiducials
@@ -35,7 +34,7 @@ IMAGE_COLUMNS = Columns(
 )
 
 
-def read_block(path: str | os.PathLike, rays_needed: bool = True) -> Block:
+def read_block(path: FilePath, rays_needed: bool = True) -> Block:
     """A block from its folder.
 
     Parameters

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
 
-from aerotri.conventions import RADIANS_PER, InputError
+from aerotri.conventions import RADIANS_PER, FilePath, InputError
 from aerotri.formats.block.scanned_film import measured_px
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.text.table_writer import check_names, write_table
@@ -30,7 +29,7 @@ IMAGE_FIELDS = ("image", "camera", "strip", "X0", "Y0", "Z0", "omega", "phi", "k
 
 
 def write_block(
-    block: Block, folder: str | os.PathLike, tables: Literal["csv", "parquet"] = "csv", rounded: bool = False
+    block: Block, folder: FilePath, tables: Literal["csv", "parquet"] = "csv", rounded: bool = False
 ) -> None:
     """Write a block; the folder appears when it is whole.
 

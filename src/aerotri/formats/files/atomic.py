@@ -15,7 +15,7 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.files.ownership import carry_over, record_files
 from aerotri.formats.files.work_place import OLDER, work_place, written
 
@@ -26,7 +26,7 @@ LEAST_ROOM = 16384
 
 
 @contextmanager
-def atomic_file(target: str | os.PathLike) -> Iterator[Path]:
+def atomic_file(target: FilePath) -> Iterator[Path]:
     """A path to write to; the file takes the name `target` when the block ends without an error.
 
     Parameters
@@ -55,9 +55,7 @@ def atomic_file(target: str | os.PathLike) -> Iterator[Path]:
 
 
 @contextmanager
-def atomic_folder(
-    target: str | os.PathLike, own: Collection[str] | None = None, gone: Collection[str] = ()
-) -> Iterator[Path]:
+def atomic_folder(target: FilePath, own: Collection[str] | None = None, gone: Collection[str] = ()) -> Iterator[Path]:
     """An empty folder to fill; it takes the name `target` when the block ends without an error.
 
     An older folder of that name is exchanged for the new one in one step. What it holds besides (a user's notes beside
@@ -102,7 +100,7 @@ def atomic_folder(
 
 
 @contextmanager
-def room_beside(target: str | os.PathLike) -> Iterator[Path]:
+def room_beside(target: FilePath) -> Iterator[Path]:
     """A hidden folder beside a target, for what is too large to be held until it is written there; then removed.
 
     Parameters
@@ -121,7 +119,7 @@ def room_beside(target: str | os.PathLike) -> Iterator[Path]:
             yield place
 
 
-def _place(target: str | os.PathLike) -> Path:
+def _place(target: FilePath) -> Path:
     """The target with links followed, so that a link stays a link."""
     return Path(target).resolve()
 

@@ -9,7 +9,7 @@ import tempfile
 import weakref
 from pathlib import Path
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 
 LEAST_ROOM = 16384
 
@@ -22,7 +22,7 @@ class Spool:
     folder : that somebody else removes; None: a temporary one of the system (TMPDIR), removed with this object.
     """
 
-    def __init__(self, folder: str | os.PathLike | None = None):
+    def __init__(self, folder: FilePath | None = None):
         self._is_own = folder is None
         self.folder = Path(tempfile.mkdtemp(prefix="aerotri-")) if folder is None else Path(folder)
         if self._is_own:

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 
 LOCK, OLDER, ENDING = "lock", ".older-result", ".aerotri.tmp"
 WAIT_S = 60.0
@@ -62,7 +62,7 @@ def work_place(target: Path, wait_s: float = WAIT_S) -> Iterator[Path]:
 
 
 @contextmanager
-def held(target: str | os.PathLike) -> Iterator[None]:
+def held(target: FilePath) -> Iterator[None]:
     """Keep other runs from writing to a folder that is written piece by piece.
 
     Raises

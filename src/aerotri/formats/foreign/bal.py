@@ -10,12 +10,11 @@ the same numbers, and the format of every camera is the smallest of whole, even 
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.text.csv_text import read_bytes
@@ -32,7 +31,7 @@ SMALLEST_FOCAL_PX = 1e-3
 WRITTEN_LENS = ("k1", "k2")
 
 
-def read_bal(path: str | os.PathLike) -> tuple[Block, np.ndarray]:
+def read_bal(path: FilePath) -> tuple[Block, np.ndarray]:
     """A block and its object points from a BAL file.
 
     Focal length, k1 and k2 are free for every image, the datum is minimal, the standard deviation one pixel.
@@ -175,7 +174,7 @@ def _number(word: bytes) -> float:
         return np.nan
 
 
-def write_bal(oriented: OrientedBlock, path: str | os.PathLike) -> tuple[str, ...]:
+def write_bal(oriented: OrientedBlock, path: FilePath) -> tuple[str, ...]:
     """Write a BAL file: one camera an image, image points free of every error but k1 and k2.
 
     Images without orientation and points without coordinates are left out.

@@ -5,13 +5,12 @@ Pix4D writes such files with the format of the camera as its name: H_34.99999_23
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.parts import RayList, texts
 from aerotri.formats.files.atomic import atomic_file
@@ -31,7 +30,7 @@ def is_bingo(path: Path) -> bool:
     return lines[1] == [END] or (len(lines[1]) == 3 and all(is_number(word) for word in lines[1][1:]))
 
 
-def read_bingo(path: str | os.PathLike) -> RayList:
+def read_bingo(path: FilePath) -> RayList:
     """Image points from a BINGO file.
 
     Raises
@@ -125,7 +124,7 @@ def format_in_name(camera: str) -> tuple[float, float] | None:
     return (float(found[1]), float(found[2])) if found else None
 
 
-def write_bingo(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
+def write_bingo(block: Block, path: FilePath) -> tuple[str, ...]:
     """Write image points as measured, photograph by photograph, to a nanometre.
 
     Returns

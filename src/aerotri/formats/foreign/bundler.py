@@ -7,13 +7,12 @@ numbers of pixels that holds the points, unless stated; a pixel counts as 1 µm 
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import Reading, texts
 from aerotri.formats.files.atomic import atomic_folder
@@ -130,7 +129,7 @@ def _check_cameras(numbers: _Numbers, cameras: np.ndarray) -> None:
         raise numbers.error(2 + CAMERA_VALUES * int(negative[0]), "is no principal distance")
 
 
-def read_bundler(path: str | os.PathLike, pixel_um: float = 1.0, size_px: tuple[int, int] | None = None) -> Reading:
+def read_bundler(path: FilePath, pixel_um: float = 1.0, size_px: tuple[int, int] | None = None) -> Reading:
     """A block and its object points; names of photographs from list.txt beside the file or in the folder above.
 
     Photographs with the same f, k1, k2 share a camera. Focal length, k1 and k2 are free, the datum is minimal, the
@@ -227,7 +226,7 @@ def _camera(number: int, inner: list[float], size: tuple[int, int], pixel_um: fl
     return Camera(str(number + 1), "frame", size, pixel_um, interior, lens={"k1": Prior(k1), "k2": Prior(k2)})
 
 
-def write_bundler(oriented: OrientedBlock, folder: str | os.PathLike) -> tuple[str, ...]:
+def write_bundler(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:
     """Write bundle.out and list.txt; image points are free of every error but k1 and k2.
 
     Photographs without orientation and points without coordinates are left out. Points are white.

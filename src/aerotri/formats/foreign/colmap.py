@@ -11,7 +11,6 @@ camera's own where it is known.
 
 from __future__ import annotations
 
-import os
 import re
 import warnings
 from collections.abc import Mapping
@@ -21,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import InputError, mm_from_px, px_from_mm
+from aerotri.conventions import FilePath, InputError, mm_from_px, px_from_mm
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.foreign.colmap_binary import check_binary_model
@@ -52,7 +51,7 @@ def is_colmap(path: Path) -> bool:
     return any(all((path / f"{name}.{ending}").is_file() for name in FILES) for ending in ("bin", "txt"))
 
 
-def read_colmap(folder: str | os.PathLike, pixel_um: float = 1.0) -> tuple[Block, np.ndarray]:
+def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndarray]:
     """A block and its object points from a COLMAP model.
 
     Rays are the image points that belong to an object point. Focal lengths and lens parameters are free, principal
@@ -256,7 +255,7 @@ def _once_each(image: np.ndarray, point: np.ndarray, px: np.ndarray) -> tuple[np
     return image, point, px
 
 
-def write_colmap(oriented: OrientedBlock, folder: str | os.PathLike, binary: bool = True) -> tuple[str, ...]:
+def write_colmap(oriented: OrientedBlock, folder: FilePath, binary: bool = True) -> tuple[str, ...]:
     """Write a COLMAP model.
 
     A camera whose errors COLMAP has words for (lens, affinity) keeps them; image points are freed of all others. Images

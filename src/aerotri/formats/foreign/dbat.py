@@ -7,14 +7,13 @@ standard deviations of image points are pixels. Points are named by their id, im
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from aerotri.conventions import RADIANS_PER, InputError, mm_from_px
+from aerotri.conventions import RADIANS_PER, FilePath, InputError, mm_from_px
 from aerotri.formats.foreign.dbat_camera import DbatCamera, estimated_elements, read_camera
 from aerotri.formats.foreign.dbat_script import Script, one, read_script
 from aerotri.formats.text.table_checks import refuse_duplicates, sigma_columns
@@ -38,7 +37,7 @@ ANGLE_UNITS = {"radian": "rad", "degrees": "deg", "gon": "gon"}
 ELEMENTS = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
 
 
-def read_dbat(path: str | os.PathLike, positions: str | os.PathLike | None = None) -> Block:
+def read_dbat(path: FilePath, positions: FilePath | None = None) -> Block:
     """A block from a DBAT script.
 
     Parameters

@@ -6,7 +6,6 @@ standard deviations of its position, they stand in its XMP (``RtkStdLon`` …) o
 
 from __future__ import annotations
 
-import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 
 FORMATS = ("JPEG", "TIFF")
 EXIF_IFD, GPS_IFD = 0x8769, 0x8825
@@ -53,7 +52,7 @@ class PhotographTags:
     sigma_m: np.ndarray
 
 
-def read_exif(path: str | os.PathLike) -> PhotographTags:
+def read_exif(path: FilePath) -> PhotographTags:
     """The tags of a photograph; one without any has its size.
 
     Raises

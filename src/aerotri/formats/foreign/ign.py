@@ -9,12 +9,11 @@ the corner of the first one (the principal point of a symmetric camera is half i
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import RADIANS_PER, InputError, mm_from_px
+from aerotri.conventions import RADIANS_PER, FilePath, InputError, mm_from_px
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, RayList, no_sigma, texts
@@ -65,7 +64,7 @@ def files_of(folder: Path, ending: str) -> list[Path]:
     return sorted(path for path in folder.iterdir() if path.suffix.lower() == ending and path.is_file())
 
 
-def read_ign_opk(path: str | os.PathLike) -> OrientationList:
+def read_ign_opk(path: FilePath) -> OrientationList:
     """Orientations; the units of the angles other than degrees are offered as choices.
 
     Raises
@@ -99,7 +98,7 @@ def read_ign_opk(path: str | os.PathLike) -> OrientationList:
     )  # fmt: skip
 
 
-def read_ign_mes(path: str | os.PathLike) -> RayList:
+def read_ign_mes(path: FilePath) -> RayList:
     """Image points; rows of 0 0 are left out.
 
     Raises
@@ -137,7 +136,7 @@ def read_ign_mes(path: str | os.PathLike) -> RayList:
     )
 
 
-def read_ign_app(path: str | os.PathLike) -> PointList:
+def read_ign_app(path: FilePath) -> PointList:
     """Control points; the codes are not interpreted.
 
     Raises
@@ -160,7 +159,7 @@ def read_ign_app(path: str | os.PathLike) -> PointList:
     return PointList(file.path, texts(names), xyz, no_sigma(len(xyz)), np.zeros(len(xyz), bool), messages=(said,))
 
 
-def read_ign_camera(path: str | os.PathLike, pixel_um: float) -> Camera:
+def read_ign_camera(path: FilePath, pixel_um: float) -> Camera:
     """A camera without lens parameters.
 
     Parameters
@@ -209,7 +208,7 @@ def without_linear_alteration(height: np.ndarray, ground: float, scale: np.ndarr
     return (height + (scale - 1.0) * ground) / scale
 
 
-def write_ign_opk(oriented: OrientedBlock, path: str | os.PathLike) -> tuple[str, ...]:
+def write_ign_opk(oriented: OrientedBlock, path: FilePath) -> tuple[str, ...]:
     """Write an .OPK file: positions to a tenth of a millimetre, angles in degrees with twelve decimals.
 
     Returns

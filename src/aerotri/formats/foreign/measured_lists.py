@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 
-from aerotri.conventions import InputError, px_from_mm
+from aerotri.conventions import FilePath, InputError, px_from_mm
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.text.text_lines import check_words
@@ -16,7 +14,7 @@ APP_CODE = 13
 """Code of a control point in .app files; what the codes mean is not published, the real files hold 3 and 13."""
 
 
-def write_ign_mes(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
+def write_ign_mes(block: Block, path: FilePath) -> tuple[str, ...]:
     """Write image points as ``point photo column row``.
 
     Returns
@@ -41,7 +39,7 @@ def write_ign_mes(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
     return losses(block, "image points")
 
 
-def write_ign_app(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
+def write_ign_app(block: Block, path: FilePath) -> tuple[str, ...]:
     """Write control and check points as ``point code X Y Z``.
 
     Returns
@@ -70,7 +68,7 @@ def write_ign_app(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
     return (*losses(block, "control", "check points"), *(words for words, count in said if count))
 
 
-def write_odm_geo(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
+def write_odm_geo(block: Block, path: FilePath) -> tuple[str, ...]:
     """Write geo.txt: observed positions with their accuracies; angles as nothing, which ODM reads as unknown.
 
     Returns
@@ -100,7 +98,7 @@ def write_odm_geo(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
     return (*losses(block, "gnss", "crs"), *said)
 
 
-def write_pix4d_offset(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
+def write_pix4d_offset(block: Block, path: FilePath) -> tuple[str, ...]:
     """Write the offset that belongs to the other Pix4D lists: zero, for they hold full coordinates."""
     with atomic_file(path) as place, place.open("w", encoding="utf-8", newline="\n") as file:
         file.write("0.000 0.000 0.000\n")

@@ -7,11 +7,11 @@ angles; whether as R or as its transpose is not told, so it only has to agree wi
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
+from aerotri.conventions import FilePath
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, texts
@@ -35,7 +35,7 @@ def _columns(line: str) -> list[str]:
     return [word.strip().lower() for word in line.lstrip("# ").replace("\t", ",").split(",")]
 
 
-def read_metashape(path: str | os.PathLike) -> OrientationList:
+def read_metashape(path: FilePath) -> OrientationList:
     """Orientations of the cameras that have one.
 
     Raises
@@ -87,7 +87,7 @@ def _check_matrices(file: TextFile, words: list[list[str]], rows: list[int], rot
         raise file.error(given[int(bad[0])][1], "the matrix contradicts omega, phi, kappa", remedy)
 
 
-def write_metashape(oriented: OrientedBlock, path: str | os.PathLike) -> tuple[str, ...]:
+def write_metashape(oriented: OrientedBlock, path: FilePath) -> tuple[str, ...]:
     """Write the list, separated by tabs; the matrix is R, camera → object, row by row.
 
     Returns

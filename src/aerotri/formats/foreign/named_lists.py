@@ -6,14 +6,13 @@ brackets. Cells are separated by commas, semicolons or tabs. Longitude and latit
 
 from __future__ import annotations
 
-import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, texts
 from aerotri.formats.text.tables import LONGEST_NAME, SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, first_lines
@@ -175,7 +174,7 @@ def _messages(found: _List, *used: str) -> tuple[str, ...]:
     return (f"{found.file.path.name}: columns not carried over: {', '.join(left)}"[:400],) if left else ()
 
 
-def read_positions(path: str | os.PathLike) -> PositionList:
+def read_positions(path: FilePath) -> PositionList:
     """Observed positions of photographs.
 
     Raises
@@ -197,7 +196,7 @@ def read_positions(path: str | os.PathLike) -> PositionList:
     )
 
 
-def read_control_list(path: str | os.PathLike) -> PointList:
+def read_control_list(path: FilePath) -> PointList:
     """Control and check points; an empty coordinate is unknown.
 
     Raises
@@ -222,7 +221,7 @@ def read_control_list(path: str | os.PathLike) -> PointList:
     )  # fmt: skip
 
 
-def read_named_orientations(path: str | os.PathLike) -> OrientationList:
+def read_named_orientations(path: FilePath) -> OrientationList:
     """Positions and ω, φ, κ in degrees, R = Rx·Ry·Rz.
 
     Raises

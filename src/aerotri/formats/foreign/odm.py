@@ -9,13 +9,12 @@ separate the entries; the name of an image ends where its file does.
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError, px_from_mm
+from aerotri.conventions import FilePath, InputError, px_from_mm
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.parts import PointList, PositionList, RayList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
@@ -102,7 +101,7 @@ def _begin(path: Path, form: str) -> tuple[TextFile, str, tuple[str, ...]]:
     return file, crs, () if crs else (f"{path.name}: '{file.lines[0][:80]}' is taken as it is: name it with --crs",)
 
 
-def read_odm_gcp(path: str | os.PathLike) -> PointList:
+def read_odm_gcp(path: FilePath) -> PointList:
     """Control points with their image points; a height of NaN is unknown.
 
     Points without a name are told apart by their coordinates and called gcp1, gcp2 …
@@ -190,7 +189,7 @@ def _about_heights(path: Path, heights: np.ndarray, what: str) -> tuple[str, ...
     return tuple(said)
 
 
-def read_odm_geo(path: str | os.PathLike) -> PositionList:
+def read_odm_geo(path: FilePath) -> PositionList:
     """Positions of photographs; photographs without a height are left out, since a position needs it.
 
     Raises
@@ -240,7 +239,7 @@ def read_odm_geo(path: str | os.PathLike) -> PositionList:
     )
 
 
-def write_odm_gcp(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
+def write_odm_gcp(block: Block, path: FilePath) -> tuple[str, ...]:
     """Write gcp_list.txt: the image points of control and check points; a height that is unknown as NaN.
 
     Returns

@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import InputError, mm_from_px, px_from_mm
+from aerotri.conventions import FilePath, InputError, mm_from_px, px_from_mm
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import Reading, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_folder
@@ -101,7 +100,7 @@ class _Node:
         return self.value
 
 
-def read_opensfm(path: str | os.PathLike, pixel_um: float = 1.0) -> Reading:
+def read_opensfm(path: FilePath, pixel_um: float = 1.0) -> Reading:
     """A block and its object points from reconstruction.json and, beside it, tracks.csv.
 
     Focal lengths and lens parameters are free, the standard deviation is one pixel. GNSS positions are observations
@@ -279,7 +278,7 @@ def _tracks(path: Path, images: list[str], points: list[str]) -> tuple[np.ndarra
     return image, point, position, len(rows) - len(known)
 
 
-def write_opensfm(oriented: OrientedBlock, folder: str | os.PathLike) -> tuple[str, ...]:
+def write_opensfm(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:
     """Write reconstruction.json and tracks.csv.
 
     Lens parameters and affinity are kept; image points are freed of all other errors. Photographs without orientation

@@ -7,12 +7,11 @@ South Africa's mapping agency NGI delivers its photographs so. The camera stands
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.parts import OrientationList, texts
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, first_lines
@@ -30,7 +29,7 @@ def is_orientation_list(path: Path) -> bool:
     return bool(lines) and all(len(line) == 7 and all_numbers(line[1:]) for line in lines)
 
 
-def read_orientation_list(path: str | os.PathLike) -> OrientationList:
+def read_orientation_list(path: FilePath) -> OrientationList:
     """Orientations, R = Rx(ω)·Ry(φ)·Rz(κ).
 
     Raises
@@ -63,7 +62,7 @@ def is_ortho_camera(path: Path) -> bool:
     return {"im_size", "focal_len", "sensor_size"} <= keys
 
 
-def read_ortho_camera(path: str | os.PathLike) -> Camera:
+def read_ortho_camera(path: FilePath) -> Camera:
     """The one camera of such a file, without lens parameters.
 
     Raises

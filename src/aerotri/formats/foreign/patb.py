@@ -9,12 +9,11 @@ h and v classes of accuracy, 0 where plan position or height is no control; 1 an
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, RayList, no_sigma, texts
@@ -65,7 +64,7 @@ def _is_class(word: str) -> bool:
     return word.isascii() and word.isdigit() and len(word) < 3
 
 
-def read_patb_im(path: str | os.PathLike) -> RayList:
+def read_patb_im(path: FilePath) -> RayList:
     """Image points from an .im file.
 
     Raises
@@ -132,7 +131,7 @@ def _sections(file: TextFile, words: list[list[str]]) -> tuple[list[int], list[i
     return heads, rows, image
 
 
-def read_patb_ori(path: str | os.PathLike, rotation: str | None = None) -> OrientationList:
+def read_patb_ori(path: FilePath, rotation: str | None = None) -> OrientationList:
     """Orientations from an .ori file.
 
     Parameters
@@ -173,7 +172,7 @@ def read_patb_ori(path: str | os.PathLike, rotation: str | None = None) -> Orien
     return OrientationList(file.path, texts(names), cameras, centre, matrix, tuple(readings.items()))
 
 
-def read_patb_con(path: str | os.PathLike) -> PointList:
+def read_patb_con(path: FilePath) -> PointList:
     """Control points from a .con file.
 
     Raises
@@ -207,7 +206,7 @@ def read_patb_con(path: str | os.PathLike) -> PointList:
     )
 
 
-def write_patb(oriented: OrientedBlock, folder: str | os.PathLike) -> tuple[str, ...]:
+def write_patb(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:
     """Write block.im, block.ori and block.con; rotations turn camera into object coordinates.
 
     Names of more than 16 characters or with blanks are replaced by numbers, all of their kind; names.csv then says

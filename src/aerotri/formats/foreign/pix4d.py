@@ -9,12 +9,11 @@ X Y Z.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, no_sigma, texts
@@ -52,7 +51,7 @@ def _is_list(path: Path, widths: tuple[int, ...]) -> bool:
     )
 
 
-def read_pix4d_eo(path: str | os.PathLike, offset: np.ndarray | None = None) -> OrientationList:
+def read_pix4d_eo(path: FilePath, offset: np.ndarray | None = None) -> OrientationList:
     """Exterior orientations.
 
     Parameters
@@ -81,7 +80,7 @@ def read_pix4d_eo(path: str | os.PathLike, offset: np.ndarray | None = None) -> 
     return OrientationList(file.path, texts(names), np.full(len(names), ""), centre, rotation)
 
 
-def read_pix4d_offset(path: str | os.PathLike) -> np.ndarray:
+def read_pix4d_offset(path: FilePath) -> np.ndarray:
     """(3,) m, from an _offset.xyz file.
 
     Raises
@@ -95,7 +94,7 @@ def read_pix4d_offset(path: str | os.PathLike) -> np.ndarray:
     return file.values(words[0], [0, 0, 0], "offset")
 
 
-def read_pix4d_gcp(path: str | os.PathLike, axes: str = "xy") -> PointList:
+def read_pix4d_gcp(path: FilePath, axes: str = "xy") -> PointList:
     """Ground control points.
 
     Parameters
@@ -112,7 +111,7 @@ def read_pix4d_gcp(path: str | os.PathLike, axes: str = "xy") -> PointList:
     return PointList(file.path, texts(names), xyz, sigma, np.zeros(len(names), bool))
 
 
-def read_pix4d_geo(path: str | os.PathLike, axes: str = "xy") -> PositionList:
+def read_pix4d_geo(path: FilePath, axes: str = "xy") -> PositionList:
     """Positions of photographs, with yaw, pitch and roll where the file has them.
 
     Parameters
@@ -165,7 +164,7 @@ def _spread(file: TextFile, accuracy: np.ndarray, may_be_zero: bool = False) -> 
     return accuracy[:, [0, 0, -1]]
 
 
-def write_pix4d_eo(oriented: OrientedBlock, path: str | os.PathLike) -> tuple[str, ...]:
+def write_pix4d_eo(oriented: OrientedBlock, path: FilePath) -> tuple[str, ...]:
     """Write exterior orientations: positions to a micrometre, angles to twelve decimals of a degree.
 
     Returns
@@ -189,7 +188,7 @@ def write_pix4d_eo(oriented: OrientedBlock, path: str | os.PathLike) -> tuple[st
     return (*losses(oriented.block, "orientations"), *oriented.unoriented())
 
 
-def write_pix4d_gcp(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
+def write_pix4d_gcp(block: Block, path: FilePath) -> tuple[str, ...]:
     """Write control and check points as ``label,X,Y,Z,acc_h,acc_v``; the horizontal accuracy is the larger of X and Y.
 
     Returns
@@ -216,7 +215,7 @@ def write_pix4d_gcp(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
     return (*losses(block, "control", "control sigmas", "check points"), *(words for words, count in said if count))
 
 
-def write_pix4d_geo(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
+def write_pix4d_geo(block: Block, path: FilePath) -> tuple[str, ...]:
     """Write observed positions as ``image,X,Y,Z,acc_h,acc_v``.
 
     Returns
@@ -239,7 +238,7 @@ def write_pix4d_geo(block: Block, path: str | os.PathLike) -> tuple[str, ...]:
     return (*losses(block, "gnss"), *said)
 
 
-def _write_list(path: str | os.PathLike, names: np.ndarray, values: np.ndarray) -> None:
+def _write_list(path: FilePath, names: np.ndarray, values: np.ndarray) -> None:
     odd = [name for name in names.tolist() if "," in name or name.startswith("#")]
     if odd:
         raise InputError(f"'{odd[0]}' cannot stand in a list separated by commas", "rename it")

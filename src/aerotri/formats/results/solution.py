@@ -14,6 +14,7 @@ import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
+from aerotri.conventions import FilePath
 from aerotri.coordinates import LocalFrame
 from aerotri.formats.files.npz import Archive
 from aerotri.formats.results.solution_checks import SCHEMA, checked_values
@@ -65,7 +66,7 @@ class SavedSolution:
 
 
 def write_solution(
-    path: str | os.PathLike,
+    path: FilePath,
     system: NormalSystem,
     solution: Solution,
     result: AdjustedBlock,
@@ -113,7 +114,7 @@ def write_solution(
     )
 
 
-def read_solution(path: str | os.PathLike, block: Block | None = None) -> SavedSolution:
+def read_solution(path: FilePath, block: Block | None = None) -> SavedSolution:
     """Read solution.npz.
 
     Parameters
