@@ -15,7 +15,7 @@ from numba import njit
 _state: dict[str, Any] = {"cached": True, "example": None}
 
 
-def kernel(function: Callable) -> Any:
+def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function on first use. Without a writable place for the cache it is compiled anew in every run."""
     try:
         compiled = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})(function)
@@ -26,7 +26,7 @@ def kernel(function: Callable) -> Any:
     return compiled
 
 
-def inlined(function: Callable) -> Any:
+def inlined(function: Callable[..., Any]) -> Any:
     """A small kernel put into its callers."""
     return njit(nogil=True, error_model="numpy", fastmath={"contract"}, inline="always")(function)
 

@@ -44,19 +44,19 @@ class ChunkSums:
             array.fill(0.0)
         return right
 
-    def add_matrix_to(self, blocks, border, corner) -> None:
+    def add_matrix_to(self, blocks: np.ndarray, border: np.ndarray, corner: np.ndarray) -> None:
         """Add to the matrix of all chunks."""
         blocks[self._images] += self._sums.diagonal
         blocks[self._pairs] += self._sums.pairs
         border[self._images] += self._sums.border
         corner += self._sums.corner
 
-    def add_squares_to(self, squares, squares_shared) -> None:
+    def add_squares_to(self, squares: np.ndarray, squares_shared: np.ndarray) -> None:
         """Add to the squares of the columns, before points are eliminated, of all chunks."""
         squares[self._images] += self._sums.squares
         squares_shared += self._sums.squares_shared
 
-    def add_right_to(self, right, right_shared) -> None:
+    def add_right_to(self, right: np.ndarray, right_shared: np.ndarray) -> None:
         """Add to the right side of all chunks."""
         right[self._images] += self._sums.right
         right_shared += self._sums.right_shared

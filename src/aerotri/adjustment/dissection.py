@@ -73,7 +73,13 @@ def dissect(n: int, edges: np.ndarray, position: np.ndarray, leaf: int = LEAF) -
     return Tree(order, np.concatenate([[0], np.cumsum(sizes)]), parent, depth)
 
 
-def _bisect(members, edges, position, side_of):
+_Half = tuple[np.ndarray, np.ndarray]
+"""Members and edges."""
+
+
+def _bisect(
+    members: np.ndarray, edges: np.ndarray, position: np.ndarray, side_of: np.ndarray
+) -> tuple[_Half, _Half, np.ndarray] | None:
     """Both halves with their edges, and the separator; None where a cut would not pay."""
     best = None
     centred = position[members] - position[members].mean(axis=0)

@@ -174,7 +174,9 @@ class NormalSystem:
         outcomes = run_chunks(chunk, len(self._bounds))
         return self._summed(state, self.whitened_rows(state), outcomes, problem)
 
-    def _summed(self, state: State, rows: list[Rows], outcomes: list, problem: Problem) -> RightSide:
+    def _summed(
+        self, state: State, rows: list[Rows], outcomes: list[tuple[float, float, int]], problem: Problem
+    ) -> RightSide:
         """Chunks, observations beside the image points and observed shared parameters together."""
         right, right_shared = np.zeros((len(self.unknowns.images), 6)), np.zeros(len(self.unknowns.shared))
         for sums in self._sums:

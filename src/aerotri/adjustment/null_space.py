@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from aerotri.adjustment._null_space_kernels import add_products
-from aerotri.adjustment.kernel_records import Directions
+from aerotri.adjustment.kernel_records import Directions, Problem, Work
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor
@@ -40,14 +40,15 @@ def smallest_eigenvalue(factor: Factor, diagonal: np.ndarray) -> float:
     """
     length = np.sqrt(diagonal)[:, None]
     basis = np.random.default_rng(0).normal(size=(len(diagonal), min(3, len(diagonal))))
+    largest = 0.0
     for _ in range(2):
         basis = np.linalg.qr(basis)[0]
         image = length * factor.solve(length * basis)
         if not np.isfinite(image).all():
             return 0.0
-        largest = np.linalg.norm(basis.T @ image, 2)
+        largest = float(np.linalg.norm(basis.T @ image, 2))
         basis = image
-    return float(1.0 / max(largest, 1e-300))
+    return 1.0 / max(largest, 1e-300)
 
 
 def free_directions(
@@ -91,7 +92,9 @@ def _weak_directions(factor: Factor, length: np.ndarray, count: int, also: np.nd
     return (basis @ turn)[:, 1.0 / np.maximum(eigenvalue, 1e-300) - REGULARISATION < CANDIDATE]
 
 
-def _measured(system, state, equations, estimator, basis: np.ndarray) -> np.ndarray:
+def _measured(
+    system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, basis: np.ndarray
+) -> np.ndarray:
     """Of the span of `basis`, in unknowns multiplied by their lengths, the part with λ < NOT_DETERMINED."""
     length = np.sqrt(equations.diagonal)
     effect, size = products(system, state, equations, estimator, basis / length[:, None])
@@ -111,7 +114,7 @@ def products(
     points = system.expand_sides(state, images, shared, np.zeros((len(u.points), 3, k)), estimator)
     sums: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
-    def chunk(first, last, problem, work):
+    def chunk(first: int, last: int, problem: Problem, work: Work) -> None:
         own = np.zeros((k, k)), np.zeros((k, k))
         add_products(first, last, problem, Directions(images, shared, points), *own, work)
         sums[first] = own

@@ -12,12 +12,15 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from aerotri.conventions import InputError
 from aerotri.memory import available_bytes
+
+T = TypeVar("T")
 
 CHUNKS = 4
 """Pieces of every parallel sum. A constant of the program, never the number of threads: it decides the rounding."""
@@ -39,7 +42,7 @@ def _blas() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def blas_threads(multiplications: float) -> AbstractContextManager:
+def blas_threads(multiplications: float) -> AbstractContextManager[object]:
     """A context in which BLAS takes one thread for work of fewer than SMALL_WORK multiplications."""
     return nullcontext() if multiplications >= SMALL_WORK else _blas().limit(limits=1, user_api="blas")
 
@@ -57,7 +60,7 @@ def chunk_bounds(work: np.ndarray, chunks: int = CHUNKS) -> list[tuple[int, int]
     return [(a, b) for a, b in pairwise(edges) if b > a]
 
 
-def run_chunks(function: Callable[[int], object], count: int) -> list:
+def run_chunks(function: Callable[[int], T], count: int) -> list[T]:
     """function(0), …, function(count − 1) in threads; results in order."""
     threads = min(thread_count(), count)
     if threads <= 1:

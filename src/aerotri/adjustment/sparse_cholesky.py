@@ -8,7 +8,7 @@ a `Factor` is therefore valid until the next one of the same `Symbolic`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -79,6 +79,11 @@ class Symbolic:
     block_row, block_col : (nb,) photographs of each stored block, row ≤ column; the n diagonal blocks come first.
     position : (n, 2) plan coordinates of the projection centres.
     n_border : number of shared parameters s.
+
+    Attributes
+    ----------
+    times_factorised : how many matrices were factorised here.
+    corner_factor : (s, s) the last one's triangle of the border.
     """
 
     def __init__(self, n: int, block_row: np.ndarray, block_col: np.ndarray, position: np.ndarray, n_border: int):
@@ -89,7 +94,7 @@ class Symbolic:
         self.rank = np.empty(n, dtype=np.int64)
         self.rank[self.tree.order] = np.arange(n)
         self.fronts = self._fronts(self.tree)
-        self._factorised = 0
+        self.times_factorised = 0
         self._allocate()
 
     @property
@@ -151,7 +156,7 @@ class Symbolic:
             return front
         above = fronts[front.parent]
         local = np.concatenate([above.first + np.arange(above.n_own), above.rows])
-        return _Front(**{**front.__dict__, "place": np.searchsorted(local, front.rows)})
+        return replace(front, place=np.searchsorted(local, front.rows))
 
     def _allocate(self) -> None:
         """Panels of the factor, and one stack of update matrices for even and one for odd depths."""
@@ -176,7 +181,7 @@ class Symbolic:
         refuse_more_than_there_is(self.bytes_needed, f"the normal equations of {self.n} photographs")
         self._panels = np.empty(offset)
         self._stacks = [np.empty(peaks[0]), np.empty(peaks[1])]
-        self._corner = np.empty((self.n_border, self.n_border), order="F")
+        self.corner_factor = np.empty((self.n_border, self.n_border), order="F")
 
     def _inverse_entries(self) -> int:
         """Numbers that the inverse on the pattern holds at once: its blocks, and a front for each depth of the tree."""
@@ -209,11 +214,11 @@ class Symbolic:
         NotPositiveDefiniteError
             When a pivot is not positive or drowns in rounding.
         """
-        self._factorised += 1
+        self.times_factorised += 1
         scale = self._scale(matrix)
         by_image = np.ascontiguousarray(scale[: B * self.n].reshape(self.n, B)[self.rank])
         by_border = scale[B * self.n :]
-        corner = self._corner
+        corner = self.corner_factor
         corner[:] = matrix.corner * by_border[:, None] * by_border[None, :]
         with blas_threads(self.flops):
             smallest = self._factorise_fronts(matrix, by_image, by_border, corner)
@@ -221,7 +226,9 @@ class Symbolic:
                 smallest = min(smallest, _factor_triangle(corner))
         return Factor(self, scale, smallest)
 
-    def _factorise_fronts(self, matrix: BorderedMatrix, by_image, by_border, corner: np.ndarray) -> float:
+    def _factorise_fronts(
+        self, matrix: BorderedMatrix, by_image: np.ndarray, by_border: np.ndarray, corner: np.ndarray
+    ) -> float:
         """All fronts from the leaves up, what they leave of the border added to `corner`; the smallest pivot."""
         children: list[list[int]] = [[] for _ in self.fronts]
         smallest = 1.0
@@ -295,7 +302,7 @@ class Factor:
 
     def __init__(self, symbolic: Symbolic, scale: np.ndarray, smallest_pivot: float):
         self._of, self._scale, self.smallest_pivot = symbolic, scale, smallest_pivot
-        self._number = symbolic._factorised
+        self._number = symbolic.times_factorised
 
     @property
     def _symbolic(self) -> Symbolic:
@@ -306,7 +313,7 @@ class Factor:
         StaleFactorError
             When another matrix was factorised there since.
         """
-        if self._number != self._of._factorised:
+        if self._number != self._of.times_factorised:
             raise StaleFactorError("another matrix was factorised in the place of this factor: factorise anew")
         return self._of
 
@@ -335,8 +342,8 @@ class Factor:
             if len(front.scalar_rows):
                 x[front.scalar_rows] -= low @ x[own]
         if s.n_border:
-            x[corner] = dtrsm(1.0, s._corner, x[corner], lower=1)
-            x[corner] = dtrsm(1.0, s._corner, x[corner], lower=1, trans_a=1)
+            x[corner] = dtrsm(1.0, s.corner_factor, x[corner], lower=1)
+            x[corner] = dtrsm(1.0, s.corner_factor, x[corner], lower=1, trans_a=1)
         for k in range(len(s.fronts) - 1, -1, -1):
             front = s.fronts[k]
             if not front.n_own:
@@ -351,7 +358,7 @@ class Factor:
 
     def border_normals(self) -> np.ndarray:
         """(s, s) the normal matrix of the border with the photographs eliminated."""
-        lower = np.tril(self._symbolic._corner) / self._scale[B * self._symbolic.n :, None]
+        lower = np.tril(self._symbolic.corner_factor) / self._scale[B * self._symbolic.n :, None]
         return lower @ lower.T
 
     def border_inverse(self) -> np.ndarray:
@@ -359,7 +366,7 @@ class Factor:
         if not self._symbolic.n_border:
             return np.zeros((0, 0))
         by_border = self._scale[B * self._symbolic.n :]
-        inverse = _symmetric_from_lower(dpotri(self._symbolic._corner, lower=1)[0])
+        inverse = _symmetric_from_lower(dpotri(self._symbolic.corner_factor, lower=1)[0])
         return inverse * by_border[:, None] * by_border[None, :]
 
     def columns(self, indices: np.ndarray) -> np.ndarray:
@@ -379,7 +386,7 @@ class Factor:
             np.zeros((len(s.block_row), B, B)), np.zeros((s.n, s.n_border, B)), np.zeros((s.n_border, s.n_border))
         )
         if s.n_border:
-            out.corner[:] = _symmetric_from_lower(dpotri(s._corner, lower=1)[0])
+            out.corner[:] = _symmetric_from_lower(dpotri(s.corner_factor, lower=1)[0])
         by_image = np.ascontiguousarray(self._scale[: B * s.n].reshape(s.n, B)[s.rank])
         by_border = self._scale[B * s.n :]
         buffers = [_Buffers() for _ in range(max((front.depth for front in s.fronts), default=0) + 1)]

@@ -100,7 +100,15 @@ def _observed_centres(block: Block, centre: np.ndarray, origin: np.ndarray) -> n
     return observed
 
 
-def _orient_along_track(block: Block, origin, directions, observed, rotation, centre, known) -> np.ndarray:
+def _orient_along_track(
+    block: Block,
+    origin: np.ndarray,
+    directions: Directions,
+    observed: np.ndarray,
+    rotation: np.ndarray,
+    centre: np.ndarray,
+    known: np.ndarray,
+) -> np.ndarray:
     """Vertical photographs along the track, refined with the centres as observations; the points they intersect."""
     there = np.flatnonzero(np.isfinite(observed[:, 0]))
     time = _times(block)[there]
@@ -151,7 +159,9 @@ def _times(block: Block) -> np.ndarray:
     return time
 
 
-def _turn_strips(trial: np.ndarray, block: Block, directions: Directions, observed, there, strip) -> None:
+def _turn_strips(
+    trial: np.ndarray, block: Block, directions: Directions, observed: np.ndarray, there: np.ndarray, strip: np.ndarray
+) -> None:
     """Strips flown the other way round than taken: those whose own rays meet better with the photographs turned.
 
     Parameters
@@ -167,7 +177,9 @@ def _turn_strips(trial: np.ndarray, block: Block, directions: Directions, observ
     trial[wrong] = turned[wrong]
 
 
-def _miss_by_strip(block: Block, directions: Directions, rotation, centre, of_image: np.ndarray) -> np.ndarray:
+def _miss_by_strip(
+    block: Block, directions: Directions, rotation: np.ndarray, centre: np.ndarray, of_image: np.ndarray
+) -> np.ndarray:
     """(strips,) rad, median angular distance of rays from the points that the strip's photographs alone give."""
     rays = block.image_points
     strips = int(of_image.max()) + 1
@@ -182,7 +194,9 @@ def _miss_by_strip(block: Block, directions: Directions, rotation, centre, of_im
     return np.array([np.median(of_strip) if len(of_strip) else 0.0 for of_strip in own])
 
 
-def _meet(count: int, point, rotation, centre, tangent, tolerance) -> tuple[np.ndarray, np.ndarray]:
+def _meet(
+    count: int, point: np.ndarray, rotation: np.ndarray, centre: np.ndarray, tangent: np.ndarray, tolerance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Points (count, 3) where rays meet, and the angular distance (m,) rad of each ray, π where there is no point."""
     ray = np.einsum("mij,mj->mi", rotation, np.column_stack([tangent, -np.ones(len(tangent))]))
     ray /= np.linalg.norm(ray, axis=1, keepdims=True)
@@ -200,7 +214,15 @@ def _loose_centres(block: Block, observed: np.ndarray, sigma_m: float) -> GnssIn
     return GnssIns(rows, observed[rows], np.full((len(rows), 3), sigma_m), nothing, nothing, nothing[:, 0])
 
 
-def refine(block: Block, origin, rotation, centre, points, iterations: int = 6, centres: GnssIns | None = None) -> None:
+def refine(
+    block: Block,
+    origin: np.ndarray,
+    rotation: np.ndarray,
+    centre: np.ndarray,
+    points: np.ndarray,
+    iterations: int = 6,
+    centres: GnssIns | None = None,
+) -> None:
     """A short robust adjustment of what is oriented so far, in place, so that errors do not grow along a strip.
 
     Without additional parameters; in the datum of `centres` where they are given, of the control where there is enough
@@ -260,7 +282,9 @@ def directions_of(block: Block) -> Directions:
     return Directions(tangent, tolerance)
 
 
-def intersect_into(points, block: Block, directions: Directions, rotation, centre) -> float:
+def intersect_into(
+    points: np.ndarray, block: Block, directions: Directions, rotation: np.ndarray, centre: np.ndarray
+) -> float:
     """Intersect every point from the oriented photographs; points that cannot be keep what they have.
 
     Returns the median angular distance (rad) of rays from their points, π where a point could not be had.
@@ -276,7 +300,9 @@ def intersect_into(points, block: Block, directions: Directions, rotation, centr
     return float(np.median(miss)) if len(miss) else np.pi
 
 
-def intersect(n_points: int, point: np.ndarray, centre: np.ndarray, ray: np.ndarray, tolerance: np.ndarray):
+def intersect(
+    n_points: int, point: np.ndarray, centre: np.ndarray, ray: np.ndarray, tolerance: np.ndarray
+) -> np.ndarray:
     """Robust forward intersection: the point nearest to its rays, with re-weighting by their angular distance.
 
     Parameters
@@ -296,7 +322,9 @@ def intersect(n_points: int, point: np.ndarray, centre: np.ndarray, ray: np.ndar
     return xyz
 
 
-def _resect_into(rotation, centre, points, block: Block, directions: Directions, tolerance: float) -> bool:
+def _resect_into(
+    rotation: np.ndarray, centre: np.ndarray, points: np.ndarray, block: Block, directions: Directions, tolerance: float
+) -> bool:
     """Resect photographs that see enough known points, those that see most of them first; whether any was added."""
     rays = block.image_points
     usable = np.isfinite(points[rays.point, 0]) & ~np.isfinite(centre[rays.image, 0])
@@ -348,7 +376,8 @@ def resect(points: np.ndarray, tangent: np.ndarray, tolerance: float) -> tuple[n
         reduced, image, matrix, None, iterationsCount=300, reprojectionError=tolerance * focal, confidence=0.9999,
         flags=cv2.SOLVEPNP_AP3P,
     )  # fmt: skip
-    if not found or inliers is None or len(inliers) < max(MIN_RESECTION_POINTS, 0.4 * len(points)):
+    # OpenCV's types leave out that nothing may be found
+    if not found or inliers is None or len(inliers) < max(MIN_RESECTION_POINTS, 0.4 * len(points)):  # pyright: ignore[reportUnnecessaryComparison]
         return None
     good = np.asarray(inliers, dtype=np.int64).ravel()
     if len(good) >= 6:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.adjustment import _pairs
+from aerotri.adjustment import _pair_kernels
 from aerotri.adjustment.kernel_records import RayArrays
 from aerotri.adjustment.shared_parameters import LensTable, SharedList, lens_table, linear_columns
 from aerotri.functional_model.rotation import (
@@ -289,7 +289,7 @@ def _pattern(n: int, row_start: np.ndarray, ray_image: np.ndarray):
     counts = np.diff(row_start)
     pair_start = np.concatenate([[0], np.cumsum(counts * (counts - 1) // 2)]).astype(np.int64)
     codes = np.empty(pair_start[-1], dtype=np.int64)
-    _pairs.enumerate_pairs(row_start, ray_image, n, codes)
+    _pair_kernels.enumerate_pairs(row_start, ray_image, n, codes)
     unique, pair_block = np.unique(codes, return_inverse=True)
     block_row = np.concatenate([np.arange(n), unique // n])
     block_col = np.concatenate([np.arange(n), unique % n])

@@ -66,7 +66,9 @@ class _Look:
             self.look(system, state, equations, estimator, iteration >= LONG)
         return bool(len(self.photographs) or len(self.points))
 
-    def look(self, system, state, equations, estimator, photographs: bool) -> bool:
+    def look(
+        self, system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, photographs: bool
+    ) -> bool:
         """Look at the points, and the photographs too where there is time for that; whether any is loose."""
         scale = _scale(system, equations, estimator, self.redundancy)
         self.points = np.flatnonzero(scale * system.looseness(state, estimator) > LOOSE)
@@ -89,9 +91,9 @@ def minimise_tied(
     -------
     The block prepared without what was set aside, its state where the given one was, and its solution.
     """
-    state, done = prepared.state, 0
+    state, done, round_ = prepared.state, 0, 0
     report = options.report
-    for round_ in range(MOST_ROUNDS + 1):
+    while True:
         freedom = redundancy(prepared.system)
         look = _Look(freedom, whole)
         counted = replace(options, inspect=look if round_ < MOST_ROUNDS else None)
@@ -105,9 +107,9 @@ def minimise_tied(
             stuck = solution.status != "converged"
             look.look(prepared.system, solution.state, solution.equations, solution.estimator, stuck)
         if not (len(look.photographs) or len(look.points)):
-            break
+            return prepared, replace(solution, iterations=done)
         prepared, state = set_aside(prepared, solution.state, look.photographs, look.points)
-    return prepared, replace(solution, iterations=done)
+        round_ += 1
 
 
 def _counting(report: Callable[[int, float, float], None], done: int) -> Callable[[int, float, float], None]:

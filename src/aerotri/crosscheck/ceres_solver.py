@@ -5,6 +5,7 @@ pyceres is an extra and is imported by this module alone, which is itself import
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,7 +59,7 @@ def solve_with_ceres(paper: PaperBlock, layout: Layout, start: np.ndarray) -> Pa
     return PaperSolution(x, vtpv, iterations, converged, "Ceres, SPARSE_SCHUR")
 
 
-def _hold(problem: Any, layout: Layout, x: np.ndarray, spans: dict[Owner, slice]) -> list:
+def _hold(problem: Any, layout: Layout, x: np.ndarray, spans: dict[Owner, slice]) -> list[Any]:
     """Hold what is not free; blocks are pieces of x."""
     pieces = [*layout.poses, *(layout.shared[span] for span in spans.values()), *layout.points]
     manifolds = []
@@ -117,11 +118,17 @@ def _point_costs(paper: PaperBlock, layout: Layout, x: np.ndarray, spans: dict[O
     return costs
 
 
-class _PointCost(pyceres.CostFunction):
+class _PointCost(pyceres.CostFunction):  # pyright: ignore[reportUntypedBaseClass] -- pyceres has no types
     """The rays of one object point. Blocks: the point, a pose for each ray, the shared blocks its rays depend on."""
 
     def __init__(
-        self, paper: PaperBlock, layout: Layout, x: np.ndarray, spans: dict, rows: slice, local: _LocalEntries
+        self,
+        paper: PaperBlock,
+        layout: Layout,
+        x: np.ndarray,
+        spans: dict[Owner, slice],
+        rows: slice,
+        local: _LocalEntries,
     ):
         super().__init__()
         rays, image = paper.rays, paper.rays.image[rows]
@@ -137,7 +144,9 @@ class _PointCost(pyceres.CostFunction):
         self.set_num_residuals(2 * len(image))
         self.set_parameter_block_sizes([len(block) for block in self.blocks])
 
-    def Evaluate(self, parameters, residuals, jacobians) -> bool:
+    def Evaluate(
+        self, parameters: Sequence[np.ndarray], residuals: np.ndarray, jacobians: Sequence[np.ndarray] | None
+    ) -> bool:
         """Residuals predicted − measured in σ; partials where they are asked for."""
         k, local = self._rays, self._local
         pose, shared = np.array(parameters[1 : k + 1]), np.concatenate([*parameters[k + 1 :], [0.0]])
@@ -170,7 +179,7 @@ class _PointCost(pyceres.CostFunction):
         return True
 
 
-class ObservedCost(pyceres.CostFunction):
+class ObservedCost(pyceres.CostFunction):  # pyright: ignore[reportUntypedBaseClass] -- pyceres has no types
     """Directly observed elements of one block: (x − value)/σ."""
 
     def __init__(self, block: np.ndarray, places: np.ndarray, value: np.ndarray, inv_sigma: np.ndarray):
@@ -182,7 +191,9 @@ class ObservedCost(pyceres.CostFunction):
         self.set_num_residuals(len(places))
         self.set_parameter_block_sizes([len(block)])
 
-    def Evaluate(self, parameters, residuals, jacobians) -> bool:
+    def Evaluate(
+        self, parameters: Sequence[np.ndarray], residuals: np.ndarray, jacobians: Sequence[np.ndarray] | None
+    ) -> bool:
         residuals[:] = (parameters[0][self._places] - self._value) * self._inv_sigma
         if jacobians is not None:
             jacobians[0][:] = self._partials.ravel()
@@ -204,10 +215,10 @@ def _observed_costs(paper: PaperBlock, layout: Layout, x: np.ndarray, spans: dic
     return costs
 
 
-class _AntennaCost(pyceres.CostFunction):
+class _AntennaCost(pyceres.CostFunction):  # pyright: ignore[reportUntypedBaseClass] -- pyceres has no types
     """One observed antenna. Blocks: the pose, and the block of shifts and drifts where there is one."""
 
-    def __init__(self, a: Antennas, order: str, layout: Layout, x: np.ndarray, spans: dict, g: int):
+    def __init__(self, a: Antennas, order: str, layout: Layout, x: np.ndarray, spans: dict[Owner, slice], g: int):
         super().__init__()
         self._order, self._lever_arm = order, a.lever_arm
         self._mount = None if layout.mount is None else layout.mount[a.image[g], None]
@@ -226,7 +237,9 @@ class _AntennaCost(pyceres.CostFunction):
         self.set_num_residuals(3)
         self.set_parameter_block_sizes([len(block) for block in self.blocks])
 
-    def Evaluate(self, parameters, residuals, jacobians) -> bool:
+    def Evaluate(
+        self, parameters: Sequence[np.ndarray], residuals: np.ndarray, jacobians: Sequence[np.ndarray] | None
+    ) -> bool:
         """Residuals predicted − measured in σ, 0 for a coordinate that was not observed."""
         position, by_pose = linearise_antenna(parameters[0][None, :], self._mount, self._lever_arm, self._order)
         if len(parameters) > 1:

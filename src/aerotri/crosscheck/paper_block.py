@@ -245,7 +245,13 @@ def _element_entries(block: Block, camera_row: int, group: str, entries: _Entrie
     return numbers
 
 
-def _linear_entries(block: Block, group: str, groups: np.ndarray, cameras: np.ndarray, entries: _Entries):
+_Linear = tuple[str, str, int]
+"""Family, item and number of an entry."""
+
+
+def _linear_entries(
+    block: Block, group: str, groups: np.ndarray, cameras: np.ndarray, entries: _Entries
+) -> list[_Linear]:
     """Entries of the linear families of a group: (family, item, number), families with a fitting camera only."""
     models = {block.cameras[k].model for k in cameras[groups == group].tolist()}
     found = []
@@ -259,7 +265,9 @@ def _linear_entries(block: Block, group: str, groups: np.ndarray, cameras: np.nd
     return found
 
 
-def _patterns(block: Block, setups: list, linear: list, setup: np.ndarray, xy: np.ndarray):
+def _patterns(
+    block: Block, setups: list[tuple[int, str]], linear: list[list[_Linear]], setup: np.ndarray, xy: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Entries (S, q) and patterns (m, 2, q) of the linear families at the rays."""
     width = max((len(found) for found in linear), default=0)
     entries, values = np.full((len(setups), width), -1), np.zeros((len(xy), 2, width))

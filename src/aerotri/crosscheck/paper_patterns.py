@@ -75,7 +75,17 @@ def ultracam_d(x: np.ndarray, y: np.ndarray, format_mm: tuple[float, float], fli
     return patterns
 
 
-def brown(x_bar, y_bar, k1, k2, k3, p1, p2, b1, b2):
+def brown(
+    x_bar: np.ndarray,
+    y_bar: np.ndarray,
+    k1: np.ndarray,
+    k2: np.ndarray,
+    k3: np.ndarray,
+    p1: np.ndarray,
+    p2: np.ndarray,
+    b1: np.ndarray,
+    b2: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
     """Image error (dx, dy) of Brown's parameters in Fraser's form, d = −Δ [L: Fraser 1997].
 
     Parameters
@@ -89,7 +99,9 @@ def brown(x_bar, y_bar, k1, k2, k3, p1, p2, b1, b2):
     return -dx, -dy
 
 
-def forward_lens(a, b, k1, k2, p1, p2, k3):
+def forward_lens(
+    a: np.ndarray, b: np.ndarray, k1: np.ndarray, k2: np.ndarray, p1: np.ndarray, p2: np.ndarray, k3: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Distorted direction (a', b') of an ideal one, as OpenCV and COLMAP have it [L]; arguments as in `brown`."""
     r2 = a**2 + b**2
     radial = 1.0 + k1 * r2 + k2 * r2**2 + k3 * r2**3

@@ -20,7 +20,7 @@ ELEMENTS = (*INTERIOR, *(f"brown.{name}" for name in BROWN), *(f"lens.{name}" fo
 SEQUENCE = {"omega-phi-kappa": (0, 1, 2), "phi-omega-kappa": (1, 0, 2)}
 
 
-def into_camera(vector: list, angles, order: str) -> list:
+def into_camera(vector: list[np.ndarray], angles: np.ndarray, order: str) -> list[np.ndarray]:
     """Coordinates of an object vector in the camera: turned by the angles one axis after the other.
 
     Parameters
@@ -56,7 +56,9 @@ def angles_of(rotation: np.ndarray, order: str) -> np.ndarray:
     return np.stack([omega, phi, kappa], axis=1)
 
 
-def predict(pose, mount, point, elements, xy, order: str) -> tuple:
+def predict(
+    pose: np.ndarray, mount: np.ndarray | None, point: np.ndarray, elements: np.ndarray, xy: np.ndarray, order: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Image coordinates (x, y) of rays without the linear patterns: x = −c·u1/u3 + x0 + d, u = Rᵀ(X − X0).
 
     Parameters
@@ -66,14 +68,22 @@ def predict(pose, mount, point, elements, xy, order: str) -> tuple:
     """
     u = into_camera([point[:, axis] - pose[..., axis] for axis in range(3)], pose[..., 3:], order)
     if mount is not None:
-        u = [sum(u[i] * mount[:, i, axis] for i in range(3)) for axis in range(3)]
+        u = [u[0] * mount[:, 0, axis] + u[1] * mount[:, 1, axis] + u[2] * mount[:, 2, axis] for axis in range(3)]
     c, x0, y0 = (elements[..., i] for i in range(3))
     a, b = forward_lens(-u[0] / u[2], -u[1] / u[2], *(elements[..., i] for i in range(10, 15)))
     dx, dy = brown(xy[:, 0] - x0, xy[:, 1] - y0, *(elements[..., i] for i in range(3, 10)))
     return c * a + x0 + dx, c * b + y0 + dy
 
 
-def linearise(pose, mount, point, elements, xy, order: str, active: np.ndarray) -> tuple:
+def linearise(
+    pose: np.ndarray,
+    mount: np.ndarray | None,
+    point: np.ndarray,
+    elements: np.ndarray,
+    xy: np.ndarray,
+    order: str,
+    active: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Prediction (k, 2) and its partials by pose (k, 2, 6) and by the `active` elements (k, 2, a).
 
     The partials by the point are those by X0, Y0, Z0 with the other sign.
@@ -86,17 +96,17 @@ def linearise(pose, mount, point, elements, xy, order: str, active: np.ndarray) 
     for direction, element in enumerate(active):
         varied[6 + direction, :, element] += 1j * STEP
     x, y = predict(poses, mount, point, varied, xy, order)
-    partials = np.stack([x.imag, y.imag], axis=-1) / STEP
+    partials = np.stack([np.imag(x), np.imag(y)], axis=-1) / STEP
     partials = np.moveaxis(partials, 0, -1)
     return np.stack([x[0].real, y[0].real], axis=-1), partials[:, :, :6], partials[:, :, 6:]
 
 
-def antenna(pose, mount, lever_arm: np.ndarray, order: str) -> list:
+def antenna(pose: np.ndarray, mount: np.ndarray | None, lever_arm: np.ndarray, order: str) -> list[np.ndarray]:
     """Antenna position [X, Y, Z] = X0 + R·lever arm; pose (..., g, 6), mount (g, 3, 3) or None, lever arm (3,) m."""
     count = pose.shape[-2]
     v = [np.full(count, lever_arm[axis]) for axis in range(3)]
     if mount is not None:
-        v = [sum(mount[:, axis, i] * v[i] for i in range(3)) for axis in range(3)]
+        v = [mount[:, axis, 0] * v[0] + mount[:, axis, 1] * v[1] + mount[:, axis, 2] * v[2] for axis in range(3)]
     for axis in SEQUENCE[order][::-1]:
         i, j = (axis + 1) % 3, (axis + 2) % 3
         cos, sin = np.cos(pose[..., 3 + axis]), np.sin(pose[..., 3 + axis])
@@ -107,7 +117,9 @@ def antenna(pose, mount, lever_arm: np.ndarray, order: str) -> list:
     return [pose[..., axis] + v[axis] for axis in range(3)]
 
 
-def linearise_antenna(pose, mount, lever_arm: np.ndarray, order: str) -> tuple[np.ndarray, np.ndarray]:
+def linearise_antenna(
+    pose: np.ndarray, mount: np.ndarray | None, lever_arm: np.ndarray, order: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Antenna positions (g, 3) and their partials by the pose (g, 3, 6)."""
     poses = np.repeat(pose[None].astype(complex), 6, axis=0)
     for direction in range(6):

@@ -38,7 +38,13 @@ def typical_distance(centre: np.ndarray, points: np.ndarray, image: np.ndarray, 
     return float(np.median(np.linalg.norm(points[point] - centre[image], axis=1)))
 
 
-def intersect(centre: np.ndarray, rotation: np.ndarray, rays: tuple, known: np.ndarray, shift: float) -> np.ndarray:
+def intersect(
+    centre: np.ndarray,
+    rotation: np.ndarray,
+    rays: tuple[np.ndarray, np.ndarray, np.ndarray],
+    known: np.ndarray,
+    shift: float,
+) -> np.ndarray:
     """Object points nearest to their rays.
 
     Parameters
