@@ -11,6 +11,7 @@ ellipsoidal normal, all at that place [C]. Neither the scale of the projection n
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -86,7 +87,7 @@ class LocalFrame:
         geographic = self.georeference.to_geographic(np.asarray(xyz, dtype=float)[there])
         enu = self.local_from_geocentric @ _east_north_up(geographic)
         if self.georeference.is_projected:
-            plan_by_enu = self._plan_partials(geographic)
+            plan_by_enu = self.plan_partials(geographic)
             turn = np.arctan2(plan_by_enu[:, 1, 0] - plan_by_enu[:, 0, 1], plan_by_enu[:, 0, 0] + plan_by_enu[:, 1, 1])
             enu = enu @ _about_z(-turn)
         axes[there] = enu
@@ -123,7 +124,7 @@ class LocalFrame:
         geocentric = xyz @ self.local_from_geocentric + self.origin_geocentric
         return self.georeference.from_geographic(self.georeference.from_geocentric(geocentric))
 
-    def _plan_partials(self, geographic: np.ndarray) -> np.ndarray:
+    def plan_partials(self, geographic: np.ndarray) -> np.ndarray:
         """(n, 2, 2) partials of X, Y of the CRS by metres east and north on the ellipsoid's tangent plane."""
         place, enu = self.georeference.to_geocentric(geographic), _east_north_up(geographic)
         columns = []
@@ -184,7 +185,7 @@ def _frame(reference: Georeference, origin: np.ndarray) -> LocalFrame:
     frame = LocalFrame(reference, origin, reference.to_geocentric(origin[None])[0], enu.T)
     if not reference.is_projected:
         return frame
-    partials = frame._plan_partials(origin[None])[0]
+    partials = frame.plan_partials(origin[None])[0]
     if not np.isfinite(partials).all() or np.linalg.det(partials) <= 0.0:
         raise InputError(
             f"crs {reference.crs} is left-handed or does not reach the block", CRS_REMEDY, file="block.toml"
@@ -193,7 +194,7 @@ def _frame(reference: Georeference, origin: np.ndarray) -> LocalFrame:
     return replace(frame, local_from_geocentric=frame.axes_at(place)[0].T @ enu.T)
 
 
-def _finite_rows(function, xyz: np.ndarray) -> np.ndarray:
+def _finite_rows(function: Callable[[np.ndarray], np.ndarray], xyz: np.ndarray) -> np.ndarray:
     """`function` of the rows that are known; the others NaN, since no coordinate is independent of the others."""
     xyz = np.asarray(xyz, dtype=float)
     out = np.full(xyz.shape, np.nan)

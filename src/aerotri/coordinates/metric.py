@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from aerotri.coordinates.georeference import area_of_use, is_projected, utm_on_d
 from aerotri.coordinates.local_frame import LocalFrame, local_frame
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Block
+
+if TYPE_CHECKING:
+    from pyproj import Transformer
 
 OUTSIDE_DEG = 1.0
 """Degrees beyond the area of use of a CRS that nobody is told of: strips beside a zone are common."""
@@ -87,7 +91,7 @@ def _plan_transformer(source: str, target: str):
     return Transformer.from_crs(source, target, always_xy=True, allow_ballpark=False)
 
 
-def _moved(xyz: np.ndarray, transformer) -> np.ndarray:
+def _moved(xyz: np.ndarray, transformer: Transformer) -> np.ndarray:
     """(n, 3) with the plan transformed; heights stay."""
     known = np.isfinite(xyz[:, :2])
     if (known.any(axis=1) & ~known.all(axis=1)).any():

@@ -17,6 +17,8 @@ a CRS: the ray is met with a sphere. To first order dr = −(H − h)·r³/(2·R
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from aerotri.conventions import InputError
@@ -190,7 +192,9 @@ def _check_heights(flying: np.ndarray, ground: np.ndarray) -> None:
         )
 
 
-def _displacement(xy: np.ndarray, focal_length_mm: float, nadir: np.ndarray | None, ideal_tangent) -> np.ndarray:
+def _displacement(
+    xy: np.ndarray, focal_length_mm: float, nadir: np.ndarray | None, ideal_tangent: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray:
     """Measured minus ideal position, where `ideal_tangent` gives the tangent of the ideal angle off the nadir.
 
     A ray is nadir·cos α + across·sin α; its ideal direction has the same `across`.

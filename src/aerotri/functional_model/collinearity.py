@@ -24,7 +24,16 @@ def interior_row(camera: Camera) -> np.ndarray:
     return np.array(row)
 
 
-def predict(rotation, centre, points, interior, image, point, lens_row, xy) -> np.ndarray:
+def predict(
+    rotation: np.ndarray,
+    centre: np.ndarray,
+    points: np.ndarray,
+    interior: np.ndarray,
+    image: np.ndarray,
+    point: np.ndarray,
+    lens_row: np.ndarray,
+    xy: np.ndarray,
+) -> np.ndarray:
     """Predicted image coordinates without linear additional parameters.
 
     Parameters
@@ -42,7 +51,16 @@ def predict(rotation, centre, points, interior, image, point, lens_row, xy) -> n
     return prediction
 
 
-def linearise(rotation, centre, points, interior, image, point, lens_row, xy) -> RayPartials:
+def linearise(
+    rotation: np.ndarray,
+    centre: np.ndarray,
+    points: np.ndarray,
+    interior: np.ndarray,
+    image: np.ndarray,
+    point: np.ndarray,
+    lens_row: np.ndarray,
+    xy: np.ndarray,
+) -> RayPartials:
     """Prediction and analytic partials; arguments as in `predict`."""
     m = len(image)
     out = RayPartials(np.empty((m, 2)), np.empty((m, 2, 6)), np.empty((m, 2, 3)), np.empty((m, 2, 15)))

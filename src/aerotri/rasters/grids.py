@@ -9,18 +9,21 @@ from __future__ import annotations
 import errno
 import shutil
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.vectors.geojson import LARGEST_M
+
+if TYPE_CHECKING:
+    from rasterio.windows import Window
 
 NO_DATA = -9999.0
 """Stands for what is not known in the files of this program."""
@@ -196,6 +199,11 @@ class RasterReader:
             code = whole.sub_crs_list[0].to_epsg() if whole.is_compound else None
         return code
 
+    @property
+    def stated_unit(self) -> str:
+        """What the file says its values count in, in lower case; '' where it does not."""
+        return (self._file.units[self.band - 1] or "").strip().lower()
+
     def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
         """A window, (rows, columns) of `dtype`; NaN where nothing is known and beyond the edges."""
         from rasterio.windows import Window
@@ -211,7 +219,7 @@ class RasterReader:
         out[top - row : bottom - row, left - column : right - column] = values
         return out
 
-    def _values(self, window) -> np.ndarray:
+    def _values(self, window: Window) -> np.ndarray:
         with _told(self.path, "cannot be read", DAMAGED):
             raw = self._file.read(self.band, window=window)
             mask = self._file.read_masks(self.band, window=window) if self._masked else None
@@ -363,7 +371,7 @@ def _transform(grid: Grid) -> Any:
 
 
 @contextmanager
-def _told(path: Path, what: str, remedy: str) -> Iterator[None]:
+def _told(path: Path, what: str, remedy: str) -> Generator[None]:
     """What rasterio and GDAL raise over a damaged file as an error that names it."""
     from rasterio._err import CPLE_BaseError
     from rasterio.errors import RasterioError
@@ -376,7 +384,7 @@ def _told(path: Path, what: str, remedy: str) -> Iterator[None]:
 
 
 @contextmanager
-def _quietly() -> Iterator[None]:
+def _quietly() -> Generator[None]:
     """Without a warning for rasters of local blocks, which have no CRS, and for those that are refused anyway."""
     from rasterio.errors import NotGeoreferencedWarning
 

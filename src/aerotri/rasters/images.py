@@ -7,7 +7,7 @@ error that names it: nothing is filled in.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +29,11 @@ DRIVERS = {b"II*\0": "GTiff", b"MM\0*": "GTiff", b"II+\0": "GTiff", b"MM\0+": "G
 LOSSLESS = {"lzw", "deflate", "zstd", "lzma", "packbits", "none"}
 PREDICTED = {"lzw", "deflate", "zstd"}
 TILE_PX = 512
-SETTINGS = {"GDAL_ERROR_ON_LIBJPEG_WARNING": "YES", "GDAL_CACHEMAX": 128, "GDAL_TIFF_INTERNAL_MASK": "YES"}
+SETTINGS: dict[str, Any] = {
+    "GDAL_ERROR_ON_LIBJPEG_WARNING": "YES",
+    "GDAL_CACHEMAX": 128,
+    "GDAL_TIFF_INTERNAL_MASK": "YES",
+}
 """A truncated JPEG is an error, not a grey lower half."""
 PIXEL_TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
 NOT_CARRIED = ("IMAGE_STRUCTURE", "DERIVED_SUBDATASETS", "RPC", "COLOR_PROFILE", "SUBDATASETS")
@@ -102,7 +106,7 @@ class Photograph:
 
 
 @contextmanager
-def open_photograph(path: FilePath) -> Iterator[Photograph]:
+def open_photograph(path: FilePath) -> Generator[Photograph]:
     """A TIFF or JPEG file to read from.
 
     Raises
@@ -146,7 +150,7 @@ def _bits(path: Path, dataset: Any) -> int:
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _told(path: Path) -> Generator[None]:
     """Errors of rasterio as `InputError`s that name the file."""
     try:
         with warnings.catch_warnings():
@@ -183,7 +187,7 @@ def _unwritten(path: Path, error: BaseException) -> InputError:
 @contextmanager
 def create_image(
     path: FilePath, columns: int, rows: int, bands: int, dtype: str, **options: Any
-) -> Iterator[RowWriter]:
+) -> Generator[RowWriter]:
     """A tiled TIFF to write to, rows from the top; the caller sees to its name once it is whole.
 
     Parameters
@@ -196,8 +200,10 @@ def create_image(
         When it cannot be written, or cannot be read again afterwards.
     """
     path = Path(path)
-    tiling = {"tiled": True, "blockxsize": TILE_PX, "blockysize": TILE_PX} if min(columns, rows) >= TILE_PX else {}
-    settings = {"bigtiff": "if_safer", "num_threads": "all_cpus", **tiling, **options}
+    tiling: dict[str, Any] = (
+        {"tiled": True, "blockxsize": TILE_PX, "blockysize": TILE_PX} if min(columns, rows) >= TILE_PX else {}
+    )
+    settings: dict[str, Any] = {"bigtiff": "if_safer", "num_threads": "all_cpus", **tiling, **options}
     try:
         with warnings.catch_warnings(), rasterio.Env(**SETTINGS):
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
@@ -213,7 +219,7 @@ def create_image(
 
 
 @contextmanager
-def create_like(path: FilePath, photograph: Photograph, compression: str = COMPRESSION) -> Iterator[RowWriter]:
+def create_like(path: FilePath, photograph: Photograph, compression: str = COMPRESSION) -> Generator[RowWriter]:
     """A tiled TIFF with everything of a photograph but its pixels.
 
     Parameters

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from aerotri.rasters.grids import NO_DATA, Grid, RasterReader
 
 if TYPE_CHECKING:
     from pyproj import CRS
+    from rasterio.windows import Window
 
 METRE = 1.0
 UNITS = {
@@ -116,11 +118,11 @@ class MetricReader(RasterReader):
         self.no_data, self.crs, self.options = no_data, warped.crs, {}
         self.dtype, self._masked = np.dtype(np.float64), False
 
-    def _values(self, window) -> np.ndarray:
+    def _values(self, window: Window) -> np.ndarray:
         values = super()._values(window)
         return values if self._factor == METRE else values * self._factor
 
-    def __exit__(self, kind, error, trace) -> None:
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
         super().__exit__(kind, error, trace)
         if self._source is not None:
             self._source.close()
@@ -128,7 +130,7 @@ class MetricReader(RasterReader):
 
 def units_of(reader: RasterReader) -> RasterUnits:
     """What a raster counts in; one without a CRS counts in metres, as local blocks do."""
-    named = (reader._file.units[reader.band - 1] or "").strip().lower()
+    named = reader.stated_unit
     of_band = UNITS.get(named)
     if reader.crs is None:
         return RasterUnits("metre", METRE if of_band is None else of_band, "no CRS")

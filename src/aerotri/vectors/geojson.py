@@ -24,7 +24,7 @@ class GeoJsonFeature:
 
     properties: Mapping[str, Any]
     kind: str
-    coordinates: list
+    coordinates: list[Any]
 
 
 def read_geojson(path: Path) -> tuple[str, list[GeoJsonFeature]]:
@@ -95,7 +95,7 @@ def _feature(entry: Any, number: int, path: Path) -> GeoJsonFeature:
     return GeoJsonFeature(properties or {}, kind, found)
 
 
-def _positions(value: Any, depth: int) -> list | None:
+def _positions(value: Any, depth: int) -> list[Any] | None:
     """Nested lists of positions as floats; None where something else stands."""
     if not isinstance(value, list):
         return None
@@ -105,7 +105,7 @@ def _positions(value: Any, depth: int) -> list | None:
     return None if any(part is None for part in found) else found
 
 
-def _position(value: list) -> list[float] | None:
+def _position(value: list[Any]) -> list[float] | None:
     """Two coordinates or three; what stands behind them is left out."""
     known = value[:3]
     if len(known) < 2 or any(isinstance(v, bool) or not isinstance(v, int | float) for v in known):

@@ -80,7 +80,7 @@ def polygon_of_wkt(text: str, path: Path | None = None) -> BaseGeometry:
             geometry = shapely.from_wkt(plain)
     except shapely.errors.ShapelyError as error:
         raise InputError(f"is no WKT: {str(error)[:200]}", WKT_REMEDY, path) from error
-    if geometry is None or geometry.geom_type not in KINDS or geometry.is_empty:
+    if geometry.geom_type not in KINDS or geometry.is_empty:
         raise InputError("is no polygon", WKT_REMEDY, path)
     if not (np.abs(shapely.get_coordinates(geometry)) <= LARGEST_M).all():
         raise InputError("has a coordinate that is not possible", "give metres", path)

@@ -11,7 +11,7 @@ import errno
 import os
 import shutil
 import sys
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Generator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -26,7 +26,7 @@ LEAST_ROOM = 16384
 
 
 @contextmanager
-def atomic_file(target: FilePath) -> Iterator[Path]:
+def atomic_file(target: FilePath) -> Generator[Path]:
     """A path to write to; the file takes the name `target` when the block ends without an error.
 
     Parameters
@@ -55,7 +55,7 @@ def atomic_file(target: FilePath) -> Iterator[Path]:
 
 
 @contextmanager
-def atomic_folder(target: FilePath, own: Collection[str] | None = None, gone: Collection[str] = ()) -> Iterator[Path]:
+def atomic_folder(target: FilePath, own: Collection[str] | None = None, gone: Collection[str] = ()) -> Generator[Path]:
     """An empty folder to fill; it takes the name `target` when the block ends without an error.
 
     An older folder of that name is exchanged for the new one in one step. What it holds besides (a user's notes beside
@@ -100,7 +100,7 @@ def atomic_folder(target: FilePath, own: Collection[str] | None = None, gone: Co
 
 
 @contextmanager
-def room_beside(target: FilePath) -> Iterator[Path]:
+def room_beside(target: FilePath) -> Generator[Path]:
     """A hidden folder beside a target, for what is too large to be held until it is written there; then removed.
 
     Parameters
@@ -125,7 +125,7 @@ def _place(target: FilePath) -> Path:
 
 
 @contextmanager
-def _told_as_input_error(target: Path) -> Iterator[None]:
+def _told_as_input_error(target: Path) -> Generator[None]:
     try:
         yield
     except InputError:

@@ -12,7 +12,7 @@ import secrets
 import shutil
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -29,7 +29,7 @@ written: list[Path] = []
 
 
 @contextmanager
-def work_place(target: Path, wait_s: float = WAIT_S) -> Iterator[Path]:
+def work_place(target: Path, wait_s: float = WAIT_S) -> Generator[Path]:
     """An empty folder beside the target for this process alone; it is removed at the end.
 
     Parameters
@@ -62,7 +62,7 @@ def work_place(target: Path, wait_s: float = WAIT_S) -> Iterator[Path]:
 
 
 @contextmanager
-def held(target: FilePath) -> Iterator[None]:
+def held(target: FilePath) -> Generator[None]:
     """Keep other runs from writing to a folder that is written piece by piece.
 
     Raises

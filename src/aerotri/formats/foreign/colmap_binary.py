@@ -42,7 +42,7 @@ class _Cursor:
         self.raw = mapped(path)
         self.at = 0
 
-    def take(self, form: str) -> tuple:
+    def take(self, form: str) -> tuple[int, ...]:
         size = struct.calcsize("<" + form)
         self.skip(size)
         return struct.unpack_from("<" + form, self.raw, self.at - size)

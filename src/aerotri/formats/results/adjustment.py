@@ -4,6 +4,9 @@ Keys and columns are an interface: columns of our own beyond it begin with ``x_`
 records, angles in degrees, what is not known is empty (CSV), null (Parquet, JSON).
 """
 
+# pyright: reportUnknownParameterType=false
+# (pyarrow has no types: what is annotated as its Table or Array is unknown to pyright)
+
 from __future__ import annotations
 
 import dataclasses
@@ -12,7 +15,7 @@ import re
 import time
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,6 +28,9 @@ from aerotri.observations import Block
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Outcome
 from aerotri.statistics.set_aside import photograph_reasons, point_reasons, status_columns
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 NEEDS_QUOTES = re.compile(r'[,"\r\n#]')
 TIMINGS = ("read", "start_values", "solve", "statistics", "plots", "write")
@@ -157,7 +163,7 @@ def _write_residuals(path: Path, adjusted: AdjustedBlock) -> None:
     pq.write_table(residual_table(adjusted), path, compression="zstd")
 
 
-def residual_table(adjusted: AdjustedBlock):
+def residual_table(adjusted: AdjustedBlock) -> pa.Table:
     """The `pyarrow.Table` of residuals.parquet: a row per ray, in the order of the input; null for one left out."""
     import pyarrow as pa
 
@@ -177,7 +183,7 @@ def residual_table(adjusted: AdjustedBlock):
     return pa.table(arrays)
 
 
-def _text_by_index(names: np.ndarray, index: np.ndarray):
+def _text_by_index(names: np.ndarray, index: np.ndarray) -> pa.Array:
     import pyarrow as pa
 
     return pa.array(names.astype(str), pa.string()).take(pa.array(np.asarray(index, dtype=np.int64)))

@@ -14,6 +14,9 @@
 | model | number of the pair of photographs, −1 where they were chosen freely |
 """
 
+# pyright: reportUnknownParameterType=false
+# (pyarrow has no types: what is annotated as its Table or Array is unknown to pyright)
+
 from __future__ import annotations
 
 from dataclasses import dataclass

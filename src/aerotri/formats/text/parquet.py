@@ -1,5 +1,8 @@
 """Parquet files as tables of text and float64 columns, the same as a CSV table gives."""
 
+# pyright: reportUnknownParameterType=false
+# (pyarrow has no types: what is annotated as its Table or Array is unknown to pyright)
+
 from __future__ import annotations
 
 from pathlib import Path

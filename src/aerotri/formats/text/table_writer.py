@@ -1,5 +1,8 @@
 """Writing tables: CSV with every float as it is, or Parquet of the same columns."""
 
+# pyright: reportUnknownParameterType=false
+# (pyarrow has no types: what is annotated as its Table or Array is unknown to pyright)
+
 from __future__ import annotations
 
 from collections.abc import Mapping

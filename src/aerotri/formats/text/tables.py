@@ -4,6 +4,9 @@ CSV is parsed by pyarrow with every name column as text, so that 007 and NA stay
 line each row stands on; nothing here loops over rows unless there is an error to locate.
 """
 
+# pyright: reportUnknownParameterType=false
+# (pyarrow has no types: what is annotated as its Table or Array is unknown to pyright)
+
 from __future__ import annotations
 
 import difflib

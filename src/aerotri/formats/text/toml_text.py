@@ -102,7 +102,7 @@ def _is_section(value: Any) -> bool:
     return isinstance(value, Mapping) and not isinstance(value, Inline)
 
 
-class Inline(dict):
+class Inline(dict[str, Any]):
     """A table written on one line: ``{ value = 1.0, sigma = 0.1 }``."""
 
 
