@@ -192,7 +192,9 @@ def nearest_models(models: tuple[BlockModel, ...], places: Places, xyz: np.ndarr
     return number
 
 
-def _seams(models, places: Places, xyz: np.ndarray, dz: np.ndarray, number: np.ndarray) -> tuple[Seam, ...]:
+def _seams(
+    models: tuple[BlockModel, ...], places: Places, xyz: np.ndarray, dz: np.ndarray, number: np.ndarray
+) -> tuple[Seam, ...]:
     """Steps at the nodes that have a neighbour in another model, in the one model less the other."""
     node = np.arange(number.size).reshape(number.shape)
     sides = []

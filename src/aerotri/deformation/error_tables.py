@@ -85,7 +85,13 @@ def _tile_table(
         step *= max(0.25, min(0.7, 0.9 * np.sqrt(tolerance / off)))
 
 
-def _values(function, x: np.ndarray, y: np.ndarray, x_side, y_side) -> np.ndarray:
+def _values(
+    function: Callable[[np.ndarray], np.ndarray],
+    x: np.ndarray,
+    y: np.ndarray,
+    x_side: tuple[float, float],
+    y_side: tuple[float, float],
+) -> np.ndarray:
     inside_x, inside_y = (
         np.clip(v, side[0] + INSIDE_MM, side[1] - INSIDE_MM) for v, side in ((x, x_side), (y, y_side))
     )
@@ -93,7 +99,9 @@ def _values(function, x: np.ndarray, y: np.ndarray, x_side, y_side) -> np.ndarra
     return function(np.column_stack([grid_x.ravel(), grid_y.ravel()])).reshape(len(y), len(x), 2)
 
 
-def _largest_error(function, table: np.ndarray, x: np.ndarray, y: np.ndarray) -> float:
+def _largest_error(
+    function: Callable[[np.ndarray], np.ndarray], table: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> float:
     """Over the middles of the cells, or an even choice of them, and of their edges."""
     every = int(np.ceil(np.sqrt(max(table.shape[0] * table.shape[1] / MOST_CHECKED, 1.0))))
     rows, columns = np.arange(0, len(y) - 1, every), np.arange(0, len(x) - 1, every)

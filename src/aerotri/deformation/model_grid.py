@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -275,7 +275,9 @@ def deform_places(model: StereoModel, places: Places, xyz: np.ndarray) -> tuple[
     return d, sigma, parallax
 
 
-def _on_nodes(model: StereoModel, places: Places, x, y, z, **described) -> Deformation:
+def _on_nodes(
+    model: StereoModel, places: Places, x: np.ndarray, y: np.ndarray, z: np.ndarray, **described: Any
+) -> Deformation:
     d, sigma, parallax = deform_places(model, places, grid_points(x, y, z))
     if not np.isfinite(d).any():
         raise InputError("no node of the grid lies in the model", "give a smaller spacing, or a DEM that covers it")

@@ -14,7 +14,7 @@ from aerotri.observations import Block
 
 Place = tuple[np.ndarray, np.ndarray]
 
-SUBJECTS = {
+SUBJECTS: dict[tuple[str, ...], str] = {
     ("control", "check"): "coordinates of control and check points",
     ("control",): "coordinates of control points",
     ("check",): "coordinates of check points",

@@ -141,7 +141,15 @@ def _ground(block: Block, model: FreeModel, is_check: bool) -> Positions:
     return Positions(name, row, block.points[point].astype(str), model.points[point], control.xyz[row], median)
 
 
-def _centres(name: str, block: Block, model: FreeModel, image, xyz, row, sigma) -> Positions:
+def _centres(
+    name: str,
+    block: Block,
+    model: FreeModel,
+    image: np.ndarray,
+    xyz: np.ndarray,
+    row: np.ndarray,
+    sigma: np.ndarray | None,
+) -> Positions:
     own = image[row]
     spread = 0.0
     if sigma is not None and np.isfinite(sigma[row]).any():
@@ -149,7 +157,16 @@ def _centres(name: str, block: Block, model: FreeModel, image, xyz, row, sigma) 
     return Positions(name, row, block.images.names[own].astype(str), model.centre[own], xyz[row], spread)
 
 
-def _attitudes(name, block: Block, model: FreeModel, row, image, angles, tolerance, with_boresight) -> Attitudes:
+def _attitudes(
+    name: str,
+    block: Block,
+    model: FreeModel,
+    row: np.ndarray,
+    image: np.ndarray,
+    angles: np.ndarray,
+    tolerance: float,
+    with_boresight: bool,
+) -> Attitudes:
     given = rotation_from_angles(angles, block.rotation)
     names = block.images.names[image].astype(str)
     return Attitudes(name, row, names, model.rotation[image], given, tolerance, with_boresight)

@@ -321,7 +321,8 @@ def _essential_pair(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, 
     cv2.setRNGSeed(1)
     camera = np.diag([1000.0, 1000.0, 1.0])
     essential, inlier = cv2.findEssentialMat(a, b, camera, method=cv2.LMEDS, prob=0.999)
-    if essential is None or essential.shape != (3, 3):
+    # OpenCV's types leave out that nothing may be found
+    if essential is None or essential.shape != (3, 3):  # pyright: ignore[reportUnnecessaryComparison]
         return None
     _, turn, shift, _ = cv2.recoverPose(essential, a, b, camera, mask=inlier)
     flip = OPENCV_FROM_CAMERA

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array, diags_array
+from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
 from aerotri.results.adjusted_block import AdjustedBlock
@@ -66,7 +66,7 @@ def photograph_ties(adjusted: AdjustedBlock, fewest: int) -> Ties:
     return Ties(shared, strongest, neighbour, tuple(sorted(cuts, key=lambda cut: cut.common)))
 
 
-def _parts(common, there: np.ndarray) -> list[Cut]:
+def _parts(common: csr_array, there: np.ndarray) -> list[Cut]:
     """Parts without any common point, all but the largest."""
     _, label = connected_components(common, directed=False)
     sizes = np.bincount(label[there], minlength=label.max(initial=0) + 1)
@@ -74,7 +74,7 @@ def _parts(common, there: np.ndarray) -> list[Cut]:
     return [Cut(np.flatnonzero(there & (label == k)), 0) for k in np.flatnonzero(sizes) if k != largest]
 
 
-def _cuts(common, sees, fewest: int) -> list[Cut]:
+def _cuts(common: csr_array, sees: csr_array, fewest: int) -> list[Cut]:
     """The weak links of the strongest tree, with the common points across the whole cut."""
     if not common.nnz:
         return []

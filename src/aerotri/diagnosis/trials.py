@@ -79,7 +79,7 @@ def explains(before: Trial, after: Trial) -> bool:
     return before.misfit >= CLEARLY_BETTER * max(after.misfit, 1.0)
 
 
-def order(trial: Trial) -> tuple:
+def order(trial: Trial) -> tuple[int, float, int]:
     """Best first: verdict, then rays in use and misfit in coarse steps."""
     return (trial.rank, -round(trial.used, 1), round(float(np.log(np.clip(trial.misfit, 1.0, 1e9))) / 0.15))
 

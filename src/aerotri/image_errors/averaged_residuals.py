@@ -125,7 +125,9 @@ def _cell_of(xy: np.ndarray, camera: Camera, shape: tuple[int, ...]) -> np.ndarr
     return np.where(inside, index[:, 1] * shape[1] + index[:, 0], -1)
 
 
-def _means(cell, remaining, weight, n_cells) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _means(
+    cell: np.ndarray, remaining: np.ndarray, weight: np.ndarray, n_cells: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Weighted mean, count and σ of the mean per cell, and the pooled σ of one residual."""
     count = np.bincount(cell, minlength=n_cells)
     total = np.bincount(cell, weight, n_cells)

@@ -5,6 +5,7 @@ Sign throughout: measured = ideal + d, corrected = measured − d.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -164,7 +165,7 @@ def _directions(errors: ErrorFunction) -> tuple[np.ndarray, np.ndarray]:
     return measured, (ideal - errors.interior[1:]) / errors.interior[0]
 
 
-def _held(names: tuple[str, ...], values) -> dict[str, Prior]:
+def _held(names: tuple[str, ...], values: Iterable[float]) -> dict[str, Prior]:
     return {name: Prior(float(value), fixed=True) for name, value in zip(names, values, strict=True)}
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import ModuleType
 
 import numpy as np
 
@@ -142,7 +143,7 @@ def error_function(adjusted: AdjustedBlock, group: ImageGroup) -> ErrorFunction:
     )
 
 
-def _of_family(values: Mapping[str, float], module) -> np.ndarray:
+def _of_family(values: Mapping[str, float], module: ModuleType) -> np.ndarray:
     return np.array([values.get(f"{module.FAMILY.name}.{item}", 0.0) for item in module.ITEMS])
 
 

@@ -212,7 +212,7 @@ def _covariance_of(adjusted: AdjustedBlock, rows: np.ndarray) -> np.ndarray:
 
 
 def _errors_with_jacobian(
-    adjusted: AdjustedBlock, group: ImageGroup, x, y
+    adjusted: AdjustedBlock, group: ImageGroup, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """d (n, 2) mm, its partials (n, 2, k) by the k parameters in force, and their rows (k,) in the record."""
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)

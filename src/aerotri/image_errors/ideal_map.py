@@ -7,6 +7,7 @@ does, the nearer one. The displacement is sampled on a grid inside each tile (se
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -123,7 +124,9 @@ def _displacement(errors: ErrorFunction, within: tuple[np.ndarray, np.ndarray]):
     return of_pixels
 
 
-def _switches(grids, seams: np.ndarray, cross_seams: np.ndarray, count: int, last: int, axis: int) -> np.ndarray:
+def _switches(
+    grids: Sequence[Sequence[TileGrid]], seams: np.ndarray, cross_seams: np.ndarray, count: int, last: int, axis: int
+) -> np.ndarray:
     """(tiles + 1, count) where one tile ends and the next begins, for every row (axis 0: columns) or column (axis 1).
 
     Parameters

@@ -24,7 +24,7 @@ from aerotri.rasters.photograph_settings import COMPRESSION, RESAMPLING, RESAMPL
 BAND_BYTES = 24 * 2**20
 """Size of the rows, all bands, resampled at a time."""
 TASK_ROWS = 32
-COMPILED_FOR = (np.uint8, np.uint16, np.float32, np.float64)
+COMPILED_FOR = tuple(np.dtype(kind) for kind in (np.uint8, np.uint16, np.float32, np.float64))
 """Types of pixel that kernels write; others come from the type of the sums, so that less is compiled."""
 Report = Callable[[float], None]
 
@@ -70,7 +70,9 @@ def resample(
 class _Tasks:
     """The work on some rows in pieces that may run at the same time."""
 
-    def __init__(self, source, source_row, rows, ideal: IdealMap, kind: PixelType, method: str):
+    def __init__(
+        self, source: np.ndarray, source_row: int, rows: tuple[int, int], ideal: IdealMap, kind: PixelType, method: str
+    ):
         self.source, self.source_row = source, source_row
         self.ideal, self.kind, self.lanczos, self.first = ideal, kind, method == "lanczos", rows[0]
         self.out = np.empty((len(source), rows[1] - rows[0], ideal.size[1]), source.dtype)
@@ -195,7 +197,13 @@ def _check_size(photograph: Photograph, camera: Camera) -> None:
         )
 
 
-def _stream(photograph: Photograph, write, ideal: IdealMap, method: str, report: Report | None) -> None:
+def _stream(
+    photograph: Photograph,
+    write: Callable[[int, np.ndarray], None],
+    ideal: IdealMap,
+    method: str,
+    report: Report | None,
+) -> None:
     """Reading ahead, resampling in threads and writing behind, a few rows at a time."""
     low, high = photograph.range
     nodata = photograph.nodata
@@ -210,8 +218,8 @@ def _stream(photograph: Photograph, write, ideal: IdealMap, method: str, report:
         return first, photograph.read(first, last)
 
     with ThreadPoolExecutor(1) as reader, ThreadPoolExecutor(1) as writer, ThreadPoolExecutor(thread_count()) as pool:
-        coming: Future = reader.submit(read, bands[0])
-        going: Future | None = None
+        coming: Future[tuple[int, np.ndarray]] = reader.submit(read, bands[0])
+        going: Future[None] | None = None
         for number, rows in enumerate(bands):
             first, pixels = coming.result()
             if number + 1 < len(bands):

@@ -163,7 +163,9 @@ def _run(i: int, count: int, runs: int) -> int:
     return min(i * runs // max(count, 1), runs - 1)
 
 
-def _main_strips(spec: FlightSpec, frame: FlightFrame, cameras: Sequence[Camera], used: list[int], height: float):
+def _main_strips(
+    spec: FlightSpec, frame: FlightFrame, cameras: Sequence[Camera], used: list[int], height: float
+) -> list[_Strip]:
     spacing = frame.footprint[1] * (1.0 - spec.side_lap)
     count = round(2.0 * frame.half_axes[1] / spacing) + 1
     strips = []
@@ -184,7 +186,13 @@ def _centred(count: int, base: float) -> np.ndarray:
 
 
 def _cross_strip(
-    spec: FlightSpec, cross: CrossStripSpec, number: int, frame: FlightFrame, cameras, index, height: float
+    spec: FlightSpec,
+    cross: CrossStripSpec,
+    number: int,
+    frame: FlightFrame,
+    cameras: Sequence[Camera],
+    index: dict[str, int],
+    height: float,
 ) -> _Strip:
     camera = 0 if cross.camera is None else _known(index, cross.camera, f"flight.cross_strips.{number}.camera")
     end_lap = spec.end_lap if cross.end_lap is None else cross.end_lap
@@ -198,7 +206,12 @@ def _cross_strip(
 
 
 def _fly(
-    spec: FlightSpec, strips: list[_Strip], frame: FlightFrame, cameras: Sequence[Camera], level: float, rng
+    spec: FlightSpec,
+    strips: list[_Strip],
+    frame: FlightFrame,
+    cameras: Sequence[Camera],
+    level: float,
+    rng: np.random.Generator,
 ) -> FlownImages:
     counts = [len(strip.positions) for strip in strips]
     n = sum(counts)

@@ -67,7 +67,12 @@ def tie_candidates(
 
 
 def _clustered(
-    spec: TiePointSpec, count: int, flown: FlownImages, cameras: Sequence[Camera], ground_m: float, rng
+    spec: TiePointSpec,
+    count: int,
+    flown: FlownImages,
+    cameras: Sequence[Camera],
+    ground_m: float,
+    rng: np.random.Generator,
 ) -> np.ndarray:
     """Around the nodes of a pattern in each image, as Gruber laid them out; the nodes of overlapping images meet."""
     nodes = float(np.prod(spec.pattern))

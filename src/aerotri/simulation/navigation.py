@@ -30,7 +30,9 @@ def observe_navigation(
     return GnssIns(np.arange(n), xyz, sigma, angles, angle_sigma, flown.time.copy())
 
 
-def _positions(spec: GnssSpec, flown: FlownImages, order: str, rng) -> tuple[np.ndarray, np.ndarray]:
+def _positions(
+    spec: GnssSpec, flown: FlownImages, order: str, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     strips, strip_of_image = np.unique(flown.strip, return_inverse=True)
     mean_time = np.bincount(strip_of_image, flown.time) / np.bincount(strip_of_image)
     shift = rng.normal(size=(len(strips), 3)) * np.array(spec.shift_sigma_m)
@@ -41,7 +43,9 @@ def _positions(spec: GnssSpec, flown: FlownImages, order: str, rng) -> tuple[np.
     return xyz + sigma * rng.normal(size=xyz.shape), sigma
 
 
-def _attitudes(spec: InsSpec, flown: FlownImages, order: str, rng) -> tuple[np.ndarray, np.ndarray]:
+def _attitudes(
+    spec: InsSpec, flown: FlownImages, order: str, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     boresight = rotation_from_angles(np.radians(spec.boresight_deg), order)
     angles = angles_from_rotation(rotation_from_angles(flown.angles, order) @ boresight, order)
     sigma = np.tile(np.radians(spec.sigma_deg), (len(flown), 1))

@@ -46,7 +46,9 @@ class Photographs:
     cameras: tuple[TrueCamera, ...]
 
     @classmethod
-    def of(cls, centre, angles, order: str, camera, cameras: Sequence[TrueCamera]) -> Photographs:
+    def of(
+        cls, centre: np.ndarray, angles: np.ndarray, order: str, camera: np.ndarray, cameras: Sequence[TrueCamera]
+    ) -> Photographs:
         return cls(centre, rotation_from_angles(angles, order), camera, tuple(cameras))
 
 

@@ -110,7 +110,7 @@ def _write_image_errors(path: Path, samples: Sequence[ImageErrorSample]) -> None
     _write(path, ["camera", "day", "x", "y", "dx", "dy"], rows)
 
 
-def _rows(texts: tuple[Iterable, ...], numbers: np.ndarray) -> list[list]:
+def _rows(texts: tuple[Iterable[object], ...], numbers: np.ndarray) -> list[list[str]]:
     """Rows of text columns and numbers; repr keeps every digit that a number was rounded to."""
     return [
         [*(str(t) for t in text), *(repr(v) for v in values)]
@@ -118,7 +118,7 @@ def _rows(texts: tuple[Iterable, ...], numbers: np.ndarray) -> list[list]:
     ]
 
 
-def _write(path: Path, header: list[str], rows: Iterable[list]) -> None:
+def _write(path: Path, header: list[str], rows: Iterable[list[str]]) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)

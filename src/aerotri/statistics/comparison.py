@@ -7,7 +7,7 @@ most of their observations, so their difference scatters by much less than σ (o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
@@ -274,7 +274,12 @@ def _points(first: AdjustedBlock, second: AdjustedBlock) -> Differences:
     return Differences(names, COORDINATES, second.points.xyz[j] - first.points.xyz[i], second.points.sigma[j])
 
 
-def _adjusted_by_both(first: AdjustedBlock, second: AdjustedBlock, names_of, rays_of):
+def _adjusted_by_both(
+    first: AdjustedBlock,
+    second: AdjustedBlock,
+    names_of: Callable[[AdjustedBlock], np.ndarray],
+    rays_of: Callable[[AdjustedBlock], np.ndarray],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Names and rows of what both runs adjusted; nothing where the coordinates mean different things."""
     if first.block.crs != second.block.crs:
         return np.zeros(0, dtype=str), np.zeros(0, np.int64), np.zeros(0, np.int64)

@@ -125,7 +125,14 @@ def _size(one: Chosen) -> int:
     return {POINT: 3, IMAGE: 6, SHARED: 1}[one.kind]
 
 
-def _unit_solutions(system, state, factor, estimator, chosen, columns):
+def _unit_solutions(
+    system: NormalSystem,
+    state: State,
+    factor: Factor,
+    estimator: Estimator,
+    chosen: Sequence[Chosen],
+    columns: list[tuple[int, int]],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Q·e for the unit vectors e of the columns: of photographs (n, 6, k), shared (s, k) and points (P, 3, k)."""
     u = system.unknowns
     n, s, k = len(u.images), len(u.shared), len(columns)

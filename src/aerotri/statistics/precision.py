@@ -5,6 +5,7 @@ All from the covariances of a result; every σ contains σ̂0.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,7 +115,9 @@ def weakest_points(adjusted: AdjustedBlock, ratio: float = WEAK, most: int = 20)
     return _weakest(points.sigma, adjusted.block.points, ("X", "Y", "Z"), points.rays, ratio, most)
 
 
-def _weakest(sigma, names, elements, rays, ratio: float, most: int) -> tuple[WeakPart, ...]:
+def _weakest(
+    sigma: np.ndarray, names: np.ndarray, elements: Sequence[str], rays: np.ndarray, ratio: float, most: int
+) -> tuple[WeakPart, ...]:
     there = np.isfinite(sigma).any(axis=1)
     if not there.any():
         return ()
@@ -127,7 +130,11 @@ def _weakest(sigma, names, elements, rays, ratio: float, most: int) -> tuple[Wea
     rows = rows[np.argsort(-largest[rows], kind="stable")][:most]
     return tuple(
         WeakPart(
-            str(names[k]), elements[element[k]], float(sigma[k, element[k]]), float(median[element[k]]), int(rays[k])
+            str(names[k]),
+            elements[int(element[k])],
+            float(sigma[k, element[k]]),
+            float(median[element[k]]),
+            int(rays[k]),
         )
         for k in rows
     )

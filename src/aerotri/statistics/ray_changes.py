@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,7 +103,13 @@ def _weight(run: AdjustedBlock) -> np.ndarray:
     return run.rays.weight / np.prod(run.block.image_points.sigma, axis=1)
 
 
-def _listed(kind: str, run: AdjustedBlock, rows: np.ndarray, first, second) -> list[RayChange]:
+def _listed(
+    kind: str,
+    run: AdjustedBlock,
+    rows: np.ndarray,
+    first: Sequence[str] | np.ndarray,
+    second: Sequence[str] | np.ndarray,
+) -> list[RayChange]:
     block = run.block
     return [
         RayChange(

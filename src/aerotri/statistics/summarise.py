@@ -244,7 +244,9 @@ def _percent(r: float) -> str:
     return f"{100.0 * r:.2f} %"
 
 
-def _ground_points(system: NormalSystem, q: Cofactors, points: PointResults, tests: HeldTests):
+def _ground_points(
+    system: NormalSystem, q: Cofactors, points: PointResults, tests: HeldTests
+) -> list[GroundPointResults]:
     """Control and check points that were adjusted."""
     block, u = system.unknowns.block, system.unknowns
     row = np.full(len(block.points), -1)
@@ -271,7 +273,9 @@ def _ground_points(system: NormalSystem, q: Cofactors, points: PointResults, tes
     return out
 
 
-def _groups(system: NormalSystem, solution: Solution, q: Cofactors, rays: RayResults, control: GroundPointResults):
+def _groups(
+    system: NormalSystem, solution: Solution, q: Cofactors, rays: RayResults, control: GroundPointResults
+) -> list[ObservationGroup]:
     """Image points by camera, control in plan and height, projection centres: redundancy and fit of each."""
     u, block = system.unknowns, system.unknowns.block
     groups = []
@@ -306,7 +310,9 @@ def _group(name: str, count: int, apriori: float, rms: float, redundancy: float,
     return ObservationGroup(name, count, apriori, rms, redundancy, posteriori)
 
 
-def _extra_results(system: NormalSystem, solution: Solution, q: Cofactors) -> tuple[list, ObservationResults | None]:
+def _extra_results(
+    system: NormalSystem, solution: Solution, q: Cofactors
+) -> tuple[list[ObservationGroup], ObservationResults | None]:
     """Groups of the observations beside the image points, and their residuals one by one."""
     groups, parts = [], []
     for rows in system.whitened_rows(solution.state):

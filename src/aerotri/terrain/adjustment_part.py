@@ -51,7 +51,9 @@ def adjustment_variances(calibration: Adjustment, of: Restitution, rows: np.ndar
     return out
 
 
-def _by_unknowns(calibration: Adjustment, of: Restitution, rows, local: np.ndarray, photographs) -> np.ndarray:
+def _by_unknowns(
+    calibration: Adjustment, of: Restitution, rows: np.ndarray, local: np.ndarray, photographs: np.ndarray
+) -> np.ndarray:
     """(n, 3, u) partials of intersected points by the unknowns of the reduced system."""
     u, state = calibration.system.unknowns, calibration.solution.state
     in_system = np.full(len(of.group), -1)

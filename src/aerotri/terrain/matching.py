@@ -78,8 +78,17 @@ def measure(
     return with_sigma0(pickets, options.window_px * gsd)
 
 
-def _coarse_level(photographs, area: Area, prior: Prior, level: int, spacing: float, gsd: float, options, models,
-                  report: Report) -> Prior:  # fmt: skip
+def _coarse_level(
+    photographs: Photographs,
+    area: Area,
+    prior: Prior,
+    level: int,
+    spacing: float,
+    gsd: float,
+    options: MatchOptions,
+    models: Models | None,
+    report: Report,
+) -> Prior:
     x, y = (
         np.linspace(a, b, max(int(np.ceil((b - a) / spacing)) + 1, 3)) for a, b in zip(area.low, area.high, strict=True)
     )
@@ -104,7 +113,15 @@ def _coarse_level(photographs, area: Area, prior: Prior, level: int, spacing: fl
     return Prior(x, y, z, SPARE_PX * per_post / 2.0 + 0.5 * relief)
 
 
-def _fine_level(photographs, nodes, prior: Prior, gsd: float, options: MatchOptions, models, report) -> Pickets:
+def _fine_level(
+    photographs: Photographs,
+    nodes: np.ndarray,
+    prior: Prior,
+    gsd: float,
+    options: MatchOptions,
+    models: Models | None,
+    report: Report,
+) -> Pickets:
     n, m = len(nodes), 2 if models is not None else options.most_photographs
     out = Pickets(
         node=nodes, xyz=np.full((n, 3), np.nan), covariance=np.full((n, 3, 3), np.nan),

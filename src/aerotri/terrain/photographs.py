@@ -174,7 +174,9 @@ class Site:
         errors = p.tables.for_kernels
         return View(self.photos, p.source, errors, p.sensor, self.centres, crops, pixels, scale, edge)
 
-    def _window(self, k: int, low, high, reach: float, scale: float) -> tuple[int, int, int, int] | None:
+    def _window(
+        self, k: int, low: np.ndarray, high: np.ndarray, reach: float, scale: float
+    ) -> tuple[int, int, int, int] | None:
         """First row and column, last row and column of the level that show the box; None where it is not seen."""
         x, y = (np.array([low[a] - reach, high[a] + reach]) for a in range(2))
         corners = np.stack(np.meshgrid(x, y, [low[2], high[2]]), axis=-1).reshape(-1, 3)

@@ -12,7 +12,7 @@ from aerotri.adjustment.parallel import thread_count
 from aerotri.terrain import _view_kernels as kernels
 from aerotri.terrain._plan_kernels import Nodes
 from aerotri.terrain.photographs import Photographs, Site, site_at
-from aerotri.terrain.pickets import MatchOptions
+from aerotri.terrain.pickets import MatchOptions, Models
 from aerotri.terrain.prior import Prior
 
 TILE_NODES = 40
@@ -54,8 +54,17 @@ def _tiles(nodes: np.ndarray, reach: float) -> Iterator[np.ndarray]:
     yield from np.split(order, np.flatnonzero(np.diff(key[order])) + 1)
 
 
-def do_tiles(photographs: Photographs, nodes, prior: Prior, level: int, reach: float, options: MatchOptions, models,
-         one: Callable[[Tile], None], report: Callable[[float], None]) -> None:  # fmt: skip
+def do_tiles(
+    photographs: Photographs,
+    nodes: np.ndarray,
+    prior: Prior,
+    level: int,
+    reach: float,
+    options: MatchOptions,
+    models: Models | None,
+    one: Callable[[Tile], None],
+    report: Callable[[float], None],
+) -> None:
     """Do something to all tiles, in threads."""
     gsd = float(np.median(photographs.gsd)) * 2**level
     spacing = np.sqrt(np.ptp(nodes[:, 0]) * np.ptp(nodes[:, 1]) / max(len(nodes), 1)) or gsd
@@ -71,7 +80,16 @@ def do_tiles(photographs: Photographs, nodes, prior: Prior, level: int, reach: f
             report((k + 1) / len(parts))
 
 
-def _make_tile(photographs: Photographs, nodes, own, prior: Prior, level: int, reach, options, models) -> Tile:
+def _make_tile(
+    photographs: Photographs,
+    nodes: np.ndarray,
+    own: np.ndarray,
+    prior: Prior,
+    level: int,
+    reach: float,
+    options: MatchOptions,
+    models: Models | None,
+) -> Tile:
     z, slopes, spare = prior.at(nodes)
     middle = 0.5 * (nodes.min(axis=0) + nodes.max(axis=0))
     site = site_at(photographs, *middle.tolist())

@@ -73,6 +73,7 @@ def place(
     else:
         scale, rotation, translation = _best_triple(source, target, sigma, seed)
     count = len(sigma)
+    misfit = np.full(count, np.nan)
     for _ in range(REWEIGHTINGS):
         misfit = np.linalg.norm(scale * source @ rotation.T + translation - target, axis=1)
         relative = misfit[:count] / sigma

@@ -123,7 +123,9 @@ def match_all(
         keys = {j: _key(features[first], features[j], cameras[first], cameras[j], options) for j in seconds}
         known = _kept(kept, {keys[j]: (len(features[first].xy), len(features[j].xy)) for j in seconds})
 
-        def one(j: int, first: int = first, known: dict = known, keys: dict = keys) -> np.ndarray:
+        def one(
+            j: int, first: int = first, known: dict[str, np.ndarray] = known, keys: dict[int, str] = keys
+        ) -> np.ndarray:
             old = known.get(keys[j])
             return _match(features[first], features[j], (cameras[first], cameras[j]), options) if old is None else old
 

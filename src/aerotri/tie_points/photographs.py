@@ -104,7 +104,7 @@ def _cameras(
 ) -> tuple[tuple[Camera, ...], np.ndarray]:
     """The cameras in use and the one of every photograph: photographs of one model, size and focal length share it."""
     found: list[Camera] = []
-    place: dict[tuple, int] = {}
+    place: dict[tuple[object, ...], int] = {}
     index = np.empty(len(tags), np.int64)
     for row, (path, tag) in enumerate(zip(paths, tags, strict=True)):
         key = (tag.make, tag.model, tag.size_px, tag.focal_length_mm, tag.pixel_um)

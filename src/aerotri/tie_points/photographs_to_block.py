@@ -144,7 +144,14 @@ def _features(photographs: PhotographSet, options: FeatureOptions, cache: Path, 
     return found
 
 
-def _tracks(photographs, features, places, options: Options, cache: Path, progress: Progress):
+def _tracks(
+    photographs: PhotographSet,
+    features: list[Features],
+    places: np.ndarray,
+    options: Options,
+    cache: Path,
+    progress: Progress,
+) -> tuple[Tracks, tuple[int, int]]:
     pairs = neighbours(places, options.matches.neighbours)
     cameras = [photographs.cameras[c] for c in photographs.camera]
     matched = match_all(

@@ -120,7 +120,13 @@ def cell_volume(surface: Surface, boundary: Boundary, base: Base | None = None) 
     return Functional(xyz, gradient, share)
 
 
-def _window_cells(surface: Surface, boundary: Boundary, extra: dict, window: tuple[int, int, int, int], factor: int):
+def _window_cells(
+    surface: Surface,
+    boundary: Boundary,
+    extra: dict[tuple[int, int], float],
+    window: tuple[int, int, int, int],
+    factor: int,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places, gradient and noise share of the cells of a window, `factor` × `factor` of them together."""
     row, column, rows, columns = window
     grid = surface.grid.window(row, column, rows, columns)

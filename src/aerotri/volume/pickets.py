@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.deformation.orientation import calibrated_orientation
+from aerotri.deformation.orientation import Orientation, calibrated_orientation
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.observations import Block
 from aerotri.results.adjustment import Adjustment
@@ -122,7 +122,9 @@ def pickets_where_seen(
     return Pickets(xyz[seen], start, image, np.full(len(image), sigma_mm), share[seen]), seen
 
 
-def _candidates(local, number, orientation, half, known) -> tuple[np.ndarray, np.ndarray]:
+def _candidates(
+    local: np.ndarray, number: np.ndarray, orientation: Orientation, half: np.ndarray, known: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Photographs whose footprint may hold a point of a run of points: by distance in plan."""
     runs = int(number[-1]) + 1 if len(number) else 0
     edges = np.searchsorted(number, np.arange(runs + 1))

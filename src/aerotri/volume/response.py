@@ -210,7 +210,9 @@ def _in_frame(calibration: Adjustment, xyz: np.ndarray, gradient: np.ndarray) ->
     return np.ascontiguousarray(local - origin), np.ascontiguousarray(gradient @ partials)
 
 
-def _in_unknowns(calibration: Adjustment, by_eo, by_interior, by_parameters, corrected: bool) -> np.ndarray:
+def _in_unknowns(
+    calibration: Adjustment, by_eo: np.ndarray, by_interior: np.ndarray, by_parameters: np.ndarray, corrected: bool
+) -> np.ndarray:
     """c in the order of the reduced system; a parameter that is corrected for moves V against what its error does."""
     u, state = calibration.system.unknowns, calibration.solution.state
     turned = by_eo.copy()

@@ -43,9 +43,9 @@ class Pair:
 
     def project(self, points: np.ndarray) -> np.ndarray:
         """(2, n, 2) mm from the principal point."""
-        return predict(*self._rays(points), np.zeros((2 * len(points), 2))).reshape(2, -1, 2)
+        return predict(*self.rays(points), np.zeros((2 * len(points), 2))).reshape(2, -1, 2)
 
-    def _rays(self, points: np.ndarray):
+    def rays(self, points: np.ndarray):
         n = len(points)
         interior = np.zeros((2, 15))
         interior[:, 0] = self.focal_length
@@ -93,7 +93,7 @@ def explicit(pair: Pair, xy: np.ndarray) -> Intersected:
 def rigorous_partials(pair: Pair, points: np.ndarray) -> np.ndarray:
     """(n, 3, 6) partials of X, Y, Z by ω, φ, κ of the first, then of the second photograph, m/rad: −N⁻¹AᵀB."""
     n = len(points)
-    rays = linearise(*pair._rays(points), np.zeros((2 * n, 2)))
+    rays = linearise(*pair.rays(points), np.zeros((2 * n, 2)))
     a, _ = _by_point(pair, points)
     gain = np.linalg.solve(np.swapaxes(a, 1, 2) @ a, np.swapaxes(a, 1, 2))
     per_angle = small_rotation_per_angle(pair.angles, ORDER)
@@ -181,6 +181,6 @@ def _directions(pair: Pair, xy: np.ndarray) -> np.ndarray:
 def _by_point(pair: Pair, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(n, 4, 3) partials of both photographs' coordinates by the point, and the coordinates (n, 4)."""
     n = len(points)
-    rays = linearise(*pair._rays(points), np.zeros((2 * n, 2)))
+    rays = linearise(*pair.rays(points), np.zeros((2 * n, 2)))
     a, xy = rays.by_point.reshape(2, n, 2, 3), rays.prediction.reshape(2, n, 2)
     return np.concatenate([a[0], a[1]], axis=1), np.concatenate([xy[0], xy[1]], axis=1)

@@ -5,6 +5,7 @@ Drawn in metres from the middle of the block, y down. Names are text content, ne
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -98,7 +99,7 @@ def interactive_plan(adjusted: AdjustedBlock) -> InteractivePlan:
     )
 
 
-def _photographs(adjusted: AdjustedBlock, here, corners: np.ndarray) -> list[Spot]:
+def _photographs(adjusted: AdjustedBlock, here: Callable[[np.ndarray], np.ndarray], corners: np.ndarray) -> list[Spot]:
     block, images = adjusted.block, adjusted.images
     sigma = images.sigma
     d, at, outlines = metre_digits(sigma[:, :3]), here(images.centre[:, :2]), here(corners)
@@ -125,7 +126,7 @@ def _ground_spots(adjusted: AdjustedBlock, kind: str, results: GroundPointResult
     return spots
 
 
-def _worst_points(adjusted: AdjustedBlock, here) -> list[Spot]:
+def _worst_points(adjusted: AdjustedBlock, here: Callable[[np.ndarray], np.ndarray]) -> list[Spot]:
     """Object points with the largest |w| beyond the critical value of the block's test."""
     points, block = adjusted.points, adjusted.block
     critical = -ndtri(block.settings.adjustment.alpha / 2.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -118,7 +119,13 @@ def plot_ground_points(adjusted: AdjustedBlock) -> Figure:
     return figure
 
 
-def _difference_vectors(axes: Axes, results, xy, heights: bool, scale_at: tuple[float, float]) -> None:
+def _difference_vectors(
+    axes: Axes,
+    results: Sequence[GroundPointResults],
+    xy: Sequence[np.ndarray],
+    heights: bool,
+    scale_at: tuple[float, float],
+) -> None:
     vector = [_vectors_of(r, heights) for r in results]
     lengths = np.concatenate([np.hypot(v[:, 0], v[:, 1]) for v in vector])
     per_inch, size = per_inch_for(lengths, 0.55)
@@ -130,7 +137,13 @@ def _difference_vectors(axes: Axes, results, xy, heights: bool, scale_at: tuple[
         if symbol["marker"] == "^":
             label = length_text(size)
             scale_vector(
-                axes, quiver, size, label, scale_at[0] - size / per_inch - 0.1 - 0.068 * len(label), scale_at[1]
+                axes,
+                quiver,
+                size,
+                per_inch,
+                label,
+                scale_at[0] - size / per_inch - 0.1 - 0.068 * len(label),
+                scale_at[1],
             )
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
+from matplotlib.quiver import Quiver
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from aerotri.functional_model.additional_parameters import ultracam_d
@@ -85,7 +88,7 @@ def micron(value_mm: float, camera: Camera) -> str:
     return f"{1e3 * value_mm:.2f} µm ({value_mm / camera.pixel_mm:.2f} px)"
 
 
-def _format_figure(title: str, subtitle: str, camera: Camera, shape) -> tuple[Axes, Figure, float]:
+def _format_figure(title: str, subtitle: str, camera: Camera, shape: tuple[int, ...]) -> tuple[Axes, Figure, float]:
     """Axes that show the format with equal scales; also the size of a cell in inches."""
     half = np.array(camera.half_format_mm)
     mm_per_inch = max(2 * half[0] / (WIDTH - 2.3), 2 * half[1] / 6.4)
@@ -130,15 +133,17 @@ def seams(camera: Camera) -> list[np.ndarray]:
     return [np.array(line) @ turn for line in across + along]
 
 
-def _draw_vectors(axes: Axes, x, y, d, strong, cell: float, camera: Camera) -> None:
+def _draw_vectors(
+    axes: Axes, x: np.ndarray, y: np.ndarray, d: np.ndarray, strong: np.ndarray, cell: float, camera: Camera
+) -> None:
     per_inch, size = per_inch_for(np.hypot(d[..., 0], d[..., 1]), min(LONGEST_IN_CELLS * cell, LONGEST_INCH))
     quiver = draw_vectors(axes, x, y, d, strong, per_inch)
-    scale_vector(axes, quiver, size, size_text(size, camera), 0.85, 0.28)
+    scale_vector(axes, quiver, size, per_inch, size_text(size, camera), 0.85, 0.28)
 
 
 def draw_vectors(
-    axes: Axes, x: np.ndarray, y: np.ndarray, d: np.ndarray, strong: np.ndarray, per_inch: float, **options
-):
+    axes: Axes, x: np.ndarray, y: np.ndarray, d: np.ndarray, strong: np.ndarray, per_inch: float, **options: Any
+) -> Quiver:
     """Vectors d (ny, nx, 2) mm at (ny, nx) mm, `per_inch` mm drawn as one inch; those not strong are fainter."""
     finite = np.isfinite(d).all(axis=-1)
     faint, dark = finite & ~strong, finite & strong

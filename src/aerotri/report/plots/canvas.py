@@ -11,20 +11,24 @@ import functools
 import io
 import warnings
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any, ParamSpec, cast
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from aerotri.report.quality import printable
+
+P = ParamSpec("P")
 
 WIDTH = 8.6
 INK, GREY, LIGHT, ACCENT = "#1c242c", "#6b7680", "#b4bcc4", "#0b5cad"
 FRAME = 0.8
 
+# the type of its keys has a name in new matplotlib only, hence the casts below
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 8.5,
@@ -55,11 +59,11 @@ STYLE: dict[str, Any] = {
 }
 
 
-def styled(plot: Callable[..., Figure]) -> Callable[..., Figure]:
+def styled(plot: Callable[P, Figure]) -> Callable[P, Figure]:
     """Draw with the report's look whatever the user's matplotlibrc says, and leave his settings as they were."""
 
     @functools.wraps(plot)
-    def wrapper(*args, **kwargs) -> Figure:
+    def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
         with matplotlib.rc_context(cast(Any, STYLE)):
             return plot(*args, **kwargs)
 
@@ -115,7 +119,9 @@ def length_text(metres: float) -> str:
     return f"{metres * 1e6:.2g} µm"
 
 
-def vectors(axes: Axes, at: np.ndarray, d: np.ndarray, per_inch: float, color: str, width: float = 0.011, **options):
+def vectors(
+    axes: Axes, at: np.ndarray, d: np.ndarray, per_inch: float, color: str, width: float = 0.011, **options: Any
+) -> Quiver:
     """Arrows d (n, 2) that begin at positions (n, 2), `per_inch` of their unit drawn as one inch."""
     return axes.quiver(
         *at.T, *d.T, color=color, angles="uv", units="inches", scale_units="inches", scale=per_inch, width=width,
@@ -123,9 +129,9 @@ def vectors(axes: Axes, at: np.ndarray, d: np.ndarray, per_inch: float, color: s
     )  # fmt: skip
 
 
-def scale_vector(axes: Axes, quiver, size: float, label: str, x: float, y: float) -> None:
+def scale_vector(axes: Axes, quiver: Quiver, size: float, per_inch: float, label: str, x: float, y: float) -> None:
     """The scale vector with its label to the right of it, its left end at (x, y) inches of the figure."""
-    length = size / quiver.scale
+    length = size / per_inch
     axes.quiverkey(
         quiver, x + length / 2.0, y, size, label, coordinates="inches", labelpos="E", labelsep=0.08, color=INK
     )

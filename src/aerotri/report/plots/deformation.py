@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 from scipy.interpolate import RegularGridInterpolator
 
-from aerotri.deformation.block_models import BlockDeformation
+from aerotri.deformation.block_models import BlockDeformation, Seam
 from aerotri.deformation.model_grid import Deformation
 from aerotri.formats.results.deformation import contour_interval, worst_seams
 from aerotri.report.plots.canvas import (
@@ -242,7 +242,7 @@ def _borders(d: BlockDeformation) -> list[np.ndarray]:
     return [*upright, *level]
 
 
-def _mark_seam(axes: Axes, d: BlockDeformation, seam, number: int) -> None:
+def _mark_seam(axes: Axes, d: BlockDeformation, seam: Seam, number: int) -> None:
     """A number on the middle of a seam."""
     n = d.number
     both = {seam.first, seam.second}
@@ -257,7 +257,6 @@ def _mark_seam(axes: Axes, d: BlockDeformation, seam, number: int) -> None:
     x, y = middle.tolist()
     axes.text(x, y, str(number), fontsize=8, weight="bold", ha="center", va="center", zorder=6,
               bbox={"boxstyle": "circle,pad=0.25", "fc": "white", "ec": INK, "lw": 0.9})  # fmt: skip
-
 
 
 def _minus(axes: Axes) -> None:

@@ -79,7 +79,7 @@ def plot_panels(panels: Sequence[Panel], title: str, subtitle: str = "") -> Figu
         quiver = draw_vectors(axes, field.x, field.y, panel.vectors, field.significant, per_inch, clip_on=False)
         _caption(figure, panel, left + AROUND, bottom + height + caption - CAPTION)
         if k == 0:
-            scale_vector(axes, quiver, size, size_text(size, camera), MARGIN + AROUND, 0.28)
+            scale_vector(axes, quiver, size, per_inch, size_text(size, camera), MARGIN + AROUND, 0.28)
     flight_arrow(figure, camera, MARGIN + columns * (width + GAP) + 0.2, FOOT + height / 2)
     vector_legend(figure, camera, ("beyond noise at 95 %", "within noise"))
     return figure

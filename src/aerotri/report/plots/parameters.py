@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -158,7 +159,7 @@ def _draw(axes: Axes, camera: Camera, item: str, at: np.ndarray, d: np.ndarray, 
     axes.set_yticks([])
     for spine in axes.spines.values():
         spine.set(color=GREY, linewidth=0.6 * FRAME)
-    dashed = {"linewidths": 0.45, "linestyles": (0, (5, 3)), "zorder": 1}
+    dashed: dict[str, Any] = {"linewidths": 0.45, "linestyles": (0, (5, 3)), "zorder": 1}
     axes.add_collection(LineCollection(seams(camera), colors=GREY, **dashed))
     axes.add_collection(LineCollection(list(_cells(item, half)), colors=LIGHT, linewidths=0.3, zorder=1))
     cell = width / len(np.unique(at[:, 0]))
@@ -192,7 +193,7 @@ def _caption(figure: Figure, family: str, item: str, d: np.ndarray, place: tuple
     (left, top, width), (sheet_width, sheet_height) = place, figure.get_size_inches()
     longest = np.hypot(d[:, 0], d[:, 1]).max()
     small = 7.0 if width > 1.3 else 6.2
-    options = {"va": "bottom", "fontsize": small, "color": GREY}
+    options: dict[str, Any] = {"va": "bottom", "fontsize": small, "color": GREY}
     name_y, text_y = (top + 0.165) / sheet_height, (top + 0.04) / sheet_height
     figure.text(
         left / sheet_width, name_y, plain(item), va="bottom", fontsize=8.5 if width > 1.3 else 7.5, weight="bold"

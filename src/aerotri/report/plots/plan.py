@@ -11,6 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from aerotri.functional_model.rotation import rotation_from_angles
+from aerotri.observations import Camera
 from aerotri.report.plots.canvas import GREY, INK, LIGHT, axes_at, coordinate_axes, plain
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 
@@ -101,7 +102,7 @@ def footprints(adjusted: AdjustedBlock) -> np.ndarray:
     return np.where(hidden.any(axis=1)[:, None, None], np.nan, corners_xy)
 
 
-def _corner_directions(camera) -> np.ndarray:
+def _corner_directions(camera: Camera) -> np.ndarray:
     """(4, 3) directions of the corners in the camera frame."""
     (half_x, half_y), (x0, y0) = camera.half_format_mm, camera.principal_point_mm
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])

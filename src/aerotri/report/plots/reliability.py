@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -110,7 +112,7 @@ def _square(k: int) -> float:
 def _legends(figure: Figure, effect: np.ndarray, redundancy: np.ndarray, uncontrolled: int) -> None:
     points, photographs = [], []
     for k, label in _named(effect, ".2g", " m"):
-        look = {"marker": "o", "ms": POINT_SIZES[k], "mfc": SHADES[k], "mec": GREY, "mew": 0.25}
+        look: dict[str, Any] = {"marker": "o", "ms": POINT_SIZES[k], "mfc": SHADES[k], "mec": GREY, "mew": 0.25}
         points.append(Line2D([], [], ls="none", label=label, **look))
     if uncontrolled:
         points.append(Line2D([], [], ls="none", marker="x", ms=4.5, color=INK, label=f"no control ({uncontrolled})"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -58,12 +59,14 @@ def plot_residual_histogram(adjusted: AdjustedBlock) -> Figure:
     return figure
 
 
-def _pixel_axis(adjusted: AdjustedBlock, axes) -> None:
+def _pixel_axis(adjusted: AdjustedBlock, axes: Axes) -> None:
     """The same in pixels along the top, where all cameras have one size of pixel."""
     sizes = {camera.pixel_um for camera in adjusted.block.cameras}
     if len(sizes) == 1:
         pixel = sizes.pop()
-        top = axes.secondary_xaxis("top", functions=(lambda um: um / pixel, lambda px: px * pixel))
+        top = axes.secondary_xaxis(
+            "top", functions=(lambda um: np.asarray(um) / pixel, lambda px: np.asarray(px) * pixel)
+        )
         top.set_xlabel("[px]")
         top.tick_params(length=3, width=0.8)
     else:
@@ -148,7 +151,7 @@ def _color_map():
     return colors.with_extremes(bad="#d5d9dd")
 
 
-def _mark_negative(axes, r: np.ndarray, side: float) -> None:
+def _mark_negative(axes: Axes, r: np.ndarray, side: float) -> None:
     row, column = np.nonzero(np.nan_to_num(r) < -0.3)
     dash = 72 * 0.45 * side / len(r)
     axes.scatter(column, row, marker="_", s=dash**2, c="white", linewidths=0.9)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
 from matplotlib.figure import Figure
@@ -119,11 +120,11 @@ def plot_budget(content: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def _bars(axes, labels: list[str], values: list[float], texts: list[str], style: dict[str, Any]) -> None:
+def _bars(axes: Axes, labels: list[str], values: list[float], texts: list[str], style: dict[str, Any]) -> None:
     """Bars across, the first on top, each with its number; the size counts, the sign stands in the number."""
     at, size = -np.arange(len(labels)), np.abs(values)
     axes.barh(at, size, height=0.62, zorder=2, **style)
-    for y, value, text in zip(at, size, texts, strict=True):
+    for y, value, text in zip(at.tolist(), size, texts, strict=True):
         axes.text(value + 0.02 * size.max(), y, text, va="center", fontsize=8)
     axes.set_yticks(at, labels)
     axes.set_xlim(0.0, 1.35 * max(float(size.max()), 1e-9))
@@ -185,7 +186,7 @@ def plot_section_profiles(profiles: Sequence[Profile], name: str) -> Figure:
     return figure
 
 
-def _section_marks(axes, sections: Sections, boundary: Boundary) -> None:
+def _section_marks(axes: Axes, sections: Sections, boundary: Boundary) -> None:
     along = direction_of(sections.azimuth)
     across = np.array([along[1], -along[0]])
     reach = (np.concatenate(boundary.rings) - sections.origin) @ across
@@ -195,7 +196,7 @@ def _section_marks(axes, sections: Sections, boundary: Boundary) -> None:
     axes.add_collection(LineCollection(lines, colors=GREY, linewidths=0.7, linestyles=[(0, (4, 3))], zorder=3))
 
 
-def _coordinates(axes, width: float, height: float, crs: str) -> None:
+def _coordinates(axes: Axes, width: float, height: float, crs: str) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 1.1)), steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(max(2, int(height / 0.8)), steps=[1, 2, 5, 10]))
     for axis in (axes.xaxis, axes.yaxis):

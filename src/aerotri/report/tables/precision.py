@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +101,7 @@ def _pairs(title: str, found: Iterable[NamedCorrelation], photograph: bool) -> T
 
 def check_effects(effects: ParameterEffects, digits: int) -> Table:
     """RMS at check points as adjusted, and with all, with a family, with one parameter left out."""
-    rows: list[tuple] = [("as adjusted", "", None, *_rms(effects.difference), None, "")]
+    rows: list[tuple[Any, ...]] = [("as adjusted", "", None, *_rms(effects.difference), None, "")]
     before = _rms(effects.difference)
     for one in effects.left_out:
         rms = _rms(one.difference)

@@ -20,7 +20,7 @@ from aerotri.simulation.projection import Field, TrueCamera
 from aerotri.simulation.random_streams import stream
 from aerotri.simulation.spec import ErrorSpec, PhysicalErrorSpec
 
-MACHINES: Mapping[str, tuple[Callable, Mapping[str, float]]] = {
+MACHINES: Mapping[str, tuple[Callable[[Camera, dict[str, float], np.random.Generator], Field], Mapping[str, float]]] = {
     "ultracam_d": (ultracam_d.ultracam_d_error, ultracam_d.WEIGHTS),
     "dmc": (dmc.dmc_error, dmc.WEIGHTS),
     "frame": (frame.frame_error, frame.WEIGHTS),
