@@ -12,13 +12,13 @@ import numpy as np
 from aerotri.adjustment.datum import FREEDOMS, nothing_holds, restore_datum
 from aerotri.adjustment.defects import checked_factor, point_without_rays_enough
 from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.prepare import NoStartValuesError, prepare
+from aerotri.adjustment.prepare import NoStartValuesError, Prepared, prepare
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import StartValues
-from aerotri.adjustment.weak_geometry import minimise_tied
+from aerotri.adjustment.weak_geometry import go_on_without, minimise_tied
 from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates.blocks import frame_of_block, needs_positions, transform_block
 from aerotri.coordinates.metric import outside_in_words
@@ -37,6 +37,7 @@ from aerotri.results.parameter_comparison import Choice, ParameterComparison
 from aerotri.results.removal import Removal
 from aerotri.results.variance_components import VarianceComponents
 from aerotri.statistics.check_freedom import check_freedom
+from aerotri.statistics.loose_points import loose_by_rays, loose_in_words, loose_points, to_set_aside
 from aerotri.statistics.observation_groups import with_scaled_sigmas
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
 from aerotri.strategies.field_estimation import with_estimated_fields
@@ -53,6 +54,8 @@ Report = Callable[[int, float, float], None]
 FOLDS = 10
 FRAME_ROUNDS = 2
 """Adjustments after the first one where a coordinate's place in the local frame depends on the adjusted position."""
+ROUNDS_OF_LOOSE_POINTS = 3
+"""Times that a robust adjustment goes on without the points that its covariance shows to be loose."""
 
 
 def adjust(block: Block, report: Report | None = None, given_points: np.ndarray | None = None) -> AdjustedBlock:
@@ -312,47 +315,45 @@ def _refuse_other_parameters(system: NormalSystem, saved: SavedSolution) -> None
 def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray | None) -> Adjustment:
     begun = time.perf_counter()
     prepared = prepare(block, given_points)
-    system, state = prepared.system, prepared.state
     started = time.perf_counter()
-    if nothing_holds(system.unknowns, system.extras):
+    if nothing_holds(prepared.system.unknowns, prepared.system.extras):
         free = f"the datum is free in {', '.join(FREEDOMS)}"
-        raise failure(system, "rank deficient", defects_in_words(system, [free]))
+        raise failure(prepared.system, "rank deficient", defects_in_words(prepared.system, [free]))
     settings = block.settings.adjustment
     options = SolveOptions(settings.max_iterations, settings.robust, report)
-    prepared, solution = minimise_tied(prepared, options, lambda tied: count_observations(tied).redundancy)
-    system, state = prepared.system, prepared.state
-    if solution.defects:
-        raise failure(system, "rank deficient", defects_in_words(system, solution.defects))
-    refuse_runaway(system, solution)
+    prepared, solution = _determined(minimise_tied(prepared, options, _redundancy))
     removed: tuple[Blunder, ...] = ()
     if settings.robust == "data-snooping":
         snooped = snoop(prepared, solution, options)
         prepared, solution, removed = snooped.prepared, snooped.solution, snooped.blunders
-        system, state = prepared.system, prepared.state
-        block = with_datum_of(block, system.unknowns.block)
-    system, solution = with_estimated_fields(system, solution, options)
+        block = with_datum_of(block, prepared.system.unknowns.block)
+    system, solution = with_estimated_fields(prepared.system, solution, options)
+    prepared = replace(prepared, system=system)
     removals: tuple[Removal, ...] = ()
     if settings.parameter_selection == "on":
-        selected = select(replace(prepared, system=system), solution, options)
+        selected = select(prepared, solution, options)
         prepared, solution, removals = selected.prepared, selected.solution, selected.removals
-        system, state = prepared.system, prepared.state
-    block = with_findings_of(block, system.unknowns.block)
-    if settings.is_free:
-        free = system.with_motions_at(solution.state).unknowns
-        moved = restore_datum(free, solution.state, state.points)
-        system = system.with_motions_at(moved)
-        solution = replace(solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator))
-    factor = _factor(system, solution)
+    block = with_findings_of(block, prepared.system.unknowns.block)
+    prepared, solution, factor = _in_its_datum(prepared, solution)
     solved = time.perf_counter()
-    warnings = prepared.warnings + doubts(system, solution.state)
-    result = summarise(system, solution, factor, prepared.ray_status, warnings)
+    result = _summarised(prepared, solution, factor)
+    for _ in range(ROUNDS_OF_LOOSE_POINTS if solution.estimator.is_robust else 0):
+        loose = to_set_aside(result)
+        if solution.status != "converged" or not len(loose):
+            break
+        found = _determined(go_on_without(prepared, solution, loose, options, _redundancy))
+        prepared, solution, factor = _in_its_datum(*found)
+        solved = time.perf_counter()
+        result = _summarised(prepared, solution, factor)
+    system = prepared.system
+    kept = np.union1d(loose_points(result), loose_by_rays(system, solution, result.outcome.sigma0))
     result = replace(result, parameters=with_removed(result.parameters, removals), removals=removals)
     timings = {
         "start_values": started - begun,
         "solve": solved - started,
         "statistics": time.perf_counter() - solved,
     }
-    said = (*result.outcome.warnings, *inseparable(result.parameters))
+    said = (*result.outcome.warnings, *loose_in_words(result, kept), *inseparable(result.parameters))
     shared_height = common_height(system, solution, factor, result.outcome.sigma0)
     if shared_height is not None:
         said += tuple(s for s in [shared_height.sentence(float(np.nanmedian(result.points.sigma[:, 2])))] if s)
@@ -360,6 +361,40 @@ def _adjust_local(block: Block, report: Report | None, given_points: np.ndarray 
     outcome = replace(result.outcome, warnings=said, timings_s=timings)
     result = replace(result, block=block, outcome=outcome, blunders=blunders)
     return Adjustment(result, result, system, solution)
+
+
+def _redundancy(system: NormalSystem) -> int:
+    return count_observations(system).redundancy
+
+
+def _determined(found: tuple[Prepared, Solution]) -> tuple[Prepared, Solution]:
+    """What was adjusted, if the observations determine it.
+
+    Raises
+    ------
+    AdjustmentFailedError
+    """
+    prepared, solution = found
+    if solution.defects:
+        raise failure(prepared.system, "rank deficient", defects_in_words(prepared.system, solution.defects))
+    refuse_runaway(prepared.system, solution)
+    return found
+
+
+def _in_its_datum(prepared: Prepared, solution: Solution) -> tuple[Prepared, Solution, Factor]:
+    """The solution of a free block moved to where its datum wants it, any other as it is; with its factor."""
+    system = prepared.system
+    if system.unknowns.block.settings.adjustment.is_free:
+        free = system.with_motions_at(solution.state).unknowns
+        moved = restore_datum(free, solution.state, prepared.state.points)
+        system = system.with_motions_at(moved)
+        solution = replace(solution, state=moved, equations=system.assemble(moved, 0.0, solution.estimator))
+    return replace(prepared, system=system), solution, _factor(system, solution)
+
+
+def _summarised(prepared: Prepared, solution: Solution, factor: Factor) -> AdjustedBlock:
+    warnings = prepared.warnings + doubts(prepared.system, solution.state)
+    return summarise(prepared.system, solution, factor, prepared.ray_status, warnings)
 
 
 def _factor(system: NormalSystem, solution: Solution) -> Factor:

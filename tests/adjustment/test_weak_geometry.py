@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aerotri import pipeline
 from aerotri.adjustment.prepare import prepare
 from aerotri.adjustment.ray_status import RayStatus
 from aerotri.adjustment.robust import LEAST_SQUARES
+from aerotri.adjustment.weak_geometry import loose_in_block
 from aerotri.formats.results.adjustment import image_columns, point_columns
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import ImagePoints
 from aerotri.pipeline import adjust
+from aerotri.statistics.summarise import summarise
 from small_blocks import small_block, with_adjustment
 
 
@@ -109,6 +112,85 @@ def test_point_that_runs_away():
     assert any("1 point (far) not fixed in distance" in said for said in result.outcome.warnings)
     np.testing.assert_allclose(result.images.centre, without.images.centre, atol=1e-3)
     assert np.isnan(result.points.xyz[-1]).all()
+
+
+def with_point_of_a_weak_photograph(robust):
+    """A block whose photograph 2 has 6 rays, the same with a point 520 km away that 2 and 1 see, and its start.
+
+    Its own rays fix the point to a twentieth of the distance, the direction of the photograph to two fifths.
+    """
+    block, truth = small_block(23)
+    block = with_few_rays(with_adjustment(block, robust=robust), 2, 6)
+    twist = -4e-4
+    far, place = with_parallel_rays(block, truth, twist)
+    ray = (place - truth.centre[1]) / np.linalg.norm(place - truth.centre[1])
+    start = np.full((len(far.points), 3), np.nan)
+    start[-1] = truth.centre[1] + ray * np.linalg.norm(truth.centre[2] - truth.centre[1]) / abs(twist)
+    return block, far, start
+
+
+def counted(monkeypatch):
+    """The calls of `summarise`, each of which forms a covariance."""
+    calls = []
+    monkeypatch.setattr(pipeline, "summarise", lambda *a: calls.append(1) or summarise(*a))
+    return calls
+
+
+def test_point_as_loose_as_its_photograph(monkeypatch):
+    """Fixed by its rays, were the photographs known, and not within the block: it goes once all has converged."""
+    block, far, start = with_point_of_a_weak_photograph("huber")
+    calls = counted(monkeypatch)
+    without = adjust(block)
+    assert len(calls) == 1
+    result = adjust(far, given_points=start)
+    assert len(calls) == 3
+    assert result.outcome.status == "converged"
+    columns = point_columns(result)
+    assert columns["status"][-1] == "set aside"
+    assert columns["reason"][-1] == "its rays do not fix it in distance"
+    assert (columns["status"] == "set aside").sum() == 1 + (point_columns(without)["status"] == "set aside").sum()
+    assert (image_columns(result)["status"] == "used").all()
+    assert any("1 point (far) not fixed in distance" in said for said in result.outcome.warnings)
+    assert result.outcome.redundancy == without.outcome.redundancy
+    shift = np.abs(result.images.centre - without.images.centre)
+    assert (shift < 0.05 * without.images.sigma[:, :3]).all()
+    assert result.outcome.iterations <= without.outcome.iterations + 6
+
+
+def test_least_squares_keeps_a_loose_point_and_says_so(monkeypatch):
+    """Least squares of all that was given is what was asked for: the point stays, nothing is adjusted twice."""
+    _, far, start = with_point_of_a_weak_photograph("off")
+    calls = counted(monkeypatch)
+    result = adjust(far, given_points=start)
+    assert len(calls) == 1
+    assert point_columns(result)["status"][-1] == "used"
+    assert any("1 point (far) hardly fixed in distance" in said for said in result.outcome.warnings)
+
+
+def test_least_squares_says_what_ran_to_infinity():
+    """The covariance of a point at infinity drowns in rounding; its own rays tell."""
+    block, truth = small_block(23)
+    far, place = with_parallel_rays(block, truth, 1e-4)
+    start = np.full((len(far.points), 3), np.nan)
+    start[-1] = place
+    result = adjust(far, given_points=start)
+    assert any("1 point (far) hardly fixed in distance" in said for said in result.outcome.warnings)
+
+
+def test_what_photographs_share_makes_no_point_loose():
+    """σ of a vague datum or of a drifting strip is in points and photographs; what a point has beyond it is its own."""
+    centre = np.array([[0.0, 0.0, 1000.0], [600.0, 0.0, 1000.0]])
+    xyz = np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0], [600.0, 0.0, 0.0], [600.0, 900.0, 0.0]])
+    point, image = np.repeat(np.arange(4), 2), np.tile([0, 1], 4)
+    shared = 500.0**2 * np.eye(3)
+    own = np.zeros((4, 3, 3))
+    own[:3, 2, 2] = [100.0**2, 600.0**2, 700.0**2]
+    own[3] = 700.0**2 * np.outer([0.0, 0.8, 0.6], [0.0, 0.8, 0.6])
+    vague = loose_in_block(point, image, xyz, centre, shared + own, np.stack([shared, shared]))
+    # √(500² + 700²) − 500 = 360: beyond 1000 / 3, and below the third of the way from the second photograph
+    np.testing.assert_array_equal(vague, [2])
+    sharp = loose_in_block(point, image, xyz, centre, own, np.zeros((2, 3, 3)))
+    np.testing.assert_array_equal(sharp, [1, 2, 3])
 
 
 def test_looseness_is_sigma_over_distance():

@@ -7,6 +7,7 @@ import pytest
 
 from aerotri.formats.results.adjustment import image_columns, point_columns
 from aerotri.pipeline import adjust
+from aerotri.statistics.loose_points import loose_points
 from places import PROJECT
 
 TOOL = PROJECT / "tools" / "prove" / "ca502.py"
@@ -34,6 +35,10 @@ def test_whole_block_converges_without_what_is_weak(tool, shared_data):
     assert ((images["reason"] == "") == (images["status"] == "used")).all()
     assert ((points["reason"] == "") == np.isfinite(points["X"])).all()
     assert any("too weakly tied" in said for said in result.outcome.warnings)
+    # no σ in the tables says that a point is not fixed; 32608 would lie 19 km below the ground
+    assert not len(loose_points(result))
+    reason = dict(zip(points["point"].tolist(), points["reason"].tolist(), strict=True))
+    assert reason["32608"] == reason["24401"] == "its rays do not fix it in distance"
     # of 33 000 points hardly one lies kilometres below the ground, as many do in the data
     used = points["status"] == "used"
     height = np.nanmedian(result.images.centre[:, 2]) - np.nanmedian(points["Z"])

@@ -48,12 +48,14 @@ class SolveOptions:
     robust : a key of `robust.STAGES`; each of its stages has `max_iterations`.
     report : called after every iteration with (iteration, cost, damping), for progress.
     inspect : may stop the adjustment, whose status is `INTERRUPTED` then.
+    step_tolerance : share of σ within which the last robust stage ends.
     """
 
     max_iterations: int = 30
     robust: str = "off"
     report: Report | None = None
     inspect: Inspect | None = None
+    step_tolerance: float = ROBUST_STEP_TOLERANCE
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,7 @@ class Solution:
     status : 'converged', 'not converged', 'rank deficient', or 'interrupted' where `SolveOptions.inspect` wanted it.
     costs : Σρ at the start and after every iteration of the last stage.
     defects : sentences naming what the observations leave free, when rank deficient.
+    step_tolerance : share of σ within which a robust adjustment converged.
     """
 
     status: str
@@ -74,6 +77,7 @@ class Solution:
     iterations: int
     costs: tuple[float, ...] = ()
     defects: tuple[str, ...] = ()
+    step_tolerance: float = ROBUST_STEP_TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -133,7 +137,7 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
         if solution.defects or solution.status == INTERRUPTED:
             return solution
         state, done = solution.state, solution.iterations
-    return _descend(system, state, redundancy, options, Stage(last, done))
+    return _descend(system, state, redundancy, options, Stage(last, done, options.step_tolerance))
 
 
 def _descend(system: NormalSystem, state: State, redundancy: int, options: SolveOptions, stage: Stage) -> Solution:
@@ -167,7 +171,7 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
             at, settled, last_decrement, scale_changes = fresh, False, np.inf, scale_changes + 1
             secants = Secants() if secants is not None else None
         if settled:
-            return course.ended("converged", at)
+            return replace(course.ended("converged", at), step_tolerance=stage.step_tolerance)
         if _is_stopped(system, at, options, course.iteration - stage.done):
             return course.ended(INTERRUPTED, at)
         if is_plain and not stage.is_robust and step.is_within_scatter:

@@ -25,14 +25,14 @@ from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.ray_status import RayStatus, with_lonely_rays, with_weak_words
 from aerotri.adjustment.robust import Estimator, normalised_lengths, scale_of
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
-from aerotri.adjustment.sparse_cholesky import BorderedMatrix, NotPositiveDefiniteError
+from aerotri.adjustment.sparse_cholesky import BorderedMatrix, InverseOnPattern, NotPositiveDefiniteError
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import State, Unknowns
 
 LOOSE = 1.0 / 3.0
 """σ over distance (points, positions) or in rad (attitudes) beyond which three σ reach to infinity."""
-MOST_PHOTOGRAPHS = 1.0 / 3.0
-"""Share of photographs beyond which it is the datum that is free and not they that are weak."""
+MOST = 1.0 / 3.0
+"""Share of photographs, or of points within the block, beyond which it is the datum or the block and not they."""
 LOOKS = range(6, 1000, 4)
 """Iterations after which a robust adjustment that has not settled is looked at."""
 LONG = 10
@@ -69,11 +69,22 @@ class _Look:
     def look(
         self, system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, photographs: bool
     ) -> bool:
-        """Look at the points, and the photographs too where there is time for that; whether any is loose."""
+        """Look at the points, and the photographs too where there is time for that; whether any is loose.
+
+        Where a point is loose by its own rays, or the photographs are looked at anyway, so are the points once more,
+        within the whole block.
+        """
         scale = _scale(system, equations, estimator, self.redundancy)
         self.points = np.flatnonzero(scale * system.looseness(state, estimator) > LOOSE)
+        if not (photographs or len(self.points)):
+            return False
+        inverse = _regularised_inverse(system, equations)
+        if inverse is None:
+            return bool(len(self.points))
         if photographs:
-            self.photographs = loose_together(system, state, equations, scale)
+            self.photographs = _loose_photographs(system, state, inverse, scale)
+        if not len(self.photographs):
+            self.points = np.union1d(self.points, _loose_points(system, state, inverse, estimator, scale))
         return bool(len(self.photographs) or len(self.points))
 
 
@@ -91,7 +102,35 @@ def minimise_tied(
     -------
     The block prepared without what was set aside, its state where the given one was, and its solution.
     """
-    state, done, round_ = prepared.state, 0, 0
+    return _tied(prepared, prepared.state, options, redundancy, whole, 0)
+
+
+def go_on_without(
+    prepared: Prepared, solution: Solution, points: np.ndarray, options: SolveOptions,
+    redundancy: Callable[[NormalSystem], int],
+) -> tuple[Prepared, Solution]:  # fmt: skip
+    """Some more points set aside, and the rest adjusted on from where it stands.
+
+    Parameters
+    ----------
+    points : rows of the block's points. redundancy : of a system.
+
+    Returns
+    -------
+    As `minimise_tied`; the iterations of `solution` count.
+    """
+    rows = np.flatnonzero(np.isin(prepared.system.unknowns.points, points))
+    prepared, state = set_aside(prepared, solution.state, np.zeros(0, dtype=np.int64), rows)
+    options = replace(options, step_tolerance=solution.step_tolerance)
+    return _tied(prepared, state, options, redundancy, True, solution.iterations)
+
+
+def _tied(
+    prepared: Prepared, state: State, options: SolveOptions, redundancy: Callable[[NormalSystem], int], whole: bool,
+    done: int,
+) -> tuple[Prepared, Solution]:  # fmt: skip
+    """As `minimise_tied`, from a state, after `done` iterations."""
+    round_ = 0
     report = options.report
     while True:
         freedom = redundancy(prepared.system)
@@ -135,23 +174,77 @@ def loose_alone(system: NormalSystem, state: State, equations: NormalEquations) 
     return _unless_many(np.flatnonzero(smallest * LOOSE**2 < 1.0), n)
 
 
-def loose_together(system: NormalSystem, state: State, equations: NormalEquations, scale: float = 1.0) -> np.ndarray:
-    """Rows of the photographs that are loose within the whole block; none where it is the datum.
+def loose_together(system: NormalSystem, state: State, equations: NormalEquations) -> np.ndarray:
+    """Rows of the photographs that are loose within the whole block; none where it is the datum."""
+    inverse = _regularised_inverse(system, equations)
+    return np.zeros(0, dtype=np.int64) if inverse is None else _loose_photographs(system, state, inverse)
 
-    A trace of regularisation lets the matrix be inverted; what is free gets a σ beyond all bounds by it.
-    """
+
+def _regularised_inverse(system: NormalSystem, equations: NormalEquations) -> InverseOnPattern | None:
+    """A trace of regularisation lets the matrix be inverted; what is free gets a σ beyond all bounds by it."""
     n, matrix = len(system.unknowns.images), equations.matrix
     blocks, corner, diagonal = matrix.blocks.copy(), matrix.corner.copy(), np.arange(6)
     blocks[:n, diagonal, diagonal] *= 1.0 + REGULARISATION
     corner[np.diag_indices_from(corner)] *= 1.0 + REGULARISATION
     try:
-        inverse = system.symbolic.factorise(BorderedMatrix(blocks, matrix.border, corner)).inverse_on_pattern()
+        return system.symbolic.factorise(BorderedMatrix(blocks, matrix.border, corner)).inverse_on_pattern()
     except NotPositiveDefiniteError:
-        return np.zeros(0, dtype=np.int64)
+        return None
+
+
+def _loose_photographs(
+    system: NormalSystem, state: State, inverse: InverseOnPattern, scale: float = 1.0
+) -> np.ndarray:
+    """Rows of the photographs that are loose; none where it is the datum."""
+    n = len(system.unknowns.images)
     cofactor = inverse.blocks[:n] * _unit_products(system.unknowns, state)
     cofactor[~system.unknowns.eo_free] = 0.0
     largest = np.linalg.eigvalsh(0.5 * (cofactor + np.swapaxes(cofactor, 1, 2)))[:, -1]
     return _unless_many(np.flatnonzero(~(scale**2 * largest <= LOOSE**2)), n)
+
+
+def _loose_points(
+    system: NormalSystem, state: State, inverse: InverseOnPattern, estimator: Estimator, scale: float
+) -> np.ndarray:
+    """Rows of the points that are loose within the whole block; none where it is the block."""
+    u = system.unknowns
+    cofactor, _ = system.point_cofactors(state, inverse, estimator)
+    of_centres = np.where(u.eo_free[:, :3, None], inverse.blocks[: len(u.images), :3, :3], 0.0)
+    point = np.repeat(np.arange(len(u.points)), np.diff(u.rays.start))
+    variances = scale**2 * cofactor, scale**2 * of_centres
+    loose = loose_in_block(point, u.rays.image, state.points, state.centre, *variances)
+    return _unless_many(loose, len(u.points))
+
+
+def loose_in_block(
+    point: np.ndarray, image: np.ndarray, xyz: np.ndarray, centre: np.ndarray, of_points: np.ndarray,
+    of_centres: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Rows of the points that are loose within the whole block.
+
+    σ of the nearest photograph's position is taken off: relative to that photograph the point is not known better than
+    the difference of the two says (triangle inequality), so that a datum known to metres only, or a strip that drifts,
+    makes no point loose.
+
+    Parameters
+    ----------
+    point, image : (m,) of the rays. xyz : (P, 3), centre : (n, 3) m.
+    of_points : (P, 3, 3), of_centres : (n, 3, 3) m², their covariance.
+    """
+    way = np.linalg.norm(xyz[point] - centre[image], axis=1)
+    reach, nearest = np.full(len(xyz), np.inf), np.zeros(len(xyz), dtype=np.int64)
+    np.minimum.at(reach, point, way)
+    first = way == reach[point]
+    nearest[point[first]] = image[first]
+    # the trace is a bound of the largest eigenvalue: hardly a point is looked at closer
+    trace = np.einsum("pii->p", of_points)
+    rows = np.flatnonzero(np.isfinite(trace) & (trace > (LOOSE * reach) ** 2))
+    return rows[_worst(of_points[rows]) - _worst(of_centres[nearest[rows]]) > LOOSE * reach[rows]]
+
+
+def _worst(covariance: np.ndarray) -> np.ndarray:
+    """(k,) σ in the worst direction, of covariance matrices (k, 3, 3)."""
+    return np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, -1], 0.0)) if len(covariance) else np.zeros(0)
 
 
 def _unit_products(unknowns: Unknowns, state: State) -> np.ndarray:
@@ -169,7 +262,7 @@ def _unit_products(unknowns: Unknowns, state: State) -> np.ndarray:
 
 
 def _unless_many(rows: np.ndarray, n: int) -> np.ndarray:
-    return rows if len(rows) <= MOST_PHOTOGRAPHS * n else rows[:0]
+    return rows if len(rows) <= MOST * n else rows[:0]
 
 
 def set_aside(prepared: Prepared, state: State, photographs: np.ndarray, points: np.ndarray) -> tuple[Prepared, State]:

@@ -1,4 +1,4 @@
-"""Rules on what did not take part: photographs, points and rays left out."""
+"""Rules on what did not take part: photographs, points and rays left out, and on points that should be."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 from aerotri.adjustment.ray_status import RayStatus
 from aerotri.diagnosis.finding import Finding, doubt, graded, some
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.statistics.loose_points import loose_points
 
 SOME_PHOTOGRAPHS, MANY_PHOTOGRAPHS = 0.02, 0.25
 SOME_POINTS, MANY_POINTS = 0.10, 0.40
@@ -39,6 +40,15 @@ def of_points(adjusted: AdjustedBlock) -> list[Finding]:
     value = f"{len(gone)} of {len(measured)}"
     names, expected = some(adjusted.block.points[gone]), f"below {100 * SOME_POINTS:.0f} %"
     return doubt("points left out", value, expected, grade, f"{value} measured points were left out ({names})")
+
+
+def of_loose_points(adjusted: AdjustedBlock) -> list[Finding]:
+    """Points that were adjusted although the block does not fix them in distance."""
+    loose, count = loose_points(adjusted), int(np.sum(adjusted.points.rays > 0))
+    grade = graded(len(loose) / max(count, 1), SOME_POINTS, MANY_POINTS)
+    value = f"{len(loose)} of {count}"
+    names, expected = some(adjusted.block.points[loose]), f"below {100 * SOME_POINTS:.0f} %"
+    return doubt("points not fixed", value, expected, grade, f"{value} points are not fixed in distance ({names})")
 
 
 def of_rays(adjusted: AdjustedBlock) -> list[Finding]:

@@ -19,6 +19,7 @@ RULES: tuple[Rule, ...] = (
     check_points.of_means,
     left_out.of_photographs,
     left_out.of_points,
+    left_out.of_loose_points,
     left_out.of_rays,
     geometry.of_depths,
     geometry.of_turns,
