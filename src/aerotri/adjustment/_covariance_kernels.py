@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.adjustment._point_kernels import E, linearise_point, reduce_point
-from aerotri.adjustment.kernel_records import Coupling
+from aerotri.adjustment.kernel_records import Coupling, Elimination, Pattern
 from aerotri.compiled import kernel
 
 
@@ -25,17 +25,23 @@ def solve_lower_transposed(lower, rhs):
 @kernel
 def point_cofactors(first, last, problem, inverse, cofactor, redundancy, work):
     """Cofactors (P, 3, 3) of points first..last and redundancy numbers (m, 2) of their rays."""
-    start, image = problem.rays.start, problem.rays.image
+    rays, table, values, points, weighting = (
+        problem.rays, problem.table, problem.values, problem.points, problem.weighting,
+    )  # fmt: skip
+    start, image = rays.start, rays.image
     coupling = coupling_scratch(work)
-    lower, misclosure = np.zeros((3, 3)), np.zeros(3)
+    q_pp = coupling.q_pp
+    pattern = Pattern(start, image, problem.pairs.start, problem.pairs.block)
+    lower = np.zeros((3, 3))
+    elimination = Elimination(lower, np.zeros(3))
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        _, n_union = linearise_point(p, problem, work)
-        reduce_point(p, n_rays, n_union, problem, work, lower, misclosure)
-        couple_point(p, problem, inverse, n_union, lower, work, coupling)
+        _, n_union = linearise_point(p, rays, table, values, points, weighting, work)
+        reduce_point(p, n_rays, n_union, points, 0.0, work, elimination)
+        couple_point(p, pattern, inverse, n_union, lower, work, coupling)
         for a in range(3):
             for b in range(3):
-                cofactor[p, a, b] = coupling.q_pp[a, b]
+                cofactor[p, a, b] = q_pp[a, b]
         for q in range(n_rays):
             for row in range(2):
                 explained = row_cofactor(q, row, row, image[start[p] + q], inverse, work, coupling)
@@ -49,17 +55,18 @@ def coupling_scratch(work):
 
 
 @kernel
-def couple_point(p, problem, inverse, n_union, lower, work, coupling):
+def couple_point(p, pattern, inverse, n_union, lower, work, coupling):
     """G in place of L⁻¹·N_pr in `work`, H and Q_pp of point p.
 
     With the point eliminated, x_p = N⁻¹(b − N_pr·x_r), G = N⁻¹·N_pr and H = Q_rr·Gᵀ: Q_pp = N⁻¹ + G·H, Q_rp = −H.
     """
     couple, couple_shared, h, h_shared = work.couple, work.couple_shared, coupling.h, coupling.h_shared
-    n_rays = problem.rays.start[p + 1] - problem.rays.start[p]
+    q_pp = coupling.q_pp
+    n_rays = pattern.start[p + 1] - pattern.start[p]
     for q in range(n_rays):
         solve_lower_transposed(lower, couple[q])
     solve_lower_transposed(lower, couple_shared[:, :n_union])
-    _coupled_cofactors(p, n_union, problem, inverse, work, coupling)
+    _coupled_cofactors(p, n_union, pattern, inverse, work, coupling)
     own = np.eye(3)
     _solve_lower(lower, own)
     solve_lower_transposed(lower, own)
@@ -71,7 +78,7 @@ def couple_point(p, problem, inverse, n_union, lower, work, coupling):
                     value += couple[q, a, t] * h[q, t, b]
             for t in range(n_union):
                 value += couple_shared[a, t] * h_shared[t, b]
-            coupling.q_pp[a, b] = value
+            q_pp[a, b] = value
 
 
 @kernel
@@ -123,12 +130,12 @@ def _solve_lower(lower, rhs):
 
 
 @kernel
-def _coupled_cofactors(p, n_union, problem, inverse, work, coupling):
+def _coupled_cofactors(p, n_union, pattern, inverse, work, coupling):
     """H = Q_rr·Gᵀ over the photographs and the shared parameters of point p; G lies in the couplings of `work`."""
-    start, image, pair_block = problem.rays.start, problem.rays.image, problem.pairs.block
+    start, image, pair_block = pattern.start, pattern.image, pattern.pair_block
     blocks, border, corner = inverse.blocks, inverse.border, inverse.corner
     union, g, g_shared, h, h_shared = work.union, work.couple, work.couple_shared, coupling.h, coupling.h_shared
-    first_ray, n_rays, pair = start[p], start[p + 1] - start[p], problem.pairs.start[p]
+    first_ray, n_rays, pair = start[p], start[p + 1] - start[p], pattern.pair_start[p]
     for t in range(n_union):
         for b in range(3):
             value = 0.0
@@ -171,13 +178,17 @@ def reduce_point_sides(first, last, problem, sides, right, right_shared, work):
 
     sides : (P, 3, k); right : (n, 6, k); right_shared : (s, k).
     """
-    start, image = problem.rays.start, problem.rays.image
+    rays, table, values, points, weighting = (
+        problem.rays, problem.table, problem.values, problem.points, problem.weighting,
+    )  # fmt: skip
+    start, image = rays.start, rays.image
     union, couple, couple_shared = work.union, work.couple, work.couple_shared
-    lower, misclosure = np.zeros((3, 3)), np.zeros(3)
+    lower = np.zeros((3, 3))
+    elimination = Elimination(lower, np.zeros(3))
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        _, n_union = linearise_point(p, problem, work)
-        reduce_point(p, n_rays, n_union, problem, work, lower, misclosure)
+        _, n_union = linearise_point(p, rays, table, values, points, weighting, work)
+        reduce_point(p, n_rays, n_union, points, 0.0, work, elimination)
         side = sides[p].copy()
         _solve_lower(lower, side)
         for k in range(side.shape[1]):
@@ -194,13 +205,18 @@ def reduce_point_sides(first, last, problem, sides, right, right_shared, work):
 @kernel
 def expand_point_sides(first, last, problem, sides, x, work):
     """Solution of the points, out, for right sides of the points (P, 3, k): x_p = N_pp⁻¹(side − N_pr·x_r)."""
-    start, image = problem.rays.start, problem.rays.image
+    rays, table, values, points, weighting = (
+        problem.rays, problem.table, problem.values, problem.points, problem.weighting,
+    )  # fmt: skip
+    start, image = rays.start, rays.image
+    x_images, x_shared, x_points = x.images, x.shared, x.points
     union, couple, couple_shared = work.union, work.couple, work.couple_shared
-    lower, misclosure = np.zeros((3, 3)), np.zeros(3)
+    lower = np.zeros((3, 3))
+    elimination = Elimination(lower, np.zeros(3))
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        _, n_union = linearise_point(p, problem, work)
-        reduce_point(p, n_rays, n_union, problem, work, lower, misclosure)
+        _, n_union = linearise_point(p, rays, table, values, points, weighting, work)
+        reduce_point(p, n_rays, n_union, points, 0.0, work, elimination)
         side = sides[p].copy()
         _solve_lower(lower, side)
         for k in range(side.shape[1]):
@@ -208,11 +224,11 @@ def expand_point_sides(first, last, problem, sides, x, work):
                 for q in range(n_rays):
                     i = image[start[p] + q]
                     for t in range(E):
-                        side[a, k] -= couple[q, a, t] * x.images[i, t, k]
+                        side[a, k] -= couple[q, a, t] * x_images[i, t, k]
                 for t in range(n_union):
-                    side[a, k] -= couple_shared[a, t] * x.shared[union[t], k]
+                    side[a, k] -= couple_shared[a, t] * x_shared[union[t], k]
         solve_lower_transposed(lower, side)
         # by elements: assigning a slice costs seconds of compilation
         for a in range(3):
             for k in range(side.shape[1]):
-                x.points[p, a, k] = side[a, k]
+                x_points[p, a, k] = side[a, k]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.adjustment._point_kernels import E, linearise_point, point_normals, reduce_point, solve_transposed
+from aerotri.adjustment.kernel_records import Elimination
 from aerotri.compiled import inlined, kernel
 
 
@@ -75,19 +76,23 @@ def assemble(first, last, problem, offsets, sums, work):
     Returns the cost, the part of the Newton decrement that belongs to the points, and the number of a point that its
     rays do not determine (−1 when all are).
     """
-    start, image = problem.rays.start, problem.rays.image
+    rays, table, values, points, weighting, damping = (
+        problem.rays, problem.table, problem.values, problem.points, problem.weighting, problem.damping,
+    )  # fmt: skip
+    start, image = rays.start, rays.image
     pair_start, pair_block = problem.pairs.start, problem.pairs.block
     diagonal, pairs, border, corner = sums.diagonal, sums.pairs, sums.border, sums.corner
     right, right_shared, squares, squares_shared = sums.right, sums.right_shared, sums.squares, sums.squares_shared
     first_image, first_pair = offsets
     by_eo, by_sh, whitened, columns, n_columns = work.by_eo, work.by_sh, work.whitened, work.columns, work.n_columns
     union, couple, couple_shared = work.union, work.couple, work.couple_shared
-    lower, misclosure = np.zeros((3, 3)), np.zeros(3)
+    misclosure = np.zeros(3)
+    elimination = Elimination(np.zeros((3, 3)), misclosure)
     cost, decrement, undetermined = 0.0, 0.0, -1
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        ray_cost, n_union = linearise_point(p, problem, work)
-        prior_cost, ok = reduce_point(p, n_rays, n_union, problem, work, lower, misclosure)
+        ray_cost, n_union = linearise_point(p, rays, table, values, points, weighting, work)
+        prior_cost, ok = reduce_point(p, n_rays, n_union, points, damping, work, elimination)
         if not ok:
             undetermined = p
         cost += ray_cost + prior_cost
@@ -129,15 +134,19 @@ def reduce_right_side(first, last, problem, first_image, right, right_shared, wo
 
     right (ni, 6), right_shared (s) are added to. Returns as `assemble` does.
     """
-    start, image = problem.rays.start, problem.rays.image
+    rays, table, values, points, weighting, damping = (
+        problem.rays, problem.table, problem.values, problem.points, problem.weighting, problem.damping,
+    )  # fmt: skip
+    start, image = rays.start, rays.image
     by_eo, by_pt, by_sh, whitened = work.by_eo, work.by_pt, work.by_sh, work.whitened
     columns, n_columns, union = work.columns, work.n_columns, work.union
     lower, d = np.zeros((3, 3)), np.zeros(3)
+    elimination = Elimination(lower, d)
     cost, decrement, undetermined = 0.0, 0.0, -1
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        ray_cost, _ = linearise_point(p, problem, work)
-        prior_cost, ok = point_normals(p, n_rays, problem, problem.damping, work, lower, d)
+        ray_cost, _ = linearise_point(p, rays, table, values, points, weighting, work)
+        prior_cost, ok = point_normals(p, n_rays, points, damping, work, elimination)
         if not ok:
             undetermined = p
         cost += ray_cost + prior_cost
@@ -162,26 +171,31 @@ def back_substitute(first, last, problem, step, work):
     Each ray's misclosure is shortened by what the photograph and the shared parameters explain; what is left belongs to
     the point.
     """
-    start, image = problem.rays.start, problem.rays.image
+    rays, table, values, points, weighting, damping = (
+        problem.rays, problem.table, problem.values, problem.points, problem.weighting, problem.damping,
+    )  # fmt: skip
+    start, image = rays.start, rays.image
+    images, shared, moves = step.images, step.shared, step.points
     by_eo, by_sh, whitened = work.by_eo, work.by_sh, work.whitened
     columns, n_columns, union = work.columns, work.n_columns, work.union
     lower, d = np.zeros((3, 3)), np.zeros(3)
+    elimination = Elimination(lower, d)
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        linearise_point(p, problem, work)
+        linearise_point(p, rays, table, values, points, weighting, work)
         for q in range(n_rays):
             i = image[start[p] + q]
             for row in range(2):
                 explained = 0.0
                 for t in range(E):
-                    explained += by_eo[q, row, t] * step.images[i, t]
+                    explained += by_eo[q, row, t] * images[i, t]
                 for t in range(n_columns[q]):
-                    explained += by_sh[q, row, t] * step.shared[union[columns[q, t]]]
+                    explained += by_sh[q, row, t] * shared[union[columns[q, t]]]
                 whitened[q, row] -= explained
-        point_normals(p, n_rays, problem, problem.damping, work, lower, d)
+        point_normals(p, n_rays, points, damping, work, elimination)
         solve_transposed(lower, d)
         for a in range(3):
-            step.points[p, a] = d[a]
+            moves[p, a] = d[a]
 
 
 @kernel
@@ -190,24 +204,27 @@ def settle_points(first, last, problem, rounds, work):
 
     Each point goes its own damped way and only downhill.
     """
-    start, points = problem.rays.start, problem.values.points
-    prior_xyz, prior_weight = problem.table.prior_xyz, problem.table.prior_weight
+    rays, table, values, points, weighting = (
+        problem.rays, problem.table, problem.values, problem.points, problem.weighting,
+    )  # fmt: skip
+    start, xyz, prior_xyz, prior_weight = rays.start, points.xyz, points.prior_xyz, points.prior_weight
     lower, d, old = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+    elimination = Elimination(lower, d)
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        before, _ = linearise_point(p, problem, work)
+        before, _ = linearise_point(p, rays, table, values, points, weighting, work)
         for a in range(3):
-            before += prior_weight[p, a] * (prior_xyz[p, a] - points[p, a]) ** 2
+            before += prior_weight[p, a] * (prior_xyz[p, a] - xyz[p, a]) ** 2
         damping = 1e-4
         for _ in range(rounds):
-            point_normals(p, n_rays, problem, damping, work, lower, d)
+            point_normals(p, n_rays, points, damping, work, elimination)
             solve_transposed(lower, d)
             for a in range(3):
-                old[a] = points[p, a]
-                points[p, a] += d[a]
-            after, _ = linearise_point(p, problem, work)
+                old[a] = xyz[p, a]
+                xyz[p, a] += d[a]
+            after, _ = linearise_point(p, rays, table, values, points, weighting, work)
             for a in range(3):
-                after += prior_weight[p, a] * (prior_xyz[p, a] - points[p, a]) ** 2
+                after += prior_weight[p, a] * (prior_xyz[p, a] - xyz[p, a]) ** 2
             if after < before:
                 damping *= 0.1
                 small = before - after < 1e-3 * before
@@ -216,6 +233,6 @@ def settle_points(first, last, problem, rounds, work):
                     break
             else:
                 for a in range(3):
-                    points[p, a] = old[a]
+                    xyz[p, a] = old[a]
                 damping *= 30.0
-                linearise_point(p, problem, work)
+                linearise_point(p, rays, table, values, points, weighting, work)

@@ -18,15 +18,18 @@ def add_products(first, last, problem, directions, effect, size, work):
     directions : images (n, 6, k), shared (s, k), points (P, 3, k). effect (k, k) : VᵀAᵀA·V, size (k, k) : VᵀD·V,
     D the squares of the points' columns; both are added to.
     """
-    start, image = problem.rays.start, problem.rays.image
-    prior_weight, point_free = problem.table.prior_weight, problem.table.point_free
-    images, shared, points = directions.images, directions.shared, directions.points
+    rays, table, values, points, weighting = (
+        problem.rays, problem.table, problem.values, problem.points, problem.weighting,
+    )  # fmt: skip
+    start, image = rays.start, rays.image
+    prior_weight, point_free = points.prior_weight, points.free
+    images, shared, moves = directions.images, directions.shared, directions.points
     by_eo, by_pt, by_sh = work.by_eo, work.by_pt, work.by_sh
     columns, n_columns, union = work.columns, work.n_columns, work.union
-    count = points.shape[2]
+    count = moves.shape[2]
     value, square = np.zeros(count), np.zeros(3)
     for p in range(first, last):
-        linearise_point(p, problem, work)
+        linearise_point(p, rays, table, values, points, weighting, work)
         for t in range(3):
             square[t] = prior_weight[p, t] * point_free[p, t]
         for q in range(start[p + 1] - start[p]):
@@ -37,7 +40,7 @@ def add_products(first, last, problem, directions, effect, size, work):
                     for t in range(E):
                         total += by_eo[q, row, t] * images[i, t, k]
                     for t in range(3):
-                        total += by_pt[q, row, t] * points[p, t, k]
+                        total += by_pt[q, row, t] * moves[p, t, k]
                     for t in range(n_columns[q]):
                         total += by_sh[q, row, t] * shared[union[columns[q, t]], k]
                     value[k] = total
@@ -50,6 +53,6 @@ def add_products(first, last, problem, directions, effect, size, work):
             observed = prior_weight[p, t] * point_free[p, t]
             for k in range(count):
                 for other in range(count):
-                    product = points[p, t, k] * points[p, t, other]
+                    product = moves[p, t, k] * moves[p, t, other]
                     effect[k, other] += observed * product
                     size[k, other] += square[t] * product

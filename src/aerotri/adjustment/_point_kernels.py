@@ -11,7 +11,7 @@ from aerotri.adjustment._intersection_kernels import smallest_eigenvalue
 from aerotri.adjustment._robust_kernels import robust_factor
 from aerotri.adjustment.kernel_records import Work
 from aerotri.compiled import inlined, kernel
-from aerotri.functional_model._kernels import RayPartials, linearise_ray
+from aerotri.functional_model._kernels import linearise_ray
 
 E = 6
 MIN_PIVOT = 1e-14
@@ -37,28 +37,28 @@ def scratch(max_rays, max_columns, n_shared):
 
 
 @kernel
-def linearise_point(p, problem, work):
+def linearise_point(p, rays, table, values, points, weighting, work):
     """Whitened partials and misclosures of the rays of point p into `work`; its residuals and weights out.
 
     Returns the cost of its rays and the number of shared parameters that act on them.
     """
-    rays, table, values = problem.rays, problem.table, problem.values
-    residual, weight = problem.residual, problem.weight
+    residual, weight, estimator, limit = weighting.residual, weighting.weight, weighting.estimator, weighting.limit
     start, image, xy, inv_sigma = rays.start, rays.image, rays.xy, rays.inv_sigma
     ap_index, ap_value = rays.ap_index, rays.ap_value
-    lens_columns, eo_free, turn, point_free, kept = (
-        table.lens_columns, table.eo_free, table.turn, table.point_free, table.kept,
-    )  # fmt: skip
+    lens_columns, eo_free, turn, kept = table.lens_columns, table.eo_free, table.turn, table.kept
+    xyz, point_free = points.xyz, points.free
     by_eo, by_pt, by_sh, whitened = work.by_eo, work.by_pt, work.by_sh, work.whitened
     columns, n_columns, union, place = work.columns, work.n_columns, work.union, work.place
-    shared, by_interior, prediction = values.shared, work.by_interior, work.prediction
+    by_interior, prediction = work.by_interior, work.prediction
+    rotation, centre, interior, shared = values.rotation, values.centre, values.interior, values.shared
+    lens_row = rays.lens_row
     cost, n_union = 0.0, 0
     for q in range(start[p + 1] - start[p]):
         ray = start[p] + q
-        i, lens = image[ray], rays.lens_row[ray]
+        i, lens = image[ray], lens_row[ray]
         linearise_ray(
-            values.rotation[i], values.centre[i], values.points[p], values.interior[lens], xy[ray, 0], xy[ray, 1],
-            RayPartials(prediction, by_eo[q], by_pt[q], by_interior),
+            rotation[i], centre[i], xyz[p], interior[lens], xy[ray, 0], xy[ray, 1],
+            prediction, by_eo[q], by_pt[q], by_interior,
         )  # fmt: skip
         n = 0
         for t in range(15):
@@ -81,7 +81,7 @@ def linearise_point(p, problem, work):
         n_columns[q] = n
         residual[ray, 0], residual[ray, 1] = xy[ray, 0] - prediction[0], xy[ray, 1] - prediction[1]
         ex, ey = residual[ray, 0] * inv_sigma[ray, 0], residual[ray, 1] * inv_sigma[ray, 1]
-        factor, ray_cost = robust_factor(np.sqrt(ex * ex + ey * ey), problem.estimator, problem.limit)
+        factor, ray_cost = robust_factor(np.sqrt(ex * ex + ey * ey), estimator, limit)
         weight[ray] = factor
         cost += ray_cost
         for row in range(2):
@@ -109,13 +109,13 @@ def linearise_point(p, problem, work):
 
 
 @kernel
-def point_normals(p, n_rays, problem, damping, work, lower, misclosure):
-    """Cholesky factor L of the 3 × 3 normals of point p into `lower`, L⁻¹·(right side) into `misclosure`.
+def point_normals(p, n_rays, points, damping, work, elimination):
+    """Cholesky factor of the 3 × 3 normals of point p, and its right side times its inverse, into `elimination`.
 
     Returns the cost of the coordinates observed, and False where the rays do not determine the point.
     """
-    table, points, by_pt, whitened = problem.table, problem.values.points, work.by_pt, work.whitened
-    prior_xyz, prior_weight, point_free = table.prior_xyz, table.prior_weight, table.point_free
+    xyz, prior_xyz, prior_weight, point_free = points.xyz, points.prior_xyz, points.prior_weight, points.free
+    by_pt, whitened, lower, misclosure = work.by_pt, work.whitened, elimination.lower, elimination.misclosure
     cost = 0.0
     n00, n10, n11, n20, n21, n22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     y0, y1, y2 = 0.0, 0.0, 0.0
@@ -135,7 +135,7 @@ def point_normals(p, n_rays, problem, damping, work, lower, misclosure):
     misclosure[0], misclosure[1], misclosure[2] = y0, y1, y2
     for t in range(3):
         if prior_weight[p, t] > 0.0:
-            gap = prior_xyz[p, t] - points[p, t]
+            gap = prior_xyz[p, t] - xyz[p, t]
             cost += prior_weight[p, t] * gap * gap
             lower[t, t] += prior_weight[p, t] * point_free[p, t]
             misclosure[t] += prior_weight[p, t] * gap * point_free[p, t]
@@ -173,11 +173,12 @@ def solve_transposed(lower, d):
 
 
 @kernel
-def reduce_point(p, n_rays, n_union, problem, work, lower, misclosure):
+def reduce_point(p, n_rays, n_union, points, damping, work, elimination):
     """Eliminate point p: `point_normals`, and the couplings L⁻¹·N_pe and L⁻¹·N_ps into `work`."""
     by_eo, by_pt, by_sh, columns, n_columns = work.by_eo, work.by_pt, work.by_sh, work.columns, work.n_columns
     couple, couple_shared = work.couple, work.couple_shared
-    cost, ok = point_normals(p, n_rays, problem, problem.damping, work, lower, misclosure)
+    lower = elimination.lower
+    cost, ok = point_normals(p, n_rays, points, damping, work, elimination)
     for t in range(n_union):
         for a in range(3):
             couple_shared[a, t] = 0.0
@@ -209,18 +210,20 @@ def looseness(first, last, problem, work, loose):
 
     Of the point's own weighted 3 × 3 normals, the photographs held; a held or kept point has 0. loose : (P,) out.
     """
-    start, image = problem.rays.start, problem.rays.image
-    prior_weight, point_free = problem.table.prior_weight, problem.table.point_free
-    centre, points = problem.values.centre, problem.values.points
+    rays, table, values, points, weighting = (
+        problem.rays, problem.table, problem.values, problem.points, problem.weighting,
+    )  # fmt: skip
+    start, image, centre = rays.start, rays.image, values.centre
+    xyz, prior_weight, point_free = points.xyz, points.prior_weight, points.free
     by_pt, normal = work.by_pt, np.empty((3, 3))
     for p in range(first, last):
-        linearise_point(p, problem, work)
+        linearise_point(p, rays, table, values, points, weighting, work)
         normal[:] = 0.0
         nearest = np.inf
         for q in range(start[p + 1] - start[p]):
             i, squares = image[start[p] + q], 0.0
             for a in range(3):
-                squares += (points[p, a] - centre[i, a]) ** 2
+                squares += (xyz[p, a] - centre[i, a]) ** 2
                 for b in range(3):
                     normal[a, b] += by_pt[q, 0, a] * by_pt[q, 0, b] + by_pt[q, 1, a] * by_pt[q, 1, b]
             nearest = min(nearest, squares)

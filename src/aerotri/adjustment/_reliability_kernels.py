@@ -9,7 +9,7 @@ import numpy as np
 
 from aerotri.adjustment._covariance_kernels import couple_point, coupling_scratch, row_cofactor
 from aerotri.adjustment._point_kernels import E, linearise_point, reduce_point
-from aerotri.adjustment.kernel_records import RowPlace
+from aerotri.adjustment.kernel_records import Elimination, Pattern, RowPlace
 from aerotri.compiled import kernel
 
 
@@ -17,22 +17,28 @@ from aerotri.compiled import kernel
 def predicted_cofactors(first, last, problem, full, inverse, cofactors, work):
     """Cofactors (P, 3, 3) of points first..last and (m, 3) of the predictions of x with x, x with y, y with y.
 
-    problem : as adjusted, 1/σ of rays switched off set to 0; full : the same with the 1/σ that all would have.
+    problem : as adjusted, 1/σ of rays switched off set to 0; full : its rays with the 1/σ that all would have.
     cofactors : the two, out.
     """
-    start, image = problem.rays.start, problem.rays.image
+    rays, table, values, points, weighting = (
+        problem.rays, problem.table, problem.values, problem.points, problem.weighting,
+    )  # fmt: skip
+    start, image = rays.start, rays.image
     cofactor, predicted = cofactors
     coupling = coupling_scratch(work)
-    lower, misclosure = np.zeros((3, 3)), np.zeros(3)
+    q_pp = coupling.q_pp
+    pattern = Pattern(start, image, problem.pairs.start, problem.pairs.block)
+    lower = np.zeros((3, 3))
+    elimination = Elimination(lower, np.zeros(3))
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        _, n_union = linearise_point(p, problem, work)
-        reduce_point(p, n_rays, n_union, problem, work, lower, misclosure)
-        couple_point(p, problem, inverse, n_union, lower, work, coupling)
+        _, n_union = linearise_point(p, rays, table, values, points, weighting, work)
+        reduce_point(p, n_rays, n_union, points, 0.0, work, elimination)
+        couple_point(p, pattern, inverse, n_union, lower, work, coupling)
         for a in range(3):
             for b in range(3):
-                cofactor[p, a, b] = coupling.q_pp[a, b]
-        linearise_point(p, full, work)
+                cofactor[p, a, b] = q_pp[a, b]
+        linearise_point(p, full, table, values, points, weighting, work)
         for q in range(n_rays):
             for k in range(3):
                 predicted[start[p] + q, k] = row_cofactor(
@@ -51,19 +57,24 @@ def ray_effects(first, last, problem, inverse, measures, effects, work):
 
     measures : `Datum` and `Scale`. effects : out.
     """
-    start, image, kept = problem.rays.start, problem.rays.image, problem.table.kept
+    rays, table, values, points, weighting = (
+        problem.rays, problem.table, problem.values, problem.points, problem.weighting,
+    )  # fmt: skip
+    start, image, kept = rays.start, rays.image, table.kept
     datum, scale = measures
     to_angles, per_image, per_shared, per_point = scale.to_angles, scale.per_image, scale.per_shared, scale.per_point
     columns, n_columns, union = work.columns, work.n_columns, work.union
     size, unknown, height = effects.size, effects.unknown, effects.height
     coupling = coupling_scratch(work)
-    lower, misclosure = np.zeros((3, 3)), np.zeros(3)
+    pattern = Pattern(start, image, problem.pairs.start, problem.pairs.block)
+    lower = np.zeros((3, 3))
+    elimination = Elimination(lower, np.zeros(3))
     change = np.empty(9 + columns.shape[1])
     for p in range(first, last):
         n_rays = start[p + 1] - start[p]
-        _, n_union = linearise_point(p, problem, work)
-        reduce_point(p, n_rays, n_union, problem, work, lower, misclosure)
-        couple_point(p, problem, inverse, n_union, lower, work, coupling)
+        _, n_union = linearise_point(p, rays, table, values, points, weighting, work)
+        reduce_point(p, n_rays, n_union, points, 0.0, work, elimination)
+        couple_point(p, pattern, inverse, n_union, lower, work, coupling)
         for q in range(n_rays):
             ray = start[p] + q
             i = image[ray]

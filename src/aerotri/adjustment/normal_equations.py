@@ -12,7 +12,7 @@ from aerotri.adjustment import _covariance_kernels, _kernels, _point_kernels
 from aerotri.adjustment.chunk_sums import ChunkSums, add_gaps, add_own_squares, add_squares
 from aerotri.adjustment.datum import ExtraObservations, free_motions, observes_centres, without_motion
 from aerotri.adjustment.field_prior import FieldPrior, field_prior
-from aerotri.adjustment.kernel_records import Directions, Inverse, Pairs, Problem, Table, Values
+from aerotri.adjustment.kernel_records import Directions, Inverse, Pairs, Points, Problem, Table, Values, Weighting
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.robust import Estimator, normalised_lengths
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, InverseOnPattern, Symbolic
@@ -114,18 +114,11 @@ class NormalSystem:
         return Problem(
             rays=u.rays.arrays(),
             pairs=Pairs(u.pair_start, u.pair_block),
-            table=Table(
-                u.lens.columns, u.eo_free.astype(float), u.turn(state), u.prior_xyz, self._point_prior,
-                u.point_free.astype(float), u.kept,
-            ),
-            values=Values(
-                np.ascontiguousarray(state.rotation), state.centre, state.points, u.interior(state), state.shared
-            ),
-            estimator=estimator.code,
-            limit=float(estimator.limit),
+            table=Table(u.lens.columns, u.eo_free.astype(float), u.turn(state), u.kept),
+            values=Values(np.ascontiguousarray(state.rotation), state.centre, u.interior(state), state.shared),
+            points=Points(state.points, u.prior_xyz, self._point_prior, u.point_free.astype(float)),
+            weighting=Weighting(estimator.code, float(estimator.limit), np.empty((m, 2)), np.empty(m)),
             damping=float(damping),
-            residual=np.empty((m, 2)),
-            weight=np.empty(m),
         )  # fmt: skip
 
     def assemble(self, state: State, damping: float, estimator: Estimator) -> NormalEquations:
@@ -194,8 +187,8 @@ class NormalSystem:
             right=np.concatenate([right.ravel(), right_shared]),
             cost=float(cost + np.sum(self._prior_weight * gap**2)),
             point_decrement=float(sum(o[1] for o in outcomes)),
-            residual=problem.residual,
-            weight=problem.weight,
+            residual=problem.weighting.residual,
+            weight=problem.weighting.weight,
             undetermined=max(o[2] for o in outcomes),
         )
 

@@ -72,10 +72,11 @@ def predict_ray(rotation, centre, point, interior, x, y, prediction):
 
 
 @kernel
-def linearise_ray(rotation, centre, point, interior, x, y, partials):
-    """As `predict_ray`, with the partials; they share their intermediates. partials : `RayPartials`, out."""
-    prediction, by_orientation = partials.prediction, partials.by_orientation
-    by_point, by_interior = partials.by_point, partials.by_interior
+def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orientation, by_point, by_interior):
+    """As `predict_ray`, with the partials; they share their intermediates.
+
+    The outputs are those of `RayPartials`, one by one: a record made for every ray costs a tenth of the linearisation.
+    """
     dx, dy, dz = point[0] - centre[0], point[1] - centre[1], point[2] - centre[2]
     u1 = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
     u2 = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
@@ -160,9 +161,11 @@ def predict_rays(rotation, centre, points, interior, rays, prediction):
 def linearise_rays(rotation, centre, points, interior, rays, partials):
     """`linearise_ray` over m rays. rays : `RayList`. partials : `RayPartials`, out, m before every shape."""
     image, point, lens_row, xy = rays.image, rays.point, rays.lens_row, rays.xy
+    prediction, by_orientation = partials.prediction, partials.by_orientation
+    by_point, by_interior = partials.by_point, partials.by_interior
     for k in range(len(image)):
         i = image[k]
-        own = RayPartials(
-            partials.prediction[k], partials.by_orientation[k], partials.by_point[k], partials.by_interior[k]
-        )
-        linearise_ray(rotation[i], centre[i], points[point[k]], interior[lens_row[k]], xy[k, 0], xy[k, 1], own)
+        linearise_ray(
+            rotation[i], centre[i], points[point[k]], interior[lens_row[k]], xy[k, 0], xy[k, 1], prediction[k],
+            by_orientation[k], by_point[k], by_interior[k],
+        )  # fmt: skip

@@ -35,6 +35,7 @@ def ray_effects(system: NormalSystem, solution: Solution, q: Cofactors) -> RayEf
     inverse = Inverse(q.inverse.blocks, q.inverse.border, q.inverse.corner)
     measures, found = (_datum(u, q.inner), _scale(system, solution, q)), Effects(size, unknown, height)
     problem = system.problem(state, estimator)
+    weight = problem.weighting.weight
     system.over_points(
         problem,
         lambda first, last, problem, work: _reliability_kernels.ray_effects(
@@ -42,7 +43,7 @@ def ray_effects(system: NormalSystem, solution: Solution, q: Cofactors) -> RayEf
         ),
     )
     settings = u.block.settings.adjustment
-    error = detectable_share(q.ray_redundancy, settings.alpha, settings.power) * np.sqrt(problem.weight)[:, None]
+    error = detectable_share(q.ray_redundancy, settings.alpha, settings.power) * np.sqrt(weight)[:, None]
     count = len(u.block.image_points)
     effects = RayEffects(
         np.full((count, 2), np.nan), np.full((count, 2), -1, np.int32), np.full((count, 2), np.nan), shared_labels(u)

@@ -178,7 +178,7 @@ def _predictions(system: NormalSystem, switched: NormalSystem, state: State, inv
     m = len(u.rays.image)
     points, predicted = np.empty((len(u.points), 3, 3)), np.empty((m, 3))
     problem, parts = switched.problem(state, LEAST_SQUARES), Inverse(inverse.blocks, inverse.border, inverse.corner)
-    full = problem._replace(rays=u.rays.arrays())
+    full = u.rays.arrays()
     switched.over_points(
         problem,
         lambda first, last, problem, work: _reliability_kernels.predicted_cofactors(

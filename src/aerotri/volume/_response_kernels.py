@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aerotri.compiled import kernel
-from aerotri.functional_model._kernels import RayPartials, linearise_ray, predict_ray
+from aerotri.functional_model._kernels import linearise_ray, predict_ray
 
 
 class PhotoArrays(NamedTuple):
@@ -114,8 +114,7 @@ def respond(first, last, pickets, photos, tiles, out):
                 for _ in range(3):
                     predict_ray(rotation[i], centre[i], points[p], row, x, y, at[r])
                     x, y = at[r, 0], at[r, 1]
-            partials = RayPartials(at[r], by_eo[r], by_pt[r], by_in[r])
-            linearise_ray(rotation[i], centre[i], points[p], row, x, y, partials)
+            linearise_ray(rotation[i], centre[i], points[p], row, x, y, at[r], by_eo[r], by_pt[r], by_in[r])
             weight = inv_sigma[start[p] + r] ** 2
             for a in range(3):
                 for b in range(3):
