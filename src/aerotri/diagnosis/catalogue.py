@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
@@ -57,7 +57,7 @@ def of_measurements() -> Iterator[Hypothesis]:
         yield Hypothesis("measurements of all photographs", remedy, changes.on_image_points(change), _mirror(remedy))
 
 
-def _mirror(remedy: str):
+def _mirror(remedy: str) -> Callable[[FreeModel], FreeModel]:
     """What a reflection of all measurements makes of the model: the mirror image, every camera turned in its plane."""
     # measured' = M·measured: R' = S·R·M with a reflection S of the space, here x of the model, whatever M is
     plane = {

@@ -112,7 +112,9 @@ def free_block(block: Block) -> Block:
     return replace(block, images=images, gnss_ins=None, constraints=None, settings=settings)
 
 
-def _stages(block: Block, adjust: Adjust, free: AdjustedBlock, full: AdjustedBlock | None):
+def _stages(
+    block: Block, adjust: Adjust, free: AdjustedBlock, full: AdjustedBlock | None
+) -> tuple[list[Stage], AdjustedBlock | None]:
     """The adjustments after the free one with their tests, and the result of the one with control alone, or None."""
     scale = free.outcome.sigma0 if free.outcome.redundancy > 0 else 1.0
     if abs(scale - 1.0) < SAME_SCALE:

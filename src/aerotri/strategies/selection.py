@@ -142,7 +142,7 @@ def with_removed(parameters: SharedParameters, removals: Sequence[Removal]) -> S
     covariance[:s, :s] = parameters.covariance
     covariance[np.arange(s, s + k), np.arange(s, s + k)] = [r.sigma**2 for r in removals]
 
-    def longer(column: np.ndarray, values: list) -> np.ndarray:
+    def longer(column: np.ndarray, values: Sequence[object]) -> np.ndarray:
         return np.concatenate([column, np.array(values, dtype=column.dtype)])
 
     p = parameters

@@ -11,6 +11,7 @@ test is T² = vᵀ·Q_vv⁻¹·v, by which vᵀPv shrinks when all of them are t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,7 +56,7 @@ class Switches:
     def any(self) -> bool:
         return bool(self.rays.any() or self.control.any() or any(rows.any() for rows in self.extras))
 
-    def combined(self, other: Switches, how) -> Switches:
+    def combined(self, other: Switches, how: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Switches:
         """Every array combined with the other's by a function of two arrays."""
         extras = tuple(how(a, b) for a, b in zip(self.extras, other.extras, strict=True))
         return Switches(how(self.rays, other.rays), how(self.control, other.control), extras)
