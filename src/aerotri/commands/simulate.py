@@ -38,7 +38,9 @@ def run_simulate(
     console = Console(quiet=as_json)
     flight = simulate(spec, seed)
     wanted, counts = render is not None, flight.summary
-    looks = {} if render is None else {"targets": render.targets, "blur_px": render.blur_px, "noise": render.noise}
+    looks: dict[str, Any] = (
+        {} if render is None else {"targets": render.targets, "blur_px": render.blur_px, "noise": render.noise}
+    )
     flight.save(out, photographs=wanted, only=only, overwrite=overwrite, progress=console.stage, **looks)
     rendered = (len(dict.fromkeys(only)) or counts["images"]) if wanted else 0
     if wanted:

@@ -7,19 +7,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aerotri.conventions import FilePath
 from aerotri.public.adjustment import Adjustment, adjust
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import StageReport
 from aerotri.public.saving import RECORD, write_adjustment
 
 if TYPE_CHECKING:
-    import os
-
     from aerotri.observations import Block
     from aerotri.public.progress import Progress
 
 
-def read_in_metres(folder: Path, control_prefix: str = "", geoid: str | os.PathLike | None = None) -> tuple[Block, str]:
+def read_in_metres(folder: Path, control_prefix: str = "", geoid: FilePath | None = None) -> tuple[Block, str]:
     """A block from its folder, in a coordinate system that counts in metres; and what was done for that.
 
     Parameters
@@ -53,7 +52,7 @@ def adjust_folder(
     progress: Progress,
     plots: bool = True,
     control_prefix: str = "",
-    geoid: str | os.PathLike | None = None,
+    geoid: FilePath | None = None,
     **settings: Any,
 ) -> Adjustment:
     """Read, adjust, and write the result.

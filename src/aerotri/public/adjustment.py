@@ -8,11 +8,10 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.public.progress import ProgressLike, stage_report
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Mapping, Sequence
 
     import numpy as np
@@ -176,7 +175,7 @@ class Adjustment:
 
         return covariance_of(self.record, list(names))
 
-    def save(self, out: str | os.PathLike, plots: bool = True, progress: ProgressLike = None) -> Path:
+    def save(self, out: FilePath, plots: bool = True, progress: ProgressLike = None) -> Path:
         """Write the tables, adjustment.json, the solution, the block as used and the report into a folder.
 
         Parameters
@@ -212,18 +211,21 @@ class Adjustment:
         )
 
     def _repr_html_(self) -> str:
+        return self.html()
+
+    def html(self) -> str:
         """The outcome as a notebook shows it: the verdict first."""
         o = self.adjusted.outcome
         reasons = "".join(f"<li>{escape(reason)}</li>" for reason in (*o.reasons, *o.warnings))
         return (
             f"<div><b>{escape(str(self.block.name))}: {escape(o.verdict)}</b> ({escape(o.status)}), "
             f"σ<sub>0</sub> {o.sigma0:.4g} ({o.sigma0_um:.3g} µm), redundancy {o.redundancy}"
-            f"{f'<ul>{reasons}</ul>' if reasons else ''}{self.groups._repr_html_()}</div>"
+            f"{f'<ul>{reasons}</ul>' if reasons else ''}{self.groups.html()}</div>"
         )
 
 
 def adjust(
-    block: Block | str | os.PathLike,
+    block: Block | FilePath,
     *,
     parameters: str | None = None,
     parameter_selection: Switch | None = None,
@@ -232,7 +234,7 @@ def adjust(
     variance_components: Switch | None = None,
     max_iterations: int | None = None,
     points: np.ndarray | None = None,
-    geoid: str | os.PathLike | None = None,
+    geoid: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> Adjustment:
     """Adjust a block: orientation, points, self-calibration, and σ of everything.
@@ -322,7 +324,7 @@ def with_settings(block: Block, given: Mapping[str, object]) -> Block:
     return replace(block, settings=replace(block.settings, adjustment=adjustment))
 
 
-def open_result(folder: str | os.PathLike, progress: ProgressLike = None) -> Adjustment:
+def open_result(folder: FilePath, progress: ProgressLike = None) -> Adjustment:
     """A result that was saved: linearised and factorised once at its solution, never adjusted again.
 
     Parameters

@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.observations import Block
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from aerotri.formats.assembly.project import Request
 
-PathLike = str | os.PathLike
 Sigmas = tuple[float, float, float]
 GnssShift = Literal["off", "block", "strip"]
 FlightAxis = Literal["+x", "-x", "+y", "-y"]
@@ -26,7 +25,7 @@ Axes = Literal["xy", "yx"]
 PatbRotation = Literal["camera-to-object", "object-to-camera"]
 
 
-def as_block(block: Block | PathLike) -> Block:
+def as_block(block: Block | FilePath) -> Block:
     """The block itself, or the one of a folder.
 
     Raises
@@ -37,7 +36,7 @@ def as_block(block: Block | PathLike) -> Block:
     return block if isinstance(block, Block) else read_block(block)
 
 
-def read_block(folder: PathLike) -> Block:
+def read_block(folder: FilePath) -> Block:
     """A block from its folder.
 
     Parameters
@@ -100,16 +99,16 @@ class ReadBlock:
 
 
 def read(
-    source: PathLike,
+    source: FilePath,
     *,
     name: str = "",
-    image_points: Sequence[PathLike] = (),
-    positions: PathLike | None = None,
-    control: PathLike | None = None,
-    orientation: PathLike | None = None,
+    image_points: Sequence[FilePath] = (),
+    positions: FilePath | None = None,
+    control: FilePath | None = None,
+    orientation: FilePath | None = None,
     check: Sequence[str] = (),
     crs: str = "",
-    camera: PathLike | None = None,
+    camera: FilePath | None = None,
     camera_name: str = "",
     camera_size: tuple[int, int] | None = None,
     pixel_um: float | None = None,
@@ -125,9 +124,9 @@ def read(
     orientation_sigma_m: Sigmas | None = None,
     orientation_sigma_deg: Sigmas | None = None,
     gnss_shift: GnssShift | None = None,
-    geoid: PathLike | None = None,
+    geoid: FilePath | None = None,
     axes: Axes | None = None,
-    offset: PathLike | None = None,
+    offset: FilePath | None = None,
     patb_rotation: PatbRotation | None = None,
     linear_alteration_m: float | None = None,
 ) -> ReadBlock:
@@ -228,6 +227,6 @@ def read_request(request: Request) -> ReadBlock:
     return ReadBlock(read_block(Path(request.source) / "block"), None, (), request.source, is_result=True)
 
 
-def text_of_path(path: PathLike | None) -> str:
+def text_of_path(path: FilePath | None) -> str:
     """A path as text, which may say its kind; '' for None."""
     return "" if path is None else os.fspath(path)

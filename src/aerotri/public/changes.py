@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.table import Table
@@ -73,7 +72,7 @@ class ResultChanges:
 
 
 def changes(
-    first: Adjustment | str | os.PathLike, second: Adjustment | str | os.PathLike, progress: ProgressLike = None
+    first: Adjustment | FilePath, second: Adjustment | FilePath, progress: ProgressLike = None
 ) -> ResultChanges:
     """What changed from one result to another of the same block.
 
@@ -106,7 +105,7 @@ def changes(
     return ResultChanges(compare(*runs), *runs)
 
 
-def _adjusted(source: Adjustment | str | os.PathLike, tell: Any) -> AdjustedBlock:
+def _adjusted(source: Adjustment | FilePath, tell: Any) -> AdjustedBlock:
     """The adjusted block of a result; a folder's is linearised and factorised at its solution."""
     from aerotri.compiled import compilation_notice
     from aerotri.opening import open_result

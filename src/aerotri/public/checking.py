@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.observations import Block
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.progress import ProgressLike, stage_report
@@ -31,7 +30,7 @@ def refuse_free_datum(block: Block) -> None:
 
 
 def free_check(
-    source: Adjustment | Block, *, geoid: str | os.PathLike | None = None, progress: ProgressLike = None
+    source: Adjustment | Block, *, geoid: FilePath | None = None, progress: ProgressLike = None
 ) -> FreeCheck:
     """Adjust a block with a minimal datum, and compare it with its control.
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyarrow as pa
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.observations import Block
 from aerotri.public.adjustment import Adjustment, with_settings
 from aerotri.public.blocks import as_block, read
@@ -60,7 +59,7 @@ class ComparedParameters:
 
         return plot_comparison(self.record)
 
-    def save(self, out: str | os.PathLike) -> Path:
+    def save(self, out: FilePath) -> Path:
         """Write the comparison as JSON, CSV and a picture into a folder.
 
         Raises
@@ -80,16 +79,16 @@ class ComparedParameters:
         return target
 
     def _repr_html_(self) -> str:
-        return f"<div>{self.table._repr_html_()}<p>{self.reason}</p></div>"
+        return f"<div>{self.table.html()}<p>{self.reason}</p></div>"
 
 
 def compare_parameters(
-    block: Block | str | os.PathLike,
+    block: Block | FilePath,
     sets: Sequence[str] = (),
     *,
     folds: int = 10,
     robust: str | None = None,
-    geoid: str | os.PathLike | None = None,
+    geoid: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> ComparedParameters:
     """Adjust a block with several sets of additional parameters, and predict its control by cross-validation.
@@ -173,7 +172,7 @@ class Crosscheck:
 
         return plot_crosscheck(self.record)
 
-    def save(self, out: str | os.PathLike) -> Path:
+    def save(self, out: FilePath) -> Path:
         """Write crosscheck.json, crosscheck.csv, the plots and the report into a folder.
 
         Raises
@@ -199,10 +198,10 @@ class Crosscheck:
         return target
 
     def _repr_html_(self) -> str:
-        return f"<div><p>{self.sentence}</p>{self.table._repr_html_()}</div>"
+        return f"<div><p>{self.sentence}</p>{self.table.html()}</div>"
 
 
-def crosscheck(source: Adjustment | Block | str | os.PathLike, progress: ProgressLike = None) -> Crosscheck:
+def crosscheck(source: Adjustment | Block | FilePath, progress: ProgressLike = None) -> Crosscheck:
     """Adjust the same block by pycolmap, and by Ceres with a model written from the papers alone.
 
     Parameters
@@ -234,7 +233,7 @@ def crosscheck(source: Adjustment | Block | str | os.PathLike, progress: Progres
         return Crosscheck(check(local, pipeline.adjust, lambda text: report.stage(text, None)), local)
 
 
-def _adjusted(source: Adjustment | Block | str | os.PathLike, iteration) -> Adjustment:
+def _adjusted(source: Adjustment | Block | FilePath, iteration: Callable[[int, float, float], None]) -> Adjustment:
     from aerotri.pipeline import adjust_keeping_system
     from aerotri.public.adjustment import open_result
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.observations import Block
 from aerotri.public.adjustment import Adjustment
-from aerotri.public.blocks import PathLike, ReadBlock, read, text_of_path
+from aerotri.public.blocks import ReadBlock, read, text_of_path
 from aerotri.public.folders import refuse_existing_file, refuse_foreign_entries
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 
@@ -24,12 +24,12 @@ Target = Literal[
 
 
 def convert(
-    source: Block | Adjustment | ReadBlock | PathLike,
-    out: PathLike,
+    source: Block | Adjustment | ReadBlock | FilePath,
+    out: FilePath,
     to: Target = "block",
     *,
     points: np.ndarray | None = None,
-    geoid: PathLike | None = None,
+    geoid: FilePath | None = None,
     overwrite: bool = False,
     progress: ProgressLike = None,
 ) -> tuple[str, ...]:
@@ -102,14 +102,14 @@ def refuse_target(source: str, target: Path, to: str, overwrite: bool) -> None:
         refuse_existing_file(target, overwrite)
 
 
-def _place(source: Block | Adjustment | ReadBlock | PathLike) -> str:
+def _place(source: Block | Adjustment | ReadBlock | FilePath) -> str:
     """Where the source comes from; '' where it is in memory."""
     if isinstance(source, (Block, Adjustment)):
         return ""
     return source.source if isinstance(source, ReadBlock) else text_of_path(source)
 
 
-def _write_result(source: Adjustment | ReadBlock, target: Path, to: Target, geoid: PathLike | None) -> tuple[str, ...]:
+def _write_result(source: Adjustment | ReadBlock, target: Path, to: Target, geoid: FilePath | None) -> tuple[str, ...]:
     """Orientation and points as adjusted; what was measured, as it was measured."""
     from aerotri.formats.assembly.oriented import oriented_from_adjusted
     from aerotri.formats.convert import BLOCK_WRITERS, write_any, write_oriented
@@ -122,7 +122,7 @@ def _write_result(source: Adjustment | ReadBlock, target: Path, to: Target, geoi
 
 
 def _write_block(
-    reading: ReadBlock, target: Path, to: Target, geoid: PathLike | None, report: StageReport
+    reading: ReadBlock, target: Path, to: Target, geoid: FilePath | None, report: StageReport
 ) -> tuple[str, ...]:
     from aerotri.formats.assembly.oriented import oriented_block
     from aerotri.formats.convert import BLOCK_WRITERS, ORIENTATION_WRITERS, write_any, write_oriented
@@ -162,7 +162,7 @@ def _at_start_values(
     return (oriented, ()) if to == "patb" else (None, ())
 
 
-def _adjusted(reading: ReadBlock, geoid: PathLike | None, report: StageReport) -> OrientedBlock:
+def _adjusted(reading: ReadBlock, geoid: FilePath | None, report: StageReport) -> OrientedBlock:
     """The block adjusted for the purpose.
 
     Raises

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.files.spool import Spool
 from aerotri.public.adjustment import Adjustment
-from aerotri.public.blocks import PathLike
 from aerotri.public.folders import refuse_existing_file
 from aerotri.public.models import ModelDeformation, check_crs, refuse_without_errors
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
@@ -86,7 +85,7 @@ class CorrectedDem:
         columns = {name: [row[name] for row in rows] for name in ("first", "second", "places", *steps)}
         return Table("steps at seams", pa.table(columns), dict.fromkeys(steps, "m"))
 
-    def save(self, out: PathLike, overwrite: bool = False) -> Path:
+    def save(self, out: FilePath, overwrite: bool = False) -> Path:
         """Write the corrected DEM; dZ, its σ and a JSON file stand beside it.
 
         Parameters
@@ -115,7 +114,7 @@ class CorrectedDem:
 
     def _repr_html_(self) -> str:
         s, dz = self.summary, self.summary["dZ"]
-        seams = self.seams._repr_html_() if len(self.seams) else ""
+        seams = self.seams.html() if len(self.seams) else ""
         return (
             f"<div><b>{escape(s['dem'])}</b>: {s['corrected']} of {s['cells']} cells corrected, dZ {dz['min']:+.3f} … "
             f"{dz['max']:+.3f} m, RMS {dz['rms']:.3f} m{seams}</div>"
@@ -124,13 +123,13 @@ class CorrectedDem:
 
 def correct_dem(
     dem: SurfaceLike,
-    result: Adjustment | PathLike,
+    result: Adjustment | FilePath,
     *,
     pair: tuple[str, str] | None = None,
-    models: ModelDeformation | TerrainModel | PathLike | None = None,
-    model_table: PathLike | None = None,
-    orientation: Adjustment | Absorbed | PathLike | None = None,
-    scratch: PathLike | None = None,
+    models: ModelDeformation | TerrainModel | FilePath | None = None,
+    model_table: FilePath | None = None,
+    orientation: Adjustment | Absorbed | FilePath | None = None,
+    scratch: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> CorrectedDem:
     """Free a DEM of the deformation of its stereo models: heights and plan, window by window, with σ.
@@ -228,7 +227,7 @@ def _reader(dem: SurfaceLike, stack: ExitStack) -> Reader:
 
 
 def _model_map(
-    models: ModelDeformation | TerrainModel | PathLike | None, table: PathLike | None, reader: Reader, stack: ExitStack
+    models: ModelDeformation | TerrainModel | FilePath | None, table: FilePath | None, reader: Reader, stack: ExitStack
 ) -> ModelMap:
     """Which model every cell was made in."""
     from aerotri.deformation.model_map import number_map, read_number_table, read_polygons, table_beside
@@ -269,9 +268,7 @@ def _numbers_in_memory(models: ModelDeformation | TerrainModel | None) -> tuple[
     return held, {row["number"]: (row["left"], row["right"]) for row in rows}
 
 
-def _orientation(
-    record: Record, stated: Adjustment | PathLike | None
-) -> tuple[Orientation | None, str]:
+def _orientation(record: Record, stated: Adjustment | FilePath | None) -> tuple[Orientation | None, str]:
     """The orientation a DEM was made with, None for that of the result or without parameters; a doubt in a sentence."""
     from aerotri.deformation.orientation import given_orientation, orientation_of_result
     from aerotri.formats.results.orientations import block_with_orientations
@@ -299,7 +296,12 @@ def _correct(
     from aerotri.rasters.grids import NO_DATA, RasterWriter, write_raster
 
     no_data = NO_DATA if reader.no_data is None else reader.no_data
-    common = {"crs": reader.crs, "no_data": no_data, "options": reader.options, "threads": thread_count()}
+    common: dict[str, Any] = {
+        "crs": reader.crs,
+        "no_data": no_data,
+        "options": reader.options,
+        "threads": thread_count(),
+    }
     with (
         RasterWriter(spool.folder / DEM, reader.grid, reader.dtype, **common) as writer,
         RasterWriter(spool.folder / DZ, reader.grid, np.float32, **common) as dz_writer,

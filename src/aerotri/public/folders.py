@@ -6,7 +6,7 @@ import os
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 
 
 def refuse_foreign_entries(folder: Path, own: Collection[str], overwrite: bool = False) -> None:
@@ -53,6 +53,6 @@ def refuse_foreign_folder(folder: Path, *own: str) -> None:
         raise InputError(f"'{folder}' holds other files", "choose another --out, or an empty folder")
 
 
-def paths_of(given: str | os.PathLike | Sequence[str | os.PathLike]) -> list[Path]:
+def paths_of(given: FilePath | Sequence[FilePath]) -> list[Path]:
     """One path or several, as a list."""
     return [Path(given)] if isinstance(given, str | os.PathLike) else [Path(path) for path in given]

@@ -10,9 +10,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.public.adjustment import Adjustment
-from aerotri.public.blocks import PathLike
 from aerotri.public.folders import paths_of, refuse_existing_file, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.stated import StatedAdjustment
@@ -70,8 +69,8 @@ class IdealPhotographs:
         return f"<aerotri ideal photographs in {self.folder}: {len(self.summary['photographs'])}>"
 
     def _repr_html_(self) -> str:
-        shown = self.photographs._repr_html_() if self.summary["photographs"] else ""
-        return f"<div><b>{escape(str(self.folder))}</b>{self.groups._repr_html_()}{shown}</div>"
+        shown = self.photographs.html() if self.summary["photographs"] else ""
+        return f"<div><b>{escape(str(self.folder))}</b>{self.groups.html()}{shown}</div>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +83,9 @@ class _Job:
 
 
 def ideal_photographs(
-    result: Adjustment | PathLike,
-    photographs: PathLike | Sequence[PathLike] = (),
-    out: PathLike = "ideal",
+    result: Adjustment | FilePath,
+    photographs: FilePath | Sequence[FilePath] = (),
+    out: FilePath = "ideal",
     *,
     resampling: Resampling = RESAMPLING,
     compression: Compression = COMPRESSION,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.deformation.block_models import BlockDeformation
 from aerotri.deformation.model_grid import Deformation
 from aerotri.public.adjustment import Adjustment, open_result
@@ -122,7 +121,7 @@ class ModelDeformation:
             raise InputError("profiles are drawn of one model", "choose a pair or an end lap")
         return plot_deformation_profile(self.record, self.block)
 
-    def save(self, out: str | os.PathLike, plots: bool = True) -> Path:
+    def save(self, out: FilePath, plots: bool = True) -> Path:
         """Write rasters of dX, dY, dZ and their σ, deform.json and the plots into a folder.
 
         Raises
@@ -137,13 +136,13 @@ class ModelDeformation:
 
 
 def deform(
-    result: Adjustment | str | os.PathLike,
+    result: Adjustment | FilePath,
     *,
     pair: tuple[str, str] | None = None,
     end_lap: float | None = None,
     step: int = 1,
     variant: Variant = "free",
-    dem: str | os.PathLike | None = None,
+    dem: FilePath | None = None,
     spacing: float | None = None,
     gsd: float | None = None,
     group: str | None = None,
@@ -216,7 +215,9 @@ def _of_block(
     )
 
 
-def _refuse_contradictions(pair, end_lap, dem, gsd, group) -> None:
+def _refuse_contradictions(
+    pair: tuple[str, str] | None, end_lap: float | None, dem: FilePath | None, gsd: float | None, group: str | None
+) -> None:
     if pair is not None and end_lap is not None:
         raise InputError("a pair and an end lap are both given", "choose one of them")
     if end_lap is not None and dem is not None:
@@ -237,7 +238,7 @@ def refuse_without_errors(models: Restitution, name: str) -> None:
         raise InputError(f"'{name}' has no image errors, so its models are not deformed", remedy)
 
 
-def _ground(record: Record, dem: str | os.PathLike | None, stack: ExitStack) -> tuple[Ground, tuple[str, ...]]:
+def _ground(record: Record, dem: FilePath | None, stack: ExitStack) -> tuple[Ground, tuple[str, ...]]:
     """The DEM, open as long as the stack, or the level of the object points; and what was done with it."""
     from aerotri.deformation.model_grid import DemGround, FlatGround, mean_ground
     from aerotri.rasters.grids import RasterReader, horizontal_crs

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 
 if TYPE_CHECKING:
     from aerotri.functional_model.additional_parameters import ParameterDescription
@@ -44,7 +43,7 @@ def list_parameters(family: str | None = None) -> tuple[ParameterDescription, ..
     return tuple(d for d in describe() if family in (None, d.family))
 
 
-def draw_parameters(out: str | os.PathLike, family: str | None = None) -> tuple[str, ...]:
+def draw_parameters(out: FilePath, family: str | None = None) -> tuple[str, ...]:
     """Draw what the parameters do over the format of a camera: PNG and SVG files.
 
     Parameters

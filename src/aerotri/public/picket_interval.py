@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 import pyarrow as pa
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.public.adjustment import Adjustment, open_result
-from aerotri.public.blocks import PathLike
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.table import Table
 
@@ -71,7 +70,7 @@ class IntervalPrediction:
         return f"<aerotri.IntervalPrediction, GSD {self.gsd:.3f} m>"
 
     def _repr_html_(self) -> str:
-        return self.table._repr_html_()
+        return self.table.html()
 
 
 def picket_interval(
@@ -80,8 +79,8 @@ def picket_interval(
     scale: float | None = None,
     gsd: float | None = None,
     k: float | None = None,
-    pilot: Adjustment | PathLike | None = None,
-    photographs: PathLike | Sequence[PathLike] = (),
+    pilot: Adjustment | FilePath | None = None,
+    photographs: FilePath | Sequence[FilePath] = (),
     area: Corners | None = None,
     tolerance: float | None = None,
     progress: ProgressLike = None,
@@ -123,7 +122,7 @@ def picket_interval(
     stated = stated_gsd(scan_um, scale, gsd, pilot is not None, bool(files))
     if stated is not None:
         return by_formula(stated, k)
-    record = (pilot if isinstance(pilot, Adjustment) else open_result(cast(PathLike, pilot))).record
+    record = (pilot if isinstance(pilot, Adjustment) else open_result(cast(FilePath, pilot))).record
     with stage_report(progress) as report:
         return _by_pilot(record, files, area, tolerance, report)
 

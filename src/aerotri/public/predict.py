@@ -84,7 +84,7 @@ class VolumePrediction:
         return f"<aerotri.VolumePrediction: σ of the mean height {self.sigma_mean_height:.4f} m>"
 
     def _repr_html_(self) -> str:
-        return self.table._repr_html_()
+        return self.table.html()
 
 
 def volume(
@@ -198,7 +198,7 @@ class AttitudePrediction:
         return f"<aerotri.AttitudePrediction for {self.tolerance:.4g} m³>"
 
     def _repr_html_(self) -> str:
-        return self.table._repr_html_()
+        return self.table.html()
 
 
 def attitude(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
@@ -47,7 +47,7 @@ class StageReport:
 
 
 @contextmanager
-def stage_report(progress: ProgressLike) -> Iterator[StageReport]:
+def stage_report(progress: ProgressLike) -> Generator[StageReport]:
     """The report of what the user gave for `progress`; a bar is taken away at the end.
 
     Parameters
@@ -70,7 +70,7 @@ def _is_notebook() -> bool:
 
 
 @contextmanager
-def _notebook_bar() -> Iterator[Progress]:
+def _notebook_bar() -> Generator[Progress]:
     """A line that is written anew as the work goes on, and is taken away at the end."""
     display = import_module("IPython.display")
     line, shown, at = display.display(display.Pretty(""), display_id=True), "", 0.0
@@ -95,7 +95,7 @@ def _drawn(stage: str, share: float) -> str:
 
 
 @contextmanager
-def _bar() -> Iterator[Progress]:
+def _bar() -> Generator[Progress]:
     """A bar of rich, which knows terminals and notebooks."""
     from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar

@@ -10,9 +10,9 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.deformation.absorbed import AbsorptionFailedError
-from aerotri.public.blocks import PathLike, Sigmas
+from aerotri.public.blocks import Sigmas
 from aerotri.public.progress import Progress, ProgressLike, StageReport, stage_report
 from aerotri.public.run_steps import BLOCK, DTM, RECORD, REPORT, RESULT, Step, Verb, is_block, is_missing, steps_of
 from aerotri.results.failure import AdjustmentFailedError
@@ -89,24 +89,24 @@ class Project:
             f"<td>{escape(step.reason or str(self.folder / step.folder))}</td></tr>"
             for step in self.steps
         )
-        shown = [one._repr_html_() for one in (self.adjustment, self.surface, self.volume) if one is not None]
+        shown = [one.html() for one in (self.adjustment, self.surface, self.volume) if one is not None]
         return f"<div><table><caption>{escape(self.verdict)}</caption>{rows}</table>{''.join(shown)}</div>"
 
 
 def run(
-    source: PathLike,
-    out: PathLike | None = None,
+    source: FilePath,
+    out: FilePath | None = None,
     *,
-    control: PathLike | None = None,
+    control: FilePath | None = None,
     check: Sequence[str] = (),
     control_sigma_m: Sigmas | None = None,
     control_prefix: str = "",
-    positions: PathLike | None = None,
-    camera: PathLike | None = None,
+    positions: FilePath | None = None,
+    camera: FilePath | None = None,
     focal_length_mm: float | None = None,
     pixel_um: float | None = None,
     crs: str = "",
-    geoid: PathLike | None = None,
+    geoid: FilePath | None = None,
     seed: int = DEFAULTS.seed,
     parameters: str | None = None,
     interval: float | None = None,

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.observations import Block
-from aerotri.public.blocks import PathLike
 from aerotri.public.folders import refuse_existing_file, refuse_foreign_entries
 from aerotri.public.progress import ProgressLike, stage_report
 
@@ -50,7 +49,7 @@ class SimulatedBlock:
 
     def save(
         self,
-        out: PathLike,
+        out: FilePath,
         *,
         photographs: bool = False,
         only: Sequence[str] = (),
@@ -129,7 +128,7 @@ class SimulatedBlock:
         )
 
 
-def simulate(plan: PathLike | Mapping[str, Any], seed: int = 1) -> SimulatedBlock:
+def simulate(plan: FilePath | Mapping[str, Any], seed: int = 1) -> SimulatedBlock:
     """A block with known truth, from a flight plan.
 
     Parameters

@@ -7,12 +7,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from aerotri.conventions import FilePath
 from aerotri.public.adjustment import Adjustment, open_result
-from aerotri.public.blocks import PathLike
 
 if TYPE_CHECKING:
     from aerotri.results.adjustment import Adjustment as Record
-
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +23,7 @@ class StatedAdjustment:
     source : a result, or its folder.
     """
 
-    source: Adjustment | PathLike
+    source: Adjustment | FilePath
 
     @cached_property
     def record(self) -> Record:

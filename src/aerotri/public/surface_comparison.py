@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.surfaces import Surface, as_surface
@@ -99,7 +99,7 @@ class SurfaceComparison:
 
         return plot_comparison(self.record, f"{self.test} − {self.control}")
 
-    def save(self, out: str | os.PathLike, plots: bool = True) -> Path:
+    def save(self, out: FilePath, plots: bool = True) -> Path:
         """Write compare.json, the raster of the differences and the plot into a folder.
 
         Parameters
@@ -127,7 +127,7 @@ class SurfaceComparison:
         moved = f"<p>{escape(self.record.alignment_text)}</p>" if self.record.alignment_text else ""
         return (
             f"<div><b>{escape(self.test)} − {escape(self.control)}</b>, {100.0 * self.coverage:.1f} % of the control "
-            f"covered{moved}{self.statistics._repr_html_()}</div>"
+            f"covered{moved}{self.statistics.html()}</div>"
         )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.public.folders import refuse_existing_file
 from aerotri.public.optional import optional_module
 from aerotri.rasters.grids import Grid
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from aerotri.rasters.metric import MetricReader
 
     Reader: TypeAlias = MetricReader | HeldRaster
-    SurfaceLike: TypeAlias = "Surface | TerrainModel | str | os.PathLike"
+    SurfaceLike: TypeAlias = "Surface | TerrainModel | FilePath"
 
 Layer = Literal["dsm", "dtm"]
 BYTES_OF_CELL = 32
@@ -49,7 +49,7 @@ class Surface:
     (4, 100.0)
     """
 
-    source: Heights | str | os.PathLike
+    source: Heights | FilePath
     crs: str | None = None
     name: str = ""
 
@@ -163,7 +163,7 @@ class Surface:
         """
         return dataset_of({"": self}, self._crs_text())
 
-    def save(self, path: str | os.PathLike, overwrite: bool = False) -> Path:
+    def save(self, path: FilePath, overwrite: bool = False) -> Path:
         """Write heights and σ as the two bands of a cloud-optimised GeoTIFF.
 
         Parameters
@@ -197,6 +197,10 @@ class Surface:
         return f"<aerotri.Surface {self.label!r}, {'in memory' if self.path is None else self.path}>"
 
     def _repr_html_(self) -> str:
+        return self.html()
+
+    def html(self) -> str:
+        """Name, size and heights, as a notebook shows them."""
         from html import escape
 
         g, z = self.grid, self.z

@@ -1,5 +1,8 @@
 """A table of a result: Arrow underneath, pandas and geopandas where they are installed."""
 
+# pyright: reportUnknownParameterType=false
+# (pyarrow has no types: what is annotated as its Table or Array is unknown to pyright)
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -114,6 +117,9 @@ class Table:
         return f"<aerotri.Table '{self.name}': {len(self)} rows of {', '.join(self.columns)}>"
 
     def _repr_html_(self) -> str:
+        return self.html()
+
+    def html(self) -> str:
         """The first rows, as a notebook shows them."""
         shown = self.arrow.slice(0, SHOWN_ROWS)
         units = [self.units.get(column, "") for column in self.columns]

@@ -1,5 +1,8 @@
 """The tables of an adjusted block; their columns are those of the written files."""
 
+# pyright: reportUnknownParameterType=false
+# (pyarrow has no types: what is annotated as its Table or Array is unknown to pyright)
+
 from __future__ import annotations
 
 from collections.abc import Mapping

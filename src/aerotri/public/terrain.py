@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.public.adjustment import Adjustment, open_result
-from aerotri.public.blocks import PathLike
 from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.surfaces import Surface, dataset_of
@@ -136,7 +135,7 @@ class TerrainModel:
         """
         return dataset_of({"dsm": self.dsm, "dtm": self.dtm}, self._crs_of_rasters)
 
-    def save(self, out: PathLike, plots: bool = True) -> Path:
+    def save(self, out: FilePath, plots: bool = True) -> Path:
         """Write pickets, surfaces, dtm.json and the plots into a folder.
 
         Parameters
@@ -168,17 +167,21 @@ class TerrainModel:
         return f"<aerotri terrain model of {self.block!r}: {p['accepted']} of {p['seen']} pickets accepted>"
 
     def _repr_html_(self) -> str:
+        return self.html()
+
+    def html(self) -> str:
+        """Pickets and σ, as a notebook shows them."""
         s = self.summary
         p, sigma = s["pickets"], s["sigma_Z_m"]
         return (
             f"<div><b>{escape(self.block)}</b>: {p['accepted']} of {p['seen']} pickets accepted, every "
-            f"{s['interval_m']:g} m, σ of Z {sigma['median']:.3f} m (median){self.dsm._repr_html_()}</div>"
+            f"{s['interval_m']:g} m, σ of Z {sigma['median']:.3f} m (median){self.dsm.html()}</div>"
         )
 
 
 def terrain(
-    result: Adjustment | PathLike,
-    photographs: PathLike | Sequence[PathLike],
+    result: Adjustment | FilePath,
+    photographs: FilePath | Sequence[FilePath],
     *,
     interval: float | None = DEFAULTS.interval,
     cell: float | None = DEFAULTS.cell,
@@ -191,7 +194,7 @@ def terrain(
     agreeing: float = DEFAULTS.agreeing,
     edge: float | None = DEFAULTS.edge,
     most_photographs: int = DEFAULTS.most_photographs,
-    breaklines: PathLike | None = DEFAULTS.breaklines,
+    breaklines: FilePath | None = DEFAULTS.breaklines,
     ideal: bool = DEFAULTS.ideal,
     progress: ProgressLike = None,
 ) -> TerrainModel:
@@ -240,7 +243,7 @@ def terrain(
 
 
 def measure_terrain(
-    result: Adjustment | PathLike, photographs: Sequence[Path], settings: TerrainSettings, progress: ProgressLike = None
+    result: Adjustment | FilePath, photographs: Sequence[Path], settings: TerrainSettings, progress: ProgressLike = None
 ) -> TerrainModel:
     """As `terrain`, with the settings in one record.
 

@@ -10,7 +10,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.public.blocks import PathLike, Sigmas, text_of_path
+from aerotri.conventions import FilePath
+from aerotri.public.blocks import Sigmas, text_of_path
 from aerotri.public.folders import refuse_foreign_entries, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.tie_points.settings import DEFAULTS, TiePointSettings
@@ -63,7 +64,7 @@ class TiedPhotographs:
         """What was matched, assumed or left out, in sentences."""
         return self.record.messages
 
-    def summary(self, folder: PathLike | None = None) -> dict[str, Any]:
+    def summary(self, folder: FilePath | None = None) -> dict[str, Any]:
         """The content of tiepoints.json.
 
         Parameters
@@ -76,7 +77,7 @@ class TiedPhotographs:
         page = "" if folder is None or self.given.control is None else str(Path(folder) / MARKS / PAGE)
         return tie_points_json(self.record, self.seconds) | {"marking_page": page}
 
-    def save(self, out: PathLike, *, overwrite: bool = False, progress: ProgressLike = None) -> Path:
+    def save(self, out: FilePath, *, overwrite: bool = False, progress: ProgressLike = None) -> Path:
         """Write the block's folder, tiepoints.json, and a page to mark control points in.
 
         Parameters
@@ -131,18 +132,18 @@ class TiedPhotographs:
 
 
 def tie_points(
-    photographs: PathLike,
+    photographs: FilePath,
     *,
-    control: PathLike | None = None,
+    control: FilePath | None = None,
     check: tuple[str, ...] | list[str] = (),
-    positions: PathLike | None = None,
-    orientation: PathLike | None = None,
-    camera: PathLike | None = None,
+    positions: FilePath | None = None,
+    orientation: FilePath | None = None,
+    camera: FilePath | None = None,
     focal_length_mm: float | None = None,
     pixel_um: float | None = None,
     free_interior: bool = False,
     crs: str = "",
-    geoid: PathLike | None = None,
+    geoid: FilePath | None = None,
     control_sigma_m: Sigmas | None = None,
     control_prefix: str = "",
     mark_sigma_px: float = DEFAULTS.mark_sigma_px,
@@ -154,7 +155,7 @@ def tie_points(
     feature_size: int = DEFAULTS.feature_size,
     neighbours: int = DEFAULTS.neighbours,
     seed: int = DEFAULTS.seed,
-    cache: PathLike | None = None,
+    cache: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> TiedPhotographs:
     """From photographs to a block: tie points, first orientation, control.

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.files.spool import Spool
-from aerotri.public.blocks import PathLike
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.stated import StatedAdjustment
 from aerotri.public.volume_result import THICKNESS, MeasuredVolume
@@ -30,25 +29,24 @@ if TYPE_CHECKING:
     from aerotri.volume.thickness import ThicknessMap
 
 
-
 def volume(
     surface: SurfaceLike,
-    boundary: BaseGeometry | PathLike | None = None,
+    boundary: BaseGeometry | FilePath | None = None,
     *,
     base: SurfaceLike | float = BASE,
     method: Method = METHOD,
     section_spacing: float | None = SECTIONS.spacing,
     azimuth: float = SECTIONS.azimuth,
-    adjustment: Adjustment | PathLike | None = None,
-    pickets: Table | PathLike | None = None,
-    base_adjustment: Adjustment | PathLike | None = None,
-    base_pickets: Table | PathLike | None = None,
+    adjustment: Adjustment | FilePath | None = None,
+    pickets: Table | FilePath | None = None,
+    base_adjustment: Adjustment | FilePath | None = None,
+    base_pickets: Table | FilePath | None = None,
     matching_sigma_um: float | None = SIGMA.matching_sigma_um,
     matching_window: float = SIGMA.matching_window_m,
     base_sigma: float = SIGMA.base_sigma,
     boundary_sigma: float = SIGMA.boundary_sigma,
     corrected: bool = SIGMA.corrected,
-    scratch: PathLike | None = None,
+    scratch: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> MeasuredVolume:
     """The volume between a surface and a base, cut and fill, by several methods; with an adjustment its σ.
@@ -112,7 +110,7 @@ class _Asked:
     top: MeasuredSurface
     below: MeasuredSurface | None
     base: SurfaceLike | float
-    boundary: BaseGeometry | PathLike | None
+    boundary: BaseGeometry | FilePath | None
     method: Method
     plan: SectionPlan
     options: SigmaOptions
@@ -125,12 +123,17 @@ def is_surface(base: SurfaceLike | float) -> TypeGuard[SurfaceLike]:
     return is_raster(base) if isinstance(base, str) else not isinstance(base, int | float)
 
 
-def _refuse_contradictions(adjustment, pickets, base_adjustment, base_pickets) -> None:
+def _refuse_contradictions(
+    adjustment: Adjustment | FilePath | None,
+    pickets: Table | FilePath | None,
+    base_adjustment: Adjustment | FilePath | None,
+    base_pickets: Table | FilePath | None,
+) -> None:
     if adjustment is None and not (pickets is None and base_adjustment is None and base_pickets is None):
         raise InputError("pickets, base_pickets and base_adjustment belong to an adjustment", "give the adjustment")
 
 
-def _stated(adjustment: Adjustment | PathLike | None) -> StatedAdjustment | None:
+def _stated(adjustment: Adjustment | FilePath | None) -> StatedAdjustment | None:
     return None if adjustment is None else StatedAdjustment(adjustment)
 
 
@@ -159,7 +162,7 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     return MeasuredVolume(volumes, boundary, content, thickness, profiles, spool, notes)
 
 
-def _boundary(stated: BaseGeometry | PathLike | None, reader: Reader) -> Boundary:
+def _boundary(stated: BaseGeometry | FilePath | None, reader: Reader) -> Boundary:
     from shapely.geometry.base import BaseGeometry
 
     from aerotri.volume.boundary import boundary_of, boundary_of_grid, read_boundary

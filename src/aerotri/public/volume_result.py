@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.conventions import InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.surfaces import Surface
 from aerotri.public.table import Table
@@ -176,7 +175,7 @@ class MeasuredVolume:
         """Plots, each a matplotlib Figure."""
         return VolumePlots(self.record, self.boundary, self.summary, self.map, self.profiles)
 
-    def save(self, out: str | os.PathLike, plots: bool = True) -> Path:
+    def save(self, out: FilePath, plots: bool = True) -> Path:
         """Write volume.json, the raster of the thickness, the sections, the plots and the page into a folder.
 
         Parameters
@@ -202,10 +201,14 @@ class MeasuredVolume:
         return f"<aerotri volume of {self.summary['dtm']!r}: net {self.net:.6g}{sure} m³>"
 
     def _repr_html_(self) -> str:
+        return self.html()
+
+    def html(self) -> str:
+        """The volume, as a notebook shows it."""
         s = self.summary
         sure = "" if self.sigma is None else f" ± {self.sigma:.4g} (1 σ)"
         warnings = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
-        parts = "" if self.sigma is None else self.parts._repr_html_()
+        parts = "" if self.sigma is None else self.parts.html()
         return (
             f"<div><b>{escape(s['dtm'])}: net {self.net:.6g} m³{sure}</b>, cut {self.cut:.6g}, fill {self.fill:.6g} m³ "
             f"over {escape(s['base']['name'])}, {self.area:.6g} m² inside {escape(s['boundary']['name'])}"

@@ -9,8 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aerotri.conventions import InputError
-from aerotri.public.blocks import PathLike
+from aerotri.conventions import FilePath, InputError
 from aerotri.public.models import check_crs
 from aerotri.public.stated import StatedAdjustment
 from aerotri.public.surfaces import Surface, as_surface
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
     from aerotri.volume.settings import SigmaOptions
 
 
-
 @dataclass(frozen=True, eq=False)
 class MeasuredSurface:
     """A surface, and what it was measured with as far as it is stated.
@@ -41,7 +39,7 @@ class MeasuredSurface:
 
     given: SurfaceLike
     adjustment: StatedAdjustment | None = None
-    pickets: PathLike | Table | None = None
+    pickets: FilePath | Table | None = None
 
     @cached_property
     def surface(self) -> Surface:
@@ -54,7 +52,7 @@ class MeasuredSurface:
         return not isinstance(self.given, Surface | str | os.PathLike)
 
     @property
-    def points(self) -> PathLike | Table | None:
+    def points(self) -> FilePath | Table | None:
         """The points measured: as stated, or those of a terrain model."""
         if self.pickets is None and not isinstance(self.given, Surface | str | os.PathLike):
             return self.given.pickets
@@ -155,7 +153,7 @@ def adjustment_of_base(
 
 
 def surface_part(
-    record: Record, heights: Heights, points: PathLike | Table | None, boundary: Boundary, base: Base | None,
+    record: Record, heights: Heights, points: FilePath | Table | None, boundary: Boundary, base: Base | None,
     options: SigmaOptions,
 ) -> Part:  # fmt: skip
     """The share of a surface in σ: of the points it was measured at where they are known, else of all its cells.
