@@ -42,7 +42,7 @@ class Saved:
         out.mkdir(parents=True, exist_ok=True)
         (out / "tiepoints.json").write_text('{"messages": ["<script>x</script>"], "rays": 12}')
 
-    def _repr_html_(self):
+    def html(self):
         return "<p>saved</p>"
 
 
@@ -50,7 +50,7 @@ def adjusted(verdict, status="converged"):
     outcome = SimpleNamespace(verdict=verdict, status=status, reasons=("σ₀ is 522",), message="")
     return SimpleNamespace(
         verdict=verdict, status=status, block="adjusted", notes=(), reasons=outcome.reasons,
-        adjusted=SimpleNamespace(outcome=outcome), _repr_html_=lambda: "<p>adjusted</p>",
+        adjusted=SimpleNamespace(outcome=outcome), html=lambda: "<p>adjusted</p>",
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from aerotri.adjustment import _covariance_kernels, _kernels, _point_kernels
 from aerotri.adjustment.chunk_sums import ChunkSums, add_gaps, add_own_squares, add_squares
 from aerotri.adjustment.datum import ExtraObservations, free_motions, observes_centres, without_motion
 from aerotri.adjustment.field_prior import FieldPrior, field_prior
-from aerotri.adjustment.kernel_records import Directions, Inverse, Pairs, Points, Problem, Table, Values, Weighting
+from aerotri.adjustment.kernel_records import Directions, Inverse, Pairs, Points, Problem, Table, Values, Weighting, Work
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.robust import Estimator, normalised_lengths
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, InverseOnPattern, Symbolic
@@ -307,7 +307,7 @@ class NormalSystem:
             cofactor[row] = inverse.corner[np.ix_(columns, columns)]
         return cofactor, redundancy
 
-    def over_points(self, problem: Problem, kernel: Callable[..., object]) -> None:
+    def over_points(self, problem: Problem, kernel: Callable[[int, int, Problem, Work], object]) -> None:
         """kernel(first, last, problem, work) over ranges of points, in threads."""
         run_chunks(lambda k: kernel(*self._bounds[k], problem, self._work()), len(self._bounds))
 

@@ -23,7 +23,7 @@ def crosscheck(
     adjust : adjusts a block; needed again for blocks freed of systematic errors or with fixed weights.
     report : called with what is being done.
     """
-    tell = report or (lambda text: None)
+    tell: Callable[[str], None] = report or (lambda text: None)
     tell("adjusting through pycolmap")
     colmap = _colmap(adjusted, adjust)
     tell("adjusting by the independent model")

@@ -176,7 +176,7 @@ def _of_photographs(block: Block, search: _Search) -> tuple[str, ...]:
     found = try_photographs(block, model)
     if not found:
         return ()
-    tried = []
+    tried: list[tuple[Trial, list[Hypothesis]]] = []
     for choice in range(max(len(trial.hypotheses) for trial in found)):
         chosen = [trial.hypotheses[min(choice, len(trial.hypotheses) - 1)] for trial in found]
         better = block
@@ -212,7 +212,7 @@ def _of_the_block(block: Block, search: _Search) -> tuple[str, ...]:
     model, local = search.model, search.local(block)
     now = None if local is None else fit(gather(local, model))
     cost_now = np.inf if now is None or now.placed is None else now.cost
-    candidates = []
+    candidates: list[_Candidate] = []
     for hypothesis in _hypotheses(block, local, model, now):
         if search.is_over:
             break

@@ -174,7 +174,7 @@ def compare(first: AdjustedBlock, second: AdjustedBlock) -> Comparison:
 def _outcome(first: AdjustedBlock, second: AdjustedBlock) -> tuple[Change, ...]:
     names = ("status", "sigma0", "sigma0_um", "vtpv", "iterations", "observations", "unknowns", "redundancy")
     changes = [Change(name, getattr(first.outcome, name), getattr(second.outcome, name)) for name in names]
-    counts = [
+    counts: list[tuple[str, Callable[[AdjustedBlock], int]]] = [
         ("photographs adjusted", lambda run: int((run.images.rays > 0).sum())),
         ("points adjusted", lambda run: int((run.points.rays > 0).sum())),
         ("rays used", lambda run: int(run.images.rays.sum())),

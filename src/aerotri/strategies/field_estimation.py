@@ -147,10 +147,13 @@ def estimate_covariance(
         bounds = start.sigma_um / MOST_CHANGE, start.sigma_um * MOST_CHANGE
         return FieldCovariance(given.sigma_um or float(np.clip(sigma, *bounds)), length)
 
+    def deviance(x: np.ndarray) -> float:
+        return reduced.deviance(covariance(x))
+
     first = np.array([np.log(start.sigma_um**2 / start.length_mm), np.log(start.length_mm)])
     corners = first + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.7]])
     options = {"initial_simplex": corners, "xatol": 0.02, "fatol": 0.02, "maxfev": 120}
-    found = minimize(lambda x: reduced.deviance(covariance(x)), first, method="Nelder-Mead", options=options)
+    found = minimize(deviance, first, method="Nelder-Mead", options=options)
     return covariance(found.x)
 
 

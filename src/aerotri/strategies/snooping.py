@@ -179,7 +179,11 @@ def _counting(options: SolveOptions, done: int) -> SolveOptions:
     report = options.report
     if report is None:
         return replace(options, robust="off")
-    return replace(options, robust="off", report=lambda k, cost, damping: report(done + k, cost, damping))
+
+    def counted(k: int, cost: float, damping: float) -> None:
+        report(done + k, cost, damping)
+
+    return replace(options, robust="off", report=counted)
 
 
 def _finished(prepared: Prepared, stand: _Stand, options: SolveOptions) -> Snooped:

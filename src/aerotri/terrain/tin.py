@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -127,6 +128,10 @@ def _delaunay(plan: np.ndarray) -> Delaunay:
         raise InputError("the points lie on a line and make no surface", "measure pickets in an area") from error
 
 
+def _plan_distance(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.hypot(*(b - a)[:2]))
+
+
 def _segments(lines: Sequence[np.ndarray]) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """Corners of the lines and of their crossings, (k, 3), and the pieces between them by their numbers."""
     points, pieces = [], []
@@ -154,7 +159,7 @@ def _segments(lines: Sequence[np.ndarray]) -> tuple[np.ndarray, list[tuple[int, 
         return number[key]
 
     for (a, b), between in zip(pieces, cuts, strict=True):
-        along = sorted([a, *between, b], key=lambda p, a=a: float(np.hypot(*(p - a)[:2])))
+        along = sorted([a, *between, b], key=partial(_plan_distance, a))
         numbers = [at(p) for p in along]
         segments += [(m, n) for m, n in pairwise(numbers) if m != n]
     return np.array(points), segments

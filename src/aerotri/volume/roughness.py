@@ -266,10 +266,14 @@ def _likeliest(xy: np.ndarray, z: np.ndarray, noise: float, smoothest: float) ->
         if noise == 0.0:
             return minus(np.log(start)), start
         best = minimize_scalar(minus, bounds=(np.log(start) - 25.0, np.log(start) + 1.0), method="bounded")
-        return float(best.fun), float(np.exp(best.x))
+        # scipy has no types, and what is inferred for its results changes with the order of the files
+        return float(best.fun), float(np.exp(best.x))  # pyright: ignore[reportAttributeAccessIssue]
 
-    exponent = _not_whole(float(minimize_scalar(lambda h: fit(h)[0], bounds=(ROUGHEST, smoothest), method="bounded",
-                                                options={"xatol": 0.01}).x))  # fmt: skip
+    def of_exponent(h: float) -> float:
+        return fit(h)[0]
+
+    found = minimize_scalar(of_exponent, bounds=(ROUGHEST, smoothest), method="bounded", options={"xatol": 0.01})
+    exponent = _not_whole(float(found.x))  # pyright: ignore[reportAttributeAccessIssue]
     return Roughness(float(np.sqrt(fit(exponent)[1])) / size**exponent, exponent)
 
 

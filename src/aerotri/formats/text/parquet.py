@@ -66,5 +66,5 @@ def _is_text(kind: pa.DataType) -> bool:
     import pyarrow as pa
 
     # pyarrow 15 has no string views yet
-    is_view = getattr(pa.types, "is_string_view", lambda _: False)
-    return pa.types.is_string(kind) or pa.types.is_large_string(kind) or is_view(kind)
+    is_view = hasattr(pa.types, "is_string_view") and pa.types.is_string_view(kind)
+    return pa.types.is_string(kind) or pa.types.is_large_string(kind) or is_view

@@ -64,7 +64,7 @@ class ParameterSet:
         """Acting patterns at points; `index` counts within `items`, what belongs to items not chosen is zero."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         if not self.items:
-            return dense_terms(x, y, 0, partials, lambda *_: None)
+            return dense_terms(x, y, 0, partials, lambda x, y, value, partial: None)
         return LINEAR_FAMILIES[self.family].terms(self.camera, x, y, partials, self.items)
 
     def basis(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -153,11 +153,21 @@ def per_inch_for(lengths: np.ndarray, longest_inch: float) -> tuple[float, float
     return longest / longest_inch, nice_number(longest)
 
 
+def coordinate_text(value: float, place: int | None = None) -> str:
+    """A coordinate in full with the minus sign of print; `place` is its number among the ticks of an axis."""
+    return f"{value:.10g}".replace("-", "−")
+
+
+def value_text(value: float, place: int | None = None) -> str:
+    """A number of up to six digits with the minus sign of print; `place` as in `coordinate_text`."""
+    return f"{value:g}".replace("-", "−")
+
+
 def coordinate_axes(axes: Axes, width: float, height: float, labels: tuple[str, str]) -> None:
     """Round, whole coordinates along axes of so many inches, and their labels."""
     axes.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 1.0)), steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(max(2, int(height / 0.7)), steps=[1, 2, 5, 10]))
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.10g}".replace("-", "−")))
+        axis.set_major_formatter(FuncFormatter(coordinate_text))
     axes.set_xlabel(labels[0])
     axes.set_ylabel(labels[1])

@@ -27,6 +27,7 @@ from aerotri.report.plots.canvas import (
     new_figure,
     plain,
     styled,
+    value_text,
 )
 
 MEANING = {"free": "orientation of the self-calibrated block", "absorbed": "orientation adjusted without parameters"}
@@ -185,7 +186,7 @@ def _contours(axes: Axes, view: _View, dz: np.ndarray, interval: float) -> None:
         values = np.ma.masked_array(dz, ~region | ~np.isfinite(dz))
         lines = axes.contour(*view.at, values, levels=levels, colors=INK, linestyles=styles, linewidths=widths,
                              zorder=3)  # fmt: skip
-        axes.clabel(lines, fmt=lambda value: f"{value:g}".replace("-", "−"), fontsize=7, inline=True, inline_spacing=2)
+        axes.clabel(lines, fmt=value_text, fontsize=7, inline=True, inline_spacing=2)
 
 
 def contour_symbols(seams: bool) -> list[Line2D]:
@@ -260,7 +261,7 @@ def _mark_seam(axes: Axes, d: BlockDeformation, seam: Seam, number: int) -> None
 
 
 def _minus(axes: Axes) -> None:
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "−")))
+    axes.yaxis.set_major_formatter(FuncFormatter(value_text))
 
 
 def _legend(figure: Figure, handles: list[Line2D], columns: int) -> None:

@@ -23,6 +23,7 @@ from aerotri.report.plots.canvas import (
     new_figure,
     plain,
     styled,
+    value_text,
 )
 from aerotri.terrain.compare import Comparison
 from aerotri.terrain.dtm import TerrainOutcome
@@ -168,7 +169,7 @@ def plot_comparison(comparison: Comparison, title: str) -> Figure:
     histogram.set_xlabel("difference [m], line: normal, σ = NMAD")
     histogram.set_yticks([])
     histogram.spines[["top", "right", "left"]].set_visible(False)
-    histogram.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}".replace("-", "−")))
+    histogram.xaxis.set_major_formatter(FuncFormatter(value_text))
     return figure
 
 
@@ -201,7 +202,7 @@ def _contours(axes: Axes, grid: Grid, z: np.ndarray) -> None:
     x, y = grid.x(np.arange(0, grid.columns, every)), grid.y(np.arange(0, grid.rows, every))
     levels = MaxNLocator(8, steps=[1, 2, 5, 10]).tick_values(float(shown.min()), float(shown.max()))
     lines = axes.contour(x, y, shown, levels=levels, colors=INK, linewidths=0.6)
-    axes.clabel(lines, fmt=lambda value: f"{value:g}".replace("-", "−"), fontsize=7, inline_spacing=2)
+    axes.clabel(lines, fmt=value_text, fontsize=7, inline_spacing=2)
 
 
 def _coordinates(axes: Axes, width: float, height: float, local: bool, labels: tuple[str, str] | None = None) -> None:
@@ -210,4 +211,4 @@ def _coordinates(axes: Axes, width: float, height: float, local: bool, labels: t
 
 
 def _signed(axes: Axes) -> None:
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "−")))
+    axes.yaxis.set_major_formatter(FuncFormatter(value_text))

@@ -14,7 +14,18 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from aerotri.report.plots.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, plain, styled
+from aerotri.report.plots.canvas import (
+    ACCENT,
+    GREY,
+    INK,
+    LIGHT,
+    WIDTH,
+    axes_at,
+    coordinate_text,
+    new_figure,
+    plain,
+    styled,
+)
 from aerotri.report.quality import two_digits, with_sigma
 from aerotri.volume.accuracy import PARTS
 from aerotri.volume.boundary import Boundary
@@ -74,7 +85,7 @@ def plot_thickness(found: ThicknessMap, boundary: Boundary, volumes: Volumes, co
     bar = figure.colorbar(image, cax=scale)
     bar.set_label("surface − base [m]")
     scale.set_ylim(0.0 if finite.min() >= 0.0 else -size, 0.0 if finite.max() <= 0.0 else size)
-    scale.yaxis.set_major_formatter(FuncFormatter(_minus))
+    scale.yaxis.set_major_formatter(FuncFormatter(coordinate_text))
     handles = [Line2D([], [], color=INK, lw=1.4, label="boundary"),
                Line2D([], [], color=GREY, lw=0.7, ls=(0, (4, 3)), label="sections drawn")]  # fmt: skip
     if finite.min() < 0.0 < finite.max():
@@ -130,7 +141,7 @@ def _bars(axes: Axes, labels: list[str], values: list[float], texts: list[str], 
     axes.set_xlim(0.0, 1.35 * max(float(size.max()), 1e-9))
     axes.set_ylim(-len(labels) + 0.4, 0.6)
     axes.xaxis.set_major_locator(MaxNLocator(4))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: _count(value)))
+    axes.xaxis.set_major_formatter(FuncFormatter(_count))
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(axis="y", length=0)
 
@@ -151,7 +162,7 @@ def plot_section_areas(sections: Sections, name: str) -> Figure:
     axes.margins(x=0.01)
     axes.set_xlabel("station [m]")
     axes.set_ylabel("area [m²]")
-    axes.yaxis.set_major_formatter(FuncFormatter(_minus))
+    axes.yaxis.set_major_formatter(FuncFormatter(coordinate_text))
     axes.spines[["top", "right"]].set_visible(False)
     handles = [Line2D([], [], color=CUT, label="cut"), Line2D([], [], color=FILL, ls="--", label="fill (downwards)")]
     figure.legend(handles=handles, loc="center left", bbox_to_anchor=(0.9 / WIDTH, 0.14 / 3.2), ncols=2)
@@ -200,16 +211,12 @@ def _coordinates(axes: Axes, width: float, height: float, crs: str) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 1.1)), steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(max(2, int(height / 0.8)), steps=[1, 2, 5, 10]))
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(FuncFormatter(_minus))
+        axis.set_major_formatter(FuncFormatter(coordinate_text))
     axes.set_xlabel("E [m]" if crs else "X [m]")
     axes.set_ylabel("N [m]" if crs else "Y [m]")
 
 
-def _count(value: float) -> str:
+def _count(value: float, place: int | None = None) -> str:
     """A number of cubic metres with thin spaces between thousands; small ones with three digits."""
     text = f"{value:,.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
     return text.replace(",", "\u2009").replace("-", "−")
-
-
-def _minus(value: float, _: int | None = None) -> str:
-    return f"{value:.10g}".replace("-", "−")
