@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from aerotri.report.plots.canvas import FRAME, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, plain, styled
 from aerotri.results.parameter_comparison import ParameterComparison, SetOutcome
@@ -53,7 +53,7 @@ def _draw_axis(axes: Axes, outcomes: list[SetOutcome], k: int) -> None:
         if np.isfinite(o.control.rms[k]):
             axes.plot(o.control.rms[k], row, "s", mfc="white", mec=GREY, mew=1.1, ms=5, zorder=4)
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=6))
-    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.xaxis.set_major_formatter(FuncFormatter(_tick))
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.tick_params(axis="x", which="minor", length=0)
     axes.grid(axis="x", color=LIGHT, lw=0.4)
@@ -66,3 +66,7 @@ def _legend(figure: Figure, height: float) -> None:
         Line2D([], [], color=GREY, marker="s", mfc="white", ms=5, lw=0, label="control points, predicted"),
     ]
     figure.legend(handles=handles, loc="lower right", bbox_to_anchor=(1 - 0.2 / WIDTH, 0.12 / height), ncols=2)
+
+
+def _tick(value: float, place: int | None = None) -> str:
+    return f"{value:g}"
