@@ -12,7 +12,17 @@ from aerotri.adjustment import _covariance_kernels, _kernels, _point_kernels
 from aerotri.adjustment.chunk_sums import ChunkSums, add_gaps, add_own_squares, add_squares
 from aerotri.adjustment.datum import ExtraObservations, free_motions, observes_centres, without_motion
 from aerotri.adjustment.field_prior import FieldPrior, field_prior
-from aerotri.adjustment.kernel_records import Directions, Inverse, Pairs, Points, Problem, Table, Values, Weighting, Work
+from aerotri.adjustment.kernel_records import (
+    Directions,
+    Inverse,
+    Pairs,
+    Points,
+    Problem,
+    Table,
+    Values,
+    Weighting,
+    Work,
+)
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.robust import Estimator, normalised_lengths
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, InverseOnPattern, Symbolic
