@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aerotri import pipeline
 from aerotri.adjustment.prepare import prepare
 from aerotri.adjustment.ray_status import RayStatus
 from aerotri.adjustment.robust import LEAST_SQUARES
@@ -13,7 +12,7 @@ from aerotri.adjustment.weak_geometry import loose_in_block
 from aerotri.formats.results.adjustment import image_columns, point_columns
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import ImagePoints
-from aerotri.pipeline import adjust
+from aerotri.pipeline import adjust, local
 from aerotri.statistics.summarise import summarise
 from small_blocks import small_block, with_adjustment
 
@@ -132,7 +131,7 @@ def with_point_of_a_weak_photograph(robust):
 def counted(monkeypatch):
     """The calls of `summarise`, each of which forms a covariance."""
     calls = []
-    monkeypatch.setattr(pipeline, "summarise", lambda *a: calls.append(1) or summarise(*a))
+    monkeypatch.setattr(local, "summarise", lambda *a: calls.append(1) or summarise(*a))
     return calls
 
 

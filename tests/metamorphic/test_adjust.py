@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from transformations import about_z, both, largest_difference, moved, numbers_of, permuted, renamed, same
 
-from aerotri import pipeline
 from aerotri.functional_model.additional_parameters import AUTO, parse_parameters
 from aerotri.observations import GnssSettings
 from aerotri.observations.block import Edits
-from aerotri.pipeline import adjust
+from aerotri.pipeline import adjust, chain
 from small_blocks import ERRING, small_block, with_adjustment
 
 ALL = 1e-9
@@ -148,7 +147,7 @@ def test_variance_components():
 def few_sets(monkeypatch, order=1):
     """The choice among four sets, in their order or the other way round."""
     specs = ("none", "bluh:1-12", "brown", "ebner")[::order]
-    monkeypatch.setattr(pipeline, "candidate_sets", lambda block: tuple(parse_parameters(spec) for spec in specs))
+    monkeypatch.setattr(chain, "candidate_sets", lambda block: tuple(parse_parameters(spec) for spec in specs))
 
 
 def test_parameters_chosen_by_the_program(monkeypatch):

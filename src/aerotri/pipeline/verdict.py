@@ -1,0 +1,55 @@
+"""What is to be thought of a result, and which usual mistake explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from aerotri.conventions import FilePath, InputError
+from aerotri.coordinates.blocks import frame_of_block
+from aerotri.diagnosis import diagnose, judge
+from aerotri.diagnosis.check_points import in_doubt
+from aerotri.observations import Block
+from aerotri.results.adjusted_block import AdjustedBlock, Outcome
+from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.check_freedom import check_freedom
+
+
+def judged(found: Adjustment) -> Adjustment:
+    """The adjustment with the verdict over it."""
+    if found.local.block.settings.adjustment.datum == "control" and in_doubt(found.local):
+        factor = found.system.factorise(found.solution.equations)
+        freedom = check_freedom(found.system, found.solution, factor, found.local)
+        local = replace(found.local, check=replace(found.local.check, freedom=freedom))
+        found = replace(found, local=local, result=local if found.frame is None else found.result)
+    verdict = judge(found.local)
+    outcome = replace(found.result.outcome, verdict=verdict.level, reasons=verdict.reasons)
+    return with_outcome(found, outcome)
+
+
+def with_outcome(found: Adjustment, outcome: Outcome) -> Adjustment:
+    """The adjustment with another outcome, in both frames."""
+    result = replace(found.result, outcome=outcome)
+    local = replace(found.local, outcome=outcome) if found.frame is not None else result
+    return replace(found, result=result, local=local)
+
+
+def causes(
+    block: Block,
+    found: Adjustment | None,
+    adjust: Callable[[Block], AdjustedBlock],
+    geoid: FilePath | None,
+) -> tuple[str, ...]:
+    """The usual mistake that explains a block, in words; nothing where none does.
+
+    Parameters
+    ----------
+    block : as it was given.
+    found : its adjustment, None where it has no result.
+    adjust : what adjusts a changed block.
+    """
+    try:
+        frame = None if block.crs == "local" else frame_of_block(block, geoid)
+    except InputError:
+        frame = None
+    return diagnose(block, adjust, None if found is None else found.local, frame)
