@@ -80,10 +80,7 @@ class Symbolic:
     position : (n, 2) plan coordinates of the projection centres.
     n_border : number of shared parameters s.
 
-    Attributes
-    ----------
-    times_factorised : how many matrices were factorised here.
-    corner_factor : (s, s) the last one's triangle of the border.
+    `times_factorised` counts the matrices factorised here; `corner_factor` (s, s) is the triangle of the last border.
     """
 
     def __init__(self, n: int, block_row: np.ndarray, block_col: np.ndarray, position: np.ndarray, n_border: int):
