@@ -206,13 +206,11 @@ class RasterReader:
 
     def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
         """A window, (rows, columns) of `dtype`; NaN where nothing is known and beyond the edges."""
-        from rasterio.windows import Window
-
         top, left = max(row, 0), max(column, 0)
         bottom, right = min(row + rows, self.grid.rows), min(column + columns, self.grid.columns)
         if bottom <= top or right <= left:
             return np.full((rows, columns), np.nan, self.dtype)
-        values = self._values(Window(left, top, right - left, bottom - top))  # pyright: ignore[reportCallIssue]
+        values = self._values(window_of(left, top, right - left, bottom - top))
         if values.shape == (rows, columns):
             return values
         out = np.full((rows, columns), np.nan, self.dtype)
@@ -278,11 +276,9 @@ class RasterWriter:
 
     def write(self, row: int, column: int, values: np.ndarray) -> None:
         """Write a window from its upper left cell on; NaN becomes the no-data value, in `values` too."""
-        from rasterio.windows import Window
-
         if self.no_data is not None and not np.isnan(self.no_data) and values.dtype.kind == "f":
             np.copyto(values, self.no_data, where=np.isnan(values))
-        window = Window(column, row, values.shape[1], values.shape[0])  # pyright: ignore[reportCallIssue]
+        window = window_of(column, row, values.shape[1], values.shape[0])
         self._file.write(values, 1, window=window)
 
     def describe(self, text: str) -> None:
@@ -368,6 +364,14 @@ def _transform(grid: Grid) -> Any:
     from rasterio import Affine
 
     return Affine(grid.cell_x, 0.0, grid.left, 0.0, -grid.cell_y, grid.top)
+
+
+def window_of(column: int, row: int, columns: int, rows: int) -> Window:
+    """rasterio's window from its upper left cell on."""
+    from rasterio.windows import Window
+
+    # attrs makes the class, in a way that cannot be read from its source
+    return Window(column, row, columns, rows)  # pyright: ignore[reportCallIssue]
 
 
 @contextmanager

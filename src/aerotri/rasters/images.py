@@ -19,9 +19,9 @@ from rasterio._err import CPLE_BaseError
 from rasterio.enums import ColorInterp, MaskFlags
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 from rasterio.transform import Affine
-from rasterio.windows import Window
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.rasters.grids import window_of
 from aerotri.rasters.photograph_settings import COMPRESSION
 
 DRIVERS = {b"II*\0": "GTiff", b"MM\0*": "GTiff", b"II+\0": "GTiff", b"MM\0+": "GTiff", b"\xff\xd8\xff": "JPEG"}
@@ -102,7 +102,7 @@ class Photograph:
         InputError
         """
         with _told(self.path), rasterio.Env(**SETTINGS):
-            return self.dataset.read(window=Window(0, first, self.columns, last - first))  # type: ignore[call-arg]
+            return self.dataset.read(window=window_of(0, first, self.columns, last - first))
 
 
 @contextmanager
@@ -172,7 +172,7 @@ class RowWriter:
 
     def write(self, first: int, pixels: np.ndarray) -> None:
         """Write (bands, rows, columns) from row `first` on."""
-        window = Window(0, first, pixels.shape[2], pixels.shape[1])  # type: ignore[call-arg]
+        window = window_of(0, first, pixels.shape[2], pixels.shape[1])
         try:
             with rasterio.Env(**SETTINGS):
                 self.dataset.write(pixels, window=window)
@@ -213,7 +213,7 @@ def create_image(
                 yield RowWriter(path, dataset)
             # what the cache could not write is lost in silence
             with rasterio.open(path) as written:
-                written.read(window=Window(0, rows - 1, columns, 1))  # type: ignore[call-arg]
+                written.read(window=window_of(0, rows - 1, columns, 1))
     except (RasterioError, OSError) as error:
         raise _unwritten(path, error) from error
 

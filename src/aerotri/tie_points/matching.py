@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -211,4 +212,5 @@ def _kept(path: Path, sizes: Mapping[str, tuple[int, int]]) -> dict[str, np.ndar
 
 def _keep(path: Path, found: dict[str, np.ndarray]) -> None:
     with atomic_file(path) as place, place.open("wb") as file:
-        np.savez(file, **{key: matches.astype(np.int32) for key, matches in found.items()})  # type: ignore[arg-type]
+        arrays: dict[str, Any] = {key: matches.astype(np.int32) for key, matches in found.items()}
+        np.savez(file, **arrays)

@@ -81,17 +81,20 @@ def _lines_of_dxf(path: Path) -> Iterator[np.ndarray]:
 
 def _entities(path: Path) -> Iterator[np.ndarray]:
     import ezdxf
+    from ezdxf.entities import LWPolyline, Polyline
 
-    space = ezdxf.readfile(path).modelspace()  # pyright: ignore[reportPrivateImportUsage]
+    space = ezdxf.readfile(path).modelspace()
     for entity in space.query("LINE"):
         yield np.array([entity.dxf.start, entity.dxf.end], dtype=float)
     for entity in space.query("POLYLINE"):
-        points = np.array([vertex.dxf.location for vertex in entity.vertices], dtype=float)  # pyright: ignore
-        yield np.vstack([points, points[:1]]) if entity.is_closed else points  # pyright: ignore
+        assert isinstance(entity, Polyline)
+        points = np.array([vertex.dxf.location for vertex in entity.vertices], dtype=float)
+        yield np.vstack([points, points[:1]]) if entity.is_closed else points
     for entity in space.query("LWPOLYLINE"):
-        plan = np.array([(x, y) for x, y, *_ in entity.get_points()], dtype=float).reshape(-1, 2)  # pyright: ignore
+        assert isinstance(entity, LWPolyline)
+        plan = np.array([(x, y) for x, y, *_ in entity.get_points()], dtype=float).reshape(-1, 2)
         points = np.column_stack([plan, np.full(len(plan), float(entity.dxf.elevation))])
-        yield np.vstack([points, points[:1]]) if entity.closed else points  # pyright: ignore
+        yield np.vstack([points, points[:1]]) if entity.closed else points
 
 
 def _of_geopackage(path: Path, epsg: int | None) -> tuple[list[np.ndarray], VectorSystem]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -166,9 +165,9 @@ def _is_component(entry: Any) -> bool:
     return _is_record({key: value for key, value in entry.items() if key != "test"}, VarianceComponent, ("test",))
 
 
-def _is_record(entry: Any, record: Callable[..., Any], without: tuple[str, ...] = ()) -> bool:
+def _is_record(entry: Any, record: type[Any], without: tuple[str, ...] = ()) -> bool:
     """Whether a table has the fields of a record and values of their types; null stands for what is not known."""
-    fields = {field.name: field.type for field in dataclasses.fields(record) if field.name not in without}  # type: ignore[arg-type]
+    fields = {field.name: field.type for field in dataclasses.fields(record) if field.name not in without}
     if not isinstance(entry, dict) or set(entry) != set(fields):
         return False
     return all(_fits(entry[name], str(kind)) for name, kind in fields.items())
