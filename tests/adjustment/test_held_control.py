@@ -148,9 +148,7 @@ def test_in_a_crs_the_given_coordinates_come_back():
     control = block.control
     shift = np.array([500000.0, 5400000.0, 0.0])
     images = replace(block.images, centre=block.images.centre + shift)
-    block = replace(
-        block, crs="EPSG:32632", images=images, control=replace(control, xyz=control.xyz + shift)
-    )
+    block = replace(block, crs="EPSG:32632", images=images, control=replace(control, xyz=control.xyz + shift))
     found = adjust_keeping_system(block).result
     assert found.outcome.status == "converged"
     np.testing.assert_allclose(found.control.difference, 0.0, atol=1e-6)

@@ -118,9 +118,7 @@ def permuted(seed: int) -> Transformation:
 
 
 def _control(control: Control, order: np.ndarray, to_point: np.ndarray) -> Control:
-    return Control(
-        to_point[control.point[order]], control.xyz[order], control.sigma[order], control.is_check[order]
-    )
+    return Control(to_point[control.point[order]], control.xyz[order], control.sigma[order], control.is_check[order])
 
 
 def _gnss(observed: GnssIns | None, rng: np.random.Generator, to_image: np.ndarray) -> GnssIns | None:

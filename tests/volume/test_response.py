@@ -247,6 +247,3 @@ def test_response_to_control_is_numeric(calibration, hill):
             heights.append(np.mean(intersect(calibration, few, state, xy, basis)[:, 2]))
         row = int(np.flatnonzero(u.points == block.control.point[k])[0])
         assert (heights[0] - heights[1]) / 0.04 == pytest.approx(found[row, 2], rel=0.02)
-
-
-

@@ -192,9 +192,7 @@ def _regularised_inverse(system: NormalSystem, equations: NormalEquations) -> In
         return None
 
 
-def _loose_photographs(
-    system: NormalSystem, state: State, inverse: InverseOnPattern, scale: float = 1.0
-) -> np.ndarray:
+def _loose_photographs(system: NormalSystem, state: State, inverse: InverseOnPattern, scale: float = 1.0) -> np.ndarray:
     """Rows of the photographs that are loose; none where it is the datum."""
     n = len(system.unknowns.images)
     cofactor = inverse.blocks[:n] * _unit_products(system.unknowns, state)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
+from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def run_adjust(
         if check_free:
             _tell_free(free_check(block, geoid=geoid, progress=console.stage), as_json, console)
         if as_json:
-            print(json.dumps(outcome_json(block, failure.outcome), indent=2, ensure_ascii=False))
+            print(json_text(outcome_json(block, failure.outcome)))
         return 1
     checked = free_check(found, progress=console.stage) if check_free else None
     timed = with_read_time(found, read_s).record
@@ -93,7 +93,7 @@ def _tell(result: AdjustedBlock, target: Path, console: Console, as_json: bool, 
     if as_json:
         from aerotri.formats.results.adjustment import adjustment_json
 
-        print(json.dumps(adjustment_json(result), indent=2, ensure_ascii=False))
+        print(json_text(adjustment_json(result)))
         return
     console.lines(outcome_lines(result, target, checked))
 

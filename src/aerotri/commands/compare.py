@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.commands.console import Console
 from aerotri.conventions import InputError
+from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.terrain.settings import ALIGNMENTS, INTERPOLATIONS, Interpolation, Movement
 
@@ -33,7 +33,7 @@ def run_compare(
         console.note(note)
     found.save(target, plots)
     if as_json:
-        print(json.dumps(found.summary, indent=2, ensure_ascii=False))
+        print(json_text(found.summary))
     else:
         console.lines([*_summary(found), f"Written to {target}"])
 

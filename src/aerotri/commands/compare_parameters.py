@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.commands.adjust import folder_name
 from aerotri.commands.console import Console
+from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def _tell(found: ComparedParameters, target: Path, console: Console, as_json: bo
 
     if as_json:
         content = comparison_json(found.record) | {"choice": found.reason}
-        print(json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False))
+        print(json_text(content))
         return
     lines = table_lines(comparison_table(found.record))
     console.lines([*lines, NOTE, *([found.reason] if found.reason else []), f"Written to {target}"])

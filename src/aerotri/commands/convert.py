@@ -33,7 +33,6 @@ The data sets that stand beside the project:
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -44,6 +43,7 @@ import numpy as np
 from aerotri.commands.console import Console
 from aerotri.conventions import FLIGHT_AXES, LARGEST, InputError
 from aerotri.formats.assembly.camera_spec import CameraSpec
+from aerotri.formats.results.json_text import json_text
 from aerotri.formats.text.text_lines import is_number
 
 if TYPE_CHECKING:
@@ -109,6 +109,6 @@ def run_convert(request: Request, target: Path, to: Any, as_json: bool, overwrit
     geoid, tell = request.stated.geoid, Console().stage
     messages = [*found.messages, *convert(found, target, to, geoid=geoid, overwrite=overwrite, progress=tell)]
     if as_json:
-        print(json.dumps({"target": str(target), "format": to, "messages": messages}, ensure_ascii=False))
+        print(json_text({"target": str(target), "format": to, "messages": messages}, None))
         return
     print("\n".join([*messages, f"Written to {target}"]))

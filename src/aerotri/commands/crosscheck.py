@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.commands.console import Console
+from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def _tell(found: Crosscheck, target: Path, console: Console, as_json: bool) -> N
     if as_json:
         from aerotri.crosscheck.outcome_json import crosscheck_json
 
-        print(json.dumps(crosscheck_json(found.record), indent=2, ensure_ascii=False))
+        print(json_text(crosscheck_json(found.record)))
         return
     from aerotri.report.plots.crosscheck import crosscheck_table
     from aerotri.report.quality import printable
@@ -51,8 +51,6 @@ def _tell(found: Crosscheck, target: Path, console: Console, as_json: bool) -> N
     table = crosscheck_table(found.record)
     rows = [tuple(column.name for column in table.columns), *table.texts]
     widths = [max(len(row[k]) for row in rows) for k in range(len(table.columns))]
-    lines = [
-        "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows
-    ]
+    lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
     notes = [f"{check.peer}: {printable(note, 300)}" for check in found.record.checks for note in check.notes]
     console.lines([printable(found.sentence, 1000), *lines, *notes, f"Written to {target}"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
+from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
 
@@ -69,7 +69,7 @@ def run_deform(source: Path, options: DeformOptions, out: Path | None, plots: bo
     found.save(target, plots)
     content = found.summary
     if as_json:
-        print(json.dumps(content, indent=2, ensure_ascii=False))
+        print(json_text(content))
     else:
         console.lines([*_summary(content), f"Written to {target}"])
     return 0

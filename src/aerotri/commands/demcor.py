@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
+from aerotri.formats.results.json_text import json_text
 
 
 def run_demcor(
@@ -41,7 +41,7 @@ def run_demcor(
     for note in found.notes:
         console.note(note)
     if as_json:
-        print(json.dumps(found.summary, indent=2, ensure_ascii=False))
+        print(json_text(found.summary))
     else:
         console.lines([*_summary(found.summary), f"Written to {out}"])
     return 0

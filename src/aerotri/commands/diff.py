@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.commands.console import Console
+from aerotri.formats.results.json_text import json_text
 
 if TYPE_CHECKING:
     from aerotri.results.adjusted_block import AdjustedBlock
@@ -32,7 +32,7 @@ def run_diff(first: Path, second: Path, top: int, as_json: bool) -> int:
     if as_json:
         verdicts = [{"verdict": run.outcome.verdict, "reasons": list(run.outcome.reasons)} for run in runs]
         content = {"first": str(first), "second": str(second), "verdicts": verdicts} | found.summary(top)
-        print(json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False))
+        print(json_text(content))
         return 0
     lines = [f"first: {printable(first)}, second: {printable(second)}"]
     lines += [f"{name} is {_verdict(run)}" for name, run in zip(("first", "second"), runs, strict=True)]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError, stated_number
+from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.terrain.settings import TerrainSettings
 
@@ -46,7 +46,7 @@ def run_dtm(
     console.progress("writing")
     found.save(target, plots)
     if as_json:
-        print(json.dumps(found.summary, indent=2, ensure_ascii=False))
+        print(json_text(found.summary))
     else:
         console.lines(outcome_lines(found, target))
     return 0

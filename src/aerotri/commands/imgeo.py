@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
+from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.rasters.photograph_settings import (
     COMPRESSION,
@@ -74,7 +74,7 @@ def run_imgeo(
         compression=options.compression, group=options.group, overwrite=overwrite, progress=console.stage,
     )  # fmt: skip
     if as_json:
-        print(json.dumps(found.summary, indent=2, ensure_ascii=False))
+        print(json_text(found.summary))
     else:
         text = f"Written to {out}: ideal camera in camera.toml, image errors in correction.csv"
         console.lines([*_summary(found), text])

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from aerotri.formats.results.json_text import json_text
 
 if TYPE_CHECKING:
     from aerotri.functional_model.additional_parameters import ParameterDescription
@@ -26,7 +27,7 @@ def run_parameters(draw: Path | None, family: str | None, as_json: bool) -> None
     entries = list_parameters(family)
     drawn = None if draw is None else draw_parameters(draw, family)
     if as_json:
-        print(json.dumps([vars(d) for d in entries], ensure_ascii=False, indent=2))
+        print(json_text([vars(d) for d in entries]))
         return
     lines = _lines(entries, whole=family is not None)
     print("\n".join(lines if drawn is None else [*lines, f"Drawn to {draw}: {', '.join(drawn)}"]))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from aerotri.formats.results.json_text import json_text
 
 if TYPE_CHECKING:
     from aerotri.simulation.designs import VolumeDesign
@@ -21,7 +22,7 @@ def run_predict_volume(design: VolumeDesign, simulate: bool, seed: int, as_json:
         d.height, d.length, d.width, d.bridging, sigma0_share=d.sigma0_share, simulate=simulate, seed=seed
     )
     if as_json:
-        print(json.dumps(found.summary, indent=2, ensure_ascii=False))
+        print(json_text(found.summary))
         return
     p = found.record
     print(f"{p.m} strips of {p.n} models, control every {p.d} models, σ of a height from one model {p.sigma0:.3f} m")
@@ -53,7 +54,7 @@ def run_predict_attitude(design: AttitudeDesign, as_json: bool) -> None:
         offset=d.offset,
     )  # fmt: skip
     if as_json:
-        print(json.dumps(found.summary, indent=2, ensure_ascii=False))
+        print(json_text(found.summary))
         return
     print(f"a tolerance of {d.tolerance_percent:g} % is {found.tolerance:.4g} m³ (1 σ); it allows, in seconds of arc:")
     for t in found.record:

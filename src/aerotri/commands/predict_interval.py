@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
+from aerotri.formats.results.json_text import json_text
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def run_predict_interval(question: IntervalQuestion, as_json: bool) -> None:
         tolerance=q.tolerance, progress=console.stage,
     )  # fmt: skip
     content = found.summary
-    console.lines([json.dumps(content, indent=2, ensure_ascii=False)] if as_json else _summary(content))
+    console.lines([json_text(content)] if as_json else _summary(content))
 
 
 def _summary(content: dict[str, Any]) -> list[str]:

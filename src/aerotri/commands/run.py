@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
+from aerotri.formats.results.json_text import json_text
 
 if TYPE_CHECKING:
     from aerotri.public.adjustment import Adjustment
@@ -32,7 +32,7 @@ def run_all(source: Path, out: Path, settings: Mapping[str, Any], as_json: bool)
     console = Console()
     project = run(source, out, **settings, on_step=_Told(console, out, as_json), progress=console.stage)
     if as_json:
-        print(json.dumps(project.summary, ensure_ascii=False))
+        print(json_text(project.summary, None))
     else:
         console.lines(_lines(project))
     return 0 if project.complete else 1

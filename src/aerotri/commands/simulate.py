@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
+from aerotri.formats.results.json_text import json_text
 
 if TYPE_CHECKING:
     from aerotri.simulation.rendering import RenderOptions
@@ -46,7 +46,7 @@ def run_simulate(
     if wanted:
         counts["rendered"] = rendered
     if as_json:
-        print(json.dumps(counts, ensure_ascii=False))
+        print(json_text(counts, None))
         return
     console.lines(_lines(counts, out, rendered))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from aerotri.commands.console import Console
 from aerotri.formats.assembly.assemble import Statements
 from aerotri.formats.assembly.camera_spec import CameraSpec
+from aerotri.formats.results.json_text import json_text
 from aerotri.tie_points.settings import DEFAULTS
 
 
@@ -58,7 +58,7 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
         tied.save(out, overwrite=overwrite, progress=console.stage)
     content = tied.summary(out)
     if as_json:
-        print(json.dumps(content, ensure_ascii=False))
+        print(json_text(content, None))
     else:
         console.lines(outcome_lines(content, out))
 

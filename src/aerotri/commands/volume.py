@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
 from aerotri.conventions import InputError
+from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def run_volume(
     for note in found.notes:
         console.note(note)
     if as_json:
-        print(json.dumps(found.summary, indent=2, ensure_ascii=False))
+        print(json_text(found.summary))
     else:
         console.lines(outcome_lines(found.summary, target))
     return 0

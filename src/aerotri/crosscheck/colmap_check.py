@@ -216,9 +216,7 @@ def _covariance(ours: AdjustedBlock, problem: _Problem, sigma_px: float) -> Cova
     jacobian = _angles_by_tangent(problem, ours.block.rotation)
     variance = (sigma_px * ours.outcome.sigma0) ** 2
     peer = variance * jacobian @ cofactor @ np.swapaxes(jacobian, 1, 2)
-    return covariance_difference(
-        ours.images.covariance[problem.images], peer, ours.block.images.names[problem.images]
-    )
+    return covariance_difference(ours.images.covariance[problem.images], peer, ours.block.images.names[problem.images])
 
 
 def _angles_by_tangent(problem: _Problem, order: str) -> np.ndarray:

@@ -101,6 +101,4 @@ def _with_rays(block: Block, keep: np.ndarray, xy: np.ndarray, sigma: np.ndarray
 
 def _from_solution(block: Block, adjusted: AdjustedBlock) -> Block:
     """The block with the adjusted orientation as start values."""
-    return replace(
-        block, images=replace(block.images, centre=adjusted.images.centre, angles=adjusted.images.angles)
-    )
+    return replace(block, images=replace(block.images, centre=adjusted.images.centre, angles=adjusted.images.angles))

@@ -52,7 +52,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     result = replace(summarise(system, solution, factor, saved.ray_status, saved.warnings), block=local)
     result = replace(result, parameters=with_removed(result.parameters, removals), removals=removals)
     if saved.components:
-        result = with_components(result, VarianceComponents.from_json(saved.components))
+        result = with_components(result, VarianceComponents.from_dict(json.loads(saved.components)))
     if saved.verdict:
         result = replace(result, outcome=replace(result.outcome, verdict=saved.verdict, reasons=saved.reasons))
     delivered = result if frame is None else transform_result(result, block, frame)

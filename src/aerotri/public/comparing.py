@@ -182,7 +182,7 @@ class Crosscheck:
         """
         from aerotri.crosscheck.outcome_json import crosscheck_json
         from aerotri.formats.files.atomic import atomic_folder
-        from aerotri.public.saving import write_json
+        from aerotri.formats.results.json_text import write_json
         from aerotri.public.tables import write_rows
         from aerotri.report.pages.adjustment import Findings, write_report
         from aerotri.report.plots.overview import all_plots, save_plots

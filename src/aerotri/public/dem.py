@@ -326,7 +326,7 @@ def _refuse_nothing(outcome: DemOutcome, models: DemModels, dem: Path) -> None:
 def _write(out: Path, found: CorrectedDem) -> None:
     """Write all files whole or not at all."""
     from aerotri.formats.files.atomic import atomic_file
-    from aerotri.public.saving import write_json
+    from aerotri.formats.results.json_text import write_json
 
     with ExitStack() as files:
         for name in (DZ, SIGMA_DZ):

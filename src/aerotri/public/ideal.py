@@ -221,7 +221,7 @@ def _write_exports(exports: Exports, out: Path, photographs: list[str], overwrit
 def _write_record(record: dict[str, Any], out: Path) -> None:
     from aerotri.formats.files.atomic import atomic_file
     from aerotri.formats.results.image_errors import RECORD
-    from aerotri.public.saving import write_json
+    from aerotri.formats.results.json_text import write_json
 
     with atomic_file(out / RECORD) as place:
         write_json(place, record)

@@ -271,7 +271,7 @@ def check_crs(record: Record, epsg: int | None, dem: Path) -> None:
 
 def _write(target: Path, found: ModelDeformation, plots: bool) -> None:
     from aerotri.formats.files.atomic import atomic_folder
-    from aerotri.public.saving import write_json
+    from aerotri.formats.results.json_text import write_json
     from aerotri.rasters.grids import Grid, horizontal_crs, write_raster
 
     d = found.record

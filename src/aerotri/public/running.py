@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.deformation.absorbed import AbsorptionFailedError
+from aerotri.formats.results.json_text import write_json
 from aerotri.public.blocks import Sigmas
 from aerotri.public.progress import Progress, ProgressLike, StageReport, stage_report
 from aerotri.public.run_steps import BLOCK, DTM, RECORD, REPORT, RESULT, Step, Verb, is_block, is_missing, steps_of
@@ -307,6 +307,6 @@ def write_report(content: Mapping[str, Any], folder: Path) -> None:
     from aerotri.report.pages.run import run_page
 
     with atomic_file(folder / RECORD) as place:
-        place.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        write_json(place, content)
     with atomic_file(folder / REPORT) as place:
         place.write_text(run_page(dict(content), folder), encoding="utf-8")

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from aerotri.formats.block.folder import write_block
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.results.adjustment import write_csv, write_result
+from aerotri.formats.results.json_text import write_json
 from aerotri.formats.results.solution import write_solution
 from aerotri.image_errors import group_changes
 from aerotri.public.folders import refuse_foreign_folder
@@ -109,12 +109,6 @@ def write_adjustment(
         _write_parameter_tables(adjustment, folder)
         write_result(result, folder)
     return result
-
-
-def write_json(path: Path, content: Any) -> None:
-    """A file of JSON, as every command writes it."""
-    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")
 
 
 def write_comparison_tables(comparison: ParameterComparison, folder: Path) -> None:

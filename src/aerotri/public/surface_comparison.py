@@ -227,7 +227,7 @@ def _file(surface: SurfaceLike) -> Path | None:
 
 def _write(target: Path, found: SurfaceComparison, plots: bool) -> None:
     from aerotri.formats.files.atomic import atomic_folder
-    from aerotri.public.saving import write_json
+    from aerotri.formats.results.json_text import write_json
     from aerotri.rasters.grids import write_raster
 
     c = found.record

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 
@@ -20,11 +20,28 @@ from aerotri.terrain.surface import Surface as Heights
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from aerotri.public.terrain import TerrainModel
+    from aerotri.public.table import Table
     from aerotri.rasters.metric import MetricReader
 
     Reader: TypeAlias = MetricReader | HeldRaster
-    SurfaceLike: TypeAlias = "Surface | TerrainModel | FilePath"
+    SurfaceLike: TypeAlias = "Surface | WithSurfaces | FilePath"
+
+
+class WithSurfaces(Protocol):
+    """What `aerotri.terrain` returns: a surface with objects, one without, and the pickets they were measured from.
+
+    adjustment : key of the adjustment it was measured with.
+    """
+
+    adjustment: str
+
+    @property
+    def dsm(self) -> Surface: ...
+    @property
+    def dtm(self) -> Surface: ...
+    @property
+    def pickets(self) -> Table: ...
+
 
 Layer = Literal["dsm", "dtm"]
 BYTES_OF_CELL = 32

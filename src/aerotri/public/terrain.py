@@ -302,9 +302,9 @@ def terrain_plan(
 def _write(target: Path, model: TerrainModel, plots: bool) -> None:
     """Write all files whole or not at all."""
     from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.formats.results.json_text import write_json
     from aerotri.formats.results.pickets import write_pickets
     from aerotri.formats.results.point_cloud import write_point_cloud
-    from aerotri.public.saving import write_json
     from aerotri.public.tables import write_rows
     from aerotri.rasters.grids import horizontal_crs, write_raster, write_surface
 

@@ -98,7 +98,7 @@ class TiedPhotographs:
         from aerotri.formats.block.writer import OWN_ENTRIES, write_block
         from aerotri.formats.files.atomic import atomic_folder
         from aerotri.formats.files.work_place import held
-        from aerotri.public.saving import write_json
+        from aerotri.formats.results.json_text import write_json
         from aerotri.report.pages.control_marks import MARKS, write_control_marks
 
         target, given = Path(out), self.given

@@ -224,7 +224,7 @@ def _table(name: str, columns: dict[str, Any], units: dict[str, str]) -> Table:
 
 def _write(target: Path, found: MeasuredVolume, plots: bool) -> None:
     from aerotri.formats.files.atomic import atomic_folder
-    from aerotri.public.saving import write_json
+    from aerotri.formats.results.json_text import write_json
     from aerotri.public.tables import write_rows
 
     with atomic_folder(target, own=OWN_NAMES) as folder:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -73,18 +72,17 @@ class VarianceComponents:
         """The factor of every group's σ."""
         return {c.group: c.factor for c in self.components}
 
-    def to_json(self) -> str:
-        """As JSON: what is not known is null."""
-        return json.dumps(_without_nan(asdict(self)), indent=2, ensure_ascii=False, allow_nan=False)
+    def as_dict(self) -> dict[str, Any]:
+        """The numbers by name; None for what is not known."""
+        return _without_nan(asdict(self))
 
     @classmethod
-    def from_json(cls, text: str) -> VarianceComponents:
-        """The inverse of `to_json`."""
-        content = json.loads(text)
+    def from_dict(cls, content: dict[str, Any]) -> VarianceComponents:
+        """The inverse of `as_dict`."""
         components = []
         for c in content["components"]:
-            test = ChiSquareTest(**_with_nan(c.pop("test")))
-            components.append(VarianceComponent(**_with_nan(c), test=test))
+            test = ChiSquareTest(**_with_nan(c["test"]))
+            components.append(VarianceComponent(**_with_nan({k: v for k, v in c.items() if k != "test"}), test=test))
         return cls(tuple(components), content["rounds"], content["settled"])
 
 

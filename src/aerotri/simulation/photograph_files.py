@@ -12,6 +12,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.files.atomic import atomic_file
+from aerotri.formats.results.json_text import write_json
 from aerotri.observations import Block
 from aerotri.rasters.images import create_image
 from aerotri.simulation.rendering import Scene, rendered_rows
@@ -82,7 +83,7 @@ def write_photographs(scene: Scene, chosen: Sequence[int], folder: Path, report:
     files = [file_name(str(scene.names[image])) for image in chosen]
     content = {"photographs": files, "seed": scene.seed, "options": asdict(scene.options)}
     with atomic_file(folder / RECORD) as place:
-        place.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        write_json(place, content)
     for number, (image, name) in enumerate(zip(chosen, files, strict=True)):
         _write_photograph(
             scene, image, folder / name, lambda share, before=number: report((before + share) / len(chosen))

@@ -96,9 +96,7 @@ def warm_up(targets: Sequence[Target], folder: Path) -> None:
         target.call(folder)
 
 
-def run_inputs(
-    targets: Sequence[Target], seed: int, numbers: Sequence[int], folder: Path
-) -> Iterator[Found]:
+def run_inputs(targets: Sequence[Target], seed: int, numbers: Sequence[int], folder: Path) -> Iterator[Found]:
     """What becomes of inputs; a process that dies of one is replaced."""
     rest = list(numbers)
     while rest:
@@ -111,9 +109,7 @@ def run_inputs(
         rest = rest[done:]
 
 
-def _of_one_process(
-    targets: Sequence[Target], seed: int, numbers: Sequence[int], folder: Path
-) -> Iterator[Found]:
+def _of_one_process(targets: Sequence[Target], seed: int, numbers: Sequence[int], folder: Path) -> Iterator[Found]:
     reading, writing = os.pipe()
     sys.stdout.flush()
     child = os.fork()
@@ -156,9 +152,7 @@ def _name(targets: Sequence[Target], number: int) -> str:
     return targets[number % len(targets)].name
 
 
-def _child(
-    targets: Sequence[Target], seed: int, numbers: Sequence[int], folder: Path, writing: int
-) -> None:
+def _child(targets: Sequence[Target], seed: int, numbers: Sequence[int], folder: Path, writing: int) -> None:
     """Run the inputs and tell of each on the pipe; never returns."""
     silent = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silent, 1)

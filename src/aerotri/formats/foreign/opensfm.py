@@ -20,6 +20,7 @@ from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import Reading, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.foreign.colmap import COLMAP_FROM_CAMERA, SIGN, colmap_camera
+from aerotri.formats.results.json_text import json_text
 from aerotri.formats.text.csv_text import UTF8_REMEDY, read_bytes
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile
@@ -313,7 +314,7 @@ def write_opensfm(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:
         lines.append(f"{image}\t{point}\t{k}\t{x!r}\t{y!r}\t0.004\t255\t255\t255\t-1\t-1")
     content = [{"cameras": cameras, "shots": shots, "points": points}]
     with atomic_folder(folder, own=(RECONSTRUCTION, TRACKS)) as place:
-        text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
+        text = json_text(content, 1)
         (place / RECONSTRUCTION).write_text(text, encoding="utf-8", newline="\n")
         (place / TRACKS).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
     said = ("image points are written free of the additional parameters, which OpenSfM has no words for",)

@@ -10,7 +10,6 @@ records, angles in degrees, what is not known is empty (CSV), null (Parquet, JSO
 from __future__ import annotations
 
 import dataclasses
-import json
 import re
 import time
 from importlib.metadata import PackageNotFoundError, version
@@ -21,6 +20,7 @@ import numpy as np
 
 from aerotri.adjustment.ray_status import RAY_STATUS, RayStatus
 from aerotri.conventions import MGON_PER_RADIAN
+from aerotri.formats.results.json_text import write_json
 from aerotri.formats.results.reliability_columns import control_columns, observation_columns, ray_columns
 from aerotri.formats.text.table_writer import with_plain_texts
 from aerotri.image_errors import interior_elements
@@ -65,11 +65,10 @@ def write_result(adjusted: AdjustedBlock, folder: str | Path) -> None:
         write_csv(folder / "observations.csv", observation_columns(adjusted))
     _write_residuals(folder / "residuals.parquet", adjusted)
     if adjusted.components is not None:
-        (folder / "variance_components.json").write_text(adjusted.components.to_json() + "\n", encoding="utf-8")
+        write_json(folder / "variance_components.json", adjusted.components.as_dict())
     content = adjustment_json(adjusted)
     content["timings_s"]["write"] += time.perf_counter() - started
-    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-    (folder / "adjustment.json").write_text(text + "\n", encoding="utf-8")
+    write_json(folder / "adjustment.json", content)
 
 
 def adjustment_json(adjusted: AdjustedBlock) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from aerotri.adjustment.solve import Solution
 from aerotri.conventions import FilePath
 from aerotri.coordinates import LocalFrame
 from aerotri.formats.files.npz import Archive
+from aerotri.formats.results.json_text import json_text
 from aerotri.formats.results.solution_checks import SCHEMA, checked_values
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock
@@ -110,7 +111,7 @@ def write_solution(
         verdict=np.array(result.outcome.verdict),
         reasons=np.array(result.outcome.reasons, dtype=str),
         removals=np.array(json.dumps([removal.as_dict() for removal in result.removals])),
-        components=np.array("" if result.components is None else result.components.to_json()),
+        components=np.array("" if result.components is None else json_text(result.components.as_dict())),
     )
 
 

@@ -88,9 +88,7 @@ def _titled(title: str, count: int, shown: int) -> str:
 
 
 def _changes(title: str, changes: tuple[Change, ...]) -> Table:
-    rows = [
-        (c.name, *(_text(_readable(c.name, value)) for value in (c.first, c.second))) for c in changes
-    ]
+    rows = [(c.name, *(_text(_readable(c.name, value)) for value in (c.first, c.second))) for c in changes]
     return Table(title, (Column("what"), Column("first"), Column("second")), tuple(rows))
 
 
