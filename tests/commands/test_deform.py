@@ -12,7 +12,7 @@ import pytest
 
 from aerotri.commands.deform import DeformOptions, run_deform
 from aerotri.conventions import InputError
-from aerotri.deformation import absorbed, restitution
+from aerotri.deformation import absorbed, restitution_of
 from aerotri.deformation.model_grid import mean_ground, pair_of
 from aerotri.deformation.stereo_model import covariance_of, deform_points
 from aerotri.rasters.grids import Grid, RasterReader, write_raster
@@ -46,7 +46,7 @@ def test_pair_as_flown(erring_result, erring, tmp_path, capsys):
     plots = {p.name for p in (tmp_path / "out" / "plots").iterdir()}
     assert plots == {"contours.png", "contours.svg", "profiles.png", "profiles.svg"}
     assert (content["kind"], content["pair"], content["variant"]) == ("pair", list(PAIR), "free")
-    model = pair_of(restitution(erring), erring, *PAIR)
+    model = pair_of(restitution_of(erring), erring, *PAIR)
     values = {what: raster(tmp_path / "out" / f"{what}.tif") for what in ("dX", "dY", "dZ", "sigma_dX", "sigma_dZ")}
     grid = values["dZ"][1]
     seen = np.argwhere(np.isfinite(values["dZ"][0]))
@@ -108,7 +108,7 @@ def test_block_and_the_map_of_its_models(erring_result, erring, tmp_path, capsys
 
 def test_ground_from_a_dem(erring_result, erring, tmp_path, capsys):
     """Every node has the height of the DEM; where the DEM has none there is no node."""
-    model = pair_of(restitution(erring), erring, *PAIR)
+    model = pair_of(restitution_of(erring), erring, *PAIR)
     middle, level = model.true.centre.mean(axis=0), mean_ground(erring)
     grid = Grid(80, 80, middle[0] - 1000.0, middle[1] + 1000.0, 25.0, 25.0)
     z = level + 0.2 * (grid.x(np.arange(80)) - middle[0]) + np.zeros((80, 1))

@@ -15,7 +15,7 @@ from aerotri.commands.deform import DeformOptions, run_deform
 from aerotri.commands.demcor import run_demcor
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
-from aerotri.deformation import restitution
+from aerotri.deformation import restitution_of
 from aerotri.deformation.block_models import block_models, nearest_models, strip_pairs
 from aerotri.deformation.model_grid import Places, mean_ground, pair_of
 from aerotri.deformation.orientation import calibrated_orientation
@@ -64,7 +64,7 @@ def restored(wrong, out):
 
 @pytest.mark.parametrize("variant", ["free", "absorbed"])
 def test_one_model(erring_result, erring, variant, tmp_path):
-    wrong = Wrong(erring, restitution(erring, variant), tmp_path)
+    wrong = Wrong(erring, restitution_of(erring, variant), tmp_path)
     out = tmp_path / "corrected.tif"
     content = demcor(erring_result, wrong.path, out, PAIR, orientation="absorbed" if variant == "absorbed" else None)
     assert restored(wrong, out)
@@ -91,7 +91,7 @@ def test_one_model(erring_result, erring, variant, tmp_path):
 def test_dem_made_with_another_adjustment(erring_result, erring, plain_result, tmp_path):
     """The paper's case: oriented without self-calibration, given as that result, or as its table of orientations."""
     other = calibrated_orientation(reopened(plain_result, Console(quiet=True)))
-    wrong = Wrong(erring, restitution(erring, used=other), tmp_path)
+    wrong = Wrong(erring, restitution_of(erring, used=other), tmp_path)
     found = []
     for k, orientation in enumerate((plain_result, plain_result / "images.csv")):
         out = tmp_path / f"out{k}.tif"
@@ -122,7 +122,7 @@ def polygons(path, squares, epsg=None):
 @pytest.mark.parametrize("kind", ["raster", "polygons"])
 def test_map_of_models(erring_result, erring, kind, tmp_path):
     """A DEM pieced together: the map that deform writes, or polygons; the steps at its seams go."""
-    of = restitution(erring, "absorbed")
+    of = restitution_of(erring, "absorbed")
     models = block_models(erring, of, strip_pairs(erring, of))
     middle = np.mean([m.middle for m in models if m.model.names[0].startswith("2_")], axis=0)
     grid, terrain = square_grid(middle, 200, 3.0), Terrain(middle, mean_ground(erring))
@@ -174,7 +174,7 @@ def test_map_of_models(erring_result, erring, kind, tmp_path):
 
 def test_kind_of_file_is_kept(erring_result, erring, tmp_path):
     """Type, no-data value, compression and tiles of the DEM; holes stay holes."""
-    wrong = Wrong(erring, restitution(erring), tmp_path, dtype=np.float64, no_data=-32768.0,
+    wrong = Wrong(erring, restitution_of(erring), tmp_path, dtype=np.float64, no_data=-32768.0,
                   options={"compress": "deflate", "predictor": 3})  # fmt: skip
     z = wrong.z.copy()
     z[10:14, 20:25] = np.nan
@@ -195,7 +195,7 @@ def test_kind_of_file_is_kept(erring_result, erring, tmp_path):
 
 
 def test_what_cannot_be_done_is_said_and_nothing_is_written(erring_result, erring, plain_result, tmp_path):
-    wrong = Wrong(erring, restitution(erring), tmp_path)
+    wrong = Wrong(erring, restitution_of(erring), tmp_path)
     far = tmp_path / "far.tif"
     write_raster(far, np.zeros((5, 5)), Grid(5, 5, 9e5, 9e5, 1.0, 1.0))
     empty = tmp_path / "empty.tif"
@@ -228,7 +228,7 @@ def test_what_cannot_be_done_is_said_and_nothing_is_written(erring_result, errin
 
 
 def test_command_line(erring_result, erring, tmp_path):
-    wrong = Wrong(erring, restitution(erring), tmp_path)
+    wrong = Wrong(erring, restitution_of(erring), tmp_path)
 
     def run(*arguments):
         return subprocess.run(
@@ -254,7 +254,7 @@ def test_command_line(erring_result, erring, tmp_path):
 
 def test_models_of_the_dem_are_those_that_were_flown(erring, erring_result, tmp_path):
     """Left and right exchanged are the same model; another pair is not."""
-    wrong = Wrong(erring, restitution(erring), tmp_path)
+    wrong = Wrong(erring, restitution_of(erring), tmp_path)
     demcor(erring_result, wrong.path, tmp_path / "turned.tif", PAIR[::-1])
     assert restored(wrong, tmp_path / "turned.tif")
     demcor(erring_result, wrong.path, tmp_path / "other.tif", ("2_002", "2_004"))

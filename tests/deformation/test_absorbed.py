@@ -11,7 +11,7 @@ from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials
 from aerotri.deformation.model_geometry import normal_model
 from aerotri.deformation.model_grid import mean_ground, pair_of
 from aerotri.deformation.orientation import calibrated_orientation
-from aerotri.deformation.restitution import restitution
+from aerotri.deformation.restitution import restitution_of
 from aerotri.deformation.stereo_model import covariance_of, deform_points, intersect, measured
 from aerotri.functional_model.rotation import logarithm
 from aerotri.pipeline import adjust_keeping_system
@@ -110,7 +110,7 @@ def nodes(calibration, model):
 @pytest.mark.parametrize("variant", ["free", "absorbed"])
 def test_sigma_against_monte_carlo(calibration, pair, variant):
     """Parameters drawn from Q_pp; the variance of every coordinate of every node within its χ² bounds."""
-    model = pair_of(restitution(calibration, variant), calibration, *pair)
+    model = pair_of(restitution_of(calibration, variant), calibration, *pair)
     points = nodes(calibration, model)
     seen = np.isfinite(deform_points(model, points).d[:, 2])
     points = points[seen]
@@ -127,7 +127,7 @@ def test_sigma_against_monte_carlo(calibration, pair, variant):
     images = [names.index(name) for name in pair]
     for k in range(count):
         other, state = with_values(calibration, p.value[rows] + root @ rng.normal(size=len(rows)))
-        drawn = pair_of(restitution(other), other, *pair)
+        drawn = pair_of(restitution_of(other), other, *pair)
         used = drawn.used if variant == "free" else absorbed_orientation(calibration, state).orientation.take(images)
         draws[k] = intersect(used, measured(drawn, points), points)[0] - points
     ratio = draws.var(axis=0, ddof=1) / predicted
@@ -142,14 +142,14 @@ def test_sigma_of_the_normal_case_follows_its_parameters(calibration):
     """The mean change of orientation and its partials belong together: a finite change of the parameters."""
     rows = additional_rows(calibration)
     value, sigma = calibration.local.parameters.value[rows], calibration.local.parameters.sigma[rows]
-    of = restitution(calibration, "absorbed")
-    model, _ = normal_model(calibration, of, 0.6)
+    restitution = restitution_of(calibration, "absorbed")
+    model, _ = normal_model(calibration, restitution, 0.6)
     step = 0.2 * sigma * np.random.default_rng(8).normal(size=len(rows))
     ends = []
     for sign in (0.5, -0.5):
         _, state = with_values(calibration, value + sign * step)
         used = absorbed_orientation(calibration, state).orientation
-        ends.append(normal_model(calibration, replace(of, used=used), 0.6)[0].used)
+        ends.append(normal_model(calibration, replace(restitution, used=used), 0.6)[0].used)
     expected = model.follows[0] @ step
     moved = (ends[0].centre - ends[1].centre)[0]
     turned = logarithm((ends[0].rotation @ np.swapaxes(ends[1].rotation, 1, 2))[:1])[0]

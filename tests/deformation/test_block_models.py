@@ -18,7 +18,7 @@ from aerotri.deformation.model_grid import (
     pair_of,
     places_of,
 )
-from aerotri.deformation.restitution import restitution
+from aerotri.deformation.restitution import restitution_of
 from aerotri.deformation.stereo_model import deform_points, seen_by_both
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.pipeline import adjust_keeping_system
@@ -28,32 +28,32 @@ EDGE_OF_THE_ZONE = np.array([[850_000.0, 5_456_000.0, 280.0]])
 
 @pytest.fixture(scope="module")
 def whole(calibration):
-    of = restitution(calibration, "absorbed")
-    return of, deform_block(calibration, of, FlatGround(mean_ground(calibration)), 40.0)
+    restitution = restitution_of(calibration, "absorbed")
+    return restitution, deform_block(calibration, restitution, FlatGround(mean_ground(calibration)), 40.0)
 
 
 def test_models_follow_the_strips(calibration):
     """Photographs in shuffled order still pair with their neighbours; a step of two leaves every second one out."""
-    of = restitution(calibration)
+    restitution = restitution_of(calibration)
     names = calibration.local.block.images.names
 
     def named(pairs):
         return {frozenset((str(names[a]), str(names[b]))) for a, b in pairs}
 
-    found = named(strip_pairs(calibration, of))
+    found = named(strip_pairs(calibration, restitution))
     assert frozenset(("2_003", "2_004")) in found
     assert frozenset(("2_003", "2_005")) not in found
     assert all(len({name[:2] for name in pair}) == 1 for pair in found)
     assert len(found) == 3 * 5 + 4
     # 60 % photographs two apart overlap by a fifth at most
-    assert len(strip_pairs(calibration, of, 2)) < len(found)
+    assert len(strip_pairs(calibration, restitution, 2)) < len(found)
     with pytest.raises(InputError, match="step"):
-        strip_pairs(calibration, of, 0)
+        strip_pairs(calibration, restitution, 0)
 
 
 def test_every_node_is_that_of_the_nearest_model(calibration, whole):
-    of, d = whole
-    models = block_models(calibration, of, strip_pairs(calibration, of))
+    restitution, d = whole
+    models = block_models(calibration, restitution, strip_pairs(calibration, restitution))
     rows, columns = np.nonzero(d.number >= 0)
     for k in np.random.default_rng(7).choice(len(rows), 15, replace=False):
         i, j = rows[k], columns[k]
@@ -113,7 +113,7 @@ def in_crs(calibration):
 def test_a_block_in_a_crs_suffers_the_same(calibration, in_crs, pair, variant):
     """At the same places, the deformation turned and scaled into the CRS; σ of the height alike."""
     frame, georeferenced = in_crs
-    here, there = restitution(calibration, variant), restitution(georeferenced, variant)
+    here, there = restitution_of(calibration, variant), restitution_of(georeferenced, variant)
     model = pair_of(here, calibration, *pair)
     x, y = np.meshgrid(np.linspace(-300, 300, 7), np.linspace(-300, 300, 7))
     middle = model.true.centre.mean(axis=0)
@@ -139,19 +139,19 @@ def test_a_block_in_a_crs_suffers_the_same(calibration, in_crs, pair, variant):
 def test_grid_of_a_pair_in_a_crs(in_crs, pair):
     _, georeferenced = in_crs
     level = mean_ground(georeferenced)
-    d = deform_pair(georeferenced, restitution(georeferenced), pair, FlatGround(level), 50.0)
+    d = deform_pair(georeferenced, restitution_of(georeferenced), pair, FlatGround(level), 50.0)
     assert d.crs == "EPSG:25832"
     assert abs(d.x.mean() - 850_000.0) < 2_000.0
     assert np.isfinite(d.d[..., 2]).sum() > 50
     assert 0.5 < d.geometry.end_lap < 0.7
     names = georeferenced.local.block.images.names
-    of, apart = restitution(georeferenced), (str(names[0]), str(names[5]))
+    restitution, apart = restitution_of(georeferenced), (str(names[0]), str(names[5]))
     with pytest.raises(InputError, match="do not overlap"):
-        deform_pair(georeferenced, of, apart, FlatGround(level))
+        deform_pair(georeferenced, restitution, apart, FlatGround(level))
 
 
 def test_pairs_that_are_refused(calibration):
-    of = restitution(calibration)
+    restitution = restitution_of(calibration)
     for left, right, message in (("2_003", "9_999", "9_999"), ("2_003", "2_003", "twice")):
         with pytest.raises(InputError, match=message):
-            pair_of(of, calibration, left, right)
+            pair_of(restitution, calibration, left, right)

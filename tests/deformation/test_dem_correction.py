@@ -11,7 +11,7 @@ from aerotri.deformation.dem_correction import correct_dem, windows_of
 from aerotri.deformation.dem_window import dem_models
 from aerotri.deformation.model_grid import mean_ground, pair_of
 from aerotri.deformation.model_map import NumberMap, OneModel
-from aerotri.deformation.restitution import restitution
+from aerotri.deformation.restitution import restitution_of
 from aerotri.deformation.stereo_model import deform_points, seen_by_both
 from aerotri.rasters.grids import Grid, RasterReader, RasterWriter
 from wrong_dems import SLOPE, Terrain, beside, cells, middle_of, square_grid, write_dem, wrong_heights
@@ -21,7 +21,7 @@ TOLERANCE_M = 1e-3
 
 @pytest.fixture(scope="module")
 def variants(calibration):
-    return {variant: restitution(calibration, variant) for variant in ("free", "absorbed")}
+    return {variant: restitution_of(calibration, variant) for variant in ("free", "absorbed")}
 
 
 def corrected(models, numbers, folder, name="dem.tif"):
@@ -44,8 +44,8 @@ def corrected(models, numbers, folder, name="dem.tif"):
 @pytest.mark.parametrize(("cell", "waves"), [(0.5, 0.0), (3.0, 0.0), (1.0, 8.0)])
 def test_truth_is_restored(calibration, variants, pair, variant, cell, waves, tmp_path):
     """Every cell within 1 mm, seams of the tiles included; the planimetric shift on the slope is honoured."""
-    of = variants[variant]
-    model = pair_of(of, calibration, *pair)
+    restitution = variants[variant]
+    model = pair_of(restitution, calibration, *pair)
     grid = square_grid(middle_of(model), 110, cell)
     terrain = Terrain(middle_of(model), mean_ground(calibration), waves)
     xy = cells(grid)
@@ -53,7 +53,7 @@ def test_truth_is_restored(calibration, variants, pair, variant, cell, waves, tm
     good = ~beside(~good.reshape(110, 110))
     assert good.mean() > 0.5
     write_dem(tmp_path / "dem.tif", grid, z.reshape(110, 110))
-    outcome, found, dz = corrected(dem_models(calibration, of, (pair,)), OneModel(*pair), tmp_path)
+    outcome, found, dz = corrected(dem_models(calibration, restitution, (pair,)), OneModel(*pair), tmp_path)
     truth = terrain(xy).reshape(110, 110)
     # bilinear between cells cannot follow hills: f(1 − f)/2·cell² of their curvature, f the shift in cells
     shift = np.abs(xy - true[:, :2]).max()
@@ -69,14 +69,14 @@ def test_truth_is_restored(calibration, variants, pair, variant, cell, waves, tm
 
 def test_single_cells_against_the_definition(calibration, variants, pair, tmp_path):
     """P = I(EO_cal; m − d(m)) at the place the fixed point finds: a shifted index would be caught."""
-    of = variants["absorbed"]
-    model = pair_of(of, calibration, *pair)
+    restitution = variants["absorbed"]
+    model = pair_of(restitution, calibration, *pair)
     grid = square_grid(middle_of(model) + (0.3, 0.8), 90, 1.5)
     rng = np.random.default_rng(5)
     z = mean_ground(calibration) + rng.normal(scale=3.0, size=(90, 90))
     z[:, 40:60] += 60.0
     write_dem(tmp_path / "dem.tif", grid, z)
-    models = dem_models(calibration, of, (pair,))
+    models = dem_models(calibration, restitution, (pair,))
     _, found, dz = corrected(models, OneModel(*pair), tmp_path)
     xyz = np.column_stack([cells(grid), z.ravel()])
     exact = models.deformation_at(np.zeros(len(xyz), np.int32), xyz).reshape(90, 90, 3)
@@ -116,8 +116,8 @@ def inverse_bilinear(corners, target):
 
 def test_missing_data_is_kept(calibration, variants, pair, tmp_path):
     """Holes stay holes, cells beside them stay cells, and on a plane are as right as the others."""
-    of = variants["free"]
-    model = pair_of(of, calibration, *pair)
+    restitution = variants["free"]
+    model = pair_of(restitution, calibration, *pair)
     grid = square_grid(middle_of(model) + (40.0, 60.0), 60, 0.5)
     terrain = Terrain(middle_of(model), mean_ground(calibration))
     xy = cells(grid)
@@ -129,7 +129,7 @@ def test_missing_data_is_kept(calibration, variants, pair, tmp_path):
     z[holes] = np.nan
     for no_data in (-9999.0, np.nan):
         write_dem(tmp_path / "dem.tif", grid, z.copy(), no_data=no_data)
-        outcome, found, dz = corrected(dem_models(calibration, of, (pair,)), OneModel(*pair), tmp_path)
+        outcome, found, dz = corrected(dem_models(calibration, restitution, (pair,)), OneModel(*pair), tmp_path)
         np.testing.assert_array_equal(np.isnan(found), holes)
         np.testing.assert_array_equal(np.isnan(dz), holes)
         assert np.abs(found - terrain(xy).reshape(60, 60))[~holes].max() < TOLERANCE_M
@@ -139,13 +139,13 @@ def test_missing_data_is_kept(calibration, variants, pair, tmp_path):
 
 def test_heights_of_double_precision_stay_that(calibration, variants, pair, tmp_path):
     """A DEM of eight bytes, far above the sea of its numbers: no rounding to four."""
-    of = variants["free"]
-    model = pair_of(of, calibration, *pair)
+    restitution = variants["free"]
+    model = pair_of(restitution, calibration, *pair)
     grid = square_grid(middle_of(model) + (40.0, 60.0), 40, 0.5)
     z = mean_ground(calibration) + np.random.default_rng(9).normal(size=(40, 40))
     for dtype in (np.float32, np.float64):
         write_dem(tmp_path / "dem.tif", grid, z, dtype)
-        _, found, dz = corrected(dem_models(calibration, of, (pair,)), OneModel(*pair), tmp_path)
+        _, found, dz = corrected(dem_models(calibration, restitution, (pair,)), OneModel(*pair), tmp_path)
         assert found.dtype == dtype
         assert dz.dtype == np.float32
         if dtype == np.float32:
@@ -155,12 +155,12 @@ def test_heights_of_double_precision_stay_that(calibration, variants, pair, tmp_
 
 
 def test_off_the_model_nothing_is_made_up(calibration, variants, pair, tmp_path):
-    of = variants["free"]
-    model = pair_of(of, calibration, *pair)
+    restitution = variants["free"]
+    model = pair_of(restitution, calibration, *pair)
     grid = square_grid(middle_of(model), 100, 20.0)
     height = mean_ground(calibration)
     write_dem(tmp_path / "dem.tif", grid, np.full((100, 100), height))
-    outcome, found, _ = corrected(dem_models(calibration, of, (pair,)), OneModel(*pair), tmp_path)
+    outcome, found, _ = corrected(dem_models(calibration, restitution, (pair,)), OneModel(*pair), tmp_path)
     # the DEM's own heights are the wrong ones; used = true in the free variant
     seen = seen_by_both(model, np.column_stack([cells(grid), np.full(10000, height)])).reshape(100, 100)
     np.testing.assert_array_equal(np.isfinite(found), seen)
@@ -171,12 +171,12 @@ def test_off_the_model_nothing_is_made_up(calibration, variants, pair, tmp_path)
 
 def test_windows_and_threads_do_not_matter(calibration, variants, pair, tmp_path, monkeypatch):
     """Cut into small windows, with too narrow a halo to begin with, by one thread or two."""
-    of = variants["absorbed"]
-    model = pair_of(of, calibration, *pair)
+    restitution = variants["absorbed"]
+    model = pair_of(restitution, calibration, *pair)
     grid = square_grid(middle_of(model), 150, 0.004)
     z = mean_ground(calibration) + 0.01 * np.random.default_rng(3).normal(size=(150, 150))
     write_dem(tmp_path / "dem.tif", grid, z)
-    models = dem_models(calibration, of, (pair,))
+    models = dem_models(calibration, restitution, (pair,))
     whole, expected, expected_dz = corrected(models, OneModel(*pair), tmp_path)
     assert whole.halo > 4
     monkeypatch.setattr(dem_correction, "WINDOW", 64)
@@ -206,9 +206,9 @@ def test_windows_cover_every_cell_once():
 
 def test_memory_does_not_grow_with_the_dem(calibration, variants, pair, tmp_path, monkeypatch):
     """Nine times the cells, the same memory: what Python's arrays take at most, windows being small."""
-    of = variants["free"]
-    model = pair_of(of, calibration, *pair)
-    models = dem_models(calibration, of, (pair,))
+    restitution = variants["free"]
+    model = pair_of(restitution, calibration, *pair)
+    models = dem_models(calibration, restitution, (pair,))
     monkeypatch.setattr(dem_correction, "WINDOW", 64)
     monkeypatch.setattr(dem_correction, "SIGMA_CELLS", 32)
     peaks = []
@@ -230,16 +230,16 @@ def test_memory_does_not_grow_with_the_dem(calibration, variants, pair, tmp_path
 
 def test_many_models_and_the_steps_between_them(calibration, variants, tmp_path):
     """A DEM pieced together from models: restored everywhere, and the steps at the seams are gone."""
-    of = variants["absorbed"]
-    pairs = strip_pairs(calibration, of)
-    models = block_models(calibration, of, pairs)
+    restitution = variants["absorbed"]
+    pairs = strip_pairs(calibration, restitution)
+    models = block_models(calibration, restitution, pairs)
     names = tuple(one.model.names for one in models)
     chosen = [k for k, name in enumerate(names) if str(name[0]).startswith("2_")]
     middle = np.mean([models[k].middle for k in chosen], axis=0)
     grid = square_grid(middle, 200, 3.0)
     terrain = Terrain(middle, mean_ground(calibration))
     xy = cells(grid)
-    dem = dem_models(calibration, of, names)
+    dem = dem_models(calibration, restitution, names)
     number = nearest_models(models, dem.places, np.column_stack([xy, terrain(xy)]))
     z, good = np.full(len(xy), np.nan), np.zeros(len(xy), bool)
     for k in np.unique(number[number >= 0]):

@@ -10,7 +10,7 @@ from aerotri.conventions import InputError
 from aerotri.deformation.absorbed import absorbed_orientation
 from aerotri.deformation.model_geometry import normal_geometry, normal_model
 from aerotri.deformation.model_grid import FlatGround, deform_normal_case, deform_pair, mean_ground, pair_of
-from aerotri.deformation.restitution import restitution
+from aerotri.deformation.restitution import restitution_of
 from aerotri.deformation.stereo_model import deform_points, regions
 from aerotri.observations import Camera, Prior
 from aerotri.simulation.presets import PRESETS
@@ -69,8 +69,8 @@ def test_end_lap_that_is_none():
 def test_against_exact_intersection(few_parameters, pair, variant):
     """0.1 mm is asked for; what is left is how well the other solver converges."""
     a = few_parameters
-    of = restitution(a, variant)
-    model = pair_of(of, a, *pair)
+    restitution = restitution_of(a, variant)
+    model = pair_of(restitution, a, *pair)
     p = {str(n): v for n, v in zip(a.local.parameters.names, a.local.parameters.value, strict=True)}
     rows = [list(a.local.block.images.names).index(name) for name in pair]
     rotations = [independent.rotation(*a.local.images.angles[row]) for row in rows]
@@ -96,7 +96,7 @@ def test_against_exact_intersection(few_parameters, pair, variant):
 
 
 def test_outside_the_overlap_there_is_nothing(calibration, pair):
-    model = pair_of(restitution(calibration), calibration, *pair)
+    model = pair_of(restitution_of(calibration), calibration, *pair)
     centre = model.true.centre.mean(axis=0)
     below = [centre[0], centre[1], mean_ground(calibration)]
     points = np.array([below, [centre[0] + 3000.0, *below[1:]], [centre[0], centre[1], centre[2] + 500.0]])
@@ -112,7 +112,7 @@ def test_no_parameters_no_deformation(calibration, pair):
 
     plain = adjust_keeping_system(with_adjustment(calibration.result.block, additional_parameters=()))
     for variant in ("free", "absorbed"):
-        d = deform_pair(plain, restitution(plain, variant), pair, FlatGround(mean_ground(plain)), 50.0)
+        d = deform_pair(plain, restitution_of(plain, variant), pair, FlatGround(mean_ground(plain)), 50.0)
         assert np.nanmax(np.abs(d.d)) < 1e-6
         assert np.nanmax(d.sigma) == 0.0
 
@@ -146,7 +146,7 @@ def test_against_the_normal_case_to_its_order(calibration):
     differences = []
     for factor in (1.0, 0.5, 0.25):
         a = scaled(calibration, factor)
-        model, geometry = normal_model(a, restitution(a), 0.663)
+        model, geometry = normal_model(a, restitution_of(a), 0.663)
         grid = np.stack(np.meshgrid(np.linspace(-180, 180, 19), np.linspace(-500, 500, 41)), axis=-1).reshape(-1, 2)
         points = np.column_stack([grid, np.zeros(len(grid))])
         found = deform_points(model, points).d
@@ -165,7 +165,7 @@ def test_against_the_normal_case_to_its_order(calibration):
 
 def test_normal_case_looks_the_same_for_any_flight_axis(calibration):
     """A camera mounted the other way round, its image errors turned with it, deforms the model alike."""
-    d = deform_normal_case(calibration, restitution(calibration), 0.6, 20.0)
+    d = deform_normal_case(calibration, restitution_of(calibration), 0.6, 20.0)
     turned_camera = replace(calibration.local.block.cameras[0], flight_axis="-y")
     block = replace(calibration.local.block, cameras=(turned_camera,))
     p = calibration.local.parameters
@@ -173,15 +173,15 @@ def test_normal_case_looks_the_same_for_any_flight_axis(calibration):
     odd = np.isin(p.names, ["bluh.5", "bluh.6", "bluh.7", "bluh.8"])
     parameters = replace(p, value=np.where(odd, -p.value, p.value))
     other = replace(calibration, local=replace(calibration.local, block=block, parameters=parameters))
-    turned = deform_normal_case(other, restitution(other), 0.6, 20.0)
+    turned = deform_normal_case(other, restitution_of(other), 0.6, 20.0)
     np.testing.assert_allclose(turned.d, d.d, atol=1e-9)
 
 
 def test_nodes_are_where_they_say(calibration, pair):
     """Single nodes recomputed one by one: a shifted index would be caught."""
-    of = restitution(calibration, "absorbed")
-    d = deform_pair(calibration, of, pair, FlatGround(mean_ground(calibration)), 20.0)
-    model = pair_of(of, calibration, *pair)
+    restitution = restitution_of(calibration, "absorbed")
+    d = deform_pair(calibration, restitution, pair, FlatGround(mean_ground(calibration)), 20.0)
+    model = pair_of(restitution, calibration, *pair)
     rows, columns = np.nonzero(np.isfinite(d.d[..., 2]))
     for k in np.random.default_rng(1).choice(len(rows), 12, replace=False):
         i, j = rows[k], columns[k]
@@ -199,12 +199,12 @@ def test_heights_matter(calibration, pair):
         def heights(self, x, y):
             return mean_ground(calibration) + 0.1 * (x - x.mean())
 
-    of = restitution(calibration)
-    flat = deform_pair(calibration, of, pair, FlatGround(mean_ground(calibration)), 40.0)
-    sloping = deform_pair(calibration, of, pair, Slope(), 40.0)
+    restitution = restitution_of(calibration)
+    flat = deform_pair(calibration, restitution, pair, FlatGround(mean_ground(calibration)), 40.0)
+    sloping = deform_pair(calibration, restitution, pair, Slope(), 40.0)
     np.testing.assert_array_equal(flat.x, sloping.x)
     assert np.nanmax(np.abs(flat.d - sloping.d)) > 0.005
-    model = pair_of(of, calibration, *pair)
+    model = pair_of(restitution, calibration, *pair)
     i, j = np.argwhere(np.isfinite(sloping.d[..., 2]))[7]
     point = np.array([[sloping.x[j], sloping.y[i], sloping.z[i, j]]])
     np.testing.assert_allclose(sloping.d[i, j], deform_points(model, point).d[0], atol=1e-9)

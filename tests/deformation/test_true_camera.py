@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aerotri.deformation import dem_models, restitution
+from aerotri.deformation import dem_models, restitution_of
 from aerotri.deformation.orientation import Orientation, calibrated_orientation
 from aerotri.deformation.stereo_model import intersect, project
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -31,7 +31,7 @@ def heights(calibration):
     names = [str(name) for name in block.images.names]
     triples = [[names.index(f"{strip}_{k + j:03d}") for j in range(3)] for strip in (1, 2, 3) for k in range(1, 5)]
     pairs = tuple((names[three[j]], names[three[j + 1]]) for three in triples for j in range(2))
-    models = dem_models(calibration, restitution(calibration, used=used), pairs)
+    models = dem_models(calibration, restitution_of(calibration, used=used), pairs)
     found = []
     for k, three in enumerate(triples):
         x, y = np.meshgrid(np.linspace(-300, 300, 31), np.linspace(-300, 300, 31))

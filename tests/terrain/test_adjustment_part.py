@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aerotri.deformation.restitution import restitution
+from aerotri.deformation.restitution import restitution_of
 from aerotri.functional_model.collinearity import linearise
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.terrain.adjustment_part import adjustment_variances
@@ -19,7 +19,7 @@ def test_point_after_the_adjustment_is_as_sure_as_in_it(parameters):
     """
     found = adjust_keeping_system(small_block(2, parameters)[0])
     block, points = found.result.block, found.result.points
-    of = restitution(found)
+    restitution = restitution_of(found)
     rays = block.image_points
     tie = np.setdiff1d(np.flatnonzero(points.rays >= 3), block.control.point)[:60]
     used = [rays.image[rays.point == p] for p in tie]
@@ -31,13 +31,20 @@ def test_point_after_the_adjustment_is_as_sure_as_in_it(parameters):
         points.xyz[tie, :2], points.xyz[tie], np.zeros((n, 3, 3)), np.zeros(n, np.int8), np.zeros(n, np.int16),
         photographs, np.ones(n), np.full(n, -1), np.zeros(n), block.images.names, 1.0,
     )  # fmt: skip
-    adjustment = adjustment_variances(found, of, np.arange(len(block.images)), pickets)
+    adjustment = adjustment_variances(found, restitution, np.arange(len(block.images)), pickets)
     picket, column = np.nonzero(photographs >= 0)
     image = photographs[picket, column]
-    interior = np.zeros((len(of.true), 15))
-    interior[:, :3] = of.true.interior
+    interior = np.zeros((len(restitution.true), 15))
+    interior[:, :3] = restitution.true.interior
     by_point = linearise(
-        of.true.rotation, of.true.centre, points.xyz[tie], interior, image, picket, image, np.zeros((len(image), 2))
+        restitution.true.rotation,
+        restitution.true.centre,
+        points.xyz[tie],
+        interior,
+        image,
+        picket,
+        image,
+        np.zeros((len(image), 2)),
     ).by_point
     normal = np.zeros((n, 3, 3))
     sigma = found.result.outcome.sigma0_um * 1e-3

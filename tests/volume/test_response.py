@@ -9,7 +9,7 @@ import pytest
 
 from aerotri.adjustment.unknowns import Step
 from aerotri.deformation.absorbed import shared_columns
-from aerotri.deformation.restitution import restitution
+from aerotri.deformation.restitution import restitution_of
 from aerotri.deformation.stereo_model import covariance_of, deform_points, pair_model
 from aerotri.functional_model._kernels import linearise_ray, predict_ray
 from aerotri.pipeline import adjust_keeping_system
@@ -64,7 +64,7 @@ def measured_now(calibration, pickets):
     """What the rays of the pickets measure at the solution, and the columns of the additional parameters there."""
     u, state = calibration.system.unknowns, calibration.solution.state
     row_of = {int(image): row for row, image in enumerate(u.images)}
-    errors = restitution(calibration).errors[0]
+    errors = restitution_of(calibration).errors[0]
     columns = shared_columns(calibration)
     xy, basis = np.empty((len(pickets.image), 2)), np.zeros((len(pickets.image), 2, len(state.shared)))
     interior = u.interior(state)
@@ -172,8 +172,8 @@ def test_mean_height_and_profile(calibration, hill):
 
 def test_uncorrected_image_errors_of_one_point_are_the_deformation_of_its_model(calibration):
     """dZ of single points against the exact deformation, both variants; σ against that of the deformation."""
-    of = {variant: restitution(calibration, variant) for variant in ("free", "absorbed")}
-    models = {variant: pair_model(of[variant], ("left", "right"), (8, 9)) for variant in of}
+    restitution = {variant: restitution_of(calibration, variant) for variant in ("free", "absorbed")}
+    models = {variant: pair_model(restitution[variant], ("left", "right"), (8, 9)) for variant in restitution}
     xyz = calibration.local.points.xyz
     seen = np.flatnonzero(np.isfinite(deform_points(models["free"], xyz).d[:, 2]))[:25]
     assert len(seen) > 10

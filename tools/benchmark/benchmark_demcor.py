@@ -142,8 +142,8 @@ def _row(case: Case, result: Path, arguments: argparse.Namespace) -> str:
         ours.append(_ours(case, result))
         theirs.append(_measured(command))
         target.unlink()
-    seconds, processor = (np.array([[getattr(run, of) for run in runs] for runs in (ours, theirs)])
-                          for of in ("seconds", "processor"))  # fmt: skip
+    seconds, processor = (np.array([[getattr(run, restitution) for run in runs] for runs in (ours, theirs)])
+                          for restitution in ("seconds", "processor"))  # fmt: skip
     start = np.array([run.seconds - json.loads(run.printed)["timings_s"]["total"] for run in ours])
     median, pairs, work = np.median(seconds, axis=1), seconds[0] / seconds[1], np.median(processor, axis=1)
     peaks = [max(run.peak for run in runs) for runs in (ours, theirs)]

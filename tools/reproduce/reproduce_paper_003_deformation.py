@@ -13,7 +13,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from aerotri.deformation import deform_normal_case, restitution
+from aerotri.deformation import deform_normal_case, restitution_of
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.image_errors import ErrorField, field_on_grid
 from aerotri.observations import Block
@@ -40,9 +40,9 @@ def main() -> None:
         plain = _adjusted(block, "none") if case.key == "ultracam_d" else None
         for heading, parameters in case.sets:
             found = _adjusted(block, parameters)
-            of = restitution(found)
+            restitution = restitution_of(found)
             fields[case.key, heading] = field_on_grid(found.local, found.local.block.cameras[0].name)
-            rows += [Row(case, heading, p, deform_normal_case(found, of, p.end_lap)) for p in case.pictures]
+            rows += [Row(case, heading, p, deform_normal_case(found, restitution, p.end_lap)) for p in case.pictures]
             if plain is not None:
                 compared.append((heading, even_against_odd(found, plain, case.spec, SEED, truth)))
     text = markdown(rows, compared, cases()[0].spec.flight.end_lap)

@@ -57,7 +57,7 @@ from aerotri.commands.simulate import run_simulate
 from aerotri.deformation.dem_window import dem_models
 from aerotri.deformation.model_map import read_number_table
 from aerotri.deformation.photo_errors import seams_mm
-from aerotri.deformation.restitution import ABSORBED, restitution
+from aerotri.deformation.restitution import ABSORBED, restitution_of
 from aerotri.functional_model.additional_parameters import parameter_set, parse_parameters
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.terrain import terrain
@@ -245,10 +245,10 @@ def places(grid: Grid, z: np.ndarray) -> np.ndarray:
 def foretold(here: Path, name: str, found: Pair) -> np.ndarray:
     """(rows, columns) m, what the deformation of the models lets expect of the difference."""
     calibration = reopened(here / name, Console(quiet=True))
-    of, parts = restitution(calibration, ABSORBED), []
+    restitution, parts = restitution_of(calibration, ABSORBED), []
     for subset, z in zip(SUBSETS, (found.even, found.odd), strict=True):
         names, number = models_of_cells(here, subset, found.grid)
-        models = dem_models(calibration, of, names)
+        models = dem_models(calibration, restitution, names)
         parts.append(models.deformation_at(number.ravel(), places(found.grid, z))[:, 2].reshape(z.shape))
     return parts[0] - parts[1]
 
@@ -259,15 +259,15 @@ def clear_cells(here: Path, found: Pair) -> np.ndarray:
     A window of 17 pixels is a tenth of a tile of this camera, and 1/200 of one of the true camera.
     """
     calibration = reopened(here / "plain", Console(quiet=True))
-    of, clear = restitution(calibration).true, np.isfinite(found.difference)
+    restitution, clear = restitution_of(calibration).true, np.isfinite(found.difference)
     row = {str(name): k for k, name in enumerate(calibration.local.block.images.names)}
     for subset, z in zip(SUBSETS, (found.even, found.odd), strict=True):
         names, number = models_of_cells(here, subset, found.grid)
         clear &= maximum_filter(number, 3) == minimum_filter(number, 3)
         for side in (0, 1):
             photo = np.array([row[pair[side]] for pair in names])[number.ravel()]
-            u = np.einsum("nji,nj->ni", of.rotation[photo], places(found.grid, z) - of.centre[photo])
-            xy = -of.interior[photo, :1] * u[:, :2] / u[:, 2:]
+            u = np.einsum("nji,nj->ni", restitution.rotation[photo], places(found.grid, z) - restitution.centre[photo])
+            xy = -restitution.interior[photo, :1] * u[:, :2] / u[:, 2:]
             for axis, seams in enumerate(seams_mm(calibration.local.block.cameras[0])):
                 away = np.abs(xy[:, axis, None] - seams).min(axis=1) / (1e-3 * PIXEL_UM)
                 clear &= (away > 0.5 * WINDOW_PX + ERROR_PX).reshape(z.shape)

@@ -222,8 +222,8 @@ class _Entries:
         place = np.empty(len(keys), np.int64)
         place[order] = np.arange(len(keys))
         start, sigma, free = (np.array([self._rows[keys[i]][k] for i in order]) for k in (1, 2, 3))
-        names, of = tuple(keys[i][0] for i in order), tuple(keys[i][1] for i in order)
-        return Shared(names, of, start, sigma, free.astype(bool)), place
+        names, groups = tuple(keys[i][0] for i in order), tuple(keys[i][1] for i in order)
+        return Shared(names, groups, start, sigma, free.astype(bool)), place
 
 
 def _element_entries(block: Block, camera_row: int, group: str, entries: _Entries) -> list[int]:

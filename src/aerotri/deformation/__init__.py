@@ -4,7 +4,7 @@ from aerotri.deformation.block_models import BlockDeformation, deform_block
 from aerotri.deformation.dem_correction import DemOutcome, correct_dem
 from aerotri.deformation.dem_window import DemModels, dem_models
 from aerotri.deformation.model_grid import Deformation, DemGround, FlatGround, deform_normal_case, deform_pair
-from aerotri.deformation.restitution import Restitution, restitution
+from aerotri.deformation.restitution import Restitution, restitution_of
 
 __all__ = [
     "BlockDeformation",
@@ -19,5 +19,5 @@ __all__ = [
     "deform_normal_case",
     "deform_pair",
     "dem_models",
-    "restitution",
+    "restitution_of",
 ]

@@ -97,7 +97,7 @@ class BlockDeformation:
         return float(np.sqrt(sum(seam.count * seam.rms**2 for seam in self.seams) / count)) if count else np.nan
 
 
-def strip_pairs(calibration: Adjustment, of: Restitution, step: int = 1) -> list[tuple[int, int]]:
+def strip_pairs(calibration: Adjustment, restitution: Restitution, step: int = 1) -> list[tuple[int, int]]:
     """Rows of the photographs of every model: along each strip every photograph with the `step`-th after it.
 
     Photographs without a named strip follow one another as in the table. Pairs that overlap by less than a fifth along
@@ -105,8 +105,8 @@ def strip_pairs(calibration: Adjustment, of: Restitution, step: int = 1) -> list
     """
     if step < 1:
         raise InputError(f"a step of {step} pairs no photographs", "give 1 or more")
-    strips, centre = calibration.local.block.images.strip, of.true.centre
-    known = of.true.known & of.used.known
+    strips, centre = calibration.local.block.images.strip, restitution.true.centre
+    known = restitution.true.known & restitution.used.known
     ground = float(np.nanmedian(calibration.local.points.xyz[:, 2]))
     pairs = []
     for strip in dict.fromkeys(strips[known].tolist()):
@@ -114,19 +114,21 @@ def strip_pairs(calibration: Adjustment, of: Restitution, step: int = 1) -> list
         if strip and len(members) > 1:
             members = members[along_strip(centre[members])]
         for left, right in zip(members[:-step].tolist(), members[step:].tolist(), strict=True):
-            model = pair_model(of, ("", ""), (left, right))
+            model = pair_model(restitution, ("", ""), (left, right))
             if geometry_of(model, ground).end_lap >= SMALLEST_END_LAP:
                 pairs.append((left, right))
     return pairs
 
 
-def block_models(calibration: Adjustment, of: Restitution, pairs: list[tuple[int, int]]) -> tuple[BlockModel, ...]:
+def block_models(
+    calibration: Adjustment, restitution: Restitution, pairs: list[tuple[int, int]]
+) -> tuple[BlockModel, ...]:
     """The models of pairs of photographs."""
     places, names = places_of(calibration), calibration.local.block.images.names
     ground = float(np.nanmedian(calibration.local.points.xyz[:, 2]))
     models = []
     for left, right in pairs:
-        model = pair_model(of, (str(names[left]), str(names[right])), (left, right))
+        model = pair_model(restitution, (str(names[left]), str(names[right])), (left, right))
         middle = places.from_local(model.true.centre).mean(axis=0)[:2]
         models.append(BlockModel(model, middle, geometry_of(model, ground)))
     return tuple(models)
@@ -134,7 +136,7 @@ def block_models(calibration: Adjustment, of: Restitution, pairs: list[tuple[int
 
 def deform_block(
     calibration: Adjustment,
-    of: Restitution,
+    restitution: Restitution,
     ground: Ground,
     spacing: float | None = None,
     step: int = 1,
@@ -154,7 +156,7 @@ def deform_block(
         When there is no model.
     """
     places = places_of(calibration)
-    models = block_models(calibration, of, strip_pairs(calibration, of, step))
+    models = block_models(calibration, restitution, strip_pairs(calibration, restitution, step))
     if not models:
         raise InputError("no two photographs that follow one another overlap", "name a pair, or give --end-lap")
     points = calibration.result.points.xyz
@@ -174,7 +176,8 @@ def deform_block(
     number = number.reshape(shape)
     seams = _seams(models, places, xyz, d[:, 2], number)
     return BlockDeformation(
-        of.variant, calibration.result.block.crs, ground.text, x, y, z, d.reshape(*shape, 3), sigma.reshape(*shape, 3),
+        restitution.variant, calibration.result.block.crs, ground.text, x, y, z, d.reshape(*shape, 3),
+        sigma.reshape(*shape, 3),
         models, number, seams,
     )  # fmt: skip
 

@@ -182,7 +182,7 @@ class _Correction:
             own = known & (self._models_at == k)
             local = models.places.to_local(np.column_stack([x[own], y[own], self._heights[own]]))
             left, right = models.rows[k].tolist()
-            model = pair_model(models.of, models.names[k], (left, right))
+            model = pair_model(models.restitution, models.names[k], (left, right))
             variance = models.places.variances(local, covariance_of(model, local))
             sigma[own] = np.sqrt(np.maximum(variance[:, 2], 0.0))
         return sigma
@@ -205,7 +205,7 @@ def halo_for(models: DemModels, grid: Grid) -> int:
     grid_x, grid_y = np.meshgrid(x, y)
     largest = 0.0
     for k in range(len(models.names)):
-        centre = models.places.from_local(models.of.true.centre[models.rows[k]]).mean(axis=0)
+        centre = models.places.from_local(models.restitution.true.centre[models.rows[k]]).mean(axis=0)
         around = np.column_stack([grid_x.ravel(), grid_y.ravel(), np.full(grid_x.size, models.ground)])
         # a large DEM may have no sample within a small model, whose middle always is
         xyz = np.vstack([around, [[centre[0], centre[1], models.ground]]])

@@ -54,7 +54,7 @@ class DemModels:
 
     names: tuple[tuple[str, str], ...]
     rows: np.ndarray
-    of: Restitution
+    restitution: Restitution
     tables: ErrorTables
     source: np.ndarray
     places: Places
@@ -70,8 +70,14 @@ class DemModels:
         rows = self.rows if chosen is None else self.rows[chosen]
         local, axes = self.places.axes_at(np.array([x, y, self.ground]))
         local = local - self.ground * axes[:, 2]
-        sides = [(of, rows[:, k]) for of in (self.of.used, self.of.true) for k in range(2)]
-        return np.ascontiguousarray(np.stack([photo_rows(of.take(r), local, axes) for of, r in sides], axis=1))
+        sides = [
+            (restitution, rows[:, k])
+            for restitution in (self.restitution.used, self.restitution.true)
+            for k in range(2)
+        ]
+        return np.ascontiguousarray(
+            np.stack([photo_rows(restitution.take(r), local, axes) for restitution, r in sides], axis=1)
+        )
 
     def deformation_at(self, number: np.ndarray, xyz: np.ndarray) -> np.ndarray:
         """(n, 3) m, the deformation at points (n, 3) of the DEM in models (n,); NaN where they are not seen."""
@@ -138,7 +144,7 @@ def _corrected_part(dem: _kernels.Dem, models: _kernels.Models, halo: int) -> Co
     return CorrectedWindow(corrected.z, corrected.dz, corrected.sums, exact)
 
 
-def dem_models(calibration: Adjustment, of: Restitution, names: tuple[tuple[str, str], ...]) -> DemModels:
+def dem_models(calibration: Adjustment, restitution: Restitution, names: tuple[tuple[str, str], ...]) -> DemModels:
     """The models of a DEM, by the names of their photographs (left, right).
 
     Raises
@@ -150,14 +156,14 @@ def dem_models(calibration: Adjustment, of: Restitution, names: tuple[tuple[str,
     ground = float(np.nanmedian(calibration.local.points.xyz[:, 2]))
     rows, per_metre = [], []
     for left, right in names:
-        model = pair_of(of, calibration, left, right)
+        model = pair_of(restitution, calibration, left, right)
         geometry = geometry_of(model, ground)
         per_metre.append(geometry.base_mm / geometry.height_m)
         rows.append([row_of_image(block, name) for name in (left, right)])
     # both photographs may be off
-    tables = error_tables(of.errors, 0.5 * TABLE_TOLERANCE_M * min(per_metre))
+    tables = error_tables(restitution.errors, 0.5 * TABLE_TOLERANCE_M * min(per_metre))
     return DemModels(
-        names, np.array(rows), of, tables, of.group[np.array(rows)], places, mean_ground(calibration),
+        names, np.array(rows), restitution, tables, restitution.group[np.array(rows)], places, mean_ground(calibration),
         2.0 * tables.accuracy / min(per_metre),
     )  # fmt: skip
 

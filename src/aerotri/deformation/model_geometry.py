@@ -87,7 +87,11 @@ def normal_geometry(camera: Camera, c: float, end_lap: float, height: float) -> 
 
 
 def normal_model(
-    calibration: Adjustment, of: Restitution, end_lap: float, group: str | None = None, gsd: float | None = None
+    calibration: Adjustment,
+    restitution: Restitution,
+    end_lap: float,
+    group: str | None = None,
+    gsd: float | None = None,
 ) -> tuple[StereoModel, ModelGeometry]:
     """The normal-case model of a group of photographs.
 
@@ -100,26 +104,28 @@ def normal_model(
     group : parameter group; that of most photographs unless given.
     gsd : m; the block's own, from its median flying height, unless given.
     """
-    members, number = _members(calibration, of, group)
-    errors = of.errors[number]
-    interior = of.true.interior[members[0]]
+    members, number = _members(calibration, restitution, group)
+    errors = restitution.errors[number]
+    interior = restitution.true.interior[members[0]]
     if gsd is None:
         points = calibration.local.points.xyz
-        height = float(np.median(of.true.centre[members, 2]) - np.nanmedian(points[:, 2]))
+        height = float(np.median(restitution.true.centre[members, 2]) - np.nanmedian(points[:, 2]))
     else:
         height = gsd / errors.camera.pixel_mm * interior[0]
     geometry = normal_geometry(errors.camera, float(interior[0]), end_lap, height)
-    scale = height / float(np.median(of.true.centre[members, 2]) - np.nanmedian(calibration.local.points.xyz[:, 2]))
+    scale = height / float(
+        np.median(restitution.true.centre[members, 2]) - np.nanmedian(calibration.local.points.xyz[:, 2])
+    )
     true = _normal_orientation(errors.camera, interior, geometry)
-    used, follows = _with_mean_change(true, of, members, scale)
+    used, follows = _with_mean_change(true, restitution, members, scale)
     names = ("first", "second")
-    return StereoModel(names, (errors, errors), true, used, follows, of.covariance), geometry
+    return StereoModel(names, (errors, errors), true, used, follows, restitution.covariance), geometry
 
 
-def _members(calibration: Adjustment, of: Restitution, group: str | None) -> tuple[np.ndarray, int]:
+def _members(calibration: Adjustment, restitution: Restitution, group: str | None) -> tuple[np.ndarray, int]:
     """Rows of the oriented photographs of a group, and its number."""
     groups = image_groups(calibration.local.block)
-    known = of.true.known & of.used.known
+    known = restitution.true.known & restitution.used.known
     if group is None:
         number = int(np.argmax([np.sum(g.images & known) for g in groups]))
     else:
@@ -144,7 +150,7 @@ def _normal_orientation(camera: Camera, interior: np.ndarray, geometry: ModelGeo
 
 
 def _with_mean_change(
-    true: Orientation, of: Restitution, members: np.ndarray, scale: float
+    true: Orientation, restitution: Restitution, members: np.ndarray, scale: float
 ) -> tuple[Orientation, np.ndarray]:
     """The orientation in use, and how it follows the parameters.
 
@@ -152,18 +158,18 @@ def _with_mean_change(
     ----------
     scale : of the model to the block; shifts of the projection centres go with it.
     """
-    to_camera = np.swapaxes(of.true.rotation[members], 1, 2)
-    moved = of.used.centre[members] - of.true.centre[members]
-    turned = logarithm(of.used.rotation[members] @ to_camera)
+    to_camera = np.swapaxes(restitution.true.rotation[members], 1, 2)
+    moved = restitution.used.centre[members] - restitution.true.centre[members]
+    turned = logarithm(restitution.used.rotation[members] @ to_camera)
     shift = scale * np.einsum("nij,nj->ni", to_camera, moved).mean(axis=0)
     turn = np.einsum("nij,nj->ni", to_camera, turned).mean(axis=0)
-    interior = (of.used.interior[members] - of.true.interior[members]).mean(axis=0)
+    interior = (restitution.used.interior[members] - restitution.true.interior[members]).mean(axis=0)
     rotation = true.rotation[0]
     used = Orientation(
         true.centre + rotation @ shift, exponential(rotation @ turn) @ true.rotation, true.interior + interior
     )
-    follows = np.zeros((9, of.follows.shape[2]))
-    follows[:3] = scale * rotation @ (to_camera @ of.follows[members, :3]).mean(axis=0)
-    follows[3:6] = rotation @ (to_camera @ of.follows[members, 3:6]).mean(axis=0)
-    follows[6:] = of.follows[members, 6:].mean(axis=0)
+    follows = np.zeros((9, restitution.follows.shape[2]))
+    follows[:3] = scale * rotation @ (to_camera @ restitution.follows[members, :3]).mean(axis=0)
+    follows[3:6] = rotation @ (to_camera @ restitution.follows[members, 3:6]).mean(axis=0)
+    follows[6:] = restitution.follows[members, 6:].mean(axis=0)
     return used, np.stack([follows, follows])

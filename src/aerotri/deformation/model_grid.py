@@ -160,7 +160,7 @@ def places_of(calibration: Adjustment) -> Places:
     return Places(frame)
 
 
-def pair_of(of: Restitution, calibration: Adjustment, left: str, right: str) -> StereoModel:
+def pair_of(restitution: Restitution, calibration: Adjustment, left: str, right: str) -> StereoModel:
     """The model of two photographs of the block, by their names.
 
     Raises
@@ -173,12 +173,12 @@ def pair_of(of: Restitution, calibration: Adjustment, left: str, right: str) -> 
         row = row_of_image(calibration.local.block, name)
         if row < 0:
             raise InputError(f"the block has no photograph '{name}'", "name two photographs of images.csv")
-        if not (of.true.known & of.used.known)[row]:
+        if not (restitution.true.known & restitution.used.known)[row]:
             raise InputError(f"photograph '{name}' is not oriented", "name two photographs that are")
         rows.append(row)
     if left == right:
         raise InputError(f"'{left}' is named twice", "a model needs two photographs")
-    return pair_model(of, (left, right), (rows[0], rows[1]))
+    return pair_model(restitution, (left, right), (rows[0], rows[1]))
 
 
 def mean_ground(calibration: Adjustment) -> float:
@@ -187,7 +187,11 @@ def mean_ground(calibration: Adjustment) -> float:
 
 
 def deform_pair(
-    calibration: Adjustment, of: Restitution, names: tuple[str, str], ground: Ground, spacing: float | None = None
+    calibration: Adjustment,
+    restitution: Restitution,
+    names: tuple[str, str],
+    ground: Ground,
+    spacing: float | None = None,
 ) -> Deformation:
     """The deformation of a pair of the block as flown.
 
@@ -200,7 +204,7 @@ def deform_pair(
     InputError
         When the photographs do not overlap.
     """
-    places, model = places_of(calibration), pair_of(of, calibration, *names)
+    places, model = places_of(calibration), pair_of(restitution, calibration, *names)
     level = _level(calibration, places, model)
     low, high = _overlap(places, model, level)
     if not (high > low).all():
@@ -209,7 +213,7 @@ def deform_pair(
     z = np.stack([ground.heights(x, np.full(len(x), value)) for value in y])
     centre = places.from_local(model.true.centre)
     return _on_nodes(
-        model, places, x, y, z, title=f"pair {names[0]}, {names[1]}", variant=of.variant, names=names,
+        model, places, x, y, z, title=f"pair {names[0]}, {names[1]}", variant=restitution.variant, names=names,
         geometry=geometry_of(model, _local_level(places, centre, level)), crs=calibration.result.block.crs,
         ground=ground.text, base=centre[:, :2], seams=_seams(places, model, level),
     )  # fmt: skip
@@ -217,19 +221,19 @@ def deform_pair(
 
 def deform_normal_case(
     calibration: Adjustment,
-    of: Restitution,
+    restitution: Restitution,
     end_lap: float,
     spacing: float | None = None,
     group: str | None = None,
     gsd: float | None = None,
 ) -> Deformation:
     """The deformation of the normal-case model at an end lap, over its flat ground; see `model_geometry`."""
-    model, geometry = normal_model(calibration, of, end_lap, group, gsd)
+    model, geometry = normal_model(calibration, restitution, end_lap, group, gsd)
     low, high = _overlap(Places(), model, 0.0)
     x, y = nodes_between(low, high, spacing)
     return _on_nodes(
         model, Places(), x, y, np.zeros((len(y), len(x))), title=f"normal case, end lap {100.0 * end_lap:.1f} %",
-        variant=of.variant, names=None, geometry=geometry, crs="model", ground="flat",
+        variant=restitution.variant, names=None, geometry=geometry, crs="model", ground="flat",
         base=model.true.centre[:, :2], seams=_seams(Places(), model, 0.0),
     )  # fmt: skip
 

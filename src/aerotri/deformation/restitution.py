@@ -53,7 +53,7 @@ class Restitution:
     covariance: np.ndarray
 
 
-def restitution(calibration: Adjustment, variant: str = FREE, used: Orientation | None = None) -> Restitution:
+def restitution_of(calibration: Adjustment, variant: str = FREE, used: Orientation | None = None) -> Restitution:
     """The restitution of a block.
 
     Parameters

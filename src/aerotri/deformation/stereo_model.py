@@ -60,13 +60,18 @@ class PointDeformation:
     parallax: np.ndarray
 
 
-def pair_model(of: Restitution, names: tuple[str, str], rows: tuple[int, int]) -> StereoModel:
+def pair_model(restitution: Restitution, names: tuple[str, str], rows: tuple[int, int]) -> StereoModel:
     """The model of two photographs of a block, by their rows."""
     pair = list(rows)
-    left, right = (of.errors[of.group[row]] for row in pair)
+    left, right = (restitution.errors[restitution.group[row]] for row in pair)
     return StereoModel(
-        names, (left, right), of.true.take(pair), of.used.take(pair), of.follows[pair], of.covariance
-    )  # fmt: skip
+        names,
+        (left, right),
+        restitution.true.take(pair),
+        restitution.used.take(pair),
+        restitution.follows[pair],
+        restitution.covariance,
+    )
 
 
 def seen_by_both(model: StereoModel, points: np.ndarray) -> np.ndarray:

@@ -170,14 +170,14 @@ def correct_dem(
         raise InputError("either a pair or a map of models says what the DEM was made of", "give one of the two")
     from aerotri.deformation.dem_window import dem_models
     from aerotri.deformation.model_map import OneModel, PolygonMap
-    from aerotri.deformation.restitution import FREE, restitution
+    from aerotri.deformation.restitution import FREE, restitution_of
     from aerotri.rasters.grids import cache_limited
 
     stated, spool = StatedAdjustment(result), Spool(scratch)
     with stage_report(progress) as report, ExitStack() as stack:
         record = stated.record
         used, doubt = _orientation(record, orientation)
-        photographs = restitution(record, ABSORBED if orientation == ABSORBED else FREE, used)
+        photographs = restitution_of(record, ABSORBED if orientation == ABSORBED else FREE, used)
         if used is None:
             refuse_without_errors(photographs, stated.name)
         stack.enter_context(cache_limited())

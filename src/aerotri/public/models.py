@@ -185,7 +185,7 @@ def deform(
     True
     """
     from aerotri.deformation.model_grid import deform_normal_case, deform_pair
-    from aerotri.deformation.restitution import VARIANTS, restitution
+    from aerotri.deformation.restitution import VARIANTS, restitution_of
 
     if variant not in VARIANTS:
         raise InputError(f"there is no variant '{variant}'", f"choose {' or '.join(VARIANTS)}")
@@ -194,7 +194,7 @@ def deform(
     name = str(record.result.block.name)
     with stage_report(progress) as report, ExitStack() as stack:
         report.stage("orientation", None)
-        models = restitution(record, variant)
+        models = restitution_of(record, variant)
         refuse_without_errors(models, name)
         report.stage("deformation", None)
         if end_lap is not None:

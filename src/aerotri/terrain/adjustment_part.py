@@ -20,7 +20,9 @@ from aerotri.terrain.pickets import Pickets
 MOST_PLACES, AT_A_TIME = 500, 100
 
 
-def adjustment_variances(calibration: Adjustment, of: Restitution, rows: np.ndarray, pickets: Pickets) -> np.ndarray:
+def adjustment_variances(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, pickets: Pickets
+) -> np.ndarray:
     """(n, 3) m², in the CRS, of pickets that were measured; NaN of others.
 
     Parameters
@@ -39,7 +41,7 @@ def adjustment_variances(calibration: Adjustment, of: Restitution, rows: np.ndar
     variances = np.empty((len(places), 3))
     for first in range(0, len(places), AT_A_TIME):
         part = slice(first, first + AT_A_TIME)
-        j = _by_unknowns(calibration, of, rows, local[part], photographs[part])
+        j = _by_unknowns(calibration, restitution, rows, local[part], photographs[part])
         q = factor.solve(j.reshape(-1, j.shape[2]).T)
         both = np.einsum("nau,unb->nab", j, q.reshape(j.shape[2], len(j), 3))
         covariance = calibration.local.outcome.sigma0**2 * both
@@ -52,15 +54,15 @@ def adjustment_variances(calibration: Adjustment, of: Restitution, rows: np.ndar
 
 
 def _by_unknowns(
-    calibration: Adjustment, of: Restitution, rows: np.ndarray, local: np.ndarray, photographs: np.ndarray
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, local: np.ndarray, photographs: np.ndarray
 ) -> np.ndarray:
     """(n, 3, u) partials of intersected points by the unknowns of the reduced system."""
     u, state = calibration.system.unknowns, calibration.solution.state
-    in_system = np.full(len(of.group), -1)
+    in_system = np.full(len(restitution.group), -1)
     in_system[u.images] = np.arange(len(u.images))
     picket, column = np.nonzero(photographs >= 0)
     image = rows[photographs[picket, column]]
-    orientation = of.true
+    orientation = restitution.true
     interior = np.zeros((len(orientation), u.lens.base.shape[1]))
     interior[:, :3] = orientation.interior
     rays = linearise(
@@ -88,8 +90,8 @@ def _by_unknowns(
             np.add.at(j, (picket[has][:, None], np.arange(3), first_shared + free[has, k][:, None]), e)
     columns = shared_columns(calibration)
     if len(additional_rows(calibration)):
-        for g, errors in enumerate(of.errors):
-            has = np.flatnonzero(of.group[image] == g)
+        for g, errors in enumerate(restitution.errors):
+            has = np.flatnonzero(restitution.group[image] == g)
             if len(has):
                 partials = errors.partials(errors.measured(rays.prediction[has]))
                 e = -gain[has] @ partials

@@ -134,7 +134,7 @@ def make_terrain_model(calibration: Adjustment, plan: TerrainPlan, report: Repor
         )
     pickets = with_error_pickets(pickets, gsd / base_ratio(photographs, pickets))
     tell("statistics", 0.97)
-    adjustment = adjustment_variances(calibration, photographs.of, plan.rows, pickets)
+    adjustment = adjustment_variances(calibration, photographs.restitution, plan.rows, pickets)
     outcome = _surfaces(pickets, adjustment, interval, plan, 0.5 * plan.window_px * gsd)
     tell("surfaces", 1.0)
     number = _model_numbers(outcome[0], pickets) if models is not None else np.zeros((0, 0), np.int32)
@@ -189,18 +189,18 @@ def models_of(calibration: Adjustment, photographs: Photographs, step: int | Non
     InputError
     """
     row = {int(r): k for k, r in enumerate(photographs.rows)}
-    missing = ~np.isin(np.arange(len(photographs.of.true)), photographs.rows)
-    of = photographs.of
+    missing = ~np.isin(np.arange(len(photographs.restitution.true)), photographs.rows)
+    restitution = photographs.restitution
     # photographs that are not matched are none of a strip, so that steps count those that are
-    centre = np.where(missing[:, None], np.nan, of.true.centre)
-    of = replace(of, true=replace(of.true, centre=centre))
+    centre = np.where(missing[:, None], np.nan, restitution.true.centre)
+    restitution = replace(restitution, true=replace(restitution.true, centre=centre))
     best: tuple[float, list[tuple[int, int]]] = (np.inf, [])
     ground = float(np.nanmedian(calibration.local.points.xyz[:, 2]))
     for one in range(1, 6) if step is None else (step,):
-        pairs = strip_pairs(calibration, of, one)
+        pairs = strip_pairs(calibration, restitution, one)
         if not pairs:
             continue
-        laps = [geometry_of(pair_model(photographs.of, ("", ""), pair), ground).end_lap for pair in pairs]
+        laps = [geometry_of(pair_model(photographs.restitution, ("", ""), pair), ground).end_lap for pair in pairs]
         off = abs(float(np.median(laps)) - BEST_END_LAP)
         if off < best[0]:
             best = off, pairs

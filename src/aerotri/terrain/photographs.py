@@ -19,7 +19,7 @@ from aerotri.deformation.error_tables import ErrorTables, error_tables
 from aerotri.deformation.model_grid import Places, mean_ground, places_of
 from aerotri.deformation.orientation import Orientation, photo_rows
 from aerotri.deformation.photo_errors import PhotoErrors
-from aerotri.deformation.restitution import FREE, Restitution, restitution
+from aerotri.deformation.restitution import FREE, Restitution, restitution_of
 from aerotri.rasters.images import open_photograph
 from aerotri.results.adjustment import Adjustment
 from aerotri.terrain._view_kernels import View
@@ -110,7 +110,7 @@ class Photographs:
     rows: np.ndarray
     orientation: Orientation
     names: np.ndarray
-    of: Restitution
+    restitution: Restitution
     tables: ErrorTables
     source: np.ndarray
     sensor: np.ndarray
@@ -209,26 +209,26 @@ def photographs_of(
     InputError
         For scanned film, whose pixels are no image coordinates, and for photographs without orientation.
     """
-    block, of = calibration.local.block, restitution(calibration, FREE)
+    block, restitution = calibration.local.block, restitution_of(calibration, FREE)
     for row, path in zip(rows.tolist(), paths, strict=True):
         if row in block.interior_fits:
             raise InputError("is scanned film, which matching does not read", "resample it to its fiducials", path)
-        if not of.true.known[row]:
+        if not restitution.true.known[row]:
             raise InputError("is not oriented", "leave it out, or adjust it", path)
-    places, orientation = places_of(calibration), of.true.take(rows)
+    places, orientation = places_of(calibration), restitution.true.take(rows)
     cameras = [block.cameras[c] for c in block.images.camera[rows]]
     pixel = min(camera.pixel_mm for camera in cameras)
     if ideal:
-        of = replace(of, errors=tuple(_without_errors(e) for e in of.errors))
-    tables = error_tables(of.errors, TABLE_TOLERANCE_PX * pixel)
+        restitution = replace(restitution, errors=tuple(_without_errors(e) for e in restitution.errors))
+    tables = error_tables(restitution.errors, TABLE_TOLERANCE_PX * pixel)
     ground = mean_ground(calibration)
     centres = places.from_local(orientation.centre)
     height = centres[:, 2] - ground
     sizes = [camera.size_px for camera in cameras]
     most = max(int(np.log2(max(min(s) for s in sizes) / 96.0)) + 1, 1)
     return Photographs(
-        rows=rows, orientation=orientation, names=block.images.names[rows], of=of, tables=tables,
-        source=of.group[rows],
+        rows=rows, orientation=orientation, names=block.images.names[rows], restitution=restitution, tables=tables,
+        source=restitution.group[rows],
         sensor=np.array([[s[0] / 2.0, s[1] / 2.0, 1.0 / c.pixel_mm] for s, c in zip(sizes, cameras, strict=True)]),
         places=places, ground=ground, gsd=height * [c.pixel_mm for c in cameras] / orientation.interior[:, 0],
         centres=centres, error_px=float(np.abs(tables.values).max(initial=0.0)) / pixel,

@@ -64,7 +64,7 @@ def compute_volumes(
         raise InputError(f"there is no method '{method}'", f"choose one of {', '.join(METHODS)}")
 
     def told(what: str) -> Callable[[int, int], None]:
-        return lambda done, of: progress(what, done, of) if progress is not None else None
+        return lambda done, count: progress(what, done, count) if progress is not None else None
 
     rasters = raster_volumes(surface, base, boundary, keep, told("window"))
     if rasters.cells.area <= 0.0:

@@ -109,11 +109,11 @@ def respond(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, cor
     )  # fmt: skip
     by_eo, by_interior, deposits, noise = _summed(calibration, pickets, gradient, photos, nodes)
     by_parameters, error = np.zeros(len(rows)), 0.0
-    for of, own in zip(errors, nodes.of_group, strict=True):
+    for group, own in zip(errors, nodes.of_group, strict=True):
         used = np.flatnonzero(deposits[own].any(axis=1))
         xy, f = nodes.xy[own][used], deposits[own][used]
-        by_parameters += np.einsum("na,nap->p", f, of.partials(xy))
-        error += float(np.sum(f * of.function.of_measured(xy)))
+        by_parameters += np.einsum("na,nap->p", f, group.partials(xy))
+        error += float(np.sum(f * group.function.of_measured(xy)))
     c = _in_unknowns(calibration, by_eo, by_interior, by_parameters, corrected)
     factor = system.factorise(calibration.solution.equations)
     solved = factor.solve(c)
@@ -245,8 +245,8 @@ def _nodes_of(errors: tuple[PhotoErrors, ...]) -> _Nodes:
     edges, meta = np.full((len(errors), 2, 2), np.inf), np.zeros((len(errors), 3, 3, 7))
     parts: list[np.ndarray] = []
     of_group, count = [], 0
-    for s, of in enumerate(errors):
-        camera, begun = of.camera, count
+    for s, group in enumerate(errors):
+        camera, begun = group.camera, count
         for axis, seams in enumerate(seams_mm(camera)):
             edges[s, axis, : len(seams)] = seams
         tiles = tiles_of(camera)

@@ -128,10 +128,10 @@ def ground_between(
     few = own if len(own) <= MOST_TRIANGLES else rng.choice(own, MOST_TRIANGLES, replace=False)
     tree = KDTree(xyz[:, :2])
     part = [_over(roughness, xyz, triangles[few[k : k + CHUNK]], noise, tree) for k in range(0, len(few), CHUNK)]
-    more = np.concatenate([of.more for of in part]) * share[few]
+    more = np.concatenate([one.more for one in part]) * share[few]
     scale = len(own) / len(few)
     sampling = len(own) ** 2 * (1.0 - 1.0 / scale) * float(np.var(more)) / len(few)
-    single = scale * float(np.concatenate([of.variance for of in part]) @ share[few])
+    single = scale * float(np.concatenate([one.variance for one in part]) @ share[few])
     factor = _neighbours(roughness, xyz, triangles[own], noise, tree, rng)
     return Between(scale * float(more.sum()), single * factor + sampling)
 

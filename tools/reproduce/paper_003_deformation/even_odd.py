@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.deformation import restitution
+from aerotri.deformation import restitution_of
 from aerotri.deformation.dem_window import dem_models
 from aerotri.deformation.orientation import Orientation, calibrated_orientation
 from aerotri.deformation.stereo_model import intersect, project
@@ -45,10 +45,10 @@ def even_against_odd(
         truth.centre, rotation_from_angles(truth.angles, block.rotation), truth.interior[block.images.camera]
     )
     used = calibrated_orientation(plain)
-    of = restitution(calibrated, used=used)
+    restitution = restitution_of(calibrated, used=used)
     names, fours = block.images.names.astype(str), _fours(block.images.strip)
     pairs = [tuple(names[four[pair]]) for four in fours for pair in PAIRS]
-    models, parts = dem_models(calibrated, of, tuple(pairs)), []
+    models, parts = dem_models(calibrated, restitution, tuple(pairs)), []
     for k, four in enumerate(fours):
         points = _nodes(truth.centre[four], truth.points[:, 2].mean())
         seen, xy = _measured(true, four, points, scene)
