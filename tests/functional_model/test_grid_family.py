@@ -7,7 +7,7 @@ import pytest
 from test_additional_parameters import orientation_columns
 
 from aerotri.functional_model.additional_parameters import collocation, grid, parameter_set, parse_parameters
-from aerotri.functional_model.additional_parameters.beside_field import said_by_others
+from aerotri.functional_model.additional_parameters.beside_field import patterns_of_other_unknowns
 from aerotri.observations import Camera, Prior
 from family_cameras import INTERIOR
 
@@ -110,7 +110,7 @@ def test_a_field_has_no_scale():
     """And nothing else is held: the camera's own parts and other grids are no matter."""
     items = collocation.FAMILY.sizes.items((5, 4))
     others = [("collocation", items), ("ultracam_d", ("42",)), ("grid", ("4x3_x_0_0",))]
-    held = said_by_others(CAMERA, items, others)
+    held = patterns_of_other_unknowns(CAMERA, items, others)
     position, axis = grid.node_positions(CAMERA, items)
     scale = position[np.arange(40), axis]
     np.testing.assert_allclose(held, (scale / np.linalg.norm(scale))[:, None])
@@ -122,7 +122,7 @@ def test_a_field_is_orthogonal_to_what_others_say():
     position, axis = grid.node_positions(CAMERA, items)
     free = replace(CAMERA, interior={name: Prior(prior.value) for name, prior in CAMERA.interior.items()})
     chosen = [("collocation", items), ("brown", ("K1",)), ("bluh", ("1", "2"))]
-    held = said_by_others(free, items, chosen)
+    held = patterns_of_other_unknowns(free, items, chosen)
     assert held.shape == (70, 6)
     np.testing.assert_allclose(held.T @ held, np.eye(6), atol=1e-12)
     basis = parameter_set("bluh", ["1", "2"], free).basis(*position.T)[np.arange(70), axis]
@@ -141,7 +141,7 @@ def test_a_field_is_orthogonal_to_what_others_say():
 
 def test_the_lens_beside_a_field():
     items = collocation.FAMILY.sizes.items((7, 5))
-    held = said_by_others(CAMERA, items, [("lens", ("k1",))])
+    held = patterns_of_other_unknowns(CAMERA, items, [("lens", ("k1",))])
     position, axis = grid.node_positions(CAMERA, items)
     pattern = position[np.arange(70), axis] * np.sum(position**2, axis=1)
     np.testing.assert_allclose(held @ (held.T @ pattern), pattern, atol=1e-9 * np.abs(pattern).max())

@@ -10,7 +10,7 @@ import pytest
 from aerotri.formats.block.folder import read_block, write_block
 from aerotri.formats.results.solution import read_solution, write_solution
 from aerotri.functional_model.additional_parameters import collocation, parameter_set, parse_parameters
-from aerotri.functional_model.additional_parameters.beside_field import said_by_others
+from aerotri.functional_model.additional_parameters.beside_field import patterns_of_other_unknowns
 from aerotri.functional_model.orientation_patterns import orientation_patterns
 from aerotri.image_errors import field_on_grid, systematic_errors
 from aerotri.observations import Block, CollocationSettings, Prior
@@ -87,7 +87,7 @@ def simulated(seed: int, sigma_um: float, length_mm: float):
     content["tie_points"]["per_image"] = 150
     camera = simulate(parse_spec(content), seed)[0].cameras[0]
     items = collocation.FAMILY.sizes.items(GRID)
-    held = said_by_others(camera, items, [])
+    held = patterns_of_other_unknowns(camera, items, [])
     covariance = collocation.prior_covariance(camera, items, 1e-3 * sigma_um, length_mm, held)
     values = np.linalg.cholesky(covariance) @ np.random.default_rng(seed).normal(size=len(items))
     names = [f"collocation.{item}" for item in items]

@@ -18,7 +18,7 @@ from aerotri.functional_model.additional_parameters import (
     mark_of,
     parameter_set,
 )
-from aerotri.functional_model.additional_parameters.beside_field import said_by_others
+from aerotri.functional_model.additional_parameters.beside_field import patterns_of_other_unknowns
 from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, interior_row
 from aerotri.observations import Block, Camera, Prior
@@ -227,7 +227,7 @@ def _add_set(shared: SharedList, chosen: ParameterSet, group: str) -> int:
 
 def random_field(block: Block, nodes: ParameterSet, group: str, first: int) -> RandomField:
     """The field whose nodes begin at column `first` of the shared list."""
-    held = said_by_others(nodes.camera, nodes.items, block.settings.adjustment.additional_parameters)
+    held = patterns_of_other_unknowns(nodes.camera, nodes.items, block.settings.adjustment.additional_parameters)
     return RandomField(slice(first, first + len(nodes.items)), nodes.items, nodes.camera, group, held)
 
 

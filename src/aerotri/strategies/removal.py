@@ -22,7 +22,7 @@ Found = Mapping[tuple[str, int, int], tuple[float, float]]
 """w and estimated error (mm, m or rad) of what was taken out, by kind ('ray', 'control', 'extra'), number and row."""
 
 
-def remembered(found: Found, which: Switches, tests: AllTests) -> Found:
+def with_tests_of(found: Found, which: Switches, tests: AllTests) -> Found:
     """The tests of some observations, kept for when they can be tested no more; where there is none, the old one."""
     parts = [("ray", 0, which.rays, tests.rays), ("control", 0, which.control, tests.control)]
     parts += [("extra", k, *both) for k, both in enumerate(zip(which.extras, tests.extras, strict=True))]
@@ -35,7 +35,7 @@ def remembered(found: Found, which: Switches, tests: AllTests) -> Found:
     return out
 
 
-def listed(system: NormalSystem, gone: Switches, found: Found) -> tuple[Blunder, ...]:
+def blunders_of(system: NormalSystem, gone: Switches, found: Found) -> tuple[Blunder, ...]:
     """The list of what was removed, largest |w| first."""
     u = system.unknowns
     images, points, point = u.block.images.names[u.images], u.block.points[u.points], ray_points(u)

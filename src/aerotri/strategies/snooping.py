@@ -43,7 +43,7 @@ from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import State
 from aerotri.results.adjusted_block import Blunder
 from aerotri.statistics.summarise import count_observations
-from aerotri.strategies.removal import Found, listed, remembered, without_removed
+from aerotri.strategies.removal import Found, blunders_of, with_tests_of, without_removed
 from aerotri.strategies.suspects import limits_of, to_remove, to_return
 from aerotri.strategies.switched_tests import AllTests, Switches, participants, ray_points, switched_system, test_all
 
@@ -156,7 +156,7 @@ def _switched(
         returned = returned.with_again(which)
         frozen = frozen.with_again(replace(which, rays=np.zeros_like(which.rays)))
     else:
-        found = remembered(found, which, stand.tests)
+        found = with_tests_of(found, which, stand.tests)
     gone = 2 * int((~participants(system.unknowns, switches).rays).sum())
     redundancy = max(count_observations(system).redundancy - gone, 1)
     counting = replace(_counting(options, stand.iterations), max_iterations=options.max_iterations if whole else 1)
@@ -190,7 +190,7 @@ def _finished(prepared: Prepared, stand: _Stand, options: SolveOptions) -> Snoop
     """The block without what was removed, adjusted to the end."""
     old = prepared.system.unknowns
     gone = stand.switches.off()
-    blunders = listed(prepared.system, gone, remembered(stand.found, gone, stand.tests))
+    blunders = blunders_of(prepared.system, gone, with_tests_of(stand.found, gone, stand.tests))
     left = without_removed(prepared, stand.state, stand.switches)
     new = left.system.unknowns
     start = with_shared(new, old, left.state, stand.state)

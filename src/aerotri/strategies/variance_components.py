@@ -30,8 +30,8 @@ LARGEST_STEP = 3.0
 """Factor by which a σ may change in one round."""
 
 CAUTION = 2.0
-"""Added to an S_gg below `LEAST_FREEDOM`, but no more than r_g: a group that says little of itself yet moves no faster
-than by Förstner's ratio."""
+"""Added to an S_gg below `LEAST_FREEDOM`, but no more than r_g: the σ of a group with little redundancy then changes
+no faster than by Förstner's ratio."""
 
 FRESH = 0.2
 """Relative change of a σ up to which S is not computed anew."""

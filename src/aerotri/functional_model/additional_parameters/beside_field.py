@@ -23,8 +23,8 @@ Chosen = Iterable[tuple[str, Sequence[str]]]
 RANK = 1e-9
 
 
-def said_by_others(camera: Camera, items: Sequence[str], chosen: Chosen) -> np.ndarray:
-    """Orthonormal patterns of the nodes of a field that unknowns beside it say.
+def patterns_of_other_unknowns(camera: Camera, items: Sequence[str], chosen: Chosen) -> np.ndarray:
+    """Orthonormal patterns of the nodes of a field that other unknowns of the adjustment describe as well.
 
     Parameters
     ----------
