@@ -22,6 +22,8 @@ from aerotri.conventions import InputError
 __all__ = ["adjusting", "app", "blocks", "image_errors", "main", "run", "terrain", "volumes"]
 
 BAD_INPUT, BUG = 2, 3
+"""Exit status for input that cannot be used, the same as typer's for a bad command line, and for an error of the
+program itself."""
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 UsageError: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
 """What typer raises for a command line that cannot be read; where the class stands depends on its version."""

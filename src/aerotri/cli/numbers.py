@@ -11,7 +11,9 @@ from typer.core import TyperCommand
 from aerotri.conventions import LARGEST
 
 LARGEST_COUNT = 2**31 - 1
+"""Largest whole number of an option, that of 32 bits with a sign: what libraries below take for a count."""
 LARGEST_SEED = 2**63 - 1
+"""Largest seed, that of 64 bits with a sign."""
 
 
 class CheckedCommand(TyperCommand):

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from aerotri.statistics.comparison import Comparison, Differences
 
 MOST_NAMED = 5
+"""Largest changes that a summary lists by name; chosen [C]: it is read at a glance, all of them are in the tables."""
 ANGLES = ("omega", "phi", "kappa")
 
 

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from aerotri.statistics.joint_covariance import Chosen
 
 MOST_SHOWN = 12
+"""Unknowns whose correlations a notebook shows; chosen [C]: as many columns as fit a page."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 __all__ = ["attitude", "picket_interval", "volume"]
 
 SITE_PLACES, MOST_MODELS = 41, 100_000
+"""Places a side of an area that are judged, and models of a block that is adjusted at most; chosen [C]: 41 × 41 show
+the edges of strips, and more models than 100 000 are a mistake in the size."""
 AREA_SHARE = 0.96
 """Part of the sides of an area that is judged: its middle."""
 FEWEST_SEEN = 0.9

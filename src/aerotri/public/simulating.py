@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from aerotri.simulation import SimulationSpec, Truth
 
 MOST_BLUR_PX, MOST_NOISE = 20.0, 20_000.0
+"""σ of the blur, pixels, and of the noise, grey values of 65 535, at most; chosen [C]: beyond them no texture is left,
+and a wide blur needs wide margins around every piece."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import pyarrow
 
 SHOWN_ROWS = 10
+"""Rows that a notebook shows; chosen [C]: as many as pandas shows of a long table."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -30,7 +30,10 @@ NO_DATA = -9999.0
 CACHE_MB = 256
 """Blocks that GDAL keeps: it would take a share of the machine's memory otherwise."""
 TILE = 512
+"""Side of the tiles of files written, pixels; a multiple of 16 as TIFF asks for, and the size usual for cloud-optimised
+files."""
 LEAST_ROOM = 16384
+"""Bytes below which a disk counts as full; chosen [C]: file systems keep a few blocks of 4096 bytes back."""
 SIGMA = "σ"
 """The description of a band of σ begins with it."""
 DAMAGED = "write the file anew, it is damaged"

@@ -29,6 +29,8 @@ DRIVERS = {b"II*\0": "GTiff", b"MM\0*": "GTiff", b"II+\0": "GTiff", b"MM\0+": "G
 LOSSLESS = {"lzw", "deflate", "zstd", "lzma", "packbits", "none"}
 PREDICTED = {"lzw", "deflate", "zstd"}
 TILE_PX = 512
+"""Side of the tiles of photographs written; a multiple of 16 as TIFF asks for; smaller ones compress worse, larger ones
+are read for nothing."""
 SETTINGS: dict[str, Any] = {
     "GDAL_ERROR_ON_LIBJPEG_WARNING": "YES",
     "GDAL_CACHEMAX": 128,

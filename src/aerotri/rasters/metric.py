@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rasterio.windows import Window
 
 METRE = 1.0
+"""Factor of heights that are in metres already."""
 UNITS = {
     "m": METRE, "metre": METRE, "metres": METRE, "meter": METRE, "meters": METRE, "ft": 0.3048, "foot": 0.3048,
     "feet": 0.3048, "international foot": 0.3048, "us survey foot": 1200.0 / 3937.0, "us-ft": 1200.0 / 3937.0,

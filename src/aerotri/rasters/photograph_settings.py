@@ -9,3 +9,4 @@ RESAMPLINGS: tuple[Resampling, ...] = get_args(Resampling)
 Compression = Literal["keep", "deflate", "lzw", "zstd", "none"]
 COMPRESSIONS: tuple[Compression, ...] = get_args(Compression)
 RESAMPLING, COMPRESSION = RESAMPLINGS[0], COMPRESSIONS[0]
+"""Where nothing is stated: the first of each."""

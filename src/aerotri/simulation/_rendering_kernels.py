@@ -9,7 +9,9 @@ import numpy as np
 from aerotri.compiled import inlined, kernel
 
 M1, M2, M3 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
+"""Increment and factors of SplitMix64 [L: Steele, Lea, Flood 2014]."""
 S27, S30, S31, S40 = np.uint64(27), np.uint64(30), np.uint64(31), np.uint64(40)
+"""Its shifts in bits; by the last, 24 bits are left, as many as a 32 bit real number holds exactly."""
 
 
 class LatticeArrays(NamedTuple):

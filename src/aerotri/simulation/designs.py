@@ -10,6 +10,7 @@ import numpy as np
 FILM_MM, FOCAL_MM = 230.0, 153.0
 """The wide-angle film camera of the theory."""
 END_LAP = 0.6
+"""Share of a photograph that the next one shows too: 60 %, that of the theory (Kubik, paper 001)."""
 SIGMA0_SHARE = 2e-4
 """σ of a height from one model over the flying height (Kubik, paper 001)."""
 

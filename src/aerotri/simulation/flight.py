@@ -15,6 +15,7 @@ from aerotri.simulation.spec import CrossStripSpec, FlightSpec
 BYTES_OF_PHOTOGRAPH = 3000
 """With its name, its line of a table and its true orientation."""
 AXIS_ANGLE = {"+x": 0.0, "+y": np.pi / 2, "-x": np.pi, "-y": -np.pi / 2}
+"""Direction, rad, in the image frame of the axis that points along the flight."""
 
 
 @dataclass(frozen=True, eq=False)

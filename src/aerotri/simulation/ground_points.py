@@ -18,6 +18,8 @@ from aerotri.simulation.spec import ControlSpec, TiePointSpec, TowerSpec
 CONTROL_REACH = 0.7
 """Control lies as far beyond the outer strip axes as this share of half a footprint."""
 CHECK_SURPLUS = 2
+"""Check points drawn for one that is wanted: those that fewer than two photographs see are left out; chosen [C]: where
+more than half are, the flight does not cover its area."""
 BYTES_OF_POINT = 2000
 """With its name and its rays in as many photographs as usually see one."""
 TOWER_REACH = (0.1, 0.5)

@@ -17,6 +17,8 @@ from aerotri.simulation.spec import GrossErrorSpec, TiePointSpec
 PILOT_SHARE = 1.4
 """Candidates drawn first, over the number that the wanted rays need when every candidate counts."""
 ROUNDS = 8
+"""Rounds in which more candidates are drawn; chosen [C]: each round has up to four times as many as the one before; a
+flight that needs more has hardly any overlap."""
 BYTES_OF_RAY = 800
 """What the simulation takes for an image point at its peak, 500 measured, and its line of a table."""
 HOPELESS = 1000

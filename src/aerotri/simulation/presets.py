@@ -39,3 +39,4 @@ PRESETS: MappingProxyType[str, dict[str, Any]] = MappingProxyType(
         },
     }
 )
+"""Formats, pixels and focal lengths are those of the makers; a comment says what was derived."""

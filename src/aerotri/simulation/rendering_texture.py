@@ -16,9 +16,12 @@ from aerotri.simulation import _rendering_kernels as kernels
 from aerotri.simulation.random_streams import stream
 
 COARSEST_M = 400.0
+"""Spacing of the coarsest octave, m; chosen [C]: a good part of the ground of a photograph, so that coarse levels of
+pyramids have texture too."""
 RMS_OF_NODES = 151.0 / 315.0 / np.sqrt(3.0)
 """RMS of a B-spline surface over the amplitude of its uniform coefficients: (Σ w²) averaged, along both axes."""
 MARGIN = 4
+"""Nodes beyond the ground asked for; a cubic B-spline reaches over two, the others are spare [C]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,8 @@ import numpy as np
 from aerotri.simulation.spec import TerrainSpec
 
 WAVES = 12
+"""Waves of undulating ground; chosen [C]: fewer show as a pattern of stripes, more look alike and take longer at every
+point."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,11 +10,19 @@ from aerotri.terrain._sampling_kernels import sample_cubic
 from aerotri.terrain._view_kernels import window_corners
 
 SHIFT_STEPS = 12
+"""Steps of least squares until a window is given up; chosen [C]: good windows need a few, and those that never settle
+cost time."""
 FIRST_NOISE = 0.05
 """Share of the variance of the grey values that is taken for noise before it is known."""
 CONVERGED_POSTS = 0.005
+"""Change of the displacement, in posts, at which the steps end; chosen [C]: far below any σ of matching; a smaller one
+only adds steps."""
 LONGEST_SHIFT_POSTS = 3.0
+"""Displacement, in posts, beyond which the window is given up; chosen [C]: the search before it is finer than a post,
+and farther away lies other texture."""
 MOST_EXCESS = 10.0
+"""`excess_of_slopes` from which a window is refused; chosen [C]: a σ ten times that of least squares says that the
+windows have nothing but noise in common."""
 
 
 @kernel

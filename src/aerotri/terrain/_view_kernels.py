@@ -16,6 +16,8 @@ from aerotri.functional_model._photo_kernels import ErrorTable, error_in_tile, p
 SMALLEST_ANGLE = 0.02
 """Base over height below which two photographs give no height."""
 FIXED_POINT_MM, FIXED_POINT_STEPS = 1e-5, 40
+"""Change, mm, at which measured = ideal + d is solved, and most steps; chosen [C]: 0.01 µm is a thousandth of a pixel,
+and image errors that change little across the format converge in a few steps."""
 
 
 class View(NamedTuple):

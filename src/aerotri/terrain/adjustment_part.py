@@ -18,6 +18,8 @@ from aerotri.results.adjustment import Adjustment
 from aerotri.terrain.pickets import Pickets
 
 MOST_PLACES, AT_A_TIME = 500, 100
+"""Pickets whose variance is computed, the others interpolated, and how many at a time; chosen [C]: this variance
+changes slowly over a block, and 100 at a time, 300 columns of the inverse, fit into memory."""
 
 
 def adjustment_variances(

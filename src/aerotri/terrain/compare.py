@@ -24,14 +24,26 @@ from aerotri.terrain.surface import grid_over
 from aerotri.terrain.tin import Tin, triangulate
 
 NMAD = 1.4826
+"""Factor from a median absolute deviation to the σ of a normal distribution, 1/Φ⁻¹(0.75) [L: Höhle & Höhle 2009]."""
 LARGEST_SIDE = 8.0
+"""Sides of triangles, in typical distances of the points, that still are surface; chosen [C]: less tears holes into
+uneven points, more bridges lakes and woods."""
 SPLINE_NEIGHBOURS = 24
+"""Points around a place that its thin-plate spline goes through; chosen [C]: fewer show where the neighbours change,
+more take longer and add little."""
 ROUNDS, SETTLED_M = 15, 1e-4
+"""Most rounds of an alignment, and the change, m, at which it ends; chosen [C]: 0.1 mm is below every height compared,
+and the rounds stop one that swings."""
 CUT = 3.0
+"""Differences beyond so many NMAD do not take part in an alignment: the usual 3σ of gross errors."""
 MOST_ALIGNED = 200_000
+"""Places that an alignment uses at most, evenly thinned; chosen [C]: three or six unknowns gain nothing from more."""
 FEWEST = 20
+"""Points of a surface and places in common at least; chosen [C]: medians of fewer are chance."""
 PART_CELLS = 16_000_000
+"""Cells of the finer surface that are held at a time; chosen [C]: 128 MB as 64 bit numbers."""
 AXES = np.eye(2)
+"""Unit steps along X and Y, for slopes by differences."""
 MOST_CELLS = 10_000
 """A side of the grid of differences has at most so many, however fine the surfaces are."""
 BYTES_OF_CELL = 64

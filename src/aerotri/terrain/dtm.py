@@ -23,7 +23,11 @@ from aerotri.terrain.pickets import Area, MatchOptions, Models, Pickets, footpri
 from aerotri.terrain.surface import Surface, grid_over, ground_cells, interpolation_error, surface_of
 
 BEST_END_LAP = 0.6
+"""End lap of the pairs that are looked for: the usual one of aerial photographs [C]; less shows the ground too
+differently, more has a weak base."""
 CELLS_PER_INTERVAL = 2
+"""Cells of the raster between two pickets where no cell is stated; chosen [C]: one would cut off corners of the
+triangles, more only repeat their planes."""
 Report = Callable[[str, float], None]
 
 

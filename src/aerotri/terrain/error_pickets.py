@@ -17,12 +17,17 @@ from aerotri.terrain.pickets import Pickets
 from aerotri.terrain.tin import order_in_plan
 
 N_NEIGHBOURS = 12
+"""Neighbours that a picket is held against; chosen [C]: about the two rings around it; fewer can be outvoted by errors,
+more reach over breaks of the ground."""
 LIMIT = 6.0
 """Deviations from which on a picket is in error; those of undisturbed terrain are far from normal."""
 SMALLEST_PX = 1.0
 """Posts of parallax below which a deviation is none: photographs do not show it."""
 PEAK_LIMIT = 4.0
+"""What a peak stands out by, over what corners around it differ from their neighbours; chosen [C]: less takes off
+summits, more leaves errors in."""
 NMAD = 1.4826
+"""Factor from a median absolute deviation to the σ of a normal distribution, 1/Φ⁻¹(0.75) [L: Höhle & Höhle 2009]."""
 
 
 def with_error_pickets(pickets: Pickets, metres_per_px: float) -> Pickets:

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 K_MOUNTAINS, K_PLAIN = (0.08, 0.09), (0.095, 0.105)
+"""Lowest and highest k of the interval k·√(P·Ma), P in µm, the interval in m: those Tran (2007, paper 004) gives for
+mountains and for plains."""
 FEWEST_NODES = 50_000
 """Nodes an area has at least where all photographs measure its surface, unless the older rule asks for fewer [C]."""
 ROUGH_SLOPE = 0.15

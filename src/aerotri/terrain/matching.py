@@ -26,11 +26,27 @@ from aerotri.terrain.prior import COARSE_NODES_PX, SPARE_PX, Prior, cleaned, fir
 from aerotri.terrain.tiles import Tile, do_tiles
 
 STEP_PX, COARSE_STEP_PX = 0.5, 0.5
+"""Posts of parallax between heights that are tried, in the finest and in coarser levels; chosen [C]: the peak of a
+correlation is about two posts wide; wider steps miss it, narrower ones only take longer."""
 MOST_STEPS = 400
+"""Heights tried for a node at most; chosen [C]: 200 posts of parallax; it bounds memory where the prior height is all
+but unknown."""
 COARSE_WINDOW = 11
+"""Side of a window in coarser levels, posts, odd; chosen [C]: smaller ones find texture that repeats, larger ones blur
+relief that is already coarse."""
 FINE_START = 0.4
+"""Correlation of the search below which nothing is measured; chosen [C]: far below the threshold of a picket, as least
+squares raises it; less wastes time on windows without texture."""
 LONGEST_STEP_ASIDE = 0.4
-NMAD, FEWEST_MISFITS, NEAREST = 1.4826, 20, 40
+"""How far a picket may move from its node, in intervals; chosen [C]: below a half, so that neighbouring nodes never
+measure one place twice."""
+NMAD = 1.4826
+"""Factor from a median absolute deviation to the σ of a normal distribution, 1/Φ⁻¹(0.75) [L: Höhle & Höhle 2009]."""
+FEWEST_MISFITS = 20
+"""Y-parallaxes that σ0 of matching is taken from at least; chosen [C]: the NMAD of 20 is known to a quarter."""
+NEAREST = 40
+"""Neighbours among which one of the same two photographs is looked for; chosen [C]: of fewer often none is, more lie
+too far away to share the error of the orientation."""
 Report = Callable[[float], None]
 
 

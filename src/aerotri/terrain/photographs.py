@@ -25,8 +25,13 @@ from aerotri.results.adjustment import Adjustment
 from aerotri.terrain._view_kernels import View
 
 CACHE_BYTES = 3 << 30
+"""Bytes of pyramids kept in memory, 3 GiB; chosen [C]: some twelve photographs of 12 000 × 8000 pixels; less reads
+files again and again."""
 COLOURS = 3
+"""Bands that are averaged to grey, red, green and blue: what follows them is infrared or a mask."""
 TABLE_TOLERANCE_PX = 0.01
+"""Largest error of tabulated image errors, pixels; chosen [C]: far below any σ of matching, so that it does not
+count."""
 CROP_MARGIN_PX = 24
 """By which crops reach beyond the windows of their nodes, pixels of the level."""
 

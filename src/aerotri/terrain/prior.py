@@ -12,12 +12,22 @@ from aerotri.conventions import InputError
 from aerotri.terrain.pickets import Area
 
 COARSE_NODES_PX = 8
+"""Pixels of a level between its nodes; chosen [C]: less than a window, so that no ground lies between the windows;
+every level doubles the resolution."""
 SPARE_PX = 4.0
 """Posts of parallax by which a height is looked for about the one of the level above."""
 OUTLIER_PX = 3.0
+"""Posts of parallax off the median of the neighbours from which a height is taken out; chosen [C]: less takes off true
+edges of the ground, more leaves outliers that mislead the next level."""
 COARSE_CORRELATION = 0.5
+"""Correlation from which a coarse height counts; chosen [C]: coarse levels only guide the search; more leaves holes
+over weak texture, less lets chance in."""
 STEEPEST = 1.5
+"""Steepest slope of ground that windows are tilted to; chosen [C]: 56°; steeper is the wall of an object, and a window
+so tilted shrinks to nothing in a photograph."""
 CURVATURE_NODES = 2.0
+"""σ, in nodes, over which the square of the curvature is averaged; chosen [C]: less follows the noise of single
+heights, more hides where rough ground begins."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,10 @@ INTERPOLATION, ALIGNMENT = INTERPOLATIONS[0], ALIGNMENTS[0]
 EDGE, EDGE_OF_PAIRS = 0.02, 0.10
 """Share of the format at its edge not used: of pairs as Tran (2007) has it; where more vouch for a picket, less."""
 LARGEST_EDGE = 0.4
+"""Share of the format that `edge` may take on every side; at a half nothing would be left."""
 FEWEST_PHOTOGRAPHS, MOST_PHOTOGRAPHS = 2, 20
+"""Photographs of a picket, the bounds of the setting: a ray alone gives no height; more than 20 take time and add
+hardly any base."""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from aerotri.formats.files.atomic import atomic_file
 from aerotri.tie_points.settings import DEFAULTS
 
 FIRST_PIXEL = 0.5
+"""Pixels from the corner of the first pixel, where images begin here, to its centre, where OpenCV counts from."""
 CONTRAST_THRESHOLD, EDGE_THRESHOLD, LAYERS, SIGMA = 0.015, 10.0, 3, 1.6
 """Lowe's values but for the contrast, which is lower: dark ground has features too, and `_spread` chooses."""
 CELLS = 16
@@ -25,6 +26,8 @@ CELLS = 16
 STRETCH = (0.1, 99.9)
 """Percentiles of grey values of more than 8 bits that become black and white."""
 SAMPLE_STEP = 4
+"""Every so many-th row and column that percentiles of grey values are taken from; chosen [C]: a sixteenth of millions
+of pixels gives the same percentiles."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,8 @@ from aerotri.observations import Block, Camera, Prior
 LENS_IN_MAPPING = ("k1", "k2")
 """Lens parameters that the first orientation estimates; the adjustment frees the others."""
 FEWEST_INITIAL, FEWEST_POSE = 50, 15
+"""Points in common of the first pair, and of a further photograph: half of COLMAP's defaults, 100 and 30; aerial tie
+points are spread evenly and fewer than those of other photographs."""
 SMALLEST_ANGLE_DEG = (16.0, 8.0, 4.0, 2.0)
 """Angles between the rays of the first pair, tried one after the other: narrow cameras have small ones."""
 

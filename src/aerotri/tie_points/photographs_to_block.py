@@ -24,6 +24,8 @@ from aerotri.tie_points.verification import rays_that_meet
 
 CACHE = "tie_point_cache"
 ITERATIONS = 300
+"""Iterations that the written settings allow, ten times the default; chosen [C]: start values of a first orientation
+are bent, and Huber's weights settle slowly."""
 MORE_TRACKS = 2
 """Tracks given to the first orientation over those wanted in the end: some do not stand it."""
 

@@ -10,6 +10,8 @@ from aerotri.formats.assembly.reprojection import reproject
 from aerotri.observations import Block
 
 ROUNDS = 6
+"""Rounds, in each of which a track loses its worst ray; chosen [C]: a track with more wrong rays than that holds no
+point."""
 LIMIT = 4.0
 """Residuals, in robust standard deviations, beyond which a ray belongs to another point."""
 SMALLEST_LIMIT = 1.0

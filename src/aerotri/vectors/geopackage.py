@@ -18,9 +18,11 @@ from aerotri.vectors.geojson import LARGEST_M
 ENVELOPE_BYTES = (0, 32, 48, 48, 64)
 """Of a GeoPackage geometry, by the kind of envelope its header has [L: OGC 12-128]."""
 KINDS = {2: "LineString", 3: "Polygon", 5: "MultiLineString", 6: "MultiPolygon"}
+"""Names of the kinds of geometry that have lines, by their code [L: OGC 06-103]."""
 PARTS = {5: 2, 6: 3}
 """What a geometry of several parts is made of [L: OGC 06-103]."""
 EXTRA_DIMENSIONS = {0: 0, 1: 1, 2: 1, 3: 2}
+"""Coordinates beyond X and Y, by the thousands of the code: none, Z, M, both [L: OGC 06-103]."""
 STEPS, MOST_STEPS = 10_000, 100_000
 """Instructions of the database between two counts, and counts until it is given up: a view may never end."""
 REMEDY = "write the GeoPackage anew"

@@ -23,6 +23,8 @@ RING_SHARE = 0.3
 RING_STEPS = 9
 """Steps across the ring: the wider contrasts reach over eight of them."""
 MOST_RING_CELLS = 4_000_000
+"""Cells around the ring outside a boundary that are read at most; chosen [C]: 32 MB; larger areas keep the σ stated for
+the base."""
 SMOOTHEST_BELOW = 0.9
 """Exponent of the ground under a spline at most: what a ring shows as smooth need not be so far inwards."""
 PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")

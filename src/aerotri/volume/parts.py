@@ -33,6 +33,8 @@ from aerotri.volume.sums import cells_within
 from aerotri.volume.triangles import areas, cut_to
 
 LATTICE_PATCH = 16
+"""Nodes a side of the patch that stands for all cells of a raster; chosen [C]: two rows at its edge do not count, and
+the 11 × 11 cells left average the correlation of neighbours."""
 PATCH_CELLS = 512
 """Cells a side of the part of a raster whose roughness is taken."""
 

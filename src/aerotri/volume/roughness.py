@@ -22,15 +22,25 @@ from aerotri.rasters.grids import Grid
 from aerotri.volume.triangles import areas
 
 SMOOTHEST, ROUGHEST = 2.5, 0.05
+"""Largest and smallest exponent H that is tried; chosen [C]: the covariance holds for 0 < H < 3 and degenerates at
+either end, at 0 to noise that does not depend on the distance."""
 NEAR_WHOLE = 0.01
 """At a whole H the covariance is that of a surface of second order: kept so far away."""
 AROUND = 20
 """Pickets of a neighbourhood."""
 ENOUGH = 30
+"""Pickets or cells a roughness is taken from at least; chosen [C]: an exponent from fewer is chance."""
 MOST_NEIGHBOURHOODS = 300
+"""Neighbourhoods drawn for a roughness; chosen [C]: fewer leave the exponent to chance, more take longer and change it
+little."""
 MOST_TRIANGLES = 20_000
+"""Triangles whose curvature and variance are integrated, the sums scaled from them to all; chosen [C]: enough for most
+volumes, and what drawing adds to the variance is counted."""
 CHUNK = 2000
+"""Triangles integrated at a time; chosen [C]: their matrices of 20 pickets stay within some tens of MB."""
 PARTS = 2
+"""Into so many parts a side of a triangle is divided for the rules below; chosen [C]: 12 places a triangle; one part, 3
+places, is too few for distances within a triangle."""
 RULES = (2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0), (0.5, 0.5, 0.0)
 """Two rules for means over a triangle, of second order both and without a place in common, so that a mean over pairs of
 places has none of distance zero [L: Hammer & Stroud 1956]."""

@@ -21,7 +21,9 @@ from aerotri.volume.quantity import Volume
 INSET = 1e-9
 """Of the extent: the outermost sections lie so much inside, where the boundary has a length along them."""
 PIECES_AT_ONCE = 4096
+"""Pieces of a line that are sampled at a time; chosen [C]: enough for numpy to be busy, a few hundred kB."""
 MOST_SECTIONS = 1_000_000
+"""Sections cut at most; chosen [C]: a spacing that asks for more is a mistake in the unit."""
 
 
 @dataclass(frozen=True, eq=False)

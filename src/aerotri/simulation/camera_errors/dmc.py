@@ -24,6 +24,7 @@ and most of the focal length: lens error and focal length, as far as they change
 temperature) and each head's own; attitude; matching noise of the stitching."""
 
 SIGNS = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+"""Signs of x and y in the quadrants of the heads 0–3, counter-clockwise from x > 0, y > 0 [C]."""
 
 
 def head_of(x: np.ndarray, y: np.ndarray) -> np.ndarray:

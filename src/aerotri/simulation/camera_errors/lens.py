@@ -7,7 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 RADIAL_SHARES = np.array([1.0, 0.6, 0.35])
+"""σ of the random coefficients of the three radial patterns; chosen [C]: higher orders are smaller in lenses; equal
+ones make edges that no lens has."""
 WAVES = 4
+"""Slow waves without symmetry in either coordinate; chosen [C]: one would be a stripe, many sum up to noise."""
 
 
 def unit_rms(patterns: np.ndarray) -> np.ndarray:

@@ -23,10 +23,14 @@ WEIGHTS = {"lens": 1.0, "cone": 0.4, "focal": 0.4, "ccd": 0.8, "ccd_tilt": 0.25,
 distance; shift, turn and scale of a CCD; its tilt; matching noise of the stitching."""
 
 TILE_SIZE_PX = (4008, 2672)
+"""Columns and rows of a CCD: tiles every 3746 and 2414 pixels that overlap by 262 and 258 [L/D]."""
 CONE_OF_TILE = np.array([0, 1, 0, 2, 3, 2, 0, 1, 0])
+"""Cone that carries each CCD, row by row from the upper left: the master cone, 0, has the four corners."""
 STITCHING = ((1, (0, 2)), (7, (6, 8)), (3, (0, 6)), (5, (2, 8)), (4, (0, 1, 2, 3, 5, 6, 7, 8)))
 """Each slave tile and the tiles it is laid onto, in this order: the centre last, onto tiles already in place."""
 TIES_PER_OVERLAP = (6, 24)
+"""Tie points across and along the area where two CCDs overlap; chosen [C]: it is ten times as long as wide, or more;
+nearly square ones, at corners, have 6 × 6."""
 
 
 @dataclass(frozen=True, eq=False)
