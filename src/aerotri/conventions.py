@@ -22,7 +22,9 @@ from pathlib import Path
 import numpy as np
 
 RADIANS_PER = {"deg": np.pi / 180.0, "gon": np.pi / 200.0, "rad": 1.0}
+"""Radians of one unit of an angle, by the name of the unit in files: 360° and 400 gon are 2π."""
 MGON_PER_RADIAN = 200.0e3 / np.pi
+"""Milligon of one radian: 200 gon are π."""
 FLIGHT_AXES = ("+x", "-x", "+y", "-y")
 FilePath = str | os.PathLike[str]
 """What names a file or a folder."""

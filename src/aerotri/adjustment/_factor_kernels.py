@@ -12,6 +12,7 @@ import numpy as np
 from aerotri.compiled import kernel
 
 B = 6
+"""Unknowns of a photograph, the size of its blocks: three of the projection centre and three of the rotation."""
 
 
 @kernel

@@ -7,6 +7,8 @@ import numpy as np
 from aerotri.compiled import kernel
 
 ITERATIONS = 6
+"""Solutions of a point, each with the weights of the one before, the first with equal ones [C]: with fewer a wrong ray
+still pulls, more change a start value by nothing that matters."""
 
 
 @kernel

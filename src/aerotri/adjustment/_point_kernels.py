@@ -14,7 +14,10 @@ from aerotri.compiled import inlined, kernel
 from aerotri.functional_model._kernels import linearise_ray
 
 E = 6
+"""Elements of exterior orientation of a ray: projection centre and rotation."""
 MIN_PIVOT = 1e-14
+"""Share of a diagonal element of a point's 3 × 3 below which its pivot is taken for rounding [C]: doubles carry 2e-16;
+a larger limit would refuse points of very narrow rays, which `weak_geometry` judges by their σ."""
 
 
 @kernel

@@ -7,6 +7,7 @@ import numpy as np
 from aerotri.compiled import kernel
 
 NONE, HUBER, DANISH, CAUCHY = 0, 1, 2, 3
+"""Codes of the estimators, as solution.npz keeps them."""
 DANISH_FLOOR = 1e-4
 """Weight that is left to the longest residual: a point whose rays had none would not be determined."""
 ADAPTIVE, ADAPTIVE_STEPS, ADAPTIVE_PER_DECADE, ADAPTIVE_SPREAD = 16, 64, 4.0, 3.0

@@ -12,7 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 LEAF = 20
+"""Photographs that are not divided any further [C]: matrices of 120 rows. Smaller ones cost more calls than they save
+arithmetic, larger ones hold zeros."""
 CUTS = np.linspace(0.38, 0.62, 9)
+"""Shares of the photographs before a cut [C]: near the middle, so that both halves cost alike; fewer places miss the
+narrowest separator, more cost time."""
 
 
 @dataclass(frozen=True, eq=False)

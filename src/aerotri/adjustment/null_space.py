@@ -23,9 +23,13 @@ NOT_DETERMINED = 1e-12
 SUSPECT = 1e-10
 """Estimate of the smallest λ, by the factor alone, below which the directions are measured."""
 REGULARISATION = 1e-8
+"""Share of the diagonal added so that a singular matrix has a factor [C]: far above its rounding, and not above
+`CANDIDATE`, beyond which it would hide the weak directions that are sought."""
 CANDIDATE = 1e-8
 """λ by the factor below which a direction is measured by the design matrix."""
 FIRST_SUBSPACE, LAST_SUBSPACE = 21, 168
+"""Directions looked for at first, three times the seven motions of a block, and at most [C]: they are doubled while
+all turn out to be free. With more defects than the last the block is named as undetermined anyway."""
 
 
 def smallest_eigenvalue(factor: Factor, diagonal: np.ndarray) -> float:

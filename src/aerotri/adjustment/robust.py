@@ -46,8 +46,13 @@ SAME_LIMIT = 0.01
 """Relative change of a limit that is none."""
 
 RAYLEIGH_MEDIAN = float(np.sqrt(2.0 * np.log(2.0)))
+"""Median length of a vector of two coordinates with σ = 1: √(2 ln 2), of the Rayleigh distribution [L]."""
 EM_ROUNDS, EM_SAMPLE = 60, 2000
+"""Iterations, and quantiles that stand for all residuals [C]: the outcome is rounded to steps of the code, so that
+more of either change nothing; fewer may stop before the share of gross errors stands."""
 FEWEST_GROSS, MOST_GROSS, WIDEST = 1e-6, 0.5, 5
+"""Bounds of the share of gross errors, and of their spread as a power of ADAPTIVE_SPREAD [C]: a share of 0 could never
+grow again, above one half gross errors would be the good ones; 3⁵ = 243 times the spread is far off."""
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,8 @@ import numpy as np
 from aerotri.adjustment.sparse_cholesky import Factor
 
 MOST_SECANTS = 20
+"""Steps remembered: limited-memory BFGS uses 3 to 20 [L: Nocedal and Wright, Numerical Optimization, 7.2]; older ones
+describe a curvature that has changed."""
 LEAST_CURVATURE = 0.1
 """Curvature along a step, over that of the normal matrix, below which nothing is learnt from it: it may be a slope
 that bends away, or rounding."""

@@ -22,6 +22,7 @@ from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block, Control, GnssIns, GnssSettings, Prior
 
 MIN_RESECTION_POINTS = 4
+"""Points a photograph is resected from: three give up to four solutions, the fourth chooses [L: AP3P]."""
 RESECTION_TOLERANCES = (8.0, 40.0)
 """Reprojection errors a ray may have in a resection, in a-priori σ or pixels; the second as last resort."""
 MIN_INTERSECTION = 1e-6
@@ -37,6 +38,7 @@ HELD_TRACK_ITERATIONS = 30
 TRACK_TOLERANCE = 20.0
 """Median miss of the rays, in tolerances, beyond which the track was no track."""
 OPENCV_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
+"""From axes with z up, against the viewing direction, to those of OpenCV with y down and z in viewing direction."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,8 +38,14 @@ LOOKS = range(6, 1000, 4)
 LONG = 10
 """Iterations after which photographs are looked at as well."""
 MOST_ROUNDS = 12
+"""Adjustments that may be interrupted to set weak geometry aside [C]: each takes out all that is found at the time, so
+few are needed; the bound ends a block that falls apart piece by piece."""
 REGULARISATION = 1e-12
+"""Relative addition to the diagonal [C]: above rounding, and so small that what is free still has a σ beyond all
+bounds."""
 HELD = 1e12
+"""Stands on the diagonal for orientation elements that are held, in units where free ones are judged against 1/LOOSE²
+[C]: so large that a held element is never the weakest."""
 
 
 @dataclass(eq=False)

@@ -18,7 +18,10 @@ from aerotri.crosscheck.paper_system import PaperSolution, observed_entries
 from aerotri.crosscheck.paper_unknowns import Layout
 
 MAX_ITERATIONS = 60
+"""Of Ceres [C]: the blocks of benchmark_adjust.md take it 3 to 8; a cross-check that needs 60 says 'not converged'."""
 FUNCTION_TOLERANCE = 1e-13
+"""Relative change of vᵀPv that ends the iteration [C]: just above the rounding of a sum of squares; a larger one would
+leave differences that are not errors of the adjustment compared."""
 
 
 def solver_options(threads: int) -> Any:

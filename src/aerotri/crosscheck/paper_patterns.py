@@ -9,12 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 BLUH_ITEMS = tuple(str(number) for number in range(1, 13))
+"""Numbers of the general additional parameters [P]."""
 ULTRACAM_ITEMS = tuple(str(number) for number in range(42, 74))
+"""Numbers of the special additional parameters of the UltraCamD [P]."""
 
 # tiles of the UltraCamD in its own pixels, 11500 across the flight and 7500 along it, counted from the upper left
 SENSOR_ACROSS, SENSOR_ALONG = 11500.0, 7500.0
 TILE_COLUMNS, TILE_ROWS = (2004.0, 5750.0, 9496.0), (1336.0, 3750.0, 6164.0)
+"""Middles of the tiles, px: tiles of 4008 × 2672 px that begin every 3746 columns and 2414 rows [L]."""
 SEAM_COLUMNS, SEAM_ROWS = (3877.0, 7623.0), (2543.0, 4957.0)
+"""Middles of the overlaps of the tiles, 262 and 258 px wide, px: a point belongs to one tile only [D]."""
 
 
 def bluh(x: np.ndarray, y: np.ndarray, r_max: float) -> np.ndarray:

@@ -11,6 +11,8 @@ import numpy as np
 from aerotri.crosscheck.paper_patterns import brown, forward_lens
 
 STEP = 1e-30
+"""Imaginary step of the partials: they need no difference, so it may be so small that its square vanishes [L: Squire
+and Trapp 1998]."""
 INTERIOR = ("focal_length_mm", "x0_mm", "y0_mm")
 BROWN = ("K1", "K2", "K3", "P1", "P2", "b1", "b2")
 LENS = ("k1", "k2", "p1", "p2", "k3")
@@ -18,6 +20,7 @@ ELEMENTS = (*INTERIOR, *(f"brown.{name}" for name in BROWN), *(f"lens.{name}" fo
 """What a ray depends on besides pose, point and the linear patterns, in the order of the arrays here."""
 
 SEQUENCE = {"omega-phi-kappa": (0, 1, 2), "phi-omega-kappa": (1, 0, 2)}
+"""Axes in the order in which Rᵀ turns a vector, by the order of the angles: x is 0, y 1, z 2."""
 
 
 def into_camera(vector: list[np.ndarray], angles: np.ndarray, order: str) -> list[np.ndarray]:

@@ -13,10 +13,13 @@ from aerotri.crosscheck.paper_rays import linearise, linearise_antenna
 from aerotri.crosscheck.paper_unknowns import Layout
 
 RAYS_AT_ONCE = 20_000
+"""Rays whose complex partials are held at a time [C]: some tens of MB; more cost memory, fewer cost calls of NumPy."""
 MAX_ITERATIONS = 60
+"""[C] A block that is determined takes a few; more would only delay 'not converged'."""
 STEP_TOLERANCE = 1e-5
 """A step no larger than this in units of σ ends the iteration."""
 MOST_DAMPING = 1e6
+"""Factor of the diagonal from which no step can help any more [C]: steps are then a millionth of Gauss-Newton's."""
 
 
 @dataclass(frozen=True, eq=False)

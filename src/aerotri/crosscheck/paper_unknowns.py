@@ -11,7 +11,11 @@ from aerotri.crosscheck.paper_rays import angles_of, rotation_matrix
 from aerotri.crosscheck.start import displacement, intersect, spread_points, typical_distance
 
 QUARTER_ABOUT_X = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""A quarter turn about x: it takes a middle angle of ±90°, where the other two cannot be told apart, to where they
+can."""
 STEEP_COSINE = 0.3
+"""Cosine of the middle angle below which the turn is put before it [C]: within 17° of ±90°. The angles are
+differentiable beyond, but the nearer they are, the worse is the condition."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 SEED = 20
+"""Of the displacements: any will do, a fixed one gives the same run each time."""
 CENTRE_M, ANGLE_RAD = 1.0, 1e-3
 """How far the start is off; at close range a centre no more than the angle's effect at the object."""
 MIN_INTERSECTION = 1e-5

@@ -16,8 +16,12 @@ from aerotri.compiled import kernel
 from aerotri.functional_model._photo_kernels import ErrorTable, image_error, partials, project
 
 SMALLEST_PATCH, NODES, CHECKS, MODELS_IN_PATCH = 4, 9, 6, 3
+"""Cells along a patch that is not halved, nodes of a fit (3 × 3), places it is checked at, models of a patch [C]. A fit
+takes 17 exact deformations, about as many as the 4 × 4 cells of the smallest patch."""
 MIXED, ONE_TILE, OFF = 0, 1, 2
+"""Where a patch lies: across tiles or an edge, in one tile of both photographs, off one of them."""
 STEPS = 8
+"""Steps of an intersection at most [C]: two or three reach LAST_STEP_M; the others are for rays that hardly meet."""
 LAST_STEP_M = 5e-3
 """A step of the intersection after which the next one is below 0.01 mm: steps shrink a thousandfold."""
 

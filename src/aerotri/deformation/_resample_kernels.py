@@ -9,6 +9,8 @@ import numpy as np
 from aerotri.compiled import kernel
 
 FIXED_POINTS = 30
+"""Steps to the place of a cell at most [C]: each shrinks by the slope of dXY, far below 1 where a model is smooth;
+where they do not settle, at a seam, the surface goes on as a plane."""
 N_SUMS = 14
 """Of `resample`: cells corrected, without data, outside the models, shifted beyond the halo; Σ and Σ² of dZ, smallest
 and largest dZ; Σ of Z before and after; smallest and largest Z before, and after."""

@@ -26,7 +26,9 @@ from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.covariance import cofactors
 
 N_INTERIOR = 3
+"""Elements of interior orientation that an adjustment without additional parameters has: c, x0, y0."""
 MAX_ITERATIONS = 50
+"""[C] Of the adjustment without parameters: it starts at the solution and has only their effect to go."""
 
 
 class AbsorptionFailedError(InputError):

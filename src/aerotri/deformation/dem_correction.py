@@ -23,12 +23,18 @@ from aerotri.rasters.grids import Grid, RasterReader, RasterWriter
 from aerotri.rasters.held import HeldRaster
 
 WINDOW = 1024
+"""Cells along a window [C]: a few MB for each array. Larger windows take memory times the threads, smaller ones
+compute more cells twice, in the overlap."""
 LARGEST_WINDOW_M = 2000.0
 """Of a DEM in a CRS, within which the CRS counts as an affine image of the local frame."""
 SIGMA_CELLS = 256
 """Cells of the σ raster along its longer side, at most: σ is smooth within a model."""
 FEWEST_HALO, MOST_HALO = 3, 512
+"""Cells by which windows overlap [C]: the least holds a cell's neighbours; half a window is the most, beyond which
+shifts are no deformation."""
 SAMPLE_POINTS = 200
+"""Places over the DEM, 14 × 14, at which the shifts of every model are looked up [C]: a cell shifted further makes its
+window start again with a wider overlap."""
 DZ_STEP_M = 2.0**-14
 """dZ is written in whole multiples of this: 0.06 mm, and its file becomes smaller."""
 

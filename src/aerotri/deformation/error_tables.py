@@ -12,9 +12,13 @@ from aerotri.deformation.photo_errors import PhotoErrors, seams_mm
 from aerotri.functional_model._photo_kernels import ErrorTable
 
 FIRST_STEP_MM = 1.0
+"""Distance of nodes a table begins with [C]: half of it or less follows most image errors; finer ones follow from the
+tolerance."""
 MOST_NODES = 1 << 21
 """Of one tile: the table then is as good as it gets."""
 MOST_CHECKED = 30_000
+"""Cells whose middles are compared with the function, an even choice of them [C]: enough for an error that is smooth;
+all would cost more than the table."""
 INSIDE_MM = 1e-7
 """By which the nodes on the edge of a tile are moved into it."""
 

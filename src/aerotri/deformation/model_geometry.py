@@ -21,6 +21,7 @@ from aerotri.observations import Camera
 from aerotri.results.adjustment import Adjustment
 
 AXES = {"+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
+"""Direction of flight in image coordinates, by `flight_axis` of the camera."""
 DEFAULT_AXIS = "+x"
 """Of a camera that does not state its flight axis [C]."""
 

@@ -27,7 +27,11 @@ from aerotri.results.adjustment import Adjustment
 DEFAULT_NODES = 120
 """Nodes along the longer side of a model, about."""
 MOST_NODES = 4_000_000
+"""Of a grid with a given spacing [C]: 100 MB for every vector that a node has; a spacing in wrong units would ask for
+more."""
 PARTIALS_STEP_M = 50.0
+"""Half the distance of a difference between CRS and local frame [C]: curvature cancels in it; a much shorter one shows
+the rounding of coordinates of millions of metres, a much longer one the change of curvature."""
 AROUND_FORMAT = 9
 """Points along each side of a format whose images on the ground bound a model."""
 STEEPEST = 0.1

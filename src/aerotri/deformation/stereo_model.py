@@ -20,7 +20,9 @@ from aerotri.deformation.restitution import Restitution
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, RayPartials, linearise, predict
 
 ITERATIONS = 20
+"""Steps of an intersection at most [C]: a few reach the tolerance; the others are for rays that hardly meet."""
 STEP_TOLERANCE_M = 1e-8
+"""Last step of an intersection [C]: 0.01 µm, above the rounding of local coordinates and far below any deformation."""
 PIECE = 2048
 """Nodes whose partials by all parameters are held at a time."""
 

@@ -26,11 +26,13 @@ SUBJECTS: dict[tuple[str, ...], str] = {
     ("ins", "start angles"): "attitudes of the INS and start values of the angles",
 }
 UNITS = ((1e-3, "millimetres"), (1e-2, "centimetres"), (0.3048, "feet"))
+"""Metres of one unit that coordinates may have been given in; the international foot is 0.3048 m exactly [L]."""
 ANGLE_UNITS = (
     (0.9, "gon in place of degrees"), (1.0 / 0.9, "degrees in place of gon"),
     (180.0 / np.pi, "radians in place of degrees"), (np.pi / 180.0, "degrees in place of radians"),
     (200.0 / np.pi, "radians in place of gon"), (np.pi / 200.0, "gon in place of radians"),
 )  # fmt: skip
+"""Factors that undo a mistaken unit of angles: 360° = 400 gon = 2π."""
 
 
 def sets_there(block: Block) -> set[str]:

@@ -14,6 +14,8 @@ Change = Callable[[Block], Block]
 Positions = Callable[[np.ndarray], np.ndarray]
 
 EARTH_RADIUS = 6371000.0
+"""m, a sphere of the mean radius [L: 6371.0 km]: degrees become metres to about half a percent, enough to see that
+they were degrees."""
 
 
 def on_positions(sets: tuple[str, ...], change: Positions) -> Change:

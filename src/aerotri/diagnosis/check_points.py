@@ -12,6 +12,7 @@ from aerotri.diagnosis.geometry import usual_distance
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 
 ENOUGH_CHECK_POINTS = 30
+"""Check points that a tested accuracy needs at least [L: ASPRS Positional Accuracy Standards, edition 2]."""
 AT_CHECK_POINTS = "at check points"
 
 POOR, WORTHLESS = 2.0, 10.0

@@ -33,6 +33,8 @@ WORST_OFFENDER, GROSS = 3.0, 30.0
 """Least size, in σ, of a single observation that is named, and the size from which it spoils the block."""
 
 WEAK_REDUNDANCY = 0.1
+"""Redundancy number below which an observation counts as nearly uncontrolled [C]: less than a tenth of an error shows
+in its own residual."""
 
 
 def of_status(adjusted: AdjustedBlock) -> list[Finding]:

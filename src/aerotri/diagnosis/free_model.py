@@ -29,9 +29,12 @@ FEWEST_COMMON = 8
 PAIRS_TRIED = 8
 """First pairs that are tried; one wrong photograph spoils only its own."""
 PAIR_ITERATIONS = 15
+"""Steps by which an oriented pair is refined [C]: enough for the few from a five-point solution; the bound ends pairs
+that run away."""
 GOOD_PAIR = 4.0
 """Median miss of the rays of a pair, in tolerances, from which no better pair is sought."""
 VERY_GOOD_PAIR = 1.0
+"""Median miss, in tolerances, with which no other solution or pair is tried [C]: rays fit as well as they may."""
 UNFIT = 6.0
 """Times the median over the photographs from which one's miss says that it does not belong."""
 

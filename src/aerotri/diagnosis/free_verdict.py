@@ -5,6 +5,7 @@ from __future__ import annotations
 from aerotri.strategies.free_stages import CONTROL, INFLATED, FreeCheck, Stage, Suspect
 
 DECIMALS = 3
+"""Of metres in sentences: mm, as precise as coordinates are given."""
 ANGLES = ("omega", "phi", "kappa")
 
 

@@ -10,7 +10,9 @@ from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.statistics.loose_points import loose_points
 
 SOME_PHOTOGRAPHS, MANY_PHOTOGRAPHS = 0.02, 0.25
+"""Shares left out from which there is some doubt, and serious doubt [C]: a lost photograph is a gap in the block."""
 SOME_POINTS, MANY_POINTS = 0.10, 0.40
+"""Shares left out likewise [C]: mismatched points are usual in automatic measurements."""
 SOME_RAYS, MANY_RAYS = 0.15, 0.40
 """Shares left out. Mismatched points and rays are usual in automatic measurements, lost photographs are not."""
 

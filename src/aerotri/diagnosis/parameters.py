@@ -18,6 +18,7 @@ SHIFTED = 3.0
 """Least shift of GNSS, in σ of the positions and of the shift together, that is named."""
 
 SIGNIFICANT_T = 1.96
+"""|p|/σ from which a parameter counts as significant: 95 % of the normal distribution, two-sided [L]."""
 
 
 def of_interior(adjusted: AdjustedBlock) -> list[Finding]:

@@ -19,8 +19,13 @@ from aerotri.functional_model.rotation import logarithm
 from aerotri.observations import Block
 
 FEWEST_RAYS = 6
+"""Rays to points of the model from which a photograph is tried [C]: four determine a resection, two more say whether a
+change helps."""
 MOST_PHOTOGRAPHS = 8
+"""Photographs tried one by one [C]: of more the block as a whole is wrong, and each costs a number of resections."""
 TOLERANCES = (8.0, 60.0, 500.0, 5000.0)
+"""Tolerances of a resection, in a-priori σ or pixels, one after the other until one finds a place [C]: the first is
+the usual one, the last as large as an image."""
 CLEARLY_BETTER = 5.0
 """Factor by which the rays have to fit better."""
 AS_GOOD = 2.0

@@ -19,7 +19,9 @@ FEW = 4
 OFF = 2.0
 """Misfit in tolerances from which a position is off."""
 SAME_PLACE = 1e-3
+"""m within which two positions are the same [C]: the last digit of most files; a copied line differs by nothing."""
 HALF_ROUND = np.pi / 2.0
+"""Turn of an attitude, rad, from which it is nearer to the opposite direction than to the given one: 90°."""
 
 
 def off_positions(own: Positions, found: Fit) -> np.ndarray:

@@ -10,8 +10,13 @@ from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock
 
 MOST_PHOTOGRAPHS = 60
+"""Photographs the search for a mistake works with [C]: a few strips show every usual mistake; more make a search of
+many trials slow."""
 MOST_RAYS = 12000
+"""Rays it works with, likewise [C]: two hundred for each of so many photographs."""
 WORST_W = 100.0
+"""Test value, in σ, that a single ray counts as at most, and one without a test as [C]: so that one gross error does
+not make a photograph the worst."""
 
 
 def sampled(block: Block, result: AdjustedBlock | None) -> tuple[Block, bool]:

@@ -12,6 +12,7 @@ from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.statistics.outliers import used_rays
 
 MOST_CUTS = 200
+"""Weak links that are looked at, the weakest first [C]: each costs a pass over the block, and a report names a few."""
 
 
 @dataclass(frozen=True, eq=False)

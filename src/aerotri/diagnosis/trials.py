@@ -18,8 +18,14 @@ from aerotri.results.failure import AdjustmentFailedError
 Adjust = Callable[[Block], AdjustedBlock]
 
 CLEARLY_BETTER = 1.5
+"""Factor by which the misfit has to shrink before a change explains a block [C]: weaker ones come by chance among so
+many changes; mistakes usually give far more."""
 MORE_RAYS = 1.1
+"""Factor by which the rays in use have to grow for a change to count by them alone [C]: a few percent vary with the
+rejection of outliers."""
 NEARLY_ALL = 0.9
+"""Share of the rays in use that a change has to keep [C]: with fewer a block fits better because what contradicts is
+gone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +51,7 @@ class Trial:
 
 
 FAILED = Trial("", np.inf, np.inf, 0.0)
+"""A block that cannot be adjusted: worse than any result."""
 
 
 def trial_of(result: AdjustedBlock) -> Trial:

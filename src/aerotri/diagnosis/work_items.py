@@ -20,6 +20,8 @@ KINDS = (
 )  # fmt: skip
 
 FEWEST_CONTROL_RAYS, SINGLE_PHOTOGRAPHS = 3, 2
+"""Control rays that say something of a photograph, and photographs listed one by one [C]: of two rays either may be
+wrong; where more photographs err to the same side the cause is a common one."""
 CONTROL_HINTS = (
     "look at the photograph's control rays one by one, and at its tie points",
     "control was pointed at otherwise than tie points: another pixel origin, another part of the mark?",

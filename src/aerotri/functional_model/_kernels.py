@@ -11,8 +11,6 @@ import numpy as np
 
 from aerotri.compiled import kernel
 
-N_INTERIOR = 15
-
 
 class RayPartials(NamedTuple):
     """Image coordinates and their partials, out, of a ray; with m before every shape, of m rays.

@@ -25,6 +25,8 @@ from aerotri.conventions import InputError
 from aerotri.observations import Block
 
 EARTH_RADIUS_M = 6371000.0
+"""m, the mean radius of the earth [L: 6371.0 km]; radii of curvature of the ellipsoid differ from it by less than 0.6
+%."""
 GRAVITY = 9.80665
 """m/s² [L: ISO 2533, the standard atmosphere, also below]."""
 GAS_CONSTANT = 287.05287
@@ -36,6 +38,7 @@ SEA_LEVEL_TEMPERATURE = 288.15
 LAPSE_RATE = 0.0065
 """K/m, up to the tropopause."""
 TROPOPAUSE_M = 11000.0
+"""m, above which the temperature stays constant [L: ISO 2533, up to 20 km]."""
 REFRACTIVITY = 2.26e-4
 """m³/kg: (n − 1)/ρ of air in visible light; 277·10⁻⁶ at sea level [L: Gladstone and Dale]."""
 STEEPEST_COS = np.cos(np.radians(80.0))

@@ -15,6 +15,8 @@ import numpy as np
 from aerotri.functional_model.observed_unknowns import Rows
 
 EARTH_RADIUS = 6371000.0
+"""m, the mean radius of the earth [L: 6371.0 km]: over 1 km a level falls by 78 mm, to 0.5 mm with any radius of the
+ellipsoid."""
 NO_BASIS = (np.zeros(3), np.eye(3))
 """Of conditions that need none."""
 

@@ -24,9 +24,12 @@ PARAMETER_NAMES = {
     "projective": ("a0", "a1", "a2", "b0", "b1", "b2", "c1", "c2"),
 }
 MARKS_NEEDED = {"similarity": 2, "affine": 3, "projective": 4}
+"""Fiducial marks of two coordinates each that determine 4, 6 and 8 parameters."""
 WEAKEST = 0.01
 """Smallest singular value of the scaled design, relative to the largest, below which the marks do not determine it."""
 MAX_ITERATIONS = 20
+"""[C] A projective transformation starts from the affine one and takes a few; the bound ends marks that do not fit at
+all."""
 
 
 @dataclass(frozen=True, eq=False)

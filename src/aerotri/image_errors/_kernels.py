@@ -16,9 +16,13 @@ from aerotri.compiled import inlined, kernel
 PAD = 3
 """Pixels by which the source has to reach beyond the image on every side, for the taps next to the border."""
 LONGEST = 1.0e6
+"""px of a run at most [C]: longer than any row, and safe to turn into an integer where a change is nearly zero."""
 ONE, TWO, THREE, FOUR, FIVE = np.uintp(1), np.uintp(2), np.uintp(3), np.uintp(4), np.uintp(5)
+"""As unsigned integers: sums with unsigned places stay unsigned, so that no negative index is looked for."""
 COSINES = np.cos(np.pi * (2.0 - np.arange(6)) / 3.0)
+"""Of the six taps of Lanczos-3, π/3 apart: with SINES a single sine and cosine of the position serve them all."""
 SINES = np.sin(np.pi * (2.0 - np.arange(6)) / 3.0)
+"""See COSINES."""
 LANCZOS_DRIFT = 1.0 / 8.0
 """Pixels by which the source position may drift within a run whose Lanczos weights are a parabola through those of its
 start, middle and end: wrong by less than 3e-4 then."""

@@ -17,7 +17,9 @@ from aerotri.observations import Camera
 from aerotri.results.adjusted_block import AdjustedBlock
 
 LONGER_SIDE_CELLS = 20
+"""Cells along the longer side of the format at most [C]: more are too small for the arrows of a plot."""
 FEWEST_CELLS = 6
+"""Cells along it at least [C]: fewer hide the pattern, even where few rays lie in each."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,8 @@ ALPHA = 0.01
 MOST_PAIRS = 10
 """Pairs of groups tested at most; where there are more, only each group with the next."""
 RANK = 1e-10
+"""Added to the diagonal of a correlation matrix [C]: it makes a singular one positive definite and changes no quotient
+that can be told from 1."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,9 +23,14 @@ NODE_SPACING = 1.0 / 40.0
 CELLS = 230
 """Cells of the correction raster along the longer side of the format."""
 INSIDE_PX = 1e-6
+"""By which places on the edge of a tile or of the format are moved into it [C]: far above rounding, far below any
+effect."""
 OPENCV_ITEMS = ("k1", "k2", "p1", "p2")
 FIT_GRID = (93, 61)
+"""Places across and along to which a lens is fitted [C]: square cells in a format of 3 : 2, hundreds of times more
+places than parameters."""
 BROWN_ROUNDS = 3
+"""Linear fits, each about the principal point of the one before [C]: it moves by little, so that few are needed."""
 
 
 @dataclass(frozen=True, eq=False)

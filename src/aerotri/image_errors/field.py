@@ -24,6 +24,8 @@ from aerotri.results.adjusted_block import AdjustedBlock
 CHI2_LIMIT = -2.0 * np.log(1.0 - 0.95)
 """95 % quantile of χ² with two degrees of freedom; the distribution function is 1 − exp(−χ²/2)."""
 LENS_ITERATIONS = 20
+"""Steps of a fixed point: each shrinks by the slope of the lens error; even a slope of 0.3 leaves 3·10⁻¹¹ of it
+[D]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ from aerotri.rasters.photograph_settings import COMPRESSION, RESAMPLING, RESAMPL
 BAND_BYTES = 24 * 2**20
 """Size of the rows, all bands, resampled at a time."""
 TASK_ROWS = 32
+"""Rows a thread resamples at a time [C]: enough work for a call, few enough that all threads end together."""
 COMPILED_FOR = tuple(np.dtype(kind) for kind in (np.uint8, np.uint16, np.float32, np.float64))
 """Types of pixel that kernels write; others come from the type of the sums, so that less is compiled."""
 Report = Callable[[float], None]

@@ -22,6 +22,8 @@ from aerotri.functional_model.additional_parameters.ultracam_d import (
 from aerotri.observations import Camera
 
 COARSEST, FINEST = 128, 2
+"""px between the nodes of a grid [C]: wider ones save nothing that counts, and below 2 there are as many nodes as
+pixels."""
 FEWEST_CELLS = 8
 """Cells along the longer side of a region that the search for a spacing begins with."""
 TOLERANCE = 0.008

@@ -28,6 +28,8 @@ AS_DIGITS = str.maketrans("oil|", "0111")
 SIGNS = re.compile(r"[\s_\-./\\:#()\[\]'\"]+")
 ZEROS = re.compile(r"(?<!\d)0+(?=\d)")
 SHOWN, SHOWN_NEAR, MOST_COMPARED, MANY = 5, 2, 200, 50_000
+"""Names a message shows, near names behind each, names compared with the known ones, and known names from which only
+those with the same core are compared [C]: a message stays one line, and the search of large tables short."""
 
 
 def stem(name: str) -> str:

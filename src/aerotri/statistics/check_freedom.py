@@ -17,6 +17,7 @@ from aerotri.results.adjusted_block import AdjustedBlock
 SAMPLE = 20
 """Check points whose correlations stand for those of all."""
 COLUMNS_AT_ONCE = 12
+"""Right sides solved together, of three a check point [C]: limits the memory, a row of each for every unknown."""
 
 
 def check_freedom(system: NormalSystem, solution: Solution, factor: Factor, adjusted: AdjustedBlock) -> np.ndarray:

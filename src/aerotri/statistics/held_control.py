@@ -20,6 +20,8 @@ from aerotri.functional_model.collinearity import linearise
 NOT_PREDICTED = 1e-9
 """Share of a coordinate's own normal equation below which the rest does not determine it."""
 COLUMNS_AT_ONCE = 96
+"""Right sides solved together [C]: more need more memory, a row of each for every unknown; fewer go through the factor
+more often."""
 
 
 @dataclass(frozen=True, eq=False)

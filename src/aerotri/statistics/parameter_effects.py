@@ -18,7 +18,11 @@ from aerotri.functional_model.additional_parameters import Parameter
 from aerotri.results.adjusted_block import AdjustedBlock
 
 AT_ONCE = 48
+"""Right sides solved together [C]: more need more memory, a row of each for every unknown; fewer go through the factor
+more often."""
 FEWEST_POINTS = 5
+"""Check points from which a Student test is made [C]: of fewer the spread is so uncertain that hardly any change would
+be found."""
 NO_DIFFERENCE = "no difference"
 INDIVIDUALLY = 60
 """Of a family with more parameters (nodes of a grid) none is left out on its own."""

@@ -22,6 +22,8 @@ WEAK = 3.0
 """Times the median σ from which a photograph or point counts as weak [C]."""
 
 MOST_NAMED = 1000
+"""Correlations that are named, the largest first [C]: more than anybody reads, and files stay small where all are
+high."""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ STRONGLY = 2.0
 """Factor by which the weight of a ray has to change to be named."""
 
 LISTED = 1000
+"""Rays of one kind that are named [C]: more than anybody reads; all are counted."""
 KINDS = ("added", "gone", "switched", "measured anew", "weighted anew")
 
 

@@ -19,6 +19,8 @@ from aerotri.results.adjusted_block import AdjustedBlock, Blunder, GroundPointRe
 from aerotri.results.normalised import MIN_REDUNDANCY
 
 LISTED_BLUNDERS = 100
+"""Suspected gross errors that are named, the largest |w| first [C]: the largest hide the others, which come up when
+they are mended."""
 
 
 @dataclass(frozen=True, eq=False)

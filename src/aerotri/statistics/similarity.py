@@ -10,8 +10,12 @@ from aerotri.adjustment.datum import motions_of_points
 from aerotri.functional_model.rotation import exponential, logarithm
 
 MOTIONS = 7
+"""Parameters of a similarity in space: three translations, three rotations, one scale."""
 ITERATIONS = 30
+"""[C] Steps of Gauss-Newton shrink quadratically: a few suffice; the bound ends what does not converge."""
 CONVERGED = 1e-10
+"""Effect of the last step, in m of the coordinate with the largest weight [C]: far below the digits of any coordinate,
+far above rounding of reduced ones."""
 LARGEST_CONDITION = 1e10
 """Condition of the scaled equations beyond which given coordinates do not determine all seven motions."""
 

@@ -28,6 +28,8 @@ from aerotri.statistics.summarise import count_observations, effective_redundanc
 SETTLED = 0.1
 """Change of −2 ln L below which σ_d and ℓ stand: far below what would tell one from another."""
 MOST_ROUNDS = 5
+"""Estimates of σ_d and ℓ, each with a new adjustment [C]: what they change at the linearisation point is small; the
+bound ends two that alternate."""
 LENGTHS = (0.1, 5.0)
 """Correlation lengths looked at, in half diagonals of the format; at the upper end σ_d²/ℓ alone has a meaning."""
 MOST_CHANGE = 30.0

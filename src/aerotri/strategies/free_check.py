@@ -30,6 +30,7 @@ __all__ = ["FreeCheck", "check_free", "free_block"]
 SAME_SCALE = 0.01
 """σ̂0 of the free block nearer to 1 than this needs no adjustment with other weights."""
 NAMED_SUSPECTS = 10
+"""Suspects named at a stage, the largest first [C]: one or two explain most mistakes, ten still fit on a screen."""
 LEAST_SIGMA_M = 1e-6
 """Stands for σ = 0 of control in the weights of a similarity."""
 

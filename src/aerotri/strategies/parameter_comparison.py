@@ -36,7 +36,9 @@ from aerotri.strategies.control_prediction import predict_control
 from aerotri.strategies.field_estimation import ReducedToFields, covariance_in_use, with_estimated_fields
 
 SIGNIFICANT_T = 1.96
+"""|p|/σ from which a parameter counts as significant: 95 % of the normal distribution, two-sided [L]."""
 HYPERPARAMETERS = 2
+"""Parameters of a random field's covariance that BIC counts: σ_d and the correlation length."""
 
 Progress = Callable[[int, int, str], None]
 

@@ -48,8 +48,14 @@ from aerotri.strategies.suspects import limits_of, to_remove, to_return
 from aerotri.strategies.switched_tests import AllTests, Switches, participants, ray_points, switched_system, test_all
 
 GROSS, GROSS_LIMIT = 1000.0, 10.0
+"""Joint test T beyond which the start is taken to be spoilt, and robust σ beyond which rays then are off to begin with
+[C]: below, steps stay linear and the tests find the errors; lower limits would take away good rays."""
 MOST_ROUNDS = 200
+"""Rounds of removal [C]: each takes one ray of a point and more, so that a block with so many is not mended by tests;
+the bound ends an endless search."""
 WORTH_SAYING = 1.25
+"""Spread of w from which a message says that the σ are too small [C]: a quarter more changes what is rejected, less is
+usual."""
 WEAKENED = 0.01
 """Share of its smallest pivot that the factor may lose before something is taken to be no longer determined."""
 

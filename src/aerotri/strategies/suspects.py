@@ -25,6 +25,8 @@ FEWEST_RAYS = 6
 than be oriented by so few."""
 
 RAYS_PER_CELL, MOST_CELLS = 100, 9
+"""Rays a cell of the format has on average, and cells along a side at most [C]: the median of 200 values of |w| is
+uncertain by 8 %; more cells follow errors of the camera better and judge each by fewer rays."""
 SIGNIFICANT = 2.0
 """Standard deviations by which the spread in a cell of the format must exceed that of the block to count."""
 

@@ -23,6 +23,7 @@ from aerotri.statistics.observation_groups import EXTRA_GROUPS, GroupFit, group_
 from aerotri.strategies.residual_response import ResidualResponse, cross_redundancy
 
 MAX_ROUNDS = 10
+"""Adjustments with new σ [C]: groups that can be told apart settle in a few; more would only delay the message."""
 SETTLED = 0.01
 """Relative change of every σ below which the components stand still."""
 

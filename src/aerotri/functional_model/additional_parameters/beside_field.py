@@ -21,6 +21,8 @@ from aerotri.observations import Camera
 
 Chosen = Iterable[tuple[str, Sequence[str]]]
 RANK = 1e-9
+"""Singular value, as a share of the largest, below which a direction says nothing new: columns have length 1, so that
+it is far above their rounding and far below any real difference [C]."""
 
 
 def patterns_of_other_unknowns(camera: Camera, items: Sequence[str], chosen: Chosen) -> np.ndarray:

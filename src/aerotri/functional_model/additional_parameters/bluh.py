@@ -29,10 +29,13 @@ DESCRIPTION = {
 }
 
 NORMAL_R_MAX = 115.0 * np.sqrt(2.0)
+"""mm, half the diagonal of a photograph of 23 × 23 cm: 128², π/64 and π/32 only fit mm on that format [D]."""
 ZERO_RADIUS_SQUARED = 128.0**2
+"""mm² of the normalised image: at a radius of 128 mm the pattern 9 is zero [P]."""
 UNITS = {"7": per_mm(1), "8": per_mm(1), "9": per_mm(2)}
 """In normalised image coordinates."""
 FREQUENCY = {"10": np.pi / 64.0, "11": np.pi / 32.0}
+"""Of the patterns sin(πr/64) and sin(πr/32), 1/mm of the normalised image [P]."""
 
 
 def scale(camera: Camera) -> float:

@@ -23,6 +23,7 @@ DESCRIPTION = {
     "b2": "affinity, shear of x",
 }
 UNITS = {"K1": per_mm(2), "K2": per_mm(4), "K3": per_mm(6), "P1": per_mm(1), "P2": per_mm(1)}
+"""Of parameters whose patterns are polynomials: those of image coordinates in mm; b1 and b2 have none."""
 
 
 def image_error(x_bar: np.ndarray, y_bar: np.ndarray, parameters: np.ndarray) -> np.ndarray:

@@ -21,6 +21,8 @@ from aerotri.observations import Camera
 FAMILY = node_family(
     "collocation", "D", "Image error as a random field, bilinear between nodes; derived for this project", (19, 13)
 )
+"""19 × 13 nodes unless others are asked for [D]: square cells in a format of 3 : 2, their spacing well below usual
+correlation lengths; far wider ones smooth the field, narrower ones add unknowns that say nothing."""
 HELD_MM = 1e-5
 """σ of what a field does not have: far below any measurement, far above rounding."""
 

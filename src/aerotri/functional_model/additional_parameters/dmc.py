@@ -29,10 +29,14 @@ from aerotri.functional_model.additional_parameters.terms import Terms, only, tu
 from aerotri.observations import Camera
 
 SYNCHRONISATION = tuple(str(i) for i in range(30, 34))
+"""Parameters 30–33, one for each head [P]."""
 ORIENTATION = tuple(str(i) for i in range(34, 42))
+"""Parameters 34–41, x and y of each head [P]."""
 RADIAL = tuple(str(i) for i in range(74, 78))
+"""Parameters 74–77, one for each head [P]."""
 ITEMS = (*SYNCHRONISATION, *ORIENTATION, *RADIAL, "79", "80")
 DEFAULT_ITEMS = ITEMS[:-1]
+"""Without 80, which is the sum of 74–77."""
 NEEDS_HEIGHT = ("29",)
 MARKS = {item: "P" for item in ORIENTATION} | {item: "D" for item in (*RADIAL, "79", "80", *NEEDS_HEIGHT)}
 QUADRANT_NAMES = ("upper right", "upper left", "lower left", "lower right")
@@ -47,15 +51,22 @@ DESCRIPTION = {
     "80": "radial symmetric, common to all heads",
     "29": "offset of the heads' projection centres, by height",
 }  # fmt: skip
+"""What every parameter corrects, in words of a report."""
 
 UNITS = {
     **dict.fromkeys((*SYNCHRONISATION, *ORIENTATION), per_mm(1)), **dict.fromkeys((*RADIAL, "80"), per_mm(2)),
     **dict.fromkeys(NEEDS_HEIGHT, "m"),
 }  # fmt: skip
+"""Of the parameters; 79 has none."""
 ZERO_ALONG_MM = 32.0
+"""mm along the flight at which the pattern of 30–33 is zero again: y² − 32·|y| [P]."""
 HEAD_SCALE = NORMAL_R_MAX / float(np.hypot(*heads.HALF_FORMAT_MM))
 SEAM_POINTS = 41
+"""Points along a seam in which the two heads have to meet [D]: the mismatch is smooth, so that their number changes
+little."""
 ORIENTATION_GRID = (61, 41)
+"""Points across and along over which the orientation is taken off [D]: square cells, dense enough for a smooth
+pattern."""
 
 
 def check_items(items: Sequence[str]) -> None:

@@ -37,6 +37,7 @@ PATTERNS: dict[str, Pattern] = {
     "11": ("x", 2, 2),
     "12": ("y", 2, 2),
 }
+"""p1 to p12 as products of polynomials [L: Ebner 1976]."""
 DESCRIPTION = {item: pattern_text(p, "2", ("", "x", "k"), ("", "y", "l")) for item, p in PATTERNS.items()}
 
 
@@ -48,6 +49,7 @@ def polynomials(x: np.ndarray, b: float, partials: bool) -> Polynomials:
 
 
 BASIS = ProductBasis(polynomials, q=2.0)
+"""q = 2 makes the tilt pairs orthogonal to the orientation on 3 × 3 points [L: Ebner 1976]."""
 FAMILY = Family(
     name="ebner",
     items=tuple(PATTERNS),

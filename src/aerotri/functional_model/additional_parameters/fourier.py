@@ -17,6 +17,8 @@ from aerotri.functional_model.additional_parameters.terms import Terms, dense_te
 from aerotri.observations import Camera
 
 LARGEST = (6, 6)
+"""Orders offered at most [C]: 336 parameters, whose shortest wave is a sixth of the format; finer image errors are for
+the random field."""
 
 
 def _waves(m: int, n: int) -> list[tuple[int, int]]:
@@ -50,6 +52,7 @@ WAVES = {
 }
 """Axis, function and wave numbers of every item."""
 SIZES = Sizes("order in x and in y", (1, 1), (1, 1), LARGEST, items_of_order)
+"""Order 1 × 1 unless another is asked for [C]: 16 parameters, about as many as the sets of the literature."""
 DESCRIPTION = {
     item: f"d{axis} = {'cos' if function == 'c' else 'sin'}({_angle_text(m, n)})"
     for item, (axis, function, m, n) in WAVES.items()

@@ -43,6 +43,7 @@ PATTERNS: dict[str, Pattern] = {
         for ij in COMMON
     },
 }
+"""The 44 parameters as products of polynomials [L: Grün 1978]."""
 DESCRIPTION = {
     item: pattern_text(pattern, "(10/7)", ("", "x", "k", "x·p", "r"), ("", "y", "l", "y·q", "s"))
     for item, pattern in PATTERNS.items()
@@ -62,6 +63,7 @@ def polynomials(x: np.ndarray, b: float, partials: bool) -> Polynomials:
 
 
 BASIS = ProductBasis(polynomials, q=10.0 / 7.0)
+"""q = 10/7 makes the tilt pairs orthogonal to the orientation on 5 × 5 points [L: Grün 1978]."""
 FAMILY = Family(
     name="gruen",
     items=tuple(PATTERNS),

@@ -24,6 +24,7 @@ from aerotri.functional_model.additional_parameters.products import (
 from aerotri.functional_model.additional_parameters.sizes import Sizes
 
 LARGEST = (6, 6)
+"""Orders offered at most [C]: 92 parameters; finer image errors are for the random field."""
 OfDegree = Callable[[int], ProductBasis]
 Q = 5.0 / 6.0
 """Of the tilt pairs for P_2 as it is scaled."""

@@ -27,6 +27,8 @@ AUTO: Choice = (("auto", ()),)
 """Stands for the set that cross-validation chooses; none of the families."""
 
 LONGEST_RANGE, MOST_DIGITS = 1000, 9
+"""Items of a range and digits of its ends [C]: no numbered family has a tenth as many; a slip of the keyboard is
+refused and not written out."""
 
 
 def parse_parameters(spec: str | Iterable[str]) -> Choice:

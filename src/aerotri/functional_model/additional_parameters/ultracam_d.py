@@ -16,13 +16,20 @@ from aerotri.functional_model.additional_parameters.terms import Terms, only, tu
 from aerotri.observations import Camera
 
 ITEMS = tuple(str(i) for i in range(42, 74))
+"""Parameters 42–73: scale, shift in x, shift in y, rotation of eight tiles each [P]."""
 
 SENSOR_SIZE_PX = (11500, 7500)
+"""Across and along the flight [L]."""
 TILE_CENTRE_COLUMNS = np.array([2004.0, 5750.0, 9496.0])
+"""px: tiles 4008 px wide that begin every 3746 px [L]."""
 TILE_CENTRE_ROWS = np.array([1336.0, 3750.0, 6164.0])
+"""px: tiles 2672 px high that begin every 2414 px [L]."""
 SEAM_COLUMNS = np.array([3877.0, 7623.0])
+"""px, the middles of overlaps of 262 px: every point belongs to one tile [D]."""
 SEAM_ROWS = np.array([2543.0, 4957.0])
+"""px, the middles of overlaps of 258 px."""
 CENTRE_TILE = 4
+"""Number of the tile without parameters, to which the others are referred."""
 TILE_NAMES = (
     "upper left", "upper", "upper right", "left", "right", "lower left", "lower", "lower right",
 )  # fmt: skip
@@ -31,6 +38,7 @@ DESCRIPTION = {
     for kind, what in enumerate(("scale", "shift x", "shift y", "rotation"))
     for tile, name in enumerate(TILE_NAMES)
 }
+"""What every parameter corrects, in words of a report."""
 
 
 def native_pixel_mm(camera: Camera) -> float:
@@ -88,3 +96,4 @@ FAMILY = Family(
     evaluate=_evaluate,
     camera_model="ultracam_d",
 )
+"""Units go with the kind of the parameter, eight of each from 42 on."""
