@@ -19,6 +19,8 @@ CLEAR = 0.5
 FEWEST = 4
 """Rays to intersected points without which nothing is settled."""
 LENS_ITERATIONS = 20
+"""Steps that take lens distortion off an image point; chosen [C]: a step multiplies the error by the slope of the
+distortion; where that is 0.3, a strong lens, 20 leave 1e-10 of it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,8 @@ from aerotri.observations.block import CONSTRAINT_KINDS, EDIT_ACTIONS, Constrain
 EDIT_COLUMNS = Columns(text=("image", "point", "action"), optional_text=("reason",))
 CONSTRAINT_COLUMNS = Columns(text=("kind", "points"), numbers=("sigma",), optional_numbers=("value",))
 POINTS_NEEDED = {"vertical": 2, "horizontal": 2, "height_difference": 2, "distance": 2, "plane": 4, "line": 3}
+"""Points that each kind of constraint takes at least: three make any plane and two any line, so that one more is needed
+for a condition."""
 EXACTLY_TWO = ("height_difference", "distance")
 """Kinds between two points, which have a value."""
 

@@ -20,9 +20,12 @@ from aerotri.formats.files.ownership import carry_over, record_files
 from aerotri.formats.files.work_place import OLDER, work_place, written
 
 AT_FDCWD = -100
+"""Of linux/fcntl.h: paths count from the working directory."""
 RENAME_EXCHANGE = 2
+"""Of linux/fs.h: renameat2 exchanges two names in one step."""
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 LEAST_ROOM = 16384
+"""Bytes below which a disk counts as full; chosen [C]: file systems keep a few blocks of 4096 bytes back."""
 
 
 @contextmanager

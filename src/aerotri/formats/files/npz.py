@@ -22,6 +22,7 @@ from aerotri.conventions import InputError
 
 MAGIC = b"\x93NUMPY"
 LARGEST_HEADER = 10_000
+"""Characters of the header of an array at most, numpy's own limit: its parser is slow with longer ones."""
 LARGEST_BYTES = 1 << 33
 """Of one array, where nothing else bounds it."""
 REMEDY = "adjust the block again"

@@ -12,6 +12,7 @@ from pathlib import Path
 from aerotri.conventions import FilePath, InputError
 
 LEAST_ROOM = 16384
+"""Bytes below which a disk counts as full; chosen [C]: file systems keep a few blocks of 4096 bytes back."""
 
 
 class Spool:

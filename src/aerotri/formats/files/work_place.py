@@ -20,6 +20,8 @@ from aerotri.conventions import FilePath, InputError
 
 LOCK, OLDER, ENDING = "lock", ".older-result", ".aerotri.tmp"
 WAIT_S = 60.0
+"""Seconds that a process waits for another that writes the same target; chosen [C]: longer than writing a usual result
+takes, shorter than a user's patience."""
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 
 _held: dict[Path, tuple[int, int]] = {}

@@ -24,10 +24,13 @@ from aerotri.functional_model.rotation import angles_from_rotation, exponential,
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Prior, Settings
 
 PIXEL_UM = 1000.0
+"""Size of a pixel, µm: files have pixels only, and with 1 mm a pixel both are the same numbers."""
 CAMERA_VALUES = 9
+"""Numbers of a camera: rotation vector, translation, f, k1, k2 [L: Agarwal et al. 2010]."""
 FARTHEST_PX = 1e6
 """No photograph reaches farther from its centre."""
 SMALLEST_FOCAL_PX = 1e-3
+"""Focal length, pixels, below which it counts as 0; chosen [C]: no camera sees half a sphere on a pixel."""
 WRITTEN_LENS = ("k1", "k2")
 
 

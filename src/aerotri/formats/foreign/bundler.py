@@ -25,6 +25,7 @@ from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints,
 
 HEADER = "# Bundle file v0.3"
 CAMERA_VALUES = 15
+"""Numbers of a camera: f, k1, k2, the rotation matrix, the translation [L: manual of Bundler v0.3]."""
 BUNDLE, LIST = "bundle.out", "list.txt"
 SKEW = 1e-4
 """Largest deviation of RᵀR from the unit matrix."""

@@ -30,6 +30,7 @@ from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints,
 from aerotri.observations.block import LENS_NAMES
 
 COLMAP_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
+"""COLMAP's cameras have y down and look along +z, those here y up and look along −z."""
 LENS_OF_MODEL: Mapping[str, tuple[str, ...]] = {
     "SIMPLE_PINHOLE": (),
     "PINHOLE": (),
@@ -41,7 +42,10 @@ LENS_OF_MODEL: Mapping[str, tuple[str, ...]] = {
 """Models that can be expressed, and their lens parameters in COLMAP's order."""
 TWO_FOCAL_LENGTHS = ("PINHOLE", "OPENCV", "FULL_OPENCV")
 SIGN = {"p1": -1.0}
+"""Parameters that change their sign with y: p1 is the tangential distortion along it."""
 SMALLEST_FOCAL_PX, MOST_PIXELS, LARGEST_RATIO = 1e-3, 10_000_000, 100.0
+"""Least focal length, largest format, both pixels, and largest ratio of two focal lengths; chosen [C]: beyond any
+camera, so that only damaged files are refused."""
 FILES = ("cameras", "images", "points3D")
 OWN_ENTRIES = tuple(f"{name}.{end}" for name in (*FILES, "rigs", "frames") for end in ("txt", "bin"))
 

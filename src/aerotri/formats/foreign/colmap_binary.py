@@ -15,8 +15,8 @@ from aerotri.conventions import InputError
 
 PARAMETERS = (3, 4, 4, 5, 8, 8, 12, 5, 4, 5, 12, 16, 3, 4, 3, 4, 16, 5, 5)
 """Of the camera models, by their number."""
-MOST_PARAMETERS = 32
 LONGEST_NAME = 1000
+"""Bytes of a name at most, about that of tables: without an end the search would run through the whole file."""
 REMEDY = "export the model anew; is the file cut off?"
 
 

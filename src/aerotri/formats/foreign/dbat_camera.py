@@ -20,7 +20,9 @@ SAME_PIXEL = 1e-6
 """Relative difference of pixel width and height that counts as none."""
 LENS = ("K1", "K2", "K3", "P1", "P2")
 UNIT_MM = {"mm": 1.0}
+"""Millimetres of the units a DBAT script may name: all its cameras are in mm."""
 GROUPS = {"all": ("cc", "px", "py", *LENS), "cc": ("cc",), "pp": ("px", "py"), "K": LENS[:3], "P": LENS[3:]}
+"""Parameters that an element of a DBAT script stands for."""
 NOT_MODELLED = ("aspect", "skew")
 
 

@@ -17,13 +17,19 @@ from aerotri.conventions import FilePath, InputError
 
 FORMATS = ("JPEG", "TIFF")
 EXIF_IFD, GPS_IFD = 0x8769, 0x8825
+"""Numbers of tags, here and below [L: CIPA DC-008, Exif 2.32]."""
 MAKE, MODEL = 271, 272
+"""Maker and model of the camera."""
 FOCAL_LENGTH, FOCAL_LENGTH_35MM = 37386, 41989
+"""mm; the second is that of a lens that shows as much on 35 mm film."""
 FOCAL_PLANE_X_RESOLUTION, FOCAL_PLANE_UNIT = 41486, 41488
+"""Pixels a unit on the sensor, and the number of that unit."""
 EXIF_WIDTH, EXIF_HEIGHT = 40962, 40963
+"""Pixels of the photograph as it was taken."""
 UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0, 5: 1e-3}
 """Millimetres of the units of the focal plane's resolution."""
 LATITUDE_REF, LATITUDE, LONGITUDE_REF, LONGITUDE, ALTITUDE_REF, ALTITUDE, ERROR = 1, 2, 3, 4, 5, 6, 31
+"""Of the GPS directory; the last is the horizontal positioning error, m."""
 LONG_SIDE_35MM = 36.0
 """Long side of the frame that a focal length 'in 35 mm film' belongs to [C]; some makers mean the diagonal."""
 

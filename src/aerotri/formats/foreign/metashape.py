@@ -21,6 +21,7 @@ from aerotri.functional_model.rotation import angles_from_rotation, rotation_fro
 
 COLUMNS = ("PhotoID", "X", "Y", "Z", "Omega", "Phi", "Kappa")
 MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
+"""Columns of the rotation matrix, row by row, as Metashape names them."""
 AGREEMENT = 1e-4
 """Largest difference of an element of the matrix from that of the angles."""
 

@@ -48,6 +48,7 @@ MEANINGS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 ELLIPSOIDAL = ("ellipsoidalheight", "ellheight")
 MOST_COLUMNS = 1000
+"""Columns of a list at most; chosen [C]: no program writes as many; a file of another kind on one long line would."""
 NO_NUMBER = ("", "nan", "NaN", "NAN")
 """What stands where nothing is known."""
 

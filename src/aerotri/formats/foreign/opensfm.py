@@ -47,7 +47,10 @@ LENS_OF_TYPE: dict[str, tuple[str, ...]] = {
 }
 """Projections that can be expressed, and their lens parameters."""
 LARGEST = 1e9
+"""Largest number of a reconstruction; chosen [C]: beyond every coordinate in metres and every pixel; squares of it keep
+their digits."""
 LARGEST_FORMAT_PX = 1e7
+"""Longest side of a photograph, pixels; chosen [C]: beyond any camera, so that only damaged files are refused."""
 
 
 def is_opensfm(path: Path) -> bool:

@@ -21,6 +21,7 @@ from aerotri.observations import Camera, Prior
 SQUARE = 1e-3
 """Relative difference of width and height of a pixel that is still square."""
 LARGEST_FORMAT_PX = 1e7
+"""Longest side of a photograph, pixels; chosen [C]: beyond any camera, so that only damaged files are refused."""
 
 
 def is_orientation_list(path: Path) -> bool:

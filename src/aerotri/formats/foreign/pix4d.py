@@ -25,6 +25,8 @@ from aerotri.observations import Block
 
 EO_HEADER = ["imageName", "X", "Y", "Z", "Omega", "Phi", "Kappa"]
 GCP_WIDTHS, GEO_WIDTHS = (4, 5, 6), (4, 5, 6, 7, 8, 9)
+"""Entries of a row, the name among them: a position, then one or two accuracies; of photographs also three angles in
+front of them."""
 AXES = ("xy", "yx")
 
 

@@ -22,6 +22,7 @@ SIGN = "measured = ideal + d; corrected = measured - d"
 RECORD = "imgeo.json"
 EXPORTS = ("correction.csv", "camera.toml", "cameras.txt", "ideal_cameras.txt", "correction.tif",
            *(f"correction_{k}.tif" for k in range(1, 100)))  # fmt: skip
+"""Names that older versions, whose records do not list them, gave their exports; of 99 cameras or groups at most."""
 CORRECTION_HEAD = f"""# {SIGN}
 # x y dx dy sx sy in mm from the image centre, y up; column row in pixels, (0, 0) the corner of the upper left pixel
 # interpolate between nodes of one tile only; nodes on a seam stand here once for either side

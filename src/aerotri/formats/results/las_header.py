@@ -21,14 +21,19 @@ HEADER_BYTES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375}
 RECORD_BYTES = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)
 """Least size of a point, by its format."""
 COMPRESSED = 0x80
+"""Bit of the point format that LASzip sets [L: LASzip]."""
 VLR_BYTES, EVLR_BYTES = 54, 60
+"""Head of a record before the points, and of one after them [L: ASPRS LAS 1.4]."""
 LASZIP_USER, LASZIP_RECORD = b"laszip encoded", 22204
+"""Owner and number of the record that tells how points are compressed [L: LASzip]."""
 POINTS_PER_BYTE = 100
 """A compressed point takes a few bytes; a hundredth of one is no measured surface."""
 LAYERED, LAYERED_BYTES = 3, 14
+"""Number of the compressor that keeps parts of points apart, and of the item of extra bytes [L: LASzip]."""
 LAYERS_OF_ITEM = {10: 9, 11: 1, 12: 2, 13: 1}
 """Layers of points, colours, colours with infrared and wave packets of formats from 6 on; extra bytes have one each."""
 VARIABLE_CHUNKS = 0xFFFFFFFF
+"""Size of a chunk that says that every chunk has its own [L: LASzip]."""
 Bytes = bytes | mmap.mmap
 REMEDY = "give a whole LAS or LAZ file"
 

@@ -11,7 +11,10 @@ from aerotri.formats.results.las_header import check_las
 from aerotri.vectors.geojson import LARGEST_M
 
 UNCLASSIFIED, GROUND = 1, 2
+"""Classes of points [L: ASPRS LAS 1.4]."""
 SCALE_M = 0.001
+"""Step of the coordinates, m, which LAS keeps as whole numbers; chosen [C]: 1 mm is below σ of every picket, and 32
+bits then reach over 4000 km."""
 
 
 def write_point_cloud(path: Path, xyz: np.ndarray, sigma: np.ndarray, ground: np.ndarray, crs: str | None) -> None:

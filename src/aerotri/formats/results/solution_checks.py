@@ -17,11 +17,14 @@ from aerotri.results.removal import Removal
 from aerotri.results.variance_components import ChiSquareTest, VarianceComponent
 
 SCHEMA = 1
+"""Version of the archive; it grows when an array changes its meaning, and others are refused."""
 STATUS = ("converged", "not converged", "rank deficient")
 VERDICTS = ("", "accepted", "doubtful", "rejected")
 SQUARE = 1e-6
 """Largest deviation of RᵀR from the unit matrix in a rotation written with all its digits."""
 LARGEST = 1e15
+"""No value of an adjustment is larger, as in tables: numbers beyond lose their decimals, and squares of them
+overflow."""
 SCALARS = {"estimator_code": "iu", "estimator_limit": "f", "sigma0": "f", "iterations": "iu", "status": "U"} | {
     "geoid": "U", "components": "U", "removals": "U",
 }  # fmt: skip

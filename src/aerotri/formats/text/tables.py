@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 IGNORED_PREFIX = "x_"
 LONGEST_NAME = 1000
+"""Characters of a name at most; chosen [C]: no photograph or point needs more; a file without line ends would."""
 NUMBER = r"^[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?$"
 """Every digit belongs to one part alone: with two ways to read it the time grows with the square of the length."""
 LARGEST_NUMBER = 1e15

@@ -23,6 +23,7 @@ WIDTH_PX = 980.0
 HIGHEST = 0.72
 """Of the width: taller blocks are drawn smaller."""
 WORST_POINTS = 200
+"""Points with suspicious rays that a page lets be chosen; chosen [C]: more make the page heavy and the plan crowded."""
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from aerotri.report.plots.canvas import (
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 
 MOST_NAMED_CONTROL_POINTS = 30
+"""Control points up to which their names are drawn; chosen [C]: with more the names overlap."""
 CONTROL_SYMBOLS: dict[str, dict[str, Any]] = {
     "full": {"marker": "^", "mfc": INK, "mec": INK},
     "plan only": {"marker": "^", "mfc": "white", "mec": INK},

@@ -31,8 +31,11 @@ from aerotri.report.plots.canvas import (
 )
 
 FLIGHT = {"+x": (1, 0), "-x": (-1, 0), "+y": (0, 1), "-y": (0, -1)}
+"""Direction of the flight in the image frame, by the axis that points along it."""
 FAINT = "#a3abb3"
 LONGEST_IN_CELLS, LONGEST_INCH = 1.9, 0.5
+"""Longest arrow in cells of its grid, and in inches; chosen [C]: longer ones cross too many others, shorter ones do not
+show their direction."""
 AROUND_FORMAT = 0.38
 """Inches between the format and the edge of the axes, for arrows that leave the format."""
 

@@ -25,8 +25,10 @@ from aerotri.report.quality import printable
 P = ParamSpec("P")
 
 WIDTH = 8.6
+"""Inches of a plot; chosen [C]: scaled into the margins of an A4 page its letters are still readable."""
 INK, GREY, LIGHT, ACCENT = "#1c242c", "#6b7680", "#b4bcc4", "#0b5cad"
 FRAME = 0.8
+"""Points, of lines around plots; chosen [C]: thinner than the lines of data."""
 
 # the type of its keys has a name in new matplotlib only, hence the casts below
 STYLE: dict[str, Any] = {

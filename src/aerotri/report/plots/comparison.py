@@ -12,6 +12,7 @@ from aerotri.report.plots.canvas import FRAME, GREY, INK, LIGHT, WIDTH, axes_at,
 from aerotri.results.parameter_comparison import ParameterComparison, SetOutcome
 
 ROW, HEAD, FOOT, LABELS, GAP = 0.34, 0.95, 0.95, 2.45, 0.22
+"""Inches: a row of the picture, above and below all of them, for the names, between the axes."""
 
 
 @styled

@@ -11,7 +11,9 @@ from aerotri.report.plots.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at
 from aerotri.report.tables.adjustment import Column, Table
 
 FEWEST_DECADES = 6
+"""Powers of ten below the limit that are drawn at least; chosen [C]: pictures of different checks then look alike."""
 MOST_STEPS = 400
+"""Steps of a curve at most; chosen [C]: finer ones are below a pixel of the picture."""
 LOOKS = {
     "projection centres": (INK, "-", 1.6),
     "orientation angles": (INK, (0, (5, 2)), 1.4),
@@ -20,6 +22,7 @@ LOOKS = {
     "additional parameters": (GREY, "-", 1.8),
     "GNSS shifts and drifts": (GREY, (0, (4, 1.5, 1, 1.5)), 1.6),
 }
+"""Colour, dashes and width of the lines, points: told apart without colours too."""
 
 
 def crosscheck_table(result: CrosscheckResult) -> Table:

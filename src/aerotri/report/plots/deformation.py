@@ -32,13 +32,17 @@ from aerotri.report.plots.canvas import (
 
 MEANING = {"free": "orientation of the self-calibrated block", "absorbed": "orientation adjusted without parameters"}
 HIGHEST = 6.6
+"""Inches that a map is high at most: with its title it fits a printed page."""
 SEAM_STYLE: dict[str, Any] = {"colors": GREY, "linewidths": 0.9, "linestyles": (0, (1, 2))}
+"""Grey and dotted: behind the contour lines."""
 PROFILE_STYLES: tuple[dict[str, Any], ...] = (
     {"color": GREY, "lw": 1.0, "ls": (0, (1, 1.2))},
     {"color": GREY, "lw": 1.0, "ls": (0, (5, 2))},
     {"color": INK, "lw": 1.6, "ls": "-"},
 )
+"""Of dX, dY and dZ: the height is what matters, so it is strongest."""
 BASE_STYLE: dict[str, Any] = {"marker": "+", "ms": 9, "mew": 1.3, "color": ACCENT}
+"""Of the two projection centres."""
 
 
 @styled

@@ -29,6 +29,8 @@ __all__ = [
 ]
 
 MOST_GROUPS = 8
+"""Groups of photographs that have plots over the image format; chosen [C]: more make the report long and slow to
+draw."""
 
 
 def all_plots(adjusted: AdjustedBlock, changes: Sequence[Change] = ()) -> dict[str, Figure]:

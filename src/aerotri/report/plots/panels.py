@@ -22,7 +22,10 @@ from aerotri.report.plots.canvas import WIDTH, axes_at, new_figure, per_inch_for
 MARGIN, GAP, AROUND = 0.3, 0.12, 0.14
 """Inches: beside the panels, between them, around a format."""
 HEAD, FOOT, CAPTION = 0.55, 0.52, 0.48
+"""Inches: above and below all panels, above a panel."""
 LARGEST_INCH, WIDEST = 0.42, 4.2
+"""Longest arrow, and widest panel, inches; chosen [C]: a single panel would fill the page otherwise, and its arrows
+cross."""
 
 
 @dataclass(frozen=True, eq=False)

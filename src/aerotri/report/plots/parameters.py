@@ -18,16 +18,20 @@ from aerotri.report.plots.camera import seams
 from aerotri.report.plots.canvas import FRAME, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, plain, styled, vectors
 
 MOST_ON_A_SHEET = 44
+"""Patterns of a sheet at most: Grün's 44 and the 44 of Legendre's M = N = 4 fill one."""
 COLUMNS = ((4, 2), (20, 4), (36, 6), (MOST_ON_A_SHEET, 7))
 """Panels beside each other for up to so many patterns."""
 MARGIN, GAP, HEAD, CAPTION = 0.2, 0.16, 0.92, 0.34
 """Inches: around the sheet, between panels, title of the sheet, title of a panel."""
 ARROW_SPACING = 0.14
+"""Inches between arrows; chosen [C]: closer ones are too short to show their direction, wider ones miss tiles."""
 LONGEST_IN_CELLS = 0.95
 """Arrows are drawn about their positions and stay in their cells, so that none meets the next or a caption."""
 LETTER = 0.53
 """Mean width of a letter, in its height."""
 EXAMPLE_GRID = (7, 5)
+"""Columns and rows of the nodes where a family needs a grid and none is stated; chosen [C]: about the ratio of a
+format, with a node in the middle."""
 EXAMPLE_HEIGHTS = (1000.0, 100.0)
 """Flying height, and height of the point above the mean ground, m, of patterns that depend on them."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

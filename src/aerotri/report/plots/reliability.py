@@ -15,9 +15,12 @@ from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.statistics.outliers import used_rays
 
 CLASSES = 5
+"""Classes of equal numbers; chosen [C]: as many shades of grey as are told apart in print."""
 SHADES = ("#e3e6e9", "#bcc3ca", "#8b949d", "#565f68", "#111417")
 POINT_SIZES = (2.2, 2.9, 3.8, 5.0, 6.6)
+"""Diameters, points, each a third larger than the one before, so that size tells what the shade does."""
 MOST_POINTS = 20000
+"""Points drawn, about; chosen [C]: more cover one another and make the file large."""
 
 
 @styled

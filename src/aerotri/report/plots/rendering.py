@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from aerotri.report.plots.canvas import STYLE
 
 DPI = 130
+"""Pixels an inch of PNG; chosen [C]: sharp on a screen; prints take the SVG."""
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,11 @@ from aerotri.report.plots.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at
 from aerotri.results.adjusted_block import AdjustedBlock
 
 BINS = 60
+"""Bars of the histogram; chosen [C]: fewer hide the shape of the tails, more show chance."""
 MOST_PARAMETERS = 90
+"""Parameters drawn, beyond which GNSS shifts are left out first; chosen [C]: a cell is then still wider than a line."""
 MOST_LABELS = 60
+"""Names along a side; chosen [C]: with more they overlap, and every second stands."""
 
 
 @styled

@@ -30,8 +30,10 @@ from aerotri.terrain.dtm import TerrainOutcome
 from aerotri.terrain.picket_status import PicketStatus
 
 HIGHEST = 6.4
+"""Inches that a map is high at most: with its title it fits a printed page."""
 HOLE = "#cfe0f2"
 MOST_CELLS = 1200
+"""Cells drawn along a side, the others skipped; chosen [C]: about the pixels of the picture."""
 ERROR_MARKS = {
     PicketStatus.BACKWARD: ("x", "backward"), PicketStatus.AMBIGUOUS: ("+", "ambiguous"),
     PicketStatus.NEIGHBOURS: ("s", "off its neighbours"), PicketStatus.PEAK: ("^", "peak or pit"),

@@ -34,6 +34,7 @@ from aerotri.volume.sections import Profile, Sections, direction_of
 from aerotri.volume.thickness import ThicknessMap
 
 HIGHEST = 6.4
+"""Inches that a map is high at most: with its title it fits a printed page."""
 CUT, FILL = "#7a2e0e", "#0b3d6b"
 # light in the middle and equally dark at both ends: in black and white the bold zero line tells the sides apart
 COLOURS = LinearSegmentedColormap.from_list("cut_and_fill", [FILL, "#8fb4d6", "#ffffff", "#dfa684", CUT])
@@ -50,6 +51,7 @@ SYSTEMATIC = {
     "absorbed": "image errors uncorrected, orientation without parameters",
 }
 BAR = 0.36
+"""Inches of a row of bars; chosen [C]: its name of 8.5 points has room."""
 
 
 @styled

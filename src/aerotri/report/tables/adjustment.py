@@ -18,11 +18,16 @@ from aerotri.report.quality import asprs_warning, ground_statistics, metre_digit
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Outcome
 
 TOP_RESIDUALS = 30
+"""Largest residuals that are listed; chosen [C]: read one after the other on a page, all are in residuals.parquet."""
 TOP_WEAK = 15
+"""Weakest points and photographs that are listed; chosen [C] likewise."""
 LONGEST_CELL = 1000
+"""Characters of a cell at most: as many as a name may have."""
 MOST_ROWS = 3000
+"""Rows of a table of photographs at most; chosen [C]: a page with more opens slowly; all are in images.csv."""
 GNSS_UNITS = {"shift": "m", "drift": "m/s"}
 MOST_REASONS = 6
+"""Reasons that are listed with the verdict; chosen [C]: the first are the gravest, all are in adjustment.json."""
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from aerotri.statistics.precision import (
 )
 
 MOST_CORRELATIONS = 200
+"""Pairs of a table at most; chosen [C]: nobody reads more, and a block of many cameras can have thousands."""
 NAMED_FROM = 0.7
 """Correlation of shared parameters from which on a pair is named in the table [C]."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from aerotri.report.tables.adjustment import Table
 
 WIDEST_CELL = 48
+"""Characters of a cell in a terminal; chosen [C]: two such columns fit a line of 100 characters."""
 
 
 def table_lines(table: Table, indent: str = "  ") -> list[str]:
