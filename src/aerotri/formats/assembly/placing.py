@@ -19,8 +19,8 @@ NORTH_STEP_DEG = 1e-5
 BODY = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """Between x forward, y right, z down and x right, y forward, z up; its own inverse."""
 FAR_M = 1e4
-"""Distance, m, of points from the photographs from which exchanged axes are suspected; chosen [C]: below the differences
-of X and Y in most systems, beyond the way from a block to its control points."""
+"""Distance, m, of points from the photographs from which exchanged axes are suspected; chosen [C]: below the
+differences of X and Y in most systems, beyond the way from a block to its control points."""
 NEARER = 0.1
 """Share of that distance which exchanging X and Y has to leave; chosen [C]: chance does not bring points ten times
 nearer."""
