@@ -13,12 +13,13 @@ from aerotri.diagnosis import diagnose
 from aerotri.diagnosis.evidence import fit, gather
 from aerotri.diagnosis.free_model import connected_parts, free_model
 from aerotri.diagnosis.placement import lay_on
-from aerotri.diagnosis.sampling import MOST_PHOTOGRAPHS, MOST_RAYS, sampled
+from aerotri.diagnosis.sampling import ENOUGH_CONTROL, MOST_PHOTOGRAPHS, MOST_RAYS, sampled
+from aerotri.diagnosis.trials import FAILED, Trial, explains
 from aerotri.formats.block.folder import write_block
 from aerotri.functional_model.rotation import exponential
 from aerotri.pipeline import adjust
 from small_blocks import small_block
-from wrong_blocks import answer_of, clean, image_points, kinds, misses, negated
+from wrong_blocks import answer_of, clean, focal_length, image_points, kinds, misses, negated
 
 FEW = (
     ("navigation", "x of one photograph negated"),
@@ -114,3 +115,38 @@ def test_the_cause_of_a_failure_is_printed(tmp_path, capsys):
     said = capsys.readouterr().err
     assert "rank deficient" in said
     assert "because the photographs fall into 2 parts without a common point" in said
+
+
+@pytest.fixture(scope="module")
+def sparse_control():
+    """More photographs than the search works with, and one control point for every fifteen of them."""
+    block, _ = small_block(
+        flight={"gsd_m": 0.1, "strips": 6, "images_per_strip": 15, "end_lap": 0.7, "side_lap": 0.4},
+        tie_points={"per_image": 25, "sigma_um": 2.0},
+        control={"positions": [[x, y] for x in (0.0, 0.5, 1.0) for y in (0.0, 1.0)], "sigma_m": [0.03, 0.03, 0.05]},
+    )
+    return block
+
+
+def test_a_part_of_a_large_block_has_the_control_that_holds_it(sparse_control):
+    part, is_part = sampled(sparse_control, None)
+    assert is_part
+    assert MOST_PHOTOGRAPHS <= len(part.images) <= len(sparse_control.images)
+    own = part.control.point[~part.control.is_check]
+    rays = np.bincount(part.image_points.point, minlength=len(part.points))[own]
+    assert (rays >= 2).sum() >= ENOUGH_CONTROL
+    assert adjust(part).outcome.status == "converged"
+
+
+def test_a_change_is_proven_by_an_adjustment_of_a_large_block_too(sparse_control):
+    block = focal_length(0.9)(sparse_control)
+    said = " ".join(diagnose(block, adjust, adjust(block)))
+    assert "1.11" in said, said
+    assert "principal distance" in said
+    assert "no result" not in said
+
+
+def test_what_has_no_result_explains_nothing():
+    assert not explains(FAILED, FAILED)
+    assert not explains(Trial("rejected", 9.0, 9.0, 1.0), FAILED)
+    assert explains(FAILED, Trial("accepted", 1.0, 1.0, 1.0))

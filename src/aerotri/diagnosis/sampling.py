@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 
 from aerotri.diagnosis.free_model import sub_block
 from aerotri.observations import Block
@@ -12,6 +12,10 @@ from aerotri.results.adjusted_block import AdjustedBlock
 MOST_PHOTOGRAPHS = 60
 """Photographs the search for a mistake works with [C]: a few strips show every usual mistake; more make a search of
 many trials slow."""
+LARGEST_PART = 240
+"""Photographs of a part that is still looking for control: an adjustment of so many takes a second."""
+ENOUGH_CONTROL = 5
+"""Control points seen twice that a part without GNSS should have: three hold it, two more test whether they fit."""
 MOST_RAYS = 12000
 """Rays it works with, likewise [C]: two hundred for each of so many photographs."""
 WORST_W = 100.0
@@ -47,15 +51,30 @@ def _around(block: Block, seed: int) -> np.ndarray:
     seen = coo_array((np.ones(len(rays)), (rays.image, rays.point)), shape=(n, len(block.points))).tocsr()
     chosen = np.zeros(n, bool)
     chosen[seed] = True
-    while chosen.sum() < MOST_PHOTOGRAPHS:
+    while not _is_enough(block, seen, chosen):
         common = seen @ (seen.T @ chosen.astype(float))
         common[chosen] = 0.0
-        new = np.argsort(-common, kind="stable")[: max(1, min(8, MOST_PHOTOGRAPHS - int(chosen.sum())))]
+        count = int(chosen.sum())
+        room = (MOST_PHOTOGRAPHS if count < MOST_PHOTOGRAPHS else LARGEST_PART) - count
+        new = np.argsort(-common, kind="stable")[: min(8, room)]
         new = new[common[new] > 0.0]
         if not len(new):
             break
         chosen[new] = True
     return np.flatnonzero(chosen)
+
+
+def _is_enough(block: Block, seen: csr_array, chosen: np.ndarray) -> bool:
+    """Whether photographs (n,) bool are enough to judge by: many, and with the control that an adjustment needs."""
+    count = int(chosen.sum())
+    if count < MOST_PHOTOGRAPHS or count >= LARGEST_PART:
+        return count >= LARGEST_PART
+    if block.gnss_ins is not None:
+        return True
+    control = block.control
+    whole = control.point[~control.is_check & np.isfinite(control.xyz).all(axis=1)]
+    rays = np.asarray(seen.T @ chosen.astype(float))[whole]
+    return int((rays >= 2).sum()) >= min(ENOUGH_CONTROL, len(whole))
 
 
 def _some_points(block: Block) -> np.ndarray:

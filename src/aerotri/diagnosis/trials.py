@@ -76,7 +76,9 @@ def try_adjusting(block: Block, adjust: Adjust) -> Trial:
 
 
 def explains(before: Trial, after: Trial) -> bool:
-    """Whether a change makes a block clearly better."""
+    """Whether a change makes a block clearly better; a change that leads to no result explains nothing."""
+    if not after.level:
+        return False
     if after.rank > before.rank or after.used < NEARLY_ALL * before.used:
         return False
     if after.rank < before.rank and after.misfit <= max(before.misfit, 1.5):
