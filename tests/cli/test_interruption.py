@@ -37,6 +37,9 @@ sys.meta_path.insert(0, Slow())
 import aerotri.cli
 """
 
+LISTENING = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+"""What a shell starts in the background ignores SIGINT, and so do the programs that it starts."""
+
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of a system")
 @pytest.mark.parametrize(
@@ -44,7 +47,9 @@ import aerotri.cli
     [(EARLY, signal.SIGINT, 130), (LATE, signal.SIGINT, 130), (LATE, signal.SIGTERM, 143)],
 )
 def test_an_interruption_is_one_line(program, number, code):
-    process = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = subprocess.Popen(
+        [sys.executable, "-c", LISTENING + program], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
     assert process.stdout is not None
     assert process.stdout.readline().strip() == b"running"
     time.sleep(0.05)

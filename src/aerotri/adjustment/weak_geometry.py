@@ -69,27 +69,28 @@ class _Look:
             if suspect and not len(self.photographs):
                 self.photographs = loose_together(system, state, equations)
         elif self.whole and estimator.is_robust and iteration in LOOKS:
-            self.look(system, state, equations, estimator, iteration >= LONG)
+            self.look(system, state, equations, estimator, iteration >= LONG, in_block=False)
         return bool(len(self.photographs) or len(self.points))
 
     def look(
-        self, system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, photographs: bool
-    ) -> bool:
+        self, system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, photographs: bool,
+        in_block: bool = True,
+    ) -> bool:  # fmt: skip
         """Look at the points, and the photographs too where there is time for that; whether any is loose.
 
-        Where a point is loose by its own rays, or the photographs are looked at anyway, so are the points once more,
-        within the whole block.
+        in_block : where a point is loose by its own rays, or the photographs are looked at anyway, so are the points
+            once more, within the whole block. Not on the way: far from the minimum too many would go.
         """
         scale = _scale(system, equations, estimator, self.redundancy)
         self.points = np.flatnonzero(scale * system.looseness(state, estimator) > LOOSE)
-        if not (photographs or len(self.points)):
-            return False
+        if not (photographs or (in_block and len(self.points))):
+            return bool(len(self.points))
         inverse = _regularised_inverse(system, equations)
         if inverse is None:
             return bool(len(self.points))
         if photographs:
             self.photographs = _loose_photographs(system, state, inverse, scale)
-        if not len(self.photographs):
+        if in_block and not len(self.photographs):
             self.points = np.union1d(self.points, _loose_points(system, state, inverse, estimator, scale))
         return bool(len(self.photographs) or len(self.points))
 
@@ -135,8 +136,12 @@ def _tied(
     prepared: Prepared, state: State, options: SolveOptions, redundancy: Callable[[NormalSystem], int], whole: bool,
     done: int,
 ) -> tuple[Prepared, Solution]:  # fmt: skip
-    """As `minimise_tied`, from a state, after `done` iterations."""
+    """As `minimise_tied`, from a state, after `done` iterations.
+
+    Where the rest does not converge without the points that were found loose at the end, they stay.
+    """
     round_ = 0
+    settled: tuple[Prepared, Solution] | None = None
     report = options.report
     while True:
         freedom = redundancy(prepared.system)
@@ -152,7 +157,11 @@ def _tied(
             stuck = solution.status != "converged"
             look.look(prepared.system, solution.state, solution.equations, solution.estimator, stuck)
         if not (len(look.photographs) or len(look.points)):
+            if settled is not None and solution.status == "not converged":
+                return settled
             return prepared, replace(solution, iterations=done)
+        if solution.status == "converged":
+            settled = prepared, replace(solution, iterations=done)
         prepared, state = set_aside(prepared, solution.state, look.photographs, look.points)
         round_ += 1
 

@@ -124,13 +124,20 @@ def _delivered(stand: _Stand) -> _Delivered:
 
 
 def _without_loose_points(delivered: _Delivered, options: SolveOptions) -> _Delivered:
-    """A robust adjustment without the points that the covariance of the whole block shows to be loose."""
+    """A robust adjustment without the points that the covariance of the whole block shows to be loose.
+
+    Where the rest does not converge without them they stay, and are named.
+    """
     for _ in range(ROUNDS_OF_LOOSE_POINTS if delivered.stand.solution.estimator.is_robust else 0):
         stand, loose = delivered.stand, to_set_aside(delivered.result)
         if stand.solution.status != "converged" or not len(loose):
             break
-        found = _determined(go_on_without(stand.prepared, stand.solution, loose, options, _redundancy))
-        delivered = _delivered(replace(stand, prepared=found[0], solution=found[1]))
+        prepared, solution = go_on_without(stand.prepared, stand.solution, loose, options, _redundancy)
+        if solution.status != "converged":
+            # the factor of before was overwritten
+            return _delivered(stand)
+        _determined((prepared, solution))
+        delivered = _delivered(replace(stand, prepared=prepared, solution=solution))
     return delivered
 
 
