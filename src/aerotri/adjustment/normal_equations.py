@@ -25,7 +25,7 @@ from aerotri.adjustment.kernel_records import (
 )
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.robust import Estimator, normalised_lengths
-from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, InverseOnPattern, Symbolic
+from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, Symbolic
 from aerotri.adjustment.unknowns import State, Step, Unknowns
 from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.observations import CollocationSettings
@@ -299,15 +299,14 @@ class NormalSystem:
         )
         return loose
 
-    def point_cofactors(self, state: State, inverse: InverseOnPattern, estimator: Estimator):
+    def point_cofactors(self, state: State, inverse: Inverse, estimator: Estimator):
         """Cofactors of the points (P, 3, 3) and redundancy numbers of the rays (m, 2), in the order of `unknowns`."""
         u = self.unknowns
         cofactor, redundancy = np.empty((len(u.points), 3, 3)), np.empty((len(u.rays.image), 2))
-        parts = Inverse(inverse.blocks, inverse.border, inverse.corner)
         self.over_points(
             self.problem(state, estimator),
             lambda first, last, problem, work: _covariance_kernels.point_cofactors(
-                first, last, problem, parts, cofactor, redundancy, work
+                first, last, problem, inverse, cofactor, redundancy, work
             ),
         )
         held = u.point_held

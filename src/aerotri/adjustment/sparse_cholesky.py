@@ -17,7 +17,7 @@ from scipy.linalg.lapack import dpotrf, dpotri  # pyright: ignore[reportAttribut
 
 from aerotri.adjustment import _factor_kernels as _kernels
 from aerotri.adjustment.dissection import Tree, dissect
-from aerotri.adjustment.kernel_records import Front, FrontBlocks, MatrixBlocks
+from aerotri.adjustment.kernel_records import Front, FrontBlocks, Inverse, MatrixBlocks
 from aerotri.adjustment.parallel import blas_threads, refuse_more_than_there_is
 
 B = 6
@@ -282,15 +282,6 @@ def _eliminate(top: np.ndarray, low: np.ndarray, rest: np.ndarray) -> float:
     return smallest
 
 
-@dataclass(frozen=True, eq=False)
-class InverseOnPattern:
-    """The inverse where the matrix has blocks: blocks (nb, 6, 6), border (n, s, 6), corner (s, s)."""
-
-    blocks: np.ndarray
-    border: np.ndarray
-    corner: np.ndarray
-
-
 class Factor:
     """A factor of a `BorderedMatrix`: solves, inverts on the pattern, gives columns of the inverse.
 
@@ -372,14 +363,14 @@ class Factor:
         unit[indices, np.arange(len(indices))] = 1.0
         return self.solve(unit)
 
-    def inverse_on_pattern(self) -> InverseOnPattern:
+    def inverse_on_pattern(self) -> Inverse:
         """The inverse on the pattern of the matrix, by the Takahashi recursion from the root down."""
         with blas_threads(self._symbolic.flops):
             return self._inverse_on_pattern()
 
-    def _inverse_on_pattern(self) -> InverseOnPattern:
+    def _inverse_on_pattern(self) -> Inverse:
         s = self._symbolic
-        out = InverseOnPattern(
+        out = Inverse(
             np.zeros((len(s.block_row), B, B)), np.zeros((s.n, s.n_border, B)), np.zeros((s.n_border, s.n_border))
         )
         if s.n_border:

@@ -20,12 +20,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from aerotri.adjustment.carry_over import reference_state, start_values_at, with_shared
+from aerotri.adjustment.kernel_records import Inverse
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.ray_status import RayStatus, with_lonely_rays, with_weak_words
 from aerotri.adjustment.robust import Estimator, normalised_lengths, scale_of
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
-from aerotri.adjustment.sparse_cholesky import BorderedMatrix, InverseOnPattern, NotPositiveDefiniteError
+from aerotri.adjustment.sparse_cholesky import BorderedMatrix, NotPositiveDefiniteError
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import State, Unknowns
 
@@ -195,7 +196,7 @@ def loose_together(system: NormalSystem, state: State, equations: NormalEquation
     return np.zeros(0, dtype=np.int64) if inverse is None else _loose_photographs(system, state, inverse)
 
 
-def _regularised_inverse(system: NormalSystem, equations: NormalEquations) -> InverseOnPattern | None:
+def _regularised_inverse(system: NormalSystem, equations: NormalEquations) -> Inverse | None:
     """A trace of regularisation lets the matrix be inverted; what is free gets a σ beyond all bounds by it."""
     n, matrix = len(system.unknowns.images), equations.matrix
     blocks, corner, diagonal = matrix.blocks.copy(), matrix.corner.copy(), np.arange(6)
@@ -207,7 +208,7 @@ def _regularised_inverse(system: NormalSystem, equations: NormalEquations) -> In
         return None
 
 
-def _loose_photographs(system: NormalSystem, state: State, inverse: InverseOnPattern, scale: float = 1.0) -> np.ndarray:
+def _loose_photographs(system: NormalSystem, state: State, inverse: Inverse, scale: float = 1.0) -> np.ndarray:
     """Rows of the photographs that are loose; none where it is the datum."""
     n = len(system.unknowns.images)
     cofactor = inverse.blocks[:n] * _unit_products(system.unknowns, state)
@@ -217,7 +218,7 @@ def _loose_photographs(system: NormalSystem, state: State, inverse: InverseOnPat
 
 
 def _loose_points(
-    system: NormalSystem, state: State, inverse: InverseOnPattern, estimator: Estimator, scale: float
+    system: NormalSystem, state: State, inverse: Inverse, estimator: Estimator, scale: float
 ) -> np.ndarray:
     """Rows of the points that are loose within the whole block; none where it is the block."""
     u = system.unknowns

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment.datum import datum_rows, motions_of_images, motions_of_points
+from aerotri.adjustment.kernel_records import Inverse
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.robust import Estimator
-from aerotri.adjustment.sparse_cholesky import Factor, InverseOnPattern
+from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.unknowns import State, Unknowns
 from aerotri.functional_model.rotation import angles_from_rotation, small_rotation_per_angle
 
@@ -52,7 +53,7 @@ class Cofactors:
     points: np.ndarray
     image_shared: np.ndarray
     ray_redundancy: np.ndarray
-    inverse: InverseOnPattern
+    inverse: Inverse
     inner: InnerDatum | None = None
 
 
@@ -70,7 +71,7 @@ def cofactors(system: NormalSystem, state: State, factor: Factor, estimator: Est
     return result
 
 
-def _without_held(unknowns: Unknowns, inverse: InverseOnPattern) -> tuple[np.ndarray, np.ndarray]:
+def _without_held(unknowns: Unknowns, inverse: Inverse) -> tuple[np.ndarray, np.ndarray]:
     images, border = inverse.blocks[: len(unknowns.images)].copy(), np.swapaxes(inverse.border, 1, 2).copy()
     held = ~unknowns.eo_free
     images[held] = 0.0

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from aerotri.adjustment import _reliability_kernels
-from aerotri.adjustment.kernel_records import Datum, Effects, Inverse, Scale
+from aerotri.adjustment.kernel_records import Datum, Effects, Scale
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.unknowns import ORIENTATION_ELEMENTS, Unknowns
@@ -32,14 +32,13 @@ def ray_effects(system: NormalSystem, solution: Solution, q: Cofactors) -> RayEf
     u, state, estimator = system.unknowns, solution.state, solution.estimator
     m = len(u.rays.image)
     size, unknown, height = np.empty((m, 2)), np.empty((m, 2), dtype=np.int32), np.empty((m, 2))
-    inverse = Inverse(q.inverse.blocks, q.inverse.border, q.inverse.corner)
     measures, found = (_datum(u, q.inner), _scale(system, solution, q)), Effects(size, unknown, height)
     problem = system.problem(state, estimator)
     weight = problem.weighting.weight
     system.over_points(
         problem,
         lambda first, last, problem, work: _reliability_kernels.ray_effects(
-            first, last, problem, inverse, measures, found, work
+            first, last, problem, q.inverse, measures, found, work
         ),
     )
     settings = u.block.settings.adjustment

@@ -21,7 +21,6 @@ from aerotri.adjustment.kernel_records import Inverse
 from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
 from aerotri.adjustment.robust import LEAST_SQUARES
 from aerotri.adjustment.solve import Solution
-from aerotri.adjustment.sparse_cholesky import InverseOnPattern
 from aerotri.adjustment.unknowns import State, Unknowns
 from aerotri.functional_model.observed_unknowns import AttitudeObservations, CentreObservations, Rows
 from aerotri.statistics.covariance import Cofactors
@@ -173,17 +172,17 @@ def test_all(system: NormalSystem, switched: NormalSystem, solution: Solution, s
     return AllTests(rays, control, extras, factor.smallest_pivot)
 
 
-def _predictions(system: NormalSystem, switched: NormalSystem, state: State, inverse: InverseOnPattern):
+def _predictions(system: NormalSystem, switched: NormalSystem, state: State, inverse: Inverse):
     """Cofactors of the points (P, 3, 3), and of the predictions of x with x, x with y, y with y (m, 3)."""
     u = system.unknowns
     m = len(u.rays.image)
     points, predicted = np.empty((len(u.points), 3, 3)), np.empty((m, 3))
-    problem, parts = switched.problem(state, LEAST_SQUARES), Inverse(inverse.blocks, inverse.border, inverse.corner)
+    problem = switched.problem(state, LEAST_SQUARES)
     full = u.rays.arrays()
     switched.over_points(
         problem,
         lambda first, last, problem, work: _reliability_kernels.predicted_cofactors(
-            first, last, problem, full, parts, (points, predicted), work
+            first, last, problem, full, inverse, (points, predicted), work
         ),
     )
     for row, columns in zip(u.kept_rows, u.kept_columns, strict=True):

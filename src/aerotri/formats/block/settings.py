@@ -336,13 +336,13 @@ def read_block_toml(path: Path) -> BlockToml:
 
 def _as_input_error(error: ValidationError | OverflowError, path: Path, text: str) -> InputError:
     if not isinstance(error, ValidationError):
-        return InputError("holds a number too large to be read", "see the README for block.toml", path)
+        return InputError("holds a number too large to be read", "give a smaller number", path)
     first = error.errors(include_url=False)[0]
     where = tuple(part for part in first["loc"])
     key = ".".join(str(part) for part in where) or "block.toml"
     line = line_of_key(text, where)
     kind, value = first["type"], first["input"]
-    remedy = "see the README for block.toml"
+    remedy = "correct the value"
     if kind == "missing":
         message, remedy = f"key '{key}' is missing", f"add {where[-1]} = …"
     elif kind == "extra_forbidden":

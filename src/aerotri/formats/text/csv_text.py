@@ -144,7 +144,12 @@ def _header_cells(text: bytes, path: Path, line: int) -> tuple[str, ...]:
     except UnicodeDecodeError as error:
         raise InputError("is not UTF-8", UTF8_REMEDY, path, line) from error
     except csv.Error as error:
-        raise InputError(f"the header cannot be read: {error}", "see the README for the columns", path, line) from error
+        raise InputError(
+            f"the header cannot be read: {error}",
+            "write the names of the columns in one line, separated by commas",
+            path,
+            line,
+        ) from error
 
 
 def error_of_unparsable(text: CsvText, reason: str) -> InputError:
@@ -164,7 +169,9 @@ def error_of_unparsable(text: CsvText, reason: str) -> InputError:
     if ragged is not None:
         return ragged
     short = reason.splitlines()[0] if reason else "no reason given"
-    return InputError(f"cannot be read as a table: {short}", "see the README for the format", text.path)
+    return InputError(
+        f"cannot be read as a table: {short}", "write a row a line, its cells separated by commas", text.path
+    )
 
 
 def _ragged_row(text: CsvText) -> InputError | None:

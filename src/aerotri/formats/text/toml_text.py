@@ -24,7 +24,9 @@ DEEPEST = 100
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def read_toml(path: Path, remedy: str = "see the README for block.toml") -> tuple[dict[str, Any], str]:
+def read_toml(
+    path: Path, remedy: str = "write key = value under [table], names and texts in quotes"
+) -> tuple[dict[str, Any], str]:
     """Content and text of a TOML file.
 
     Raises
