@@ -253,7 +253,7 @@ class Constraints:
 
 @dataclass(frozen=True)
 class AdjustmentSettings:
-    """What `[adjustment]` of block.toml says; the meaning of every key is in the README.
+    """What `[adjustment]` of block.toml says; what every key means is said in `formats.block.settings_model`.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """A block folder: block.toml and tables, read into a `Block` and checked to the last cell.
 
-The format stands in the README. Two keys of this program's own: ``[adjustment] datum_fixed = ["IMAGE:X0", …]`` names
+The format stands in the reference of the documentation. Two keys of this program's own: ``[adjustment] datum_fixed = ["IMAGE:X0", …]`` names
 the orientation elements held by datum = "fixed"; ``[camera.<name>.lens]`` holds the forward lens parameters k1 k2 p1
 p2 k3 as `[camera.<name>.brown]` holds Brown's. Of scanned film see `scanned_film`.
 """

@@ -1,4 +1,4 @@
-"""The settings model of block.toml: every key, its type and its range; and its translation into the records."""
+"""block.toml read: what its keys hold, checked, and translated into the records; the keys are in `settings_model`."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import difflib
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ValidationError
 
-from aerotri.conventions import LARGEST, InputError
+from aerotri.conventions import InputError
+from aerotri.formats.block.settings_model import AdjustmentModel, BlockModel, CameraModel, CamerasModel
 from aerotri.formats.text.csv_text import BLANKS
 from aerotri.formats.text.tables import CONTROL_CHARACTERS, SMALLEST_POSITIVE
 from aerotri.formats.text.toml_text import line_of_key, read_toml
@@ -21,19 +22,9 @@ from aerotri.observations import (
     CollocationSettings,
     GnssSettings,
     InsSettings,
-    Prior,
     Settings,
 )
-from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
 
-Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[float, Field(gt=0, ge=SMALLEST_POSITIVE, le=LARGEST)]
-Fraction = Annotated[float, Field(gt=0, lt=1)]
-Pixels = Annotated[int, Field(gt=0, le=10_000_000)]
-Three = Annotated[list[Real], Field(min_length=3, max_length=3)]
-ThreeNotNegative = Annotated[list[Annotated[float, Field(ge=0, le=LARGEST)]], Field(min_length=3, max_length=3)]
-ThreePositive = Annotated[list[Positive], Field(min_length=3, max_length=3)]
-OffOn = Literal["off", "on"]
 ORIENTATION_ELEMENTS = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
 REASONS = {
     "string_pattern_mismatch": "should be 'local', 'EPSG:n' or 'EPSG:n+m'",
@@ -45,164 +36,6 @@ REASONS = {
     "too_long": "has too many entries",
 }
 """Words of our own for kinds of error whose message speaks of Python."""
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
-
-
-class PriorModel(_Section):
-    """A start value with what is known of it: ``{ value, sigma }`` (no sigma: free) or ``fixed = true``."""
-
-    value: Real | None = None
-    sigma: Positive | None = None
-    fixed: bool = False
-
-    @model_validator(mode="after")
-    def _fixed_or_observed(self) -> PriorModel:
-        if self.fixed and self.sigma is not None:
-            raise ValueError("fixed = true and a sigma exclude each other")
-        return self
-
-    def prior(self, otherwise: float = 0.0) -> Prior:
-        return Prior(otherwise if self.value is None else self.value, self.sigma, self.fixed)
-
-
-class InteriorModel(_Section):
-    focal_length_mm: PriorModel | None = None
-    x0_mm: PriorModel | None = None
-    y0_mm: PriorModel | None = None
-
-
-class BrownModel(_Section):
-    K1: PriorModel | None = None
-    K2: PriorModel | None = None
-    K3: PriorModel | None = None
-    P1: PriorModel | None = None
-    P2: PriorModel | None = None
-    b1: PriorModel | None = None
-    b2: PriorModel | None = None
-
-
-class LensModel(_Section):
-    k1: PriorModel | None = None
-    k2: PriorModel | None = None
-    p1: PriorModel | None = None
-    p2: PriorModel | None = None
-    k3: PriorModel | None = None
-
-
-class CameraModel(_Section):
-    model: Literal["frame", "ultracam_d", "dmc"] = "frame"
-    size_px: Annotated[list[Pixels], Field(min_length=2, max_length=2)]
-    pixel_um: Positive
-    focal_length_mm: Positive
-    principal_point_mm: Annotated[list[Real], Field(min_length=2, max_length=2)] = [0.0, 0.0]
-    flight_axis: Literal["+x", "-x", "+y", "-y"] | None = None
-    interior: InteriorModel = InteriorModel()
-    brown: BrownModel = BrownModel()
-    lens: LensModel = LensModel()
-    interior_orientation: Literal["affine", "projective", "similarity"] | None = None
-    fiducials: dict[str, Annotated[list[Real], Field(min_length=2, max_length=2)]] = {}
-
-    @model_validator(mode="after")
-    def _focal_length_positive(self) -> CameraModel:
-        given = self.interior.focal_length_mm
-        if given is not None and given.value is not None and given.value <= 0:
-            raise ValueError(f"interior.focal_length_mm has value = {given.value}, it should be greater than 0")
-        return self
-
-    def camera(self, name: str) -> Camera:
-        """The record; interior elements that are not named are fixed at the camera's own values."""
-        own = dict(zip(INTERIOR_ELEMENTS, (self.focal_length_mm, *self.principal_point_mm), strict=True))
-        interior = {}
-        for element, value in own.items():
-            given: PriorModel | None = getattr(self.interior, element)
-            interior[element] = Prior(float(value), fixed=True) if given is None else given.prior(float(value))
-        return Camera(
-            name=name,
-            model=self.model,
-            size_px=(self.size_px[0], self.size_px[1]),
-            pixel_um=float(self.pixel_um),
-            interior=interior,
-            brown=_priors(self.brown, BROWN_NAMES),
-            lens=_priors(self.lens, LENS_NAMES),
-            flight_axis=self.flight_axis,
-            fiducials={name: (float(x), float(y)) for name, (x, y) in self.fiducials.items()},
-            interior_orientation=self.interior_orientation,
-        )
-
-
-def _priors(section: BaseModel, names: tuple[str, ...]) -> dict[str, Prior]:
-    given = {name: getattr(section, name) for name in names}
-    return {name: model.prior() for name, model in given.items() if model is not None}
-
-
-class StochasticModel(_Section):
-    image_sigma_um: Positive | None = None
-    default_control_sigma_m: ThreeNotNegative | None = None
-
-
-class AdjustmentModel(_Section):
-    additional_parameters: list[str] = []
-    parameter_groups: str = "camera"
-    parameter_selection: OffOn = "off"
-    t_limit: Annotated[float, Field(ge=0, le=LARGEST)] = 1.0
-    correlation_limit: Annotated[float, Field(gt=0, le=1)] = 0.85
-    robust: Literal["off", "huber", "danish", "cauchy", "adaptive", "data-snooping"] = "off"
-    datum: Literal["control", "minimal", "inner", "fixed"] = "control"
-    datum_points: list[str] = []
-    datum_fixed: list[str] = []
-    variance_components: OffOn = "off"
-    alpha: Fraction = 0.001
-    power: Fraction = 0.80
-    max_iterations: Annotated[int, Field(ge=1, le=100_000)] = 30
-
-
-class CorrectionsModel(_Section):
-    refraction: Literal["off", "standard"] = "off"
-    earth_curvature: OffOn = "off"
-
-
-class GnssModel(_Section):
-    shift: Literal["off", "block", "strip"] = "off"
-    drift: Literal["off", "block", "strip"] = "off"
-    lever_arm_m: Three = [0.0, 0.0, 0.0]
-    lever_arm_sigma_m: ThreePositive | None = None
-    time_offset: Literal["off", "block", "strip"] = "off"
-
-
-class InsModel(_Section):
-    boresight: Literal["off", "camera"] = "camera"
-    drift: Literal["off", "strip"] = "off"
-
-
-class CollocationModel(_Section):
-    sigma_um: Positive | None = None
-    length_mm: Positive | None = None
-
-
-class BlockModel(_Section):
-    """block.toml."""
-
-    name: str | None = None
-    crs: Annotated[str, Field(pattern=r"^(local|EPSG:[0-9]+(\+[0-9]+)?)$")] = "local"
-    angle_unit: Literal["deg", "gon", "rad"] = "deg"
-    rotation: Literal["omega-phi-kappa", "phi-omega-kappa"] = "omega-phi-kappa"
-    image_unit: Literal["mm", "um", "px"] = "mm"
-    camera: Annotated[dict[str, CameraModel], Field(min_length=1)]
-    stochastic: StochasticModel = StochasticModel()
-    adjustment: AdjustmentModel = AdjustmentModel()
-    corrections: CorrectionsModel = CorrectionsModel()
-    gnss: GnssModel = GnssModel()
-    ins: InsModel = InsModel()
-    collocation: CollocationModel = CollocationModel()
-
-
-class CamerasModel(_Section):
-    """The cameras of block.toml in a file of their own."""
-
-    camera: Annotated[dict[str, CameraModel], Field(min_length=1)]
 
 
 class BlockToml:

@@ -1,0 +1,314 @@
+"""What block.toml may hold: every key with its type, range, unit, default and effect.
+
+The reference of the documentation and `aerotri explain` are made from these descriptions.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from aerotri.conventions import LARGEST
+from aerotri.formats.text.tables import SMALLEST_POSITIVE
+from aerotri.observations import Camera, Prior
+from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
+
+Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(gt=0, ge=SMALLEST_POSITIVE, le=LARGEST)]
+Fraction = Annotated[float, Field(gt=0, lt=1)]
+Pixels = Annotated[int, Field(gt=0, le=10_000_000)]
+Two = Annotated[list[Real], Field(min_length=2, max_length=2)]
+Three = Annotated[list[Real], Field(min_length=3, max_length=3)]
+ThreeNotNegative = Annotated[list[Annotated[float, Field(ge=0, le=LARGEST)]], Field(min_length=3, max_length=3)]
+ThreePositive = Annotated[list[Positive], Field(min_length=3, max_length=3)]
+OffOn = Literal["off", "on"]
+
+
+def key(default: Any, text: str, unit: str = "") -> Any:
+    """A key of block.toml: its default, what it means in plain words, its unit; without a default give `...`."""
+    return Field(default, description=text, json_schema_extra={"unit": unit})
+
+
+class Section(BaseModel):
+    """A table of block.toml: unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+
+class PriorModel(Section):
+    """A start value with what is known of it: ``{ value, sigma }`` (no sigma: free) or ``fixed = true``."""
+
+    value: Real | None = key(None, "Start value, in the unit of the parameter.")
+    sigma: Positive | None = key(
+        None, "Standard deviation of the value, in the same unit: the value is an observation. Without it the "
+        "parameter is free."
+    )  # fmt: skip
+    fixed: bool = key(False, "true: the value is held and is no unknown.")
+
+    @model_validator(mode="after")
+    def _fixed_or_observed(self) -> PriorModel:
+        if self.fixed and self.sigma is not None:
+            raise ValueError("fixed = true and a sigma exclude each other")
+        return self
+
+    def prior(self, otherwise: float = 0.0) -> Prior:
+        """The record; `otherwise` is the value where none is given."""
+        return Prior(otherwise if self.value is None else self.value, self.sigma, self.fixed)
+
+
+class InteriorModel(Section):
+    """Interior orientation as unknowns; an element that is not named is held at the camera's own value."""
+
+    focal_length_mm: PriorModel | None = key(None, "Principal distance (calibrated focal length) as an unknown.", "mm")
+    x0_mm: PriorModel | None = key(None, "x of the principal point as an unknown, from the image centre.", "mm")
+    y0_mm: PriorModel | None = key(None, "y of the principal point as an unknown, from the image centre.", "mm")
+
+
+class BrownModel(Section):
+    """Start values and σ of Brown's lens parameters; they act only where `additional_parameters` names them."""
+
+    K1: PriorModel | None = key(None, "Brown's radial distortion, term r³.", "mm⁻²")
+    K2: PriorModel | None = key(None, "Brown's radial distortion, term r⁵.", "mm⁻⁴")
+    K3: PriorModel | None = key(None, "Brown's radial distortion, term r⁷.", "mm⁻⁶")
+    P1: PriorModel | None = key(None, "Brown's decentring distortion along x.", "mm⁻¹")
+    P2: PriorModel | None = key(None, "Brown's decentring distortion along y.", "mm⁻¹")
+    b1: PriorModel | None = key(None, "Affinity: scale of x against y.")
+    b2: PriorModel | None = key(None, "Affinity: shear of x.")
+
+
+class LensModel(Section):
+    """Start values and σ of the lens model of OpenCV and COLMAP; see `additional_parameters`, family lens."""
+
+    k1: PriorModel | None = key(None, "Radial distortion as in OpenCV, term of the third power.")
+    k2: PriorModel | None = key(None, "Radial distortion as in OpenCV, term of the fifth power.")
+    p1: PriorModel | None = key(None, "Decentring distortion as in OpenCV, mainly along y.")
+    p2: PriorModel | None = key(None, "Decentring distortion as in OpenCV, mainly along x.")
+    k3: PriorModel | None = key(None, "Radial distortion as in OpenCV, term of the seventh power.")
+
+
+class CameraModel(Section):
+    """A camera. NAME is what images.csv has in its column camera."""
+
+    model: Literal["frame", "ultracam_d", "dmc"] = key(
+        "frame", "Kind of camera. frame: any camera with one sensor, film cameras too. ultracam_d and dmc: cameras "
+        "composed of several sensors, which have parameter families of their own."
+    )  # fmt: skip
+    size_px: Annotated[list[Pixels], Field(min_length=2, max_length=2)] = key(
+        ..., "Size of the photograph: columns, rows.", "px"
+    )
+    pixel_um: Positive = key(..., "Size of a pixel in the image plane.", "µm")
+    focal_length_mm: Positive = key(..., "Principal distance (calibrated focal length).", "mm")
+    principal_point_mm: Two = key(
+        [0.0, 0.0], "Principal point x0, y0 from the image centre; x to the right, y up.", "mm"
+    )
+    flight_axis: Literal["+x", "-x", "+y", "-y"] | None = key(
+        None, "Image axis that points along the flight. The parameters of ultracam_d and dmc need it to place the "
+        "sensors (+y where it is not given); model deformation takes the base along it (+x where it is not given)."
+    )  # fmt: skip
+    interior: InteriorModel = key(
+        InteriorModel(), "Which elements of the interior orientation are unknowns. What is not named is held."
+    )
+    brown: BrownModel = key(
+        BrownModel(), 'Start values and σ of Brown\'s lens parameters, for additional_parameters "brown:…".'
+    )
+    lens: LensModel = key(
+        LensModel(), 'Start values and σ of the OpenCV lens parameters, for additional_parameters "lens:…".'
+    )
+    interior_orientation: Literal["affine", "projective", "similarity"] | None = key(
+        None, "Scanned film: transformation from pixels of the scan to the calibrated fiducial marks."
+    )
+    fiducials: dict[str, Two] = key(
+        {}, "Scanned film: calibrated position x, y of every fiducial mark, by its name in fiducials.csv.", "mm"
+    )
+
+    @model_validator(mode="after")
+    def _focal_length_positive(self) -> CameraModel:
+        given = self.interior.focal_length_mm
+        if given is not None and given.value is not None and given.value <= 0:
+            raise ValueError(f"interior.focal_length_mm has value = {given.value}, it should be greater than 0")
+        return self
+
+    def camera(self, name: str) -> Camera:
+        """The record; interior elements that are not named are fixed at the camera's own values."""
+        own = dict(zip(INTERIOR_ELEMENTS, (self.focal_length_mm, *self.principal_point_mm), strict=True))
+        interior = {}
+        for element, value in own.items():
+            given: PriorModel | None = getattr(self.interior, element)
+            interior[element] = Prior(float(value), fixed=True) if given is None else given.prior(float(value))
+        return Camera(
+            name=name,
+            model=self.model,
+            size_px=(self.size_px[0], self.size_px[1]),
+            pixel_um=float(self.pixel_um),
+            interior=interior,
+            brown=_priors(self.brown, BROWN_NAMES),
+            lens=_priors(self.lens, LENS_NAMES),
+            flight_axis=self.flight_axis,
+            fiducials={name: (float(x), float(y)) for name, (x, y) in self.fiducials.items()},
+            interior_orientation=self.interior_orientation,
+        )
+
+
+def _priors(section: BaseModel, names: tuple[str, ...]) -> dict[str, Prior]:
+    given = {name: getattr(section, name) for name in names}
+    return {name: model.prior() for name, model in given.items() if model is not None}
+
+
+class StochasticModel(Section):
+    """Standard deviations where the tables give none."""
+
+    image_sigma_um: Positive | None = key(
+        None, "Standard deviation of an image coordinate where image_points.csv gives none. Needed where the table has "
+        "no sx and sy.", "µm"
+    )  # fmt: skip
+    default_control_sigma_m: ThreeNotNegative | None = key(
+        None, "Standard deviation of X, Y, Z of control and check points where control.csv gives none; 0 holds the "
+        "coordinate without error.", "m"
+    )  # fmt: skip
+
+
+class AdjustmentModel(Section):
+    """How the block is adjusted."""
+
+    additional_parameters: list[str] = key(
+        [], "Parameters of systematic image errors (self-calibration): FAMILY:ITEMS, items joined by + and ranges by "
+        "-, such as \"bluh:1-8+12\" or \"brown:K1+K2+P1+P2\"; \"auto\" compares the families by cross-validation. "
+        "`aerotri parameters` lists them. Empty: none."
+    )  # fmt: skip
+    parameter_groups: str = key(
+        "camera", "Photographs that share one set of additional parameters: camera, block, strip, or the name of a "
+        "column of images.csv, such as day."
+    )  # fmt: skip
+    parameter_selection: OffOn = key(
+        "off", "on: additional parameters that are not significant or too highly correlated are removed, one after "
+        "another, each with a new adjustment."
+    )  # fmt: skip
+    t_limit: Annotated[float, Field(ge=0, le=LARGEST)] = key(
+        1.0, "Selection: a parameter is removed when its value divided by its σ is below this."
+    )
+    correlation_limit: Annotated[float, Field(gt=0, le=1)] = key(
+        0.85, "Selection: of two parameters with a higher correlation one is removed; so is a parameter whose total "
+        "correlation with all others is higher."
+    )  # fmt: skip
+    robust: Literal["off", "huber", "danish", "cauchy", "adaptive", "data-snooping"] = key(
+        "off", "Robust estimation. huber, danish, cauchy, adaptive: image points with large residuals get less weight. "
+        "data-snooping: they are tested and removed one after another."
+    )  # fmt: skip
+    datum: Literal["control", "minimal", "inner", "fixed"] = key(
+        "control", "What fixes position, rotation and scale. control: control points and GNSS. minimal: as few "
+        "coordinates as are needed. inner: free network, the mean shift of the datum points is zero. fixed: the "
+        "elements of datum_fixed. With minimal and inner, control is compared only."
+    )  # fmt: skip
+    datum_points: list[str] = key([], 'datum = "inner": names of the points that carry the datum; empty: all points.')
+    datum_fixed: list[str] = key(
+        [], "datum = \"fixed\": orientation elements that are held, as PHOTOGRAPH:ELEMENT, such as \"1_001:X0\". "
+        "Elements are X0 Y0 Z0 omega phi kappa."
+    )  # fmt: skip
+    variance_components: OffOn = key(
+        "off", "on: the σ of image points, control, GNSS and INS are estimated from the residuals, group by group."
+    )
+    alpha: Fraction = key(
+        0.001, "Significance level of the tests of residuals: 0.001 means one false alarm in a thousand tests."
+    )
+    power: Fraction = key(
+        0.80, "Probability with which an error of the size of the marginally detectable error is found."
+    )
+    max_iterations: Annotated[int, Field(ge=1, le=100_000)] = key(30, "Iterations at most.")
+
+
+class CorrectionsModel(Section):
+    """Corrections of image coordinates before the adjustment."""
+
+    refraction: Literal["off", "standard"] = key(
+        "off", "standard: refraction by the standard atmosphere is taken off; heights count from sea level."
+    )
+    earth_curvature: OffOn = key(
+        "off", "on: earth curvature is taken off; for crs = \"local\" only. A block with an EPSG code is adjusted on "
+        "the curved earth anyway."
+    )  # fmt: skip
+
+
+class GnssModel(Section):
+    """Positions of gnss_ins.csv."""
+
+    shift: Literal["off", "block", "strip"] = key(
+        "off", "Constant shift X, Y, Z of the GNSS positions as an unknown: one for the block, or one a strip. A shift "
+        "in height can hide a wrong principal distance, so it is off unless asked for."
+    )  # fmt: skip
+    drift: Literal["off", "block", "strip"] = key(
+        "off", "Linear drift of the GNSS positions with time as an unknown: one for the block, or one a strip. Needs "
+        "the column time."
+    )  # fmt: skip
+    lever_arm_m: Three = key(
+        [0.0, 0.0, 0.0], "From the projection centre to the antenna, in the camera frame: x right, y up, z backwards "
+        "(away from the ground).", "m"
+    )  # fmt: skip
+    lever_arm_sigma_m: ThreePositive | None = key(
+        None, "Standard deviation of the lever arm, which becomes an unknown. Without it the lever arm is held.", "m"
+    )
+    time_offset: Literal["off", "block", "strip"] = key(
+        "off", "Difference between the clocks of GNSS and camera as an unknown: one for the block, or one a strip. "
+        "Needs the column time."
+    )  # fmt: skip
+
+
+class InsModel(Section):
+    """Angles of gnss_ins.csv."""
+
+    boresight: Literal["off", "camera"] = key(
+        "camera", "Boresight misalignment between INS and camera as three unknowns for every camera; off: none."
+    )
+    drift: Literal["off", "strip"] = key(
+        "off", "Linear drift of the angles with time as an unknown in every strip. Needs the column time."
+    )
+
+
+class CollocationModel(Section):
+    """The distortion model without assumptions about the camera, additional_parameters "collocation"."""
+
+    sigma_um: Positive | None = key(
+        None, "Standard deviation of the image error; estimated from the block where it is not given.", "µm"
+    )
+    length_mm: Positive | None = key(
+        None, "Distance in the image over which the error stays alike (correlation length); estimated from the block "
+        "where it is not given.", "mm"
+    )  # fmt: skip
+
+
+class BlockModel(Section):
+    """block.toml."""
+
+    name: str | None = key(None, "Name of the block; that of its folder where it is not given.")
+    crs: Annotated[str, Field(pattern=r"^(local|EPSG:[0-9]+(\+[0-9]+)?)$")] = key(
+        "local", "Coordinate system of all coordinates: local (right-handed, metres), or an EPSG code such as "
+        "EPSG:25832, with a code for the heights EPSG:25832+7837. Without a code for the heights they are ellipsoidal."
+    )  # fmt: skip
+    angle_unit: Literal["deg", "gon", "rad"] = key("deg", "Unit of all angles in the tables.")
+    rotation: Literal["omega-phi-kappa", "phi-omega-kappa"] = key(
+        "omega-phi-kappa", "Order of the angles: R = Rx(ω)·Ry(φ)·Rz(κ), or R = Ry(φ)·Rx(ω)·Rz(κ)."
+    )
+    image_unit: Literal["mm", "um", "px"] = key(
+        "mm", "Unit of image_points.csv. mm and um: from the image centre, x right, y up. px: column and row, (0, 0) "
+        "is the corner of the upper left pixel."
+    )  # fmt: skip
+    camera: Annotated[dict[str, CameraModel], Field(min_length=1)] = key(
+        ..., "The cameras, one table [camera.NAME] each; at least one."
+    )
+    stochastic: StochasticModel = key(StochasticModel(), "Standard deviations where the tables give none.")
+    adjustment: AdjustmentModel = key(AdjustmentModel(), "How the block is adjusted.")
+    corrections: CorrectionsModel = key(CorrectionsModel(), "Corrections of image coordinates before the adjustment.")
+    gnss: GnssModel = key(GnssModel(), "How the positions of gnss_ins.csv are used.")
+    ins: InsModel = key(InsModel(), "How the angles of gnss_ins.csv are used.")
+    collocation: CollocationModel = key(
+        CollocationModel(), "The distortion model without assumptions about the camera (additional_parameters "
+        "\"collocation\")."
+    )  # fmt: skip
+
+
+class CamerasModel(Section):
+    """The cameras of block.toml in a file of their own."""
+
+    camera: Annotated[dict[str, CameraModel], Field(min_length=1)] = key(
+        ..., "The cameras, one table [camera.NAME] each."
+    )
