@@ -25,6 +25,13 @@ RADIANS_PER = {"deg": np.pi / 180.0, "gon": np.pi / 200.0, "rad": 1.0}
 """Radians of one unit of an angle, by the name of the unit in files: 360° and 400 gon are 2π."""
 MGON_PER_RADIAN = 200.0e3 / np.pi
 """Milligon of one radian: 200 gon are π."""
+EARTH_RADIUS_M = 6371000.0
+"""m, the mean radius of the earth [L: 6371.0 km]; radii of curvature of the ellipsoid differ from it by less than
+0.6 %."""
+SIGMA_PER_MAD = 1.4826
+"""Factor from a median absolute deviation to the σ of a normal distribution, 1/Φ⁻¹(0.75) [L: Höhle & Höhle 2009]."""
+LEAST_ROOM = 16384
+"""Bytes below which a disk counts as full; chosen [C]: file systems keep a few blocks of 4096 bytes back."""
 FLIGHT_AXES = ("+x", "-x", "+y", "-y")
 FilePath = str | os.PathLike[str]
 """What names a file or a folder."""

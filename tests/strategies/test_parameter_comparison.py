@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aerotri.diagnosis.parameter_sets import verdict
+from aerotri.formats.results.parameter_sets import comparison_columns, comparison_json
 from aerotri.functional_model.additional_parameters import AUTO, parse_parameters
 from aerotri.pipeline import adjust, adjust_keeping_system, compare_parameters
-from aerotri.report.tables.parameters import comparison_columns, comparison_json, comparison_table, verdict
+from aerotri.report.tables.parameters import comparison_table
 from aerotri.report.tables.terminal import table_lines
 from aerotri.results.parameter_comparison import Accuracy, ParameterComparison, SetOutcome
 from aerotri.strategies.control_prediction import folds_of, predict_control

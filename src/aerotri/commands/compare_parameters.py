@@ -50,7 +50,8 @@ def run_compare_parameters(
 
 
 def _tell(found: ComparedParameters, target: Path, console: Console, as_json: bool) -> None:
-    from aerotri.report.tables.parameters import NOTE, comparison_json, comparison_table
+    from aerotri.formats.results.parameter_sets import comparison_json
+    from aerotri.report.tables.parameters import NOTE, comparison_table
     from aerotri.report.tables.terminal import table_lines
 
     if as_json:

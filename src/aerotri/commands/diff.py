@@ -20,9 +20,10 @@ def run_diff(first: Path, second: Path, top: int, as_json: bool) -> int:
     InputError
         Where a folder holds no result that can be read; the message names it.
     """
+    from aerotri.formats.results.run_comparison import SIGMA_NOTE
     from aerotri.public.changes import changes, refuse_negative
     from aerotri.report.quality import printable
-    from aerotri.report.tables.comparison import SIGMA_NOTE, comparison_tables
+    from aerotri.report.tables.comparison import comparison_tables
     from aerotri.report.tables.terminal import table_lines
 
     refuse_negative(top)

@@ -23,9 +23,8 @@ from __future__ import annotations
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-import numpy as np
-
 from aerotri.crosscheck.comparison import COVARIANCE_LIMIT, LIMIT, VTPV_LIMIT, CrosscheckResult, PeerCheck
+from aerotri.formats.results.json_text import number_or_none
 
 
 def crosscheck_json(result: CrosscheckResult) -> dict[str, Any]:
@@ -52,27 +51,29 @@ def _check(check: PeerCheck) -> dict[str, Any]:
         "seconds": float(check.seconds),
         "observations": int(check.observations),
         "unknowns": int(check.unknowns),
-        "vtpv": _number(check.vtpv),
-        "vtpv_peer": _number(check.vtpv_peer),
-        "vtpv_difference": _number(check.vtpv_difference),
+        "vtpv": number_or_none(check.vtpv),
+        "vtpv_peer": number_or_none(check.vtpv_peer),
+        "vtpv_difference": number_or_none(check.vtpv_difference),
         "differences": [
-            {"kind": d.kind, "count": d.count, "max": _number(d.max), "rms": _number(d.rms), "worst": str(d.worst)}
+            {
+                "kind": d.kind,
+                "count": d.count,
+                "max": number_or_none(d.max),
+                "rms": number_or_none(d.rms),
+                "worst": str(d.worst),
+            }
             for d in check.differences
         ],
         "covariance": None
         if covariance is None
         else {
             "photographs": covariance.photographs,
-            "sigma": _number(covariance.sigma),
-            "correlation": _number(covariance.correlation),
+            "sigma": number_or_none(covariance.sigma),
+            "correlation": number_or_none(covariance.correlation),
             "worst": covariance.worst,
         },
         "notes": list(check.notes),
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def _version() -> str:

@@ -8,14 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.conventions import EARTH_RADIUS_M
 from aerotri.observations import Block
 
 Change = Callable[[Block], Block]
 Positions = Callable[[np.ndarray], np.ndarray]
-
-EARTH_RADIUS = 6371000.0
-"""m, a sphere of the mean radius [L: 6371.0 km]: degrees become metres to about half a percent, enough to see that
-they were degrees."""
 
 
 def on_positions(sets: tuple[str, ...], change: Positions) -> Change:
@@ -142,8 +139,8 @@ def metres_of_degrees(order: tuple[int, int], degrees: np.ndarray, metres: np.nd
 
     def changed(xyz: np.ndarray) -> np.ndarray:
         lon, lat = np.radians(xyz[:, order[0]]), np.radians(xyz[:, order[1]])
-        east = metres[0] + EARTH_RADIUS * np.cos(lat0) * (lon - lon0)
-        return np.column_stack([east, metres[1] + EARTH_RADIUS * (lat - lat0), xyz[:, 2]])
+        east = metres[0] + EARTH_RADIUS_M * np.cos(lat0) * (lon - lon0)
+        return np.column_stack([east, metres[1] + EARTH_RADIUS_M * (lat - lat0), xyz[:, 2]])
 
     return changed
 

@@ -7,6 +7,7 @@ import numpy as np
 from aerotri.diagnosis.finding import Finding, critical_of_worst, doubt, graded, times
 from aerotri.observations import Camera
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.strategies.parameter_comparison import SIGNIFICANT_T
 
 CHANGED = 0.20
 """Share by which a free principal distance may differ from the one stated; what EXIF says is nearer."""
@@ -16,9 +17,6 @@ CORRECTED, GROSS = 4.0, 30.0
 
 SHIFTED = 3.0
 """Least shift of GNSS, in σ of the positions and of the shift together, that is named."""
-
-SIGNIFICANT_T = 1.96
-"""|p|/σ from which a parameter counts as significant: 95 % of the normal distribution, two-sided [L]."""
 
 
 def of_interior(adjusted: AdjustedBlock) -> list[Finding]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.diagnosis import changes
 from aerotri.diagnosis.catalogue import SUBJECTS
 from aerotri.diagnosis.evidence import Evidence, Fit, Positions, fit, sizes
@@ -141,7 +142,7 @@ def of_offsets(evidence: Evidence) -> Iterator[Hypothesis]:
         return
     residual, tolerance = found.residual["gnss"], found.tolerance["gnss"]
     middle = np.nanmedian(residual, axis=0)
-    scatter = 1.4826 * np.nanmedian(np.abs(residual - middle), axis=0)
+    scatter = SIGMA_PER_MAD * np.nanmedian(np.abs(residual - middle), axis=0)
     beyond = np.abs(middle) > np.maximum(3.0 * scatter, 0.5 * tolerance)
     offset = np.where(beyond & np.isfinite(middle), middle, 0.0)
     if not offset.any():

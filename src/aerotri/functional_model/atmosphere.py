@@ -21,12 +21,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import EARTH_RADIUS_M, InputError
 from aerotri.observations import Block
 
-EARTH_RADIUS_M = 6371000.0
-"""m, the mean radius of the earth [L: 6371.0 km]; radii of curvature of the ellipsoid differ from it by less than 0.6
-%."""
 GRAVITY = 9.80665
 """m/s² [L: ISO 2533, the standard atmosphere, also below]."""
 GAS_CONSTANT = 287.05287

@@ -12,11 +12,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from aerotri.conventions import EARTH_RADIUS_M
 from aerotri.functional_model.observed_unknowns import Rows
 
-EARTH_RADIUS = 6371000.0
-"""m, the mean radius of the earth [L: 6371.0 km]: over 1 km a level falls by 78 mm, to 0.5 mm with any radius of the
-ellipsoid."""
 NO_BASIS = (np.zeros(3), np.eye(3))
 """Of conditions that need none."""
 
@@ -111,11 +109,11 @@ def _equations(c: Constraint, shared: np.ndarray) -> tuple[np.ndarray, np.ndarra
         wanted = c.value if c.kind == "height_difference" else 0.0
         across, drop = along @ c.axes[:, :2], np.zeros(len(along))
         if c.curved and c.kind != "vertical":
-            drop = np.sum(across**2, axis=1) / (2.0 * EARTH_RADIUS)
+            drop = np.sum(across**2, axis=1) / (2.0 * EARTH_RADIUS_M)
         gap = (wanted - drop[:, None] - along @ axes.T).ravel()
         directions, pairs = np.tile(axes, (len(along), 1)), np.repeat(np.arange(1, len(points)), len(axes))
         if c.curved and c.kind != "vertical":
-            directions = directions + across @ c.axes[:, :2].T / EARTH_RADIUS
+            directions = directions + across @ c.axes[:, :2].T / EARTH_RADIUS_M
     columns = np.concatenate([np.broadcast_to(c.columns[0], (len(pairs), 3)), c.columns[pairs]], axis=1)
     return gap, columns, np.concatenate([-directions, directions], axis=1)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 from aerotri.adjustment.normal_equations import NormalSystem
@@ -18,8 +17,6 @@ from aerotri.pipeline.local import undamped_factor
 from aerotri.pipeline.verdict import judged
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.in_crs import transform_result
-from aerotri.results.removal import Removal
-from aerotri.results.variance_components import VarianceComponents
 from aerotri.statistics.summarise import summarise
 from aerotri.strategies.selection import with_removed, without_parameters
 from aerotri.strategies.variance_components import with_components
@@ -32,7 +29,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     ----------
     block : as it was adjusted (the result's block/). saved : its solution.npz.
     """
-    removals = tuple(Removal(**removal) for removal in json.loads(saved.removals or "[]"))
+    removals = saved.removal_records()
     block = without_parameters(block, [(removal.name, removal.group) for removal in removals])
     frame, local = None, block
     if block.crs != "local":
@@ -51,8 +48,9 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     factor = undamped_factor(system, solution)
     result = replace(summarise(system, solution, factor, saved.ray_status, saved.warnings), block=local)
     result = replace(result, parameters=with_removed(result.parameters, removals), removals=removals)
-    if saved.components:
-        result = with_components(result, VarianceComponents.from_dict(json.loads(saved.components)))
+    components = saved.component_record()
+    if components is not None:
+        result = with_components(result, components)
     if saved.verdict:
         result = replace(result, outcome=replace(result.outcome, verdict=saved.verdict, reasons=saved.reasons))
     delivered = result if frame is None else transform_result(result, block, frame)

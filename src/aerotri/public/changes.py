@@ -59,14 +59,15 @@ class ResultChanges:
         InputError
             For a negative number.
         """
-        from aerotri.report.tables.comparison import comparison_json
+        from aerotri.formats.results.run_comparison import comparison_json
 
         refuse_negative(top)
         return comparison_json(self.record, top)
 
     def _repr_html_(self) -> str:
         """The tables of the command, as a notebook shows them."""
-        from aerotri.report.tables.comparison import SIGMA_NOTE, comparison_tables
+        from aerotri.formats.results.run_comparison import SIGMA_NOTE
+        from aerotri.report.tables.comparison import comparison_tables
 
         notes = "".join(f"<p>{escape(note)}</p>" for note in (SIGMA_NOTE, *self.record.notes))
         return f"<div>{notes}{''.join(map(_html, comparison_tables(self.record, MOST_NAMED)))}</div>"

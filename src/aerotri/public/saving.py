@@ -113,7 +113,7 @@ def write_adjustment(
 
 def write_comparison_tables(comparison: ParameterComparison, folder: Path) -> None:
     """Write compare_parameters.json and compare_parameters.csv into a folder."""
-    from aerotri.report.tables.parameters import comparison_columns, comparison_json
+    from aerotri.formats.results.parameter_sets import comparison_columns, comparison_json
 
     write_json(folder / "compare_parameters.json", comparison_json(comparison))
     write_csv(folder / "compare_parameters.csv", comparison_columns(comparison))
@@ -121,7 +121,7 @@ def write_comparison_tables(comparison: ParameterComparison, folder: Path) -> No
 
 def _write_parameter_tables(adjustment: Adjustment, folder: Path) -> None:
     """The differences between groups, and the sets that were compared, where there are any."""
-    from aerotri.report.tables.parameters import changes_columns, changes_json
+    from aerotri.formats.results.parameter_sets import changes_columns, changes_json
 
     changes = group_changes(adjustment.result)
     if changes:

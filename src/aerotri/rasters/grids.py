@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import LEAST_ROOM, FilePath, InputError
 from aerotri.vectors.geojson import LARGEST_M
 
 if TYPE_CHECKING:
@@ -32,8 +32,6 @@ CACHE_MB = 256
 TILE = 512
 """Side of the tiles of files written, pixels; a multiple of 16 as TIFF asks for, and the size usual for cloud-optimised
 files."""
-LEAST_ROOM = 16384
-"""Bytes below which a disk counts as full; chosen [C]: file systems keep a few blocks of 4096 bytes back."""
 SIGMA = "σ"
 """The description of a band of σ begins with it."""
 DAMAGED = "write the file anew, it is damaged"

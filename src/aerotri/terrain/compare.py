@@ -16,15 +16,13 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.ndimage import map_coordinates
 
-from aerotri.conventions import InputError
+from aerotri.conventions import SIGMA_PER_MAD, InputError
 from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.rasters.held import HeldRaster
 from aerotri.terrain.settings import ALIGNMENT, INTERPOLATION
 from aerotri.terrain.surface import grid_over
 from aerotri.terrain.tin import Tin, triangulate
 
-NMAD = 1.4826
-"""Factor from a median absolute deviation to the σ of a normal distribution, 1/Φ⁻¹(0.75) [L: Höhle & Höhle 2009]."""
 LARGEST_SIDE = 8.0
 """Sides of triangles, in typical distances of the points, that still are surface; chosen [C]: less tears holes into
 uneven points, more bridges lakes and woods."""
@@ -35,7 +33,7 @@ ROUNDS, SETTLED_M = 15, 1e-4
 """Most rounds of an alignment, and the change, m, at which it ends; chosen [C]: 0.1 mm is below every height compared,
 and the rounds stop one that swings."""
 CUT = 3.0
-"""Differences beyond so many NMAD do not take part in an alignment: the usual 3σ of gross errors."""
+"""Differences beyond so many SIGMA_PER_MAD do not take part in an alignment: the usual 3σ of gross errors."""
 MOST_ALIGNED = 200_000
 """Places that an alignment uses at most, evenly thinned; chosen [C]: three or six unknowns gain nothing from more."""
 FEWEST = 20
@@ -132,7 +130,7 @@ class PointHeights:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Of differences, m: RMSE, mean, median, standard deviation, NMAD, LE90, largest without sign."""
+    """Of differences, m: RMSE, mean, median, standard deviation, SIGMA_PER_MAD, LE90, largest without sign."""
 
     count: int
     rmse: float
@@ -216,7 +214,8 @@ def statistics_of(difference: np.ndarray) -> Statistics:
     median = float(np.median(d))
     return Statistics(
         len(d), float(np.sqrt(np.mean(d**2))), float(d.mean()), median, float(d.std()),
-        float(NMAD * np.median(np.abs(d - median))), float(np.quantile(np.abs(d), 0.9)), float(np.abs(d).max()),
+        float(SIGMA_PER_MAD * np.median(np.abs(d - median))),
+        float(np.quantile(np.abs(d), 0.9)), float(np.abs(d).max()),
     )  # fmt: skip
 
 
@@ -280,7 +279,7 @@ def align(test: Heights, control: Heights, places: np.ndarray, z: np.ndarray, me
 
     [D] Test points P become P + t + ω × (P − M). At a place of the control surface with slopes (zx, zy) the difference
     test − control grows by tz − zx·tx − zy·ty and by what the rotation adds to t there; the motion makes it vanish.
-    Differences beyond 3 NMAD do not count. What flat ground leaves open is not moved.
+    Differences beyond 3 SIGMA_PER_MAD do not count. What flat ground leaves open is not moved.
     """
     known = np.flatnonzero(np.isfinite(z))
     known = known[:: max(len(known) // MOST_ALIGNED, 1)]
@@ -303,7 +302,7 @@ def align(test: Heights, control: Heights, places: np.ndarray, z: np.ndarray, me
         if good.sum() < FEWEST:
             raise InputError("the surfaces have too little in common to be aligned", "check their coordinate systems")
         off = np.abs(d - np.median(d[good]))
-        good &= off <= max(CUT * NMAD * float(np.median(off[good])), 1e-6)
+        good &= off <= max(CUT * SIGMA_PER_MAD * float(np.median(off[good])), 1e-6)
         scale = np.sqrt(np.mean(design[good] ** 2, axis=0)) + 1e-12
         found = -np.linalg.lstsq(design[good] / scale, d[good], rcond=1e-6)[0] / scale
         turn = found[3:] if kind == "rigid" else np.zeros(3)

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import Delaunay, KDTree
 
+from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.terrain.picket_status import PicketStatus
 from aerotri.terrain.pickets import Pickets
 from aerotri.terrain.tin import order_in_plan
@@ -26,8 +27,6 @@ SMALLEST_PX = 1.0
 PEAK_LIMIT = 4.0
 """What a peak stands out by, over what corners around it differ from their neighbours; chosen [C]: less takes off
 summits, more leaves errors in."""
-NMAD = 1.4826
-"""Factor from a median absolute deviation to the σ of a normal distribution, 1/Φ⁻¹(0.75) [L: Höhle & Höhle 2009]."""
 
 
 def with_error_pickets(pickets: Pickets, metres_per_px: float) -> Pickets:
@@ -68,7 +67,7 @@ def _off_neighbours(xyz: np.ndarray, floor: float) -> np.ndarray:
         normal = np.einsum("nki,nkj->nij", weighted, design) + 1e-9 * np.eye(3)
         plane = np.linalg.solve(normal, np.einsum("nki,nk->ni", weighted, delta[..., 2])[..., None])[..., 0]
         residual = delta[..., 2] - np.einsum("nki,ni->nk", design, plane)
-        scale = np.maximum(NMAD * np.median(np.abs(residual), axis=1), 1e-9)
+        scale = np.maximum(SIGMA_PER_MAD * np.median(np.abs(residual), axis=1), 1e-9)
         weight = 1.0 / (1.0 + (residual / (2.0 * scale[:, None])) ** 2)
     return np.abs(plane[:, 0]) > np.maximum(LIMIT * scale, floor)
 
@@ -95,5 +94,5 @@ def _stand_out(xyz: np.ndarray, floor: float) -> np.ndarray:
     mean = np.bincount(owner, difference, len(xyz)) / np.maximum(count, 1)
     around = np.bincount(owner, np.abs(mean[neighbours]), len(xyz)) / np.maximum(count, 1)
     alone = (above >= count - 1) | (above <= 1)
-    typical = np.maximum(around, NMAD * np.median(np.abs(mean)))
+    typical = np.maximum(around, SIGMA_PER_MAD * np.median(np.abs(mean)))
     return alone & (np.abs(mean) > np.maximum(PEAK_LIMIT * typical, floor))

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import KDTree
 
-from aerotri.conventions import InputError
+from aerotri.conventions import SIGMA_PER_MAD, InputError
 from aerotri.terrain import _picket_kernels as kernels
 from aerotri.terrain._plan_kernels import LEAST_CORRELATION, Plan
 from aerotri.terrain._search_kernels import find_heights
@@ -40,8 +40,6 @@ squares raises it; less wastes time on windows without texture."""
 LONGEST_STEP_ASIDE = 0.4
 """How far a picket may move from its node, in intervals; chosen [C]: below a half, so that neighbouring nodes never
 measure one place twice."""
-NMAD = 1.4826
-"""Factor from a median absolute deviation to the σ of a normal distribution, 1/Φ⁻¹(0.75) [L: Höhle & Höhle 2009]."""
 FEWEST_MISFITS = 20
 """Y-parallaxes that σ0 of matching is taken from at least; chosen [C]: the NMAD of 20 is known to a quarter."""
 NEAREST = 40
@@ -221,5 +219,5 @@ def with_sigma0(pickets: Pickets, apart: float) -> Pickets:
         return pickets
     other = near[has, fits[has].argmax(axis=1)]
     difference = np.abs(pickets.misfit[own][has] - pickets.misfit[own][other])
-    sigma0 = float(NMAD * np.median(difference) / np.sqrt(2.0))
+    sigma0 = float(SIGMA_PER_MAD * np.median(difference) / np.sqrt(2.0))
     return replace(pickets, covariance=pickets.covariance * sigma0**2, sigma0=sigma0)

@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import SIGMA_PER_MAD, InputError
 
 COLLINEAR = 0.03
 """Width over length of a set of points below which it is a line."""
@@ -81,7 +81,7 @@ def place(
     for _ in range(REWEIGHTINGS):
         misfit = np.linalg.norm(scale * source @ rotation.T + translation - target, axis=1)
         relative = misfit[:count] / sigma
-        spread = max(1.4826 * float(np.median(relative)), 1e-9)
+        spread = max(SIGMA_PER_MAD * float(np.median(relative)), 1e-9)
         robust = weight.copy()
         robust[:count] /= 1.0 + (relative / (TUNING * spread)) ** 2
         scale, rotation, translation = _similarity(source, target, robust)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.formats.assembly.reprojection import reproject
 from aerotri.observations import Block
 
@@ -34,7 +35,7 @@ def rays_that_meet(block: Block, centre: np.ndarray, rotation: np.ndarray) -> np
         left = replace(rays, image=rays.image[rows], point=rays.point[rows], xy=rays.xy[rows], sigma=rays.sigma[rows])
         relative = reproject(replace(block, image_points=left), centre, rotation).residual_px / sigma[rows]
         known = np.isfinite(relative)
-        limit = LIMIT * 1.4826 * float(np.median(relative[known])) if known.any() else 0.0
+        limit = LIMIT * SIGMA_PER_MAD * float(np.median(relative[known])) if known.any() else 0.0
         size = np.where(np.isnan(relative), np.inf, relative)
         worst = np.zeros(len(block.points))
         np.maximum.at(worst, left.point, size)

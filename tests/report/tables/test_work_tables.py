@@ -10,6 +10,7 @@ import pytest
 from aerotri.diagnosis.free_verdict import in_words
 from aerotri.diagnosis.work_list import WorkItem, WorkList
 from aerotri.formats.results.free_check import free_check_json
+from aerotri.formats.results.run_comparison import comparison_json
 from aerotri.report.pages.adjustment import Findings, report_html
 from aerotri.report.tables import comparison as comparison_tables
 from aerotri.report.tables import work as work_tables
@@ -190,7 +191,7 @@ def test_comparison_json_is_plain(adjusted):
     angles = adjusted.images.angles.copy()
     angles[2, 2] += np.radians(0.003)
     comparison = compare(adjusted, replace(adjusted, images=replace(adjusted.images, angles=angles)))
-    content = json.loads(json.dumps(comparison_tables.comparison_json(comparison, 4), allow_nan=False))
+    content = json.loads(json.dumps(comparison_json(comparison, 4), allow_nan=False))
     kappa = content["orientations"]["elements"][5]
     assert (kappa["element"], kappa["unit"], kappa["at"]) == ("kappa", "deg", str(adjusted.block.images.names[2]))
     assert kappa["max"] == pytest.approx(0.003)

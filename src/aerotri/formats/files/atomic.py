@@ -15,7 +15,7 @@ from collections.abc import Callable, Collection, Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import LEAST_ROOM, FilePath, InputError
 from aerotri.formats.files.ownership import carry_over, record_files
 from aerotri.formats.files.work_place import OLDER, work_place, written
 
@@ -24,8 +24,6 @@ AT_FDCWD = -100
 RENAME_EXCHANGE = 2
 """Of linux/fs.h: renameat2 exchanges two names in one step."""
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-LEAST_ROOM = 16384
-"""Bytes below which a disk counts as full; chosen [C]: file systems keep a few blocks of 4096 bytes back."""
 
 
 @contextmanager

@@ -9,10 +9,7 @@ import tempfile
 import weakref
 from pathlib import Path
 
-from aerotri.conventions import FilePath, InputError
-
-LEAST_ROOM = 16384
-"""Bytes below which a disk counts as full; chosen [C]: file systems keep a few blocks of 4096 bytes back."""
+from aerotri.conventions import LEAST_ROOM, FilePath, InputError
 
 
 class Spool:

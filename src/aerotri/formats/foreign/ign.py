@@ -18,7 +18,7 @@ from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, RayList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
-from aerotri.formats.text.tables import SMALLEST_POSITIVE
+from aerotri.formats.text.tables import LARGEST_FORMAT_PX, SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, check_words, first_lines
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Camera, Prior
@@ -26,8 +26,6 @@ from aerotri.observations import Camera, Prior
 HEADERS = (["NOM", "X", "Y", "Z", "O", "P", "K"], ["N", "X", "Y", "Z", "O", "P", "K"])
 CAMERA_KEYS = ("name", "ppax", "ppay", "focal", "width", "height")
 UNIT_NAMES = {"deg": "degrees", "gon": "gon", "rad": "radians"}
-LARGEST_FORMAT_PX = 1e7
-"""Columns or rows of an image at most."""
 
 
 def is_ign_opk(path: Path) -> bool:

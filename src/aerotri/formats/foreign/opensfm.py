@@ -22,7 +22,7 @@ from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.foreign.colmap import COLMAP_FROM_CAMERA, SIGN, colmap_camera
 from aerotri.formats.results.json_text import json_text
 from aerotri.formats.text.csv_text import UTF8_REMEDY, read_bytes
-from aerotri.formats.text.tables import SMALLEST_POSITIVE
+from aerotri.formats.text.tables import LARGEST_FORMAT_PX, SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile
 from aerotri.functional_model.rotation import angles_from_rotation, exponential, logarithm
 from aerotri.observations import (
@@ -49,8 +49,6 @@ LENS_OF_TYPE: dict[str, tuple[str, ...]] = {
 LARGEST = 1e9
 """Largest number of a reconstruction; chosen [C]: beyond every coordinate in metres and every pixel; squares of it keep
 their digits."""
-LARGEST_FORMAT_PX = 1e7
-"""Longest side of a photograph, pixels; chosen [C]: beyond any camera, so that only damaged files are refused."""
 
 
 def is_opensfm(path: Path) -> bool:

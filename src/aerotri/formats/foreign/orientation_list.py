@@ -13,15 +13,13 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.parts import OrientationList, texts
-from aerotri.formats.text.tables import SMALLEST_POSITIVE
+from aerotri.formats.text.tables import LARGEST_FORMAT_PX, SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import TextFile, all_numbers, first_lines
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Camera, Prior
 
 SQUARE = 1e-3
 """Relative difference of width and height of a pixel that is still square."""
-LARGEST_FORMAT_PX = 1e7
-"""Longest side of a photograph, pixels; chosen [C]: beyond any camera, so that only damaged files are refused."""
 
 
 def is_orientation_list(path: Path) -> bool:

@@ -20,7 +20,7 @@ import numpy as np
 
 from aerotri.adjustment.ray_status import RAY_STATUS, RayStatus
 from aerotri.conventions import MGON_PER_RADIAN
-from aerotri.formats.results.json_text import write_json
+from aerotri.formats.results.json_text import number_or_none, write_json
 from aerotri.formats.results.reliability_columns import control_columns, observation_columns, ray_columns
 from aerotri.formats.text.table_writer import with_plain_texts
 from aerotri.image_errors import interior_elements
@@ -96,9 +96,9 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
         "reasons": list(o.reasons),
         "message": o.message,
         "iterations": int(o.iterations),
-        "sigma0": _number(o.sigma0),
-        "sigma0_um": _number(o.sigma0_um),
-        "vtpv": _number(o.vtpv),
+        "sigma0": number_or_none(o.sigma0),
+        "sigma0_um": number_or_none(o.sigma0_um),
+        "vtpv": number_or_none(o.vtpv),
         "observations": int(o.observations),
         "unknowns": int(o.unknowns),
         "conditions": int(o.conditions),
@@ -223,7 +223,7 @@ def _ground_points(block: Block, results: GroundPointResults) -> dict[str, Any]:
     keys = ("dX", "dY", "dZ", "sX", "sY", "sZ")
     rows = np.concatenate([results.difference, results.sigma], axis=1)
     points = [
-        {"point": str(name)} | {key: _number(value) for key, value in zip(keys, row, strict=True)}
+        {"point": str(name)} | {key: number_or_none(value) for key, value in zip(keys, row, strict=True)}
         for name, row in zip(names, rows, strict=True)
     ]
     return {"count": len(results), **statistics, "points": points}
@@ -240,7 +240,7 @@ def _cameras(adjusted: AdjustedBlock) -> list[dict[str, Any]]:
     for camera in adjusted.block.cameras:
         entry: dict[str, Any] = {"name": camera.name}
         for name, value, sigma in zip(INTERIOR_ELEMENTS, *interior_elements(adjusted, camera), strict=True):
-            entry |= {name: _number(value), f"s_{name}": _number(sigma)}
+            entry |= {name: number_or_none(value), f"s_{name}": number_or_none(sigma)}
         cameras.append(entry)
     return cameras
 
@@ -255,11 +255,7 @@ def _plain(value: Any) -> Any:
         return str(value)
     if isinstance(value, int | np.integer):
         return int(value)
-    return _number(value)
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    return number_or_none(value)
 
 
 def _finite(values: np.ndarray) -> np.ndarray:

@@ -41,6 +41,7 @@ from aerotri.deformation.dem_correction import DemOutcome
 from aerotri.deformation.dem_window import FIT_TOLERANCE_M, DemModels
 from aerotri.deformation.model_grid import Deformation
 from aerotri.deformation.restitution import SIGMA_INCLUDES
+from aerotri.formats.results.json_text import number_or_none
 from aerotri.rasters.grids import Grid
 from aerotri.version import __version__
 
@@ -113,7 +114,7 @@ def block_deformation_json(deformation: BlockDeformation, block: str) -> dict[st
         "seams": {
             "count": len(d.seams),
             "nodes": sum(seam.count for seam in d.seams),
-            "rms": _number(d.step_rms),
+            "rms": number_or_none(d.step_rms),
             "worst": [_seam(d, seam) for seam in worst_seams(d)],
         },
     }
@@ -138,11 +139,11 @@ def correction_json(outcome: DemOutcome, models: DemModels, grid: Grid, block: s
         "corrected": int(s[0]),
         "no_data": int(s[1]),
         "outside_models": int(s[2]),
-        "before": {"min": _number(s[10]), "max": _number(s[11]), "mean": s[8] / n if s[0] else None},
-        "after": {"min": _number(s[12]), "max": _number(s[13]), "mean": s[9] / n if s[0] else None},
+        "before": {"min": number_or_none(s[10]), "max": number_or_none(s[11]), "mean": s[8] / n if s[0] else None},
+        "after": {"min": number_or_none(s[12]), "max": number_or_none(s[13]), "mean": s[9] / n if s[0] else None},
         "dZ": {
-            "min": _number(s[6]),
-            "max": _number(s[7]),
+            "min": number_or_none(s[6]),
+            "max": number_or_none(s[7]),
             "mean": s[4] / n if s[0] else None,
             "rms": float(np.sqrt(s[5] / n)) if s[0] else None,
         },
@@ -166,10 +167,6 @@ def _statistics(values: np.ndarray) -> dict[str, float | None]:
     if not len(v):
         return {"min": None, "max": None, "mean": None, "rms": None}
     return {"min": float(v.min()), "max": float(v.max()), "mean": float(v.mean()), "rms": float(np.sqrt(np.mean(v**2)))}
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def _model(number: int, one: BlockModel, map_of_models: np.ndarray) -> dict[str, Any]:
@@ -207,7 +204,7 @@ def _steps(outcome: DemOutcome, models: DemModels) -> dict[str, Any]:
     return {
         "count": len(steps.pair),
         "places": int(steps.count.sum()),
-        "rms_before": _number(steps.rms("before")),
-        "rms_after": _number(steps.rms("after")),
+        "rms_before": number_or_none(steps.rms("before")),
+        "rms_after": number_or_none(steps.rms("after")),
         "worst": rows,
     }

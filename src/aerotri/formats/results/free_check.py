@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.diagnosis.free_verdict import in_words
+from aerotri.formats.results.json_text import number_or_none
 from aerotri.strategies.free_stages import FreeCheck, Stage, Suspect
 
 
@@ -15,9 +16,9 @@ def free_check_json(check: FreeCheck) -> dict[str, Any]:
     return {
         "verdict": check.verdict,
         "sentence": in_words(check),
-        "sigma0_free": _number(check.stages[0].sigma0),
-        "sigma0_full": _number(check.sigma0_full),
-        "spread_free": _number(check.spread),
+        "sigma0_free": number_or_none(check.stages[0].sigma0),
+        "sigma0_full": number_or_none(check.sigma0_full),
+        "spread_free": number_or_none(check.spread),
         "rays_beyond": check.beyond,
         "robust": check.robust,
         "stages": [_stage(stage) for stage in check.stages],
@@ -31,14 +32,14 @@ def _stage(stage: Stage) -> dict[str, Any]:
         "name": stage.name,
         "status": stage.status,
         "message": stage.message,
-        "sigma0": _number(stage.sigma0),
-        "vtpv": _number(stage.vtpv),
+        "sigma0": number_or_none(stage.sigma0),
+        "vtpv": number_or_none(stage.vtpv),
         "redundancy": stage.redundancy,
         "added_observations": stage.added,
-        "ratio": _number(stage.ratio),
-        "limit": _number(stage.limit),
-        "largest_w": _number(stage.largest_w),
-        "w_limit": _number(stage.w_limit),
+        "ratio": number_or_none(stage.ratio),
+        "limit": number_or_none(stage.limit),
+        "largest_w": number_or_none(stage.largest_w),
+        "w_limit": number_or_none(stage.w_limit),
         "fits": stage.fits if stage.tested else None,
         "suspects": [_suspect(suspect) for suspect in stage.suspects],
     }
@@ -49,9 +50,9 @@ def _suspect(suspect: Suspect) -> dict[str, Any]:
         "kind": suspect.kind,
         "name": suspect.name,
         "component": suspect.component,
-        "w": _number(suspect.w),
-        "error": _number(suspect.error),
-        "error_px": _number(suspect.error_px),
+        "w": number_or_none(suspect.w),
+        "error": number_or_none(suspect.error),
+        "error_px": number_or_none(suspect.error_px),
     }
 
 
@@ -60,7 +61,7 @@ def _similarity(check: FreeCheck) -> dict[str, Any] | None:
     if s is None:
         return None
     points = [
-        {"point": str(name)} | {f"d{axis}": _number(value) for axis, value in zip("XYZ", row, strict=True)}
+        {"point": str(name)} | {f"d{axis}": number_or_none(value) for axis, value in zip("XYZ", row, strict=True)}
         for name, row in zip(check.point, s.residual, strict=True)
     ]
     return {
@@ -68,10 +69,6 @@ def _similarity(check: FreeCheck) -> dict[str, Any] | None:
         "rotation_deg": [float(value) for value in np.degrees(s.rotation)],
         "scale_ppm": (s.scale - 1.0) * 1e6,
         "redundancy": s.redundancy,
-        "rms": {axis: _number(value) for axis, value in zip("XYZ", s.rms, strict=True)},
+        "rms": {axis: number_or_none(value) for axis, value in zip("XYZ", s.rms, strict=True)},
         "points": points,
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

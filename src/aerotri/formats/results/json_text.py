@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 Content = Mapping[str, Any] | Sequence[Any]
 
 
@@ -24,3 +26,8 @@ def json_text(content: Content, indent: int | None = 2) -> str:
 def write_json(path: Path, content: Content) -> None:
     """Write the content to a file."""
     path.write_text(json_text(content) + "\n", encoding="utf-8")
+
+
+def number_or_none(value: float) -> float | None:
+    """A number as JSON takes it: None where it is not known."""
+    return float(value) if np.isfinite(value) else None

@@ -21,6 +21,8 @@ from aerotri.formats.results.json_text import json_text
 from aerotri.formats.results.solution_checks import SCHEMA, checked_values
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.removal import Removal
+from aerotri.results.variance_components import VarianceComponents
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +66,14 @@ class SavedSolution:
     removals: str = ""
     verdict: str = ""
     reasons: tuple[str, ...] = ()
+
+    def removal_records(self) -> tuple[Removal, ...]:
+        """The parameters that the selection took out."""
+        return tuple(Removal(**removal) for removal in json.loads(self.removals or "[]"))
+
+    def component_record(self) -> VarianceComponents | None:
+        """The variance components; None where there are none."""
+        return VarianceComponents.from_dict(json.loads(self.components)) if self.components else None
 
 
 def write_solution(

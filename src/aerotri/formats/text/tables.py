@@ -34,6 +34,8 @@ NUMBER = r"^[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?$"
 """Every digit belongs to one part alone: with two ways to read it the time grows with the square of the length."""
 LARGEST_NUMBER = 1e15
 """No coordinate, angle or σ is larger in any unit; numbers beyond lose their decimals, and squares of them overflow."""
+LARGEST_FORMAT_PX = 1e7
+"""Longest side of a photograph, pixels; chosen [C]: beyond any camera, so that only damaged files are refused."""
 SMALLEST_POSITIVE = 1e-12
 """A σ or a focal length, which has to be greater than 0, is at least this in any unit, or its weight overflows."""
 CONTROL_CHARACTERS = r"[\x00-\x1f\x7f]"

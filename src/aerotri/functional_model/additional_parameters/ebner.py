@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.functional_model.additional_parameters.family import Family
 from aerotri.functional_model.additional_parameters.products import (
     AFFINITY,
     SHEAR,
@@ -18,9 +17,8 @@ from aerotri.functional_model.additional_parameters.products import (
     Pattern,
     Polynomials,
     ProductBasis,
-    evaluation,
-    pattern_text,
-    unit_of_product,
+    Wording,
+    literature_family,
 )
 
 PATTERNS: dict[str, Pattern] = {
@@ -38,7 +36,6 @@ PATTERNS: dict[str, Pattern] = {
     "12": ("y", 2, 2),
 }
 """p1 to p12 as products of polynomials [L: Ebner 1976]."""
-DESCRIPTION = {item: pattern_text(p, "2", ("", "x", "k"), ("", "y", "l")) for item, p in PATTERNS.items()}
 
 
 def polynomials(x: np.ndarray, b: float, partials: bool) -> Polynomials:
@@ -50,12 +47,10 @@ def polynomials(x: np.ndarray, b: float, partials: bool) -> Polynomials:
 
 BASIS = ProductBasis(polynomials, q=2.0)
 """q = 2 makes the tilt pairs orthogonal to the orientation on 3 × 3 points [L: Ebner 1976]."""
-FAMILY = Family(
-    name="ebner",
-    items=tuple(PATTERNS),
-    mark="L",
-    reference="Ebner, Self calibrating block adjustment, Bildmessung und Luftbildwesen 44 (1976)",
-    text=DESCRIPTION.__getitem__,
-    unit=lambda item: unit_of_product(PATTERNS[item]),
-    evaluate=evaluation(PATTERNS, lambda _: BASIS),
+FAMILY = literature_family(
+    "ebner",
+    "Ebner, Self calibrating block adjustment, Bildmessung und Luftbildwesen 44 (1976)",
+    PATTERNS,
+    BASIS,
+    Wording("2", ("", "x", "k"), ("", "y", "l")),
 )

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.functional_model.additional_parameters.family import Family
 from aerotri.functional_model.additional_parameters.products import (
     AFFINITY,
     SHEAR,
@@ -21,9 +20,8 @@ from aerotri.functional_model.additional_parameters.products import (
     Pattern,
     Polynomials,
     ProductBasis,
-    evaluation,
-    pattern_text,
-    unit_of_product,
+    Wording,
+    literature_family,
 )
 
 COMMON = ("14", "23", "32", "41", "15", "24", "33", "42", "51", "25", "34", "43", "52", "35", "44", "53", "45", "54",
@@ -44,10 +42,6 @@ PATTERNS: dict[str, Pattern] = {
     },
 }
 """The 44 parameters as products of polynomials [L: Grün 1978]."""
-DESCRIPTION = {
-    item: pattern_text(pattern, "(10/7)", ("", "x", "k", "x·p", "r"), ("", "y", "l", "y·q", "s"))
-    for item, pattern in PATTERNS.items()
-}
 
 
 def polynomials(x: np.ndarray, b: float, partials: bool) -> Polynomials:
@@ -64,12 +58,10 @@ def polynomials(x: np.ndarray, b: float, partials: bool) -> Polynomials:
 
 BASIS = ProductBasis(polynomials, q=10.0 / 7.0)
 """q = 10/7 makes the tilt pairs orthogonal to the orientation on 5 × 5 points [L: Grün 1978]."""
-FAMILY = Family(
-    name="gruen",
-    items=tuple(PATTERNS),
-    mark="L",
-    reference="Grün, Experiences with self-calibrating bundle adjustment, ACSM-ASP Convention (1978)",
-    text=DESCRIPTION.__getitem__,
-    unit=lambda item: unit_of_product(PATTERNS[item]),
-    evaluate=evaluation(PATTERNS, lambda _: BASIS),
+FAMILY = literature_family(
+    "gruen",
+    "Grün, Experiences with self-calibrating bundle adjustment, ACSM-ASP Convention (1978)",
+    PATTERNS,
+    BASIS,
+    Wording("(10/7)", ("", "x", "k", "x·p", "r"), ("", "y", "l", "y·q", "s")),
 )

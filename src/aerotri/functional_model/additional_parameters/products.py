@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.functional_model.additional_parameters.family import NO_UNIT, Evaluate, per_mm
+from aerotri.functional_model.additional_parameters.family import NO_UNIT, Evaluate, Family, per_mm
 from aerotri.functional_model.additional_parameters.terms import Terms, dense_terms
 from aerotri.observations import Camera
 
@@ -125,6 +125,37 @@ def evaluation(patterns: Mapping[str, Pattern], basis_of: Callable[[Sequence[Pat
         return product_terms(basis_of(chosen), chosen, camera, x, y, partials)
 
     return evaluate
+
+
+@dataclass(frozen=True)
+class Wording:
+    """How the texts of a set write it.
+
+    Parameters
+    ----------
+    q : the factor of the tilt pairs.
+    along_x, along_y : the polynomials of degree 0, 1, …
+    """
+
+    q: str
+    along_x: tuple[str, ...]
+    along_y: tuple[str, ...]
+
+
+def literature_family(
+    name: str, reference: str, patterns: Mapping[str, Pattern], basis: ProductBasis, wording: Wording
+) -> Family:
+    """A set of the literature: named products of polynomials in millimetres."""
+    text = {item: pattern_text(p, wording.q, wording.along_x, wording.along_y) for item, p in patterns.items()}
+    return Family(
+        name=name,
+        items=tuple(patterns),
+        mark="L",
+        reference=reference,
+        text=text.__getitem__,
+        unit=lambda item: unit_of_product(patterns[item]),
+        evaluate=evaluation(patterns, lambda _: basis),
+    )
 
 
 def unit_of_product(pattern: Pattern) -> str:

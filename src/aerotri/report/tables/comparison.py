@@ -7,14 +7,10 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import MGON_PER_RADIAN
-from aerotri.functional_model.additional_parameters import format_parameters
+from aerotri.formats.results.run_comparison import readable_setting
 from aerotri.report.tables.adjustment import Column, Table, cell_text, table
 from aerotri.statistics.comparison import Change, Comparison, Differences, ParameterChange
 
-SIGMA_NOTE = (
-    "Δ = second − first; σ is that of the second run. The runs share observations, so |Δ|/σ says how much a change "
-    "matters; it is no test."
-)
 UNITS = {"X0": "m", "Y0": "m", "Z0": "m", "omega": "mgon", "phi": "mgon", "kappa": "mgon", "X": "m", "Y": "m", "Z": "m"}
 
 
@@ -43,60 +39,13 @@ def comparison_tables(comparison: Comparison, top: int) -> list[Table]:
     return [one for one in tables if len(one)]
 
 
-def comparison_json(comparison: Comparison, top: int) -> dict[str, Any]:
-    """The comparison as plain values: what is counted in full, what is named limited to `top`.
-
-    Angles in degrees; null where a value is not known.
-    """
-    c = comparison
-    return {
-        "sigma": SIGMA_NOTE,
-        "notes": list(c.notes),
-        "outcome": [_change(change) for change in c.outcome],
-        "settings": [_change(change) for change in c.settings],
-        "control": [_change(change) for change in c.roles],
-        "rays": {
-            "counts": dict(c.rays.counts),
-            "listed": [
-                {"kind": r.kind, "image": r.image, "point": r.point, "first": r.first, "second": r.second}
-                for r in c.rays.listed
-            ],
-        },
-        "orientations": _differences_json(c.orientations, top),
-        "points": _differences_json(c.points, top),
-        "parameters": [
-            {
-                "name": p.name, "group": p.group, "kind": p.kind, "first": _number(p.first),
-                "second": _number(p.second), "delta": _number(p.delta), "sigma": _number(p.sigma),
-                "ratio": _number(p.ratio),
-            }
-            for p in c.parameters
-        ],
-        "check_points": {
-            "first_count": c.check_points.counts[0],
-            "second_count": c.check_points.counts[1],
-            "common_count": len(c.check_points.names),
-            "rms_first": dict(zip("XYZ", map(_number, c.check_points.rms[0]), strict=True)),
-            "rms_second": dict(zip("XYZ", map(_number, c.check_points.rms[1]), strict=True)),
-        },
-        "warnings": {"gone": list(c.warnings_gone), "new": list(c.warnings_new)},
-    }  # fmt: skip
-
-
 def _titled(title: str, count: int, shown: int) -> str:
     return f"{title} ({shown} of {count})" if count > shown else title
 
 
 def _changes(title: str, changes: tuple[Change, ...]) -> Table:
-    rows = [(c.name, *(_text(_readable(c.name, value)) for value in (c.first, c.second))) for c in changes]
+    rows = [(c.name, *(_text(readable_setting(c.name, value)) for value in (c.first, c.second))) for c in changes]
     return Table(title, (Column("what"), Column("first"), Column("second")), tuple(rows))
-
-
-def _readable(name: str, value: Any) -> Any:
-    """Additional parameters as the command line takes them; what else is no number or text, as Python writes it."""
-    if name.endswith("additional_parameters") and value is not None:
-        return ",".join(format_parameters(value)) or "none"
-    return value
 
 
 def _text(value: Any) -> str:
@@ -199,43 +148,3 @@ def _check_points(c: Comparison) -> Table:
 def _warnings(c: Comparison) -> Table:
     rows = [("gone", text) for text in c.warnings_gone] + [("new", text) for text in c.warnings_new]
     return Table("Warnings", (Column(""), Column("warning")), tuple(rows))
-
-
-def _change(change: Change) -> dict[str, Any]:
-    first, second = (_plain(_readable(change.name, value)) for value in (change.first, change.second))
-    return {"name": change.name, "first": first, "second": second}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return _number(value)
-    return value if isinstance(value, str | int | bool | None) else str(value)
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def _differences_json(d: Differences, top: int) -> dict[str, Any]:
-    factor = np.array([np.degrees(1.0) if UNITS[name] == "mgon" else 1.0 for name in d.elements])
-    units = ["deg" if UNITS[name] == "mgon" else "m" for name in d.elements]
-    ratio = d.ratio
-    elements = []
-    for k, name in enumerate(d.elements):
-        known = np.isfinite(ratio[:, k]).any() if len(d) else False
-        at = int(np.nanargmax(ratio[:, k])) if known else None
-        largest = np.abs(d.delta[:, k]).max(initial=0.0, where=np.isfinite(d.delta[:, k]))
-        elements.append(
-            {
-                "element": name, "unit": units[k], "rms": _number(d.rms[k] * factor[k]),
-                "max": _number(largest * factor[k]), "max_ratio": None if at is None else _number(ratio[at, k]),
-                "at": None if at is None else str(d.names[at]),
-            }
-        )  # fmt: skip
-    worst = [
-        {"name": str(d.names[row])}
-        | {name: _number(value) for name, value in zip(d.elements, d.delta[row] * factor, strict=True)}
-        | {"max_ratio": _number(np.nanmax(ratio[row]))}
-        for row in d.worst(top)
-    ]
-    return {"count": len(d), "elements": elements, "worst": worst}

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.diagnosis.parameter_sets import verdict
 from aerotri.image_errors import Change
 from aerotri.report.tables.adjustment import Column, Table
 from aerotri.results.adjusted_block import AdjustedBlock
@@ -19,8 +20,6 @@ NOTE = (
     "the sets it contains, at check points and predicted control together, ± its standard error; ΔAIC, ΔBIC: above the "
     "least"
 )
-HELPS = 1.645
-"""Standard errors beyond which a gain is taken for one (95 %, one-sided)."""
 
 
 def comparison_table(comparison: ParameterComparison) -> Table:
@@ -45,87 +44,6 @@ def comparison_table(comparison: ParameterComparison) -> Table:
         cells += [o.aic - least_aic, o.bic - least_bic, _gain_text(gain), verdict(o, gain, behind.get(o.name))]
         rows.append(tuple(cells))
     return Table("Sets of additional parameters compared", tuple(columns), tuple(rows))
-
-
-def verdict(outcome: SetOutcome, gain: Gain | None, behind: Gain | None) -> str:
-    """Whether a set earns its parameters, and whether another does better, in a few words.
-
-    Parameters
-    ----------
-    gain : on the best of the sets it contains. behind : how far it is behind the best of all.
-    """
-    if not outcome.converged:
-        return outcome.status
-    said = []
-    if gain is not None and np.isfinite(gain.value):
-        mostly = 2 * outcome.significant > outcome.count > 0
-        if gain.value > HELPS * gain.error:
-            said.append("helps")
-        else:
-            said.append(f"{'significant but useless: ' * mostly}no better than {gain.against}")
-    if behind is not None and np.isfinite(behind.value):
-        if behind.against == outcome.name:
-            said.append("the best")
-        elif behind.value < -HELPS * behind.error:
-            said.append(f"worse than {behind.against}")
-        else:
-            said.append("as good as the best")
-    return "; ".join(said) or "–"
-
-
-def comparison_json(comparison: ParameterComparison) -> dict[str, Any]:
-    """Content of compare_parameters.json; what is not known is null."""
-    found, behind = gains(comparison), standings(comparison)
-    return {
-        "block": comparison.block,
-        "folds": comparison.folds,
-        "robust": comparison.robust,
-        "check_points": list(comparison.check_points),
-        "control_points": list(comparison.control_points),
-        "sets": [_set_json(o, found.get(o.name), behind.get(o.name)) for o in comparison.outcomes],
-    }
-
-
-def _set_json(o: SetOutcome, gain: Gain | None, behind: Gain | None) -> dict[str, Any]:
-    content: dict[str, Any] = {"set": o.name, "status": o.status, "count": o.count, "significant": o.significant}
-    for key in ("effective", "sigma0", "sigma0_um", "aic", "bic"):
-        content[key] = _number(getattr(o, key))
-    for key, accuracy in (("check", o.check), ("control", o.control)):
-        content[key] = {
-            "count": dict(zip("XYZ", map(int, accuracy.count), strict=True)),
-            "rms": _axes(accuracy.rms),
-            "low": _axes(accuracy.low),
-            "high": _axes(accuracy.high),
-            "differences": [[_number(v) for v in row] for row in accuracy.difference],
-        }
-    content["collocation"] = {"sigma_um": _number(o.sigma_um), "length_mm": _number(o.length_mm)}
-    content |= {"gain": _gain_json(gain), "behind": _gain_json(behind), "verdict": verdict(o, gain, behind)}
-    return content
-
-
-def _gain_json(gain: Gain | None) -> dict[str, Any] | None:
-    if gain is None:
-        return None
-    return {"against": gain.against, "value": _number(gain.value), "standard_error": _number(gain.error)}
-
-
-def comparison_columns(comparison: ParameterComparison) -> dict[str, np.ndarray]:
-    """Columns of compare_parameters.csv."""
-    out, found, behind = comparison.outcomes, gains(comparison), standings(comparison)
-    columns: dict[str, np.ndarray] = {
-        "set": np.array([o.name for o in out], dtype=object),
-        "status": np.array([o.status for o in out], dtype=object),
-    }
-    for key in ("count", "effective", "significant", "sigma0", "sigma0_um", "aic", "bic"):
-        columns[key] = np.array([getattr(o, key) for o in out])
-    for where in ("check", "control"):
-        for kind in ("rms", "low", "high"):
-            for k, axis in enumerate("XYZ"):
-                columns[f"{where}_{kind}_{axis}"] = np.array([getattr(getattr(o, where), kind)[k] for o in out])
-    columns["gain"] = np.array([g.value if (g := found.get(o.name)) else np.nan for o in out])
-    columns["gain_against"] = np.array([g.against if (g := found.get(o.name)) else "" for o in out], dtype=object)
-    columns["verdict"] = np.array([verdict(o, found.get(o.name), behind.get(o.name)) for o in out], dtype=object)
-    return columns
 
 
 def removals_table(adjusted: AdjustedBlock) -> Table:
@@ -175,38 +93,6 @@ def changes_table(changes: Sequence[Change]) -> Table:
     return Table("Change of the image errors between groups", columns, tuple(rows))
 
 
-def changes_json(changes: Sequence[Change]) -> list[dict[str, Any]]:
-    """Content of parameter_changes.json."""
-    return [
-        {
-            "first": c.first, "second": c.second, "camera": c.field.camera.name, "rms_um": 1e3 * c.field.rms,
-            "max_um": 1e3 * c.field.max, "rms_of_sigma_um": 1e3 * c.noise_mm, "statistic": c.statistic,
-            "freedom": c.freedom, "p": c.p, "changed": c.changed, "sentence": c.sentence,
-        }
-        for c in changes
-    ]  # fmt: skip
-
-
-def changes_columns(changes: Sequence[Change]) -> dict[str, np.ndarray]:
-    """Columns of parameter_changes.csv: the difference on a grid over the format, mm, with σ."""
-    counts = [c.field.x.size for c in changes]
-    columns = {
-        "first": np.repeat(np.array([c.first for c in changes], dtype=object), counts),
-        "second": np.repeat(np.array([c.second for c in changes], dtype=object), counts),
-    }
-    for name, values in (
-        ("x", [c.field.x for c in changes]),
-        ("y", [c.field.y for c in changes]),
-        ("dx", [c.field.d[..., 0] for c in changes]),
-        ("dy", [c.field.d[..., 1] for c in changes]),
-        ("s_dx", [c.field.sigma[..., 0] for c in changes]),
-        ("s_dy", [c.field.sigma[..., 1] for c in changes]),
-        ("significant", [c.field.significant.astype(int) for c in changes]),
-    ):
-        columns[name] = np.concatenate([v.ravel() for v in values])
-    return columns
-
-
 def _digits(outcomes: list[SetOutcome]) -> int:
     """Decimals of metres that show two digits of the smallest RMS."""
     rms = np.concatenate([np.concatenate([o.check.rms, o.control.rms]) for o in outcomes] or [np.zeros(0)])
@@ -234,11 +120,3 @@ def _gain_text(gain: Gain | None) -> str:
     if gain is None or not np.isfinite(gain.value):
         return "–"
     return f"{100 * gain.value:+.0f} ± {100 * gain.error:.0f} %"
-
-
-def _axes(values: np.ndarray) -> dict[str, float | None]:
-    return {axis: _number(value) for axis, value in zip("XYZ", values, strict=True)}
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
