@@ -31,7 +31,9 @@ def simulate(
     spec: Annotated[Path, typer.Argument(help="Flight plan (TOML).")],
     out: Annotated[Path, typer.Option(help="Block folder to write; its truth/ stands inside.")],
     seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same block.")] = 1,
-    render: Annotated[bool, typer.Option("--render", help="Photographs of it too, 16 bit TIFF.")] = False,
+    render: Annotated[
+        bool, typer.Option("--render", help="Photographs too: 16 bit TIFF, or JPEG with EXIF if the plan says so.")
+    ] = False,
     only: Annotated[list[str] | None, typer.Option(help="Photograph to render; may repeat. Default: all.")] = None,
     targets: Annotated[bool, typer.Option("--targets", help="Render discs at control and check points.")] = False,
     blur_px: Annotated[float, typer.Option(min=0.0, max=20.0, help="σ of the point spread rendered, px.")] = 0.5,

@@ -53,9 +53,13 @@ def run_simulate(
 
 def _lines(counts: dict[str, Any], out: Path, rendered: int) -> list[str]:
     from aerotri.simulation.photograph_files import PHOTOGRAPHS
+    from aerotri.simulation.truth import MARKED_CONTROL
 
     lines = [
         f"{counts['images']} photographs, {counts['image_points']} image points of {counts['points']} points, "
         f"{counts['control']} control and {counts['check']} check points written to {out}"
     ]
-    return lines + ([f"{rendered} photographs rendered in {out / PHOTOGRAPHS}"] if rendered else [])
+    if not rendered:
+        return lines
+    marked = [f"control points in them: {out / MARKED_CONTROL}"] if (out / MARKED_CONTROL).is_file() else []
+    return [*lines, f"{rendered} photographs rendered in {out / PHOTOGRAPHS}", *marked]

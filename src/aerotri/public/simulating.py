@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.observations import Block
@@ -14,6 +16,8 @@ from aerotri.public.progress import ProgressLike, stage_report
 
 if TYPE_CHECKING:
     from aerotri.simulation import SimulationSpec, Truth
+    from aerotri.simulation.placing import Placement
+    from aerotri.simulation.rendering import RenderOptions, Scene
 
 MOST_BLUR_PX, MOST_NOISE = 20.0, 20_000.0
 """σ of the blur, pixels, and of the noise, grey values of 65 535, at most; chosen [C]: beyond them no texture is left,
@@ -26,8 +30,8 @@ class SimulatedBlock:
 
     Parameters
     ----------
-    block : what was measured.
-    truth : orientations, points and image errors as they are.
+    block : what was measured, in the CRS of the plan where it names one.
+    truth : orientations, points and image errors as they are, in the same system.
     plan : the flight plan. seed : of the random numbers.
     """
 
@@ -66,9 +70,10 @@ class SimulatedBlock:
         Parameters
         ----------
         out : folder; files of others stay. Photographs of an older block of this place are removed.
-        photographs : render photographs, 16 bit TIFF.
+        photographs : render photographs, as the plan says: 16 bit TIFF, or JPEG with EXIF. With them come the true
+            ground as a raster, truth/surface.tif, and in a CRS the control points measured in them, gcp_list.txt.
         only : names of the photographs to render; all where empty.
-        targets : render bright discs at control and check points.
+        targets : render bright discs at control and check points, also where the plan does not ask for them.
         blur_px : σ of the point spread, pixels.
         noise : σ of the grey values.
         overwrite : replace files that aerotri has not written, or that were changed since.
@@ -93,34 +98,66 @@ class SimulatedBlock:
         target = Path(out)
         chosen = chosen_photographs(self.block, only) if photographs else []
         with held(target), stage_report(progress) as report:
-            self._write_block(target, chosen, overwrite)
-            if photographs:
-                from aerotri.compiled import compilation_notice
-                from aerotri.simulation.photograph_files import PHOTOGRAPHS, write_photographs
-                from aerotri.simulation.rendering import RenderOptions, make_scene
+            if not photographs:
+                self._write_block(target, (), overwrite)
+                return target
+            from aerotri.compiled import compilation_notice
+            from aerotri.simulation.photograph_files import PHOTOGRAPHS, gnss_fixes, write_photographs
+            from aerotri.simulation.rendering import RenderOptions
 
-                report.stage(compilation_notice() or "rendering", None)
-                looks = RenderOptions(blur_px=blur_px, noise=noise, targets=targets)
-                scene = make_scene(self.plan, self.seed, self.block, self.truth, looks)
-                write_photographs(scene, chosen, target / PHOTOGRAPHS, lambda share: report.stage("rendering", share))
+            looks = RenderOptions(blur_px=blur_px, noise=noise, targets=targets or self.plan.photographs.targets)
+            scene, place = self._scene(looks)
+            self._write_block(target, chosen, overwrite, lambda folder: self._write_beside(folder, scene, place))
+            report.stage(compilation_notice() or "rendering", None)
+            write_photographs(
+                scene, chosen, target / PHOTOGRAPHS, lambda share: report.stage("rendering", share),
+                self.plan.photographs.format, gnss_fixes(self.block, place),
+            )  # fmt: skip
         return target
 
-    def _write_block(self, target: Path, chosen: Sequence[int], overwrite: bool) -> None:
+    def _scene(self, looks: RenderOptions) -> tuple[Scene, Placement | None]:
+        """The scene in the plane of the simulation, and where on Earth that is."""
+        from aerotri import simulation
+        from aerotri.simulation.placing import placement
+        from aerotri.simulation.rendering import make_scene
+
+        if self.plan.georeference is None:
+            return make_scene(self.plan, self.seed, self.block, self.truth, looks), None
+        block, truth = simulation.simulate(self.plan, self.seed)
+        return make_scene(self.plan, self.seed, block, truth, looks), placement(self.plan.georeference)
+
+    def _write_beside(self, folder: Path, scene: Scene, place: Placement | None) -> None:
+        """The true ground, and the control points as they are measured in the photographs."""
+        from aerotri.formats.foreign.odm import write_odm_gcp
+        from aerotri.simulation.photograph_files import file_name
+        from aerotri.simulation.true_surface import SURFACE, write_true_surface
+        from aerotri.simulation.truth import MARKED_CONTROL, TRUTH
+
+        points = self.truth.points if place is None else place.from_crs(self.truth.points)
+        write_true_surface(folder / TRUTH / SURFACE, scene.terrain, points, scene.gsd_m, place)
+        if place is not None and len(self.block.control):
+            images = self.block.images
+            files = np.array([file_name(name, self.plan.photographs.format) for name in images.names.tolist()])
+            write_odm_gcp(replace(self.block, images=replace(images, names=files)), folder / MARKED_CONTROL)
+
+    def _write_block(
+        self, target: Path, chosen: Sequence[int], overwrite: bool, further: Callable[[Path], None] | None = None
+    ) -> None:
         """The block with its truth in one step; photographs of an older one go with it."""
         from aerotri.formats.block.writer import OWN_ENTRIES
         from aerotri.simulation import write_simulated
         from aerotri.simulation.photograph_files import PHOTOGRAPHS, RECORD, file_name, rendered_before
-        from aerotri.simulation.truth import TRUTH
+        from aerotri.simulation.truth import MARKED_CONTROL, TRUTH
 
-        refuse_foreign_entries(target, (*OWN_ENTRIES, TRUTH), overwrite)
+        refuse_foreign_entries(target, (*OWN_ENTRIES, TRUTH, MARKED_CONTROL), overwrite)
         older = rendered_before(target)
         for image in chosen:
-            name = file_name(str(self.block.images.names[image]))
+            name = file_name(str(self.block.images.names[image]), self.plan.photographs.format)
             if name not in older:
                 refuse_existing_file(target / PHOTOGRAPHS / name, overwrite)
         # none of them may stand beside another block
         gone = {f"{PHOTOGRAPHS}/{name}" for name in (*older, RECORD)} if older else set()
-        write_simulated(target, self.block, self.truth, gone)
+        write_simulated(target, self.block, self.truth, gone, further)
 
     def __repr__(self) -> str:
         block = self.block
@@ -157,7 +194,12 @@ def simulate(plan: FilePath | Mapping[str, Any], seed: int = 1) -> SimulatedBloc
     from aerotri import simulation
 
     spec = simulation.parse_spec(plan) if isinstance(plan, Mapping) else simulation.read_spec(plan)
-    return SimulatedBlock(*simulation.simulate(spec, seed), spec, seed)
+    made = simulation.simulate(spec, seed)
+    if spec.georeference is not None:
+        from aerotri.simulation.placing import placed, placement
+
+        made = placed(*made, placement(spec.georeference))
+    return SimulatedBlock(*made, spec, seed)
 
 
 def example_flight() -> dict[str, Any]:

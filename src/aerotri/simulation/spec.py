@@ -266,6 +266,26 @@ class StartValueSpec(Table):
     angle_sigma_deg: NotNegative = 0.1
 
 
+class GeoreferenceSpec(Table):
+    """Where on Earth the flight takes place: coordinates of the block in the CRS, `origin` there of its (0, 0, 0).
+
+    Heights count from the ellipsoid where the CRS has no vertical part.
+    """
+
+    crs: str
+    origin: Vector
+
+
+class PhotographSpec(Table):
+    """Photographs that are rendered: TIFF of 16 bits, or JPEG of 8 bits with EXIF as a drone writes it.
+
+    `targets` draws bright discs at control and check points.
+    """
+
+    format: Literal["tiff", "jpeg"] = "tiff"
+    targets: bool = False
+
+
 class AdjustmentSpec(Table):
     """What block.toml shall say under `[adjustment]`."""
 
@@ -288,4 +308,6 @@ class SimulationSpec(Table):
     ins: InsSpec | None = None
     gross_errors: GrossErrorSpec | None = None
     start_values: StartValueSpec = StartValueSpec()
+    georeference: GeoreferenceSpec | None = None
+    photographs: PhotographSpec = PhotographSpec()
     adjustment: AdjustmentSpec = AdjustmentSpec()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,19 +57,34 @@ class Truth:
 TRUTH = "truth"
 
 
-def write_simulated(folder: FilePath, block: Block, truth: Truth, gone: Collection[str] = ()) -> None:
+MARKED_CONTROL = "gcp_list.txt"
+
+
+def write_simulated(
+    folder: FilePath,
+    block: Block,
+    truth: Truth,
+    gone: Collection[str] = (),
+    further: Callable[[Path], None] | None = None,
+) -> None:
     """Write the block's folder and, under `truth/`, what is behind it; other files stay but for `gone`.
 
     Numbers are rounded to what they can mean, so that another processor writes the same.
+
+    Parameters
+    ----------
+    further : writes into the folder what belongs to the block besides: `gcp_list.txt` and files in `truth/`.
     """
     # imported here: those who only simulate need no file formats
     from aerotri.formats.block.folder import write_block
     from aerotri.formats.block.writer import OWN_ENTRIES
 
     # in one step: a block must never stand beside the truth of another one
-    with atomic_folder(folder, own=(*OWN_ENTRIES, TRUTH), gone=gone) as place:
+    with atomic_folder(folder, own=(*OWN_ENTRIES, TRUTH, MARKED_CONTROL), gone=gone) as place:
         write_block(block, place, rounded=True)
         write_truth(place, block, truth)
+        if further is not None:
+            further(place)
 
 
 def write_truth(folder: FilePath, block: Block, truth: Truth) -> None:
