@@ -1,0 +1,52 @@
+"""The page from message to remedy quotes what the program says: every quoted text stands in the source code."""
+
+import ast
+import re
+
+import pages
+
+PAGE = pages.DOCS / "understand" / "remedies.md"
+SOURCE = pages.DOCS.parent / "src" / "aerotri"
+LEAST_SHARE, LEAST_LENGTH = 0.5, 5
+"""Share of a quoted text, and letters, that one piece of a message has to cover; the rest is filled in at run time."""
+
+
+def pieces() -> set[str]:
+    """All texts of the source code that the program could print, taken apart where something is filled in."""
+    found = set()
+    for path in SOURCE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                found.add(" ".join(node.value.split()))
+    return {piece for piece in found if len(piece) >= LEAST_LENGTH}
+
+
+def quoted() -> list[str]:
+    """The texts of the first columns between the variable parts."""
+    rows = re.findall(r"^\| (`.*?) \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    codes = [code for row in rows for code in re.findall(r"`([^`]+)`", row)]
+    parts = {part.strip(" .,()") for code in codes for part in code.split("…")}
+    return sorted(part for part in parts if len(part) >= LEAST_LENGTH)
+
+
+def is_said(text: str, there: set[str]) -> bool:
+    least = LEAST_SHARE * len(text)
+    return any(text in piece or (len(piece) >= least and piece in text) for piece in there)
+
+
+def test_the_program_says_what_the_page_quotes():
+    there, texts = pieces(), quoted()
+    assert len(texts) > 60
+    assert [text for text in texts if not is_said(text, there)] == []
+
+
+def test_a_text_that_the_program_does_not_say_is_found():
+    assert not is_said("the moon is too close to the block", pieces())
+
+
+def test_every_link_to_a_place_of_the_page_has_its_place():
+    page = PAGE.read_text(encoding="utf-8")
+    anchors = set(re.findall(r"^\((message-[a-z0-9-]+)\)=$", page, re.MULTILINE))
+    links = set(re.findall(r"\(#(message-[a-z0-9-]+)\)", page))
+    assert len(anchors) >= 15
+    assert links <= anchors
