@@ -22,7 +22,7 @@ def run(*arguments, cwd=None, env=None):
     """The command in a process of its own, as a user runs it."""
     return subprocess.run(
         [sys.executable, "-m", "aerotri.cli", *map(str, arguments)],
-        capture_output=True, text=True, cwd=cwd, env=env, timeout=300, check=False,
+        capture_output=True, text=True, cwd=cwd, env=env, timeout=1200, check=False,
     )  # fmt: skip
 
 
@@ -200,7 +200,7 @@ def test_read_only_installation_without_home(block_folder, tmp_path):
     )
     done = subprocess.run(
         [sys.executable, "-c", program, str(block_folder), str(tmp_path / "out")],
-        capture_output=True, text=True, env=environment, timeout=300, check=False,
+        capture_output=True, text=True, env=environment, timeout=1200, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "there is no writable place" in done.stderr

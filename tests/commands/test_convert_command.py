@@ -36,7 +36,7 @@ def documented(target: str) -> list[str]:
 def run(*arguments):
     return subprocess.run(
         [sys.executable, "-m", "aerotri.cli", *map(str, arguments)],
-        capture_output=True, text=True, timeout=300, check=False,
+        capture_output=True, text=True, timeout=1200, check=False,
     )  # fmt: skip
 
 

@@ -180,7 +180,7 @@ def test_command_line(erring_result, tmp_path):
     def run(*arguments):
         return subprocess.run(
             [sys.executable, "-m", "aerotri.cli", "deform", str(erring_result), *arguments],
-            capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path,
+            capture_output=True, text=True, timeout=1200, check=False, cwd=tmp_path,
         )  # fmt: skip
 
     done = run("--pair", *PAIR, "--spacing", "50", "--no-plots")

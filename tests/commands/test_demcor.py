@@ -233,7 +233,7 @@ def test_command_line(erring_result, erring, tmp_path):
     def run(*arguments):
         return subprocess.run(
             [sys.executable, "-m", "aerotri.cli", "demcor", str(erring_result), "dem.tif", *arguments],
-            capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path,
+            capture_output=True, text=True, timeout=1200, check=False, cwd=tmp_path,
         )  # fmt: skip
 
     done = run("--pair", *PAIR, "--out", "out.tif")

@@ -237,7 +237,7 @@ def test_command_line(result, tmp_path):
     def run(*arguments):
         return subprocess.run(
             [sys.executable, "-m", "aerotri.cli", "imgeo", *map(str, arguments)],
-            capture_output=True, text=True, timeout=300, check=False,
+            capture_output=True, text=True, timeout=1200, check=False,
         )  # fmt: skip
 
     source = photograph(tmp_path / "1_003.tif", (300, 375))

@@ -14,7 +14,7 @@ from small_blocks import small_block
 def run(*arguments, cwd=None):
     return subprocess.run(
         [sys.executable, "-m", "aerotri.cli", *map(str, arguments)],
-        capture_output=True, text=True, cwd=cwd, timeout=300, check=False,
+        capture_output=True, text=True, cwd=cwd, timeout=1200, check=False,
     )  # fmt: skip
 
 

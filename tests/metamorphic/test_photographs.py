@@ -2,7 +2,7 @@
 
 Features are found in every photograph by itself, and random samples are drawn with a stated seed in an order of what
 the photographs show. So the tie points are the same, ray by ray and to the last digit, whatever files are called; and
-what is adjusted from them is the same to 1e-9 σ. Strips are read off the order of the files' names and are compared
+what is adjusted from them is the same to 1e-9 σ by least squares. Strips are read off the order of the files' names and are compared
 where that order stays, or is turned round.
 """
 
@@ -33,6 +33,9 @@ from small_blocks import with_adjustment
 
 ALL = 1e-9
 """σ, by which results may differ."""
+ROBUST = 1e-7
+"""σ, of a robust adjustment: it ends where a step changes nothing by more than 0.01 σ, and of that step the seventh digit
+hangs on the processor (6e-9 σ seen)."""
 TURNED = 1e-5
 """σ, of a robust adjustment in a frame with other axes: damped steps are damped by axis, so that it goes another way,
 and it ends where a step changes nothing by more than 0.01 σ."""
@@ -134,8 +137,10 @@ def test_tiepoints(flown, before, tmp_path, case):
     make, frame = CASES[case]
     lists = replace(make(flown), frame=frame.points)
     out = tied(flown, tmp_path, lists, None if lists.names else before[0])
-    result = adjust(read_block(out))
-    assert_same(before[1], result, lists, frame, ALL)
+    block = read_block(out)
+    one, other = (adjust(with_adjustment(given, robust="off")) for given in (read_block(before[0]), block))
+    assert_same(one, other, lists, frame, ALL)
+    assert_same(before[1], adjust(block), lists, frame, ROBUST)
     told, again = (json.loads((folder / "tiepoints.json").read_text()) for folder in (before[0], out))
     for key in ("photographs", "pairs", "tie_points", "rays", "points_per_photograph", "control", "check", "left_out"):
         assert again[key] == told[key], key
@@ -208,7 +213,7 @@ def adjusted(folder):
 
 def test_run_adjusts_the_same(runs):
     (one, _), (other, lists) = runs.values()
-    assert_same(adjusted(one), adjusted(other), lists, Similarity(np.eye(3), SHIFT), ALL)
+    assert_same(adjusted(one), adjusted(other), lists, Similarity(np.eye(3), SHIFT), ROBUST)
     verdicts = [json.loads((folder / "result" / "adjustment.json").read_text())["verdict"] for folder in (one, other)]
     assert verdicts[0] == verdicts[1] != "rejected"
 
@@ -230,7 +235,7 @@ def test_run_measures_the_same_terrain(runs):
     good = a.status[i] == "accepted"
     assert good.sum() > 100
     sigma = a.sigma[i][good]
-    assert np.abs((b.xyz[j][good] - SHIFT - a.xyz[i][good]) / sigma).max() < ALL
+    assert np.abs((b.xyz[j][good] - SHIFT - a.xyz[i][good]) / sigma).max() < ROBUST
     surfaces = []
     for folder in (one, other):
         with RasterReader(folder / "dtm" / "dsm.tif") as reader:

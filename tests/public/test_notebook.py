@@ -28,7 +28,7 @@ def shown(tmp_path_factory):
     notebook = nbformat.read(HERE / "first_steps.ipynb", as_version=4)
     nbformat.validate(notebook)
     resources = {"metadata": {"path": str(folder)}}
-    client = nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3", resources=resources)
+    client = nbclient.NotebookClient(notebook, timeout=900, kernel_name="python3", resources=resources)
     client.execute()
     cells = {cell.metadata["tags"][0]: cell.outputs for cell in notebook.cells if cell.cell_type == "code"}
     return cells, folder
