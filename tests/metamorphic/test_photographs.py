@@ -2,8 +2,8 @@
 
 Features are found in every photograph by itself, and random samples are drawn with a stated seed in an order of what
 the photographs show. So the tie points are the same, ray by ray and to the last digit, whatever files are called; and
-what is adjusted from them is the same to 1e-9 σ by least squares. Strips are read off the order of the files' names and are compared
-where that order stays, or is turned round.
+what is adjusted from them is the same to 1e-9 σ by least squares. Strips are read off the order of the files' names and
+are compared where that order stays, or is turned round.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from small_blocks import with_adjustment
 ALL = 1e-9
 """σ, by which results may differ."""
 ROBUST = 1e-7
-"""σ, of a robust adjustment: it ends where a step changes nothing by more than 0.01 σ, and of that step the seventh digit
-hangs on the processor (6e-9 σ seen)."""
+"""σ, of a robust adjustment: it ends where a step changes nothing by more than 0.01 σ, and of that step the seventh
+digit hangs on the processor (6e-9 σ seen)."""
 TURNED = 1e-5
 """σ, of a robust adjustment in a frame with other axes: damped steps are damped by axis, so that it goes another way,
 and it ends where a step changes nothing by more than 0.01 σ."""
