@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from aerotri.public.adjustment import Adjustment as Adjustment
     from aerotri.public.adjustment import adjust as adjust
     from aerotri.public.adjustment import open_result as open_result
+    from aerotri.public.block_check import check as check
     from aerotri.public.blocks import read as read
     from aerotri.public.blocks import read_block as read_block
     from aerotri.public.changes import changes as changes
@@ -54,6 +55,7 @@ _PLACES = {
     "Surface": "aerotri.public.surfaces",
     "Table": "aerotri.public.table",
     "changes": "aerotri.public.changes",
+    "check": "aerotri.public.block_check",
     "compare": "aerotri.public.surface_comparison",
     "compare_parameters": "aerotri.public.comparing",
     "correct_dem": "aerotri.public.dem",
@@ -88,6 +90,7 @@ __all__ = [
     "__version__",
     "adjust",
     "changes",
+    "check",
     "compare",
     "compare_parameters",
     "convert",

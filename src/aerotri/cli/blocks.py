@@ -10,9 +10,11 @@ import typer
 from aerotri.cli.app import app
 from aerotri.cli.options import (
     AnglesSigma,
+    BlockFolder,
     CheckPoints,
     ControlPrefix,
     ControlSigma,
+    GeoidGrid,
     GeoidOfSystem,
     Json,
     MarkedControl,
@@ -213,6 +215,19 @@ def _stated_sigmas(control: str, positions: str, orientation: str, angles: str) 
         "orientation_sigma_m": three_values(orientation, "--orientation-sigma-m"),
         "orientation_sigma_deg": three_values(angles, "--orientation-sigma-deg"),
     }
+
+
+@app.command(epilog="Example: aerotri check blocks/frederiksstad_ultracam")
+def check(
+    block: BlockFolder,
+    control_prefix: ControlPrefix = "",
+    geoid: GeoidGrid = None,
+    json_: Json = False,
+) -> None:
+    """Read a block without adjusting it: what it holds, what looks wrong, what an adjustment lacks."""
+    from aerotri.commands.check import run_check
+
+    raise typer.Exit(run_check(block, control_prefix, geoid, json_))
 
 
 @app.command(epilog="Example: aerotri crosscheck blocks/frederiksstad_ultracam --out check")

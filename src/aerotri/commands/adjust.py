@@ -30,12 +30,13 @@ def run_adjust(
     """Exit code of the command: 0 when converged and not rejected, 1 otherwise; arguments as on the command line."""
     console = Console(quiet=as_json)
     begun = time.perf_counter()
+    from aerotri.formats.block.unread import unread_in_words
     from aerotri.public.adjusting import read_in_metres, with_read_time
     from aerotri.public.checking import free_check, refuse_free_datum
 
     block, note = read_in_metres(path, control_prefix, geoid)
-    if note:
-        console.note(note)
+    for text in (*((note,) if note else ()), *unread_in_words(path)):
+        console.note(text)
     if check_free:
         refuse_free_datum(block)
     read_s = time.perf_counter() - begun

@@ -27,6 +27,8 @@ LOOK_ALIKE = str.maketrans(
 AS_DIGITS = str.maketrans("oil|", "0111")
 SIGNS = re.compile(r"[\s_\-./\\:#()\[\]'\"]+")
 ZEROS = re.compile(r"(?<!\d)0+(?=\d)")
+BETWEEN = re.compile(r"(?<=[^\W\d_])(?=\d)|(?<=\d)(?=[^\W\d_])")
+"""Where letters end and a number begins, and the reverse."""
 SHOWN, SHOWN_NEAR, MOST_COMPARED, MANY = 5, 2, 200, 50_000
 """Names a message shows, near names behind each, names compared with the known ones, and known names from which only
 those with the same core are compared [C]: a message stays one line, and the search of large tables short."""
@@ -57,6 +59,19 @@ def near_names(names: Iterable[str], known: Iterable[str]) -> dict[str, tuple[st
         longer = [] if same else [other for key, other in plain if _with_affix(_keys(name)[0], key)]
         found[name] = tuple(dict.fromkeys(same or sorted(longer, key=len)))
     return found
+
+
+def alike(names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Groups of names that differ only in upper and lower case, signs, leading zeros, look-alike letters or ending.
+
+    Unlike for near names a sign still parts numbers: 1_11 and 11_1 are two names. Of more than `MANY` none are found.
+    """
+    groups: dict[str, list[str]] = {}
+    for name in dict.fromkeys(names) if len(names) <= MANY else ():
+        plain = unicodedata.normalize("NFKC", ENDING.sub("", name)).translate(LOOK_ALIKE).casefold()
+        parted = BETWEEN.sub("_", SIGNS.sub("_", plain)).strip("_")
+        groups.setdefault(ZEROS.sub("", parted), []).append(name)
+    return [tuple(group) for group in groups.values() if len(group) > 1]
 
 
 def _worth_comparing(names: list[str], known: list[str]) -> list[str]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import FilePath
+from aerotri.formats.block.unread import unread_in_words
 from aerotri.public.adjustment import Adjustment, adjust
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import StageReport
@@ -83,4 +84,4 @@ def adjust_folder(
     refuse_foreign_folder(out, RECORD)
     found = with_read_time(adjust(block, geoid=geoid, progress=progress, **settings), seconds)
     write_adjustment(found.record, out, plots, StageReport(progress))
-    return replace(found, notes=(note,)) if note else found
+    return replace(found, notes=(*((note,) if note else ()), *unread_in_words(folder)))

@@ -277,6 +277,8 @@ def adjust(
     ['brown.K1', 'brown.K2']
     """
     from aerotri.coordinates.metric import in_metres
+    from aerotri.formats.block.unread import unread_in_words
+    from aerotri.observations import Block
     from aerotri.pipeline import adjust_and_explain, adjust_keeping_system
     from aerotri.public.blocks import as_block
 
@@ -291,12 +293,13 @@ def adjust(
             "max_iterations": max_iterations,
         },
     )
+    unread = () if isinstance(block, Block) else unread_in_words(Path(block))
     with stage_report(progress) as report:
         if points is not None:
-            return Adjustment(adjust_keeping_system(chosen, report.iteration, points, geoid))
+            return Adjustment(adjust_keeping_system(chosen, report.iteration, points, geoid), unread)
         metric, note = in_metres(chosen, geoid)
         found = adjust_and_explain(metric, report.iteration, geoid, lambda text: report.stage(text, None))
-        return Adjustment(found, (note,) if note else ())
+        return Adjustment(found, (*((note,) if note else ()), *unread))
 
 
 def with_settings(block: Block, given: Mapping[str, object]) -> Block:

@@ -1,12 +1,13 @@
 """A block folder: block.toml and tables, read into a `Block` and checked to the last cell.
 
-The format stands in the reference of the documentation. Two keys of this program's own: ``[adjustment] datum_fixed = ["IMAGE:X0", …]`` names
-the orientation elements held by datum = "fixed"; ``[camera.<name>.lens]`` holds the forward lens parameters k1 k2 p1
-p2 k3 as `[camera.<name>.brown]` holds Brown's. Of scanned film see `scanned_film`.
+The format stands in the reference of the documentation. Two keys of this program's own: ``[adjustment] datum_fixed =
+["IMAGE:X0", …]`` names the orientation elements held by datum = "fixed"; ``[camera.<name>.lens]`` holds the forward
+lens parameters k1 k2 p1 p2 k3 as `[camera.<name>.brown]` holds Brown's. Of scanned film see `scanned_film`.
 """
 
 from __future__ import annotations
 
+import difflib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["read_block", "write_block"]
 
+NEAR = 0.7
+"""Likeness of a file's name from which it seems to be the table that is missing."""
 IMAGE_COLUMNS = Columns(
     text=("image", "camera"),
     optional_text=("strip",),
@@ -52,7 +55,7 @@ def read_block(path: FilePath, rays_needed: bool = True) -> Block:
     InputError
         With file, line, what is wrong and the remedy, for anything the format does not allow.
     """
-    toml = _settings_file(Path(path))
+    toml = settings_file(Path(path))
     folder = toml.parent
     # pydantic is imported by the settings model only when a block is read
     from aerotri.formats.block.settings import read_block_toml
@@ -90,7 +93,14 @@ def read_block(path: FilePath, rays_needed: bool = True) -> Block:
     return block
 
 
-def _settings_file(path: Path) -> Path:
+def settings_file(path: Path) -> Path:
+    """The block.toml of a folder, or itself.
+
+    Raises
+    ------
+    InputError
+        When there is none.
+    """
     if path.is_dir():
         path = path / "block.toml"
     if not path.exists():
@@ -108,7 +118,10 @@ def _required_table(folder: Path, name: str) -> Path:
     path = _table_file(folder, name)
     if path is None:
         place = folder / f"{name}.csv"
-        raise InputError("is missing", f"a block needs a table {place.name} beside its block.toml", place)
+        near = difflib.get_close_matches(place.name, [one.name for one in folder.iterdir() if one.is_file()], 1, NEAR)
+        remedy = f"there is {near[0]}: rename it" if near else (
+            f"a block needs a table {place.name} beside its block.toml; `aerotri init` writes empty ones")  # fmt: skip
+        raise InputError("is missing", remedy, place)
     return path
 
 

@@ -1,0 +1,58 @@
+"""Whether a block can be adjusted: start values and one step, without a result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from aerotri.adjustment.datum import FREEDOMS, nothing_holds
+from aerotri.adjustment.prepare import prepare
+from aerotri.adjustment.solve import SolveOptions
+from aerotri.adjustment.weak_geometry import minimise_tied
+from aerotri.conventions import FilePath, InputError
+from aerotri.coordinates.blocks import frame_of_block, transform_block
+from aerotri.diagnosis.doubts import defects_in_words
+from aerotri.functional_model.additional_parameters import AUTO
+from aerotri.observations import Block
+from aerotri.statistics.summarise import count_observations
+
+
+@dataclass(frozen=True)
+class Rehearsal:
+    """missing : why the block cannot be adjusted, () where it can. warnings : what the adjustment would say."""
+
+    missing: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+
+
+def rehearse(block: Block, geoid: FilePath | None = None) -> Rehearsal:
+    """Prepare the adjustment of a block, and make one step of it to see whether the observations determine it.
+
+    Additional parameters that are yet to be chosen are left out.
+
+    Parameters
+    ----------
+    geoid : grid of geoid undulations for a CRS that has none of its own.
+    """
+    adjustment = block.settings.adjustment
+    if adjustment.additional_parameters == AUTO:
+        adjustment = replace(adjustment, additional_parameters=())
+        block = replace(block, settings=replace(block.settings, adjustment=adjustment))
+    if not len(block.image_points):
+        return Rehearsal(
+            ("there are no image points: measure tie points, or give the photographs to aerotri tiepoints",)
+        )
+    try:
+        local = block if block.crs == "local" else transform_block(block, frame_of_block(block, geoid))
+        prepared = prepare(local)
+    except InputError as error:
+        return Rehearsal((str(error),))
+    system = prepared.system
+    if nothing_holds(system.unknowns, system.extras):
+        free = f"the datum is free in {', '.join(FREEDOMS)}"
+        return Rehearsal((defects_in_words(system, [free]),), prepared.warnings)
+    # one step: the rank is looked at before it
+    looked, solution = minimise_tied(
+        prepared, SolveOptions(1, "off", None), lambda one: count_observations(one).redundancy, whole=False
+    )
+    missing = (defects_in_words(looked.system, solution.defects),) if solution.defects else ()
+    return Rehearsal(missing, looked.warnings)
