@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from aerotri.public.converting import convert as convert
     from aerotri.public.covariance import Covariance as Covariance
     from aerotri.public.dem import correct_dem as correct_dem
+    from aerotri.public.editing import edit as edit
     from aerotri.public.ideal import ideal_photographs as ideal_photographs
+    from aerotri.public.image_errors import ImageErrors as ImageErrors
     from aerotri.public.models import deform as deform
     from aerotri.public.running import run as run
     from aerotri.public.simulating import example_flight as example_flight
@@ -51,6 +53,7 @@ _PLACES = {
     "AdjustmentFailedError": "aerotri.pipeline",
     "Block": "aerotri.observations",
     "Covariance": "aerotri.public.covariance",
+    "ImageErrors": "aerotri.public.image_errors",
     "InputError": "aerotri.conventions",
     "Surface": "aerotri.public.surfaces",
     "Table": "aerotri.public.table",
@@ -61,6 +64,7 @@ _PLACES = {
     "correct_dem": "aerotri.public.dem",
     "crosscheck": "aerotri.public.comparing",
     "deform": "aerotri.public.models",
+    "edit": "aerotri.public.editing",
     "adjust": "aerotri.public.adjustment",
     "convert": "aerotri.public.converting",
     "example_flight": "aerotri.public.simulating",
@@ -84,6 +88,7 @@ __all__ = [
     "AdjustmentFailedError",
     "Block",
     "Covariance",
+    "ImageErrors",
     "InputError",
     "Surface",
     "Table",
@@ -97,6 +102,7 @@ __all__ = [
     "correct_dem",
     "crosscheck",
     "deform",
+    "edit",
     "example_flight",
     "ideal_photographs",
     "open_result",

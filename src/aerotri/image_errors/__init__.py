@@ -4,7 +4,9 @@ from aerotri.image_errors.averaged_residuals import AveragedResiduals, averaged_
 from aerotri.image_errors.change import Change, change, group_changes
 from aerotri.image_errors.field import (
     ErrorField,
+    field_between,
     field_difference,
+    field_of,
     field_on_grid,
     field_without_orientation,
     largest_effects,
@@ -19,7 +21,9 @@ __all__ = [
     "ImageGroup",
     "averaged_residuals",
     "change",
+    "field_between",
     "field_difference",
+    "field_of",
     "field_on_grid",
     "field_without_orientation",
     "group_changes",

@@ -5,6 +5,7 @@ measured = ideal + d, evaluated at the measured position. σ̂0² is in Q_pp, so
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,6 +131,40 @@ def field_difference(
     jacobian[:, :, column[len(rows_one) :]] -= jacobian_two
     errors = d_one - d_two, jacobian, rows
     return _field(adjusted, one.camera, f"{first} − {second}", (x, y), errors)
+
+
+def field_of(
+    camera: Camera, group: str, d: Callable[[np.ndarray, np.ndarray], np.ndarray], nx: int | None = None,
+    without_orientation: bool = False,
+) -> ErrorField:  # fmt: skip
+    """A field that is known without error, on a grid.
+
+    Parameters
+    ----------
+    d : (n,) x and (n,) y in mm → (n, 2) mm. nx, without_orientation : as of `field_on_grid` and
+        `field_without_orientation`.
+    """
+    x, y = grid_nodes(camera, nx)
+    errors = d(x.ravel(), y.ravel())
+    if without_orientation:
+        errors = _without_orientation(camera, x.ravel(), y.ravel(), errors, np.zeros((len(errors), 2, 0)))[0]
+    grid = (*x.shape, 2)
+    known = np.ones(x.shape, dtype=bool)
+    return ErrorField(camera, group, x, y, errors.reshape(grid), np.zeros(grid), known, without_orientation)
+
+
+def field_between(first: ErrorField, second: ErrorField) -> ErrorField:
+    """First field less second on the same grid, the two taken as independent of each other.
+
+    Significant where (d_x/σ_x)² + (d_y/σ_y)² exceeds the 95 % quantile of χ² with two degrees of freedom: the fields do
+    not keep how d_x and d_y of a node are correlated. Where σ is 0 any difference but 0 counts.
+    """
+    d, sigma = first.d - second.d, np.hypot(first.sigma, second.sigma)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        statistic = np.nan_to_num((d / sigma) ** 2, posinf=np.inf).sum(axis=-1)
+    name = f"{first.group} − {second.group}"
+    freed = first.without_orientation and second.without_orientation
+    return ErrorField(first.camera, name, first.x, first.y, d, sigma, statistic > CHI2_LIMIT, freed)
 
 
 def largest_effects(adjusted: AdjustedBlock) -> np.ndarray:

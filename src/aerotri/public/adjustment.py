@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from aerotri.observations import Block
     from aerotri.public.covariance import Covariance
+    from aerotri.public.image_errors import ImageErrors
     from aerotri.public.plots import AdjustmentPlots
     from aerotri.public.table import Table
     from aerotri.results.adjusted_block import AdjustedBlock
@@ -145,6 +146,59 @@ class Adjustment:
         from aerotri.public.tables import groups_table
 
         return groups_table(self.adjusted)
+
+    @cached_property
+    def findings(self) -> Table:
+        """What the verdict rests on: each number beside what it should be."""
+        from aerotri.public.findings import findings_table
+
+        return findings_table(self.record.local)
+
+    @cached_property
+    def work_list(self) -> Table:
+        """What to look at first, the worst on top: what, where, how far beyond its limit, what to do."""
+        from aerotri.public.findings import work_table
+
+        return work_table(self.record.local)
+
+    @cached_property
+    def blunders(self) -> Table:
+        """Image points that a robust estimator or data snooping took for gross errors, and how large they are; µm."""
+        from aerotri.public.findings import blunders_table
+
+        return blunders_table(self.adjusted)
+
+    @cached_property
+    def group_changes(self) -> Table:
+        """Image errors of parameter groups (days, strips, cameras) against each other, with the test of 'no change'."""
+        from aerotri.public.findings import changes_table
+
+        return changes_table(self.adjusted)
+
+    def image_errors(
+        self,
+        group: str | None = None,
+        camera: str | None = None,
+        without_orientation: bool = False,
+        nodes: int | None = None,
+    ) -> ImageErrors:
+        """The systematic image errors, measured − ideal, on a grid over the format, with σ.
+
+        Parameters
+        ----------
+        group : parameter group (a camera, a day); the first where None. camera : where a group has several.
+        without_orientation : leave out shifts, scale, rotation and tilts, which the orientation of the photographs can
+            take as well; so that different sets of parameters, or result and truth, can be compared.
+        nodes : along x; 25 on the longer side of the format where None.
+
+        Raises
+        ------
+        InputError
+            For a group that the block does not have.
+        """
+        from aerotri.public.image_errors import errors_of_result
+
+        return errors_of_result(self.adjusted, group, camera, without_orientation, nodes)
 
     @property
     def plot(self) -> AdjustmentPlots:

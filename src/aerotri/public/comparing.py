@@ -47,7 +47,7 @@ class ComparedParameters:
     @property
     def table(self) -> Table:
         """A row a set: the columns of compare_parameters.csv."""
-        from aerotri.report.tables.parameters import comparison_columns
+        from aerotri.formats.results.parameter_sets import comparison_columns
 
         columns = {name: pa.array(np.asarray(values).tolist()) for name, values in
                    comparison_columns(self.record).items()}  # fmt: skip

@@ -113,6 +113,46 @@ class AdjustmentPlots:
             raise InputError("the external reliability was not computed for this block", "")
         return plot_reliability(self.adjusted)
 
+    def height_accuracy(self) -> Figure:
+        """σ of heights as a map over the block, with control and check points.
+
+        Raises
+        ------
+        InputError
+            When no object point has a σ.
+        """
+        from aerotri.conventions import InputError
+        from aerotri.report.plots.accuracy import heights_with_sigma, plot_height_accuracy
+
+        if not heights_with_sigma(self.adjusted).any():
+            raise InputError("no object point has a σ", "adjust the block until it converges")
+        return plot_height_accuracy(self.adjusted)
+
+    def group_change(self, first: str | None = None, second: str | None = None) -> Figure:
+        """Image errors of two parameter groups (days, strips, cameras) and their difference, on one scale.
+
+        Parameters
+        ----------
+        first, second : names of the groups; the first two that can be compared where None.
+
+        Raises
+        ------
+        InputError
+            When the two groups were not compared.
+        """
+        from aerotri.conventions import InputError
+        from aerotri.image_errors import group_changes
+        from aerotri.report.plots.overview import plot_change
+
+        found = [
+            change for change in group_changes(self.adjusted)
+            if first in (None, change.first) and second in (None, change.second)
+        ]  # fmt: skip
+        if not found:
+            remedy = "adjust with additional parameters and parameter_groups; group_changes lists what was compared"
+            raise InputError("these groups were not compared", remedy)
+        return plot_change(self.adjusted, found[0])
+
     def all(self) -> dict[str, Figure]:
         """Every plot of the report by the name of its file."""
         from aerotri.report.plots.overview import all_plots
@@ -121,7 +161,7 @@ class AdjustmentPlots:
 
     def _group(self, group: str | None, camera: str | None) -> tuple[str, None, str | None]:
         """Name of the group, nodes of its grid (as the format has it), camera."""
-        from aerotri.image_errors import image_groups
+        from aerotri.public.image_errors import chosen_group
 
-        first = image_groups(self.adjusted.block)[0]
-        return (first.name, None, first.camera.name) if group is None else (group, None, camera)
+        found = chosen_group(self.adjusted.block, group, camera)
+        return found.name, None, found.camera.name

@@ -15,6 +15,12 @@ from aerotri.public.folders import refuse_existing_file, refuse_foreign_entries
 from aerotri.public.progress import ProgressLike, stage_report
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from aerotri.public.image_errors import ImageErrors
+    from aerotri.public.surfaces import Surface
+    from aerotri.public.table import Table
+    from aerotri.public.truth import TrueBlock
     from aerotri.simulation import SimulationSpec, Truth
     from aerotri.simulation.placing import Placement
     from aerotri.simulation.rendering import RenderOptions, Scene
@@ -52,6 +58,64 @@ class SimulatedBlock:
             "control": int((~is_check).sum()),
             "check": int(is_check.sum()),
         }
+
+    @property
+    def true_images(self) -> Table:
+        """Where the photographs were really taken; m and degrees."""
+        return self._true.images()
+
+    @property
+    def true_points(self) -> Table:
+        """Where the object points really are, in the order of the block; m."""
+        return self._true.points()
+
+    @property
+    def gross_errors(self) -> Table:
+        """Image points that were made wrong, and by how much; µm."""
+        return self._true.gross_errors()
+
+    def true_image_errors(
+        self, camera: str | None = None, day: str = "", without_orientation: bool = False, nodes: int | None = None
+    ) -> ImageErrors:
+        """What the camera really does wrong, measured − ideal, on a grid over its format.
+
+        Parameters
+        ----------
+        camera : name; the first where None.
+        day : of a flight of several days, '1', '2' …; the first where ''.
+        without_orientation, nodes : as of `Adjustment.image_errors`.
+
+        Raises
+        ------
+        InputError
+            For a camera or a day that the flight does not have.
+        """
+        return self._true.image_errors(camera, day, without_orientation, nodes)
+
+    def true_heights(self, xy: np.ndarray) -> np.ndarray:
+        """(n,) m, true heights of the ground, or of the roof over it, at places (n, 2) m."""
+        return self._true.heights(xy)
+
+    def true_surface(self, cell: float, area: tuple[float, float, float, float] | None = None) -> Surface:
+        """The true ground with its houses as a surface.
+
+        Parameters
+        ----------
+        cell : m.
+        area : m, X and Y of the lower left, then of the upper right corner; as far as object points reach where None.
+
+        Raises
+        ------
+        InputError
+            For a cell or an area without size, or too many cells.
+        """
+        return self._true.surface(cell, area)
+
+    @property
+    def _true(self) -> TrueBlock:
+        from aerotri.public.truth import TrueBlock
+
+        return TrueBlock(self.block, self.truth, self.plan, self.seed)
 
     def save(
         self,

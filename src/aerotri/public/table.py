@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from types import ModuleType
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 SHOWN_ROWS = 10
 """Rows that a notebook shows; chosen [C]: as many as pandas shows of a long table."""
+DECIMALS = {"m": 4, "mm": 4, "µm": 2, "°": 5, "mgon": 2}
+"""Decimals that a notebook shows by unit; chosen [C]: a tenth of a millimetre on the ground, a tenth of a micrometre in
+the image. Other numbers have four digits. The values themselves are not rounded."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,9 +70,86 @@ class Table:
         InputError
             For a column that the table does not have.
         """
+        self._refuse_unknown(column)
+        return self.arrow.column(column).to_numpy()
+
+    @classmethod
+    def of(cls, name: str, columns: Mapping[str, Any], units: Mapping[str, str] | None = None) -> Table:
+        """A table of one's own.
+
+        Parameters
+        ----------
+        name : what the rows are. columns : sequences or arrays of equal length by name. units : by column name.
+
+        Returns
+        -------
+        Table
+
+        Raises
+        ------
+        InputError
+            When the columns have different lengths.
+
+        Examples
+        --------
+        >>> Table.of("layouts", {"layout": ["corners", "dense"], "sigma": [0.08, 0.02]}, {"sigma": "m"})
+        <aerotri.Table 'layouts': 2 rows of layout, sigma>
+        """
+        import pyarrow as pa
+
+        lists = {key: np.asarray(values).tolist() for key, values in columns.items()}
+        lengths = {key: len(values) for key, values in lists.items()}
+        if len(set(lengths.values())) > 1:
+            said = ", ".join(f"{key} {count}" for key, count in lengths.items())
+            raise InputError(f"columns of '{name}' have different lengths: {said}", "give a value for every row")
+        return cls(name, pa.table({key: pa.array(values, from_pandas=True) for key, values in lists.items()}),
+                   dict(units or {}))  # fmt: skip
+
+    def select(self, *columns: str) -> Table:
+        """The table with these columns only, in this order.
+
+        Raises
+        ------
+        InputError
+            For a column that the table does not have.
+        """
+        for column in columns:
+            self._refuse_unknown(column)
+        return self._with(self.arrow.select(list(columns)))
+
+    def where(self, keep: np.ndarray | Sequence[bool]) -> Table:
+        """The rows for which `keep` is true.
+
+        Parameters
+        ----------
+        keep : (rows,) bool.
+
+        Examples
+        --------
+        >>> table = Table.of("points", {"point": ["a", "b"], "rays": [2, 5]})
+        >>> table.where(table["rays"] > 2)["point"].tolist()
+        ['b']
+        """
+        return self._with(self.arrow.take(np.flatnonzero(np.asarray(keep, dtype=bool))))
+
+    def sorted(self, column: str, descending: bool = False) -> Table:
+        """The rows in the order of a column.
+
+        Raises
+        ------
+        InputError
+            For a column that the table does not have.
+        """
+        self._refuse_unknown(column)
+        return self._with(self.arrow.sort_by([(column, "descending" if descending else "ascending")]))
+
+    def _with(self, arrow: pyarrow.Table) -> Table:
+        kept = self.geometry is not None and set(self.geometry) <= set(arrow.column_names)
+        return Table(self.name, arrow, self.units, self.geometry if kept else None, self.crs)
+
+    def _refuse_unknown(self, column: str) -> None:
         if column not in self.arrow.column_names:
             raise InputError(f"the table '{self.name}' has no column '{column}'", f"it has {', '.join(self.columns)}")
-        return self.arrow.column(column).to_numpy()
 
     def row(self, name: str) -> dict[str, Any]:
         """The row of a name in the first column, as a dictionary.
@@ -124,12 +204,13 @@ class Table:
         """The first rows, as a notebook shows them."""
         shown = self.arrow.slice(0, SHOWN_ROWS)
         units = [self.units.get(column, "") for column in self.columns]
+        columns = list(zip(self.columns, units, strict=True))
         head = "".join(
             f"<th>{escape(column)}{f' [{escape(unit)}]' if unit else ''}</th>"
-            for column, unit in zip(self.columns, units, strict=True)
+            for column, unit in columns
         )
         rows = "".join(
-            "<tr>" + "".join(f"<td>{escape(_cell(value))}</td>" for value in row.values()) + "</tr>"
+            "<tr>" + "".join(f"<td>{escape(_cell(row[column], unit))}</td>" for column, unit in columns) + "</tr>"
             for row in shown.to_pylist()
         )
         more = len(self) - shown.num_rows
@@ -137,9 +218,16 @@ class Table:
         return f"<table><caption>{caption}</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
 
 
-def _cell(value: Any) -> str:
+def _cell(value: Any, unit: str) -> str:
+    """A value as a reader wants it: lengths and angles with the decimals that mean something, others with four digits
+    and more where they are large.
+    """
     if value is None or (isinstance(value, float) and np.isnan(value)):
         return "–"
-    return f"{value:.6g}" if isinstance(value, float) and abs(value) < 1e5 else (
-        f"{value:.3f}" if isinstance(value, float) else str(value)
-    )  # fmt: skip
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if not isinstance(value, float) or not np.isfinite(value):
+        return str(value)
+    if unit in DECIMALS:
+        return f"{value:.{DECIMALS[unit]}f}"
+    return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.1f}"

@@ -19,6 +19,7 @@ __all__ = [
     "all_plots",
     "plot_averaged_residuals",
     "plot_block_plan",
+    "plot_change",
     "plot_correlations",
     "plot_ground_points",
     "plot_rays_per_point",
@@ -54,7 +55,7 @@ def all_plots(adjusted: AdjustedBlock, changes: Sequence[Change] = ()) -> dict[s
         averaged = averaged_residuals(adjusted, group.name, camera=group.camera.name)
         figures[f"averaged_residuals{suffix}"] = plot_averaged_residuals(averaged, name)
     for number, change in enumerate(changes, start=1):
-        figures["change" if number == 1 else f"change_{number}"] = _plot_change(adjusted, change)
+        figures["change" if number == 1 else f"change_{number}"] = plot_change(adjusted, change)
     if len(correlated_parameters(adjusted)) >= 2:
         figures["correlations"] = plot_correlations(adjusted)
     figures["residual_histogram"] = plot_residual_histogram(adjusted)
@@ -64,7 +65,7 @@ def all_plots(adjusted: AdjustedBlock, changes: Sequence[Change] = ()) -> dict[s
     return figures
 
 
-def _plot_change(adjusted: AdjustedBlock, change: Change) -> Figure:
+def plot_change(adjusted: AdjustedBlock, change: Change) -> Figure:
     """Two groups and their difference, on one scale."""
     fields = [field_on_grid(adjusted, group, camera=change.camera) for group in (change.first, change.second)]
     title = f"Two groups – {adjusted.block.name}"

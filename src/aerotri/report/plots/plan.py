@@ -144,10 +144,10 @@ def ground_point_xy(adjusted: AdjustedBlock, points: np.ndarray) -> np.ndarray:
 
 
 def control_kinds(results: GroundPointResults) -> np.ndarray:
-    """(k,) str: 'full', 'height only' or 'plan only', by the coordinates that were given."""
+    """(k,) str: 'full', 'height only', 'plan only', or 'off' where none is used; by the coordinates that were given."""
     given = np.isfinite(results.difference)
     plan, height = given[:, :2].any(axis=1), given[:, 2]
-    return np.where(plan & height, "full", np.where(height, "height only", "plan only"))
+    return np.where(plan & height, "full", np.where(height, "height only", np.where(plan, "plan only", "off")))
 
 
 def draw_names(axes: Axes, xy: np.ndarray, names: list[str], others: np.ndarray, size: float = 7.0) -> None:
