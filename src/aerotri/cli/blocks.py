@@ -217,6 +217,21 @@ def _stated_sigmas(control: str, positions: str, orientation: str, angles: str) 
     }
 
 
+@app.command(epilog="Example: aerotri init gravel_pit --camera-size 8192x5460 --pixel-um 4.4 --focal-length-mm 35")
+def init(
+    folder: Annotated[Path, typer.Argument(help="Folder of the new block; no file in it is replaced.")],
+    camera_name: Annotated[str, typer.Option(help="Name of the camera.")] = "camera",
+    camera_size: Annotated[str, typer.Option(help="Columns and rows, px, as 8192x5460.")] = "",
+    pixel_um: Annotated[float | None, typer.Option(min=1e-6, help="Size of a pixel, µm.")] = None,
+    focal_length_mm: Annotated[float | None, typer.Option(min=1e-6, help="Principal distance, mm.")] = None,
+    json_: Json = False,
+) -> None:
+    """Begin a block: block.toml with every key explained, and empty tables with their columns."""
+    from aerotri.commands.init import run_init
+
+    run_init(folder, camera_name, camera_size, pixel_um, focal_length_mm, json_)
+
+
 @app.command(epilog="Example: aerotri check blocks/frederiksstad_ultracam")
 def check(
     block: BlockFolder,

@@ -112,6 +112,22 @@ def _key(part: str) -> str:
     return part if _BARE.fullmatch(part) else _string(part)
 
 
+def value_text(value: Any) -> str:
+    """A value as TOML has it.
+
+    Raises
+    ------
+    InputError
+        For a number that is not finite.
+    """
+    return _value(value)
+
+
+def key_text(name: str) -> str:
+    """A key as TOML has it, in quotes where it needs them."""
+    return _key(name)
+
+
 def _value(value: Any) -> str:
     if isinstance(value, (bool, np.bool_)):
         return "true" if value else "false"
