@@ -17,14 +17,19 @@ from typing import TYPE_CHECKING, Any
 from aerotri.version import __version__
 
 if TYPE_CHECKING:
+    from aerotri import observations as observations
     from aerotri.conventions import InputError as InputError
     from aerotri.observations import Block as Block
     from aerotri.pipeline import AdjustmentFailedError as AdjustmentFailedError
+    from aerotri.public import drawing as drawing
+    from aerotri.public import geometry as geometry
+    from aerotri.public import parameters as parameters
     from aerotri.public import predict as predict
     from aerotri.public.adjustment import Adjustment as Adjustment
     from aerotri.public.adjustment import adjust as adjust
     from aerotri.public.adjustment import open_result as open_result
     from aerotri.public.block_check import check as check
+    from aerotri.public.block_settings import with_settings as with_settings
     from aerotri.public.blocks import read as read
     from aerotri.public.blocks import read_block as read_block
     from aerotri.public.changes import changes as changes
@@ -64,12 +69,16 @@ _PLACES = {
     "correct_dem": "aerotri.public.dem",
     "crosscheck": "aerotri.public.comparing",
     "deform": "aerotri.public.models",
+    "drawing": "aerotri.public.drawing",
     "edit": "aerotri.public.editing",
     "adjust": "aerotri.public.adjustment",
     "convert": "aerotri.public.converting",
     "example_flight": "aerotri.public.simulating",
+    "geometry": "aerotri.public.geometry",
     "ideal_photographs": "aerotri.public.ideal",
+    "observations": "aerotri.observations",
     "open_result": "aerotri.public.adjustment",
+    "parameters": "aerotri.public.parameters",
     "predict": "aerotri.public.predict",
     "read": "aerotri.public.blocks",
     "read_block": "aerotri.public.blocks",
@@ -78,9 +87,10 @@ _PLACES = {
     "terrain": "aerotri.public.terrain",
     "tie_points": "aerotri.public.tying",
     "volume": "aerotri.public.volume",
+    "with_settings": "aerotri.public.block_settings",
 }
 """Where every public name stands; imported when it is used, so that `import aerotri` is quick."""
-_MODULES = ("predict",)
+_MODULES = ("drawing", "geometry", "observations", "parameters", "predict")
 """Names that are whole modules."""
 
 __all__ = [
@@ -102,10 +112,14 @@ __all__ = [
     "correct_dem",
     "crosscheck",
     "deform",
+    "drawing",
     "edit",
     "example_flight",
+    "geometry",
     "ideal_photographs",
+    "observations",
     "open_result",
+    "parameters",
     "predict",
     "read",
     "read_block",
@@ -114,6 +128,7 @@ __all__ = [
     "terrain",
     "tie_points",
     "volume",
+    "with_settings",
 ]
 
 

@@ -59,3 +59,12 @@ def test_files_of_others_stay(flight, tmp_path):
     assert (tmp_path / "x.txt").read_text() != "mine"
     with pytest.raises(InputError, match="'pdf' is not a format that is written"):
         aerotri.convert(flight.block, tmp_path / "y", to="pdf")
+
+
+def test_tables_as_parquet(tmp_path, flight):
+    aerotri.convert(flight.block, tmp_path / "copy", tables="parquet")
+    assert (tmp_path / "copy" / "image_points.parquet").is_file()
+    again = aerotri.read_block(tmp_path / "copy")
+    assert np.array_equal(again.image_points.xy, flight.block.image_points.xy)
+    with pytest.raises(InputError, match="no tables as 'json'"):
+        aerotri.convert(flight.block, tmp_path / "other", tables="json")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 
@@ -17,13 +18,16 @@ from aerotri.functional_model.rotation import rotation_from_angles
 
 MODULES = (
     "adjustment",
+    "block_settings",
     "blocks",
     "changes",
     "comparing",
     "converting",
     "covariance",
     "dem",
+    "drawing",
     "editing",
+    "geometry",
     "ideal",
     "image_errors",
     "models",
@@ -267,3 +271,34 @@ def test_prediction_of_a_volume_is_told_by_the_best_way():
     assert both.table["by"].tolist()[-1] == "simulated flight, adjusted"
     for shown in (theory, aerotri.predict.attitude(1.0, 5.0)):
         assert "<table>" in shown._repr_html_()
+
+
+def test_image_errors_are_parameters_times_patterns(flight):
+    """d = Σ pattern · value, at the nodes of the field and anywhere else."""
+    result = aerotri.adjust(flight.block, parameters="bluh:1-3+9", explain=False)
+    field = result.image_errors().field
+    xy = np.column_stack([field.x.ravel(), field.y.ravel()])
+    names, patterns = aerotri.parameters.patterns("bluh:1-3+9", result.block.cameras[0], xy)
+    value = [result.parameters.row(name)["value"] for name in names]
+    assert np.allclose(patterns @ value, field.d.reshape(-1, 2), atol=1e-12)
+    assert np.allclose(result.image_errors_at(xy), field.d.reshape(-1, 2), atol=1e-12)
+    six = aerotri.parameters.orientation_patterns(xy, result.block.cameras[0].focal_length_mm).reshape(-1, 6)
+    less = result.image_errors(without_orientation=True).field.d.ravel()
+    assert np.allclose(less + six @ np.linalg.lstsq(six, field.d.ravel() - less)[0], field.d.ravel(), atol=1e-9)
+    assert result.averaged_residuals().count.sum() == len(result.rays)
+    with pytest.raises(InputError, match="'brown' is no function"):
+        aerotri.parameters.patterns("brown:K1", result.block.cameras[0], xy)
+
+
+def test_what_was_set_aside(flight):
+    """A photograph whose image points are all gone, and the points that nobody else shows."""
+    block, rays = flight.block, flight.block.image_points
+    keep = rays.image != 0
+    parts = {name: getattr(rays, name)[keep] for name in ("image", "point", "xy", "sigma")}
+    result = aerotri.adjust(replace(block, image_points=aerotri.observations.ImagePoints(**parts)), explain=False)
+    table = result.set_aside
+    assert table.to_arrow().slice(0, 1).to_pylist() == [
+        {"kind": "photograph", "name": str(block.images.names[0]), "reason": "no image points"}
+    ]
+    assert (table["kind"] == "point").sum() == np.isnan(result.adjusted.points.xyz[:, 0]).sum()
+    assert aerotri.adjust(block, explain=False).set_aside.columns == ("kind", "name", "reason")

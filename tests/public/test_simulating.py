@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import aerotri
@@ -48,3 +49,18 @@ def test_files_of_others_are_kept(tiny, tmp_path):
     tiny.save(tmp_path)
     assert (tmp_path / "photographs" / "1_001.tif").read_text() == "mine"
     assert len(aerotri.read_block(tmp_path).images) == 3
+
+
+def test_looks_that_are_not_possible(tmp_path):
+    flight = aerotri.simulate(aerotri.example_flight(), seed=3)
+    with pytest.raises(InputError, match="contrast 2 or detail_px 2"):
+        flight.save(tmp_path / "flight", photographs=True, contrast=2.0)
+
+
+def test_true_ground_in_a_crs():
+    """Points of the truth lie on the ground there too."""
+    plan = aerotri.example_flight()
+    plan["georeference"] = {"crs": "EPSG:32632", "origin": [500_000.0, 5_400_000.0, 300.0]}
+    flight = aerotri.simulate(plan, seed=3)
+    points = flight.truth.points
+    assert np.allclose(flight.true_heights(points[:, :2]), points[:, 2], atol=1e-5)

@@ -13,11 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.formats.block.folder import read_block
-from aerotri.observations import Block
-from aerotri.pipeline import AdjustmentFailedError, adjust
-from aerotri.public.adjustment import with_settings
-from aerotri.results.adjusted_block import AdjustedBlock
+import aerotri
 
 
 @dataclass(frozen=True)
@@ -26,51 +22,44 @@ class Line:
 
     control: str
     left_out: str
-    result: AdjustedBlock | None
+    result: aerotri.Adjustment | None
     reason: str = ""
 
     def cells(self) -> list[str]:
         if self.result is None:
             return [self.control, self.left_out, self.reason, "", "", "", ""]
-        check = self.result.check
+        check = self.result.adjusted.check
         difference = check.difference if len(check) == 1 else np.nanmean(check.difference, axis=0, keepdims=True)
         sigma = check.sigma if len(check) == 1 else np.nanmean(check.sigma, axis=0, keepdims=True)
-        parameters = self.result.parameters
+        parameters = self.result.adjusted.parameters
         focal = np.flatnonzero(parameters.names == "focal_length_mm")
         c = f"{parameters.value[focal[0]]:.4f} ± {parameters.sigma[focal[0]]:.4f}" if len(focal) else "held"
         numbers = [f"{d:+.3f} ± {s:.3f}" for d, s in zip(difference[0], sigma[0], strict=True)]
-        return [self.control, self.left_out, *numbers, c, f"{self.result.outcome.sigma0_um:.2f}"]
+        return [self.control, self.left_out, *numbers, c, f"{self.result.sigma0_um:.2f}"]
 
 
-def with_check(block: Block, rows: np.ndarray) -> Block:
-    """The block with these control points as check points."""
-    is_check = block.control.is_check.copy()
-    is_check[rows] = True
-    return replace(block, control=replace(block.control, is_check=is_check))
-
-
-def line(name: str, block: Block, left_out: str, start: AdjustedBlock) -> Line:
+def line(name: str, block: aerotri.Block, left_out: str, full: aerotri.Adjustment) -> Line:
     """Adjust one variant from the orientation of the full adjustment."""
+    start = full.adjusted
     images = replace(block.images, centre=start.images.centre, angles=start.images.angles)
     try:
-        return Line(name, left_out, adjust(replace(block, images=images), given_points=start.points.xyz))
-    except AdjustmentFailedError as failure:
+        return Line(name, left_out, aerotri.adjust(replace(block, images=images), points=start.points.xyz))
+    except aerotri.AdjustmentFailedError as failure:
         return Line(name, left_out, None, failure.outcome.message)
 
 
-def lines(block: Block) -> list[Line]:
+def lines(block: aerotri.Block) -> list[Line]:
     """All lines of the table."""
-    full = adjust(block)
-    control = np.flatnonzero(~block.control.is_check)
-    names = [str(block.points[block.control.point[k]]) for k in control]
+    full = aerotri.adjust(block, explain=False)
+    names = block.points[block.control.point[~block.control.is_check]].astype(str).tolist()
     variants = [("control and GNSS", block)] if block.gnss_ins is not None else []
     variants.append(("control alone", replace(block, gnss_ins=None)))
     table = []
-    for variant, of_variant in variants:
-        for k, name in zip(control, names, strict=True):
-            table.append(line(variant, with_check(of_variant, np.array([k])), name, full))
+    for variant, reduced in variants:
+        for name in names:
+            table.append(line(variant, aerotri.edit(reduced, check=[name]), name, full))
     if block.gnss_ins is not None:
-        table.append(line("GNSS alone", with_check(block, control), "all (mean)", full))
+        table.append(line("GNSS alone", aerotri.edit(block, check=names), "all (mean)", full))
     return table
 
 
@@ -80,13 +69,12 @@ def main() -> None:
     parser.add_argument("--parameters", help="additional parameters, in place of block.toml's")
     parser.add_argument("--robust", help="robust estimator, in place of block.toml's")
     options = parser.parse_args()
-    given = {"additional_parameters": options.parameters, "robust": options.robust}
-    table = lines(with_settings(read_block(options.block), given))
+    table = lines(aerotri.with_settings(options.block, parameters=options.parameters, robust=options.robust))
     print("| datum | left out | dX m | dY m | dZ m | c mm | σ0 µm |\n|---|---|---|---|---|---|---|")
     for entry in table:
         print("| " + " | ".join(entry.cells()) + " |")
     print()
-    for warning in table[-1].result.outcome.warnings if table[-1].result else ():
+    for warning in table[-1].result.warnings if table[-1].result else ():
         print(f"- {table[-1].control}: {warning}")
 
 

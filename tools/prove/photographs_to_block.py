@@ -23,10 +23,6 @@ work); surface against model.laz after rigid alignment: 80.6 % covered, median â
 from __future__ import annotations
 
 import argparse
-import contextlib
-import csv
-import io
-import json
 import shutil
 import time
 from pathlib import Path
@@ -34,16 +30,7 @@ from pathlib import Path
 import numpy as np
 
 import aerotri
-from aerotri.cli.app import invoke
-from aerotri.commands.adjust import run_adjust
-from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
-from aerotri.conventions import px_from_mm
-from aerotri.formats.assembly.assemble import Statements
-from aerotri.formats.assembly.camera_spec import CameraSpec
-from aerotri.formats.block.folder import read_block
-from aerotri.rasters.images import create_image
-from aerotri.simulation import parse_spec, simulate
-from aerotri.simulation.rendering import RenderOptions, make_scene, render
+from aerotri import geometry
 
 SPEC = {
     "name": "rendered",
@@ -62,19 +49,18 @@ AXES = ("X", "Y", "Z")
 
 def write_files(folder: Path, seed: int, plan: dict = SPEC) -> tuple[str, ...]:
     """Photographs and gcp_list.txt of a rendered block; the names of its check points."""
-    spec = parse_spec(plan)
-    block, truth = simulate(spec, seed)
-    scene, camera, rays = make_scene(spec, seed, block, truth, RenderOptions()), block.cameras[0], block.image_points
-    (folder / "photographs").mkdir(parents=True, exist_ok=True)
-    columns, rows = camera.size_px
-    for number, name in enumerate(block.images.names.tolist()):
-        with create_image(folder / "photographs" / f"{name}.tif", columns, rows, 1, "uint16") as writer:
-            writer.write(0, render(scene, number)[None])
+    flight = aerotri.simulate(plan, seed)
+    block, camera, rays = flight.block, flight.block.cameras[0], flight.block.image_points
+    flight.save(folder / "flown", photographs=True)
+    (folder / "flown" / "photographs").rename(folder / "photographs")
     place = dict(zip(block.control.point.tolist(), block.control.xyz.tolist(), strict=True))
     lines = ["+proj=local"]
     for image, point, xy in zip(rays.image.tolist(), rays.point.tolist(), rays.xy, strict=True):
         if point in place:
-            values = [*place[point], *(px_from_mm(xy[None], camera.size_px, camera.pixel_mm)[0] - 0.5).tolist()]
+            values = [
+                *place[point],
+                *(geometry.px_from_mm(xy[None], camera.size_px, camera.pixel_mm)[0] - 0.5).tolist(),
+            ]
             words = " ".join(f"{value:.4f}" for value in values)
             lines.append(f"{words} {block.images.names[image]}.tif {block.points[point]}")
     (folder / "gcp_list.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -83,40 +69,35 @@ def write_files(folder: Path, seed: int, plan: dict = SPEC) -> tuple[str, ...]:
     return tuple(name for name in check if name in measured)
 
 
-def rendered(folder: Path, seed: int) -> tuple[dict, np.ndarray, np.ndarray]:
-    """Tie points, adjustment; adjustment.json, d and w (k, 3) of the check points."""
+def rendered(folder: Path, seed: int) -> tuple[aerotri.Adjustment, np.ndarray, np.ndarray]:
+    """Tie points, adjustment; the result, d and w (k, 3) of the check points."""
     check = write_files(folder, seed)
-    options = TiePointOptions(
-        gcp=str(folder / "gcp_list.txt"), check=check, camera=CameraSpec(focal_length_mm=6.0, pixel_um=6.0),
-        stated=Statements(control_sigma_m=(0.01, 0.01, 0.02)), mark_sigma_px=0.1, seed=seed,
+    result = tied_and_adjusted(folder, seed, 6.0, check)
+    d, w = (np.column_stack([result.check[f"{what}{axis}"] for axis in AXES]) for what in ("d", "w"))
+    return result, d, w
+
+
+def tied_and_adjusted(folder: Path, seed: int, focal_length_mm: float, check: tuple[str, ...]) -> aerotri.Adjustment:
+    """From the photographs and gcp_list.txt of a folder to its block and its result, which are saved there."""
+    tied = aerotri.tie_points(
+        folder / "photographs", control=folder / "gcp_list.txt", check=check, focal_length_mm=focal_length_mm,
+        pixel_um=6.0, control_sigma_m=(0.01, 0.01, 0.02), mark_sigma_px=0.1, seed=seed,
     )  # fmt: skip
-    with contextlib.redirect_stdout(io.StringIO()):
-        run_tiepoints(folder / "photographs", folder / "block", options, True)
-        run_adjust(folder / "block", folder / "result", None, None, None, False, True)
-    with (folder / "result" / "check.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    d, w = (np.array([[float(row[f"{what}{axis}"]) for axis in AXES] for row in rows]) for what in ("d", "w"))
-    return json.loads((folder / "result" / "adjustment.json").read_text(encoding="utf-8")), d, w
+    result = aerotri.adjust(tied.save(folder / "block"))
+    result.save(folder / "result", plots=False)
+    return result
 
 
 def brighton(folder: Path, data: Path) -> list[str]:
     """One command, and what it says; its surface against that of another program, `model.laz`."""
     begun, cpu = time.perf_counter(), time.process_time()
-    aerotri.run(data / "images", folder)
+    project = aerotri.run(data / "images", folder)
     seconds, cpu = time.perf_counter() - begun, time.process_time() - cpu
-    import pyarrow.parquet as pq
-
-    block = read_block(folder / "block")
-    rays = pq.read_table(folder / "result" / "residuals.parquet").to_pydict()
-    size = np.hypot(rays["vx"], rays["vy"]) / block.cameras[0].pixel_mm
-    with (folder / "result" / "images.csv").open(encoding="utf-8") as file:
-        centre = np.array([[float(row[name]) for name in ("X0", "Y0", "Z0")] for row in csv.DictReader(file)])
+    block, result = project.block, project.adjustment
+    size = np.hypot(result.rays["vx"], result.rays["vy"]) / block.cameras[0].pixel_mm
+    centre = np.column_stack([result.images[name] for name in ("X0", "Y0", "Z0")])
     off = centre[block.gnss_ins.image] - block.gnss_ins.xyz
-    compared = folder / "compared"
-    surfaces = [str(folder / "dtm" / "dsm.tif"), str(data / "model.laz")]
-    with contextlib.redirect_stdout(io.StringIO()):
-        invoke(["compare", *surfaces, "--align", "rigid", "--out", str(compared), "--no-plots"])
-    surface = json.loads((compared / "compare.json").read_text(encoding="utf-8"))
+    surface = aerotri.compare(folder / "dtm" / "dsm.tif", data / "model.laz", align="rigid").summary
     d = surface["difference_m"]
     return [
         f"{len(block.images)} photographs, {len(block.points)} points, {len(size)} rays",
@@ -138,11 +119,11 @@ def main() -> None:
     for seed in range(1, arguments.seeds + 1):
         folder = arguments.out / f"rendered_{seed}"
         shutil.rmtree(folder, ignore_errors=True)
-        outcome, d, w = rendered(folder, seed)
+        result, d, w = rendered(folder, seed)
         every.append(w)
         rms = [np.sqrt((values**2).mean(axis=0)) for values in (d, w)]
         lines.append(
-            f"| {seed} | {len(w)} | {outcome['sigma0']:.2f} | "
+            f"| {seed} | {len(w)} | {result.sigma0:.2f} | "
             + " | ".join(" ".join(f"{v:.3f}" if k == 0 else f"{v:.2f}" for v in rms[k]) for k in (0, 1))
             + f" | {np.abs(w).max():.1f} |"
         )

@@ -27,12 +27,17 @@ from scipy.stats import binom
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
-from aerotri.pipeline import adjust
-from small_blocks import small_block, with_adjustment
+import aerotri
+from small_blocks import small_block
 
 ZERO_RATE = 0.6827
 TRUE = {"bluh.1": 3e-5, "bluh.2": -3e-5, "bluh.9": -6e-9}
 """Parameters that are not zero in the second experiment, each of about 2 µm at the edge of the format."""
+
+
+def adjusted(block: aerotri.Block, **settings):
+    """The numbers of the block adjusted with other settings."""
+    return aerotri.adjust(aerotri.with_settings(block, **settings), explain=False).adjusted
 
 
 def rates(parameters: str, seeds: int, errors: dict[str, float]) -> str:
@@ -41,13 +46,13 @@ def rates(parameters: str, seeds: int, errors: dict[str, float]) -> str:
     at_once = by_t = by_rule = lost = count = 0
     for seed in range(9000, 9000 + seeds):
         block = small_block(seed, parameters, camera=camera)[0]
-        p = adjust(block).parameters
+        p = adjusted(block).parameters
         zero = ~np.isin(p.names.astype(str), list(errors))
         count += int(zero.sum())
         at_once += int((p.t[zero] < 1.0).sum())
-        only_t = adjust(with_adjustment(block, parameter_selection="on", correlation_limit=1.0)).removals
+        only_t = adjusted(block, parameter_selection="on", correlation_limit=1.0).removals
         by_t += sum(r.name not in errors for r in only_t)
-        removed = adjust(with_adjustment(block, parameter_selection="on")).removals
+        removed = adjusted(block, parameter_selection="on").removals
         by_rule += sum(r.name not in errors for r in removed)
         lost += sum(r.name in errors for r in removed)
     low, high = binom.ppf([0.0005, 0.9995], count, ZERO_RATE) / count

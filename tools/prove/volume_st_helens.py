@@ -14,19 +14,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
 from matplotlib.figure import Figure
 from scipy import ndimage
 
-from aerotri.rasters.grids import Grid, RasterReader
-from aerotri.report.plots.volume import plot_thickness
-from aerotri.volume.bases import SurfaceBase
-from aerotri.volume.boundary import boundary_of
-from aerotri.volume.compute import Volumes, compute_volumes
-from aerotri.volume.settings import SectionPlan
-from aerotri.volume.thickness import ThicknessMap
+import aerotri
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "st_helens"
 BEFORE, EPOCHS = "2000_09_25", ("2004_10_04", "2004_10_13", "2005_01_03")
@@ -35,7 +30,7 @@ GROWN_M, AROUND = 8.0, 4
 LAGS = 12
 
 
-def stable_sigma(difference: np.ndarray, grid: Grid, area: float) -> tuple[float, float, float, int, float]:
+def stable_sigma(difference: np.ndarray, cell: float, area: float) -> tuple[float, float, float, int, float]:
     """σ of the mean height over an area from the ground that did not grow.
 
     Returns
@@ -56,27 +51,21 @@ def stable_sigma(difference: np.ndarray, grid: Grid, area: float) -> tuple[float
         pairs = pairs[np.isfinite(pairs)]
         if len(pairs) < 30 or pairs.mean() < variance / np.e:
             break
-        length = lag * grid.cell_x
+        length = lag * cell
     # an exponential correlation of that length covers 2πℓ² of the area
-    scatter = variance * min(1.0, 2.0 * np.pi * max(length, grid.cell_x) ** 2 / area)
+    scatter = variance * min(1.0, 2.0 * np.pi * max(length, cell) ** 2 / area)
     return float(np.sqrt(mean**2 + scatter)), mean, nmad, len(values), length
 
 
-def epoch(name: str) -> tuple[Volumes, Figure, float, tuple[float, float, float, int, float]]:
+def epoch(name: str) -> tuple[Any, Figure, float, tuple[float, float, float, int, float]]:
     """Volumes, map, area measured anew (m²) and stable ground of an epoch."""
-    with RasterReader(DATA / f"{name}.tif") as after, RasterReader(DATA / f"{BEFORE}.tif") as before:
-        grid = after.grid
-        z = [r.read(0, 0, grid.rows, grid.columns).astype(float) for r in (after, before)]
-        difference = z[0] - z[1]
-        row, column = np.nonzero(difference)
-        boundary = boundary_of(shapely.MultiPoint(np.column_stack([grid.x(column), grid.y(row)])).convex_hull.buffer(
-            grid.cell_x), "hull of what was measured anew")  # fmt: skip
-        volumes = compute_volumes(after, SurfaceBase(f"{BEFORE}.tif", before), boundary, plan=SectionPlan(20.0, 0.0))
-        inside = np.where(boundary.coverage(grid) > 0.0, difference, np.nan)
-        content = {"dtm": f"{name}.tif", "base": {"name": f"{BEFORE}.tif"}, "crs": "EPSG:26910"}
-        figure = plot_thickness(ThicknessMap(grid, inside), boundary, volumes, content)
-        area = float((difference != 0.0).sum()) * grid.cell_x * grid.cell_y
-        return volumes, figure, area, stable_sigma(difference, grid, area)
+    after, before = (aerotri.Surface(DATA / f"{one}.tif") for one in (name, BEFORE))
+    difference, grid = after.z - before.z, after.grid
+    row, column = np.nonzero(difference)
+    anew = shapely.MultiPoint(np.column_stack([grid.x(column), grid.y(row)])).convex_hull.buffer(grid.cell_x)
+    found = aerotri.volume(after, anew, base=before, section_spacing=20.0, azimuth=0.0)
+    area = float((difference != 0.0).sum()) * grid.cell_x * grid.cell_y
+    return found.record, found.plot.thickness(), area, stable_sigma(difference, grid.cell_x, area)
 
 
 def main() -> None:

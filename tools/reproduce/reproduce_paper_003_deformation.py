@@ -10,16 +10,10 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from aerotri.deformation import deform_normal_case, restitution_of
-from aerotri.functional_model.additional_parameters import parse_parameters
-from aerotri.image_errors import ErrorField, field_on_grid
-from aerotri.observations import Block
-from aerotri.pipeline import adjust_keeping_system
-from aerotri.results.adjustment import Adjustment
-from aerotri.simulation import simulate
+import aerotri
 from paper_003_deformation.cases import cases
 from paper_003_deformation.even_odd import EvenOdd, even_against_odd
 from paper_003_deformation.figures import deformation_figure, errors_and_deformation, interval_of
@@ -32,20 +26,19 @@ def main() -> None:
     """Simulate, adjust, deform; print the answer, write it where asked."""
     options = _options()
     rows: list[Row] = []
-    fields: dict[tuple[str, str], ErrorField] = {}
+    fields: dict[tuple[str, str], Any] = {}
     compared: list[tuple[str, EvenOdd]] = []
     for case in cases():
         print(f"{case.title} …", file=sys.stderr)
-        block, truth = simulate(case.spec, SEED)
-        plain = _adjusted(block, "none") if case.key == "ultracam_d" else None
+        flight = aerotri.simulate(case.plan, SEED)
+        plain = _adjusted(flight, "none") if case.key == "ultracam_d" else None
         for heading, parameters in case.sets:
-            found = _adjusted(block, parameters)
-            restitution = restitution_of(found)
-            fields[case.key, heading] = field_on_grid(found.local, found.local.block.cameras[0].name)
-            rows += [Row(case, heading, p, deform_normal_case(found, restitution, p.end_lap)) for p in case.pictures]
+            found = _adjusted(flight, parameters)
+            fields[case.key, heading] = found.image_errors().field
+            rows += [Row(case, heading, p, aerotri.deform(found, end_lap=p.end_lap).record) for p in case.pictures]
             if plain is not None:
-                compared.append((heading, even_against_odd(found, plain, case.spec, SEED, truth)))
-    text = markdown(rows, compared, cases()[0].spec.flight.end_lap)
+                compared.append((heading, even_against_odd(found, plain, flight)))
+    text = markdown(rows, compared, cases()[0].plan["flight"]["end_lap"])
     print(text, end="")
     if options.out is not None:
         options.out.mkdir(parents=True, exist_ok=True)
@@ -59,12 +52,11 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _adjusted(block: Block, parameters: str) -> Adjustment:
-    chosen = replace(block.settings.adjustment, additional_parameters=parse_parameters(parameters))
-    return adjust_keeping_system(replace(block, settings=replace(block.settings, adjustment=chosen)))
+def _adjusted(flight, parameters: str) -> aerotri.Adjustment:
+    return aerotri.adjust(flight.block, parameters=parameters, explain=False)
 
 
-def _draw(folder: Path, rows: list[Row], fields: dict[tuple[str, str], ErrorField]) -> None:
+def _draw(folder: Path, rows: list[Row], fields: dict[tuple[str, str], Any]) -> None:
     ultracam, dmc, film = cases()
     subtitle = "Simulated block, image errors from physics; normal case over level ground, variant free."
     panels = []
@@ -81,7 +73,7 @@ def _draw(folder: Path, rows: list[Row], fields: dict[tuple[str, str], ErrorFiel
         figure.savefig(folder / f"paper_003_deformation_{name}.png", dpi=110)
 
 
-def _with_field(row: Row, own: list[Row], fields: dict[tuple[str, str], ErrorField]):
+def _with_field(row: Row, own: list[Row], fields: dict[tuple[str, str], Any]):
     """Of all sets of a camera the same interval, as the paper has it."""
     interval = max(interval_of(r.deformation, r.picture.interval_cm) for r in own)
     return _caption(row), fields[row.case.key, row.parameters], row.deformation, interval

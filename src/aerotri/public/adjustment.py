@@ -12,10 +12,11 @@ from aerotri.conventions import FilePath, InputError
 from aerotri.public.progress import ProgressLike, stage_report
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     import numpy as np
 
+    from aerotri.image_errors import AveragedResiduals, Change
     from aerotri.observations import Block
     from aerotri.public.covariance import Covariance
     from aerotri.public.image_errors import ImageErrors
@@ -200,12 +201,64 @@ class Adjustment:
 
         return errors_of_result(self.adjusted, group, camera, without_orientation, nodes)
 
+    @cached_property
+    def set_aside(self) -> Table:
+        """Photographs and points that did not take part, and why: columns kind, name, reason."""
+        from aerotri.public.tables import set_aside_table
+
+        return set_aside_table(self.adjusted)
+
     @property
     def plot(self) -> AdjustmentPlots:
         """Plots of the result, each a matplotlib Figure."""
         from aerotri.public.plots import AdjustmentPlots
 
         return AdjustmentPlots(self.adjusted)
+
+    def image_errors_at(self, xy: np.ndarray, group: str | None = None, camera: str | None = None) -> np.ndarray:
+        """(n, 2) mm, the systematic image errors at image positions.
+
+        Parameters
+        ----------
+        xy : (n, 2) mm from the image centre, as measured.
+        group, camera : as of `image_errors`.
+
+        Raises
+        ------
+        InputError
+            For a group that the block does not have.
+        """
+        from aerotri.public.image_errors import errors_at
+
+        return errors_at(self.adjusted, xy, group, camera)
+
+    def averaged_residuals(self, group: str | None = None, camera: str | None = None) -> AveragedResiduals:
+        """Mean residuals by cell of the format: what the parameters have left; mm.
+
+        Parameters
+        ----------
+        group, camera : as of `image_errors`.
+        """
+        from aerotri.public.image_errors import residuals_of_result
+
+        return residuals_of_result(self.adjusted, group, camera)
+
+    def change_between(self, first: str, second: str) -> Change:
+        """How the image errors of two parameter groups differ, and whether they changed at all.
+
+        Parameters
+        ----------
+        first, second : names of groups, such as two days; the `field` of the change is first − second, and
+            `statistic`, `freedom` and `p` are those of the test of no change.
+
+        Raises
+        ------
+        InputError
+            For a group that the block does not have.
+        """
+        from aerotri.image_errors import change
+
+        return change(self.adjusted, first, second)
 
     def covariance(self, names: Sequence[str]) -> Covariance:
         """The joint covariance of points, photographs and parameters, however far apart.
@@ -289,6 +342,7 @@ def adjust(
     max_iterations: int | None = None,
     points: np.ndarray | None = None,
     geoid: FilePath | None = None,
+    explain: bool = True,
     progress: ProgressLike = None,
 ) -> Adjustment:
     """Adjust a block: orientation, points, self-calibration, and σ of everything.
@@ -307,6 +361,8 @@ def adjust(
     max_iterations : at most, in each stage of a robust estimator.
     points : (N, 3) m, start values of the object points, where known from elsewhere.
     geoid : grid of geoid undulations for a coordinate system that has none of its own.
+    explain : look for the usual mistake behind a block that is not accepted, by adjusting it again with that mended;
+        False saves the time where many blocks are adjusted. Not looked for where points are given.
     progress : True for a bar in the terminal or notebook; or a function that takes (stage, share), share 0 … 1 or None
         where it is not known.
 
@@ -334,51 +390,22 @@ def adjust(
     from aerotri.formats.block.unread import unread_in_words
     from aerotri.observations import Block
     from aerotri.pipeline import adjust_and_explain, adjust_keeping_system
-    from aerotri.public.blocks import as_block
+    from aerotri.public.block_settings import with_settings
 
     chosen = with_settings(
-        as_block(block),
-        {
-            "additional_parameters": parameters,
-            "parameter_selection": parameter_selection,
-            "robust": robust,
-            "datum": datum,
-            "variance_components": variance_components,
-            "max_iterations": max_iterations,
-        },
-    )
+        block, parameters=parameters, parameter_selection=parameter_selection, robust=robust, datum=datum,
+        variance_components=variance_components, max_iterations=max_iterations,
+    )  # fmt: skip
     unread = () if isinstance(block, Block) else unread_in_words(Path(block))
     with stage_report(progress) as report:
         if points is not None:
             return Adjustment(adjust_keeping_system(chosen, report.iteration, points, geoid), unread)
         metric, note = in_metres(chosen, geoid)
-        found = adjust_and_explain(metric, report.iteration, geoid, lambda text: report.stage(text, None))
+        if explain:
+            found = adjust_and_explain(metric, report.iteration, geoid, lambda text: report.stage(text, None))
+        else:
+            found = adjust_keeping_system(metric, report.iteration, geoid=geoid)
         return Adjustment(found, (*((note,) if note else ()), *unread))
-
-
-def with_settings(block: Block, given: Mapping[str, object]) -> Block:
-    """The block with settings of its adjustment changed.
-
-    Parameters
-    ----------
-    given : by the names of block.toml; None: as the block has it. `additional_parameters` as a specification.
-
-    Raises
-    ------
-    InputError
-        For a value that the setting cannot have.
-    """
-    from dataclasses import replace
-
-    from aerotri.formats.block.settings import checked_adjustment_settings
-    from aerotri.functional_model.additional_parameters import parse_parameters
-
-    changes = {name: value for name, value in given.items() if value is not None}
-    if isinstance(changes.get("additional_parameters"), str):
-        changes["additional_parameters"] = parse_parameters(str(changes["additional_parameters"]))
-    checked_adjustment_settings({k: v for k, v in changes.items() if k != "additional_parameters"})
-    adjustment = replace(block.settings.adjustment, **changes)
-    return replace(block, settings=replace(block.settings, adjustment=adjustment))
 
 
 def open_result(folder: FilePath, progress: ProgressLike = None) -> Adjustment:

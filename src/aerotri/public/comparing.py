@@ -12,8 +12,9 @@ import pyarrow as pa
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.observations import Block
-from aerotri.public.adjustment import Adjustment, with_settings
-from aerotri.public.blocks import as_block, read
+from aerotri.public.adjustment import Adjustment
+from aerotri.public.block_settings import with_settings
+from aerotri.public.blocks import read
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.table import Table
@@ -127,7 +128,7 @@ def compare_parameters(
     choices = [parse_parameters(spec) for spec in sets]
     if AUTO in choices:
         raise InputError("auto is no set to compare with others", "without sets all that auto compares are shown")
-    chosen = with_settings(as_block(block), {"robust": robust})
+    chosen = with_settings(block, robust=robust)
     with stage_report(progress) as report:
         found = pipeline.compare_parameters(chosen, choices or candidate_sets(chosen), folds, geoid, report.set_of)
     if not any(outcome.converged for outcome in found.outcomes):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from aerotri.public.progress import ProgressLike, StageReport, stage_report
 if TYPE_CHECKING:
     from aerotri.formats.assembly.oriented import OrientedBlock
 
+Tables = Literal["csv", "parquet"]
 Target = Literal[
     "block", "bal", "colmap", "colmap-text", "bundler", "opensfm", "metashape", "opk", "pix4d-eo", "ign", "patb",
     "bingo", "pix4d-gcp", "pix4d-geo", "pix4d-offset", "odm-gcp", "odm-geo", "ign-mes", "ign-app",
@@ -29,6 +30,7 @@ def convert(
     to: Target = "block",
     *,
     points: np.ndarray | None = None,
+    tables: Tables = "csv",
     geoid: FilePath | None = None,
     overwrite: bool = False,
     progress: ProgressLike = None,
@@ -42,6 +44,7 @@ def convert(
     out : file or folder to write.
     to : format to write.
     points : (N, 3) m, object points of a block, for formats that hold them.
+    tables : of our own format; 'parquet' is read faster where there are millions of image points.
     geoid : grid of geoid undulations for heights of the coordinate system.
     overwrite : replace files that aerotri has not written, or that were changed since.
     progress : see `aerotri.adjust`.
@@ -72,10 +75,22 @@ def convert(
         said = source.messages
     if isinstance(source, Block):
         source = ReadBlock(source, points, ())
+    if to == "block" and tables != "csv":
+        return (*said, *_write_tables(source.block, target, tables))
     with stage_report(progress) as report:
         if isinstance(source, Adjustment) or source.is_result:
             return (*said, *_write_result(source, target, to, geoid))
         return (*said, *_write_block(source, target, to, geoid, report))
+
+
+def _write_tables(block: Block, target: Path, tables: Tables) -> tuple[str, ...]:
+    """The block in our own format with its tables as asked for."""
+    from aerotri.formats.block.writer import write_block
+
+    if tables not in get_args(Tables):
+        raise InputError(f"there are no tables as '{tables}'", f"choose {' or '.join(get_args(Tables))}")
+    write_block(block, target, tables)
+    return _about_held(block)
 
 
 def name_of_target(target: Path, to: Target) -> str:

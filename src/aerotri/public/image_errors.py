@@ -15,7 +15,7 @@ from aerotri.public.table import Table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from aerotri.image_errors import ErrorField, ImageGroup
+    from aerotri.image_errors import AveragedResiduals, ErrorField, ImageGroup
     from aerotri.observations import Block
     from aerotri.results.adjusted_block import AdjustedBlock
 
@@ -142,6 +142,22 @@ def errors_of_result(
     make = field_without_orientation if without_orientation else field_on_grid
     name = found.name if len(adjusted.block.cameras) == 1 else f"{found.name}, {found.camera.name}"
     return ImageErrors(name, make(adjusted, found.name, nodes, found.camera.name))
+
+
+def errors_at(adjusted: AdjustedBlock, xy: np.ndarray, group: str | None, camera: str | None) -> np.ndarray:
+    """As `Adjustment.image_errors_at`."""
+    from aerotri.image_errors import systematic_errors
+
+    found, at = chosen_group(adjusted.block, group, camera), np.asarray(xy, dtype=float)
+    return systematic_errors(adjusted, found.name, at[:, 0], at[:, 1], found.camera.name)[0]
+
+
+def residuals_of_result(adjusted: AdjustedBlock, group: str | None, camera: str | None) -> AveragedResiduals:
+    """As `Adjustment.averaged_residuals`."""
+    from aerotri.image_errors import averaged_residuals
+
+    found = chosen_group(adjusted.block, group, camera)
+    return averaged_residuals(adjusted, found.name, camera=found.camera.name)
 
 
 def chosen_group(block: Block, group: str | None, camera: str | None) -> ImageGroup:

@@ -127,6 +127,25 @@ def picket_interval(
         return _by_pilot(record, files, area, tolerance, report)
 
 
+def error_pickets(share: float, area: float, interval: np.ndarray | float) -> np.ndarray | float:
+    """How many pickets of an area will be in error, by the law e = p·S/PSI² (Tran 2007).
+
+    Parameters
+    ----------
+    share : p, of the pickets that are in error, 0 … 1.
+    area : S, m².
+    interval : PSI, m between pickets, one or several.
+
+    Examples
+    --------
+    >>> float(error_pickets(0.1, 1e6, 50.0))
+    40.0
+    """
+    from aerotri.terrain.interval import expected_error_pickets
+
+    return expected_error_pickets(share, area, interval)
+
+
 def stated_gsd(
     scan_um: float | None, scale: float | None, gsd: float | None, has_pilot: bool, has_photographs: bool
 ) -> float | None:

@@ -15,15 +15,16 @@ import numpy as np
 import pyarrow as pa
 
 from aerotri.conventions import InputError
-from aerotri.public.picket_interval import picket_interval
+from aerotri.public.picket_interval import error_pickets, picket_interval
 from aerotri.public.table import Table
 from aerotri.simulation.designs import SIGMA0_SHARE, VolumeDesign, volume_flight
+from aerotri.volume import theory
 
 if TYPE_CHECKING:
     from aerotri.volume.sensitivity import AttitudeTolerance
     from aerotri.volume.theory import Prediction
 
-__all__ = ["attitude", "picket_interval", "volume"]
+__all__ = ["VolumeDesign", "attitude", "error_pickets", "picket_interval", "simulated_sigma", "theory", "volume"]
 
 SITE_PLACES, MOST_MODELS = 41, 100_000
 """Places a side of an area that are judged, and models of a block that is adjusted at most; chosen [C]: 41 × 41 show

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 MOST_BLUR_PX, MOST_NOISE = 20.0, 20_000.0
 """σ of the blur, pixels, and of the noise, grey values of 65 535, at most; chosen [C]: beyond them no texture is left,
 and a wide blur needs wide margins around every piece."""
+MOST_CONTRAST, LEAST_DETAIL_PX, MOST_DETAIL_PX = 1.0, 0.5, 100.0
+"""RMS of the texture over its mean, at most, and size of the finest texture, pixels; chosen [C]: more contrast has no
+light and shade between black and white, finer texture is lost in a pixel, coarser shows nothing to match."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,7 +96,7 @@ class SimulatedBlock:
         return self._true.image_errors(camera, day, without_orientation, nodes)
 
     def true_heights(self, xy: np.ndarray) -> np.ndarray:
-        """(n,) m, true heights of the ground, or of the roof over it, at places (n, 2) m."""
+        """(n,) m, true heights of the ground, or of the roof over it, at places (n, 2) in the block's coordinates."""
         return self._true.heights(xy)
 
     def true_surface(self, cell: float, area: tuple[float, float, float, float] | None = None) -> Surface:
@@ -126,6 +129,8 @@ class SimulatedBlock:
         targets: bool = False,
         blur_px: float = 0.5,
         noise: float = 50.0,
+        contrast: float = 0.25,
+        detail_px: float = 2.0,
         overwrite: bool = False,
         progress: ProgressLike = None,
     ) -> Path:
@@ -140,6 +145,8 @@ class SimulatedBlock:
         targets : render bright discs at control and check points, also where the plan does not ask for them.
         blur_px : σ of the point spread, pixels.
         noise : σ of the grey values.
+        contrast : RMS of the texture of the ground over its mean grey value.
+        detail_px : size of the finest texture, pixels.
         overwrite : replace files that aerotri has not written, or that were changed since.
         progress : see `aerotri.adjust`.
 
@@ -159,6 +166,9 @@ class SimulatedBlock:
         if not (0.0 <= blur_px <= MOST_BLUR_PX and 0.0 <= noise <= MOST_NOISE):
             raise InputError(f"blur_px {blur_px:g} or noise {noise:g} is not possible",
                              f"give 0 to {MOST_BLUR_PX:g} px and 0 to {MOST_NOISE:g}")  # fmt: skip
+        if not (0.0 <= contrast <= MOST_CONTRAST and LEAST_DETAIL_PX <= detail_px <= MOST_DETAIL_PX):
+            remedy = f"give 0 to {MOST_CONTRAST:g}, and {LEAST_DETAIL_PX:g} to {MOST_DETAIL_PX:g} px"
+            raise InputError(f"contrast {contrast:g} or detail_px {detail_px:g} is not possible", remedy)
         target = Path(out)
         chosen = chosen_photographs(self.block, only) if photographs else []
         with held(target), stage_report(progress) as report:
@@ -169,7 +179,10 @@ class SimulatedBlock:
             from aerotri.simulation.photograph_files import PHOTOGRAPHS, gnss_fixes, write_photographs
             from aerotri.simulation.rendering import RenderOptions
 
-            looks = RenderOptions(blur_px=blur_px, noise=noise, targets=targets or self.plan.photographs.targets)
+            looks = RenderOptions(
+                contrast=contrast, detail_px=detail_px, blur_px=blur_px, noise=noise,
+                targets=targets or self.plan.photographs.targets,
+            )  # fmt: skip
             scene, place = self._scene(looks)
             self._write_block(target, chosen, overwrite, lambda folder: self._write_beside(folder, scene, place))
             report.stage(compilation_notice() or "rendering", None)

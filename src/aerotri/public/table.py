@@ -205,10 +205,7 @@ class Table:
         shown = self.arrow.slice(0, SHOWN_ROWS)
         units = [self.units.get(column, "") for column in self.columns]
         columns = list(zip(self.columns, units, strict=True))
-        head = "".join(
-            f"<th>{escape(column)}{f' [{escape(unit)}]' if unit else ''}</th>"
-            for column, unit in columns
-        )
+        head = "".join(f"<th>{escape(column)}{f' [{escape(unit)}]' if unit else ''}</th>" for column, unit in columns)
         rows = "".join(
             "<tr>" + "".join(f"<td>{escape(_cell(row[column], unit))}</td>" for column, unit in columns) + "</tr>"
             for row in shown.to_pylist()

@@ -67,6 +67,22 @@ def groups_table(adjusted: AdjustedBlock) -> Table:
     return _table("groups of observations", columns)
 
 
+def set_aside_table(adjusted: AdjustedBlock) -> Table:
+    """Photographs and points that did not take part, and why."""
+    from aerotri.statistics.set_aside import photograph_reasons, point_reasons
+
+    block = adjusted.block
+    kinds = (("photograph", block.images.names, photograph_reasons(adjusted)),
+             ("point", block.points, point_reasons(adjusted)))  # fmt: skip
+    rows = [(kind, names[why != ""], why[why != ""]) for kind, names, why in kinds]
+    columns = {
+        "kind": np.concatenate([np.full(len(names), kind) for kind, names, _ in rows]),
+        "name": np.concatenate([names.astype(str) for _, names, _ in rows]),
+        "reason": np.concatenate([why.astype(str) for _, _, why in rows]),
+    }
+    return _table("set aside", columns)
+
+
 def write_rows(table: Table, path: Path) -> None:
     """Write a table as CSV; names that a spreadsheet would run as formulas are marked."""
     import csv

@@ -84,11 +84,15 @@ class TrueBlock:
         return ImageErrors(name, field_of(own, name, known[chosen, asked], nodes, without_orientation))
 
     def heights(self, xy: np.ndarray) -> np.ndarray:
-        """(n,) m, of the ground or of the roof over it, at (n, 2) m."""
+        """(n,) m, of the ground or of the roof over it, at (n, 2) in the coordinate system of the block."""
+        from aerotri.simulation.placing import placement
         from aerotri.simulation.random_streams import stream
         from aerotri.simulation.terrain import make_terrain
+        from aerotri.simulation.true_surface import true_heights
 
-        return make_terrain(self.plan.terrain, self.plan.flight.centre_m, stream(self.seed, "terrain")).height(xy)
+        place = None if self.plan.georeference is None else placement(self.plan.georeference)
+        terrain = make_terrain(self.plan.terrain, self.plan.flight.centre_m, stream(self.seed, "terrain"))
+        return true_heights(terrain, np.asarray(xy, dtype=float), place)
 
     def surface(self, cell: float, area: tuple[float, float, float, float] | None) -> Surface:
         """As `SimulatedBlock.true_surface`.
@@ -98,6 +102,8 @@ class TrueBlock:
         InputError
             For a cell or an area without size, or too many cells.
         """
+        from aerotri.rasters.grids import horizontal_crs
+
         xy = self.truth.points[:, :2]
         left, bottom, right, top = area if area is not None else (*xy.min(axis=0), *xy.max(axis=0))
         if not (cell > 0.0 and right > left and top > bottom):
@@ -108,4 +114,5 @@ class TrueBlock:
             raise InputError(f"{rows} × {columns} cells are too many", "take a larger cell, or a smaller area")
         x, y = left + cell * (np.arange(columns) + 0.5), top - cell * (np.arange(rows) + 0.5)
         z = self.heights(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)).reshape(rows, columns)
-        return Surface.of_array(z, left=float(left), top=float(top), cell=cell, name="true surface")
+        return Surface.of_array(z, left=float(left), top=float(top), cell=cell, crs=horizontal_crs(self.block.crs),
+                                name="true surface")  # fmt: skip

@@ -34,7 +34,7 @@ def write_true_surface(path: Path, terrain: Terrain, points: np.ndarray, gsd_m: 
     x, y = grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows))
     heights = np.empty((grid.rows, grid.columns))
     for row, northing in enumerate(y.tolist()):
-        heights[row] = _heights(terrain, np.column_stack([x, np.full(len(x), northing)]), place)
+        heights[row] = true_heights(terrain, np.column_stack([x, np.full(len(x), northing)]), place)
     crs = None if place is None else horizontal_crs(place.crs)
     with RasterWriter(path, grid, np.float32, crs, options=STORED) as writer:
         writer.describe("true height, m")
@@ -50,8 +50,8 @@ def _grid(xy: np.ndarray, gsd_m: float) -> Grid:
     return Grid(max(rows, 1), max(columns, 1), float(left), float(top), cell, cell)
 
 
-def _heights(terrain: Terrain, xy: np.ndarray, place: Placement | None) -> np.ndarray:
-    """(n,) m at (n, 2) of the CRS."""
+def true_heights(terrain: Terrain, xy: np.ndarray, place: Placement | None) -> np.ndarray:
+    """(n,) m of ground and houses at (n, 2) of the CRS, or of the plane of the simulation without one."""
     if place is None:
         return terrain.height(xy)
     heights = np.full(len(xy), place.to_crs(np.array([[0.0, 0.0, terrain.base]]))[0, 2])

@@ -10,8 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from aerotri.simulation import SimulationSpec, parse_spec
-
 
 @dataclass(frozen=True)
 class Picture:
@@ -29,7 +27,7 @@ class Case:
 
     key: str
     title: str
-    spec: SimulationSpec
+    plan: dict[str, Any]
     sets: tuple[tuple[str, str], ...]
     pictures: tuple[Picture, ...]
 
@@ -40,43 +38,41 @@ def cases() -> tuple[Case, ...]:
         Case(
             "ultracam_d",
             "UltraCamD, DSK-Saar",
-            _spec("ultracam_d", 4.0, 1019.0, end_lap=0.8315, side_lap=0.4, strips=4, images_per_strip=19),
+            _plan("ultracam_d", 4.0, 1019.0, end_lap=0.8315, side_lap=0.4, strips=4, images_per_strip=19),
             (("1–12", "bluh:1-12"), ("1–12, 42–73", "bluh:1-12,ultracam_d:42-73")),
             (Picture(16, 0.663, 4.4, 5.0), Picture(17, 0.495, 2.9, 5.0), Picture(18, 0.84, 9.3, 10.0)),
         ),
         Case(
             "dmc",
             "DMC, Frederiksstad",
-            _spec("dmc", 4.0 / 3.0, 919.9, end_lap=0.63, side_lap=0.6, strips=6, images_per_strip=16),
+            _plan("dmc", 4.0 / 3.0, 919.9, end_lap=0.63, side_lap=0.6, strips=6, images_per_strip=16),
             (("1–12", "bluh:1-12"), ("1–12, 30–41, 74–77", "bluh:1-12,dmc:30-41+74-77")),
             (Picture(19, 0.63, None, 5.0),),
         ),
         Case(
             "rmk_top_15",
             "RMK TOP 15, Frederiksstad",
-            _spec("rmk_top_15", 4.0, 1620.0, end_lap=0.61, side_lap=0.6, strips=5, images_per_strip=10),
+            _plan("rmk_top_15", 4.0, 1620.0, end_lap=0.61, side_lap=0.6, strips=5, images_per_strip=10),
             (("1–12", "bluh:1-12"),),
             (Picture(20, 0.61),),
         ),
     )
 
 
-def _spec(preset: str, rms_um: float, height_m: float, **flight: Any) -> SimulationSpec:
-    return parse_spec(
-        {
-            "name": preset,
-            "camera": {preset: {"preset": preset, "errors": {"physical": {"rms_um": rms_um, "seed": 2}}}},
-            "flight": {
-                "height_m": height_m,
-                "heading_deg": 90.0,
-                "cross_strips": [{"position": 0.5}],
-                "attitude_sigma_deg": [1.0, 1.0, 2.0],
-                "position_sigma_m": [5.0, 5.0, 3.0],
-                **flight,
-            },
-            "terrain": {"kind": "undulating", "height_m": 200.0, "relief_rms_m": 20.0, "wavelength_m": 900.0},
-            "tie_points": {"per_image": 130, "probability": 0.5, "sigma_um": 2.0},
-            "control": {"distance_bases": 4.0, "base_end_lap": 0.6, "sigma_m": [0.03, 0.03, 0.03], "check_points": 0},
-            "start_values": {"kind": "perturbed", "position_sigma_m": 1.0, "angle_sigma_deg": 0.05},
-        }
-    )
+def _plan(preset: str, rms_um: float, height_m: float, **flight: Any) -> dict[str, Any]:
+    return {
+        "name": preset,
+        "camera": {preset: {"preset": preset, "errors": {"physical": {"rms_um": rms_um, "seed": 2}}}},
+        "flight": {
+            "height_m": height_m,
+            "heading_deg": 90.0,
+            "cross_strips": [{"position": 0.5}],
+            "attitude_sigma_deg": [1.0, 1.0, 2.0],
+            "position_sigma_m": [5.0, 5.0, 3.0],
+            **flight,
+        },
+        "terrain": {"kind": "undulating", "height_m": 200.0, "relief_rms_m": 20.0, "wavelength_m": 900.0},
+        "tie_points": {"per_image": 130, "probability": 0.5, "sigma_um": 2.0},
+        "control": {"distance_bases": 4.0, "base_end_lap": 0.6, "sigma_m": [0.03, 0.03, 0.03], "check_points": 0},
+        "start_values": {"kind": "perturbed", "position_sigma_m": 1.0, "angle_sigma_deg": 0.05},
+    }

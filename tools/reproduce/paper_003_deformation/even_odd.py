@@ -2,6 +2,9 @@
 
 The photographs show true points with the true errors of the camera; they are intersected with the orientation of an
 adjustment without parameters, as in the paper. The correction knows the self-calibration alone, not the truth.
+
+Measures the deformation at single points intersected with another orientation, where the package corrects whole
+rasters: imports inside on purpose.
 """
 
 from __future__ import annotations
@@ -10,13 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import aerotri
 from aerotri.deformation import restitution_of
 from aerotri.deformation.dem_window import dem_models
 from aerotri.deformation.orientation import Orientation, calibrated_orientation
 from aerotri.deformation.stereo_model import intersect, project
 from aerotri.functional_model.rotation import rotation_from_angles
-from aerotri.results.adjustment import Adjustment
-from aerotri.simulation import SimulationSpec, Truth
 from aerotri.simulation.projection import measured_positions
 from aerotri.simulation.rendering import make_scene
 
@@ -35,16 +37,15 @@ class EvenOdd:
     error: tuple[float, float]
 
 
-def even_against_odd(
-    calibrated: Adjustment, plain: Adjustment, spec: SimulationSpec, seed: int, truth: Truth
-) -> EvenOdd:
+def even_against_odd(self_calibrated: aerotri.Adjustment, plain: aerotri.Adjustment, flight) -> EvenOdd:
     """Compare the two DEMs over all fours of photographs that follow one another in a strip."""
+    calibrated, truth = self_calibrated.record, flight.truth
     block = calibrated.local.block
-    scene = make_scene(spec, seed, block, truth)
+    scene = make_scene(flight.plan, flight.seed, block, truth)
     true = Orientation(
         truth.centre, rotation_from_angles(truth.angles, block.rotation), truth.interior[block.images.camera]
     )
-    used = calibrated_orientation(plain)
+    used = calibrated_orientation(plain.record)
     restitution = restitution_of(calibrated, used=used)
     names, fours = block.images.names.astype(str), _fours(block.images.strip)
     pairs = [tuple(names[four[pair]]) for four in fours for pair in PAIRS]

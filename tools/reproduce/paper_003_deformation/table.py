@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from aerotri.deformation import Deformation
 from paper_003_deformation.cases import Case, Picture
 from paper_003_deformation.even_odd import EvenOdd
 
@@ -54,7 +54,7 @@ class Row:
     case: Case
     parameters: str
     picture: Picture
-    deformation: Deformation
+    deformation: Any
 
 
 def markdown(rows: Sequence[Row], compared: Sequence[tuple[str, EvenOdd]], end_lap: float) -> str:
@@ -96,7 +96,7 @@ def _row(row: Row) -> str:
     )
 
 
-def _local_rms(d: Deformation, dz: np.ndarray) -> float:
+def _local_rms(d, dz: np.ndarray) -> float:
     """RMS of what a surface of second order leaves."""
     x, y = np.meshgrid(d.x / np.abs(d.x).max(), d.y / np.abs(d.y).max())
     known = np.isfinite(dz)

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from aerotri.conventions import InputError
-from aerotri.formats.block.settings_model import AdjustmentModel, BlockModel, CameraModel, CamerasModel
+from aerotri.formats.block.settings_model import BlockModel, CameraModel, CamerasModel
 from aerotri.formats.text.csv_text import BLANKS
 from aerotri.formats.text.tables import CONTROL_CHARACTERS, SMALLEST_POSITIVE
 from aerotri.formats.text.toml_text import line_of_key, read_toml
@@ -101,14 +101,10 @@ class BlockToml:
         )
 
     def _fixed_element(self, text: str) -> tuple[str, str]:
-        image, _, element = text.rpartition(":")
-        if not image or element not in ORIENTATION_ELEMENTS:
-            raise self.error(
-                ("adjustment", "datum_fixed"),
-                f"datum_fixed = {text!r} names no orientation element",
-                f"write IMAGE:ELEMENT, the element one of {' '.join(ORIENTATION_ELEMENTS)}",
-            )
-        return image, element
+        try:
+            return fixed_element(text)
+        except InputError as error:
+            raise self.error(("adjustment", "datum_fixed"), error.message, error.remedy) from error
 
 
 def _camera_records(
@@ -217,18 +213,48 @@ def _known_keys(where: tuple[Any, ...]) -> str:
     return (f"did you mean '{close[0]}'? " if close else "") + f"known are {', '.join(known)}"
 
 
-def checked_adjustment_settings(values: Mapping[str, object]) -> None:
-    """Settings of the adjustment given elsewhere than in block.toml are held to the same rules.
+def checked_settings(table: str, values: Mapping[str, object]) -> dict[str, Any]:
+    """Settings given elsewhere than in block.toml, held to the same rules; as the records have them.
+
+    Parameters
+    ----------
+    table : of block.toml, such as 'adjustment' or 'gnss'.
 
     Raises
     ------
     InputError
         Naming the setting.
     """
+    model: Any = BlockModel.model_fields[table].annotation
+    listed: dict[str, Any] = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
     try:
-        AdjustmentModel.model_validate(dict(values))
+        model.model_validate(listed)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         name = ".".join(str(part) for part in first["loc"])
+        if first["type"] == "extra_forbidden":
+            raise InputError(f"there is no setting '{name}'", _known_keys((table, name))) from None
         reason = _reason(first)
         raise InputError(f"{name} = {_shown(first['input'])}: {reason}", "correct the setting") from None
+    found = {key: tuple(value) if isinstance(value, list) else value for key, value in listed.items()}
+    if "additional_parameters" in found:
+        found["additional_parameters"] = parse_parameters(listed["additional_parameters"])
+    if "datum_fixed" in found:
+        found["datum_fixed"] = tuple(fixed_element(text) for text in found["datum_fixed"])
+    return found
+
+
+def fixed_element(text: str) -> tuple[str, str]:
+    """Photograph and element of orientation that a datum holds, from 'IMAGE:ELEMENT'.
+
+    Raises
+    ------
+    InputError
+    """
+    image, _, element = text.rpartition(":")
+    if not image or element not in ORIENTATION_ELEMENTS:
+        raise InputError(
+            f"datum_fixed = {text!r} names no orientation element",
+            f"write IMAGE:ELEMENT, the element one of {' '.join(ORIENTATION_ELEMENTS)}",
+        )
+    return image, element
