@@ -19,6 +19,7 @@ from aerotri.formats.block.folder import write_block
 from aerotri.functional_model.rotation import exponential
 from aerotri.pipeline import adjust
 from small_blocks import small_block
+from ten_photographs import ten_photographs, without_start_values
 from wrong_blocks import answer_of, clean, focal_length, image_points, kinds, misses, negated
 
 FEW = (
@@ -54,6 +55,16 @@ def test_nothing_is_said_of_a_block_that_is_only_noisy():
     result = adjust(noisy)
     assert result.outcome.verdict != "accepted"
     assert diagnose(noisy, adjust, result) == ()
+
+
+def test_no_unit_is_said_where_nothing_tells_it():
+    """Control of decimetres stated as centimetres, no other positions: in any smaller unit it would count for less."""
+    block = without_start_values(ten_photographs(1, navigated=False))
+    noise = np.random.default_rng(3).normal(0.0, 0.25, block.control.xyz.shape)
+    noisy = replace(block, control=replace(block.control, xyz=block.control.xyz + noise))
+    result = adjust(noisy)
+    assert result.outcome.verdict != "accepted"
+    assert not [cause for cause in diagnose(noisy, adjust, result) if "taken for what they are" in cause]
 
 
 def test_the_model_of_the_image_points_leaves_a_mirrored_photograph_out():

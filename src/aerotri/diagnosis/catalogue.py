@@ -25,6 +25,7 @@ SUBJECTS: dict[tuple[str, ...], str] = {
     ("start angles",): "start values of the angles",
     ("ins", "start angles"): "attitudes of the INS and start values of the angles",
 }
+POSITIONS = {"control", "check", "gnss", "start"}
 UNITS = ((1e-3, "millimetres"), (1e-2, "centimetres"), (0.3048, "feet"))
 """Metres of one unit that coordinates may have been given in; the international foot is 0.3048 m exactly [L]."""
 ANGLE_UNITS = (
@@ -98,8 +99,10 @@ def _axes_and_units(sets: tuple[str, ...], block: Block, places: Mapping[str, Pl
     yield made(changes.x_and_y_exchanged, "X and Y exchanged")
     for axis, name in enumerate("XYZ"):
         yield made(changes.negated(axis), f"{name} negated")
-    for factor, unit in UNITS:
-        yield made(changes.scaled(factor), f"{unit} taken for what they are, not for metres")
+    # all positions in another unit are a block of another size: nothing given contradicts it, they only count for less
+    if set(sets) < sets_there(block) & POSITIONS:
+        for factor, unit in UNITS:
+            yield made(changes.scaled(factor), f"{unit} taken for what they are, not for metres")
     yield made(changes.scaled_heights(0.3048), "heights in feet taken for what they are, not for metres")
     xyz = _of_set(block, sets[0])
     if changes.could_be_degrees(xyz):
