@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import aerotri
 
 project = "aerotri"
@@ -27,7 +29,7 @@ myst_heading_anchors = 4
 
 # notebooks run where the documentation is built; one that fails stops the build
 nb_execution_mode = "cache"
-nb_execution_cache_path = "_build/.notebooks"
+nb_execution_cache_path = str(Path(__file__).parent / "_build" / ".notebooks")
 nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_merge_streams = True
@@ -39,5 +41,6 @@ numpydoc_show_class_members = False
 html_theme = "pydata_sphinx_theme"
 html_title = "aerotri"
 html_static_path = ["_static"]
+html_css_files = ["notebooks.css"]
 html_theme_options = {"show_prev_next": True, "navbar_align": "left", "secondary_sidebar_items": ["page-toc"]}
 html_copy_source = False

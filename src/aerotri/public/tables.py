@@ -61,9 +61,10 @@ def check_table(adjusted: AdjustedBlock) -> Table:
 
 
 def groups_table(adjusted: AdjustedBlock) -> Table:
-    """Groups of observations."""
+    """Groups of observations; the unit is that of both σ and the RMS."""
     names = ("name", "count", "sigma_apriori", "rms", "redundancy", "sigma_aposteriori")
     columns = {name: np.array([getattr(group, name) for group in adjusted.groups]) for name in names}
+    columns["unit"] = np.array([_unit_of_group(group.name) for group in adjusted.groups], dtype=str)
     return _table("groups of observations", columns)
 
 
@@ -81,6 +82,12 @@ def set_aside_table(adjusted: AdjustedBlock) -> Table:
         "reason": np.concatenate([why.astype(str) for _, _, why in rows]),
     }
     return _table("set aside", columns)
+
+
+def _unit_of_group(name: str) -> str:
+    if name == "image points":
+        return "µm"
+    return "rad" if name == "attitudes" else "m"
 
 
 def write_rows(table: Table, path: Path) -> None:

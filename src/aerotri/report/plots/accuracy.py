@@ -67,8 +67,8 @@ def median_around(xy: np.ndarray, values: np.ndarray, x: np.ndarray, y: np.ndarr
     """(ny, nx) median of the values (n,) of the nearest points (n, 2) at every node; NaN where none is near."""
     nodes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     count = min(NEAREST, len(xy))
-    distance, index = KDTree(xy).query(nodes, k=max(count, 2))
-    index = index[:, :count]
+    found = KDTree(xy).query(nodes, k=max(count, 2))
+    distance, index = np.asarray(found[0]), np.asarray(found[1])[:, :count]
     spacing = np.sqrt(max((x[-1] - x[0]) * (y[-1] - y[0]), 1e-12) / len(xy))
     near = distance[:, 0] <= REACH * spacing
     return np.where(near, np.median(values[index], axis=1), np.nan).reshape(len(y), len(x))
