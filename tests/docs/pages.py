@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from aerotri.cli.app import invoke
@@ -30,10 +30,16 @@ def commands(text: str) -> Iterator[list[str]]:
             yield words[1:]
 
 
-def follow(page: Path, folder: Path) -> Iterator[list[str]]:
+def page_commands(page: Path) -> list[list[str]]:
+    """The arguments of all commands of a page that stand in blocks of shell lines (sh)."""
+    return [words for language, _, text in fences(page) if language == "sh" for words in commands(text)]
+
+
+def follow(page: Path, folder: Path, can_run: Callable[[list[str]], bool] | None = None) -> Iterator[list[str]]:
     """Write each file of a page into a folder and run each of its commands there, in the order of the page.
 
-    A block whose caption is a path with a suffix is a file. The current folder has to be `folder`.
+    A block whose caption is a path with a suffix is a file. The current folder has to be `folder`. Commands for which
+    `can_run` is false are left out.
 
     Yields
     ------
@@ -45,6 +51,6 @@ def follow(page: Path, folder: Path) -> Iterator[list[str]]:
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(text, encoding="utf-8")
         if language == "sh":
-            for arguments in commands(text):
+            for arguments in filter(can_run, commands(text)):
                 assert invoke(arguments) == 0, f"{page.name}: aerotri {shlex.join(arguments)}"
                 yield arguments

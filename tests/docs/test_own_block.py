@@ -11,7 +11,7 @@ PAGE = pages.DOCS / "start" / "own_block.md"
 
 @pytest.fixture(scope="module")
 def followed(tmp_path_factory):
-    """The folder in which the page was followed, and its commands."""
+    """The folder in which the page was followed, and its commands; they draw their plots, which takes some seconds."""
     folder = tmp_path_factory.mktemp("own_block")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
@@ -24,7 +24,7 @@ def outcome(folder, name):
 
 def test_every_adjustment_of_the_page_is_accepted(followed):
     folder, run = followed
-    assert [arguments[0] for arguments in run] == ["adjust", "adjust"]
+    assert [arguments[0] for arguments in run] == ["check", "adjust", "adjust"]
     for name in ("gravel_pit_result", "gravel_pit_rtk"):
         assert outcome(folder, name)["verdict"] == "accepted"
 

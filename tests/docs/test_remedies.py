@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 
 import pages
 
@@ -11,6 +12,7 @@ LEAST_SHARE, LEAST_LENGTH = 0.5, 5
 """Share of a quoted text, and letters, that one piece of a message has to cover; the rest is filled in at run time."""
 
 
+@cache
 def pieces() -> set[str]:
     """All texts of the source code that the program could print, taken apart where something is filled in."""
     found = set()
