@@ -183,14 +183,14 @@ def test_ground_between_pickets_lies_within_its_sigma(proof):
     for kind, spacing, radius, cell in (("rolling", 12.0, 60.0, 2.0), ("dump", 3.0, 25.0, 0.5)):
         site = sites.make_site(kind, spacing, radius, cell)
         triangles = triangulated(np.column_stack([site.xy, site.xy[:, 0]]))
-        pieces = cut_to(site.boundary.polygon, site.xy[triangles])
+        pieces = cut_to(site.polygon, site.xy[triangles])
         used = triangles[pieces.triangle]
         share = pieces.area / areas(site.xy[used])
         missed, raw = [], []
         for seed in range(8):
             z, dense = site.heights(np.random.default_rng(seed))
             xyz = np.column_stack([site.xy, z])
-            left = float(site.weight @ dense) - tin_volume(xyz, triangles, site.boundary)[0]
+            left = float(site.weight @ dense) - tin_volume(xyz, triangles, proof.boundary(site))[0]
             own = ground_between(roughness_of_pickets(xyz, 0.0, np.unique(used)), xyz, used, share, 0.0)
             missed.append((left - own.curvature) / np.sqrt(own.variance))
             raw.append(left / np.sqrt(own.mean_square))

@@ -39,20 +39,15 @@ from __future__ import annotations
 
 import argparse
 import time
+import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import binom
+from scipy.stats import binom, norm
 
-from aerotri.adjustment.ray_status import RayStatus
-from aerotri.observations import Block
-from aerotri.pipeline import adjust
-from aerotri.results.adjusted_block import AdjustedBlock
-from aerotri.simulation import Truth, parse_spec, read_spec, simulate
-from aerotri.simulation.spec import SimulationSpec
-from aerotri.statistics.reliability import critical_value, noncentrality, ray_reliability
+import aerotri
 
 DEMO = Path(__file__).parents[2] / "blocks" / "frederiksstad_ultracam" / "simulation.toml"
 METHODS = ("data-snooping", "adaptive", "danish", "cauchy", "huber")
@@ -88,29 +83,34 @@ class Bulk:
     named: bool
 
 
-def with_method(block: Block, method: str) -> Block:
-    """The block with another robust method."""
-    settings = replace(block.settings.adjustment, robust=method)
-    return replace(block, settings=replace(block.settings, adjustment=settings))
+def adjust(block: aerotri.Block, method: str | None = None) -> aerotri.Adjustment:
+    """The block adjusted by a robust method."""
+    return aerotri.adjust(block, robust=method, explain=False)
 
 
-def flagged(result: AdjustedBlock) -> np.ndarray:
+def flagged(result: aerotri.Adjustment) -> np.ndarray:
     """(m,) rays taken for gross errors."""
-    return (result.rays.status == RayStatus.REMOVED) | (np.nan_to_num(result.rays.weight, nan=1.0) < 0.5)
+    return (result.rays["status"] == "removed") | (np.nan_to_num(result.rays["weight"], nan=1.0) < 0.5)
+
+
+def pair_of(result: aerotri.Adjustment, x: str, y: str) -> np.ndarray:
+    """(m, 2) values of two columns of the rays."""
+    return np.column_stack([result.rays[x], result.rays[y]])
 
 
 def single_blunders(seeds: Iterable[int]) -> list[str]:
     """Lines of the table on single errors."""
     rng, counts = np.random.default_rng(1), np.zeros(7, dtype=int)
     for seed in seeds:
-        block = simulate(parse_spec(SMALL), seed)[0]
-        clean, snooped = adjust(block), adjust(with_method(block, "data-snooping"))
+        block = aerotri.simulate(SMALL, seed).block
+        clean, snooped = adjust(block), adjust(block, "data-snooping")
         foul, rows, axes = with_single_errors(block, clean, rng)
-        found, plain = adjust(with_method(foul, "data-snooping")), adjust(foul)
-        w = clean.rays.w[clean.rays.r > 1e-3]
-        limit = critical_value(ALPHA)
+        found, plain = adjust(foul, "data-snooping"), adjust(foul)
+        w = pair_of(clean, "wx", "wy")[pair_of(clean, "rx", "ry") > 1e-3]
+        limit = norm.ppf(1.0 - ALPHA / 2.0)
         counts += [
-            w.size, np.sum(np.abs(w) > limit), len(rows), np.sum(np.abs(plain.rays.w[rows, axes]) > limit),
+            w.size, np.sum(np.abs(w) > limit), len(rows),
+            np.sum(np.abs(pair_of(plain, "wx", "wy")[rows, axes]) > limit),
             flagged(found)[rows].sum(), len(block.image_points), flagged(snooped).sum(),
         ]  # fmt: skip
     tested, alarms, errors, beyond, removed, rays, lost = counts.tolist()
@@ -124,7 +124,7 @@ def single_blunders(seeds: Iterable[int]) -> list[str]:
     ]
 
 
-def with_single_errors(block: Block, clean: AdjustedBlock, rng: np.random.Generator):
+def with_single_errors(block: aerotri.Block, clean: aerotri.Adjustment, rng: np.random.Generator):
     """Errors of ∇0 in points of five rays or more, each in a point and photograph of its own: block, rows, axes."""
     rays, rows, seen = block.image_points, [], set()
     often = np.bincount(rays.point)[rays.point] >= FEWEST
@@ -134,36 +134,38 @@ def with_single_errors(block: Block, clean: AdjustedBlock, rng: np.random.Genera
             rows.append(int(k))
             seen |= own
     axes, xy = rng.integers(0, 2, len(rows)), rays.xy.copy()
-    xy[rows, axes] += rng.choice([-1.0, 1.0], len(rows)) * ray_reliability(clean).detectable[rows, axes]
+    xy[rows, axes] += rng.choice([-1.0, 1.0], len(rows)) * pair_of(clean, "x_mde_x", "x_mde_y")[rows, axes]
     return replace(block, image_points=replace(rays, xy=xy)), np.array(rows), axes
 
 
-def bulk(clean: Block, foul: Block, truth: Truth, method: str) -> Bulk:
+def bulk(clean: aerotri.Block, flight, method: str) -> Bulk:
     """Counts of one block by one method."""
-    is_check = clean.control.is_check.copy()
-    is_check[truth.control_blunders] = True
-    reference = adjust(replace(clean, control=replace(clean.control, is_check=is_check)))
+    foul, truth = flight.block, flight.truth
+    wrong_control = foul.points[foul.control.point[truth.control_blunders]].tolist()
+    reference = adjust(aerotri.edit(clean, check=wrong_control))
     begun = time.perf_counter()
-    result = adjust(with_method(foul, method))
+    result = adjust(foul, method)
     seconds = time.perf_counter() - begun
     rays, m = foul.image_points, len(foul.image_points)
     wrong, size = np.zeros(m, dtype=bool), np.zeros((m, 2))
     wrong[truth.gross_errors], size[truth.gross_errors] = True, np.abs(truth.gross_error_mm)
+    # an error of δ0·σ/√r is found with the probability POWER
+    delta = norm.ppf(1.0 - ALPHA / 2.0) + norm.ppf(POWER)
     with np.errstate(divide="ignore"):
-        above = (size > noncentrality(ALPHA, POWER) * rays.sigma / np.sqrt(reference.rays.r)).any(axis=1)
+        above = (size > delta * rays.sigma / np.sqrt(pair_of(reference, "rx", "ry"))).any(axis=1)
     keepable = ~wrong & (np.bincount(rays.point[~wrong], minlength=len(foul.points))[rays.point] >= 2)
     gone = flagged(result)
-    there, then = (np.concatenate([r.images.centre, r.images.angles], axis=1) for r in (result, reference))
-    expected = {str(foul.points[foul.control.point[row]]) for row in truth.control_blunders}
-    named = {b.point for b in result.blunders if b.action == "control removed"} == expected
+    there, then = (np.concatenate([r.centre, r.angles], axis=1)
+                   for r in (result.adjusted.images, reference.adjusted.images))  # fmt: skip
+    named = {b.point for b in result.adjusted.blunders if b.action == "control removed"} == set(wrong_control)
     return Bulk(
         int(above.sum()), int((above & gone).sum()), int(keepable.sum()), int((keepable & gone).sum()),
-        int((~wrong).sum()), int((~wrong & gone).sum()), float((np.abs(there - then) / reference.images.sigma).max()),
-        seconds, named,
+        int((~wrong).sum()), int((~wrong & gone).sum()),
+        float((np.abs(there - then) / reference.adjusted.images.sigma).max()), seconds, named,
     )  # fmt: skip
 
 
-def bulk_line(name: str, blocks: Iterable[Callable[[], tuple[Block, Block, Truth]]], method: str) -> str:
+def bulk_line(name: str, blocks: Iterable[Callable[[], tuple]], method: str) -> str:
     """One line of the table on gross errors in bulk."""
     runs = [bulk(*make(), method) for make in blocks]
     total = {key: sum(getattr(run, key) for run in runs) for key in ("above", "flagged", "keepable", "lost", "good")}
@@ -176,19 +178,10 @@ def bulk_line(name: str, blocks: Iterable[Callable[[], tuple[Block, Block, Truth
     )
 
 
-def small_pair(seed: int, control: dict | None = None) -> tuple[Block, Block, Truth]:
-    """The small block of a seed without and with gross errors."""
-    foul = SMALL | BULK
-    if control is not None:
-        foul |= {"control": SMALL["control"] | control}
-    return simulate(parse_spec(SMALL), seed)[0], *simulate(parse_spec(foul), seed)
-
-
-def demo_pair(spec: SimulationSpec, seed: int, control: dict | None = None) -> tuple[Block, Block, Truth]:
-    """The sample block of a seed without and with gross errors."""
-    foul = spec.model_dump() | BULK
-    foul["control"] = spec.control.model_dump() | (control or {})
-    return simulate(spec, seed)[0], *simulate(spec.model_validate(foul), seed)
+def pair(plan: dict, seed: int, control: dict | None = None) -> tuple:
+    """The block of a seed without gross errors, and the flight with them."""
+    foul = plan | BULK | {"control": plan["control"] | (control or {})}
+    return aerotri.simulate(plan, seed).block, aerotri.simulate(foul, seed)
 
 
 def main() -> None:
@@ -196,20 +189,21 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=200, help="of the small block")
     parser.add_argument("--demo-seeds", type=int, default=20, help="of the sample block")
     arguments = parser.parse_args()
-    small, demo, spec = range(1, arguments.seeds + 1), range(1, arguments.demo_seeds + 1), read_spec(DEMO)
+    small, demo = range(1, arguments.seeds + 1), range(1, arguments.demo_seeds + 1)
+    plan = tomllib.loads(DEMO.read_text(encoding="utf-8"))
     print("| single errors | found | expected |\n|---|---|---|")
     print("\n".join(single_blunders(range(1001, 1001 + arguments.seeds))), flush=True)
     print("\n| block | method | seeds | above ∇0 flagged | good lost (of all) | max off, σ | control named | s |")
     print("|---|---|---|---|---|---|---|---|")
     wrong = {"blunders": [{"point": "C03", "error_m": [0.0, 0.0, 10.0]}]}
     for method in METHODS:
-        print(bulk_line("29 photographs", [lambda s=s: small_pair(s) for s in small], method), flush=True)
-    made = [lambda s=s: small_pair(s, wrong) for s in small]
+        print(bulk_line("29 photographs", [lambda s=s: pair(SMALL, s) for s in small], method), flush=True)
+    made = [lambda s=s: pair(SMALL, s, wrong) for s in small]
     print(bulk_line("the same, C03 10 m off", made, METHODS[0]), flush=True)
     for method in METHODS:
-        print(bulk_line("sample block, 132", [lambda s=s: demo_pair(spec, s) for s in demo], method), flush=True)
+        print(bulk_line("sample block, 132", [lambda s=s: pair(plan, s) for s in demo], method), flush=True)
     wrong = {"blunders": [{"point": "C05", "error_m": [0.0, 0.0, 10.0]}]}
-    made = [lambda s=s: demo_pair(spec, s, wrong) for s in demo]
+    made = [lambda s=s: pair(plan, s, wrong) for s in demo]
     print(bulk_line("the same, C05 10 m off", made, METHODS[0]), flush=True)
 
 

@@ -6,6 +6,8 @@ have: then their errors are in both volumes. Pickets are measured in both withou
 stands alone. Every epoch alone, then both differences, the last also as if nothing were in common. Prints a Markdown
 table; with --out writes volume_epochs.md there. The last answer stands in tools/results/volume_epochs.md.
 
+Measures the adjustment's part of σ alone, of pickets at stated places: imports inside on purpose.
+
 Example: python tools/prove/volume_epochs.py --runs 200 --out results
 """
 
@@ -14,14 +16,11 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from aerotri.functional_model.additional_parameters import parse_parameters
-from aerotri.observations import Block
-from aerotri.pipeline import adjust_keeping_system
-from aerotri.results.adjustment import Adjustment
-from aerotri.simulation import Truth, parse_spec, simulate
+import aerotri
 from aerotri.volume.accuracy import volume_sigma
 from aerotri.volume.bases import level
 from aerotri.volume.functionals import tin_volume, triangulated
@@ -30,7 +29,7 @@ from aerotri.volume.pickets import pickets_where_seen
 from aerotri.volume.response import respond
 from aerotri.volume.settings import SigmaOptions
 from volume_monte_carlo import HEADER, row
-from volume_proof.simulated import MATCHING_UM, PARAMETERS, SPEC, measured_pickets
+from volume_proof.simulated import MATCHING_UM, PARAMETERS, SPEC, boundary, measured_pickets
 from volume_proof.sites import LEVEL, Site, make_site
 
 SIGMA_UM = (2.0, 3.0)
@@ -39,37 +38,35 @@ CASES = ("first epoch", "second epoch", "difference, control of their own", "dif
          "the same, σ as if nothing were in common")  # fmt: skip
 
 
-def free_of_noise(seed: int) -> tuple[Block, Truth]:
+def free_of_noise(seed: int) -> tuple[aerotri.Block, Any]:
     """The block without errors of image and control points."""
     spec = SPEC | {
         "tie_points": SPEC["tie_points"] | {"sigma_um": 0.0, "stated_sigma_um": SIGMA_UM[0]},
         "control": SPEC["control"] | {"sigma_m": [0.0, 0.0, 0.0], "stated_sigma_m": list(CONTROL_SIGMA_M)},
     }
-    block, truth = simulate(parse_spec(spec), seed)
-    settings = replace(block.settings.adjustment, additional_parameters=parse_parameters(PARAMETERS))
-    return replace(block, settings=replace(block.settings, adjustment=settings)), truth
+    flight = aerotri.simulate(spec, seed)
+    return aerotri.with_settings(flight.block, parameters=PARAMETERS), flight.truth
 
 
-def observed(block: Block, sigma_um: float, control: np.ndarray, rng: np.random.Generator) -> Adjustment:
+def observed(block: aerotri.Block, sigma_um: float, control: np.ndarray, rng: np.random.Generator):
     """The block with noise of its image points and errors (k, 3) m of its control points, adjusted."""
     rays = block.image_points
     xy = rays.xy + rng.normal(0.0, 1e-3 * sigma_um, rays.xy.shape)
     rays = replace(rays, xy=xy, sigma=np.full_like(rays.sigma, 1e-3 * sigma_um))
-    return adjust_keeping_system(
-        replace(block, image_points=rays, control=replace(block.control, xyz=block.control.xyz + control))
-    )
+    changed = replace(block, image_points=rays, control=replace(block.control, xyz=block.control.xyz + control))
+    return aerotri.adjust(changed, explain=False).record
 
 
-def measured(calibration: Adjustment, truth: Truth, site: Site, z: np.ndarray, rng) -> tuple[float, Part]:
+def measured(calibration, truth, site: Site, z: np.ndarray, rng) -> tuple[float, Part]:
     """Error of the volume of an epoch, and its share in σ."""
     true = np.column_stack([site.xy, z])
     triangles = triangulated(true)
     chosen, seen = pickets_where_seen(calibration, true, 1e-3 * MATCHING_UM)
     assert seen.all(), "the block is too small for the site"
     found = replace(chosen, xyz=measured_pickets(calibration, truth, chosen, rng, frozenset()))
-    value, functional = tin_volume(found.xyz, triangles, site.boundary)
+    value, functional = tin_volume(found.xyz, triangles, boundary(site))
     response = respond(calibration, found, functional.gradient)
-    error = value - tin_volume(true, triangles, site.boundary)[0]
+    error = value - tin_volume(true, triangles, boundary(site))[0]
     return error, Part(calibration, response, None, len(found), len(found.image), 0.0)
 
 
@@ -77,7 +74,7 @@ def sigma_of(site: Site, part: Part, below: Part | None = None) -> float:
     """m³, the adjustment's part."""
     # the surface matters only for the boundary and a spline below
     surface: object = None
-    return volume_sigma(surface, level(LEVEL), site.boundary, part, below, SigmaOptions()).parts["adjustment"]
+    return volume_sigma(surface, level(LEVEL), boundary(site), part, below, SigmaOptions()).parts["adjustment"]
 
 
 def one(site: Site, seed: int) -> list[tuple[float, float]]:
@@ -108,7 +105,7 @@ def main() -> None:
     options = parser.parse_args()
     site = make_site("fractal", 14.0, 120.0, 8.0)
     found = np.array([one(site, seed) for seed in range(1, options.runs + 1)])
-    lines = [f"# σ of a difference of two epochs against its scatter, {site.boundary.area:.0f} m²", "",
+    lines = [f"# σ of a difference of two epochs against its scatter, {site.polygon.area:.0f} m²", "",
              *HEADER.replace("source of error", "volume").split("\n")]  # fmt: skip
     lines += [row(name, *found[:, k].T) for k, name in enumerate(CASES)]
     print("\n".join(lines))

@@ -53,7 +53,7 @@ def of_site(name: str, site: Site, seeds: range, wanted: str) -> list[str]:
     sources = [(part, frozenset([part])) for part in PARTS] + [("all together", ALL)]
     if name in ONLY_INTERPOLATION:
         wanted = ALONE
-    lines = ["", f"## {name[0].upper()}{name[1:]}, {site.boundary.area:.0f} m²", "", *HEADER.split("\n")]
+    lines = ["", f"## {name[0].upper()}{name[1:]}, {site.polygon.area:.0f} m²", "", *HEADER.split("\n")]
     print("\n".join(lines), flush=True)
     for source, on in [(source, on) for source, on in sources if wanted in ("", source)]:
         found = rows(source, [run(site, seed, on) for seed in seeds])

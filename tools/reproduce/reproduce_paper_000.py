@@ -4,6 +4,8 @@ Table 2 (rules over cross sections, spacings 5–50 m), Table 3 (pixel sizes 8�
 intersections side by side) and Table 5 (change of the partials by an error of κ). Prints Markdown; with --out also
 writes paper_000.md and paper_000.png there. The last answer stands in tools/results/paper_000.md.
 
+Measures the formulas of the paper for two photographs, which no command uses: imports inside on purpose.
+
 Example: python tools/reproduce/reproduce_paper_000.py --out results
 """
 

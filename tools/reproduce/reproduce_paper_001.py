@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from aerotri.public.predict import VolumeDesign, simulated_sigma
-from aerotri.volume import theory
+from aerotri import predict
 
+theory = predict.theory
 HEIGHT = 1500.0
 DESIGNS = [(d, n, m) for m in (1, 2) for d, n in ((2, 8), (4, 8), (4, 12), (6, 12))]
 EXACT = 0.02
@@ -93,9 +93,9 @@ def simulated() -> list[str]:
     ]  # fmt: skip
     base = theory.BASE_SHARE * HEIGHT
     for d, n, m in DESIGNS:
-        design = VolumeDesign(HEIGHT, n * base, m * 2.0 * base, d * base)
+        design = predict.VolumeDesign(HEIGHT, n * base, m * 2.0 * base, d * base)
         p = theory.predict_volume(HEIGHT, design.length, design.width, design.bridging)
-        found, exact = simulated_sigma(design), simulated_sigma(design, pointing=EXACT)
+        found, exact = predict.simulated_sigma(design), predict.simulated_sigma(design, pointing=EXACT)
         share = 100.0 * (1.0 - exact**2 / found**2)
         lines.append(f"| {d} | {n} | {m} | {p.spanwise:.3f} | {p.joint:.3f} | {found:.3f} | {found / p.joint:.2f}"
                      f" | {exact:.3f} | {exact / p.joint:.2f} | {share:.0f} % |")  # fmt: skip

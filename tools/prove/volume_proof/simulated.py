@@ -2,24 +2,24 @@
 
 The camera errs by BLUH's parameters, which the adjustment estimates. The ground between the pickets is that of a site.
 Every source of error can be switched on alone.
+
+Measures the parts of σ one by one, of pickets at stated places: imports inside on purpose.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import shapely
 
-from aerotri.functional_model.additional_parameters import parse_parameters
+import aerotri
 from aerotri.functional_model.collinearity import linearise, predict
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.image_errors import image_groups
 from aerotri.image_errors.error_function import ErrorFunction, error_function
-from aerotri.pipeline import adjust_keeping_system
-from aerotri.results.adjustment import Adjustment
-from aerotri.simulation import Truth, parse_spec, simulate
 from aerotri.volume.accuracy import PARTS, boundary_variance
 from aerotri.volume.bases import level
 from aerotri.volume.boundary import Boundary, boundary_of
@@ -54,6 +54,11 @@ BASE_SIGMA, BOUNDARY_SIGMA = 0.03, 0.5
 ALL = frozenset(PARTS)
 
 
+def boundary(site: Site) -> Boundary:
+    """That of a site, as the inside of the package has it."""
+    return boundary_of(site.polygon, site.name)
+
+
 @dataclass(frozen=True)
 class Run:
     """Error of the volume and its σ, m³, the σ of every part, and the curvature foretold with its σ."""
@@ -75,28 +80,28 @@ def run(site: Site, seed: int, on: frozenset[str] = ALL) -> Run:
     chosen, seen = pickets_where_seen(calibration, true, 1e-3 * (MATCHING_UM if "matching" in on else NOISELESS_UM))
     assert seen.all(), "the block is too small for the site"
     found = replace(chosen, xyz=measured_pickets(calibration, truth, chosen, rng, on))
-    value, functional = tin_volume(found.xyz, triangles, site.boundary)
+    value, functional = tin_volume(found.xyz, triangles, boundary(site))
     between = Between()
     if "interpolation" in on:
-        part = part_of_pickets(calibration, found, triangles, site.boundary, level(LEVEL), SigmaOptions())
+        part = part_of_pickets(calibration, found, triangles, boundary(site), level(LEVEL), SigmaOptions())
         response, between = part.response, part.between or between
     else:
         response = respond(calibration, found, functional.gradient)
-    wanted = tin_volume(true, triangles, site.boundary)[0]
+    wanted = tin_volume(true, triangles, boundary(site))[0]
     if "interpolation" in on:
         wanted = float(site.weight @ dense)
     error = value - wanted
     if "base" in on:
-        error += float(rng.normal(0.0, BASE_SIGMA)) * site.boundary.area
+        error += float(rng.normal(0.0, BASE_SIGMA)) * boundary(site).area
     surface = _TinSurface(found.xyz)
     if "boundary" in on:
-        error += _boundary_error(site.boundary, found.xyz, triangles, value, rng)
+        error += _boundary_error(boundary(site), found.xyz, triangles, value, rng)
     parts = {
         "adjustment": np.sqrt(response.variance),
         "matching": np.sqrt(response.noise),
         "interpolation": np.sqrt(between.mean_square),
-        "base": BASE_SIGMA * site.boundary.area,
-        "boundary": np.sqrt(boundary_variance(surface, level(LEVEL), site.boundary, BOUNDARY_SIGMA)),
+        "base": BASE_SIGMA * boundary(site).area,
+        "boundary": np.sqrt(boundary_variance(surface, level(LEVEL), boundary(site), BOUNDARY_SIGMA)),
     }  # fmt: skip
     sigma = np.sqrt(sum(parts[name] ** 2 for name in on))
     curvature = between.curvature, float(np.sqrt(between.variance))
@@ -104,12 +109,12 @@ def run(site: Site, seed: int, on: frozenset[str] = ALL) -> Run:
 
 
 @cache
-def free_of_error() -> tuple[Adjustment, Truth]:
+def free_of_error() -> tuple[Any, Any]:
     """The block adjusted from observations without error: its orientation is the true one."""
     return adjusted_block(1, False)
 
 
-def adjusted_block(seed: int, noisy: bool = True, spec: dict = SPEC) -> tuple[Adjustment, Truth]:
+def adjusted_block(seed: int, noisy: bool = True, spec: dict = SPEC) -> tuple[Any, Any]:
     """A simulated block and its adjustment; without noise its σ stay those of the noise it states."""
     used = spec
     if not noisy:
@@ -117,14 +122,11 @@ def adjusted_block(seed: int, noisy: bool = True, spec: dict = SPEC) -> tuple[Ad
             "tie_points": spec["tie_points"] | {"sigma_um": 0.0, "stated_sigma_um": 2.0},
             "control": spec["control"] | {"sigma_m": [0.0, 0.0, 0.0], "stated_sigma_m": [0.03, 0.03, 0.05]},
         }
-    block, truth = simulate(parse_spec(used), seed)
-    settings = replace(block.settings.adjustment, additional_parameters=parse_parameters(PARAMETERS))
-    return adjust_keeping_system(replace(block, settings=replace(block.settings, adjustment=settings))), truth
+    flight = aerotri.simulate(used, seed)
+    return aerotri.adjust(flight.block, parameters=PARAMETERS, explain=False).record, flight.truth
 
 
-def measured_pickets(
-    calibration: Adjustment, truth: Truth, pickets: Pickets, rng: np.random.Generator, on: frozenset[str]
-) -> np.ndarray:
+def measured_pickets(calibration, truth, pickets: Pickets, rng: np.random.Generator, on: frozenset[str]) -> np.ndarray:
     """(k, 3) m, pickets measured in the true photographs and intersected with the adjusted orientation."""
     block = calibration.result.block
     true = rotation_from_angles(truth.angles, block.rotation)
@@ -137,7 +139,7 @@ def measured_pickets(
     return intersected(rotation, images.centre, function.interior, xy - function.of_measured(xy), pickets)
 
 
-def true_image_points(calibration: Adjustment, truth: Truth, rotation: np.ndarray, pickets: Pickets) -> np.ndarray:
+def true_image_points(calibration, truth, rotation: np.ndarray, pickets: Pickets) -> np.ndarray:
     """(r, 2) mm, where the erring camera shows the pickets, without noise."""
     function = error_function(calibration.local, image_groups(calibration.result.block)[0])
     values = dict(zip(truth.parameter_names, truth.parameter_values, strict=True))

@@ -10,8 +10,6 @@ import shapely
 from scipy.linalg import cholesky
 from scipy.spatial import KDTree
 
-from aerotri.volume.boundary import Boundary, boundary_of
-
 Heights = Callable[[np.random.Generator], np.ndarray]
 LEVEL = 85.0
 EXPONENT, ROUGH = 0.6, 0.08
@@ -35,7 +33,7 @@ class Site:
     xy: np.ndarray
     dense: np.ndarray
     weight: np.ndarray
-    boundary: Boundary
+    polygon: shapely.Polygon
     ground: Heights
 
     def heights(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -63,15 +61,16 @@ def make_site(kind: str, spacing: float, radius: float, cell: float, seed: int =
     x, y = np.meshgrid(np.arange(-reach, reach, spacing), np.arange(-reach, reach, spacing))
     xy = np.column_stack([x.ravel(), y.ravel()]) + rng.uniform(-0.25, 0.25, (x.size, 2)) * spacing
     angle = np.arange(16) * np.pi / 8.0
-    boundary = boundary_of(shapely.Polygon(radius * np.column_stack([np.cos(angle), np.sin(angle)])), "circle")
+    # from its lowest corner, as volumes take it
+    polygon = shapely.normalize(shapely.Polygon(radius * np.column_stack([np.cos(angle), np.sin(angle)])))
     x, y = np.meshgrid(np.arange(-radius, radius, cell), np.arange(-radius, radius, cell))
     cells = shapely.intersection(shapely.box(x.ravel(), y.ravel(), x.ravel() + cell, y.ravel() + cell),
-                                 boundary.polygon)  # fmt: skip
+                                 polygon)  # fmt: skip
     area = shapely.area(cells)
     dense = shapely.get_coordinates(shapely.centroid(cells[area > 0.0]))
     places = np.concatenate([xy, dense])
     make = {"fractal": fractal, "rolling": rolling, "dump": dump, "benches": benches}[kind]
-    return Site(kind, xy, dense, area[area > 0.0], boundary, make(places))
+    return Site(kind, xy, dense, area[area > 0.0], polygon, make(places))
 
 
 def fractal(places: np.ndarray) -> Heights:

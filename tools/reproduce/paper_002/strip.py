@@ -14,9 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.observations import Block
-from aerotri.pipeline import AdjustmentFailedError, adjust
-from aerotri.simulation import SimulationSpec, Truth, parse_spec, simulate
+import aerotri
 
 PHOTOGRAPHS = 50
 FOCAL_LENGTH_MM, SCALE = 152.0, 5000.0
@@ -88,8 +86,8 @@ def pairs_every(bases: int, photographs: int = PHOTOGRAPHS, across: float = 0.4)
     return tuple((a / last, 0.5 + side * across) for a in along for side in (-1, 1))
 
 
-def strip_spec(case: Case, photographs: int = PHOTOGRAPHS) -> SimulationSpec:
-    """The simulation of a case, flown from west to east: roll is ω."""
+def strip_plan(case: Case, photographs: int = PHOTOGRAPHS) -> dict:
+    """The flight plan of a case, flown from west to east: roll is ω."""
     tables = {
         "name": "paper_002",
         "camera": {
@@ -130,10 +128,10 @@ def strip_spec(case: Case, photographs: int = PHOTOGRAPHS) -> SimulationSpec:
         tables["gnss"] = {"sigma_m": [case.gnss_m] * 3}
     if case.towers:
         tables["towers"] = {"height_m": 15.0, "sigma_m": 0.01}
-    return parse_spec(tables)
+    return tables
 
 
-def with_fewer_heights(block: Block, case: Case, photographs: int) -> Block:
+def with_fewer_heights(block: aerotri.Block, case: Case, photographs: int) -> aerotri.Block:
     """The block with the heights of its control left out but for the first and last and every so many bases between."""
     if case.heights_every is None:
         return block
@@ -146,13 +144,13 @@ def with_fewer_heights(block: Block, case: Case, photographs: int) -> Block:
     return replace(block, control=replace(block.control, xyz=xyz, sigma=sigma))
 
 
-def without_errors(block: Block, truth: Truth, spec: SimulationSpec) -> Block:
+def without_errors(block: aerotri.Block, centre: np.ndarray, plan: dict) -> aerotri.Block:
     """The block with true projection centres and true image coordinates in place of the observed ones."""
-    exact = spec.tie_points.model_copy(update={"sigma_um": 0.0, "stated_sigma_um": spec.tie_points.sigma_um})
-    clean, _ = simulate(spec.model_copy(update={"tie_points": exact}), 1)
+    exact = plan["tie_points"] | {"sigma_um": 0.0, "stated_sigma_um": plan["tie_points"]["sigma_um"]}
+    clean = aerotri.simulate(plan | {"tie_points": exact}, 1).block
     gnss = block.gnss_ins
     if gnss is not None:
-        gnss = replace(gnss, xyz=truth.centre[gnss.image])
+        gnss = replace(gnss, xyz=centre[gnss.image])
     return replace(block, image_points=clean.image_points, gnss_ins=gnss)
 
 
@@ -171,7 +169,7 @@ def run(case: Case, seeds: Iterable[int], photographs: int = PHOTOGRAPHS) -> Pre
     """Simulate and adjust a case; theoretical and practical precision of its pass points."""
     try:
         runs = [_run(case, seed, photographs) for seed in ((1,) if case.exact else seeds)]
-    except AdjustmentFailedError as failure:
+    except aerotri.AdjustmentFailedError as failure:
         nothing = np.full(3, np.nan)
         return Precision(nothing, nothing, nothing, np.nan, np.zeros(0), np.zeros((0, 3)), str(failure))
     squares = np.array([one.square for one in runs])
@@ -186,10 +184,11 @@ def run(case: Case, seeds: Iterable[int], photographs: int = PHOTOGRAPHS) -> Pre
 
 
 def _run(case: Case, seed: int, photographs: int) -> _Run:
-    spec = strip_spec(case, photographs)
-    block, truth = simulate(spec, seed)
-    block = with_fewer_heights(block, case, photographs)
-    result = adjust(without_errors(block, truth, spec) if case.exact else block)
+    plan = strip_plan(case, photographs)
+    flight = aerotri.simulate(plan, seed)
+    truth, block = flight.truth, with_fewer_heights(flight.block, case, photographs)
+    observed = without_errors(block, truth.centre, plan) if case.exact else block
+    result = aerotri.adjust(observed, explain=False).adjusted
     # where there are no errors σ̂0 says nothing, and the σ are those of the weights
     scale = result.outcome.sigma0 if case.exact else 1.0
     image_sigma, point_sigma = result.images.sigma / scale, result.points.sigma / scale
