@@ -10,25 +10,7 @@ options or a file. Kinds of files are told from their content, or stated: ``kind
 - positions: csv (columns by name), pix4d-geo, odm-geo
 - control: csv (columns by name), pix4d-gcp, ign-app, patb-con, odm-gcp (with its image points)
 
-The data sets that stand beside the project:
-
-.. code-block:: sh
-
-    # 581 photographs, image points of BINGO, RTK positions, six control points named GCP02 here and GCP_GCP02 there
-    aerotri convert ../shared/data/cu_sbr_p1/tp_bingo.txt cu_sbr_p1 \\
-      --positions ../shared/data/cu_sbr_p1/gnss_positions.csv --gnss-shift off \\
-      --control ../shared/data/cu_sbr_p1/control_points.csv --control-prefix GCP_ \\
-      --camera-name P1 --camera-size 8192x5460 --pixel-um 4.27246 --focal-length-mm 35.01 --free-interior \\
-      --image-sigma-px 0.5 --crs EPSG:32647
-
-    # seven UltraCam Eagle M3: heights of .OPK above the geoid and corrected for scale, those of .app ellipsoidal; the
-    # seventeen tie points alone do not hold them, so the orientations are observations too
-    aerotri convert ../shared/data/ultracam_eagle_m3 eagle --pixel-um 4 --image-sigma-px 0.5 --crs EPSG:2154+5720 \\
-      --geoid ../shared/data/ultracam_eagle_m3/fr_ign_RAF20.tif --control-heights ellipsoidal \\
-      --linear-alteration 5 --control-sigma-m 0.05 --orientation-sigma-m 0.1 --orientation-sigma-deg 0.002
-
-    # four DMC photographs: orientations and camera, no image points
-    aerotri convert ../shared/data/dmc_ngi/camera_pos_ori.txt dmc --camera ../shared/data/dmc_ngi/config.yaml
+The commands for the public data sets stand in docs/validation/data.md.
 """
 
 from __future__ import annotations
