@@ -7,15 +7,15 @@ from inspect import Parameter, signature
 import pytest
 
 import aerotri
-from aerotri.cli import adjusting, blocks, run, terrain, volumes
+from aerotri.cli import adjusting, blocks, converting, run, terrain, volumes
 from aerotri.public.simulating import SimulatedBlock
 
 NOTHING = (None, "", (), [], "auto")
 PAIRS = {
     "simulate": (blocks.simulate, SimulatedBlock.save),
     "seed of simulate": (blocks.simulate, aerotri.simulate),
-    "convert": (blocks.convert, aerotri.read),
-    "tiepoints": (blocks.tiepoints, aerotri.tie_points),
+    "convert": (converting.convert, aerotri.read),
+    "tiepoints": (converting.tiepoints, aerotri.tie_points),
     "compare-parameters": (adjusting.compare_parameters, aerotri.compare_parameters),
     "dtm": (terrain.dtm, aerotri.terrain),
     "volume": (volumes.volume, aerotri.volume),
@@ -23,6 +23,8 @@ PAIRS = {
     "predict attitude": (volumes.predict_attitude, aerotri.predict.attitude),
     "predict picket-interval": (terrain.predict_picket_interval, aerotri.predict.picket_interval),
     "run": (run.run, aerotri.run),
+    "adjust": (adjusting.adjust, aerotri.adjust),
+    "check": (blocks.check, aerotri.check),
 }
 
 

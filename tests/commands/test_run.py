@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from test_cli import run
 
+from aerotri.cli.app import invoke
 from aerotri.commands.run import run_all
 from aerotri.conventions import InputError
+from aerotri.formats.block.folder import read_block
 from aerotri.formats.block.writer import write_block
 from chain_of_fakes import Fakes, ends_of
 from small_blocks import small_block
@@ -35,6 +37,20 @@ def test_block_is_adjusted_and_terrain_named(block_folder, tmp_path):
     assert page.count("<iframe sandbox srcdoc=") == 1
     assert "&lt;h2" in page
     assert "<script" not in page
+
+
+def test_control_points_made_check_points(block_folder, tmp_path):
+    """By adjust and by run alike; a name that is none is refused."""
+    names = read_block(block_folder).points[read_block(block_folder).control.point].tolist()
+    given = ["--check", names[0], "--check", names[2], "--parameters", "none", "--no-plots"]
+    assert invoke(["adjust", str(block_folder), "--out", str(tmp_path / "result"), *given]) == 0
+    assert invoke(["run", str(block_folder), "--out", str(tmp_path / "out"), *given]) == 0
+    for result in (tmp_path / "result", tmp_path / "out" / "result"):
+        checks = [line.split(",")[0] for line in (result / "check.csv").read_text().splitlines()[1:]]
+        assert {names[0], names[2]} <= set(checks)
+        assert names[1] not in checks
+    with pytest.raises(InputError, match="--check nobody: there is no such control point"):
+        invoke(["adjust", str(block_folder), "--check", "nobody"])
 
 
 def test_every_step_is_told(block_folder, tmp_path, capsys):

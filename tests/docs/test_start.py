@@ -57,7 +57,7 @@ def test_other_programs(place):
         return not names & missing
 
     run = list(pages.follow(START / "other_programs.md", place, can_run))
-    made = {words[2] for words in run if words[0] == "convert"}
+    made = {words[words.index("--out") + 1] for words in run if words[0] == "convert"}
     assert {"from_metashape", "from_opk", "from_colmap", "from_bundler", "from_opensfm"} <= made
     for name in made:
         if (place / name / "block.toml").is_file():

@@ -53,7 +53,7 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
     assert adjust == ("adjust", (str(out / "block"), str(out / "result")), {"plots": True})
     assert "camera" not in tie[2]
     assert terrain == ("terrain", (str(out / "result"), str(photographs)), {"interval": 5.0})
-    assert volume[1] == (str(out / "dtm" / "dsm.tif"),)
+    assert volume[1] == (str(out / "dtm"),)
     assert (volume[2]["boundary"], volume[2]["base"]) == ("pile.gpkg", "lowest")
     assert volume[2]["adjustment"] == out / "result"
     lines = [step["arguments"] for step in json.loads((out / "run.json").read_text())["steps"]]
@@ -63,9 +63,31 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
         "--features", "2000",
     ]  # fmt: skip
     assert lines[1] == ["adjust", str(out / "block"), "--out", str(out / "result")]
+    assert lines[3][:4] == ["volume", str(out / "dtm"), "--adjustment", str(out / "result")]
     assert lines[3][-5:] == ["--boundary", "pile.gpkg", "--base", "lowest", "--no-plots"]
     assert project.block == "adjusted"
     assert project.volume is not None
+
+
+def test_the_layer_of_the_volume_is_told(fakes, photographs, tmp_path):
+    """The surface with objects where nothing is said; the ground alone where it is asked for."""
+    aerotri.run(photographs, tmp_path / "out", boundary="pile.gpkg", layer="dtm")
+    assert fakes.called[-1][2]["layer"] == "dtm"
+    steps = json.loads((tmp_path / "out" / "run.json").read_text())["steps"]
+    assert steps[3]["arguments"][-2:] == ["--layer", "dtm"]
+
+
+def test_what_is_said_of_photographs_is_refused_with_a_block(fakes, tmp_path):
+    """It would have no effect; check points are those of the adjustment then."""
+    (tmp_path / "block").mkdir()
+    (tmp_path / "block" / "block.toml").write_text("")
+    with pytest.raises(InputError, match="--gcp, --pixel-um: for photographs only"):
+        aerotri.run(tmp_path / "block", tmp_path / "out", control="gcp_list.txt", pixel_um=4.0)
+    aerotri.run(tmp_path / "block", tmp_path / "out", check=["K1"])
+    assert fakes.verbs == ["adjust"]
+    assert fakes.called[0][2]["check"] == ("K1",)
+    steps = json.loads((tmp_path / "out" / "run.json").read_text())["steps"]
+    assert steps[0]["arguments"][-2:] == ["--check", "K1"]
 
 
 def test_settings_as_a_command_line():

@@ -47,6 +47,24 @@ def test_bases_of_a_level(cone, base):
     assert aerotri.volume(cone, PILE, base=base).net == pytest.approx(np.pi * RADIUS**2 * HEIGHT / 3.0, rel=3e-3)
 
 
+def test_the_folder_of_a_terrain_model(measured):
+    """With its pickets, as the model in memory; with objects, or the ground alone where that is asked for."""
+    _, result, model, folder = measured
+    grid = model.dsm.grid
+    left, bottom, right, top = grid.bounds
+    middle = shapely.box(left, bottom, right, top).centroid.buffer(0.2 * min(right - left, top - bottom))
+    held = aerotri.volume(model, middle, base="lowest", adjustment=result)
+    read = aerotri.volume(folder, middle, base="lowest", adjustment=result)
+    assert read.net == pytest.approx(held.net, rel=1e-6)
+    assert read.sigma == pytest.approx(held.sigma, rel=1e-3)
+    assert read.summary["sigma"]["pickets"] == held.summary["sigma"]["pickets"] > 0
+    for layer in ("dsm", "dtm"):
+        alone = aerotri.volume(folder / f"{layer}.tif", middle, base="lowest")
+        assert aerotri.volume(folder, middle, base="lowest", layer=layer).net == alone.net
+    with pytest.raises(InputError, match="no layer 'ground'"):
+        aerotri.volume(folder, middle, layer="ground")
+
+
 def test_from_memory_as_from_files(cone, tmp_path):
     path = cone.save(tmp_path / "cone.tif")
     flat = aerotri.Surface.of_array(np.full((160, 160), 99.5), left=-80.0, top=80.0, cell=1.0, name="flat")

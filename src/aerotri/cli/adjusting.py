@@ -8,48 +8,93 @@ from typing import Annotated
 import typer
 
 from aerotri.cli.app import app
-from aerotri.cli.options import BlockFolder, ControlPrefix, GeoidGrid, Json
+from aerotri.cli.options import (
+    ADJUSTMENT,
+    ARGUMENTS,
+    INPUT,
+    METHOD,
+    OUTPUT,
+    BlockFolder,
+    CheckPoints,
+    ControlPrefix,
+    GeoidGrid,
+    Json,
+    Robust,
+)
 
 
-@app.command(epilog="Example: aerotri adjust blocks/frederiksstad_ultracam --parameters bluh:1-12,ultracam_d:42-73")
+@app.command(
+    rich_help_panel=ADJUSTMENT,
+    epilog="Example: aerotri adjust blocks/frederiksstad_ultracam --parameters bluh:1-12,ultracam_d:42-73",
+)
 def adjust(
     block: BlockFolder,
-    out: Annotated[Path | None, typer.Option(help="Result folder; default NAME_result in the current folder.")] = None,
-    parameters: Annotated[
-        str | None, typer.Option(help="Additional parameters: bluh:1-8+12,ultracam_d:42-73, brown:K1+K2, none, auto.")
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; default NAME_result here.", rich_help_panel=OUTPUT)
     ] = None,
-    robust: Annotated[str | None, typer.Option(help="off, huber, danish, cauchy, adaptive or data-snooping.")] = None,
+    parameters: Annotated[
+        str | None,
+        typer.Option(
+            help="Additional parameters (self-calibration): bluh:1-8+12,ultracam_d:42-73, brown:K1+K2, auto, none. "
+            "Default: as block.toml says.",
+            rich_help_panel=METHOD,
+        ),
+    ] = None,
+    robust: Robust = None,
+    check: CheckPoints = None,
+    control_prefix: ControlPrefix = "",
     geoid: GeoidGrid = None,
     check_free: Annotated[
-        bool, typer.Option("--check-free", help="Adjust free as well: is an error in the tie points or in the control?")
+        bool,
+        typer.Option(
+            "--check-free",
+            help="Adjust without the control as well: is an error in the tie points or in the control?",
+            rich_help_panel=METHOD,
+        ),
     ] = False,
-    control_prefix: ControlPrefix = "",
-    plots: Annotated[bool, typer.Option(help="Draw the plots and the report.")] = True,
+    plots: Annotated[bool, typer.Option(help="Draw the plots and the report.", rich_help_panel=OUTPUT)] = True,
     json_: Json = False,
 ) -> None:
     """Adjust a block: orientation, points, self-calibration, and σ of everything."""
     from aerotri.commands.adjust import run_adjust
 
-    raise typer.Exit(run_adjust(block, out, parameters, robust, geoid, plots, json_, check_free, control_prefix))
+    names = tuple(check or ())
+    raise typer.Exit(run_adjust(block, out, parameters, robust, geoid, plots, json_, check_free, control_prefix, names))
 
 
-@app.command(epilog="Example: aerotri parameters --family dmc --draw patterns")
+@app.command(rich_help_panel=ADJUSTMENT, epilog="Example: aerotri parameters --family dmc --out patterns")
 def parameters(
-    family: Annotated[str | None, typer.Option(help="One family in full, such as bluh or dmc.")] = None,
-    draw: Annotated[Path | None, typer.Option(help="Folder to picture every pattern in.")] = None,
+    family: Annotated[
+        str | None, typer.Option(help="One family in full, such as bluh or dmc.", rich_help_panel=INPUT)
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder to write a picture of every pattern to.", rich_help_panel=OUTPUT),
+    ] = None,
+    draw: Annotated[Path | None, typer.Option(hidden=True, help="The old form of --out.")] = None,
     json_: Json = False,
 ) -> None:
     """The sets of additional parameters: names, mark, source, pattern."""
+    from aerotri.commands.console import OldForm
     from aerotri.commands.parameters import run_parameters
 
-    run_parameters(draw, family, json_)
+    form = OldForm(out, draw, "--draw DIR", "--out DIR")
+    run_parameters(form.target, family, json_)
+    form.tell()
 
 
-@app.command(epilog="Example: aerotri diff before_result after_result --top 10")
+@app.command(
+    rich_help_panel=ADJUSTMENT, epilog="Example: aerotri diff plain_result frederiksstad_ultracam_result --top 10"
+)
 def diff(
-    first: Annotated[Path, typer.Argument(help="Result folder of the first run.")],
-    second: Annotated[Path, typer.Argument(help="Result folder of the second run; its σ measure the changes.")],
-    top: Annotated[int, typer.Option(help="How many photographs, points, rays to name.")] = 5,
+    first: Annotated[Path, typer.Argument(help="Result folder of the first run.", rich_help_panel=ARGUMENTS)],
+    second: Annotated[
+        Path,
+        typer.Argument(help="Result folder of the second run; its σ measure the changes.", rich_help_panel=ARGUMENTS),
+    ],
+    top: Annotated[
+        int, typer.Option(help="Number of photographs, points and image points to name.", rich_help_panel=OUTPUT)
+    ] = 5,
     json_: Json = False,
 ) -> None:
     """What changed between two runs, against σ."""
@@ -58,19 +103,35 @@ def diff(
     raise typer.Exit(run_diff(first, second, top, json_))
 
 
-@app.command("compare-parameters", epilog="Example: aerotri compare-parameters saar --set none --set bluh:1-12")
+@app.command(
+    "compare-parameters",
+    rich_help_panel=ADJUSTMENT,
+    epilog="Example: aerotri compare-parameters blocks/frederiksstad_ultracam --set none --set bluh:1-12 --folds 3",
+)
 def compare_parameters(
     block: BlockFolder,
     sets: Annotated[
         list[str] | None,
-        typer.Option("--set", help="A set, as adjust --parameters takes it; may repeat. Default: one of each family."),
+        typer.Option(
+            "--set",
+            help="A set, as adjust --parameters takes it. May be repeated. Default: one of each family.",
+            rich_help_panel=METHOD,
+        ),
     ] = None,
     folds: Annotated[
-        int, typer.Option(min=2, max=1000, help="Parts in which control points are left out and predicted.")
+        int,
+        typer.Option(
+            min=2,
+            max=1000,
+            help="Number of parts in which control points are left out and predicted.",
+            rich_help_panel=METHOD,
+        ),
     ] = 10,
-    robust: Annotated[str | None, typer.Option(help="off, huber, danish, cauchy or adaptive.")] = None,
+    robust: Robust = None,
     geoid: GeoidGrid = None,
-    out: Annotated[Path | None, typer.Option(help="Folder to write; default NAME_compare here.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; default NAME_compare here.", rich_help_panel=OUTPUT)
+    ] = None,
     json_: Json = False,
 ) -> None:
     """Sets of additional parameters side by side: fit, check points, cross-validation over control points."""

@@ -5,9 +5,25 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from aerotri.cli.numbers import CheckedCommand
+from aerotri.cli.options import COMMAND_PANELS, PLANNING
 from aerotri.version import __version__
+
+MARKUP = "markdown"
+"""How help texts are read: panels, and nothing in square brackets is lost."""
+
+
+class ByPanel(TyperGroup):
+    """Commands in the order of their panels, whatever module they stand in."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        def place(name: str) -> int:
+            panel = getattr(self.commands[name], "rich_help_panel", "")
+            return COMMAND_PANELS.index(panel) if panel in COMMAND_PANELS else len(COMMAND_PANELS)
+
+        return sorted(super().list_commands(ctx), key=place)
 
 
 class Program(typer.Typer):
@@ -19,14 +35,14 @@ class Program(typer.Typer):
 
 app = Program(
     name="aerotri",
+    cls=ByPanel,
     help="Bundle block adjustment with self-calibration for aerial photographs, and how sure it is.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
-    rich_markup_mode=None,
+    rich_markup_mode=MARKUP,
 )
-predict = Program(help="What a flight will give, before it is flown.", no_args_is_help=True, rich_markup_mode=None)
-app.add_typer(predict, name="predict")
+predict = Program(help="What a flight will give, before it is flown.", no_args_is_help=True, rich_markup_mode=MARKUP)
+app.add_typer(predict, name="predict", rich_help_panel=PLANNING)
 
 
 def invoke(arguments: list[str]) -> int:
@@ -41,7 +57,9 @@ def invoke(arguments: list[str]) -> int:
 
 
 @app.callback(invoke_without_command=True)
-def version(show: Annotated[bool, typer.Option("--version", help="Print the version.")] = False) -> None:
+def version(
+    show: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
     if show:
         print(__version__)
         raise typer.Exit

@@ -8,38 +8,72 @@ from typing import Annotated, Any, cast
 import typer
 
 from aerotri.cli.app import app
-from aerotri.cli.options import Json, Overwrite, ResultFolder
+from aerotri.cli.options import ARGUMENTS, IMAGE_ERRORS, INPUT, METHOD, OUTPUT, Json, Overwrite, ResultFolder
 from aerotri.rasters.photograph_settings import COMPRESSION, RESAMPLING
 
 
-@app.command(epilog="Example: aerotri deform saar_result --end-lap 0.663 --variant absorbed --out saar_deformation")
+@app.command(
+    rich_help_panel=IMAGE_ERRORS,
+    epilog="Example: aerotri deform frederiksstad_ultracam_result --end-lap 0.663 --out deformation",
+)
 def deform(
     result: ResultFolder,
     pair: Annotated[
-        tuple[str, str] | None, typer.Option(help="Two photographs of the block, left and right, as flown.")
+        tuple[str, str] | None,
+        typer.Option(help="Two photographs of the block, left and right, as flown.", rich_help_panel=INPUT),
     ] = None,
     end_lap: Annotated[
-        float | None, typer.Option(help="End lap of a normal-case model, such as 0.663; its ground is flat.")
+        float | None,
+        typer.Option(
+            help="A model of two level photographs with this end lap, a share of 1 such as 0.663, over flat ground.",
+            rich_help_panel=INPUT,
+        ),
     ] = None,
     block: Annotated[
-        bool, typer.Option("--block", help="The whole block, every node in the model nearest to it (the default).")
+        bool,
+        typer.Option(
+            "--block",
+            help="The whole block, every place in the model nearest to it. This is the default.",
+            rich_help_panel=INPUT,
+        ),
     ] = False,
     step: Annotated[
-        int, typer.Option(min=1, help="With --block: pair every photograph with the STEP-th after it in its strip.")
+        int,
+        typer.Option(
+            min=1,
+            help="With --block: a pair is a photograph and the one this number of photographs further in its strip.",
+            rich_help_panel=METHOD,
+        ),
     ] = 1,
     variant: Annotated[
-        str, typer.Option(help="free: orientation of the result; absorbed: as adjusted without parameters.")
+        str,
+        typer.Option(
+            help="free: orientation of the result; absorbed: as adjusted without additional parameters.",
+            rich_help_panel=METHOD,
+        ),
     ] = "free",
-    dem: Annotated[Path | None, typer.Option(help="DEM to take the ground from (GeoTIFF); flat without.")] = None,
-    spacing: Annotated[float | None, typer.Option(help="Metres between nodes.")] = None,
+    dem: Annotated[
+        Path | None,
+        typer.Option(help="DEM (GeoTIFF) to take the ground from; flat without.", rich_help_panel=INPUT),
+    ] = None,
+    spacing: Annotated[
+        float | None, typer.Option(help="Distance of the computed places, m.", rich_help_panel=METHOD)
+    ] = None,
     gsd: Annotated[
-        float | None, typer.Option(help="With --end-lap: GSD in metres, in place of the block's own.")
+        float | None,
+        typer.Option(help="With --end-lap: GSD, m, in place of the block's own.", rich_help_panel=METHOD),
     ] = None,
     group: Annotated[
-        str | None, typer.Option(help="With --end-lap: parameter group (camera, day), that of most photographs else.")
+        str | None,
+        typer.Option(
+            help="With --end-lap: parameter group (camera, day). Default: that of most photographs.",
+            rich_help_panel=METHOD,
+        ),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder to write; default NAME_deformation here.")] = None,
-    plots: Annotated[bool, typer.Option(help="Draw contours and profiles.")] = True,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; default NAME_deformation here.", rich_help_panel=OUTPUT)
+    ] = None,
+    plots: Annotated[bool, typer.Option(help="Draw contours and profiles.", rich_help_panel=OUTPUT)] = True,
     json_: Json = False,
 ) -> None:
     """What the systematic image errors do to stereo models: dX, dY, dZ and the σ of every node."""
@@ -49,47 +83,80 @@ def deform(
     raise typer.Exit(run_deform(result, options, out, plots, json_))
 
 
-@app.command(epilog="Example: aerotri demcor saar_result dem.tif --pair 01_003 01_004 --out dem_corrected.tif")
+@app.command(
+    rich_help_panel=IMAGE_ERRORS,
+    epilog="Example: aerotri demcor drone_project/result drone_project/dtm/dsm.tif --pair 2_001.jpg 2_002.jpg "
+    "--out dsm_corrected.tif",
+)
 def demcor(
-    result: Annotated[Path, typer.Argument(help="Result folder of `aerotri adjust` with additional parameters.")],
-    dem: Annotated[Path, typer.Argument(help="DEM to correct (GeoTIFF), in the CRS of the block.")],
-    out: Annotated[Path, typer.Option(help="Corrected DEM to write; dZ, σ and a JSON file stand beside it.")],
+    result: Annotated[
+        Path,
+        typer.Argument(help="Result folder of `aerotri adjust` with additional parameters.", rich_help_panel=ARGUMENTS),
+    ],
+    dem: Annotated[
+        Path, typer.Argument(help="DEM to correct (GeoTIFF), in the CRS of the block.", rich_help_panel=ARGUMENTS)
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(help="Corrected DEM to write; dZ, σ and a JSON file stand beside it.", rich_help_panel=OUTPUT),
+    ],
     pair: Annotated[
-        tuple[str, str] | None, typer.Option(help="The two photographs the DEM was made of, left and right.")
+        tuple[str, str] | None,
+        typer.Option(help="The two photographs the DEM was made of, left and right.", rich_help_panel=INPUT),
     ] = None,
     models: Annotated[
         Path | None,
-        typer.Option(help="Map of the models: polygons (GeoJSON, GeoPackage) with left and right, or a raster."),
+        typer.Option(
+            help="Map of the models: polygons (GeoJSON, GeoPackage) with left and right, or a raster.",
+            rich_help_panel=INPUT,
+        ),
     ] = None,
     model_table: Annotated[
-        Path | None, typer.Option(help="Table number,left,right of a raster; default models.csv or NAME.csv beside it.")
+        Path | None,
+        typer.Option(
+            help="Table number,left,right of a raster; default models.csv or NAME.csv beside it.",
+            rich_help_panel=INPUT,
+        ),
     ] = None,
     dem_orientation: Annotated[
         str | None,
         typer.Option(
-            help="Orientation the DEM was made with: images.csv, a result, or absorbed; default that of RESULT."
+            help="Orientation the DEM was made with: images.csv, a result, or absorbed. Default: that of RESULT.",
+            rich_help_panel=METHOD,
         ),
     ] = None,
     overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:
-    """Free a DEM of the deformation of its models: heights and plan, window by window, with σ."""
+    """Correct a DEM for the deformation of its models: heights and plan, window by window, with σ."""
     from aerotri.commands.demcor import run_demcor
 
     raise typer.Exit(run_demcor(result, dem, out, pair, models, model_table, dem_orientation, json_, overwrite))
 
 
-@app.command(epilog="Example: aerotri imgeo saar_result photographs/*.tif --out ideal")
+@app.command(
+    rich_help_panel=IMAGE_ERRORS,
+    epilog="Example: aerotri imgeo drone_project/result blocks/drone_site/photographs/2_002.jpg --out ideal",
+)
 def imgeo(
     result: ResultFolder,
     photographs: Annotated[
-        list[Path] | None, typer.Argument(help="TIFF or JPEG files, named as in the block; none: the exports alone.")
+        list[Path] | None,
+        typer.Argument(
+            help="Photographs, TIFF or JPEG, named as in the block. Without any: the other files alone.",
+            rich_help_panel=ARGUMENTS,
+        ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("ideal"),
-    resampling: Annotated[str, typer.Option(help="bicubic or lanczos.")] = RESAMPLING,
-    compression: Annotated[str, typer.Option(help="keep, deflate, lzw, zstd or none.")] = COMPRESSION,
+    out: Annotated[Path, typer.Option(help="Folder to write.", rich_help_panel=OUTPUT)] = Path("ideal"),
+    resampling: Annotated[str, typer.Option(help="bicubic or lanczos.", rich_help_panel=METHOD)] = RESAMPLING,
+    compression: Annotated[
+        str, typer.Option(help="keep, deflate, lzw, zstd or none.", rich_help_panel=OUTPUT)
+    ] = COMPRESSION,
     group: Annotated[
-        str | None, typer.Option(help="Parameter group (camera, day) of photographs that are not in the block.")
+        str | None,
+        typer.Option(
+            help="Parameter group (camera, day) of photographs that are not in the block.", rich_help_panel=METHOD
+        ),
     ] = None,
     overwrite: Overwrite = False,
     json_: Json = False,

@@ -8,6 +8,7 @@ from typing import Any, cast
 import typer
 from typer.core import TyperCommand
 
+from aerotri.cli.options import HELP
 from aerotri.conventions import LARGEST
 
 LARGEST_COUNT = 2**31 - 1
@@ -17,7 +18,14 @@ LARGEST_SEED = 2**63 - 1
 
 
 class CheckedCommand(TyperCommand):
-    """A command whose numbers are held against what can be, before anything is done."""
+    """A command whose numbers are held against what can be, before anything is done; help stands last."""
+
+    def get_help_option(self, ctx: Any) -> Any:
+        """--help in the panel of its own."""
+        option: Any = super().get_help_option(ctx)
+        if option is not None:
+            option.rich_help_panel = HELP
+        return option
 
     def invoke(self, ctx: Any) -> Any:
         for param in self.params:

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have."""
+"""Arguments and options that several commands have, and the panels in which help shows them."""
 
 from __future__ import annotations
 
@@ -7,22 +7,122 @@ from typing import Annotated
 
 import typer
 
-Json = Annotated[bool, typer.Option("--json", help="Print the outcome as JSON instead of text.")]
-BlockFolder = Annotated[Path, typer.Argument(help="Block folder, or its block.toml.")]
+ARGUMENTS, INPUT, CONTROL, CAMERA, PLACE, SIGMAS = (
+    "Arguments", "Input", "Control and check points", "Camera", "Coordinate system", "Standard deviations",
+)  # fmt: skip
+METHOD, SURFACE, OUTPUT, HELP = "Method", "Surface and base", "Output", "Help"
+"""Panels of options."""
+FIRST, BLOCKS, ADJUSTMENT, IMAGE_ERRORS, TERRAIN, PLANNING = (
+    "All steps", "Blocks", "Adjustment", "Image errors", "Terrain and volumes", "Before the flight",
+)  # fmt: skip
+"""Panels of commands."""
+COMMAND_PANELS = (FIRST, BLOCKS, ADJUSTMENT, IMAGE_ERRORS, TERRAIN, PLANNING, HELP)
+"""In the order in which help shows them."""
+
+Json = Annotated[
+    bool, typer.Option("--json", help="Print the outcome as JSON instead of text.", rich_help_panel=OUTPUT)
+]
 Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Replace files that aerotri has not written, or that were changed since.")
-]
-ResultFolder = Annotated[Path, typer.Argument(help="Result folder of `aerotri adjust`.")]
+    bool,
+    typer.Option(
+        "--overwrite", help="Replace files that aerotri has not written, or that were changed since.",
+        rich_help_panel=OUTPUT,
+    ),
+]  # fmt: skip
+BlockFolder = Annotated[Path, typer.Argument(help="Block folder, or its block.toml.", rich_help_panel=ARGUMENTS)]
+ResultFolder = Annotated[Path, typer.Argument(help="Result folder of `aerotri adjust`.", rich_help_panel=ARGUMENTS)]
 GeoidGrid = Annotated[
-    Path | None, typer.Option(help="Geoid grid (PROJ GeoTIFF) for heights that the CRS does not bring along.")
+    Path | None,
+    typer.Option(
+        help="Geoid grid (PROJ GeoTIFF) for heights above sea level that PROJ has no grid for.", rich_help_panel=PLACE
+    ),
 ]
-MarkedControl = Annotated[str, typer.Option(help="Control points with their image points, gcp_list.txt.")]
-CheckPoints = Annotated[list[str] | None, typer.Option(help="Control point that is a check point; may repeat.")]
-PhotographPositions = Annotated[str, typer.Option(help="Positions of the photographs, in place of EXIF.")]
-SystemOfPhotographs = Annotated[str, typer.Option(help="Coordinate system; default that of control, else UTM of EXIF.")]
-ControlSigma = Annotated[str, typer.Option(help="σ of control points without one: X,Y,Z in m; 0: without error, held.")]
-PositionsSigma = Annotated[str, typer.Option(help="σ of positions without one: X,Y,Z in m.")]
-OrientationSigma = Annotated[str, typer.Option(help="Orientations are observations: σ X,Y,Z in m.")]
-AnglesSigma = Annotated[str, typer.Option(help="The same of omega,phi,kappa in degrees.")]
-ControlPrefix = Annotated[str, typer.Option(help="What image points have before names of control.")]
-GeoidOfSystem = Annotated[Path | None, typer.Option(help="Geoid grid for its heights.")]
+Robust = Annotated[
+    str | None,
+    typer.Option(
+        help="Robust estimation: off, huber, danish, cauchy, adaptive or data-snooping. Default: as block.toml says.",
+        rich_help_panel=METHOD,
+    ),
+]
+MarkedControl = Annotated[
+    str,
+    typer.Option(help="Control points with their image points, gcp_list.txt of OpenDroneMap.", rich_help_panel=CONTROL),
+]
+CheckPoints = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Name of a control point that is to be a check point: compared, not used. May be repeated.",
+        rich_help_panel=CONTROL,
+    ),
+]
+ControlPrefix = Annotated[
+    str,
+    typer.Option(
+        help="What stands before the names of control points in the image points, such as GCP_.",
+        rich_help_panel=CONTROL,
+    ),
+]
+ControlSigma = Annotated[
+    str,
+    typer.Option(
+        help="σ of control points that have none: X,Y,Z in m, or one value for all; 0 holds them.",
+        rich_help_panel=SIGMAS,
+    ),
+]
+PositionsSigma = Annotated[
+    str,
+    typer.Option(
+        help="σ of positions that have none: X,Y,Z in m, or one value for all.", rich_help_panel=SIGMAS
+    ),
+]  # fmt: skip
+OrientationSigma = Annotated[
+    str,
+    typer.Option(
+        help="Positions of --orientation are observations with this σ: X,Y,Z in m.", rich_help_panel=SIGMAS
+    ),
+]  # fmt: skip
+AnglesSigma = Annotated[
+    str,
+    typer.Option(
+        help="Angles of --orientation are observations with this σ: omega,phi,kappa in degrees.",
+        rich_help_panel=SIGMAS,
+    ),
+]  # fmt: skip
+PhotographPositions = Annotated[
+    str, typer.Option(help="List of positions of the photographs, in place of those in EXIF.", rich_help_panel=INPUT)
+]
+CameraFile = Annotated[
+    Path | None,
+    typer.Option(
+        help="File with the camera: tables camera.NAME as in block.toml, IGN, or orthority.",
+        rich_help_panel=CAMERA,
+    ),
+]  # fmt: skip
+FocalLength = Annotated[
+    float | None,
+    typer.Option(min=1e-6, help="Focal length (principal distance), mm, in place of EXIF.", rich_help_panel=CAMERA),
+]
+PixelSize = Annotated[
+    float | None, typer.Option(min=1e-6, help="Size of a pixel, µm, in place of EXIF.", rich_help_panel=CAMERA)
+]
+SystemOfPhotographs = Annotated[
+    str,
+    typer.Option(
+        help="Coordinate system, such as EPSG:25832. Default: that of the control points, else UTM by EXIF.",
+        rich_help_panel=PLACE,
+    ),
+]  # fmt: skip
+Seed = Annotated[
+    int,
+    typer.Option(
+        help="Number that random choices start from; the same gives the same outcome.", rich_help_panel=METHOD
+    ),
+]
+SurfaceLayer = Annotated[
+    str,
+    typer.Option(
+        "--layer",
+        help="Which surface of `aerotri dtm`: dsm with objects (piles are objects), or dtm, the ground alone.",
+        rich_help_panel=SURFACE,
+    ),
+]

@@ -9,38 +9,76 @@ import typer
 
 from aerotri.cli.app import app
 from aerotri.cli.options import (
+    ARGUMENTS,
+    FIRST,
+    METHOD,
+    OUTPUT,
+    SURFACE,
+    CameraFile,
     CheckPoints,
     ControlPrefix,
     ControlSigma,
+    FocalLength,
+    GeoidGrid,
     Json,
     MarkedControl,
     PhotographPositions,
+    PixelSize,
+    Seed,
+    SurfaceLayer,
     SystemOfPhotographs,
 )
 from aerotri.tie_points.settings import DEFAULTS
+from aerotri.volume.settings import LAYER
 
 
-@app.command(epilog="Example: aerotri run photographs --out project --gcp gcp_list.txt --control-sigma-m 0.02")
+@app.command(
+    rich_help_panel=FIRST,
+    epilog="Example: aerotri run blocks/drone_site/photographs --out drone_project "
+    "--gcp blocks/drone_site/gcp_list.txt --control-sigma-m 0.01,0.01,0.02 --check K01 --check K02 --check K03 "
+    "--boundary blocks/drone_site/pile.geojson",
+)
 def run(
-    source: Annotated[Path, typer.Argument(help="Folder of photographs, or a block.")],
-    out: Annotated[Path, typer.Option(help="Folder to write: block, result, dtm, volume, and one report.")],
+    source: Annotated[Path, typer.Argument(help="Folder of photographs, or a block.", rich_help_panel=ARGUMENTS)],
+    out: Annotated[
+        Path,
+        typer.Option(help="Folder to write: block, result, dtm, volume, and one report.", rich_help_panel=OUTPUT),
+    ],
     gcp: MarkedControl = "",
     check: CheckPoints = None,
     control_sigma_m: ControlSigma = "",
     control_prefix: ControlPrefix = "",
     positions: PhotographPositions = "",
-    camera: Annotated[str, typer.Option(help="Camera: [camera.NAME] tables (.toml), orthority.")] = "",
-    focal_length_mm: Annotated[float | None, typer.Option(min=1e-6, help="In place of EXIF.")] = None,
-    pixel_um: Annotated[float | None, typer.Option(min=1e-6, help="Size of a pixel, µm, in place of EXIF.")] = None,
+    camera: CameraFile = None,
+    focal_length_mm: FocalLength = None,
+    pixel_um: PixelSize = None,
     crs: SystemOfPhotographs = "",
-    geoid: Annotated[str, typer.Option(help="Geoid grid for its heights.")] = "",
-    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same result.")] = DEFAULTS.seed,
-    parameters: Annotated[str, typer.Option(help="Additional parameters of the adjustment.")] = "",
-    interval: Annotated[str, typer.Option(help="Interval of the pickets of the DTM, or auto.")] = "",
-    boundary: Annotated[str, typer.Option(help="Of a volume: GeoPackage, GeoJSON or WKT; no volume without.")] = "",
-    base: Annotated[str, typer.Option(help="Of the volume, as aerotri volume takes it.")] = "",
-    plots: Annotated[bool, typer.Option(help="Draw the plots of the adjustment.")] = True,
-    go_on: Annotated[bool, typer.Option("--go-on", help="Go on after an adjustment that was rejected.")] = False,
+    geoid: GeoidGrid = None,
+    seed: Seed = DEFAULTS.seed,
+    parameters: Annotated[
+        str,
+        typer.Option(help="Additional parameters of the adjustment, as adjust takes them.", rich_help_panel=METHOD),
+    ] = "",
+    interval: Annotated[
+        str,
+        typer.Option(help="Distance of the points (pickets) of the terrain, m, or auto.", rich_help_panel=SURFACE),
+    ] = "",
+    boundary: Annotated[
+        str,
+        typer.Option(
+            help="Boundary of a volume: GeoPackage, GeoJSON or WKT. Without it there is no volume.",
+            rich_help_panel=SURFACE,
+        ),
+    ] = "",
+    base: Annotated[
+        str, typer.Option(help="Base of the volume, as aerotri volume takes it.", rich_help_panel=SURFACE)
+    ] = "",
+    layer: SurfaceLayer = LAYER,
+    plots: Annotated[bool, typer.Option(help="Draw the plots of the adjustment.", rich_help_panel=OUTPUT)] = True,
+    go_on: Annotated[
+        bool,
+        typer.Option("--go-on", help="Go on after an adjustment that was rejected.", rich_help_panel=METHOD),
+    ] = False,
     json_: Json = False,
 ) -> None:
     """Everything: photographs to tie points, adjustment, terrain and volume, with one report."""
@@ -54,6 +92,6 @@ def run(
         "positions": positions, "camera": camera, "focal_length_mm": focal_length_mm, "pixel_um": pixel_um, "crs": crs,
         "geoid": geoid, "seed": seed, "parameters": parameters,
         "interval": metres_or_auto(interval) if interval else None,
-        "boundary": boundary, "base": base, "plots": plots, "go_on": go_on,
+        "boundary": boundary, "base": base, "layer": layer, "plots": plots, "go_on": go_on,
     }  # fmt: skip
     raise typer.Exit(run_all(source, out, settings, json_))

@@ -8,7 +8,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from aerotri.cli.app import app, predict
-from aerotri.cli.options import Json, ResultFolder
+from aerotri.cli.options import ARGUMENTS, INPUT, METHOD, OUTPUT, TERRAIN, Json, ResultFolder
 from aerotri.terrain.settings import (
     ALIGNMENT,
     DEFAULTS,
@@ -19,48 +19,108 @@ from aerotri.terrain.settings import (
     TerrainSettings,
 )
 
+GRID, MATCHING, FORMULA, PILOT = "Points and raster", "Matching", "By formula", "By a pilot"
 
-@app.command(epilog="Example: aerotri dtm saar_result photographs --out saar_dtm --interval 5")
+
+@app.command(
+    rich_help_panel=TERRAIN,
+    epilog="Example: aerotri dtm drone_project/result blocks/drone_site/photographs --interval 3 --out drone_dtm",
+)
 def dtm(
     result: ResultFolder,
-    photographs: Annotated[list[Path], typer.Argument(help="Folders or files of the photographs, TIFF or JPEG.")],
-    out: Annotated[Path | None, typer.Option(help="Folder to write; default NAME_dtm here.")] = None,
+    photographs: Annotated[
+        list[Path],
+        typer.Argument(help="Folders or files of the photographs, TIFF or JPEG.", rich_help_panel=ARGUMENTS),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; default NAME_dtm here.", rich_help_panel=OUTPUT)
+    ] = None,
     interval: Annotated[
-        str, typer.Option(help="Metres between pickets, or auto: from the GSD and the relief.")
+        str,
+        typer.Option(
+            help="Distance of the points that are measured (pickets), m, or auto: from the GSD and the relief.",
+            rich_help_panel=GRID,
+        ),
     ] = "auto",
-    cell: Annotated[float | None, typer.Option(min=1e-6, help="Cell of the rasters, m; default interval / 2.")] = None,
+    cell: Annotated[
+        float | None,
+        typer.Option(min=1e-6, help="Cell of the rasters, m. Default: half of the interval.", rich_help_panel=GRID),
+    ] = None,
     pairs: Annotated[
-        bool, typer.Option("--pairs", help="Measure every picket in its best pair, as demcor wants it; else in all.")
+        bool,
+        typer.Option(
+            "--pairs",
+            help="Measure every point in its best pair of photographs, as demcor needs it. Default: in all.",
+            rich_help_panel=MATCHING,
+        ),
     ] = False,
     step: Annotated[
-        int | None, typer.Option(min=1, help="With --pairs: pair a photograph with the STEP-th after it.")
+        int | None,
+        typer.Option(
+            min=1,
+            help="With --pairs: a pair is a photograph and the one this number of photographs further in its strip.",
+            rich_help_panel=MATCHING,
+        ),
     ] = None,
-    subset: Annotated[str, typer.Option(help="all, or even or odd photographs of every strip.")] = DEFAULTS.subset,
+    subset: Annotated[
+        str,
+        typer.Option(help="all, or even or odd photographs of every strip.", rich_help_panel=MATCHING),
+    ] = DEFAULTS.subset,
     area: Annotated[
-        tuple[float, float, float, float] | None, typer.Option(help="X Y of the lower left, X Y of the upper right.")
+        tuple[float, float, float, float] | None,
+        typer.Option(help="X Y of the lower left, X Y of the upper right corner, m.", rich_help_panel=GRID),
     ] = None,
-    window: Annotated[int, typer.Option(help="Pixels a side of the windows that are matched, odd.")] = DEFAULTS.window,
-    threshold: Annotated[float, typer.Option(min=0.0, max=1.0, help="Correlation from which a match counts.")] = (
-        DEFAULTS.threshold
-    ),
+    window: Annotated[
+        int,
+        typer.Option(help="Side of the windows that are matched, pixels, odd.", rich_help_panel=MATCHING),
+    ] = DEFAULTS.window,
+    threshold: Annotated[
+        float,
+        typer.Option(
+            min=0.0, max=1.0, help="Correlation (0 to 1) from which a match counts.", rich_help_panel=MATCHING
+        ),
+    ] = DEFAULTS.threshold,
     agreeing: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="The same of three photographs and more whose rays meet; 1: never.")
+        float,
+        typer.Option(
+            min=0.0,
+            max=1.0,
+            help="The same (0 to 1) of three photographs and more whose rays meet; 1: never.",
+            rich_help_panel=MATCHING,
+        ),
     ] = DEFAULTS.agreeing,
     edge: Annotated[
         float | None,
-        typer.Option(min=0.0, max=LARGEST_EDGE, help="Share of the format at its edge not used; 0.02, pairs 0.10."),
+        typer.Option(
+            min=0.0,
+            max=LARGEST_EDGE,
+            help="Share of the photograph at its edge that is not used. Default: 0.02, with --pairs 0.10.",
+            rich_help_panel=MATCHING,
+        ),
     ] = None,
     most_photographs: Annotated[
-        int, typer.Option(min=FEWEST_PHOTOGRAPHS, max=MOST_PHOTOGRAPHS, help="Photographs of a picket, at most.")
+        int,
+        typer.Option(
+            min=FEWEST_PHOTOGRAPHS,
+            max=MOST_PHOTOGRAPHS,
+            help="Number of photographs a point is measured in, at most.",
+            rich_help_panel=MATCHING,
+        ),
     ] = DEFAULTS.most_photographs,
-    breaklines: Annotated[Path | None, typer.Option(help="Lines with heights: .gpkg, .geojson or .dxf.")] = None,
+    breaklines: Annotated[
+        Path | None,
+        typer.Option(help="Lines with heights: .gpkg, .geojson or .dxf.", rich_help_panel=INPUT),
+    ] = None,
     ideal: Annotated[
-        bool, typer.Option("--ideal", help="The photographs are those of imgeo, free of image errors.")
+        bool,
+        typer.Option(
+            "--ideal", help="The photographs are those of imgeo, without image errors.", rich_help_panel=INPUT
+        ),
     ] = False,
-    plots: Annotated[bool, typer.Option(help="Draw the surface and the pickets.")] = True,
+    plots: Annotated[bool, typer.Option(help="Draw the surface and the points.", rich_help_panel=OUTPUT)] = True,
     json_: Json = False,
 ) -> None:
-    """Pickets by image matching with σ, error pickets, and the surfaces they make with and without objects."""
+    """Ground points by image matching (pickets), each with σ, and the surfaces with and without objects."""
     from aerotri.commands.dtm import metres_or_auto, run_dtm
 
     settings = TerrainSettings(
@@ -70,15 +130,32 @@ def dtm(
     raise typer.Exit(run_dtm(result, photographs, out, settings, plots, json_))
 
 
-@app.command(epilog="Example: aerotri compare saar_dtm/dtm.tif laser.laz --align shift --out difference")
+@app.command(
+    rich_help_panel=TERRAIN,
+    epilog="Example: aerotri compare drone_project/dtm blocks/drone_site/truth/surface.tif --out difference",
+)
 def compare(
-    test: Annotated[Path, typer.Argument(help="Surface to judge: GeoTIFF, LAZ, pickets.parquet, or a folder of dtm.")],
-    control: Annotated[Path, typer.Argument(help="Control surface of the same kinds.")],
-    out: Annotated[Path | None, typer.Option(help="Folder to write; default TEST_comparison here.")] = None,
-    method: Annotated[str, typer.Option(help="Interpolation of both: linear or spline.")] = INTERPOLATION,
-    align: Annotated[str, typer.Option(help="Move the first onto the second: none, shift or rigid.")] = ALIGNMENT,
-    cell: Annotated[float | None, typer.Option(min=1e-6, help="Cell of the differences, m.")] = None,
-    plots: Annotated[bool, typer.Option(help="Draw map and histogram.")] = True,
+    test: Annotated[
+        Path,
+        typer.Argument(
+            help="Surface to judge: GeoTIFF, LAZ, pickets.parquet, or the folder that dtm wrote.",
+            rich_help_panel=ARGUMENTS,
+        ),
+    ],
+    control: Annotated[Path, typer.Argument(help="Control surface of the same kinds.", rich_help_panel=ARGUMENTS)],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; default TEST_comparison here.", rich_help_panel=OUTPUT)
+    ] = None,
+    method: Annotated[
+        str, typer.Option(help="Interpolation of both: linear or spline.", rich_help_panel=METHOD)
+    ] = INTERPOLATION,
+    align: Annotated[
+        str, typer.Option(help="Move the first onto the second: none, shift or rigid.", rich_help_panel=METHOD)
+    ] = ALIGNMENT,
+    cell: Annotated[
+        float | None, typer.Option(min=1e-6, help="Cell of the differences, m.", rich_help_panel=METHOD)
+    ] = None,
+    plots: Annotated[bool, typer.Option(help="Draw map and histogram.", rich_help_panel=OUTPUT)] = True,
     json_: Json = False,
 ) -> None:
     """Differences of two surfaces: RMSE, bias, NMAD, LE90, map and histogram."""
@@ -89,21 +166,46 @@ def compare(
 
 @predict.command("picket-interval", epilog="Example: aerotri predict picket-interval --scan-um 28 --scale 7000")
 def predict_picket_interval(
-    scan_um: Annotated[float | None, typer.Option(min=1e-6, help="Size of a pixel in the image, µm.")] = None,
-    scale: Annotated[float | None, typer.Option(min=1.0, help="Denominator of the photo scale.")] = None,
-    gsd: Annotated[float | None, typer.Option(min=1e-6, help="Size of a pixel on the ground, m.")] = None,
-    k: Annotated[float | None, typer.Option(min=1e-6, help="Coefficient k; 0.08–0.09 mountains, 0.1 plain.")] = None,
-    pilot: Annotated[Path | None, typer.Option(help="Result of `aerotri adjust`: measure a part and see.")] = None,
-    photographs: Annotated[list[Path] | None, typer.Option(help="With --pilot: folder or files; may repeat.")] = None,
+    scan_um: Annotated[
+        float | None, typer.Option(min=1e-6, help="Size of a pixel in the photograph, µm.", rich_help_panel=FORMULA)
+    ] = None,
+    scale: Annotated[
+        float | None, typer.Option(min=1.0, help="Photo scale, 1 over this number.", rich_help_panel=FORMULA)
+    ] = None,
+    gsd: Annotated[
+        float | None, typer.Option(min=1e-6, help="Size of a pixel on the ground, m.", rich_help_panel=FORMULA)
+    ] = None,
+    k: Annotated[
+        float | None,
+        typer.Option(
+            min=1e-6, help="Coefficient k, a number: 0.08 to 0.09 in mountains, 0.1 in plains.", rich_help_panel=FORMULA
+        ),
+    ] = None,
+    pilot: Annotated[
+        Path | None,
+        typer.Option(help="Result folder of `aerotri adjust`: measure a part and see.", rich_help_panel=PILOT),
+    ] = None,
+    photographs: Annotated[
+        list[Path] | None,
+        typer.Option(help="With --pilot: folder or files. May be repeated.", rich_help_panel=PILOT),
+    ] = None,
     area: Annotated[
-        tuple[float, float, float, float] | None, typer.Option(help="With --pilot: X Y lower left, X Y upper right.")
+        tuple[float, float, float, float] | None,
+        typer.Option(
+            help="With --pilot: X Y of the lower left, X Y of the upper right corner, m.", rich_help_panel=PILOT
+        ),
     ] = None,
     tolerance: Annotated[
-        float | None, typer.Option(min=1e-9, help="With --pilot: m, allowed RMSE between pickets; σ of a picket else.")
+        float | None,
+        typer.Option(
+            min=1e-9,
+            help="With --pilot: allowed RMSE between points, m. Default: σ of a point.",
+            rich_help_panel=PILOT,
+        ),
     ] = None,
     json_: Json = False,
 ) -> None:
-    """How far apart pickets should be: by formula from scan and scale or GSD, or by a pilot."""
+    """How far apart measured ground points should be: by formula from scan and scale or GSD, or by a pilot."""
     from aerotri.commands.predict_interval import IntervalQuestion, run_predict_interval
 
     question = IntervalQuestion(scan_um, scale, gsd, k, pilot, tuple(photographs or ()), area, tolerance)

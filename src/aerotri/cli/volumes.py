@@ -8,61 +8,118 @@ from typing import Annotated, Any, cast
 import typer
 
 from aerotri.cli.app import app, predict
-from aerotri.cli.options import Json
-from aerotri.volume.settings import BASE, METHOD, SECTIONS, SIGMA, SectionPlan, SigmaOptions
+from aerotri.cli.options import ARGUMENTS, METHOD, OUTPUT, SIGMAS, SURFACE, TERRAIN, Json, Seed, SurfaceLayer
+from aerotri.volume.settings import BASE, LAYER, SECTIONS, SIGMA, SectionPlan, SigmaOptions
+from aerotri.volume.settings import METHOD as VOLUME_METHOD
+
+FLIGHT, SITE = "Flight", "Site"
 
 
-@app.command(epilog="Example: aerotri volume dtm.tif --boundary pile.gpkg --base boundary --adjustment saar_result")
+@app.command(
+    rich_help_panel=TERRAIN,
+    epilog="Example: aerotri volume drone_project/dtm --boundary blocks/drone_site/pile.geojson "
+    "--adjustment drone_project/result --out pile_volume",
+)
 def volume(
-    dtm: Annotated[Path, typer.Argument(help="Surface (GeoTIFF).")],
+    surface: Annotated[
+        Path,
+        typer.Argument(
+            help="Surface: GeoTIFF, or the folder that dtm wrote, whose points are then used for σ.",
+            rich_help_panel=ARGUMENTS,
+        ),
+    ],
+    layer: SurfaceLayer = LAYER,
     base: Annotated[
         str,
         typer.Option(
-            help="level:HEIGHT, plane:X,Y,Z;X,Y,Z;X,Y,Z, plane (fitted to the boundary), boundary (spline through it), "
-            "lowest (level of its lowest point), or another raster."
+            help="level:HEIGHT (m), plane:X,Y,Z;X,Y,Z;X,Y,Z, plane (fitted to the boundary), boundary (spline through "
+            "it), lowest (level of its lowest point), or another surface.",
+            rich_help_panel=SURFACE,
         ),
     ] = BASE,
     boundary: Annotated[
-        str | None, typer.Option(help="GeoPackage, GeoJSON, WKT file or WKT text; the whole surface without.")
+        str | None,
+        typer.Option(
+            help="GeoPackage, GeoJSON, WKT file or WKT text. Default: the whole surface.", rich_help_panel=SURFACE
+        ),
     ] = None,
     method: Annotated[
-        str, typer.Option(help="The one that counts: prisms, grid, trapezoidal, simpson, simpson38.")
-    ] = METHOD,
-    section_spacing: Annotated[float | None, typer.Option(min=1e-6, help="Metres between sections.")] = None,
-    azimuth: Annotated[float, typer.Option(help="Degrees from north, in which sections follow one another.")] = (
-        SECTIONS.azimuth
-    ),
+        str,
+        typer.Option(
+            help="The one that counts: prisms, grid, trapezoidal, simpson, simpson38.", rich_help_panel=METHOD
+        ),
+    ] = VOLUME_METHOD,
+    section_spacing: Annotated[
+        float | None, typer.Option(min=1e-6, help="Distance of the sections, m.", rich_help_panel=METHOD)
+    ] = None,
+    azimuth: Annotated[
+        float,
+        typer.Option(
+            help="Direction in which sections follow one another, degrees from north.", rich_help_panel=METHOD
+        ),
+    ] = SECTIONS.azimuth,
     adjustment: Annotated[
-        Path | None, typer.Option(help="Result folder the surface was measured with; gives the volume its σ.")
+        Path | None,
+        typer.Option(
+            help="Result folder the surface was measured with; gives the volume its σ.", rich_help_panel=SIGMAS
+        ),
     ] = None,
     pickets: Annotated[
-        Path | None, typer.Option(help="pickets.parquet of `aerotri dtm`; without, every cell is taken for one.")
+        Path | None,
+        typer.Option(
+            help="pickets.parquet of `aerotri dtm`. Default: that of a folder; else every cell counts as measured.",
+            rich_help_panel=SIGMAS,
+        ),
     ] = None,
-    base_adjustment: Annotated[Path | None, typer.Option(help="Result folder of a base that is a surface.")] = None,
-    base_pickets: Annotated[Path | None, typer.Option(help="pickets.parquet of a base that is a surface.")] = None,
+    base_adjustment: Annotated[
+        Path | None,
+        typer.Option(help="Result folder of a base that is a surface.", rich_help_panel=SIGMAS),
+    ] = None,
+    base_pickets: Annotated[
+        Path | None, typer.Option(help="pickets.parquet of a base that is a surface.", rich_help_panel=SIGMAS)
+    ] = None,
     matching_sigma_um: Annotated[
-        float | None, typer.Option(min=1e-6, help="σ of an image coordinate of a picket; default that of the block.")
+        float | None,
+        typer.Option(
+            min=1e-6,
+            help="σ of an image coordinate in matching, µm. Default: that of the block.",
+            rich_help_panel=SIGMAS,
+        ),
     ] = None,
     matching_window: Annotated[
-        float, typer.Option(min=0.0, help="Side of the matching window on the ground, m; its cells share noise.")
+        float,
+        typer.Option(
+            min=0.0, help="Side of the matching window on the ground, m; its cells share noise.", rich_help_panel=SIGMAS
+        ),
     ] = SIGMA.matching_window_m,
-    base_sigma: Annotated[float, typer.Option(min=0.0, help="σ of the base's height, m, common to all of it.")] = (
-        SIGMA.base_sigma
-    ),
-    boundary_sigma: Annotated[float, typer.Option(min=0.0, help="σ of a corner of the boundary, m.")] = (
-        SIGMA.boundary_sigma
-    ),
+    base_sigma: Annotated[
+        float,
+        typer.Option(min=0.0, help="σ of the base's height, m, common to all of it.", rich_help_panel=SIGMAS),
+    ] = SIGMA.base_sigma,
+    boundary_sigma: Annotated[
+        float, typer.Option(min=0.0, help="σ of a corner of the boundary, m.", rich_help_panel=SIGMAS)
+    ] = SIGMA.boundary_sigma,
     uncorrected: Annotated[
-        bool, typer.Option("--uncorrected", help="The photographs were measured with their image errors in them.")
+        bool,
+        typer.Option(
+            "--uncorrected",
+            help="The photographs were measured with their image errors in them.",
+            rich_help_panel=SIGMAS,
+        ),
     ] = False,
-    out: Annotated[Path | None, typer.Option(help="Folder to write; default NAME_volume here.")] = None,
-    plots: Annotated[bool, typer.Option(help="Draw the plots and the page.")] = True,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; default NAME_volume here.", rich_help_panel=OUTPUT)
+    ] = None,
+    plots: Annotated[bool, typer.Option(help="Draw the plots and the page.", rich_help_panel=OUTPUT)] = True,
     json_: Json = False,
 ) -> None:
     """A volume, cut and fill, and how sure it is: σ with every part named."""
     from aerotri.commands.volume import VolumeInput, run_volume
 
-    given = VolumeInput(dtm, base, boundary, cast(Any, method), adjustment, pickets, base_adjustment, base_pickets)
+    given = VolumeInput(
+        surface, base, boundary, cast(Any, method), adjustment, pickets, base_adjustment, base_pickets,
+        cast(Any, layer),
+    )  # fmt: skip
     options = SigmaOptions(
         matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma,
         corrected=not uncorrected,
@@ -74,13 +131,21 @@ def volume(
     "volume", epilog="Example: aerotri predict volume --height 1500 --length 9000 --width 3600 --bridging 3600"
 )
 def predict_volume(
-    height: Annotated[float, typer.Option(help="Flying height over the ground, m.")],
-    length: Annotated[float, typer.Option(help="Of the area, along the strips, m.")],
-    width: Annotated[float, typer.Option(help="Of the area, across the strips, m.")],
-    bridging: Annotated[float, typer.Option(help="Distance between control points along the strips, m.")],
-    sigma0_share: Annotated[float, typer.Option(help="σ of a height from one model over the flying height.")] = 2e-4,
-    simulate: Annotated[bool, typer.Option("--simulate", help="Adjust a simulated flight of this design too.")] = False,
-    seed: Annotated[int, typer.Option(help="Of the simulation.")] = 1,
+    height: Annotated[float, typer.Option(help="Flying height over the ground, m.", rich_help_panel=FLIGHT)],
+    length: Annotated[float, typer.Option(help="Length of the area, along the strips, m.", rich_help_panel=SITE)],
+    width: Annotated[float, typer.Option(help="Width of the area, across the strips, m.", rich_help_panel=SITE)],
+    bridging: Annotated[
+        float, typer.Option(help="Distance between control points along the strips, m.", rich_help_panel=SITE)
+    ],
+    sigma0_share: Annotated[
+        float,
+        typer.Option(help="σ of a height from one model, as a share of the flying height.", rich_help_panel=FLIGHT),
+    ] = 2e-4,
+    simulate: Annotated[
+        bool,
+        typer.Option("--simulate", help="Adjust a simulated flight of this design too.", rich_help_panel=METHOD),
+    ] = False,
+    seed: Seed = 1,
     json_: Json = False,
 ) -> None:
     """The accuracy of a volume: Kubik's theory, repaired, and the adjustment of a simulated flight."""
@@ -92,14 +157,21 @@ def predict_volume(
 
 @predict.command("attitude", epilog="Example: aerotri predict attitude --tolerance 1 --thickness 5")
 def predict_attitude(
-    tolerance: Annotated[float, typer.Option(min=1e-9, help="Of the volume, per cent, 1 σ.")],
-    thickness: Annotated[float, typer.Option(help="Mean thickness of the volume, m.")],
-    height: Annotated[float, typer.Option(help="Flying height over the ground, m.")] = 1500.0,
-    base: Annotated[float, typer.Option(help="Between the photographs, m.")] = 900.0,
-    focal_length: Annotated[float, typer.Option(help="mm.")] = 153.0,
-    site: Annotated[tuple[float, float], typer.Option(help="Size along and across the base, m.")] = (400.0, 400.0),
+    tolerance: Annotated[
+        float, typer.Option(min=1e-9, help="Tolerance of the volume, per cent, 1 σ.", rich_help_panel=SITE)
+    ],
+    thickness: Annotated[float, typer.Option(help="Mean thickness of the volume, m.", rich_help_panel=SITE)],
+    height: Annotated[float, typer.Option(help="Flying height over the ground, m.", rich_help_panel=FLIGHT)] = 1500.0,
+    base: Annotated[float, typer.Option(help="Distance between the photographs, m.", rich_help_panel=FLIGHT)] = 900.0,
+    focal_length: Annotated[float, typer.Option(help="Focal length, mm.", rich_help_panel=FLIGHT)] = 153.0,
+    site: Annotated[
+        tuple[float, float], typer.Option(help="Size along and across the base, m.", rich_help_panel=SITE)
+    ] = (400.0, 400.0),
     offset: Annotated[
-        tuple[float, float], typer.Option(help="Of the site from the middle of the base, along and across it, m.")
+        tuple[float, float],
+        typer.Option(
+            help="Place of the site from the middle of the base, along and across it, m.", rich_help_panel=SITE
+        ),
     ] = (0.0, 0.0),
     json_: Json = False,
 ) -> None:

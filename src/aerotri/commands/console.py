@@ -7,6 +7,10 @@ import re
 import sys
 import time
 from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from aerotri.conventions import InputError
 
 QUICK_S, BETWEEN_LINES_S = 2.0, 5.0
 """Off a terminal nothing is said of the first seconds, and lines about one stage are so far apart at least."""
@@ -132,6 +136,52 @@ class Console:
                 sys.stderr.write("\r\x1b[K")
                 sys.stderr.flush()
             self._shown = False
+
+
+@dataclass(frozen=True)
+class OldForm:
+    """A target that may be given in the form of today or in an older one, which still works.
+
+    Parameters
+    ----------
+    out : as it is given today. old : in the older form. said, today : both forms in words.
+    """
+
+    out: Path | None
+    old: Path | None
+    said: str
+    today: str
+
+    @property
+    def target(self) -> Path | None:
+        """The target in either form.
+
+        Raises
+        ------
+        InputError
+            When both are given.
+        """
+        if self.out is not None and self.old is not None:
+            raise InputError(f"--out and {self.said} are both given", f"give {self.today} alone")
+        return self.out if self.old is None else self.old
+
+    def needed(self) -> Path:
+        """The same, where there has to be one.
+
+        Raises
+        ------
+        InputError
+            When there is none.
+        """
+        target = self.target
+        if target is None:
+            raise InputError("--out is missing", f"say what to write: {self.today}")
+        return target
+
+    def tell(self) -> None:
+        """Say the form of today to who has used the older one."""
+        if self.old is not None:
+            Console().note(f"{self.said} is the old form; write {self.today}")
 
 
 def _is_terminal() -> bool:

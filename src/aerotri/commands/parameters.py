@@ -15,7 +15,7 @@ MOST = 16
 """Parameters of a family listed when all families are."""
 
 
-def run_parameters(draw: Path | None, family: str | None, as_json: bool) -> None:
+def run_parameters(out: Path | None, family: str | None, as_json: bool) -> None:
     """List the sets, or draw their patterns; arguments as on the command line.
 
     Raises
@@ -25,12 +25,12 @@ def run_parameters(draw: Path | None, family: str | None, as_json: bool) -> None
     from aerotri.public.parameters import draw_parameters, list_parameters
 
     entries = list_parameters(family)
-    drawn = None if draw is None else draw_parameters(draw, family)
+    drawn = None if out is None else draw_parameters(out, family)
     if as_json:
         print(json_text([vars(d) for d in entries]))
         return
     lines = _lines(entries, whole=family is not None)
-    print("\n".join(lines if drawn is None else [*lines, f"Drawn to {draw}: {', '.join(drawn)}"]))
+    print("\n".join(lines if drawn is None else [*lines, f"Drawn to {out}: {', '.join(drawn)}"]))
 
 
 def _lines(entries: Sequence[ParameterDescription], whole: bool) -> list[str]:

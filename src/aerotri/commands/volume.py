@@ -10,16 +10,17 @@ from aerotri.commands.console import Console
 from aerotri.conventions import InputError
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
+from aerotri.volume.settings import LAYER
 
 if TYPE_CHECKING:
-    from aerotri.volume.settings import Method, SectionPlan, SigmaOptions
+    from aerotri.volume.settings import Layer, Method, SectionPlan, SigmaOptions
 
 
 @dataclass(frozen=True)
 class VolumeInput:
     """What to compute, as on the command line."""
 
-    dtm: Path
+    surface: Path
     base: str
     boundary: str | None
     method: Method
@@ -27,6 +28,7 @@ class VolumeInput:
     pickets: Path | None
     base_adjustment: Path | None
     base_pickets: Path | None = None
+    layer: Layer = LAYER
 
     def check(self) -> None:
         """Refuse what does not go together, in the words of the command line.
@@ -57,14 +59,14 @@ def run_volume(
 
     console, s = Console(quiet=as_json), sigma_options
     given.check()
-    target = out or Path(f"{given.dtm.stem}_volume")
+    target = out or Path(f"{given.surface.resolve().stem}_volume")
     refuse_foreign_folder(target, RECORD)
     console.progress(compilation_notice())
     try:
         with room_beside(target) as room:
             found = volume(
-                given.dtm, given.boundary, base=given.base, method=given.method, section_spacing=plan.spacing,
-                azimuth=plan.azimuth, adjustment=given.adjustment, pickets=given.pickets,
+                given.surface, given.boundary, layer=given.layer, base=given.base, method=given.method,
+                section_spacing=plan.spacing, azimuth=plan.azimuth, adjustment=given.adjustment, pickets=given.pickets,
                 base_adjustment=given.base_adjustment, base_pickets=given.base_pickets,
                 matching_sigma_um=s.matching_sigma_um, matching_window=s.matching_window_m, base_sigma=s.base_sigma,
                 boundary_sigma=s.boundary_sigma, corrected=s.corrected, scratch=room, progress=console.stage,

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import FilePath
+from aerotri.formats.assembly.assemble_control import block_with_check_points
 from aerotri.formats.block.unread import unread_in_words
 from aerotri.public.adjustment import Adjustment, adjust
 from aerotri.public.folders import refuse_foreign_folder
@@ -53,6 +55,7 @@ def adjust_folder(
     progress: Progress,
     plots: bool = True,
     control_prefix: str = "",
+    check: Sequence[str] = (),
     geoid: FilePath | None = None,
     **settings: Any,
 ) -> Adjustment:
@@ -63,7 +66,7 @@ def adjust_folder(
     folder : of the block. out : of the result.
     progress : takes (stage, share).
     plots : draw the plots and the report.
-    control_prefix, geoid : see `read_in_metres`.
+    control_prefix, geoid : see `read_in_metres`. check : names of control points that become check points.
     settings : as of `aerotri.adjust`.
 
     Returns
@@ -80,6 +83,7 @@ def adjust_folder(
     """
     begun = time.perf_counter()
     block, note = read_in_metres(folder, control_prefix, geoid)
+    block = block_with_check_points(block, check, control_prefix)
     seconds = time.perf_counter() - begun
     refuse_foreign_folder(out, RECORD)
     found = with_read_time(adjust(block, geoid=geoid, progress=progress, **settings), seconds)

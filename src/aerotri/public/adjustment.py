@@ -340,6 +340,7 @@ def adjust(
     datum: Datum | None = None,
     variance_components: Switch | None = None,
     max_iterations: int | None = None,
+    check: Sequence[str] = (),
     points: np.ndarray | None = None,
     geoid: FilePath | None = None,
     explain: bool = True,
@@ -359,6 +360,7 @@ def adjust(
     datum : what fixes the block: its control, the 'minimal' or 'inner' datum of a free network, or 'fixed' elements.
     variance_components : 'on' estimates σ of every group of observations.
     max_iterations : at most, in each stage of a robust estimator.
+    check : names of control points that become check points: they are compared, not used.
     points : (N, 3) m, start values of the object points, where known from elsewhere.
     geoid : grid of geoid undulations for a coordinate system that has none of its own.
     explain : look for the usual mistake behind a block that is not accepted, by adjusting it again with that mended;
@@ -387,14 +389,16 @@ def adjust(
     ['brown.K1', 'brown.K2']
     """
     from aerotri.coordinates.metric import in_metres
+    from aerotri.formats.assembly.assemble_control import block_with_check_points
     from aerotri.formats.block.unread import unread_in_words
     from aerotri.observations import Block
     from aerotri.pipeline import adjust_and_explain, adjust_keeping_system
     from aerotri.public.block_settings import with_settings
+    from aerotri.public.blocks import as_block
 
     chosen = with_settings(
-        block, parameters=parameters, parameter_selection=parameter_selection, robust=robust, datum=datum,
-        variance_components=variance_components, max_iterations=max_iterations,
+        block_with_check_points(as_block(block), check), parameters=parameters, parameter_selection=parameter_selection,
+        robust=robust, datum=datum, variance_components=variance_components, max_iterations=max_iterations,
     )  # fmt: skip
     unread = () if isinstance(block, Block) else unread_in_words(Path(block))
     with stage_report(progress) as report:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from aerotri.conventions import InputError
+from aerotri.volume.settings import LAYER
 
 RECORD, REPORT = "run.json", "report.html"
 BLOCK, RESULT, DTM, VOLUME = "block", "result", "dtm", "volume"
@@ -60,13 +61,13 @@ def steps_of(source: Path, out: Path, settings: Mapping[Verb, Mapping[str, Any]]
     if not is_block(source) and not source.is_dir():
         raise InputError("is neither a folder of photographs nor a block", "give the folder", source)
     block, result, dtm, volume = (str(out / name) for name in (BLOCK, RESULT, DTM, VOLUME))
-    on_surface = (f"{dtm}/dsm.tif", "--adjustment", result, "--pickets", f"{dtm}/pickets.parquet")
+    refuse_of_photographs(source, settings)
     begun = str(source) if is_block(source) else block
     steps: dict[Verb, Step] = {
         "tie_points": Step("tiepoints", BLOCK, "Tie points", ("tiepoints", str(source), "--out", block)),
         "adjust": Step("adjust", RESULT, "Adjustment", ("adjust", begun, "--out", result)),
         "terrain": Step("dtm", DTM, "Terrain", ("dtm", result, str(source), "--out", dtm)),
-        "volume": Step("volume", VOLUME, "Volume", ("volume", *on_surface, "--out", volume)),
+        "volume": Step("volume", VOLUME, "Volume", ("volume", dtm, "--adjustment", result, "--out", volume)),
     }
     if is_block(source):
         del steps["tie_points"]
@@ -79,6 +80,22 @@ def steps_of(source: Path, out: Path, settings: Mapping[Verb, Mapping[str, Any]]
     }
 
 
+def refuse_of_photographs(source: Path, settings: Mapping[Verb, Mapping[str, Any]]) -> None:
+    """What is said of photographs has no meaning where a run begins with a block.
+
+    Raises
+    ------
+    InputError
+    """
+    if not is_block(source):
+        return
+    of_adjust = ("seed", *settings["adjust"])
+    given = [name for name, value in settings["tie_points"].items() if name not in of_adjust and not is_missing(value)]
+    if given:
+        options = ", ".join(f"--{OPTIONS.get(name, name).replace('_', '-')}" for name in given)
+        raise InputError(f"{options}: for photographs only, and a block was given", "leave them out", source)
+
+
 def command_line(settings: Mapping[str, Any]) -> tuple[str, ...]:
     """Settings as options of a command line; what is not given has none."""
     words: list[str] = []
@@ -86,6 +103,8 @@ def command_line(settings: Mapping[str, Any]) -> tuple[str, ...]:
         option = f"--{OPTIONS.get(name, name).replace('_', '-')}"
         if name == "plots":
             words += [] if value else ["--no-plots"]
+        elif name == "layer" and value == LAYER:
+            continue
         elif name == "check":
             words += [word for one in value for word in (option, str(one))]
         elif not is_missing(value):

@@ -17,6 +17,7 @@ from aerotri.public.progress import Progress, ProgressLike, StageReport, stage_r
 from aerotri.public.run_steps import BLOCK, DTM, RECORD, REPORT, RESULT, Step, Verb, is_block, is_missing, steps_of
 from aerotri.results.failure import AdjustmentFailedError
 from aerotri.tie_points.settings import DEFAULTS
+from aerotri.volume.settings import LAYER, Layer
 
 if TYPE_CHECKING:
     from aerotri.observations import Block
@@ -112,6 +113,7 @@ def run(
     interval: float | None = None,
     boundary: Any = None,
     base: Any = None,
+    layer: Layer = LAYER,
     plots: bool = True,
     go_on: bool = False,
     further: Mapping[Verb, Mapping[str, Any]] | None = None,
@@ -139,6 +141,7 @@ def run(
     interval : m between the points of the terrain (pickets); from the GSD and the relief where None.
     boundary : of a volume, see `aerotri.volume`; no volume where None.
     base : of the volume, see `aerotri.volume`.
+    layer : surface of the volume, 'dsm' with objects or 'dtm', the ground alone, see `aerotri.volume`.
     plots : draw the plots of the adjustment.
     go_on : go on after an adjustment that was rejected.
     further : more settings of a step by the name of its verb, {'terrain': {'window': 21}}.
@@ -164,19 +167,20 @@ def run(
     >>> project.verdict, [step.status for step in project.steps]
     ('accepted', ['done', 'left out', 'left out'])
     """
-    marked = not is_missing(control)
+    marked, names = not is_missing(control), {"check": tuple(check)}
+    from_block = is_block(Path(source))
     settings: dict[Verb, dict[str, Any]] = {
         "tie_points": {
             "control": control, "control_sigma_m": control_sigma_m, "control_prefix": control_prefix if marked else "",
             "positions": positions, "camera": camera, "focal_length_mm": focal_length_mm, "pixel_um": pixel_um,
-            "crs": crs, "geoid": geoid, "seed": seed, "check": tuple(check),
+            "crs": crs, "geoid": geoid, "seed": seed, **({} if from_block else names),
         },
         "adjust": {
             "parameters": parameters, "geoid": geoid, "control_prefix": "" if marked else control_prefix,
-            "plots": plots,
+            "plots": plots, **(names if from_block else {}),
         },
         "terrain": {"interval": interval},
-        "volume": {"boundary": boundary, "base": base} if not is_missing(boundary) else {},
+        "volume": {"boundary": boundary, "base": base, "layer": layer} if not is_missing(boundary) else {},
     }  # fmt: skip
     for verb, more in (further or {}).items():
         settings[verb] |= more
@@ -288,8 +292,7 @@ class _Chain:
         (settings, plots), place = self._given("volume"), self._project.folder
         refuse_foreign_folder(folder, VOLUME_RECORD)
         found = volume(
-            place / DTM / "dsm.tif", adjustment=place / RESULT, pickets=place / DTM / "pickets.parquet",
-            progress=self._progress, **settings,
+            place / DTM, adjustment=place / RESULT, progress=self._progress, **settings
         )  # fmt: skip
         found.save(folder, plots)
         self._project.volume = found

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from aerotri.public.optional import optional_module
 from aerotri.rasters.grids import Grid
 from aerotri.rasters.held import HeldRaster
 from aerotri.terrain.surface import Surface as Heights
+from aerotri.volume.settings import LAYER, Layer
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,7 +44,6 @@ class WithSurfaces(Protocol):
     def pickets(self) -> Table: ...
 
 
-Layer = Literal["dsm", "dtm"]
 BYTES_OF_CELL = 32
 """Of a surface that is held as a whole: heights and σ, as they are read and as they are kept."""
 
@@ -229,17 +229,18 @@ class Surface:
         )
 
 
-def as_surface(surface: SurfaceLike, layer: Layer = "dsm") -> Surface:
+def as_surface(surface: SurfaceLike, layer: Layer = LAYER) -> Surface:
     """The surface itself, that of a terrain model, or that of a file.
 
     Parameters
     ----------
-    layer : of a terrain model: with objects (dsm) or without (dtm).
+    layer : of a terrain model, or of the folder it was written to: with objects (dsm) or without (dtm).
     """
     if isinstance(surface, Surface):
         return surface
     if isinstance(surface, str | os.PathLike):
-        return Surface(surface)
+        path = Path(surface)
+        return Surface(path / f"{layer}.tif" if path.is_dir() else path)
     return surface.dsm if layer == "dsm" else surface.dtm
 
 

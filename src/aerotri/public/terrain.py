@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from aerotri.terrain.dtm import TerrainOutcome, TerrainPlan
 
 RECORD = "dtm.json"
-OWN_NAMES = (RECORD, "pickets.parquet", "pickets.laz", "dsm.tif", "dtm.tif", "model.tif", "models.csv", "plots")
+PICKETS = "pickets.parquet"
+OWN_NAMES = (RECORD, PICKETS, "pickets.laz", "dsm.tif", "dtm.tif", "model.tif", "models.csv", "plots")
 ENDINGS = (".tif", ".tiff", ".jpg", ".jpeg")
 METRES = ("node_X", "node_Y", "X", "Y", "Z", "sX", "sY", "sZ", "sX_matching", "sY_matching", "sZ_matching")
 
@@ -310,7 +311,7 @@ def _write(target: Path, model: TerrainModel, plots: bool) -> None:
 
     outcome, p, crs = model.record, model.record.pickets, horizontal_crs(model.crs)
     with atomic_folder(target, own=OWN_NAMES) as folder:
-        write_pickets(folder / "pickets.parquet", p, outcome.adjustment)
+        write_pickets(folder / PICKETS, p, outcome.adjustment)
         own = p.accepted
         sigma = np.sqrt(p.covariance[own, 2, 2] + outcome.adjustment[own, 2])
         write_point_cloud(folder / "pickets.laz", p.xyz[own], sigma, outcome.ground[own], crs)

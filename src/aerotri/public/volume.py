@@ -15,7 +15,18 @@ from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.stated import StatedAdjustment
 from aerotri.public.volume_result import THICKNESS, MeasuredVolume
 from aerotri.public.volume_sigma import MeasuredSurface, sigma_of_volume
-from aerotri.volume.settings import BASE, METHOD, SECTIONS, SIGMA, Method, SectionPlan, SigmaOptions
+from aerotri.volume.settings import (
+    BASE,
+    LAYER,
+    LAYERS,
+    METHOD,
+    SECTIONS,
+    SIGMA,
+    Layer,
+    Method,
+    SectionPlan,
+    SigmaOptions,
+)
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -33,6 +44,7 @@ def volume(
     surface: SurfaceLike,
     boundary: BaseGeometry | FilePath | None = None,
     *,
+    layer: Layer = LAYER,
     base: SurfaceLike | float = BASE,
     method: Method = METHOD,
     section_spacing: float | None = SECTIONS.spacing,
@@ -53,8 +65,10 @@ def volume(
 
     Parameters
     ----------
-    surface : raster of heights, or what `aerotri.terrain` returned: its surface with objects, and its pickets for σ.
+    surface : raster of heights; or what `aerotri.terrain` returned, or the folder it was written to, whose pickets
+        are used for σ.
     boundary : GeoPackage, GeoJSON or WKT file, WKT text, or a shapely polygon; the whole surface where None.
+    layer : which surface of these: 'dsm' with objects (a pile is one), or 'dtm', the ground alone.
     base : height in m, 'level:H', 'plane:X,Y,Z;X,Y,Z;X,Y,Z', 'plane' (fitted to the boundary), 'boundary' (spline
         through it), 'lowest' (level of its lowest point), or another surface.
     method : the one that counts; all are computed.
@@ -90,9 +104,11 @@ def volume(
     '1200.0 m³ on 400.0 m²'
     """
     _refuse_contradictions(adjustment, pickets, base_adjustment, base_pickets)
-    top, below = MeasuredSurface(surface, _stated(adjustment), pickets), None
+    if layer not in LAYERS:
+        raise InputError(f"there is no layer '{layer}'", f"choose one of {', '.join(LAYERS)}")
+    top, below = MeasuredSurface(surface, _stated(adjustment), pickets, layer), None
     if is_surface(base):
-        below = MeasuredSurface(base, _stated(base_adjustment), base_pickets)
+        below = MeasuredSurface(base, _stated(base_adjustment), base_pickets, layer)
     elif base_adjustment is not None or base_pickets is not None:
         raise InputError("base_adjustment and base_pickets need a surface as base", "give its raster as base")
     options = SigmaOptions(

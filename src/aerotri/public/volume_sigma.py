@@ -14,7 +14,9 @@ from aerotri.public.models import check_crs
 from aerotri.public.stated import StatedAdjustment
 from aerotri.public.surfaces import Surface, as_surface
 from aerotri.public.table import Table
+from aerotri.public.terrain import PICKETS
 from aerotri.public.terrain import RECORD as TERRAIN
+from aerotri.volume.settings import LAYER, Layer
 
 if TYPE_CHECKING:
     from aerotri.public.surfaces import Reader, SurfaceLike
@@ -34,17 +36,20 @@ class MeasuredSurface:
     Parameters
     ----------
     given : the surface. adjustment : None where not stated.
-    pickets : the points measured, pickets.parquet or its table; None: those of a terrain model, else not known.
+    pickets : the points measured, pickets.parquet or its table; None: those of a terrain model, in memory or in the
+        folder it was written to, else not known.
+    layer : of a terrain model: with objects or without.
     """
 
     given: SurfaceLike
     adjustment: StatedAdjustment | None = None
     pickets: FilePath | Table | None = None
+    layer: Layer = LAYER
 
     @cached_property
     def surface(self) -> Surface:
         """The heights."""
-        return as_surface(self.given)
+        return as_surface(self.given, self.layer)
 
     @property
     def is_model(self) -> bool:
@@ -53,10 +58,13 @@ class MeasuredSurface:
 
     @property
     def points(self) -> FilePath | Table | None:
-        """The points measured: as stated, or those of a terrain model."""
-        if self.pickets is None and not isinstance(self.given, Surface | str | os.PathLike):
+        """The points measured: as stated, or those of a terrain model, in memory or in its folder."""
+        if self.pickets is not None or isinstance(self.given, Surface):
+            return self.pickets
+        if not isinstance(self.given, str | os.PathLike):
             return self.given.pickets
-        return self.pickets
+        beside = Path(self.given) / PICKETS
+        return beside if beside.is_file() else None
 
     @property
     def name_of_points(self) -> str:

@@ -41,6 +41,10 @@ class SigmaOptions:
     corrected: bool = True
 
 
+Layer = Literal["dsm", "dtm"]
+LAYERS: tuple[Layer, ...] = get_args(Layer)
+LAYER: Layer = "dsm"
+"""Of a terrain model the surface with objects: a filter that seeks the ground takes a pile for an object."""
 BASE, METHOD = "boundary", METHODS[0]
 """The base and the method that count where none is stated."""
 SECTIONS, SIGMA = SectionPlan(), SigmaOptions()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -83,7 +84,16 @@ def _in_block(block: Block, given: PointList, stated: Statements) -> tuple[np.nd
 
 
 def with_check_points(reading: Reading, names: tuple[str, ...], prefix: str = "") -> Reading:
-    """Control points made check points.
+    """As `block_with_check_points`, of what was read."""
+    return replace(reading, block=block_with_check_points(reading.block, names, prefix))
+
+
+def block_with_check_points(block: Block, names: Sequence[str], prefix: str = "") -> Block:
+    """The block with control points made check points.
+
+    Parameters
+    ----------
+    names : of them, with or without the prefix.
 
     Raises
     ------
@@ -91,8 +101,7 @@ def with_check_points(reading: Reading, names: tuple[str, ...], prefix: str = ""
         For a name that is no control point.
     """
     if not names:
-        return reading
-    block = reading.block
+        return block
     control = block.points[block.control.point]
     is_check = block.control.is_check.copy()
     for name in names:
@@ -101,4 +110,4 @@ def with_check_points(reading: Reading, names: tuple[str, ...], prefix: str = ""
             known = ", ".join(control[:8].tolist())
             raise InputError(f"--check {name}: there is no such control point", f"there are {known}")
         is_check[own] = True
-    return replace(reading, block=replace(block, control=replace(block.control, is_check=is_check)))
+    return replace(block, control=replace(block.control, is_check=is_check))
