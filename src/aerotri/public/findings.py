@@ -27,19 +27,10 @@ def work_table(adjusted: AdjustedBlock) -> Table:
     ----------
     adjusted : in the frame of the adjustment.
     """
-    from aerotri.diagnosis.work_items import PRIORITIES
     from aerotri.diagnosis.work_list import work_list
+    from aerotri.formats.results.evaluation import work_columns
 
-    items = work_list(adjusted).items
-    columns = {
-        "level": [PRIORITIES[item.priority - 1] for item in items],
-        "kind": [item.kind for item in items],
-        "where": [item.where for item in items],
-        "what": [item.what for item in items],
-        "times_limit": [float(item.severity) for item in items],
-        "do": [item.hint for item in items],
-    }
-    return Table.of("what to look at first", columns)
+    return Table.of("what to look at first", {name: list(v) for name, v in work_columns(work_list(adjusted)).items()})
 
 
 def blunders_table(adjusted: AdjustedBlock) -> Table:

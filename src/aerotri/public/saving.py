@@ -31,6 +31,7 @@ RESULT_NAMES = (
     RECORD, "images.csv", "points.csv", "residuals.parquet", "parameters.csv", "control.csv", "check.csv",
     "block", "solution.npz", "plots", "report.html", "observations.csv", "check_free.json", "variance_components.json",
     "parameter_changes.json", "parameter_changes.csv", "compare_parameters.json", "compare_parameters.csv",
+    "work_list.csv", "parameter_effects.csv",
 )  # fmt: skip
 
 
@@ -96,17 +97,18 @@ def write_adjustment(
             folder / "solution.npz", adjustment.system, adjustment.solution, adjustment.local, adjustment.frame
         )
         timings = {**result.outcome.timings_s, "write": time.perf_counter() - begun}
+        found = evaluate(adjustment)
         if plots:
             report.stage("drawing", None)
             begun = time.perf_counter()
-            _draw(adjustment, folder, checked)
+            _draw(adjustment, found, folder, checked)
             timings["plots"] = time.perf_counter() - begun
         result = replace(result, outcome=replace(result.outcome, timings_s=timings))
         if checked is not None:
             from aerotri.formats.results.free_check import free_check_json
 
             write_json(folder / "check_free.json", free_check_json(checked))
-        _write_parameter_tables(adjustment, folder)
+        _write_evaluation(found, adjustment.compared, folder)
         write_result(result, folder)
     return result
 
@@ -119,24 +121,26 @@ def write_comparison_tables(comparison: ParameterComparison, folder: Path) -> No
     write_csv(folder / "compare_parameters.csv", comparison_columns(comparison))
 
 
-def _write_parameter_tables(adjustment: Adjustment, folder: Path) -> None:
-    """The differences between groups, and the sets that were compared, where there are any."""
+def _write_evaluation(found: Evaluation, compared: ParameterComparison | None, folder: Path) -> None:
+    """The work list, and where there are any: effects of the parameters, differences between groups, sets compared."""
+    from aerotri.formats.results.evaluation import effects_columns, work_columns
     from aerotri.formats.results.parameter_sets import changes_columns, changes_json
 
-    changes = group_changes(adjustment.result)
-    if changes:
-        write_json(folder / "parameter_changes.json", changes_json(changes))
-        write_csv(folder / "parameter_changes.csv", changes_columns(changes))
-    if adjustment.compared is not None:
-        write_comparison_tables(adjustment.compared, folder)
+    write_csv(folder / "work_list.csv", work_columns(found.work))
+    if found.effects is not None:
+        write_csv(folder / "parameter_effects.csv", effects_columns(found.effects))
+    if found.changes:
+        write_json(folder / "parameter_changes.json", changes_json(found.changes))
+        write_csv(folder / "parameter_changes.csv", changes_columns(found.changes))
+    if compared is not None:
+        write_comparison_tables(compared, folder)
 
 
-def _draw(adjustment: Adjustment, folder: Path, checked: FreeCheck | None) -> None:
+def _draw(adjustment: Adjustment, found: Evaluation, folder: Path, checked: FreeCheck | None) -> None:
     from aerotri.report.pages.adjustment import Findings, write_report
     from aerotri.report.plots.comparison import plot_comparison
     from aerotri.report.plots.overview import all_plots, save_plots
 
-    found = evaluate(adjustment)
     figures = all_plots(adjustment.result, found.changes)
     if adjustment.compared is not None:
         figures["compare_parameters"] = plot_comparison(adjustment.compared)
