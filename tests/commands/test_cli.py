@@ -45,7 +45,7 @@ def test_adjust_writes_everything(result_folder):
     names = {p.name for p in result_folder.iterdir()}
     assert names - {".aerotri-files"} == {
         "adjustment.json", "images.csv", "points.csv", "residuals.parquet", "parameters.csv", "control.csv",
-        "check.csv", "block", "solution.npz", "plots", "report.html",
+        "check.csv", "block", "solution.npz", "plots", "report.html", "work_list.csv", "parameter_effects.csv",
     }  # fmt: skip
     content = json.loads((result_folder / "adjustment.json").read_text(encoding="utf-8"))
     assert content["status"] == "converged"
@@ -57,6 +57,15 @@ def test_adjust_writes_everything(result_folder):
     assert table.column_names[:12] == [
         "image", "point", "x", "y", "vx", "vy", "rx", "ry", "wx", "wy", "weight", "status",
     ]  # fmt: skip
+
+
+def test_nothing_is_lost_without_plots(result_folder, block_folder, tmp_path):
+    done = run("adjust", block_folder, "--out", tmp_path / "out", "--no-plots")
+    assert done.returncode == 0, done.stderr
+    for name in ("work_list.csv", "parameter_effects.csv"):
+        text = (tmp_path / "out" / name).read_text(encoding="utf-8")
+        assert text == (result_folder / name).read_text(encoding="utf-8")
+        assert len(text.splitlines()) > 1
 
 
 def test_result_is_the_adjustment_of_the_block_it_holds(result_folder, tmp_path):
