@@ -27,12 +27,7 @@ import argparse
 
 import numpy as np
 
-from aerotri.functional_model.additional_parameters import parameter_set, parse_parameters
-from aerotri.observations import Block
-from aerotri.pipeline import compare_parameters
-from aerotri.results.parameter_comparison import ParameterComparison
-from aerotri.simulation import parse_spec, simulate
-from aerotri.strategies.parameter_choice import choose
+import aerotri
 
 SETS = (
     "none", "bluh:1-12", "ultracam_d:42-73", "bluh:1-12,ultracam_d:42-73", "brown", "ebner", "gruen", "legendre:5x5",
@@ -61,20 +56,15 @@ def spec() -> dict:
 
 def true_parameters(seed: int, of_tiles: float) -> dict[str, float]:
     """Values of 1–12 and 42–73, the tiles' patterns `of_tiles` times as large; together RMS_UM over the format."""
-    camera = simulate(parse_spec(spec()), 1)[0].cameras[0]
+    camera = aerotri.simulate(spec(), 1).block.cameras[0]
     rng = np.random.default_rng(seed)
-    x, y = (rng.uniform(-1.0, 1.0, (2000, 2)) * camera.half_format_mm).T
-    names, patterns = [], []
-    for family, items in parse_parameters(TRUE_MODEL):
-        chosen = parameter_set(family, items, camera)
-        basis = chosen.basis(x, y)
-        size = np.sqrt(np.mean(basis**2, axis=(0, 1)))
-        patterns.append(basis / size)
-        names += list(zip(chosen.names, size, strict=True))
+    xy = rng.uniform(-1.0, 1.0, (2000, 2)) * camera.half_format_mm
+    names, patterns = aerotri.parameters.patterns(TRUE_MODEL, camera, xy)
+    size = np.sqrt(np.mean(patterns**2, axis=(0, 1)))
     value = rng.normal(size=len(names))
     value[12:] *= of_tiles
-    value *= 1e-3 * RMS_UM / np.sqrt(np.mean((np.concatenate(patterns, axis=2) @ value) ** 2))
-    return {name: float(v / size) for (name, size), v in zip(names, value, strict=True)}
+    value *= 1e-3 * RMS_UM / np.sqrt(np.mean((patterns / size @ value) ** 2))
+    return dict(zip(names, (value / size).tolist(), strict=True))
 
 
 TRUTHS = {
@@ -84,19 +74,19 @@ TRUTHS = {
 }
 
 
-def block(truth: str, seed: int) -> Block:
+def block(truth: str, seed: int) -> aerotri.Block:
     """A block whose camera errs by parameters or by physics."""
     content, of_tiles = spec(), TRUTHS[truth]
     errors: dict = {"physical": {"rms_um": RMS_UM}}
     if of_tiles is not None:
         errors = {"parameters": true_parameters(seed, of_tiles)}
     content["camera"]["ucd"]["errors"] = errors
-    return simulate(parse_spec(content), seed)[0]
+    return aerotri.simulate(content, seed).block
 
 
-def table(truth: str, comparisons: list[ParameterComparison]) -> list[str]:
+def table(truth: str, found: list) -> list[str]:
     """Lines of the means over the seeds."""
-    chosen = [choose(c).name for c in comparisons]
+    chosen, comparisons = [c.choice for c in found], [c.record for c in found]
     rms = np.array([[o.check.rms for o in c.outcomes] for c in comparisons])
     mean = np.sqrt(np.mean(rms**2, axis=0))
     least = min(mean[k, 2] for k, name in enumerate(SETS) if "collocation" not in name)
@@ -114,7 +104,7 @@ def table(truth: str, comparisons: list[ParameterComparison]) -> list[str]:
         xyz = " | ".join(f"{v:.4f}" for v in mean[k])
         times = chosen.count(own[0].name)
         lines.append(f"| {name} | {number:.0f} | {sigma0:.2f} | {xyz} | {mean[k, 2] / least:.2f} | {field} | {times} |")
-    taken = np.array([next(o.check.rms[2] for o in c.outcomes if o.name == choose(c).name) for c in comparisons])
+    taken = np.array([next(o.check.rms[2] for o in c.record.outcomes if o.name == c.choice) for c in found])
     lines.append(f"auto: Z {np.sqrt(np.mean(taken**2)):.4f}, {np.sqrt(np.mean(taken**2)) / least:.2f} of the best set")
     return lines
 
@@ -123,9 +113,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=5)
     seeds = parser.parse_args().seeds
-    choices = [parse_parameters(name) for name in SETS]
     for truth in TRUTHS:
-        comparisons = [compare_parameters(block(truth, 100 + k), choices) for k in range(seeds)]
+        comparisons = [aerotri.compare_parameters(block(truth, 100 + k), SETS) for k in range(seeds)]
         print("\n".join([*table(truth, comparisons), ""]), flush=True)
 
 

@@ -11,35 +11,29 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.formats.block.folder import read_block
-from aerotri.observations import Block
-from aerotri.pipeline import compare_parameters
-from aerotri.results.parameter_comparison import Accuracy
-from aerotri.simulation import read_spec, simulate
-from aerotri.strategies.parameter_choice import candidate_sets, choose
+import aerotri
 
 BLOCKS = Path(__file__).parents[2] / "blocks"
 SIMULATED = ("frederiksstad_ultracam", "frederiksstad_dmc", "frederiksstad_rmk", "dsk_saar_ultracam")
 
 
-def centimetres(accuracy: Accuracy) -> str:
+def centimetres(accuracy) -> str:
     """RMS X, Y, Z; a dash where there are no points."""
     known = [f"{100 * v:.1f}" if np.isfinite(v) else "–" for v in accuracy.rms]
     return ", ".join(known) if set(known) != {"–"} else "–"
 
 
-def table(block: Block) -> list[str]:
+def table(block: aerotri.Block) -> list[str]:
     """Lines on one block."""
     started = time.perf_counter()
-    comparison = compare_parameters(block, candidate_sets(block))
+    comparison = aerotri.compare_parameters(block)
     seconds = time.perf_counter() - started
-    chosen = choose(comparison)
-    least = min(o.bic for o in comparison.outcomes if o.converged)
+    outcomes, reason = comparison.record.outcomes, comparison.reason
+    least = min(o.bic for o in outcomes if o.converged)
     lines = [
         f"## {block.name}",
         "",
@@ -48,17 +42,17 @@ def table(block: Block) -> list[str]:
         "| set | parameters (effective) | σ0 µm | check points | control without itself | ΔBIC |",
         "|---|---|---|---|---|---|",
     ]
-    for o in comparison.outcomes:
+    for o in outcomes:
         if not o.converged:
             lines.append(f"| {o.name} | – | {o.status} | | | |")
             continue
         number = f"{o.count}" if abs(o.effective - o.count) < 0.5 else f"{o.count} ({o.effective:.0f})"
-        name = f"**{o.name}**" if o.name == chosen.name else o.name
+        name = f"**{o.name}**" if o.name == comparison.choice else o.name
         lines.append(
             f"| {name} | {number} | {o.sigma0_um:.2f} | {centimetres(o.check)} | {centimetres(o.control)} | "
             f"{o.bic - least:.0f} |"
         )
-    return [*lines, "", f"{chosen.reason[:1].upper()}{chosen.reason[1:]}.", ""]
+    return [*lines, "", f"{reason[:1].upper()}{reason[1:]}.", ""]
 
 
 def main() -> None:
@@ -66,11 +60,8 @@ def main() -> None:
     parser.add_argument("blocks", type=Path, nargs="*", help="Block folders beside those of blocks/.")
     parser.add_argument("--robust", default="huber", help="For the blocks given.")
     options = parser.parse_args()
-    blocks = [simulate(read_spec(BLOCKS / name / "simulation.toml"), 1)[0] for name in SIMULATED]
-    for path in options.blocks:
-        block = read_block(path)
-        adjustment = replace(block.settings.adjustment, robust=options.robust)
-        blocks.append(replace(block, settings=replace(block.settings, adjustment=adjustment)))
+    blocks = [aerotri.simulate(BLOCKS / name / "simulation.toml", 1).block for name in SIMULATED]
+    blocks += [aerotri.with_settings(path, robust=options.robust) for path in options.blocks]
     print("# Families of additional parameters compared\n\nBold: what `--parameters auto` takes.\n")
     for block in blocks:
         print("\n".join(table(block)), flush=True)

@@ -29,7 +29,6 @@ allows for the curvature of the ground within a window, which the y-parallaxes t
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,15 +37,9 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.stats import chi2
 
-from aerotri.commands.console import Console
-from aerotri.commands.results import reopened
-from aerotri.pipeline import adjust_keeping_system
-from aerotri.rasters.images import create_image
-from aerotri.results.adjustment import Adjustment
-from aerotri.simulation import parse_spec, simulate
-from aerotri.simulation.rendering import RenderOptions, make_scene, render
-from aerotri.simulation.terrain import Terrain
-from aerotri.terrain.dtm import TerrainOutcome, TerrainPlan, base_ratio, make_terrain_model
+import aerotri
+from photographs_to_block import SPEC as OF_FILES
+from photographs_to_block import rendered
 
 SPEC = {
     "name": "pickets",
@@ -59,6 +52,10 @@ SPEC = {
     "start_values": {"kind": "perturbed"},
 }  # fmt: skip
 GRAIN = (100.0, 800.0)
+NOISE = 50.0
+"""Grain of photographs with tie points found in them."""
+EDGE, MOST = 0.10, 5
+"""Share of the format at its edge that is not used, and photographs of a picket."""
 INTERVAL_M, SLOPE_STEP_M = 10.0, 0.05
 GROSS_PX, GROSS_SIGMA = 1.0, 6.0
 """A picket is off grossly by more than this parallax and this many σ."""
@@ -99,50 +96,34 @@ def main() -> None:
 
 def of_seed(folder: Path, seed: int) -> Run:
     """A block of its own, matched with its adjusted orientation."""
-    spec, grain = parse_spec(SPEC), float(np.random.default_rng(seed).uniform(*GRAIN))
-    block, truth = simulate(spec, seed)
-    scene = make_scene(spec, seed, block, truth, RenderOptions(noise=grain))
-    paths = []
-    for k, name in enumerate(scene.names):
-        paths.append(folder / f"{name}.tif")
-        pixels = render(scene, k)
-        with create_image(paths[-1], *pixels.shape[::-1], 1, "uint16") as writer:
-            writer.write(0, pixels[None])
-    return matched(adjust_keeping_system(block), tuple(paths), scene.terrain, INTERVAL_M, seed, grain)
+    flight, grain = aerotri.simulate(SPEC, seed), float(np.random.default_rng(seed).uniform(*GRAIN))
+    photographs = flight.save(folder / "flown", photographs=True, noise=grain) / "photographs"
+    return matched(aerotri.adjust(flight.block, explain=False), photographs, flight, INTERVAL_M, grain)
 
 
 def from_files(folder: Path, seed: int) -> Run:
     """Photographs and a list of control points, and nothing else: tie points, orientation, adjustment, pickets."""
-    sys.path.insert(0, str(Path(__file__).resolve().parent))
-    from photographs_to_block import SPEC as OF_FILES
-    from photographs_to_block import rendered
-
     here = folder / f"files_{seed}"
     rendered(here, seed)
-    spec = parse_spec(OF_FILES)
-    ground = make_scene(spec, seed, *simulate(spec, seed)).terrain
-    calibration = reopened(here / "result", Console(quiet=True))
-    paths = [here / "photographs" / f"{Path(str(name)).stem}.tif" for name in calibration.result.block.images.names]
-    return matched(calibration, tuple(paths), ground, 3.0, seed, RenderOptions().noise)
+    flight = aerotri.simulate(OF_FILES, seed)
+    return matched(aerotri.open_result(here / "result"), here / "photographs", flight, 3.0, NOISE)
 
 
-def matched(
-    calibration: Adjustment, paths: tuple[Path, ...], ground: Terrain, interval: float, seed: int, grain: float
-) -> Run:
+def matched(result: aerotri.Adjustment, photographs: Path, flight, interval: float, grain: float) -> Run:
     """Pickets against the ground.
 
     d is the height over the ground below the picket, so that its variance is nᵀ·C·n, n = (−slope, 1); of what the
     adjustment adds its variances count, without what X, Y and Z have in common.
     """
-    found = make_terrain_model(calibration, TerrainPlan(np.arange(len(paths)), paths, interval))
+    found = aerotri.terrain(result, photographs, interval=interval, edge=EDGE, most_photographs=MOST).record
     own = np.flatnonzero(found.pickets.accepted)
     xyz = found.pickets.xyz[own]
-    d = xyz[:, 2] - ground.height(xyz[:, :2])
-    normal = np.column_stack([*(-slope for slope in slopes(ground, xyz[:, :2])), np.ones(len(own))])
+    d = xyz[:, 2] - flight.true_heights(xyz[:, :2])
+    normal = np.column_stack([*(-slope for slope in slopes(flight, xyz[:, :2])), np.ones(len(own))])
     matching = np.einsum("ni,nij,nj->n", normal, found.pickets.covariance[own], normal)
     z = d / np.sqrt(matching + np.sum(normal**2 * found.adjustment[own], axis=1))
-    chosen = int(np.random.default_rng(seed).integers(len(own)))
-    limit = GROSS_PX * float(np.median(found.photographs.gsd)) / base_ratio(found.photographs, found.pickets)
+    chosen = int(np.random.default_rng(flight.seed).integers(len(own)))
+    limit = GROSS_PX * float(np.median(found.photographs.gsd)) / base_over_height(found)
     gross = int(((np.abs(d) > limit) & (np.abs(z) > GROSS_SIGMA)).sum())
     return Run(
         z, float(z[chosen]), float(d[chosen]), disjoint_pairs(xyz, d, matching, found), gross,
@@ -150,12 +131,20 @@ def matched(
     )  # fmt: skip
 
 
-def slopes(ground: Terrain, xy: np.ndarray) -> list[np.ndarray]:
+def base_over_height(found) -> float:
+    """Median of the first two photographs of the pickets."""
+    own = np.flatnonzero(found.pickets.accepted)
+    a, b = (found.photographs.centres[found.pickets.photographs[own, k]] for k in range(2))
+    height = 0.5 * (a[:, 2] + b[:, 2]) - found.pickets.xyz[own, 2]
+    return float(np.median(np.hypot(*(a - b)[:, :2].T) / height))
+
+
+def slopes(flight, xy: np.ndarray) -> list[np.ndarray]:
     step = SLOPE_STEP_M * np.eye(2)
-    return [(ground.height(xy + s) - ground.height(xy - s)) / (2.0 * SLOPE_STEP_M) for s in step]
+    return [(flight.true_heights(xy + s) - flight.true_heights(xy - s)) / (2.0 * SLOPE_STEP_M) for s in step]
 
 
-def disjoint_pairs(xyz: np.ndarray, d: np.ndarray, variance: np.ndarray, found: TerrainOutcome) -> np.ndarray:
+def disjoint_pairs(xyz: np.ndarray, d: np.ndarray, variance: np.ndarray, found) -> np.ndarray:
     """Differences of neighbours with the same photographs over their σ, every picket in one pair.
 
     The error of the orientation is the same for both; their windows have no pixel in common.

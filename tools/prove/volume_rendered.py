@@ -21,31 +21,16 @@ polygon. With --out volume_rendered.md is written there. Last printed:
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
-import json
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import shapely
 from scipy.stats import chi2
-from shapely import Polygon
 
-from aerotri.commands.adjust import run_adjust
-from aerotri.commands.dtm import run_dtm
-from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
-from aerotri.commands.volume import VolumeInput, run_volume
-from aerotri.formats.assembly.assemble import Statements
-from aerotri.formats.assembly.camera_spec import CameraSpec
-from aerotri.simulation import parse_spec
-from aerotri.simulation.random_streams import stream
-from aerotri.simulation.terrain import make_terrain
-from aerotri.terrain.settings import TerrainSettings
-from aerotri.volume.bases import quadrature_of
-from aerotri.volume.boundary import Boundary, boundary_of
-from aerotri.volume.settings import SectionPlan, SigmaOptions
-from photographs_to_block import SPEC, write_files
+import aerotri
+from photographs_to_block import SPEC, tied_and_adjusted, write_files
 
 PLAN = SPEC | {
     "name": "stockpile",
@@ -74,39 +59,39 @@ class Outcome:
         return (self.volume - self.truth) / self.sigma
 
 
-def site() -> Boundary:
+def site() -> shapely.Polygon:
     """The polygon, not in line with the flight."""
     angle = 0.3 + 2.0 * np.pi * np.arange(CORNERS) / CORNERS
-    return boundary_of(Polygon(RADIUS * np.column_stack([np.cos(angle), 0.8 * np.sin(angle)])), "stockpile")
+    return shapely.Polygon(RADIUS * np.column_stack([np.cos(angle), 0.8 * np.sin(angle)]))
 
 
-def true_volume(seed: int, boundary: Boundary) -> float:
+def true_volume(seed: int, boundary: shapely.Polygon) -> float:
     """m³ over the level, by cells of a twelfth of a metre."""
-    spec = parse_spec(PLAN)
-    terrain = make_terrain(spec.terrain, spec.flight.centre_m, stream(seed, "terrain"))
-    places, weight = quadrature_of(boundary, PANELS)
-    return float(weight @ (terrain.height(places) - LEVEL))
+    left, bottom, right, top = boundary.bounds
+    cell = max(right - left, top - bottom) / PANELS
+    x, y = np.meshgrid(np.arange(left, right, cell), np.arange(top, bottom, -cell))
+    boxes = shapely.box(x.ravel(), y.ravel() - cell, x.ravel() + cell, y.ravel())
+    shapely.prepare(boundary)
+    weight = np.where(shapely.contains_properly(boundary, boxes), cell**2, 0.0)
+    edge = (weight == 0.0) & shapely.intersects(boundary, boxes)
+    weight[edge] = shapely.area(shapely.intersection(boxes[edge], boundary))
+    middle = np.column_stack([x.ravel() + 0.5 * cell, y.ravel() - 0.5 * cell])
+    ground = aerotri.simulate(PLAN, seed).true_heights(middle[weight > 0.0])
+    return float(weight[weight > 0.0] @ (ground - LEVEL))
 
 
-def one(folder: Path, seed: int, boundary: Boundary) -> Outcome:
-    """From photographs to volume.json, files in between."""
+def one(folder: Path, seed: int, boundary: shapely.Polygon) -> Outcome:
+    """From photographs to the volume, files in between."""
     shutil.rmtree(folder, ignore_errors=True)
     write_files(folder, seed, PLAN)
-    options = TiePointOptions(
-        gcp=str(folder / "gcp_list.txt"), camera=CameraSpec(focal_length_mm=4.8, pixel_um=6.0),
-        stated=Statements(control_sigma_m=(0.01, 0.01, 0.02)), mark_sigma_px=0.1, seed=seed,
+    tied_and_adjusted(folder, seed, 4.8, ())
+    aerotri.terrain(folder / "result", folder / "photographs", interval=INTERVAL).save(folder / "dtm")
+    found = aerotri.volume(
+        folder / "dtm" / "dsm.tif", boundary, base=LEVEL, adjustment=folder / "result",
+        pickets=folder / "dtm" / "pickets.parquet",
     )  # fmt: skip
-    given = VolumeInput(folder / "dtm" / "dsm.tif", f"level:{LEVEL}", boundary.polygon.wkt, "prisms",
-                        folder / "result", folder / "dtm" / "pickets.parquet", None)  # fmt: skip
-    with contextlib.redirect_stdout(io.StringIO()):
-        run_tiepoints(folder / "photographs", folder / "block", options, True)
-        run_adjust(folder / "block", folder / "result", None, None, None, False, True)
-        settings = TerrainSettings(interval=INTERVAL)
-        run_dtm(folder / "result", [folder / "photographs"], folder / "dtm", settings, True, True)
-        run_volume(given, SectionPlan(), SigmaOptions(), folder / "volume", True, True)
-    content = json.loads((folder / "volume" / "volume.json").read_text(encoding="utf-8"))
-    s = content["sigma"]
-    return Outcome(true_volume(seed, boundary), content["net_m3"], s["sigma_m3"], s["parts_m3"], s["pickets"])
+    s = found.summary["sigma"]
+    return Outcome(true_volume(seed, boundary), found.net, s["sigma_m3"], s["parts_m3"], s["pickets"])
 
 
 def main() -> None:

@@ -16,11 +16,10 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from aerotri.simulation import read_spec
 from paper_003.cases import DSK, FREDERIKSSTAD, ULTRACAM, Case
 from paper_003.figures import averaged_figure, check_points_figure, days_figure, errors_figure
 from paper_003.reports import write_reports
-from paper_003.runs import days_over_seeds, over_cameras, rows_of, two_days, with_navigation
+from paper_003.runs import days_over_seeds, over_cameras, read_plan, rows_of, two_days, with_navigation
 from paper_003.table import Answer, markdown
 
 DAY_CHANGES_UM = (0.0, 0.5)
@@ -31,7 +30,7 @@ def main() -> None:
     options = _options()
     cases = (*FREDERIKSSTAD, *(() if options.without_dsk else (DSK,)))
     if options.reports is not None:
-        for path in write_reports(((case, read_spec(case.spec_path)) for case in cases), options.reports):
+        for path in write_reports(((case, read_plan(case.plan_path)) for case in cases), options.reports):
             print(path)
         return
     answers, figures = [], {}
@@ -51,19 +50,19 @@ def main() -> None:
 
 
 def _answer(case: Case, seeds: int, cameras: int) -> tuple[Answer, dict[str, Figure]]:
-    spec, large = read_spec(case.spec_path), case is DSK
-    rows = rows_of(case, spec, range(1, 2 if large else seeds + 1), _say)
+    plan, large = read_plan(case.plan_path), case is DSK
+    rows = rows_of(case, plan, range(1, 2 if large else seeds + 1), _say)
     drawn = {}
     if case.special:
         drawn[f"paper_003_figure_{case.figures[0]}"] = averaged_figure(case, rows)
-        drawn[f"paper_003_figure_{case.figures[1]}"] = errors_figure(case, rows, spec)
+        drawn[f"paper_003_figure_{case.figures[1]}"] = errors_figure(case, rows)
     if large:
         _say("two days, navigation")
-        days = [two_days(case, spec, change_um) for change_um in DAY_CHANGES_UM]
+        days = [two_days(case, plan, change_um) for change_um in DAY_CHANGES_UM]
         drawn["paper_003_figure_11"] = days_figure(case, days[0])
-        return Answer(case, rows, days=days, navigation=with_navigation(case, spec)), drawn
-    drawn_anew = over_cameras(case, spec, cameras, _say) if case.special and cameras else None
-    day_tests = days_over_seeds(case, spec, range(1, cameras + 1)) if case.special == ULTRACAM else ()
+        return Answer(case, rows, days=days, navigation=with_navigation(case, plan)), drawn
+    drawn_anew = over_cameras(case, plan, cameras, _say) if case.special and cameras else None
+    day_tests = days_over_seeds(case, plan, range(1, cameras + 1)) if case.special == ULTRACAM else ()
     return Answer(case, rows, drawn_anew, day_tests=day_tests), drawn
 
 

@@ -27,7 +27,7 @@ class Case:
     special: str
 
     @property
-    def spec_path(self) -> Path:
+    def plan_path(self) -> Path:
         """Of simulation.toml."""
         return BLOCKS / self.name / "simulation.toml"
 

@@ -9,10 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from scipy.stats import chi2
 
-from aerotri.report.plots.panels import Panel, plot_panels
-from aerotri.simulation import SimulationSpec
+from aerotri import drawing
 from paper_003.cases import PRINTED, Case
-from paper_003.runs import Days, Row, true_field
+from paper_003.runs import Days, Row
 
 LOOKS = (("X", "#1c242c", "o"), ("Y", "#0b5cad", "s"), ("Z", "#b04a00", "^"))
 """Coordinate, colour, marker: readable without the colour."""
@@ -21,16 +20,18 @@ LOOKS = (("X", "#1c242c", "o"), ("Y", "#0b5cad", "s"), ("Z", "#b04a00", "^"))
 def averaged_figure(case: Case, rows: Sequence[Row]) -> Figure:
     """Averaged residuals without, with the general and with all parameters."""
     chosen = [rows[0], rows[1], *rows[3:4]]
-    panels = [Panel(row.heading, row.first.averaged) for row in chosen]
-    return plot_panels(panels, f"Averaged residuals – {case.title}", f"measured − adjusted{_number(case.figures[0])}")
+    panels = [drawing.Panel(row.heading, row.first.averaged) for row in chosen]
+    return drawing.plot_panels(
+        panels, f"Averaged residuals – {case.title}", f"measured − adjusted{_number(case.figures[0])}"
+    )
 
 
-def errors_figure(case: Case, rows: Sequence[Row], spec: SimulationSpec) -> Figure:
+def errors_figure(case: Case, rows: Sequence[Row]) -> Figure:
     """Systematic image errors by set, and the true ones."""
-    panels = [Panel(row.heading, row.first.field) for row in rows[1:4]]
-    panels.append(Panel("truth", true_field(panels[0].field, spec, 1)))  # type: ignore[arg-type]
+    panels = [drawing.Panel(row.heading, row.first.field) for row in rows[1:4]]
+    panels.append(drawing.Panel("truth", rows[0].true_field))
     subtitle = f"measured − ideal, less what orientation takes{_number(case.figures[1])}"
-    return plot_panels(panels, f"Systematic image errors – {case.title}", subtitle)
+    return drawing.plot_panels(panels, f"Systematic image errors – {case.title}", subtitle)
 
 
 def _number(figure: int) -> str:
@@ -45,7 +46,9 @@ def days_figure(case: Case, days: Days) -> Figure:
         f"{days.change.statistic * days.change.freedom:.1f} with "
         f"{days.change.freedom} degrees of freedom, at most {chi2.ppf(0.95, days.change.freedom):.1f} by chance (95 %)"
     )
-    return plot_panels([Panel(*pair) for pair in named], f"Two days of one camera – {case.title}", subtitle)
+    return drawing.plot_panels(
+        [drawing.Panel(*pair) for pair in named], f"Two days of one camera – {case.title}", subtitle
+    )
 
 
 def check_points_figure(answers: Sequence[tuple[Case, Sequence[Row]]]) -> Figure:

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from aerotri.commands.adjust import run_adjust
-from aerotri.simulation import SimulationSpec, simulate
-from aerotri.simulation.truth import write_simulated
+import aerotri
 from paper_003.cases import Case
-from paper_003.runs import with_parameters
+from paper_003.runs import Plan
 
 
-def write_reports(cases: Iterable[tuple[Case, SimulationSpec]], folder: Path) -> list[Path]:
+def write_reports(cases: Iterable[tuple[Case, Plan]], folder: Path) -> list[Path]:
     """Write NAME/ and NAME_result/ of every block under a folder; days of a block get parameters of their own.
 
     Returns
@@ -20,12 +18,14 @@ def write_reports(cases: Iterable[tuple[Case, SimulationSpec]], folder: Path) ->
     The paths of the reports.
     """
     reports = []
-    for case, spec in cases:
-        block, truth = simulate(spec, 1)
-        groups = "day" if spec.flight.days else "camera"
-        place, result = folder / case.name, folder / f"{case.name}_result"
-        write_simulated(place, with_parameters(block, case.sets[-1 if len(case.sets) < 4 else 3][1], groups), truth)
-        if run_adjust(place, result, None, None, None, plots=True, as_json=False):
-            raise SystemExit(f"{case.title} was not adjusted")
-        reports.append(result / "report.html")
+    for case, plan in cases:
+        settings = {
+            "additional_parameters": case.sets[-1 if len(case.sets) < 4 else 3][1].split(","),
+            "parameter_groups": "day" if plan["flight"].get("days") else "camera",
+        }
+        place = aerotri.simulate(plan | {"adjustment": settings}, 1).save(folder / case.name)
+        result = aerotri.adjust(place)
+        if result.status != "converged":
+            raise SystemExit(f"{case.title} was not adjusted: {result.status}")
+        reports.append(result.save(folder / f"{case.name}_result") / "report.html")
     return reports

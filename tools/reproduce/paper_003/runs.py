@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Iterable, Mapping
+from copy import deepcopy
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from aerotri.functional_model.additional_parameters import parameter_set, parse_parameters
-from aerotri.functional_model.orientation_patterns import orientation_patterns
-from aerotri.image_errors import (
-    AveragedResiduals,
-    Change,
-    ErrorField,
-    averaged_residuals,
-    change,
-    field_without_orientation,
-    systematic_errors,
-)
-from aerotri.observations import Block
-from aerotri.pipeline import adjust
-from aerotri.results.adjusted_block import AdjustedBlock
-from aerotri.simulation import SimulationSpec, Truth, parse_spec, simulate, true_image_errors
+import aerotri
+from aerotri import parameters as patterns
 from paper_003.cases import Case
+
+Plan = dict[str, Any]
+"""The tables of simulation.toml."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +45,8 @@ class Run:
     gsd_m: float
     square: np.ndarray
     expected: np.ndarray
-    averaged: AveragedResiduals
-    field: ErrorField
+    averaged: Any
+    field: Any
     shape: float
     error_left_um: float
     estimated: int
@@ -60,30 +54,33 @@ class Run:
     t80: float
 
 
-def changed(spec: SimulationSpec, tables: Mapping[str, Mapping]) -> SimulationSpec:
-    """The spec with keys of some tables replaced, checked anew; 'camera.NAME.errors.physical' as a dotted name."""
-    data = spec.model_dump(exclude_none=True)
+def read_plan(path: Path) -> Plan:
+    """The tables of simulation.toml."""
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def changed(plan: Plan, tables: Mapping[str, Mapping]) -> Plan:
+    """The plan with keys of some tables replaced; 'camera.NAME.errors.physical' as a dotted name."""
+    data = deepcopy(plan)
     for name, keys in tables.items():
         place = data
         for part in name.split("."):
             place = place.setdefault(part, {})
         place.update(keys)
-    return parse_spec(data)
+    return data
 
 
-def with_parameters(block: Block, parameters: str, groups: str = "camera") -> Block:
-    """The block to be adjusted with a set of parameters."""
-    settings = replace(
-        block.settings.adjustment, additional_parameters=parse_parameters(parameters), parameter_groups=groups
-    )
-    return replace(block, settings=replace(block.settings, adjustment=settings))
+def adjusted(block: aerotri.Block, parameters: str, groups: str = "camera") -> aerotri.Adjustment:
+    """The block adjusted with a set of parameters."""
+    return aerotri.adjust(aerotri.with_settings(block, parameters=parameters, parameter_groups=groups), explain=False)
 
 
-def measured(result: AdjustedBlock, truth: Truth, special: str) -> Run:
+def measured(found: aerotri.Adjustment, truth, special: str) -> Run:
     """The numbers of an adjustment."""
-    block, camera, p = result.block, result.block.cameras[0], result.parameters
+    result, block, camera = found.adjusted, found.block, found.block.cameras[0]
+    p = result.parameters
     control_sigma = block.control.sigma[[list(block.control.point).index(k) for k in result.check.point]]
-    averaged = averaged_residuals(result, camera.name)
+    averaged = found.averaged_residuals(camera.name)
     ours = (p.kinds == "additional") & np.isin(p.status, ("estimated", "weighted"))
     t80 = p.t[ours & (p.names == "dmc.80")]
     above_ground = float(np.median(truth.centre[:, 2]) - np.median(truth.points[:, 2]))
@@ -91,19 +88,18 @@ def measured(result: AdjustedBlock, truth: Truth, special: str) -> Run:
         len(block.images), len(block.points), len(block.image_points), len(result.control), len(result.check),
         result.outcome.sigma0_um, camera.pixel_um, above_ground * camera.pixel_mm / camera.focal_length_mm,
         np.mean(result.check.difference**2, axis=0), np.mean(result.check.sigma**2 + control_sigma**2, axis=0),
-        averaged, field_without_orientation(result, camera.name), shape_share(averaged, special),
-        error_left(result, truth), int(ours.sum()), int(np.sum(p.t[ours] > 1.96)),
+        averaged, found.image_errors(camera.name, without_orientation=True).field, shape_share(averaged, special),
+        error_left(found, truth), int(ours.sum()), int(np.sum(p.t[ours] > 1.96)),
         float(t80[0]) if len(t80) else float("nan"),
     )  # fmt: skip
 
 
-def shape_share(averaged: AveragedResiduals, special: str) -> float:
+def shape_share(averaged, special: str) -> float:
     """How much of Σ n·|mean|² the patterns of a camera's own parameters explain, fitted with n as weights."""
     if not special:
         return float("nan")
-    ((family, items),) = parse_parameters(special)
     shown = averaged.shown
-    basis = parameter_set(family, items, averaged.camera).basis(averaged.x[shown], averaged.y[shown])
+    _, basis = patterns.patterns(special, averaged.camera, np.column_stack([averaged.x[shown], averaged.y[shown]]))
     weight = np.repeat(np.sqrt(averaged.count[shown]), 2)
     values = weight * averaged.mean[shown].ravel()
     design = weight[:, None] * basis.reshape(len(weight), -1)
@@ -111,29 +107,22 @@ def shape_share(averaged: AveragedResiduals, special: str) -> float:
     return 1.0 - float(left @ left / (values @ values))
 
 
-def error_left(result: AdjustedBlock, truth: Truth) -> float:
+def error_left(found: aerotri.Adjustment, truth) -> float:
     """µm, RMS of a coordinate of estimated − true image error over the format, less the six patterns of orientation."""
-    camera, sample = result.block.cameras[0], truth.image_errors[0]
-    estimated, _ = systematic_errors(result, camera.name, *sample.xy.T)
-    patterns = orientation_patterns(*sample.xy.T, camera.focal_length_mm).reshape(-1, 6)
-    left = (estimated - sample.d).ravel()
-    left = left - patterns @ np.linalg.lstsq(patterns, left, rcond=None)[0]
+    camera, sample = found.block.cameras[0], truth.image_errors[0]
+    six = patterns.orientation_patterns(sample.xy, camera.focal_length_mm).reshape(-1, 6)
+    left = (found.image_errors_at(sample.xy, camera.name) - sample.d).ravel()
+    left = left - six @ np.linalg.lstsq(six, left, rcond=None)[0]
     return 1e3 * float(np.sqrt(np.mean(left**2)))
-
-
-def true_field(field: ErrorField, spec: SimulationSpec, seed: int) -> ErrorField:
-    """The true image error at the nodes of an estimated field; all of it significant. It holds no orientation."""
-    error = next(iter(true_image_errors(spec, seed).values()))
-    d = error(field.x.ravel(), field.y.ravel()).reshape(field.d.shape)
-    return ErrorField(field.camera, field.group, field.x, field.y, d, np.zeros_like(d), np.ones(field.x.shape, bool))
 
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A set of a case over several seeds: its runs, the first of them drawn."""
+    """A set of a case over several seeds: its runs, the first of them drawn, and the true image error of that one."""
 
     heading: str
     runs: tuple[Run, ...]
+    true_field: Any
 
     @property
     def first(self) -> Run:
@@ -169,23 +158,25 @@ class Row:
         return 1e3 * float(np.mean([run.averaged.rms_of_noise for run in self.runs]))
 
 
-def rows_of(case: Case, spec: SimulationSpec, seeds: Iterable[int], say: Callable[[str], None]) -> list[Row]:
+def rows_of(case: Case, plan: Plan, seeds: Iterable[int], say: Callable[[str], None]) -> list[Row]:
     """Every set of a case over the seeds."""
     found: list[list[Run]] = [[] for _ in case.sets]
+    true = []
     for seed in seeds:
-        block, truth = simulate(spec, seed)
+        flight = aerotri.simulate(plan, seed)
+        true.append(flight.true_image_errors().field)
         for runs, (heading, parameters) in zip(found, case.sets, strict=True):
             say(f"{case.title}, seed {seed}, {heading}")
-            runs.append(measured(adjust(with_parameters(block, parameters)), truth, case.special))
-    return [Row(heading, tuple(runs)) for (heading, _), runs in zip(case.sets, found, strict=True)]
+            runs.append(measured(adjusted(flight.block, parameters), flight.truth, case.special))
+    return [Row(heading, tuple(runs), true[0]) for (heading, _), runs in zip(case.sets, found, strict=True)]
 
 
-def over_cameras(case: Case, spec: SimulationSpec, cameras: int, say: Callable[[str], None]) -> np.ndarray:
+def over_cameras(case: Case, plan: Plan, cameras: int, say: Callable[[str], None]) -> np.ndarray:
     """(cameras, sets, 2) m, plan (of a coordinate) and height at check points, for cameras drawn anew."""
-    name = next(iter(spec.camera))
+    name = next(iter(plan["camera"]))
     found = np.zeros((cameras, len(case.sets), 2))
     for k in range(cameras):
-        other = changed(spec, {f"camera.{name}.errors.physical": {"seed": 101 + k}})
+        other = changed(plan, {f"camera.{name}.errors.physical": {"seed": 101 + k}})
         row = rows_of(case, other, [1], lambda text, k=k: say(f"camera {k + 1}: {text}"))
         found[k] = [(one.horizontal_m, one.rms[2]) for one in row]
     return found
@@ -196,26 +187,26 @@ class Days:
     """Two days of one camera: the test of no change, and the fields of both days and their difference."""
 
     change_um: float
-    change: Change
-    fields: tuple[ErrorField, ErrorField]
+    change: Any
+    fields: tuple[Any, Any]
 
 
-def two_days(case: Case, spec: SimulationSpec, change_um: float) -> Days:
+def two_days(case: Case, plan: Plan, change_um: float) -> Days:
     """The block with parameters of its own for each day, the camera having changed by so much between them."""
-    name = next(iter(spec.camera))
-    other = changed(spec, {f"camera.{name}.errors.physical": {"day_change_um": change_um}})
-    result = adjust(with_parameters(simulate(other, 1)[0], case.sets[3][1], "day"))
-    one, two = (field_without_orientation(result, day) for day in ("1", "2"))
-    return Days(change_um, change(result, "1", "2"), (one, two))
+    name = next(iter(plan["camera"]))
+    other = changed(plan, {f"camera.{name}.errors.physical": {"day_change_um": change_um}})
+    result = adjusted(aerotri.simulate(other, 1).block, case.sets[3][1], "day")
+    one, two = (result.image_errors(day, without_orientation=True).field for day in ("1", "2"))
+    return Days(change_um, result.change_between("1", "2"), (one, two))
 
 
-def days_over_seeds(case: Case, spec: SimulationSpec, seeds: Iterable[int]) -> list[Change]:
+def days_over_seeds(case: Case, plan: Plan, seeds: Iterable[int]) -> list:
     """The test of no change between two days of a camera that stays, block after block."""
-    flown = changed(spec, {"flight": {"days": 2}})
+    flown = changed(plan, {"flight": {"days": 2}})
     found = []
     for seed in seeds:
-        result = adjust(with_parameters(simulate(flown, seed)[0], case.sets[3][1], "day"))
-        found.append(change(result, "1", "2"))
+        result = adjusted(aerotri.simulate(flown, seed).block, case.sets[3][1], "day")
+        found.append(result.change_between("1", "2"))
     return found
 
 
@@ -231,14 +222,13 @@ class Navigation:
     change_z: float
 
 
-def with_navigation(case: Case, spec: SimulationSpec) -> list[Navigation]:
+def with_navigation(case: Case, plan: Plan) -> list[Navigation]:
     """The first, second and fourth set without and with GNSS (5 cm) and INS (0.005°, κ 0.008°)."""
-    flown = changed(spec, {"gnss": {"sigma_m": [0.05, 0.05, 0.05]}, "ins": {"sigma_deg": [0.005, 0.005, 0.008]}})
-    block, _ = simulate(flown, 1)
+    flown = changed(plan, {"gnss": {"sigma_m": [0.05, 0.05, 0.05]}, "ins": {"sigma_deg": [0.005, 0.005, 0.008]}})
+    block = aerotri.simulate(flown, 1).block
     found = []
     for heading, parameters in (case.sets[0], case.sets[1], case.sets[3]):
-        chosen = with_parameters(block, parameters)
-        using, without = adjust(chosen), adjust(replace(chosen, gnss_ins=None))
+        using, without = (adjusted(one, parameters).adjusted for one in (block, replace(block, gnss_ins=None)))
         change = using.points.xyz[:, 2] - without.points.xyz[:, 2]
         rms = [np.sqrt(np.mean(result.check.difference**2, axis=0)) for result in (without, using)]
         found.append(Navigation(heading, *rms, float(np.sqrt(np.nanmean(change**2)))))

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from aerotri.image_errors import Change
 from paper_003.cases import PRINTED, PRINTED_H_B, PRINTED_T80, Case
 from paper_003.runs import Days, Navigation, Row
 
@@ -26,7 +25,7 @@ class Answer:
     rows: Sequence[Row]
     cameras: np.ndarray | None = None
     days: Sequence[Days] = ()
-    day_tests: Sequence[Change] = ()
+    day_tests: Sequence = ()
     navigation: Sequence[Navigation] = ()
 
 
