@@ -153,6 +153,15 @@ def test_without_image_points(ten, tmp_path, capsys):
     assert "missing: there are no image points" in capsys.readouterr().out
 
 
+def test_what_is_not_known_is_null(ten, tmp_path, capsys):
+    """Control in plan alone has no extent in height, which JSON cannot say by NaN."""
+    write_block(with_control(ten, lambda xyz: xyz * [1.0, 1.0, np.nan]), tmp_path / "plan")
+    assert invoke(["check", str(tmp_path / "plan"), "--json"]) == 0
+    extents = {one["name"]: one for one in json.loads(capsys.readouterr().out)["extents"]}
+    assert extents["control"]["low"][2] is None
+    assert extents["control"]["low"][0] < extents["control"]["high"][0]
+
+
 def test_names_without_partner(ten):
     """Image points call the control otherwise: the near names, and the option that makes them meet."""
     names, own = ten.points.astype("U40"), ten.control.point[~ten.control.is_check]

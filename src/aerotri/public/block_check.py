@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import FilePath
+from aerotri.formats.results.json_text import number_or_none
 from aerotri.observations import Block
 
 if TYPE_CHECKING:
@@ -53,6 +54,10 @@ class BlockCheck:
         content["image_points"]["rays_per_point"] = [
             {"photographs": rays, "points": count} for rays, count in found.image_points.rays_per_point.items()
         ]
+        content["image_points"]["sigma_um"] = number_or_none(found.image_points.sigma_um)
+        for one in content["extents"]:
+            # a coordinate that no point of the group has
+            one |= {end: list(map(number_or_none, one[end])) for end in ("low", "high")}
         return {
             "block": self.block.name,
             "can_be_adjusted": self.can_be_adjusted,

@@ -1,0 +1,28 @@
+"""Command line: what the reference says."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from aerotri.cli.app import app
+from aerotri.cli.options import Json
+
+
+# options of other commands are words to explain, not options of this one
+@app.command(epilog="Example: aerotri explain points.csv sZ", context_settings={"ignore_unknown_options": True})
+def explain(
+    key: Annotated[
+        list[str],
+        typer.Argument(
+            help="A key of block.toml, a column, a JSON key, a file, an option or a word of a result; before it the "
+            "file or command it belongs to, where it is to be that one."
+        ),
+    ],
+    json_: Json = False,
+) -> None:
+    """What a key, a column, a file, an option or a word of a result means."""
+    from aerotri.commands.explain import run_explain
+
+    run_explain(" ".join(key), app, json_)

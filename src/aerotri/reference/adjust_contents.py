@@ -1,0 +1,315 @@
+"""The JSON files that `aerotri adjust` and `aerotri compare-parameters` write, key by key."""
+
+from __future__ import annotations
+
+from aerotri.reference.adjust_tables import COMPARED, PARAMETERS, PLACE
+from aerotri.reference.records import DescribedFile, Item, of_axes, within
+
+VERSION = Item("aerotri", "text", "Version of aerotri that wrote the file.")
+BLOCK = Item("block", "text", "Name of the block.")
+STATUS_WORDS = {
+    "converged": "the iterations came to an end",
+    "not converged": "they did not",
+    "rank deficient": "the observations do not determine all unknowns",
+}
+SUSPECT_UNIT = "m, mm for image points, rad for angles"
+
+
+def _axes_object(name: str, text: str, unit: str = "m") -> tuple[Item, ...]:
+    return (
+        Item(name, "object", f"{text}, by axis.", unit),
+        *of_axes(f"{name}.{{}}", "number?", f"{text} in {{}}.", unit),
+    )
+
+
+def _ground_points(name: str, what: str) -> tuple[Item, ...]:
+    return (
+        Item(name, "object", f"Differences at the {what} points."),
+        Item(f"{name}.count", "whole", f"Number of {what} points."),
+        *_axes_object(f"{name}.rms", "Root mean square difference"),
+        *_axes_object(f"{name}.mean", "Mean difference"),
+        *_axes_object(f"{name}.max", "Largest difference without sign"),
+        Item(f"{name}.points[]", "object", f"One entry a {what} point."),
+        Item(f"{name}.points[].point", "text", "Name of the point."),
+        *of_axes(f"{name}.points[].d{{}}", "number?", "Adjusted minus given {}.", "m"),
+        *of_axes(f"{name}.points[].s{{}}", "number?", "Standard deviation of the adjusted {}.", "m"),
+    )
+
+
+ADJUSTMENT = (
+    VERSION,
+    BLOCK,
+    Item("status", "text", "How the iterations ended.", values=STATUS_WORDS),
+    Item(
+        "verdict",
+        "text",
+        "What the result is worth.",
+        values={
+            "accepted": "nothing speaks against it",
+            "doubtful": "look before use",
+            "rejected": "do not use",
+            "": "not judged",
+        },
+    ),
+    Item("reasons[]", "text", "Why the result is doubtful or rejected, the gravest reason first."),
+    Item("message", "text", "What is wrong, where the adjustment did not converge; else empty."),
+    Item("iterations", "whole", "Number of iterations."),
+    Item("sigma0", "number?", "Standard deviation of unit weight, σ0; 1 where all stated σ are right."),
+    Item("sigma0_um", "number?", "σ0 as standard deviation of an image coordinate.", "µm"),
+    Item("vtpv", "number?", "Weighted sum of squared residuals, vᵀPv."),
+    Item("observations", "whole", "Number of observations."),
+    Item("unknowns", "whole", "Number of unknowns."),
+    Item("conditions", "whole", "Number of conditions that fix the datum."),
+    Item("redundancy", "whole", "Observations less unknowns plus conditions."),
+    Item("groups[]", "object", "One entry a group of observations, such as image points or control height."),
+    Item("groups[].name", "text", "Name of the group."),
+    Item("groups[].count", "whole", "Number of observations in the group."),
+    Item(
+        "groups[].sigma_apriori",
+        "number?",
+        "Stated standard deviation (median).",
+        "µm for image points, rad for angles, else m",
+    ),
+    Item("groups[].rms", "number?", "Root mean square residual.", "µm for image points, rad for angles, else m"),
+    Item("groups[].redundancy", "number?", "Share of the group in the redundancy."),
+    Item(
+        "groups[].sigma_aposteriori",
+        "number?",
+        "Standard deviation that the residuals show.",
+        "µm for image points, rad for angles, else m",
+    ),
+    *_ground_points("check_points", "check"),
+    *_ground_points("control_points", "control"),
+    Item("additional_parameters[]", "object", "One entry an additional parameter; the columns of parameters.csv."),
+    *within("additional_parameters[]", *(one for one in PARAMETERS if one.name not in ("mark", "x_kind"))),
+    Item("cameras[]", "object", "Interior orientation of every camera after the adjustment."),
+    Item("cameras[].name", "text", "Name of the camera."),
+    Item("cameras[].focal_length_mm", "number?", "Principal distance.", "mm"),
+    Item("cameras[].s_focal_length_mm", "number?", "Its standard deviation; 0: held.", "mm"),
+    Item("cameras[].x0_mm", "number?", "x of the principal point.", "mm"),
+    Item("cameras[].s_x0_mm", "number?", "Its standard deviation; 0: held.", "mm"),
+    Item("cameras[].y0_mm", "number?", "y of the principal point.", "mm"),
+    Item("cameras[].s_y0_mm", "number?", "Its standard deviation; 0: held.", "mm"),
+    Item("blunders[]", "object", "Suspected gross errors, the largest first."),
+    Item("blunders[].image", "text", "Photograph; empty for a control point."),
+    Item("blunders[].point", "text", "Point."),
+    Item("blunders[].w", "number?", "Normalised residual."),
+    Item("blunders[].estimated_mm", "number?", "Size of the error that would explain it.", "mm"),
+    Item("blunders[].action", "text", "What was done with it."),
+    Item("warnings[]", "text", "Sentences to read: what was left out, assumed or is weak."),
+    Item("timings_s", "object", "Time by stage.", "s"),
+    *(
+        Item(f"timings_s.{name}", "number", f"Time for {what}.", "s")
+        for name, what in (
+            ("read", "reading"),
+            ("start_values", "start values"),
+            ("solve", "the iterations"),
+            ("statistics", "σ and tests"),
+            ("plots", "plots and report"),
+            ("write", "writing"),
+        )
+    ),
+)
+
+STAGES = {
+    "tie points alone": "free adjustment",
+    "with control": "control added",
+    "with observed positions": "GNSS added",
+}
+CHECK_FREE = (
+    Item(
+        "verdict",
+        "text",
+        "What does not fit.",
+        values={
+            "fits": "all fits",
+            "tie points": "the tie points",
+            "control": "the control",
+            "positions": "the observed positions",
+            "both": "tie points and what holds the block",
+            "not tested": "nothing could be tested",
+            "failed": "the tie points give no block",
+        },
+    ),
+    Item("sentence", "text", "The verdict with its reasons, in words."),
+    Item("sigma0_free", "number?", "σ0 of the tie points alone."),
+    Item("sigma0_full", "number?", "σ0 of the whole adjustment."),
+    Item("spread_free", "number?", "Standard deviation of the normalised residuals without gross errors."),
+    Item("rays_beyond", "whole", "Number of image points with residuals that chance does not explain."),
+    Item("robust", "yes/no", "Whether the weights are robust; then the limits hold approximately."),
+    Item("stages[]", "object", "The adjustments one after another, each with more observations."),
+    Item("stages[].name", "text", "What takes part.", values=STAGES),
+    Item("stages[].status", "text", "How its iterations ended."),
+    Item("stages[].message", "text", "Why it has no result; else empty."),
+    Item("stages[].sigma0", "number?", "Its σ0."),
+    Item("stages[].vtpv", "number?", "Its weighted sum of squared residuals."),
+    Item("stages[].redundancy", "whole", "Its redundancy."),
+    Item("stages[].added_observations", "whole", "Observations more than in the stage before."),
+    Item("stages[].ratio", "number?", "Growth of vᵀPv by redundancy gained, in σ0² of the free block."),
+    Item("stages[].limit", "number?", "What the ratio may be by chance."),
+    Item("stages[].largest_w", "number?", "Largest normalised residual of what was added."),
+    Item("stages[].w_limit", "number?", "What it may be by chance."),
+    Item("stages[].fits", "yes/no?", "Whether what was added fits; null where nothing tests it."),
+    Item("stages[].suspects[]", "object", "Values with large residuals, the largest first."),
+    Item("stages[].suspects[].kind", "text", "ray (image point), control, or the group of the observation."),
+    Item("stages[].suspects[].name", "text", "Point, photograph or condition."),
+    Item("stages[].suspects[].component", "text", "Coordinate or angle."),
+    Item("stages[].suspects[].w", "number?", "Normalised residual."),
+    Item("stages[].suspects[].error", "number?", "Error that would explain it.", SUSPECT_UNIT),
+    Item("stages[].suspects[].error_px", "number?", "The same in pixels, of image points.", "px"),
+    Item(
+        "transformation", "object?", "Similarity from the free block onto the control; null where it is not determined."
+    ),
+    Item("transformation.translation_m[]", "number", "Shift in X, Y, Z.", "m"),
+    Item("transformation.rotation_deg[]", "number", "Rotation about X, Y, Z.", "deg"),
+    Item("transformation.scale_ppm", "number", "Change of scale.", "ppm"),
+    Item("transformation.redundancy", "whole", "Redundancy of the transformation."),
+    *_axes_object("transformation.rms", "Root mean square residual"),
+    Item("transformation.points[]", "object", "Residuals at the control points."),
+    Item("transformation.points[].point", "text", "Name of the point."),
+    *of_axes("transformation.points[].d{}", "number?", "Transformed minus given {}.", "m"),
+    Item(
+        "position_offset_m",
+        "object?",
+        "Mean of the observed positions less where control puts them; null where not known.",
+        "m",
+    ),
+    Item("position_offset_m[]", "number", "In X, Y, Z.", "m"),
+)
+
+COMPONENTS = (
+    Item("components[]", "object", "One entry a group of observations."),
+    Item("components[].group", "text", "Name of the group."),
+    Item("components[].unit", "text", "Unit of its σ.", values={"µm": "", "m": "", "rad": ""}),
+    Item("components[].count", "whole", "Number of observations."),
+    Item("components[].redundancy", "number?", "Share of the group in the redundancy."),
+    Item("components[].sigma_apriori", "number?", "Stated standard deviation (median).", "unit"),
+    Item("components[].factor", "number?", "Factor by which all σ of the group were multiplied."),
+    Item("components[].factor_sigma", "number?", "Standard deviation of the factor."),
+    Item("components[].freedom", "number?", "Degrees of freedom behind the factor."),
+    Item("components[].held", "text", "Why the σ was left as stated; empty where it was estimated."),
+    Item("components[].test", "object", "Test of the stated σ against the residuals."),
+    Item("components[].test.group", "text", "Name of the group."),
+    Item("components[].test.ratio", "number?", "σ of the residuals over stated σ."),
+    Item("components[].test.freedom", "number?", "Degrees of freedom."),
+    Item("components[].test.statistic", "number?", "Test value, χ² distributed."),
+    Item("components[].test.low", "number?", "Smallest test value that chance allows."),
+    Item("components[].test.high", "number?", "Largest test value that chance allows."),
+    Item(
+        "components[].test.verdict",
+        "text",
+        "Outcome of the test.",
+        values={
+            "agrees": "the stated σ fits",
+            "σ given too small": "",
+            "σ given too large": "",
+            "not testable": "too little redundancy",
+        },
+    ),
+    Item("rounds", "whole", "Adjustments it took."),
+    Item("settled", "yes/no", "Whether the last adjustment changed no σ by 1 %."),
+)
+CHANGES = (
+    Item("[]", "object", "One entry a pair of groups of photographs."),
+    Item("[].first", "text", "First group."),
+    Item("[].second", "text", "Second group."),
+    Item("[].camera", "text", "Their camera."),
+    Item("[].rms_um", "number", "Root mean square difference of the image errors.", "µm"),
+    Item("[].max_um", "number", "Largest difference.", "µm"),
+    Item("[].rms_of_sigma_um", "number", "Difference that the standard deviations alone let expect.", "µm"),
+    Item("[].statistic", "number", "Test value, F distributed where nothing changed."),
+    Item("[].freedom", "whole", "Degrees of freedom."),
+    Item("[].p", "number", "Probability of such a test value where nothing changed."),
+    Item("[].changed", "yes/no", "Whether the image errors changed (p below 0.01)."),
+    Item("[].sentence", "text", "The outcome in words."),
+)
+
+
+def _accuracy(name: str, what: str) -> tuple[Item, ...]:
+    return (
+        Item(name, "object", f"Differences at {what}."),
+        Item(f"{name}.count", "object", "Number of known differences, by axis."),
+        *of_axes(f"{name}.count.{{}}", "whole", "Number of known differences in {}."),
+        *_axes_object(f"{name}.rms", "Root mean square difference"),
+        *_axes_object(f"{name}.low", "Lower 95 % bound of the RMS"),
+        *_axes_object(f"{name}.high", "Upper 95 % bound of the RMS"),
+        Item(f"{name}.differences[]", "object", "One entry a point, in the order of the names at the top."),
+        Item(f"{name}.differences[][]", "number?", "Differences in X, Y, Z.", "m"),
+    )
+
+
+def _gain(name: str, text: str) -> tuple[Item, ...]:
+    return (
+        Item(name, "object?", text),
+        Item(f"{name}.against", "text", "The set it is held against."),
+        Item(f"{name}.value", "number?", "Gain in RMS: 0.1 is 10 % smaller."),
+        Item(f"{name}.standard_error", "number?", "Standard deviation of the gain."),
+    )
+
+
+_OF_SET = tuple(
+    one
+    for one in COMPARED
+    if one.name
+    in ("set", "status", "count", "significant", "effective", "sigma0", "sigma0_um", "aic", "bic", "verdict")
+)
+COMPARE_PARAMETERS = (
+    BLOCK,
+    Item("folds", "whole", "Parts in which control points were left out and predicted."),
+    Item("robust", "text", "Robust estimation used, as adjustment.robust."),
+    Item("check_points[]", "text", "Names of the check points."),
+    Item("control_points[]", "text", "Names of the control points that were predicted."),
+    Item("sets[]", "object", "One entry a set, in the order asked for."),
+    *within("sets[]", *_OF_SET),
+    *_accuracy("sets[].check", "check points"),
+    *_accuracy("sets[].control", "control points, each predicted without itself"),
+    Item("sets[].collocation", "object", "The random field, where the set has one."),
+    Item("sets[].collocation.sigma_um", "number?", "Its standard deviation.", "µm"),
+    Item("sets[].collocation.length_mm", "number?", "Its correlation length.", "mm"),
+    *_gain("sets[].gain", "Gain over the best of the smaller sets it contains; null where there is none."),
+    *_gain("sets[].behind", "How it stands against the best of all sets; null where it has no result."),
+)
+CHOICE = Item("choice", "text", "Which set auto would take and why, in a sentence.")
+
+
+def adjust_contents() -> tuple[DescribedFile, ...]:
+    """The JSON files of a result, and of compare-parameters."""
+
+    def content(name: str, text: str, items: tuple[Item, ...], when: str = "", place: str = PLACE) -> DescribedFile:
+        return DescribedFile(name, place, "json", text, items, when)
+
+    return (
+        content(
+            "adjustment.json", "The outcome in numbers: verdict, σ0, groups, check points, parameters.", ADJUSTMENT
+        ),
+        content(
+            "check_free.json",
+            "Whether an error is in the tie points or in the control.",
+            CHECK_FREE,
+            "with --check-free",
+        ),
+        content(
+            "variance_components.json",
+            "σ of groups of observations, estimated from the residuals.",
+            COMPONENTS,
+            'with variance_components = "on"',
+        ),
+        content(
+            "parameter_changes.json",
+            "Whether the image errors changed between groups of photographs.",
+            CHANGES,
+            "where groups of photographs have parameters of their own",
+        ),
+        content(
+            "compare_parameters.json",
+            "Sets of additional parameters side by side.",
+            COMPARE_PARAMETERS,
+            "with additional parameters auto",
+        ),
+        content(
+            "compare_parameters.json",
+            "Sets of additional parameters side by side.",
+            COMPARE_PARAMETERS,
+            place="folder of compare-parameters",
+        ),
+    )

@@ -1,0 +1,225 @@
+"""The tables that `aerotri adjust` writes, column by column."""
+
+from __future__ import annotations
+
+from aerotri.adjustment.ray_status import RAY_STATUS
+from aerotri.reference.records import DescribedFile, Item, of_axes
+from aerotri.reference.words import MARKS, POINT_STATUS, RAY_STATUS_MEANING, REASONS
+from aerotri.statistics.set_aside import PHOTOGRAPH_REASONS, POINT_REASONS
+
+PLACE = "result of adjust"
+ANGLES = ("omega", "phi", "kappa")
+EFFECTS = {
+    "r": "Redundancy number of {}: 0, nothing checks the value; 1, it is fully checked by others.",
+    "w": "Normalised residual of {}: the residual over its standard deviation. Beyond 3.3 it is a suspected error.",
+    "tau": "Test value of {} that does not rely on the stated σ (Pope's τ): w over σ0.",
+    "mde": "Marginally detectable error of {}: an error of this size is found with the probability adjustment.power.",
+    "external": "Largest effect of an undetected error of {} on any result, in standard deviations of that result.",
+}
+STATUS = Item("status", "text", "Whether it took part in the adjustment.", values=POINT_STATUS)
+
+IMAGES = (
+    Item("image", "text", "Name of the photograph."),
+    Item("camera", "text", "Name of its camera."),
+    Item("strip", "text?", "Name of its strip."),
+    *of_axes("{}0", "number?", "Adjusted {} of the projection centre.", "m"),
+    *of_axes("{}", "number?", "Adjusted angle {}.", "deg", ANGLES),
+    *of_axes("s{}0", "number?", "Standard deviation of {}0.", "m"),
+    *of_axes("s_{}", "number?", "Standard deviation of {}.", "deg", ANGLES),
+    Item("rays", "whole", "Number of image points used."),
+    STATUS,
+    Item(
+        "reason",
+        "text?",
+        "Why it was set aside.",
+        values={name: REASONS[name][0] for name in (*PHOTOGRAPH_REASONS.values(), "no image points")},
+    ),
+    *of_axes("x_s_{}_mgon", "number?", "Standard deviation of {}.", "mgon", ANGLES),
+)
+POINTS = (
+    Item("point", "text", "Name of the object point."),
+    *of_axes("{}", "number?", "Adjusted {}.", "m"),
+    *of_axes("s{}", "number?", "Standard deviation of {}.", "m"),
+    Item("rays", "whole", "Number of photographs used."),
+    Item("max_abs_w", "number?", "Largest normalised residual of its image coordinates, without sign."),
+    STATUS,
+    Item(
+        "reason",
+        "text?",
+        "Why it was set aside.",
+        values={name: REASONS[name][0] for name in (*POINT_REASONS.values(), "not measured")},
+    ),
+)
+
+
+def _by_xy(name: str, text: str, unit: str = "") -> tuple[Item, ...]:
+    return of_axes(name, "number?", text, unit, ("x", "y"))
+
+
+RESIDUALS = (
+    Item("image", "text", "Name of the photograph."),
+    Item("point", "text", "Name of the object point."),
+    *_by_xy("{}", "Measured {}, from the image centre (x right, y up).", "mm"),
+    *_by_xy("v{}", "Residual of {}: adjusted minus measured.", "mm"),
+    *_by_xy("r{}", EFFECTS["r"]),
+    *_by_xy("w{}", EFFECTS["w"]),
+    Item("weight", "number", "Factor of robust estimation: 1 full weight, near 0 practically left out."),
+    Item(
+        "status",
+        "text",
+        "Whether the image point was used.",
+        values=dict(zip(RAY_STATUS, RAY_STATUS_MEANING, strict=True)),
+    ),
+    *_by_xy("x_tau_{}", EFFECTS["tau"]),
+    *_by_xy("x_mde_{}", EFFECTS["mde"], "mm"),
+    *_by_xy("x_external_{}", EFFECTS["external"]),
+    *_by_xy(
+        "x_effect_{}", "Largest effect of an undetected error of {} on a single unknown, in its standard deviations."
+    ),
+    *of_axes("x_effect_on_{}", "text?", "The unknown that an undetected error of {} acts on most.", "", ("x", "y")),
+)
+PARAMETERS = (
+    Item("name", "text", "Name of the parameter, such as focal_length_mm, bluh.1 or gnss.shift_X."),
+    Item("group", "text", "What it belongs to: a camera, strip, day, or the block."),
+    Item("mark", "text?", "Where the formula comes from.", values=MARKS),
+    Item("value", "number?", "Adjusted value.", "unit of the parameter"),
+    Item("sigma", "number?", "Standard deviation of the value.", "unit of the parameter"),
+    Item("t", "number?", "Value over standard deviation, without sign; below 2 it is not significant."),
+    Item("max_correlation", "number?", "Largest correlation with another of these parameters, −1 to 1."),
+    Item("max_correlation_with", "text?", "The parameter it is most correlated with."),
+    Item("total_correlation", "number?", "Correlation with all other parameters together, 0 to 1."),
+    Item(
+        "status",
+        "text",
+        "How the parameter was treated.",
+        values={
+            "estimated": "a free unknown",
+            "weighted": "an unknown with a given σ",
+            "fixed": "held",
+            "removed": "taken out by the selection",
+        },
+    ),
+    Item("reason", "text?", "Why it was removed."),
+    Item(
+        "x_kind",
+        "text",
+        "Kind of parameter.",
+        values={
+            "interior": "interior orientation",
+            "additional": "additional parameter (self-calibration)",
+            "gnss": "shift, drift, lever arm or time offset of GNSS",
+            "ins": "boresight or drift of the INS",
+            "constraint": "unknown of a condition",
+            "point": "coordinate of a point in a condition",
+        },
+    ),
+)
+GROUND = (
+    Item("point", "text", "Name of the point."),
+    *of_axes("d{}", "number?", "Adjusted minus given {}.", "m"),
+    *of_axes("s{}", "number?", "Standard deviation of the adjusted {}.", "m"),
+    *of_axes("r{}", "number?", EFFECTS["r"].replace("{}", "the given {}")),
+    *of_axes("w{}", "number?", EFFECTS["w"].replace("{}", "{} (check points: difference over its own σ)")),
+    Item("rays", "whole", "Number of photographs used."),
+)
+CONTROL = (
+    *GROUND,
+    *of_axes("x_tau{}", "number?", EFFECTS["tau"].replace("{}", "the given {}")),
+    *of_axes("x_mde{}", "number?", EFFECTS["mde"].replace("{}", "the given {}"), "m"),
+    *of_axes("x_external{}", "number?", EFFECTS["external"].replace("{}", "the given {}")),
+)
+OBSERVATIONS = (
+    Item(
+        "group",
+        "text",
+        "What was observed.",
+        values={
+            "projection centres": "positions of gnss_ins.csv",
+            "attitudes": "angles of gnss_ins.csv",
+            "constraints": "conditions of constraints.csv",
+        },
+    ),
+    Item("label", "text", "The photograph, or the condition with its points."),
+    Item("component", "text?", "X, Y, Z, omega, phi or kappa; empty for a condition."),
+    Item("v", "number", "Residual: adjusted minus observed.", "m, deg for angles"),
+    Item("sigma", "number", "Stated standard deviation.", "m, deg for angles"),
+    *(
+        Item(
+            name,
+            "number?",
+            EFFECTS[name].replace("{}", "the observation"),
+            "m, deg for angles" if name == "mde" else "",
+        )
+        for name in EFFECTS
+    ),
+    Item("effect", "number?", "Largest effect of an undetected error on a single unknown, in its standard deviations."),
+    Item("effect_on", "text?", "The unknown that an undetected error acts on most."),
+)
+CHANGES = (
+    Item("first", "text", "First group of photographs."),
+    Item("second", "text", "Second group of photographs."),
+    *_by_xy("{}", "Place {} in the image, from the centre.", "mm"),
+    *_by_xy("d{}", "Image error of the first group less that of the second, {}.", "mm"),
+    *_by_xy("s_d{}", "Standard deviation of the difference in {}.", "mm"),
+    Item("significant", "whole", "1 where the difference is significant, else 0."),
+)
+COMPARED = (
+    Item("set", "text", "The set of additional parameters."),
+    Item("status", "text", "converged, or why the set could not be adjusted."),
+    Item("count", "number", "Number of parameters estimated."),
+    Item("effective", "number?", "The same, counting of a random field only what the measurements determine."),
+    Item("significant", "number", "Number of them with |value|/σ above 1.96."),
+    Item("sigma0", "number?", "σ0 of the adjustment; 1 where the stated σ are right."),
+    Item("sigma0_um", "number?", "σ0 as standard deviation of an image coordinate.", "µm"),
+    Item("aic", "number?", "Akaike's criterion; the smaller the better."),
+    Item("bic", "number?", "Bayes' criterion; the smaller the better."),
+    *(
+        item
+        for where, what in (("check", "check points"), ("control", "control points, each predicted without itself"))
+        for kind, words in (
+            ("rms", "RMS of {}"),
+            ("low", "Lower 95 % bound of the RMS of {}"),
+            ("high", "Upper 95 % bound of the RMS of {}"),
+        )
+        for item in of_axes(f"{where}_{kind}_{{}}", "number?", f"{words} at {what}.", "m")
+    ),
+    Item("gain", "number?", "Gain over the best of the smaller sets it contains: 0.1 is 10 % smaller RMS."),
+    Item("gain_against", "text?", "The set that the gain refers to."),
+    Item("verdict", "text?", "Whether the set earns its parameters, in a few words."),
+)
+
+
+def adjust_tables() -> tuple[DescribedFile, ...]:
+    """The tables of a result."""
+
+    def table(name: str, text: str, items: tuple[Item, ...], when: str = "") -> DescribedFile:
+        return DescribedFile(name, PLACE, "table", text, items, when)
+
+    return (
+        table("images.csv", "Orientation of every photograph with its standard deviations.", IMAGES),
+        table("points.csv", "Coordinates of every object point with their standard deviations.", POINTS),
+        table(
+            "residuals.parquet", "Residuals and reliability of every image point, in the order of the input.", RESIDUALS
+        ),
+        table("parameters.csv", "Interior orientation, additional parameters, GNSS and INS parameters.", PARAMETERS),
+        table("control.csv", "Residuals and reliability of the control points.", CONTROL),
+        table("check.csv", "Differences at the check points.", GROUND),
+        table(
+            "observations.csv",
+            "Residuals of positions, angles and conditions.",
+            OBSERVATIONS,
+            "where any were observed",
+        ),
+        table(
+            "parameter_changes.csv",
+            "Change of the image errors between two groups of photographs, on a grid over the image.",
+            CHANGES,
+            "where groups of photographs have parameters of their own",
+        ),
+        table(
+            "compare_parameters.csv",
+            "Sets of additional parameters side by side.",
+            COMPARED,
+            "with additional parameters auto",
+        ),
+    )

@@ -1,0 +1,186 @@
+"""What simulate, tiepoints, convert and run write, and what a result holds beside tables and JSON."""
+
+from __future__ import annotations
+
+from aerotri.reference.adjust_contents import BLOCK
+from aerotri.reference.adjust_tables import PLACE as RESULT
+from aerotri.reference.records import DescribedFile, Item, of_axes
+
+SIMULATED = "block of simulate"
+TRUTH, TIEPOINTS, RUN = "truth of simulate", "block of tiepoints", "folder of run"
+MARKS, PHOTOGRAPHS, PARAMETERS = "control_marks of tiepoints", "photographs of simulate", "folder of parameters --draw"
+COMPARED = "folder of compare-parameters"
+ANGLES = ("omega", "phi", "kappa")
+NAME = Item("image", "text", "Name of the photograph.")
+POINT = Item("point", "text", "Name of the point.")
+
+TRUTH_TABLES = (
+    (
+        "images.csv",
+        "True orientations.",
+        (
+            NAME,
+            *of_axes("{}0", "number", "True {} of the projection centre.", "m"),
+            *of_axes("{}", "number", "True angle {}.", "deg", ANGLES),
+        ),
+    ),
+    ("points.csv", "True coordinates.", (POINT, *of_axes("{}", "number", "True {}.", "m"))),
+    (
+        "additional_parameters.csv",
+        "True additional parameters.",
+        (
+            Item("name", "text", "Name of the parameter."),
+            Item("group", "text", "Camera it belongs to."),
+            Item("value", "number", "True value.", "unit of the parameter"),
+        ),
+    ),
+    (
+        "cameras.csv",
+        "True interior orientations.",
+        (
+            Item("name", "text", "Name of the camera."),
+            Item("focal_length_mm", "number", "Principal distance.", "mm"),
+            Item("x0_mm", "number", "x of the principal point.", "mm"),
+            Item("y0_mm", "number", "y of the principal point.", "mm"),
+        ),
+    ),
+    (
+        "image_errors.csv",
+        "True image errors on a grid.",
+        (
+            Item("camera", "text", "Camera."),
+            Item("day", "text?", "Day; empty: all days."),
+            *of_axes("{}", "number", "Place {} in the image, from the centre.", "mm", ("x", "y")),
+            *of_axes("d{}", "number", "Image error in {}: measured minus ideal.", "mm", ("x", "y")),
+        ),
+    ),
+    (
+        "gross_errors.csv",
+        "Gross errors of image points.",
+        (NAME, POINT, *of_axes("d{}", "number", "Error in {}.", "mm", ("x", "y"))),
+    ),
+    (
+        "control_blunders.csv",
+        "Gross errors of given control.",
+        (POINT, *of_axes("d{}", "number", "Error in {}.", "m")),
+    ),
+)
+RENDERED = (
+    Item("photographs[]", "text", "Files of the photographs."),
+    Item("seed", "whole", "Seed of the random numbers."),
+    Item("options", "object", "How they were rendered."),
+    Item("options.mean", "number", "Mean grey value."),
+    Item("options.contrast", "number", "RMS of the texture over the mean grey value."),
+    Item("options.detail_px", "number", "Size of the finest details of the texture.", "px"),
+    Item("options.blur_px", "number", "Standard deviation of the point spread.", "px"),
+    Item("options.noise", "number", "Standard deviation of the grey values."),
+    Item("options.targets", "yes/no", "Whether control and check points carry bright discs."),
+    Item("options.target_radius_px", "number", "Radius of the discs.", "px"),
+    Item("options.target_level", "number", "Grey value of the discs."),
+)
+TIEPOINTS_JSON = (
+    BLOCK,
+    Item("crs", "text", "Coordinate system."),
+    Item("photographs", "whole", "Photographs in the block."),
+    Item("left_out[]", "text", "Photographs that could not be tied."),
+    Item("pairs", "object", "Pairs of photographs."),
+    Item("pairs.compared", "whole", "Pairs that were matched."),
+    Item("pairs.tied", "whole", "Pairs with tie points."),
+    Item("tie_points", "whole", "Number of tie points."),
+    Item("rays", "whole", "Number of their image points."),
+    Item("rays_per_point", "number", "Mean number of photographs of a tie point."),
+    Item("points_per_photograph", "object", "Tie points in a photograph."),
+    Item("points_per_photograph.smallest", "whole", "In the photograph with the fewest."),
+    Item("points_per_photograph.median", "number", "Median."),
+    Item("control", "whole", "Number of control points."),
+    Item("check", "whole", "Number of check points."),
+    Item("median_residual_px", "number", "Median residual of the first orientation.", "px"),
+    Item("cameras[]", "object", "The cameras."),
+    Item("cameras[].name", "text", "Name of the camera."),
+    Item("cameras[].focal_length_mm", "number", "Principal distance.", "mm"),
+    Item("cameras[].pixel_um", "number", "Size of a pixel.", "µm"),
+    Item("messages[]", "text", "What was matched, assumed or left out, in sentences."),
+    Item("seconds", "number", "Time it took.", "s"),
+    Item("marking_page", "text", "Page to mark control points in; empty without control."),
+)
+PREDICTED = (
+    POINT,
+    NAME,
+    Item("column", "number", "Predicted column.", "px"),
+    Item("row", "number", "Predicted row.", "px"),
+    Item("marked_column", "number?", "Column as marked; empty where it is not.", "px"),
+    Item("marked_row", "number?", "Row as marked; empty where it is not.", "px"),
+)
+RUN_JSON = (
+    Item("source", "text", "What the run began with."),
+    Item("steps[]", "object", "The steps in their order."),
+    Item("steps[].name", "text", "Command of the step."),
+    Item("steps[].folder", "text", "Folder it writes, in that of the run."),
+    Item("steps[].what", "text", "The step, in words."),
+    Item("steps[].arguments[]", "text", "The command line that does the same."),
+    Item("steps[].status", "text", "How it ended.", values={"done": "", "failed": "", "left out": ""}),
+    Item("steps[].reason", "text", "Why it is not done; else empty."),
+    Item("steps[].seconds", "number", "Time it took.", "s"),
+    Item("seconds", "number", "Time of all steps.", "s"),
+    Item("report", "text", "The report."),
+)
+
+
+def block_files() -> tuple[DescribedFile, ...]:
+    """The files of simulate, tiepoints, run and parameters, and the rest of a result."""
+    return (
+        *(DescribedFile(name, TRUTH, "table", text, items) for name, text, items in TRUTH_TABLES),
+        DescribedFile(
+            "surface.tif", TRUTH, "raster", "The true ground as a raster of heights, m.", when="with --render"
+        ),
+        DescribedFile("truth", SIMULATED, "folder", "What the block really is."),
+        DescribedFile("photographs", SIMULATED, "folder", "The rendered photographs.", when="with --render"),
+        DescribedFile(
+            "gcp_list.txt",
+            SIMULATED,
+            "text",
+            "Control points with their image points, as ODM has them.",
+            when="with --render, of a block in a CRS",
+        ),
+        DescribedFile(
+            "rendered.json", PHOTOGRAPHS, "json", "Which photographs were rendered, and how.", RENDERED, "with --render"
+        ),
+        DescribedFile(
+            "PHOTOGRAPH.tif", PHOTOGRAPHS, "raster", "The rendered photographs, 16 bit.", when="with --render"
+        ),
+        DescribedFile("tiepoints.json", TIEPOINTS, "json", "How well the photographs are tied.", TIEPOINTS_JSON),
+        DescribedFile(
+            "tie_point_cache", TIEPOINTS, "folder", "Features and matches, kept for the next run; may be removed."
+        ),
+        DescribedFile(
+            "control_marks", TIEPOINTS, "folder", "Control points in the photographs, to be marked.", when="with --gcp"
+        ),
+        DescribedFile(
+            "marking.html", MARKS, "page", "Page on which control points are marked by clicks.", when="with --gcp"
+        ),
+        DescribedFile(
+            "predicted.csv",
+            MARKS,
+            "table",
+            "Where control points should appear, and where they were marked.",
+            PREDICTED,
+            "with --gcp",
+        ),
+        DescribedFile(
+            "pieces", MARKS, "folder", "Pieces of the photographs around the predicted places.", when="with --gcp"
+        ),
+        DescribedFile("run.json", RUN, "json", "The steps and how each ended.", RUN_JSON),
+        DescribedFile("report.html", RUN, "page", "All steps on one page."),
+        DescribedFile("block", RUN, "folder", "The block, as of tiepoints.", when="of photographs"),
+        DescribedFile("result", RUN, "folder", "The adjustment, as of adjust."),
+        DescribedFile("dtm", RUN, "folder", "The terrain, as of dtm.", when="of photographs"),
+        DescribedFile("volume", RUN, "folder", "The volume, as of volume.", when="with --boundary"),
+        DescribedFile("block", RESULT, "folder", "The block as it was adjusted."),
+        DescribedFile("solution.npz", RESULT, "other", "The solution, from which later commands take covariances."),
+        DescribedFile(
+            "report.html", RESULT, "page", "The report, one page that needs no network.", when="unless --no-plots"
+        ),
+        DescribedFile("plots", RESULT, "folder", "The plots of the report, PNG and SVG.", when="unless --no-plots"),
+        DescribedFile("compare_parameters.png", COMPARED, "picture", "The sets side by side; also as SVG."),
+        DescribedFile("FAMILY.png", PARAMETERS, "picture", "Patterns of a family; also as SVG."),
+    )

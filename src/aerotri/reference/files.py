@@ -1,0 +1,28 @@
+"""All files that the program reads and writes."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from aerotri.reference.adjust_contents import adjust_contents
+from aerotri.reference.adjust_tables import adjust_tables
+from aerotri.reference.block_files import block_files
+from aerotri.reference.block_tables import block_table_files
+from aerotri.reference.image_error_files import image_error_files
+from aerotri.reference.printed import printed_contents
+from aerotri.reference.records import DescribedFile
+from aerotri.reference.terrain_files import terrain_files
+
+
+@cache
+def described_files() -> tuple[DescribedFile, ...]:
+    """Every file with its columns or keys: the tables of a block first, then what commands write and print."""
+    return (
+        *block_table_files(),
+        *adjust_contents(),
+        *adjust_tables(),
+        *image_error_files(),
+        *terrain_files(),
+        *block_files(),
+        *printed_contents(),
+    )

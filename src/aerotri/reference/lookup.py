@@ -1,0 +1,195 @@
+"""The entries of the reference by the words a user would ask with."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+from aerotri.reference.block_keys import BlockKey, block_keys, block_tables, prior_keys
+from aerotri.reference.command_lines import CommandLine
+from aerotri.reference.files import described_files
+from aerotri.reference.records import DescribedFile, Item
+from aerotri.reference.words import WORDS
+
+KINDS = (
+    "key of block.toml", "table of block.toml", "command", "file", "column", "option", "parameter", "word of a result",
+    "JSON key",
+)  # fmt: skip
+"""Kinds of entries in the order in which they are told."""
+CAMERA = re.compile(r"^camera\.[^.]+\.")
+NAMED = 5
+"""Near names that are offered where a word is not known; chosen [C]: more are no help."""
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """What the reference says of one thing.
+
+    Parameters
+    ----------
+    kind : one of `KINDS`.
+    name : of it. place : the file, table or command it belongs to. text : what it is.
+    facts : unit, default and the like by name, without those that there are not. values : words and their meaning.
+    """
+
+    kind: str
+    name: str
+    place: str
+    text: str
+    facts: Mapping[str, str]
+    values: Mapping[str, str]
+
+    @property
+    def title(self) -> str:
+        """Name, kind and place in a line."""
+        if self.kind == "key of block.toml":
+            return f"{self.name} — key of block.toml"
+        return f"{self.name} — {self.kind}{f' of {self.place}' if self.place else ''}"
+
+
+@cache
+def entries() -> tuple[Entry, ...]:
+    """All entries but commands and options."""
+    return tuple(
+        [
+            *map(_block_key, (*block_keys(), *prior_keys())),
+            *_block_tables(),
+            *(entry for one in described_files() for entry in _of_file(one)),
+            *_parameters(),
+            *(
+                Entry("word of a result", word.name, word.place, word.text, _facts({"what to do": word.remedy}), {})
+                for word in WORDS
+            ),
+        ]
+    )
+
+
+def command_entries(commands: Sequence[CommandLine]) -> tuple[Entry, ...]:
+    """Commands and their options."""
+    found = []
+    for command in commands:
+        facts = {"usage": command.usage, "example": command.example}
+        found.append(Entry("command", command.name, "", command.text, _facts(facts), {}))
+        for option in command.options:
+            facts = {"value": option.kind, "default": option.default, "required": "yes" if option.required else "",
+                     "may be repeated": "yes" if option.repeated else ""}  # fmt: skip
+            found.append(
+                Entry("option", ", ".join(option.names), f"aerotri {command.name}", option.text, _facts(facts), {})
+            )
+    return tuple(found)
+
+
+def find(words: str, known: Sequence[Entry]) -> list[Entry]:
+    """The entries that a user means, those of that full name before those whose name ends so.
+
+    Parameters
+    ----------
+    words : such as 'gnss.shift', 'camera.ucd.pixel_um', 'sZ', 'points.csv sZ', 'adjust --robust', 'rank deficient'.
+    """
+    asked = CAMERA.sub("camera.NAME.", " ".join(words.split()))
+    for fold in (str, str.casefold):
+        found = [
+            entry
+            for names_of in (_full_names, _short_names)
+            for entry in known
+            if fold(asked) in map(fold, names_of(entry))
+        ]
+        if found:
+            return sorted(dict.fromkeys(found), key=lambda entry: KINDS.index(entry.kind))
+    return []
+
+
+def near(words: str, known: Sequence[Entry]) -> list[str]:
+    """Names that are written nearly as what was asked."""
+    asked = " ".join(words.split()).split(" ")[-1]
+    names = {name.casefold(): name for entry in known for name in _own_names(entry)}
+    return [names[name] for name in difflib.get_close_matches(asked.casefold(), list(names), NAMED, 0.7)]
+
+
+def _own_names(entry: Entry) -> list[str]:
+    """The names of an entry without its place; the last part of a long one too."""
+    names = entry.name.split(", ") if entry.kind == "option" else [entry.name.replace("[]", "")]
+    if entry.kind in ("key of block.toml", "JSON key", "parameter"):
+        names.append(entry.name.replace("[]", "").rsplit(".", 1)[-1])
+    return names
+
+
+def _full_names(entry: Entry) -> Iterator[str]:
+    file = entry.place.split(" (")[0].removeprefix("aerotri ")
+    for name in (*_own_names(entry)[: 2 if entry.kind == "option" else 1], entry.name):
+        yield name
+        yield f"{file} {name}"
+    if entry.kind in ("command", "option"):
+        yield f"aerotri {entry.name}"
+    if entry.kind == "file":
+        yield f"{entry.name} ({entry.place})"
+    if entry.kind == "table of block.toml":
+        yield entry.name.strip("[]")
+
+
+def _short_names(entry: Entry) -> Iterator[str]:
+    file = entry.place.split(" (")[0]
+    for name in _own_names(entry)[1:]:
+        yield name
+        yield f"{file} {name}"
+    if entry.kind == "option":
+        yield from (name.lstrip("-") for name in entry.name.split(", "))
+    if entry.kind == "file":
+        yield entry.name.rsplit(".", 1)[0]
+
+
+def _facts(facts: Mapping[str, str]) -> dict[str, str]:
+    return {name: value for name, value in facts.items() if value}
+
+
+def _block_key(key: BlockKey) -> Entry:
+    facts = {
+        "value": "" if key.values else key.kind,
+        "unit": key.unit,
+        "default": key.default,
+        "required": "yes" if key.required else "",
+    }
+    return Entry("key of block.toml", key.name, "block.toml", key.text, _facts(facts), dict.fromkeys(key.values, ""))
+
+
+def _block_tables() -> list[Entry]:
+    keys = {name: [key.name.rsplit(".", 1)[-1] for key in block_keys() if key.table == name] for name in block_tables()}
+    return [
+        Entry("table of block.toml", f"[{name}]", "", text, {"keys": ", ".join(keys[name])}, {})
+        for name, text in block_tables().items()
+        if name
+    ]
+
+
+def _of_file(described: DescribedFile) -> Iterator[Entry]:
+    is_json = described.form == "json"
+    names = ", ".join(name for name in described.columns if "." not in name and name != "[]")
+    facts = {"written": described.when, "keys" if is_json else "columns": names}
+    yield Entry("file", described.name, described.place, described.text, _facts(facts), {})
+    for item in described.items:
+        if item.name != "[]":
+            kind = "JSON key" if is_json else "column"
+            yield Entry(kind, item.name, described.label, item.text, _facts(_of_item(item, is_json)), item.values)
+
+
+def _of_item(item: Item, is_json: bool) -> dict[str, str]:
+    may_be = f" or {'null' if is_json else 'empty'}" if item.kind.endswith("?") else ""
+    return {
+        "value": f"{item.kind.rstrip('?')}{may_be}",
+        "unit": item.unit,
+        "may be missing": "yes" if item.optional else "",
+    }
+
+
+def _parameters() -> list[Entry]:
+    from aerotri.functional_model.additional_parameters import describe
+
+    return [
+        Entry("parameter", f"{one.family}.{one.item}", "additional_parameters",
+              f"{one.text[:1].upper()}{one.text[1:]}." if one.text else one.reference,
+              _facts({"write it as": f"{one.family}:{one.item}", "source": one.reference, "mark": one.mark}), {})
+        for one in describe()
+    ]  # fmt: skip

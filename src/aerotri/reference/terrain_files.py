@@ -1,0 +1,226 @@
+"""What dtm, compare and volume write."""
+
+from __future__ import annotations
+
+from aerotri.reference.adjust_contents import BLOCK, VERSION
+from aerotri.reference.image_error_files import MODELS
+from aerotri.reference.records import DescribedFile, Item, of_axes
+from aerotri.terrain.picket_status import TEXTS, PicketStatus
+from aerotri.volume.accuracy import PARTS
+from aerotri.volume.settings import METHODS
+
+DTM, COMPARE, VOLUME = (f"folder of {name}" for name in ("dtm", "compare", "volume"))
+PICKET_STATUS = {
+    PicketStatus.ACCEPTED: "a ground point",
+    PicketStatus.NOT_SEEN: "fewer than two photographs see the place",
+    PicketStatus.LOW_CORRELATION: "the photographs do not look alike there",
+    PicketStatus.AT_END: "the best match is at the end of the heights searched",
+    PicketStatus.NO_TEXTURE: "nothing to match along the base",
+    PicketStatus.BACKWARD: "matching back leads to another place",
+    PicketStatus.AMBIGUOUS: "another place matches nearly as well",
+    PicketStatus.NEIGHBOURS: "its height contradicts its neighbours",
+    PicketStatus.PEAK: "it stands out as a lone peak or pit",
+}
+STATUS_WORDS = {TEXTS[status]: meaning for status, meaning in PICKET_STATUS.items()}
+
+PICKETS = (
+    *of_axes("node_{}", "number", "{} of the place where a point was planned.", "m", ("X", "Y")),
+    *of_axes("{}", "number?", "Measured {}; empty where nothing was measured.", "m"),
+    *of_axes("s{}", "number?", "Standard deviation of {}: matching and adjustment together.", "m"),
+    *of_axes("s{}_matching", "number?", "Standard deviation of {} from matching alone.", "m"),
+    Item("correlation", "number?", "Lowest correlation of its photographs, or the best that was found; 1 is equal."),
+    Item("rays", "whole", "Number of photographs it was measured in."),
+    Item("photographs", "list of text", "Names of these photographs; the others were matched to the first."),
+    Item("status", "text", "What became of it.", values=STATUS_WORDS),
+    Item("steps_aside", "whole", "How often it was moved because its first place could not be measured."),
+    Item("model", "whole", "Number of the pair of photographs, −1 where all photographs were used."),
+)
+DTM_JSON = (
+    VERSION,
+    BLOCK,
+    Item("crs", "text", "Coordinate system."),
+    Item("photographs", "whole", "Photographs matched."),
+    Item("gsd_m", "number", "Size of a pixel on the ground.", "m"),
+    Item("interval_m", "number", "Distance between the points measured (pickets).", "m"),
+    Item("interval_source", "text", "Where the interval comes from."),
+    Item("cell_m", "number", "Cell of the rasters.", "m"),
+    Item("pickets", "object", "Number of points."),
+    Item("pickets.nodes", "whole", "Places planned."),
+    Item("pickets.seen", "whole", "Places that two photographs or more see."),
+    Item("pickets.accepted", "whole", "Points measured and accepted."),
+    Item("pickets.errors", "whole", "Points measured and rejected (error pickets)."),
+    Item("pickets.stepped_aside", "whole", "Accepted points that were moved to a place nearby."),
+    Item("pickets.holes", "whole", "Places where nothing could be measured."),
+    Item("pickets.rays_mean", "number", "Mean number of photographs of an accepted point."),
+    Item("status", "object", "Number of points by status; the words are those of pickets.parquet."),
+    *(Item(f"status.{word}", "whole", f"Number of points: {meaning}.") for word, meaning in STATUS_WORDS.items()),
+    Item("sigma_Z_m", "object", "Standard deviation of heights, median over the accepted points.", "m"),
+    Item("sigma_Z_m.median", "number", "Of a point, all together.", "m"),
+    Item("sigma_Z_m.matching", "number", "From matching alone.", "m"),
+    Item("sigma_Z_m.adjustment", "number", "From the adjustment alone.", "m"),
+    Item("sigma_Z_m.interpolation", "number", "Of the surface between the points, RMS.", "m"),
+    Item("ray_sigma_px", "number", "Standard deviation of a matched image coordinate.", "px"),
+    Item("sigma0_rays", "number", "How well the rays of a point meet, against their stated σ; 1 is as stated."),
+    Item("ground_share", "number", "Share of the points that are ground, not objects."),
+    Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
+)
+DIFFERENCE = (
+    ("count", "whole", "Number of cells compared.", ""),
+    ("rmse", "number", "Root mean square difference.", "m"),
+    ("bias", "number", "Mean difference.", "m"),
+    ("median", "number", "Median difference.", "m"),
+    ("std", "number", "Standard deviation of the differences.", "m"),
+    ("nmad", "number", "Standard deviation without gross errors (NMAD).", "m"),
+    ("le90", "number", "90 % of the differences are smaller, without sign (LE90).", "m"),
+    ("max", "number", "Largest difference, without sign.", "m"),
+)
+COMPARE_JSON = (
+    VERSION,
+    Item("test", "text", "The surface that is judged."),
+    Item("control", "text", "The surface it is held against."),
+    Item("method", "text", "Interpolation of both.", values={"linear": "", "spline": ""}),
+    Item("cell_m", "number", "Cell of the differences.", "m"),
+    Item("difference_m", "object", "Statistics of the differences test − control.", "m"),
+    *(Item(f"difference_m.{name}", kind, text, unit) for name, kind, text, unit in DIFFERENCE),  # pyright: ignore[reportArgumentType]
+    Item("coverage", "number", "Share of the control surface that the test surface covers, 0 to 1."),
+    Item("alignment", "object?", "How the test surface was moved before; null where it was not."),
+    Item(
+        "alignment.kind",
+        "text",
+        "Kind of movement.",
+        values={"shift": "shift in X, Y, Z", "rigid": "shift and rotation"},
+    ),
+    Item("alignment.shift_m[]", "number", "Shift in X, Y, Z.", "m"),
+    Item("alignment.rotation_rad[]", "number", "Rotation about X, Y, Z.", "rad"),
+    Item("alignment.about_m[]", "number", "Point of the rotation.", "m"),
+)
+METHOD_WORDS = dict(
+    zip(
+        METHODS,
+        (
+            "prisms of triangles",
+            "cells of the grid",
+            "cross sections, trapezoidal rule",
+            "cross sections, Simpson's rule",
+            "cross sections, Simpson's 3/8 rule",
+        ),
+        strict=True,
+    )
+)
+VOLUMES = (
+    ("cut_m3", "Volume above the base.", "m³"),
+    ("fill_m3", "Volume below the base.", "m³"),
+    ("net_m3", "Cut less fill.", "m³"),
+    ("cut_area_m2", "Area above the base.", "m²"),
+    ("fill_area_m2", "Area below the base.", "m²"),
+    ("no_data_area_m2", "Area without heights inside the boundary.", "m²"),
+)
+PART_WORDS = dict(
+    zip(
+        PARTS,
+        (
+            "the adjustment: all heights together are wrong",
+            "image matching",
+            "the ground between the measured points",
+            "the base",
+            "the boundary",
+        ),
+        strict=True,
+    )
+)
+VOLUME_JSON = (
+    VERSION,
+    Item("dtm", "text", "File of the surface."),
+    Item("crs", "text", "Coordinate system."),
+    Item("base", "object", "The base."),
+    Item("base.name", "text", "What it is, in words."),
+    Item("base.z0_m", "number", "Of a plane: height at x0, y0.", "m", optional=True),
+    Item("base.x0_m", "number", "Of a plane: X of its point.", "m", optional=True),
+    Item("base.y0_m", "number", "Of a plane: Y of its point.", "m", optional=True),
+    Item("base.slope_x", "number", "Of a plane: slope along X.", "m/m", optional=True),
+    Item("base.slope_y", "number", "Of a plane: slope along Y.", "m/m", optional=True),
+    Item("boundary", "object", "The boundary."),
+    Item("boundary.name", "text", "File or text it comes from."),
+    Item("boundary.area_m2", "number", "Area inside.", "m²"),
+    Item("method", "text", "The method that counts."),
+    *(Item(name, "number", text, unit) for name, text, unit in VOLUMES),
+    Item("mean_thickness_m", "number", "Net volume over area.", "m"),
+    Item("lowest_m", "number?", "Smallest thickness.", "m"),
+    Item("highest_m", "number?", "Largest thickness.", "m"),
+    Item("methods[]", "object", "The volume by every method."),
+    Item("methods[].method", "text", "The method."),
+    *(Item(f"methods[].{name}", "number", text, unit) for name, text, unit in VOLUMES),
+    Item("methods[].note", "text", "What to bear in mind; else empty."),
+    Item("sections", "object", "The cross sections."),
+    Item("sections.spacing_m", "number", "Distance between them.", "m"),
+    Item("sections.azimuth_deg", "number", "Direction in which they follow one another, from north.", "deg"),
+    Item("sections.count", "whole", "Their number."),
+    Item("sigma", "object?", "How sure the net volume is; null without --adjustment."),
+    Item("sigma.sigma_m3", "number", "Standard deviation of the net volume.", "m³"),
+    Item("sigma.sigma_mean_height_m", "number", "The same over the area: of the mean height.", "m"),
+    Item("sigma.parts_m3", "object", "The parts of the standard deviation, each alone.", "m³"),
+    *(Item(f"sigma.parts_m3.{name}", "number", f"Part of {what}.", "m³") for name, what in PART_WORDS.items()),
+    Item("sigma.curvature", "object?", "Terrain between the measured points, listed separately; null where not known."),
+    Item("sigma.curvature.meaning", "text", "What it is, in words."),
+    Item("sigma.curvature.in_the_volume", "yes/no", "Whether the volume contains it."),
+    Item("sigma.curvature.value_m3", "number", "Its expected size.", "m³"),
+    Item("sigma.curvature.sigma_m3", "number", "Standard deviation of it.", "m³"),
+    Item("sigma.systematic", "object", "What systematic image errors add, were the photographs used uncorrected."),
+    Item("sigma.systematic.meaning", "text", "What it is, in words."),
+    Item("sigma.systematic.in_the_volume", "yes/no", "Whether the volume contains it (--uncorrected)."),
+    Item("sigma.systematic.variants[]", "object", "One entry a way of orienting the photographs."),
+    Item(
+        "sigma.systematic.variants[].variant",
+        "text",
+        "Orientation.",
+        values={"free": "with parameters", "absorbed": "without"},
+    ),
+    Item("sigma.systematic.variants[].value_m3", "number", "Wrong minus true volume.", "m³"),
+    Item("sigma.systematic.variants[].sigma_m3", "number", "Standard deviation of it.", "m³"),
+    Item("sigma.pickets", "whole", "Measured points behind the volume."),
+    Item("sigma.rays", "whole", "Image points behind them."),
+    Item("sigma.adjustment", "text", "Folder of the adjustment."),
+    Item("sigma.picket_file", "text", "File of the points; empty where every cell was taken for one."),
+    Item("warnings[]", "text", "Sentences to read."),
+)
+SECTIONS = (
+    Item("station_m", "number", "Place of the cross section along the azimuth.", "m"),
+    Item("cut_area_m2", "number", "Its area above the base.", "m²"),
+    Item("fill_area_m2", "number", "Its area below the base.", "m²"),
+    Item("cut_length_m", "number", "Its length above the base.", "m"),
+    Item("fill_length_m", "number", "Its length below the base.", "m"),
+    Item("no_data_length_m", "number", "Its length without heights.", "m"),
+)
+
+
+def terrain_files() -> tuple[DescribedFile, ...]:
+    """The files of dtm, compare and volume."""
+    pairs, plots = "with --pairs", "unless --no-plots"
+    return (
+        DescribedFile("dtm.json", DTM, "json", "Number and accuracy of the ground points.", DTM_JSON),
+        DescribedFile(
+            "pickets.parquet",
+            DTM,
+            "table",
+            "Ground points measured by image matching (pickets), and the rejected ones.",
+            PICKETS,
+        ),
+        DescribedFile("pickets.laz", DTM, "other", "The accepted points as LAZ 1.4 with sigma_z; class 2 is ground."),
+        DescribedFile(
+            "dsm.tif", DTM, "raster", "Surface with objects: band 1 height, band 2 its standard deviation, m."
+        ),
+        DescribedFile(
+            "dtm.tif", DTM, "raster", "Surface without objects: band 1 height, band 2 its standard deviation, m."
+        ),
+        DescribedFile("model.tif", DTM, "raster", "Number of the pair of photographs of every cell.", when=pairs),
+        DescribedFile("models.csv", DTM, "table", "The pairs by their numbers.", MODELS, pairs),
+        DescribedFile("plots", DTM, "folder", "Surface and points, PNG and SVG.", when=plots),
+        DescribedFile("compare.json", COMPARE, "json", "Statistics of the differences of two surfaces.", COMPARE_JSON),
+        DescribedFile("difference.tif", COMPARE, "raster", "Differences test − control, m."),
+        DescribedFile("plots", COMPARE, "folder", "Map and histogram, PNG and SVG.", when=plots),
+        DescribedFile("volume.json", VOLUME, "json", "The volume, and how sure it is.", VOLUME_JSON),
+        DescribedFile("thickness.tif", VOLUME, "raster", "Surface less base inside the boundary, m."),
+        DescribedFile("sections.csv", VOLUME, "table", "The cross sections.", SECTIONS),
+        DescribedFile("plots", VOLUME, "folder", "Thickness, parts of σ, cross sections, PNG and SVG.", when=plots),
+        DescribedFile("volume.html", VOLUME, "page", "The volume on one page.", when=plots),
+    )

@@ -1,0 +1,146 @@
+"""Every command run once on small blocks: the files it writes and what it prints, for all tests of the reference."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pytest
+
+from aerotri.cli.app import invoke
+from aerotri.formats.block.folder import write_block
+from rendered_photographs import Lists, fly, write_gcp_list, write_positions
+from small_blocks import with_adjustment
+from ten_photographs import ten_photographs
+
+TINY = """
+name = "tiny"
+[camera.cam]
+preset = "ultracam_d"
+size_px = [575, 375]
+pixel_um = 180.0
+[flight]
+gsd_m = 1.0
+strips = 1
+images_per_strip = 3
+end_lap = 0.6
+heading_deg = 30.0
+[terrain]
+kind = "undulating"
+height_m = 100.0
+relief_rms_m = 10.0
+wavelength_m = 400.0
+[tie_points]
+per_image = 60
+probability = 0.9
+sigma_um = 9.0
+[control]
+distance_bases = 1.0
+sigma_m = [0.05, 0.05, 0.05]
+[adjustment]
+additional_parameters = ["bluh:1-2"]
+"""
+"""Three photographs in a strip, small enough to be rendered in a second."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """Folders of all commands by the place the reference names, and what was printed by command."""
+
+    folder: Path
+    places: dict[str, tuple[Path, ...]]
+    printed: dict[str, tuple[object, ...]]
+
+
+class _Runs:
+    """Runs command lines and keeps what they print."""
+
+    def __init__(self, folder: Path):
+        self.folder, self.printed = folder, {}
+
+    def __call__(self, name: str, *arguments: object, out: str = "") -> Path:
+        target = self.folder / out
+        words = [*name.split(), *map(str, arguments), *(("--out", str(target)) if out else ()), "--json"]
+        stream = io.StringIO()
+        with contextlib.redirect_stdout(stream):
+            assert invoke(words) == 0, words
+        printed = json.loads(stream.getvalue())
+        self.printed[name] = (*self.printed.get(name, ()), printed)
+        return target
+
+
+@pytest.fixture(scope="session")
+def written(tmp_path_factory) -> Written:
+    """What every command writes; some 30 s, most of them for tie points and image matching of real size."""
+    return _written(tmp_path_factory.mktemp("written"))
+
+
+def _adjustments(run: _Runs) -> tuple[Path, Path]:
+    """A block with GNSS, INS, groups of photographs and σ estimated; the same without parameters."""
+    block = ten_photographs()
+    settings = replace(block.settings, gnss=replace(block.settings.gnss, shift="block"))
+    grouped = with_adjustment(
+        replace(block, settings=settings), additional_parameters=(("brown", ("K1",)),), parameter_groups="strip",
+        variance_components="on",
+    )  # fmt: skip
+    write_block(grouped, run.folder / "grouped")
+    write_block(block, run.folder / "plain")
+    first = run("adjust", run.folder / "grouped", "--check-free", out="first")
+    return first, run("adjust", run.folder / "plain", "--no-plots", "--parameters", "bluh:1-2", out="second")
+
+
+def _written(folder: Path) -> Written:
+    run = _Runs(folder)
+    first, second = _adjustments(run)
+    run("diff", first, second)
+    (folder / "tiny.toml").write_text(TINY)
+    tiny = run("simulate", folder / "tiny.toml", "--render", "--seed", "3", out="tiny")
+    result = run("adjust", tiny, "--no-plots", out="result")
+    photographs = tiny / "photographs"
+    pairs = run("dtm", result, photographs, "--interval", "20", "--pairs", out="dtm")
+    run("demcor", result, pairs / "dsm.tif", "--models", pairs / "model.tif", out="corrected/NAME.tif")
+    model = run("deform", result, "--end-lap", "0.6", out="model")
+    whole = run("deform", result, out="whole")
+    imgeo = run("imgeo", result, next(photographs.glob("*.tif")), out="ideal")
+    compared = run("compare", pairs / "dtm.tif", pairs / "dsm.tif", "--align", "shift", out="compared")
+    sets = run("compare-parameters", folder / "plain", "--set", "none", "--set", "brown:K1", "--folds", "2", out="sets")
+    checked = run("crosscheck", second, out="checked")
+    run("init", folder / "begun")
+    run("check", folder / "plain")
+    run("explain", "points.csv", "sZ")
+    run("parameters", "--family", "brown", "--draw", folder / "drawn")
+    run("convert", tiny, folder / "tiny_bal.txt", "--to", "bal")
+    run("predict volume", "--height", 1500, "--length", 9000, "--width", 3600, "--bridging", 3600)
+    run("predict attitude", "--tolerance", 1, "--thickness", 5)
+    run("predict picket-interval", "--gsd", 0.1)
+    run("predict picket-interval", "--pilot", result, "--photographs", photographs)
+    project = _project(run)
+    places = {
+        "block folder": (tiny, folder / "plain", project / "block"), "result of adjust": (first, second, result),
+        "folder of compare-parameters": (sets,), "folder of deform": (model, whole),
+        "folder of demcor": (folder / "corrected",), "folder of imgeo": (imgeo,), "folder of crosscheck": (checked,),
+        "folder of dtm": (pairs, project / "dtm"), "folder of compare": (compared,),
+        "folder of volume": (project / "volume",), "truth of simulate": (tiny / "truth",),
+        "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),
+        "control_marks of tiepoints": (project / "block" / "control_marks",), "folder of run": (project,),
+        "folder of parameters --draw": (folder / "drawn",),
+    }  # fmt: skip
+    return Written(folder, places, run.printed)
+
+
+def _project(run: _Runs) -> Path:
+    """Everything from six photographs to a volume."""
+    flown = fly(run.folder / "flown")
+    x, y = flown.positions[:, :2].mean(axis=0)
+    pile = run.folder / "pile.wkt"
+    pile.write_text(f"POLYGON (({x - 8} {y - 8}, {x + 8} {y - 8}, {x + 8} {y + 8}, {x - 8} {y + 8}, {x - 8} {y - 8}))")
+    gcp = write_gcp_list(flown, run.folder / "gcp_list.txt", Lists({}))
+    positions = write_positions(flown, run.folder / "positions.csv", Lists({}))
+    return run(
+        "run", flown.photographs, "--gcp", gcp, "--positions", positions, "--control-sigma-m", 0.02,
+        "--focal-length-mm", 6, "--pixel-um", 14.4, "--boundary", pile, "--parameters", "brown:K1",
+        out="project",
+    )  # fmt: skip
