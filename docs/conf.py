@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import aerotri
+
+sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
 
 project = "aerotri"
 copyright = "the aerotri developers"
@@ -20,8 +23,9 @@ extensions = [
     "sphinx_design",
     # formulas are drawn without a network
     "sphinx-mathjax-offline",
+    "reference_pages",
 ]
-exclude_patterns = ["_build", "**.ipynb_checkpoints"]
+exclude_patterns = ["_build", "_extensions", "**.ipynb_checkpoints"]
 source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
 
 myst_enable_extensions = ["deflist", "dollarmath", "colon_fence", "attrs_block", "attrs_inline"]
@@ -41,6 +45,6 @@ numpydoc_show_class_members = False
 html_theme = "pydata_sphinx_theme"
 html_title = "aerotri"
 html_static_path = ["_static"]
-html_css_files = ["notebooks.css", "pages.css"]
+html_css_files = ["notebooks.css", "pages.css", "reference.css"]
 html_theme_options = {"show_prev_next": True, "navbar_align": "left", "secondary_sidebar_items": ["page-toc"]}
 html_copy_source = False
