@@ -10,6 +10,7 @@ import importlib
 import json
 import pkgutil
 from collections.abc import Iterable, Sequence
+from inspect import ismodule
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,22 @@ GROUPS = {
     "printed": ("printed", "What commands print with `--json`"),
 }
 """Page and heading of every place that files are written to; a new one stops the build here."""
+PYTHON = {
+    "From files to a block": (
+        "read_block", "read", "tie_points", "simulate", "example_flight", "check", "edit", "convert", "Block",
+        "observations",
+    ),
+    "Adjustment": (
+        "adjust", "open_result", "Adjustment", "Covariance", "Table", "with_settings", "changes",
+        "compare_parameters", "crosscheck", "parameters", "InputError", "AdjustmentFailedError",
+    ),
+    "Image errors, terrain, volume": (
+        "ImageErrors", "deform", "correct_dem", "ideal_photographs", "terrain", "Surface", "compare", "volume", "run",
+    ),
+    "Before the flight": ("predict",),
+    "Figures and geometry of one's own": ("drawing", "geometry"),
+}  # fmt: skip
+"""The public names by chapter, a module for all that it offers; a name that is not here gets a chapter of its own."""
 MARK_WORDS = "; ".join(f"{mark}: {meaning}" for mark, meaning in MARKS.items())
 SPOKEN = "`aerotri explain NAME` prints the entry of a name on the screen."
 
@@ -73,6 +90,7 @@ def write_pages(out: Path) -> None:
         _write(out / "commands" / f"{_file_name(command.name)}.md", command_page(command))
     _write(out / "parameters.md", parameters_page(draw_patterns(out / "patterns")))
     _write(out / "words.md", words_page())
+    _write(out / "python.md", python_page())
 
 
 def _write(path: Path, text: str) -> None:
@@ -155,7 +173,8 @@ def output_page(page: str) -> str:
     for number, (place, title) in enumerate(headings):
         lines += [f"## {title}", ""] if number else []
         for described in (one for one in described_files() if one.place == place):
-            lines += [f"{'###' if number else '##'} {described.name}", "", *_head_of(described), ""]
+            name = f"`{described.name}`" if " " in described.name else described.name
+            lines += [f"{'###' if number else '##'} {name}", "", *_head_of(described), ""]
             lines += [*_item_table(described.items), ""] if described.items else []
     return "\n".join(lines)
 
@@ -301,6 +320,28 @@ def parameters_page(pictures: dict[str, list[str]]) -> str:
             "",
         ]
     return "\n".join(lines)
+
+
+def python_page() -> str:
+    """The public names of the package; what each does is taken from its docstring by autosummary."""
+    lines = [
+        "# Python", "",
+        "All names below stand in the package `aerotri`: `import aerotri`, then `aerotri.adjust(…)`. Input that cannot "
+        "be used raises `aerotri.InputError` with a remedy. The commands are made of the same functions.", "",
+    ]  # fmt: skip
+    chosen = {name for names in PYTHON.values() for name in names}
+    further = tuple(name for name in aerotri.__all__ if name not in chosen and not name.startswith("_"))
+    for title, names in {**PYTHON, **({"Further names": further} if further else {})}.items():
+        listed = [f"   aerotri.{full}" for name in names for full in _offered(name)]
+        lines += [f"## {title}", "", "```{eval-rst}", ".. autosummary::", "   :toctree: api", "   :nosignatures:", ""]
+        lines += [*listed, "```", ""]
+    return "\n".join(lines)
+
+
+def _offered(name: str) -> Iterable[str]:
+    """A name; of a module the functions and classes in it."""
+    found = getattr(aerotri, name)
+    return (f"{name}.{one}" for one in found.__all__ if callable(getattr(found, one))) if ismodule(found) else (name,)
 
 
 def words_page() -> str:
