@@ -16,6 +16,7 @@ from typing import Any
 
 import aerotri
 from aerotri.cli.app import app as program
+from aerotri.cli.options import COMMAND_PANELS
 from aerotri.reference.block_keys import BlockKey, block_keys, block_tables, prior_keys
 from aerotri.reference.block_tables import block_table_files
 from aerotri.reference.command_lines import CommandLine, CommandOption, command_lines
@@ -40,7 +41,7 @@ GROUPS = {
     "block of simulate": ("simulate", "Block of `aerotri simulate`"),
     "truth of simulate": ("simulate", "Folder truth"),
     "photographs of simulate": ("simulate", "Folder photographs"),
-    "folder of parameters --draw": ("parameters", "Folder of `aerotri parameters --draw`"),
+    "folder of parameters": ("parameters", "Folder of `aerotri parameters --out`"),
     "printed": ("printed", "What commands print with `--json`"),
 }
 """Page and heading of every place that files are written to; a new one stops the build here."""
@@ -216,16 +217,21 @@ def _with_words(item: Item, needed: bool) -> str:
 
 def commands_page(commands: Sequence[CommandLine]) -> str:
     """All commands with links to their pages."""
-    rows = [(f"[`aerotri {one.name}`](commands/{_file_name(one.name)}.md)", one.text) for one in commands]
-    pages = [f"commands/{_file_name(one.name)}" for one in commands]
-    return "\n".join([
+    panels = [panel for panel in COMMAND_PANELS if any(one.panel == panel for one in commands)]
+    lines = [
         "# Commands", "",
         "`aerotri COMMAND --help` prints what stands here. Every command takes `--json`, which prints its outcome for "
         "other programs. Exit codes: 0 success; 1 the adjustment failed or is rejected; 2 the input cannot be used; 3 "
         "an error of the program, to be reported. Results appear whole or not at all. The environment variable "
         "`AEROTRI_THREADS` limits the number of threads.", "",
-        *_table(("command", "does"), rows), "", "```{toctree}", ":hidden:", "", *pages, "```",
-    ])  # fmt: skip
+    ]  # fmt: skip
+    pages = []
+    for panel in panels:
+        own = [one for one in commands if one.panel == panel]
+        rows = [(f"[`aerotri {one.name}`](commands/{_file_name(one.name)}.md)", one.text) for one in own]
+        lines += [f"## {panel}", "", *_table(("command", "does"), rows), ""]
+        pages += [f"commands/{_file_name(one.name)}" for one in own]
+    return "\n".join([*lines, "```{toctree}", ":hidden:", "", *pages, "```"])
 
 
 def command_page(command: CommandLine) -> str:
@@ -303,7 +309,7 @@ def parameters_page(pictures: dict[str, list[str]]) -> str:
         "`adjustment.additional_parameters` in block.toml or by `--parameters`: `FAMILY:ITEMS`, items joined by `+`, "
         "ranges by `-`, families by commas, such as `bluh:1-8+12,ultracam_d:42-73`. `auto` compares the families by "
         "cross-validation. The pictures show what each parameter does over the format of a camera, much exaggerated; "
-        "`aerotri parameters --draw FOLDER` draws them. The formulas are in "
+        "`aerotri parameters --out FOLDER` draws them. The formulas are in "
         "[the chapter on theory](../../theory/additional_parameters.md).", "",
         f"The column mark says where the formula comes from: {MARK_WORDS}.", "",
     ]  # fmt: skip

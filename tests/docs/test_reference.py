@@ -48,7 +48,9 @@ def test_every_file_has_a_place(made):
 
 
 def test_every_option_has_a_row(made):
+    overview = made.commands_page(command_lines(app))
     for command in command_lines(app):
+        assert f"[`aerotri {command.name}`]" in overview
         page = made.command_page(command)
         for option in command.options:
             assert f"| `{option.names[0]}`" in page

@@ -111,8 +111,8 @@ def _written(folder: Path) -> Written:
     run("init", folder / "begun")
     run("check", folder / "plain")
     run("explain", "points.csv", "sZ")
-    run("parameters", "--family", "brown", "--draw", folder / "drawn")
-    run("convert", tiny, folder / "tiny_bal.txt", "--to", "bal")
+    run("parameters", "--family", "brown", out="drawn")
+    run("convert", tiny, "--to", "bal", out="tiny_bal.txt")
     run("predict volume", "--height", 1500, "--length", 9000, "--width", 3600, "--bridging", 3600)
     run("predict attitude", "--tolerance", 1, "--thickness", 5)
     run("predict picket-interval", "--gsd", 0.1)
@@ -126,7 +126,7 @@ def _written(folder: Path) -> Written:
         "folder of volume": (project / "volume",), "truth of simulate": (tiny / "truth",),
         "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),
         "control_marks of tiepoints": (project / "block" / "control_marks",), "folder of run": (project,),
-        "folder of parameters --draw": (folder / "drawn",),
+        "folder of parameters": (folder / "drawn",),
     }  # fmt: skip
     return Written(folder, places, run.printed)
 

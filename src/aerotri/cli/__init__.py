@@ -19,7 +19,9 @@ from aerotri.cli import adjusting, blocks, converting, explaining, image_errors,
 from aerotri.cli.app import app
 from aerotri.conventions import InputError
 
-__all__ = ["adjusting", "app", "blocks", "converting", "explaining", "image_errors", "main", "run", "terrain", "volumes"]
+__all__ = [
+    "adjusting", "app", "blocks", "converting", "explaining", "image_errors", "main", "run", "terrain", "volumes",
+]  # fmt: skip
 
 BAD_INPUT, BUG = 2, 3
 """Exit status for input that cannot be used, the same as typer's for a bad command line, and for an error of the

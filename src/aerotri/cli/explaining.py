@@ -7,17 +7,21 @@ from typing import Annotated
 import typer
 
 from aerotri.cli.app import app
-from aerotri.cli.options import Json
+from aerotri.cli.options import ARGUMENTS, HELP, Json
 
 
 # options of other commands are words to explain, not options of this one
-@app.command(epilog="Example: aerotri explain points.csv sZ", context_settings={"ignore_unknown_options": True})
+@app.command(
+    rich_help_panel=HELP, epilog="Example: aerotri explain points.csv sZ",
+    context_settings={"ignore_unknown_options": True},
+)  # fmt: skip
 def explain(
     key: Annotated[
         list[str],
         typer.Argument(
             help="A key of block.toml, a column, a JSON key, a file, an option or a word of a result; before it the "
-            "file or command it belongs to, where it is to be that one."
+            "file or command it belongs to, where it is to be that one.",
+            rich_help_panel=ARGUMENTS,
         ),
     ],
     json_: Json = False,

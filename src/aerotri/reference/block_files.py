@@ -8,7 +8,7 @@ from aerotri.reference.records import DescribedFile, Item, of_axes
 
 SIMULATED = "block of simulate"
 TRUTH, TIEPOINTS, RUN = "truth of simulate", "block of tiepoints", "folder of run"
-MARKS, PHOTOGRAPHS, PARAMETERS = "control_marks of tiepoints", "photographs of simulate", "folder of parameters --draw"
+MARKS, PHOTOGRAPHS, PARAMETERS = "control_marks of tiepoints", "photographs of simulate", "folder of parameters"
 COMPARED = "folder of compare-parameters"
 ANGLES = ("omega", "phi", "kappa")
 NAME = Item("image", "text", "Name of the photograph.")

@@ -53,10 +53,11 @@ def command_lines(program: Any) -> tuple[CommandLine, ...]:
     ----------
     program : a `typer.Typer`.
     """
-    return tuple(_commands(program, ""))
+    return tuple(_commands(program, "", ""))
 
 
-def _commands(program: Any, before: str) -> Iterator[CommandLine]:
+def _commands(program: Any, before: str, panel: str) -> Iterator[CommandLine]:
+    """Commands of a group; `panel` is that of the group, for those that state none."""
     for info in program.registered_commands:
         if info.hidden:
             continue
@@ -67,11 +68,11 @@ def _commands(program: Any, before: str) -> Iterator[CommandLine]:
             usage=" ".join(["aerotri", name, *filter(None, map(_in_usage, options)), "[OPTIONS]"]),
             text=" ".join((info.help or inspect.getdoc(info.callback) or "").split()),
             example=" ".join((info.epilog or "").split()).removeprefix("Example:").strip(),
-            panel=_said(info.rich_help_panel),
+            panel=_said(info.rich_help_panel) or panel,
             options=options,
         )
     for group in program.registered_groups:
-        yield from _commands(group.typer_instance, f"{before} {group.name}".strip())
+        yield from _commands(group.typer_instance, f"{before} {group.name}".strip(), _said(group.rich_help_panel))
 
 
 def _in_usage(option: CommandOption) -> str:
