@@ -14,23 +14,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import aerotri.commands.convert as convert_module
 from aerotri.commands.convert import camera_spec, run_convert, three_values
 from aerotri.conventions import InputError
 from aerotri.formats.assembly.project import Request, read_project
 from aerotri.formats.block.folder import read_block, write_block
 from aerotri.formats.convert import TARGETS, detect_format
 from aerotri.formats.foreign.metashape import read_metashape
+from places import PROJECT
 from small_blocks import small_block
 
-SHARED = "../shared/data"
+PAGES = ("real_blocks.md", "data.md")
+"""Of docs/validation, on which the commands for the public data sets stand."""
 
 
 def documented(target: str) -> list[str]:
-    """The arguments of the command in the module's docstring that writes `target`."""
-    text = (convert_module.__doc__ or "").replace("\\\n", " ")
-    lines = [line.strip() for line in text.splitlines() if line.strip().startswith("aerotri convert")]
-    return next(shlex.split(line)[1:] for line in lines if shlex.split(line)[3] == target)
+    """The arguments of the command of the documentation that writes `target`."""
+    found = []
+    for page in PAGES:
+        text = (PROJECT / "docs" / "validation" / page).read_text(encoding="utf-8").replace("\\\n", " ")
+        found += [shlex.split(line)[1:] for line in text.splitlines() if line.startswith("aerotri convert")]
+    return next(words for words in found if words[words.index("--out") + 1] == target)
 
 
 def run(*arguments):
@@ -46,8 +49,8 @@ def documented_run(shared_data, tmp_path):
 
     def convert(data_set: str, target: str) -> tuple[Path, list[str]]:
         folder = shared_data(data_set)
-        words = [word.replace(f"{SHARED}/{data_set}", str(folder)) for word in documented(target)]
-        words[2] = str(tmp_path / target)
+        words = [re.sub(rf"^{data_set}\b", str(folder), word) for word in documented(target)]
+        words[words.index("--out") + 1] = str(tmp_path / target)
         done = run(*words, "--json")
         assert done.returncode == 0, done.stderr
         return tmp_path / target, json.loads(done.stdout)["messages"]
@@ -57,7 +60,7 @@ def documented_run(shared_data, tmp_path):
 
 def test_cu_sbr_p1(documented_run):
     """581 photographs, 108 226 rays, RTK positions and six control points in the order Northing, Easting."""
-    folder, messages = documented_run("cu_sbr_p1", "cu_sbr_p1")
+    folder, messages = documented_run("cu_sbr_p1", "p1")
     block = read_block(folder)
     assert (len(block.images), len(block.image_points), len(block.points)) == (581, 108226, 13953)
     assert block.crs == "EPSG:32647"
