@@ -38,7 +38,10 @@ nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 
-autosummary_generate = True
+# pages of the Python names are written by reference_pages
+autosummary_generate = False
+# `aerotri.adjust` in a docstring is a link
+default_role = "py:obj"
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
 

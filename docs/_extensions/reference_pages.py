@@ -9,8 +9,9 @@ from __future__ import annotations
 import importlib
 import json
 import pkgutil
+import re
 from collections.abc import Iterable, Sequence
-from inspect import ismodule
+from inspect import isclass, ismodule
 from pathlib import Path
 from typing import Any
 
@@ -62,13 +63,27 @@ PYTHON = {
 }  # fmt: skip
 """The public names by chapter, a module for all that it offers; a name that is not here gets a chapter of its own."""
 MARK_WORDS = "; ".join(f"{mark}: {meaning}" for mark, meaning in MARKS.items())
+PARAMETER = re.compile(r"^(\*{0,2}\w[\w, ]*) : (.+)$")
 SPOKEN = "`aerotri explain NAME` prints the entry of a name on the screen."
 
 
 def setup(app: Any) -> dict[str, bool]:
     """Called by Sphinx."""
     app.connect("config-inited", lambda app, config: write_pages(Path(app.srcdir) / "reference" / "generated"))
+    # before numpydoc reads them
+    app.connect("autodoc-process-docstring", lambda *given: with_descriptions_apart(given[-1]), priority=400)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def with_descriptions_apart(lines: list[str]) -> None:
+    """Parameters of a docstring, 'name : what it is', as numpydoc has those without a type; the list is changed."""
+    section, made = "", []
+    for number, line in enumerate(lines):
+        following = lines[number + 1] if number + 1 < len(lines) else ""
+        section = line.strip() if following.strip("- ") == "" and following.startswith("---") else section
+        found = PARAMETER.match(line) if section in ("Parameters", "Returns") else None
+        made += [found[1], f"    {found[2]}"] if found else [line]
+    lines[:] = made
 
 
 def write_pages(out: Path) -> None:
@@ -92,6 +107,14 @@ def write_pages(out: Path) -> None:
     _write(out / "parameters.md", parameters_page(draw_patterns(out / "patterns")))
     _write(out / "words.md", words_page())
     _write(out / "python.md", python_page())
+    (out / "api").mkdir(exist_ok=True)
+    pages = [name for names in python_chapters().values() for name in names]
+    for name in pages:
+        _write(out / "api" / f"{name}.rst", api_page(name))
+    for older in out.glob("api/*"):
+        # of a name that is gone, or of another way to write these pages
+        if older.name not in {f"{name}.rst" for name in pages}:
+            older.unlink()
 
 
 def _write(path: Path, text: str) -> None:
@@ -329,25 +352,54 @@ def parameters_page(pictures: dict[str, list[str]]) -> str:
 
 
 def python_page() -> str:
-    """The public names of the package; what each does is taken from its docstring by autosummary."""
+    """The public names of the package by chapter; what each does is the first line of its docstring."""
     lines = [
         "# Python", "",
         "All names below stand in the package `aerotri`: `import aerotri`, then `aerotri.adjust(…)`. Input that cannot "
         "be used raises `aerotri.InputError` with a remedy. The commands are made of the same functions.", "",
     ]  # fmt: skip
+    chapters = python_chapters()
+    for title, names in chapters.items():
+        listed = [f"   aerotri.{full}" for name in names for full in _offered(name)]
+        lines += [f"## {title}", "", "```{eval-rst}", ".. autosummary::", "   :nosignatures:", "", *listed, "```", ""]
+    pages = [f"api/{name}" for names in chapters.values() for name in names]
+    return "\n".join([*lines, "```{toctree}", ":hidden:", "", *pages, "```"])
+
+
+def python_chapters() -> dict[str, tuple[str, ...]]:
+    """`PYTHON`, with a chapter for public names that it does not have yet."""
     chosen = {name for names in PYTHON.values() for name in names}
     further = tuple(name for name in aerotri.__all__ if name not in chosen and not name.startswith("_"))
-    for title, names in {**PYTHON, **({"Further names": further} if further else {})}.items():
-        listed = [f"   aerotri.{full}" for name in names for full in _offered(name)]
-        lines += [f"## {title}", "", "```{eval-rst}", ".. autosummary::", "   :toctree: api", "   :nosignatures:", ""]
-        lines += [*listed, "```", ""]
+    return {**PYTHON, "Further names": further} if further else PYTHON
+
+
+def api_page(name: str) -> str:
+    """One public name in full, in reStructuredText as docstrings are; of a module all that it offers."""
+    found = getattr(aerotri, name)
+    title = f"aerotri.{name}"
+    lines = [title, "=" * len(title), "", ".. currentmodule:: aerotri", ""]
+    if ismodule(found):
+        lines += [str(found.__doc__).split("\n>>>")[0].split("\n\n")[0].strip(), ""]
+    for full in _offered(name):
+        kind = "class" if isclass(_public(full)) else "function"
+        lines += [f".. auto{kind}:: aerotri::{full}", *(["   :members:"] if kind == "class" else []), ""]
     return "\n".join(lines)
 
 
-def _offered(name: str) -> Iterable[str]:
-    """A name; of a module the functions and classes in it."""
+def _offered(name: str) -> list[str]:
+    """A name; of a module the functions and classes in it that have no name of their own in the package."""
     found = getattr(aerotri, name)
-    return (f"{name}.{one}" for one in found.__all__ if callable(getattr(found, one))) if ismodule(found) else (name,)
+    if not ismodule(found):
+        return [name]
+    offered = [one for one in found.__all__ if callable(getattr(found, one))]
+    return [f"{name}.{one}" for one in offered if getattr(found, one) is not getattr(aerotri, one, None)]
+
+
+def _public(full: str) -> Any:
+    found: Any = aerotri
+    for part in full.split("."):
+        found = getattr(found, part)
+    return found
 
 
 def words_page() -> str:

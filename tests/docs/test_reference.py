@@ -54,3 +54,21 @@ def test_every_option_has_a_row(made):
         page = made.command_page(command)
         for option in command.options:
             assert f"| `{option.names[0]}`" in page
+
+
+def test_parameters_of_a_docstring_stand_apart_from_what_they_are(made):
+    lines = [
+        "Adjust.",
+        "",
+        "Parameters",
+        "----------",
+        "block : a block,",
+        "    or its folder.",
+        "",
+        "Raises",
+        "------",
+        "x : y",
+    ]
+    made.with_descriptions_apart(lines)
+    assert lines[4:7] == ["block", "    a block,", "    or its folder."]
+    assert lines[-1] == "x : y"
