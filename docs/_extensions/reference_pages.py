@@ -10,7 +10,7 @@ import importlib
 import json
 import pkgutil
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from inspect import isclass, ismodule
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from typing import Any
 import aerotri
 from aerotri.cli.app import app as program
 from aerotri.cli.options import COMMAND_PANELS
-from aerotri.reference.block_keys import BlockKey, block_keys, block_tables, prior_keys
+from aerotri.reference.block_keys import BlockKey, block_keys, block_tables, plan_keys, plan_tables, prior_keys
 from aerotri.reference.block_tables import block_table_files
 from aerotri.reference.command_lines import CommandLine, CommandOption, command_lines
 from aerotri.reference.files import described_files
@@ -97,6 +97,7 @@ def write_pages(out: Path) -> None:
         )
     _write(out / "block_toml.md", block_toml_page())
     _write(out / "block_tables.md", block_tables_page())
+    _write(out / "simulation_toml.md", simulation_toml_page())
     _write(out / "outputs.md", outputs_page())
     for page in dict.fromkeys(page for page, _ in GROUPS.values()):
         _write(out / "outputs" / f"{page}.md", output_page(page))
@@ -132,15 +133,36 @@ def block_toml_page() -> str:
         "names the nearest one. The tables of measurements are on [the next page](block_tables.md). A block written by "
         "hand, step by step: [your own block](../../start/own_block.md).", "", SPOKEN, "",
     ]  # fmt: skip
-    for name, text in block_tables().items():
-        keys = [key for key in block_keys() if key.table == name]
-        lines += ["## Keys above the first table" if not name else f"## [{name}]", "", text if name else "", ""]
-        lines += [*_key_table(keys), ""]
-        if name == "camera.NAME.interior":
-            lines += ["### value, sigma, fixed", "", "A parameter of `interior`, `brown` or `lens` is written as",
-                      "`K1 = { value = 0.0 }` (free), `{ value = 101.4, sigma = 0.01 }` (observed) or",
-                      "`{ fixed = true }` (held).", "", *_key_table(prior_keys()), ""]  # fmt: skip
-    return "\n".join(lines)
+    prior = ["### value, sigma, fixed", "", "A parameter of `interior`, `brown` or `lens` is written as",
+             "`K1 = { value = 0.0 }` (free), `{ value = 101.4, sigma = 0.01 }` (observed) or",
+             "`{ fixed = true }` (held).", "", *_key_table(prior_keys()), ""]  # fmt: skip
+    return "\n".join([*lines, *_by_table(block_tables(), block_keys(), {"camera.NAME.interior": prior})])
+
+
+def simulation_toml_page() -> str:
+    """Every key of simulation.toml."""
+    lines = [
+        "# simulation.toml", "",
+        "`simulation.toml` is the plan of a simulated flight, for `aerotri simulate`: cameras and what is wrong with "
+        "them, flight, ground, tie points, control. `blocks/` in the repository has several to begin with. A name with "
+        "`[]` is a list: one table `[[flight.cross_strips]]` for each strip.", "", SPOKEN, "",
+    ]  # fmt: skip
+    return "\n".join([*lines, *_by_table(plan_tables(), plan_keys(), {})])
+
+
+def _by_table(tables: Mapping[str, str], keys: Sequence[BlockKey], after: Mapping[str, list[str]]) -> list[str]:
+    lines = []
+    for name, text in tables.items():
+        head = (
+            f"## [[{name[:-2]}]]"
+            if name.endswith("[]")
+            else f"## [{name}]"
+            if name
+            else "## Keys above the first table"
+        )
+        own = [key for key in keys if key.table == name]
+        lines += [head, "", text if name else "", "", *(_key_table(own) if own else []), "", *after.get(name, [])]
+    return lines
 
 
 def _key_table(keys: Sequence[BlockKey]) -> list[str]:

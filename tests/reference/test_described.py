@@ -13,10 +13,11 @@ from aerotri.formats.block.settings_model import BlockModel
 from aerotri.formats.block.writer import TABLE_NAMES
 from aerotri.observations.block import CONSTRAINT_KINDS, EDIT_ACTIONS
 from aerotri.reference.adjust_tables import RESIDUALS
-from aerotri.reference.block_keys import block_keys, block_tables, prior_keys
+from aerotri.reference.block_keys import block_keys, block_tables, plan_keys, plan_tables, prior_keys
 from aerotri.reference.block_tables import READERS, block_table_files
 from aerotri.reference.files import described_files
 from aerotri.reference.schemas import json_files, schema_of
+from aerotri.simulation.spec import SimulationSpec
 from aerotri.terrain.picket_status import PicketStatus
 
 BARE = "[camera.NAME]\nsize_px = [100, 80]\npixel_um = 5.0\nfocal_length_mm = 50.0\n"
@@ -31,14 +32,29 @@ def keys_of(model, prefix=""):
         options = [one for one in node.get("anyOf", ()) if one.get("type") != "null"]
         if options:
             return walk(options[0], path)
+        if "$ref" in node.get("items", {}):
+            return walk(node["items"], path)
         inner = node.get("additionalProperties")
         if isinstance(inner, dict) and "$ref" in inner:
-            return walk(inner, f"{path}.NAME")
+            below = walk(inner, f"{path}.NAME")
+            return below if len(below) > 1 else [path]
         if "properties" not in node or set(node["properties"]) == {"value", "sigma", "fixed"}:
             return [path]
         return [key for name, below in node["properties"].items() for key in walk(below, f"{path}.{name}".lstrip("."))]
 
     return walk(schema, prefix)
+
+
+def test_every_key_of_simulation_toml_is_described():
+    def plain(name):
+        return name.replace("[]", "")
+
+    told = [plain(key.name) for key in plan_keys()]
+    assert sorted(told) == sorted(keys_of(SimulationSpec))
+    for key in plan_keys():
+        assert len(key.text) > 10, key
+        assert key.text.endswith("."), key
+    assert {key.table for key in plan_keys()} == set(plan_tables())
 
 
 def test_every_key_of_block_toml_is_described():

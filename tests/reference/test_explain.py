@@ -28,6 +28,7 @@ def titles(words, known):
     ("words", "first"),
     [
         ("gnss.shift", "gnss.shift — key of block.toml"),
+        ("flight.gsd_m", "flight.gsd_m — key of simulation.toml"),
         ("shift", "gnss.shift — key of block.toml"),
         ("camera.p1.pixel_um", "camera.NAME.pixel_um — key of block.toml"),
         ("GNSS.Shift", "gnss.shift — key of block.toml"),

@@ -1,4 +1,4 @@
-"""The keys of block.toml, taken from the models that check them."""
+"""The keys of block.toml and simulation.toml, taken from the models that check them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from aerotri.formats.block.settings_model import BlockModel, PriorModel
+from aerotri.simulation.spec import PriorSpec, SimulationSpec
 
+PRIORS = (PriorModel, PriorSpec)
 PRIOR = "{ value, sigma } or { fixed = true }"
 
 
@@ -50,20 +52,30 @@ def block_tables() -> dict[str, str]:
     return {"": "Above the first table.", **dict(_tables(BlockModel, ""))}
 
 
+def plan_keys() -> tuple[BlockKey, ...]:
+    """Every key of simulation.toml, as `block_keys`."""
+    return tuple(_keys(SimulationSpec, ""))
+
+
+def plan_tables() -> dict[str, str]:
+    """The headers of simulation.toml, as `block_tables`."""
+    return {"": "Above the first table.", **dict(_tables(SimulationSpec, ""))}
+
+
 def _keys(model: type[BaseModel], table: str) -> list[BlockKey]:
     found = []
     for name, field in model.model_fields.items():
-        inner, repeated = _section(field.annotation)
+        inner, below = _section(field.annotation)
         path = f"{table}.{name}" if table else name
-        if inner is not None and inner is not PriorModel:
-            found += _keys(inner, f"{path}.NAME" if repeated else path)
+        if inner is not None and inner not in PRIORS:
+            found += _keys(inner, path + below)
             continue
         extra: Any = field.json_schema_extra
         found.append(
             BlockKey(
                 name=path,
                 table=table,
-                kind=PRIOR if inner is PriorModel else _kind(field.annotation, field.metadata),
+                kind=_prior(field.annotation) if inner else _kind(field.annotation, field.metadata),
                 values=_words(field.annotation),
                 default=_written(field.default),
                 required=field.is_required(),
@@ -77,29 +89,42 @@ def _keys(model: type[BaseModel], table: str) -> list[BlockKey]:
 def _tables(model: type[BaseModel], table: str) -> list[tuple[str, str]]:
     found = []
     for name, field in model.model_fields.items():
-        inner, repeated = _section(field.annotation)
-        if inner is not None and inner is not PriorModel:
-            path = f"{table}.{name}" if table else name
-            path = f"{path}.NAME" if repeated else path
+        inner, below = _section(field.annotation)
+        if inner is not None and inner not in PRIORS:
+            path = (f"{table}.{name}" if table else name) + below
             found += [(path, str(field.description)), *_tables(inner, path)]
     return found
 
 
-def _section(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
-    """The model behind an annotation, and whether it stands in a table of names."""
+def _prior(annotation: Any) -> str:
+    is_table = get_origin(annotation) is dict
+    return f"{_one_of(get_args(annotation)[0])} = {PRIOR}" if is_table else PRIOR
+
+
+def _one_of(names: Any) -> str:
+    """The names that the entries of a table may have, or that they may have any."""
+    words = _words(names)
+    return " | ".join(words) if words else "NAME"
+
+
+def _section(annotation: Any) -> tuple[type[BaseModel] | None, str]:
+    """The model behind an annotation, and what follows its name: '.NAME' in a table of names, '[]' in a list."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation, False
+        return annotation, ""
     parts = get_args(annotation)
     if get_origin(annotation) is dict:
-        return _section(parts[1])[0], True
+        return _section(parts[1])[0], ".NAME"
     found = [inner for inner, _ in map(_section, parts) if inner is not None]
-    return (found[0] if found else None), False
+    below = next((below for inner, below in map(_section, parts) if inner is not None), "")
+    return (found[0] if found else None), "[]" if get_origin(annotation) is tuple else below
 
 
 def _words(annotation: Any) -> tuple[str, ...]:
+    """The words that may stand for a value; those for the names in a table of names are told with its kind."""
     if get_origin(annotation) is Literal:
         return tuple(map(str, get_args(annotation)))
-    return next((words for part in get_args(annotation) if (words := _words(part))), ())
+    parts = () if get_origin(annotation) is dict else get_args(annotation)
+    return next((words for part in parts if (words := _words(part))), ())
 
 
 def _kind(annotation: Any, metadata: list[Any]) -> str:
@@ -113,7 +138,10 @@ def _kind(annotation: Any, metadata: list[Any]) -> str:
         return ("whole number" if annotation is int else "number") + _range(bounds)
     origin, parts = get_origin(annotation), get_args(annotation)
     if origin is dict:
-        return f"NAME = {_kind(parts[1], [])}"
+        return f"{_one_of(parts[0])} = {_kind(parts[1], [])}"
+    if origin is tuple:
+        own = [_kind(part, []) for part in parts if part is not Ellipsis]
+        return f"[{own[0]}, …]" if Ellipsis in parts else f"[{len(own)} {own[0].replace('number', 'numbers')}]"
     if origin is list:
         one = _kind(parts[0], [])
         return f"[{bounds['min_length']} {one.replace('number', 'numbers')}]" if bounds else f"[{one}, …]"
@@ -145,4 +173,6 @@ def _written(value: Any) -> str:
         return str(value).lower()
     if isinstance(value, str):
         return f'"{value}"'
-    return "{}" if value == {} else str(value).replace("'", '"')
+    if value == {} or value == ():
+        return "{}" if value == {} else "[]"
+    return str(list(value) if isinstance(value, tuple) else value).replace("'", '"')

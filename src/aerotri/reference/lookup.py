@@ -8,15 +8,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from aerotri.reference.block_keys import BlockKey, block_keys, block_tables, prior_keys
+from aerotri.reference.block_keys import (
+    BlockKey,
+    block_keys,
+    block_tables,
+    plan_keys,
+    plan_tables,
+    prior_keys,
+)
 from aerotri.reference.command_lines import CommandLine
 from aerotri.reference.files import described_files
 from aerotri.reference.records import DescribedFile, Item
 from aerotri.reference.words import WORDS
 
 KINDS = (
-    "key of block.toml", "table of block.toml", "command", "file", "column", "option", "parameter", "word of a result",
-    "JSON key",
+    "key of block.toml", "table of block.toml", "key of simulation.toml", "table of simulation.toml", "command", "file",
+    "column", "option", "parameter", "word of a result", "JSON key",
 )  # fmt: skip
 """Kinds of entries in the order in which they are told."""
 CAMERA = re.compile(r"^camera\.[^.]+\.")
@@ -45,8 +52,8 @@ class Entry:
     @property
     def title(self) -> str:
         """Name, kind and place in a line."""
-        if self.kind == "key of block.toml":
-            return f"{self.name} — key of block.toml"
+        if self.kind.startswith(("key of", "table of")):
+            return f"{self.name} — {self.kind}"
         return f"{self.name} — {self.kind}{f' of {self.place}' if self.place else ''}"
 
 
@@ -55,8 +62,10 @@ def entries() -> tuple[Entry, ...]:
     """All entries but commands and options."""
     return tuple(
         [
-            *map(_block_key, (*block_keys(), *prior_keys())),
-            *_block_tables(),
+            *(_key("block.toml", one) for one in (*block_keys(), *prior_keys())),
+            *_tables("block.toml", block_tables(), block_keys()),
+            *(_key("simulation.toml", one) for one in plan_keys()),
+            *_tables("simulation.toml", plan_tables(), plan_keys()),
             *(entry for one in described_files() for entry in _of_file(one)),
             *_parameters(),
             *(
@@ -112,7 +121,7 @@ def near(words: str, known: Sequence[Entry]) -> list[str]:
 def _own_names(entry: Entry) -> list[str]:
     """The names of an entry without its place; the last part of a long one too."""
     names = entry.name.split(", ") if entry.kind == "option" else [entry.name.replace("[]", "")]
-    if entry.kind in ("key of block.toml", "JSON key", "parameter"):
+    if entry.kind.startswith("key of") or entry.kind in ("JSON key", "parameter"):
         names.append(entry.name.replace("[]", "").rsplit(".", 1)[-1])
     return names
 
@@ -126,7 +135,7 @@ def _full_names(entry: Entry) -> Iterator[str]:
         yield f"aerotri {entry.name}"
     if entry.kind == "file":
         yield f"{entry.name} ({entry.place})"
-    if entry.kind == "table of block.toml":
+    if entry.kind.startswith("table of"):
         yield entry.name.strip("[]")
 
 
@@ -145,21 +154,19 @@ def _facts(facts: Mapping[str, str]) -> dict[str, str]:
     return {name: value for name, value in facts.items() if value}
 
 
-def _block_key(key: BlockKey) -> Entry:
+def _key(file: str, key: BlockKey) -> Entry:
     facts = {
-        "value": "" if key.values else key.kind,
-        "unit": key.unit,
-        "default": key.default,
+        "value": "" if key.values else key.kind, "unit": key.unit, "default": key.default,
         "required": "yes" if key.required else "",
-    }
-    return Entry("key of block.toml", key.name, "block.toml", key.text, _facts(facts), dict.fromkeys(key.values, ""))
+    }  # fmt: skip
+    return Entry(f"key of {file}", key.name, file, key.text, _facts(facts), dict.fromkeys(key.values, ""))
 
 
-def _block_tables() -> list[Entry]:
-    keys = {name: [key.name.rsplit(".", 1)[-1] for key in block_keys() if key.table == name] for name in block_tables()}
+def _tables(file: str, tables: Mapping[str, str], keys: Sequence[BlockKey]) -> list[Entry]:
+    below = {name: [key.name.rsplit(".", 1)[-1] for key in keys if key.table == name] for name in tables}
     return [
-        Entry("table of block.toml", f"[{name}]", "", text, {"keys": ", ".join(keys[name])}, {})
-        for name, text in block_tables().items()
+        Entry(f"table of {file}", f"[{name}]", file, text, _facts({"keys": ", ".join(below[name])}), {})
+        for name, text in tables.items()
         if name
     ]
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
 from aerotri.conventions import LARGEST
+from aerotri.formats.text.described_key import key
 from aerotri.simulation.presets import PRESETS
 
 Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
@@ -35,9 +36,13 @@ class Table(BaseModel):
 class PriorSpec(Table):
     """What the block says of an unknown beforehand; without a value the camera's own."""
 
-    value: Number | None = None
-    sigma: Positive | None = None
-    fixed: bool = False
+    value: Number | None = key(
+        None, "Start value that the block states; the camera's own where it is not given.", "unit of the parameter"
+    )
+    sigma: Positive | None = key(
+        None, "Standard deviation that the block states; without it the parameter is free.", "unit of the parameter"
+    )
+    fixed: bool = key(False, "true: the block holds the value.")
 
 
 class PhysicalErrorSpec(Table):
@@ -47,35 +52,45 @@ class PhysicalErrorSpec(Table):
     (see `camera_errors`), `seed` fixes the camera while the seed of the simulation changes.
     """
 
-    rms_um: Positive
-    day_change_um: NotNegative = 0.0
-    seed: Number0 | None = None
-    weights: dict[str, NotNegative] = {}
+    rms_um: Positive = key(..., "RMS of the image error in a coordinate, over the format.", "µm")
+    day_change_um: NotNegative = key(0.0, "RMS of the change of the image error from day to day.", "µm")
+    seed: Number0 | None = key(
+        None, "Seed of the camera; the camera then stays the same when the simulation takes another seed."
+    )
+    weights: dict[str, NotNegative] = key(
+        {}, "Relative sizes of the causes of the error; the known causes are named where one is wrong."
+    )
 
 
 class ErrorSpec(Table):
     """What is wrong with a camera. `interior` is true minus calibrated; `parameters` by name, 'bluh.1'."""
 
-    parameters: dict[str, Number] = {}
-    brown: dict[BrownName, Number] = {}
-    lens: dict[LensName, Number] = {}
-    interior: dict[InteriorName, Number] = {}
-    physical: PhysicalErrorSpec | None = None
+    parameters: dict[str, Number] = key(
+        {}, 'True additional parameters by name, such as "bluh.1" = 1e-4.', "unit of the parameter"
+    )
+    brown: dict[BrownName, Number] = key({}, "True lens parameters of Brown.", "as in block.toml")
+    lens: dict[LensName, Number] = key({}, "True lens parameters of the OpenCV model.", "as in block.toml")
+    interior: dict[InteriorName, Number] = key({}, "True less stated interior orientation.", "mm")
+    physical: PhysicalErrorSpec | None = key(None, "Image errors from the physics of the camera.")
 
 
 class CameraSpec(Table):
     """A camera as block.toml has it, and its errors."""
 
-    model: Literal["frame", "ultracam_d", "dmc"] = "frame"
-    size_px: tuple[Count, Count]
-    pixel_um: Positive
-    focal_length_mm: Positive
-    principal_point_mm: tuple[Number, Number] = (0.0, 0.0)
-    flight_axis: Literal["+x", "-x", "+y", "-y"] = "+y"
-    interior: dict[InteriorName, PriorSpec] = {}
-    brown: dict[BrownName, PriorSpec] = {}
-    lens: dict[LensName, PriorSpec] = {}
-    errors: ErrorSpec = ErrorSpec()
+    model: Literal["frame", "ultracam_d", "dmc"] = key("frame", "Kind of camera, as in block.toml.")
+    size_px: tuple[Count, Count] = key(..., "Columns, rows.", "px")
+    pixel_um: Positive = key(..., "Size of a pixel.", "µm")
+    focal_length_mm: Positive = key(..., "Principal distance.", "mm")
+    principal_point_mm: tuple[Number, Number] = key((0.0, 0.0), "Principal point x0, y0.", "mm")
+    flight_axis: Literal["+x", "-x", "+y", "-y"] = key("+y", "Image axis along the flight.")
+    interior: dict[InteriorName, PriorSpec] = key(
+        {}, "What the block states of the interior orientation, as in block.toml.", "mm"
+    )
+    brown: dict[BrownName, PriorSpec] = key({}, "What the block states of Brown's lens parameters.", "as in block.toml")
+    lens: dict[LensName, PriorSpec] = key(
+        {}, "What the block states of the OpenCV lens parameters.", "as in block.toml"
+    )
+    errors: ErrorSpec = key(ErrorSpec(), "What is wrong with the camera in truth.")
 
     @model_validator(mode="before")
     @classmethod
@@ -92,11 +107,11 @@ class CameraSpec(Table):
 class CrossStripSpec(Table):
     """A strip across the others; `position` 0–1 along them. Without `images` it spans the outer strip axes."""
 
-    position: Share = 0.5
-    images: Count | None = None
-    end_lap: Lap | None = None
-    camera: str | None = None
-    day: Count | None = None
+    position: Share = key(0.5, "Where it crosses the other strips: 0 at their beginning, 1 at their end.")
+    images: Count | None = key(None, "Photographs; as many as span the strips where it is not given.")
+    end_lap: Lap | None = key(None, "End lap, 0 to 0.95; that of the flight where it is not given.")
+    camera: str | None = key(None, "Its camera; the first where it is not given.")
+    day: Count | None = key(None, "Day on which it is flown, from 1.")
 
 
 class FlightSpec(Table):
@@ -106,23 +121,31 @@ class FlightSpec(Table):
     `cameras` or `days` share the strips in runs of equal number.
     """
 
-    gsd_m: Positive | None = None
-    height_m: Positive | None = None
-    area_m: tuple[Positive, Positive] | None = None
-    strips: Count | None = None
-    images_per_strip: Count | None = None
-    end_lap: Lap = 0.6
-    side_lap: Lap = 0.3
-    heading_deg: Number = 90.0
-    centre_m: tuple[Number, Number] = (0.0, 0.0)
-    alternating: bool = True
-    cross_strips: tuple[CrossStripSpec, ...] = ()
-    attitude_sigma_deg: Triple = (0.0, 0.0, 0.0)
-    position_sigma_m: Triple = (0.0, 0.0, 0.0)
-    cameras: tuple[str, ...] = ()
-    days: Count | None = None
-    speed_m_s: Positive = 70.0
-    turn_s: NotNegative = 240.0
+    gsd_m: Positive | None = key(None, "Size of a pixel on the ground; give this or height_m.", "m")
+    height_m: Positive | None = key(None, "Flying height over the mean ground; give this or gsd_m.", "m")
+    area_m: tuple[Positive, Positive] | None = key(
+        None, "Area covered by stereo models, along and across the strips; or give strips and images_per_strip.", "m"
+    )
+    strips: Count | None = key(None, "Number of parallel strips.")
+    images_per_strip: Count | None = key(None, "Photographs in a strip.")
+    end_lap: Lap = key(0.6, "Overlap of photographs in a strip, 0 to 0.95.")
+    side_lap: Lap = key(0.3, "Overlap of neighbouring strips, 0 to 0.95.")
+    heading_deg: Number = key(90.0, "Direction of flight, clockwise from grid north.", "deg")
+    centre_m: tuple[Number, Number] = key((0.0, 0.0), "X and Y of the middle of the block.", "m")
+    alternating: bool = key(True, "true: every second strip is flown backwards.")
+    cross_strips: tuple[CrossStripSpec, ...] = key(
+        (), "Strips across the others, a table [[flight.cross_strips]] each."
+    )
+    attitude_sigma_deg: Triple = key(
+        (0.0, 0.0, 0.0), "Standard deviation of the true omega, phi, kappa around the plan.", "deg"
+    )
+    position_sigma_m: Triple = key((0.0, 0.0, 0.0), "Standard deviation of the true X, Y, Z around the plan.", "m")
+    cameras: tuple[str, ...] = key(
+        (), "Cameras that share the strips in runs of equal number; empty: the first camera."
+    )
+    days: Count | None = key(None, "Days that share the strips; images.csv gets a column day.")
+    speed_m_s: Positive = key(70.0, "Speed, for the times of the exposures.", "m/s")
+    turn_s: NotNegative = key(240.0, "Time from the end of a strip to the next.", "s")
 
     @model_validator(mode="after")
     def _either_or(self) -> FlightSpec:
@@ -143,14 +166,16 @@ class TerrainSpec(Table):
     `houses` have flat roofs: middle X and Y from the middle of the block, size along X and along Y, height, m.
     """
 
-    kind: Literal["flat", "undulating", "hill"] = "flat"
-    height_m: Number = 0.0
-    relief_rms_m: NotNegative = 0.0
-    wavelength_m: Positive = 1000.0
-    hill_height_m: Number = 0.0
-    hill_radius_m: Positive = 100.0
-    hill_centre_m: tuple[Number, Number] = (0.0, 0.0)
-    houses: tuple[tuple[Number, Number, Positive, Positive, Positive], ...] = ()
+    kind: Literal["flat", "undulating", "hill"] = key("flat", "Shape of the ground.")
+    height_m: Number = key(0.0, "Mean height.", "m")
+    relief_rms_m: NotNegative = key(0.0, "RMS of the relief of undulating ground.", "m")
+    wavelength_m: Positive = key(1000.0, "Wavelength of undulating ground.", "m")
+    hill_height_m: Number = key(0.0, "Height of a hill; it may stand on any ground.", "m")
+    hill_radius_m: Positive = key(100.0, "Radius of the hill.", "m")
+    hill_centre_m: tuple[Number, Number] = key((0.0, 0.0), "X and Y of the hill.", "m")
+    houses: tuple[tuple[Number, Number, Positive, Positive, Positive], ...] = key(
+        (), "Houses: X, Y from the middle of the block, size along X and Y, height.", "m"
+    )
 
 
 class TiePointSpec(Table):
@@ -161,17 +186,24 @@ class TiePointSpec(Table):
     'uniform': evenly over the ground.
     """
 
-    per_image: Positive
-    rays_per_point: Annotated[float, Field(strict=True, ge=2.0)] | None = None
-    probability: Probability | None = None
-    min_rays: Annotated[int, Field(strict=True, ge=1)] = 2
-    max_rays: Annotated[int, Field(strict=True, ge=2)] | None = None
-    distribution: Literal["uniform", "clusters", "nodes"] = "uniform"
-    pattern: tuple[Count, Count] = (3, 3)
-    cluster_sigma: Positive = 0.04
-    sigma_um: NotNegative
-    stated_sigma_um: Positive | None = None
-    margin_px: NotNegative = 20.0
+    per_image: Positive = key(..., "Tie points in a photograph.")
+    rays_per_point: Annotated[float, Field(strict=True, ge=2.0)] | None = key(
+        None, "Mean number of photographs of a point; give this or probability."
+    )
+    probability: Probability | None = key(None, "Probability that a photograph that sees a point measures it.")
+    min_rays: Annotated[int, Field(strict=True, ge=1)] = key(2, "Photographs of a point at least.")
+    max_rays: Annotated[int, Field(strict=True, ge=2)] | None = key(None, "Photographs of a point at most.")
+    distribution: Literal["uniform", "clusters", "nodes"] = key(
+        "uniform",
+        "uniform over the ground, or clusters around places in the photograph, or nodes: one at every place first.",
+    )
+    pattern: tuple[Count, Count] = key((3, 3), "Places along and across of clusters and nodes.")
+    cluster_sigma: Positive = key(0.04, "Size of a cluster, in units of the format.")
+    sigma_um: NotNegative = key(..., "Standard deviation of the measurements.", "µm")
+    stated_sigma_um: Positive | None = key(
+        None, "Standard deviation that the block states; the true one where it is not given.", "µm"
+    )
+    margin_px: NotNegative = key(20.0, "Margin of the photograph without points.", "px")
 
     @model_validator(mode="after")
     def _consistent(self) -> TiePointSpec:
@@ -187,8 +219,8 @@ class TiePointSpec(Table):
 class ControlBlunderSpec(Table):
     """A control point given wrongly by `error_m`."""
 
-    point: Name
-    error_m: Vector
+    point: Name = key(..., "Name of the control point.")
+    error_m: Vector = key(..., "Error of its given X, Y, Z.", "m")
 
 
 class ControlSpec(Table):
@@ -197,16 +229,26 @@ class ControlSpec(Table):
     block then states `stated_sigma_m`.
     """
 
-    distance_bases: Positive | None = None
-    base_end_lap: Lap = 0.6
-    interior: bool = True
-    positions: tuple[tuple[Number, Number], ...] = ()
-    sigma_m: Triple = (0.03, 0.03, 0.03)
-    stated_sigma_m: tuple[Positive, Positive, Positive] | None = None
-    image_sigma_um: NotNegative | None = None
-    check_points: Number0 = 0
-    check_sigma_m: Triple | None = None
-    blunders: tuple[ControlBlunderSpec, ...] = ()
+    distance_bases: Positive | None = key(
+        None, "Control on a grid with this mesh, in base lengths; give this or positions."
+    )
+    base_end_lap: Lap = key(0.6, "End lap of the base length that is meant.")
+    interior: bool = key(True, "false: control at the border only.")
+    positions: tuple[tuple[Number, Number], ...] = key((), "Places of the control, along and across the block, 0 to 1.")
+    sigma_m: Triple = key((0.03, 0.03, 0.03), "Standard deviation of the given X, Y, Z of control.", "m")
+    stated_sigma_m: tuple[Positive, Positive, Positive] | None = key(
+        None, "Standard deviation that the block states; the true one where it is not given.", "m"
+    )
+    image_sigma_um: NotNegative | None = key(
+        None, "Standard deviation of its image points; that of tie points where it is not given.", "µm"
+    )
+    check_points: Number0 = key(0, "Number of check points.")
+    check_sigma_m: Triple | None = key(
+        None, "Standard deviation of the given X, Y, Z of check points; that of control where it is not given.", "m"
+    )
+    blunders: tuple[ControlBlunderSpec, ...] = key(
+        (), "Control points given wrongly, a table [[control.blunders]] each."
+    )
 
     @model_validator(mode="after")
     def _stated(self) -> ControlSpec:
@@ -224,32 +266,38 @@ class TowerSpec(Table):
     X and in Y; the block has a condition of that σ for every tower.
     """
 
-    height_m: Positive
-    per_image: Count = 1
-    sigma_m: Positive = 0.01
+    height_m: Positive = key(..., "Height of the towers.", "m")
+    per_image: Count = key(1, "Towers in a photograph.")
+    sigma_m: Positive = key(0.01, "How far the top is off the plumb line, in X and in Y.", "m")
 
 
 class GnssSpec(Table):
     """Antenna positions; shift and drift of every strip are drawn with their σ."""
 
-    sigma_m: tuple[Positive, Positive, Positive]
-    shift_sigma_m: Triple = (0.0, 0.0, 0.0)
-    drift_sigma_m_s: Triple = (0.0, 0.0, 0.0)
-    lever_arm_m: Vector = (0.0, 0.0, 0.0)
+    sigma_m: tuple[Positive, Positive, Positive] = key(..., "Standard deviation of observed X, Y, Z.", "m")
+    shift_sigma_m: Triple = key((0.0, 0.0, 0.0), "Standard deviation of the shift of a strip.", "m")
+    drift_sigma_m_s: Triple = key((0.0, 0.0, 0.0), "Standard deviation of the drift of a strip.", "m/s")
+    lever_arm_m: Vector = key((0.0, 0.0, 0.0), "From the projection centre to the antenna, in the camera frame.", "m")
 
 
 class InsSpec(Table):
     """Attitudes (ω, φ, κ); `boresight_deg` turns the INS into the camera."""
 
-    sigma_deg: tuple[Positive, Positive, Positive]
-    boresight_deg: Vector = (0.0, 0.0, 0.0)
+    sigma_deg: tuple[Positive, Positive, Positive] = key(
+        ..., "Standard deviation of observed omega, phi, kappa.", "deg"
+    )
+    boresight_deg: Vector = key((0.0, 0.0, 0.0), "Boresight misalignment between INS and camera.", "deg")
 
 
 class GrossErrorSpec(Table):
     """Gross errors of tie points: a share of the rays, uniform in size, in a random direction."""
 
-    fraction: Annotated[float, Field(strict=True, ge=0.0, lt=1.0)]
-    range_sigma: tuple[NotNegative, Positive] = (10.0, 100.0)
+    fraction: Annotated[float, Field(strict=True, ge=0.0, lt=1.0)] = key(
+        ..., "Share of the image points of tie points that are wrong, 0 to 1."
+    )
+    range_sigma: tuple[NotNegative, Positive] = key(
+        (10.0, 100.0), "Smallest and largest error, in standard deviations."
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> GrossErrorSpec:
@@ -261,9 +309,11 @@ class GrossErrorSpec(Table):
 class StartValueSpec(Table):
     """Start values of the orientation: none, or the truth with errors of these σ."""
 
-    kind: Literal["none", "perturbed"] = "none"
-    position_sigma_m: NotNegative = 1.0
-    angle_sigma_deg: NotNegative = 0.1
+    kind: Literal["none", "perturbed"] = key(
+        "none", "none: the block has no start values; perturbed: the truth with errors."
+    )
+    position_sigma_m: NotNegative = key(1.0, "Standard deviation of the errors of positions.", "m")
+    angle_sigma_deg: NotNegative = key(0.1, "Standard deviation of the errors of angles.", "deg")
 
 
 class GeoreferenceSpec(Table):
@@ -272,8 +322,8 @@ class GeoreferenceSpec(Table):
     Heights count from the ellipsoid where the CRS has no vertical part.
     """
 
-    crs: str
-    origin: Vector
+    crs: str = key(..., "Coordinate system that the block is delivered in.")
+    origin: Vector = key(..., "Its coordinates of (0, 0, 0) of the plan.", "units of crs")
 
 
 class PhotographSpec(Table):
@@ -282,32 +332,39 @@ class PhotographSpec(Table):
     `targets` draws bright discs at control and check points.
     """
 
-    format: Literal["tiff", "jpeg"] = "tiff"
-    targets: bool = False
+    format: Literal["tiff", "jpeg"] = key("tiff", "tiff: 16 bit; jpeg: 8 bit with EXIF as a drone writes it.")
+    targets: bool = key(False, "true: bright discs at control and check points.")
 
 
 class AdjustmentSpec(Table):
     """What block.toml shall say under `[adjustment]`."""
 
-    additional_parameters: tuple[str, ...] = ()
-    parameter_groups: str = "camera"
+    additional_parameters: tuple[str, ...] = key((), "As in block.toml.")
+    parameter_groups: str = key("camera", "As in block.toml.")
 
 
 class SimulationSpec(Table):
     """A simulated block from flight plan to start values."""
 
-    name: Name
-    rotation: Literal["omega-phi-kappa", "phi-omega-kappa"] = "omega-phi-kappa"
-    camera: Annotated[dict[Name, CameraSpec], Field(min_length=1)]
-    flight: FlightSpec
-    terrain: TerrainSpec = TerrainSpec()
-    tie_points: TiePointSpec
-    control: ControlSpec = ControlSpec()
-    towers: TowerSpec | None = None
-    gnss: GnssSpec | None = None
-    ins: InsSpec | None = None
-    gross_errors: GrossErrorSpec | None = None
-    start_values: StartValueSpec = StartValueSpec()
-    georeference: GeoreferenceSpec | None = None
-    photographs: PhotographSpec = PhotographSpec()
-    adjustment: AdjustmentSpec = AdjustmentSpec()
+    name: Name = key(..., "Name of the block.")
+    rotation: Literal["omega-phi-kappa", "phi-omega-kappa"] = key(
+        "omega-phi-kappa", "Order of the angles, as in block.toml."
+    )
+    camera: Annotated[dict[Name, CameraSpec], Field(min_length=1)] = key(
+        ..., 'The cameras, one table [camera.NAME] each; preset = "ultracam_d", "dmc", "rmk_top_15" or "p1" takes a '
+        "known one, whose keys need not be given."
+    )  # fmt: skip
+    flight: FlightSpec = key(..., "The flight plan: parallel strips, and cross strips.")
+    terrain: TerrainSpec = key(TerrainSpec(), "The ground.")
+    tie_points: TiePointSpec = key(..., "Tie points and their measurements.")
+    control: ControlSpec = key(ControlSpec(), "Control and check points.")
+    towers: TowerSpec | None = key(None, "Towers whose foot and top are measured; the block gets a condition for each.")
+    gnss: GnssSpec | None = key(
+        None, "Observed positions; shift and drift of every strip are drawn with their standard deviation."
+    )
+    ins: InsSpec | None = key(None, "Observed angles.")
+    gross_errors: GrossErrorSpec | None = key(None, "Gross errors of tie points.")
+    start_values: StartValueSpec = key(StartValueSpec(), "Start values of the orientation.")
+    georeference: GeoreferenceSpec | None = key(None, "Where on Earth the flight takes place; a local block without.")
+    photographs: PhotographSpec = key(PhotographSpec(), "How photographs are rendered.")
+    adjustment: AdjustmentSpec = key(AdjustmentSpec(), "What block.toml shall say under [adjustment].")

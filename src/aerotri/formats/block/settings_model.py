@@ -5,11 +5,12 @@ The reference of the documentation and `aerotri explain` are made from these des
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from aerotri.conventions import LARGEST
+from aerotri.formats.text.described_key import key
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.observations import Camera, Prior
 from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
@@ -23,11 +24,6 @@ Three = Annotated[list[Real], Field(min_length=3, max_length=3)]
 ThreeNotNegative = Annotated[list[Annotated[float, Field(ge=0, le=LARGEST)]], Field(min_length=3, max_length=3)]
 ThreePositive = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 OffOn = Literal["off", "on"]
-
-
-def key(default: Any, text: str, unit: str = "") -> Any:
-    """A key of block.toml: its default, what it means in plain words, its unit; without a default give `...`."""
-    return Field(default, description=text, json_schema_extra={"unit": unit})
 
 
 class Section(BaseModel):
