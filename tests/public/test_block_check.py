@@ -201,6 +201,8 @@ def test_places_that_do_not_meet(ten):
     assert said(away) == ""
     turned = replace(away, control=replace(away.control, xyz=away.control.xyz[:, [1, 0, 2]]))
     assert "X and Y of one of them are exchanged" in said(turned)
+    assert "are both in metres?" in said(with_positions(ten, lambda xyz: 1000.0 * xyz))
+    assert "are both in metres?" in said(with_control(ten, lambda xyz: 1e-5 * xyz))
     assert "not above it" in said(with_positions(ten, lambda xyz: xyz - [0.0, 0.0, 5000.0]))
 
 

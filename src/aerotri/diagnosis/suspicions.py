@@ -19,6 +19,9 @@ their edges, and a wrong unit or size is off by far more."""
 APART = 3.0
 """Distance of control from the photographs in plan, in the size of the larger of the two areas, from which it is asked
 whether both are in one system [C]."""
+UNLIKE, FEWEST_SPANNING = 20.0, 3
+"""Ratio of the areas that control and photographs span, in length, from which their units are asked for, and control
+points that span an area [C]: of control in one corner alone the question is worth it too."""
 HALF_CIRCLE = {"degrees": 180.0, "gon": 200.0, "radians": np.pi}
 """A turn of 180° in the units of angles."""
 NEAR_HALF = 0.05
@@ -111,8 +114,16 @@ def _places(block: Block) -> list[str]:
             why = "X and Y of one of them are exchanged" if turned else "are both in the same coordinate system?"
             said.append(f"{what} {away:.4g} m from the {where}: {why}")
         elif not is_check:
-            said += _heights(ground[:, 2], above[:, 2], where)
+            said += [*_spans(ground, above, where), *_heights(ground[:, 2], above[:, 2], where)]
     return said
+
+
+def _spans(ground: np.ndarray, above: np.ndarray, where: str) -> list[str]:
+    """Areas of quite different size: one of the lists is in another unit, or the control lies in one corner."""
+    one, other = (float(np.hypot(*np.ptp(xyz[:, :2], axis=0))) for xyz in (ground, above))
+    if len(ground) < FEWEST_SPANNING or min(one, other) <= 0.0 or 1.0 / UNLIKE < one / other < UNLIKE:
+        return []
+    return [f"control spans {one:.3g} m, the {where} {other:.3g} m: are both in metres?"]
 
 
 def _distance(ground: np.ndarray, above: np.ndarray) -> float:
