@@ -59,6 +59,11 @@ class InputError(Exception):
         return _printable(f"{text} — {self.remedy}" if self.remedy else text)
 
 
+def counted(number: int, singular: str, plural: str = "") -> str:
+    """'1 photograph', '3 photographs'; `plural` where it is not the singular with an s, or a verb follows."""
+    return f"{number} {singular}" if number == 1 else f"{number} {plural or singular + 's'}"
+
+
 LARGEST = 1e12
 """No number that a user states is larger, whatever its unit; a larger one would overflow in a square."""
 

@@ -108,7 +108,7 @@ def test_parameters_that_cannot_be_told_apart_are_named():
     row = list(result.parameters.names).index("bluh.9")
     assert result.parameters.max_correlation_with[row] == "brown.K1"
     assert any("bluh.9 and brown.K1 cannot be told apart" in w for w in result.outcome.warnings)
-    with pytest.raises(AdjustmentFailedError, match=r"the principal distance ran from 101\.4"):
+    with pytest.raises(AdjustmentFailedError, match=r"changed the principal distance from 101\.4"):
         adjust(with_focal_length(Prior(101.4)))
 
 

@@ -175,5 +175,5 @@ def test_a_point_that_its_rays_do_not_fix_is_named():
     )
     prepared = prepare(block, given)
     equations = prepared.system.assemble(prepared.state, 0.0, LEAST_SQUARES)
-    sentence = f"not determined: point {block.points[point]}, whose rays are parallel or one"
+    sentence = f"not determined: point {block.points[point]}, which has only one ray, or rays that are parallel"
     assert point_without_rays_enough(prepared.system, prepared.state, equations) == [sentence]

@@ -148,13 +148,13 @@ def test_every_target_of_a_result(folders):
 
 def test_start_values_of_a_block_are_said_to_be_such(folders):
     said = _messages(Request(str(folders / "block"), ""), folders / "b_opk", "opk")
-    assert "orientations are those that the files gave, not adjusted" in said
+    assert "the orientations are those of the files, not adjusted" in said
     found = read_metashape(folders / "b_opk")
     np.testing.assert_allclose(found.centre, read_block(folders / "block").images.centre, rtol=0, atol=5.1e-7)
 
 
 def test_what_a_result_does_not_take(folders):
-    with pytest.raises(InputError, match="a result is whole"):
+    with pytest.raises(InputError, match="nothing can be added"):
         run_convert(Request(str(folders / "result"), "", control="x"), folders / "x", "block", False)
     with pytest.raises(InputError, match="source and target are the same"):
         run_convert(Request(str(folders / "block"), ""), folders / "block", "block", False)

@@ -137,7 +137,7 @@ def _distance(xy: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     ("more", "said"),
     [
         (("--subset", "third"), "there is no subset"),
-        (("--window", "16"), "has no middle"),
+        (("--window", "16"), "a window of 16 pixels is not possible"),
         (("--interval", "wide"), "--interval .wide. is none"),
         (("--breaklines", "lines.shp"), "no known kind"),
     ],

@@ -185,7 +185,7 @@ def test_points_and_photographs_that_hang_on_nothing(ten):
     alone = replace(alone, image_points=type(rays)(*(getattr(alone.image_points, name)[keep]
                                                      for name in ("image", "point", "xy", "sigma"))))  # fmt: skip
     assert inventory(alone).without_image_points == ("2_005",)
-    assert "1 photographs have no image points (2_005)" in said(alone)
+    assert "1 photograph without image points (2_005)" in said(alone)
     assert "measured in one photograph only" in said(alone)
     apart = with_strips_apart(ten)
     assert "strip '1' has no point in common with another strip" in said(apart)

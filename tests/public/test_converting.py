@@ -35,7 +35,7 @@ def test_a_result_is_written_as_adjusted(result, tmp_path):
     assert read.is_result
     assert read.block.name == result.block.name
     assert "12 photographs" in read._repr_html_()
-    with pytest.raises(InputError, match="a result is whole"):
+    with pytest.raises(InputError, match="nothing can be added"):
         aerotri.read(folder, control="x.csv")
 
 
@@ -45,7 +45,7 @@ def test_a_block_is_adjusted_where_the_target_needs_it(flight, tmp_path):
     assert any(stage.startswith("iteration 1") for stage in told)
     assert detect_format(tmp_path / "model") == "colmap"
     said = aerotri.convert(flight.block, tmp_path / "start.txt", to="opk")
-    assert said[0] == "orientations are those that the files gave, not adjusted"
+    assert said[0] == "the orientations are those of the files, not adjusted"
     assert any("control" in text for text in said[1:])
     again = aerotri.read(tmp_path / "model", pixel_um=2.4)
     assert again.points.shape == (len(again.block.points), 3)

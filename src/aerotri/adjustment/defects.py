@@ -15,6 +15,7 @@ from aerotri.adjustment.null_space import SUSPECT, free_directions, smallest_eig
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import State
+from aerotri.conventions import counted
 
 AT_INFINITY = 100.0
 """Distance from the middle of the points, in usual distances, from which a point is as good as at infinity."""
@@ -91,7 +92,7 @@ def point_without_rays_enough(system: NormalSystem, state: State, equations: Nor
     rays = slice(u.rays.start[row], u.rays.start[row + 1]) if row >= 0 else slice(0)
     if not (u.rays.inv_sigma[rays] > 0.0).any():
         return []
-    return [f"not determined: point {u.block.points[u.points[row]]}, whose rays are parallel or one"]
+    return [f"not determined: point {u.block.points[u.points[row]]}, which has only one ray, or rays that are parallel"]
 
 
 def _dead_columns(system: NormalSystem, equations: NormalEquations) -> list[str]:
@@ -116,5 +117,5 @@ def _named(
         members = [system.unknowns.name_of(int(k)) for k in np.argsort(-part)[:4] if part[k] > 0.3]
         sentences.append("not determined: " + ", ".join(members))
     if rest.shape[1] > SHOWN:
-        sentences.append(f"{rest.shape[1] - SHOWN} more directions are not determined")
+        sentences.append(f"{counted(rest.shape[1] - SHOWN, 'more combination')} of unknowns not determined")
     return sentences

@@ -47,7 +47,11 @@ def _times(observed: GnssIns, used: np.ndarray, strips: np.ndarray, wanted: str)
     """(g,) s from the mean of the strip; an error where a time is missing that is needed."""
     time = observed.time[used]
     if wanted and not np.isfinite(time).all():
-        raise InputError(f"{wanted} needs the time of every photograph", "add the column time", file="gnss_ins.csv")
+        raise InputError(
+            f"{wanted} needs the time of every photograph",
+            "add a column time, in seconds, or switch that parameter off in block.toml",
+            file="gnss_ins.csv",
+        )
     since = np.nan_to_num(time)
     for strip in set(strips.tolist()):
         since[strips == strip] -= since[strips == strip].mean()
@@ -140,7 +144,13 @@ def _attitudes(observed: GnssIns, unknowns: Unknowns, state: State) -> AttitudeO
     used, row = _used_rows(observed, unknowns, observed.angles)
     used_all = np.isfinite(observed.angles[used]).all(axis=1)
     if not used_all.all():
-        raise InputError("an attitude is given in part", "give omega, phi and kappa, or none", file="gnss_ins.csv")
+        row = int(np.argmin(used_all))
+        name = block.images.names[observed.image[used[row]]]
+        raise InputError(
+            f"only some of omega, phi, kappa are given for photograph '{name}'",
+            "give all three, or none of them",
+            file="gnss_ins.csv",
+        )
     if not len(used):
         return None
     image = observed.image[used]

@@ -17,7 +17,7 @@ from aerotri.adjustment.unknowns import (
     State,
     Unknowns,
 )
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, counted
 from aerotri.functional_model.atmosphere import corrected_image_points
 from aerotri.observations import Block
 from aerotri.observations.names import partnerless_in_words
@@ -69,7 +69,9 @@ def _held_in_words(unknowns: Unknowns) -> tuple[str, ...]:
     count, points = int(unknowns.control_held.sum()), int(unknowns.control_held.any(axis=1).sum())
     if not count:
         return ()
-    return (f"{count} coordinates of {points} control points have σ = 0 and are held at their given values",)
+    held = counted(count, "coordinate", "coordinates")
+    of_points = counted(points, "control point")
+    return (f"{held} of {of_points} with σ = 0 held at the given value",)
 
 
 def _freed_of_the_air(block: Block, start: StartValues) -> Block:
@@ -97,21 +99,23 @@ def check_settings(block: Block) -> None:
             raise InputError(f"{what} is not built into this version", remedy, file="block.toml")
     if s.adjustment.datum == "fixed" and not s.adjustment.datum_fixed:
         raise InputError(
-            'datum = "fixed" needs the elements to hold', 'give datum_fixed = ["photo:X0", …]', file="block.toml"
+            'datum = "fixed", but datum_fixed names no element',
+            'give datum_fixed = ["PHOTOGRAPH:X0", …]',
+            file="block.toml",
         )
     names = set(block.images.names.tolist())
     for image, element in s.adjustment.datum_fixed:
         if image not in names or element not in ORIENTATION_ELEMENTS:
             raise InputError(
-                f"datum_fixed names '{image}:{element}'",
-                f"name a photograph and one of {', '.join(ORIENTATION_ELEMENTS)}",
+                f"datum_fixed names '{image}:{element}', which is not an orientation element of the block",
+                f"write PHOTOGRAPH:ELEMENT, the element one of {', '.join(ORIENTATION_ELEMENTS)}",
                 file="block.toml",
             )
     unknown = set(s.adjustment.datum_points) - set(block.points.tolist())
     if unknown:
         raise InputError(
-            f"datum_points names '{min(unknown)}', which is no point of the block",
-            "correct the list",
+            f"datum_points names '{min(unknown)}', which is not a point of the block",
+            "name points of image_points or control in datum_points",
             file="block.toml",
         )
 

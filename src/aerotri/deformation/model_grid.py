@@ -253,11 +253,14 @@ def nodes_between(low: np.ndarray, high: np.ndarray, spacing: float | None) -> t
     if spacing is None:
         spacing = _round_length(float((high - low).max()) / DEFAULT_NODES)
     if not spacing > 0.0:
-        raise InputError(f"a spacing of {spacing:g} m is none", "give a number above 0")
+        raise InputError(f"a spacing of {spacing:g} m is not possible", "give metres greater than 0")
     first, last = np.floor(low / spacing), np.ceil(high / spacing)
     count = np.maximum(last - first, 1.0) + 1.0
     if count.prod() > MOST_NODES:
-        raise InputError(f"a spacing of {spacing:g} m gives {count.prod():.0f} nodes", "give a larger one")
+        raise InputError(
+            f"a spacing of {spacing:g} m gives {count.prod():.0f} nodes, more than {MOST_NODES}",
+            "give a larger spacing",
+        )
     x = (first[0] + np.arange(count[0])) * spacing
     y = (first[1] + np.arange(count[1])) * spacing
     return x, y[::-1]

@@ -67,8 +67,8 @@ def refuse_runaway(system: NormalSystem, solution: Solution) -> None:
         raise failure(
             system,
             "not converged",
-            f"the principal distance ran from {base[worst]:g} to {found[worst]:.3g} mm: the parameters chosen cannot "
-            "be told apart",
+            f"the adjustment changed the principal distance from {base[worst]:g} to {found[worst]:.3g} mm: the chosen "
+            "parameters cannot be told apart",
             solution.iterations,
         )
 

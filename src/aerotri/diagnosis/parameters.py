@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerotri.conventions import counted
 from aerotri.diagnosis.finding import Finding, critical_of_worst, doubt, graded, times
 from aerotri.observations import Camera
 from aerotri.results.adjusted_block import AdjustedBlock
@@ -110,6 +111,7 @@ def of_additional(adjusted: AdjustedBlock) -> list[Finding]:
         Finding("additional parameters", f"{rows.sum()} estimated, {significant} significant",
                 f"significant: t > {SIGNIFICANT_T} (95 %)", "whether they help, only check points tell", "good"),
         Finding("largest correlation of a parameter", f"{r.max():.2f}", f"at most {limit:g}",
-                f"{strong} parameters are beyond" if strong else "the parameters can be told apart",
+                f"{counted(strong, 'parameter is', 'parameters are')} beyond" if strong
+                else "the parameters can be told apart",
                 "note" if strong else "good"),
     ]  # fmt: skip

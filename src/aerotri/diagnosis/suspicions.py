@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from aerotri.conventions import counted
 from aerotri.diagnosis.finding import some
 from aerotri.diagnosis.inventory import Inventory
 from aerotri.observations import Block
@@ -53,19 +54,20 @@ def _lonely(block: Block, found: Inventory) -> list[str]:
     said, rays = [], block.image_points
     if found.without_image_points:
         names = some(np.array(found.without_image_points))
-        said.append(f"{len(found.without_image_points)} photographs have no image points ({names})")
+        said.append(f"{counted(len(found.without_image_points), 'photograph')} without image points ({names})")
     count = np.bincount(rays.image, minlength=len(block.images))
     few = np.flatnonzero((count > 0) & (count < FEW_POINTS))
     if len(few):
         said.append(
-            f"{len(few)} photographs have fewer than {FEW_POINTS} image points ({some(block.images.names[few])})"
+            f"{counted(len(few), 'photograph')} with fewer than {FEW_POINTS} image points "
+            f"({some(block.images.names[few])})"
         )
     of_point = np.bincount(rays.point, minlength=len(block.points))
     single = np.setdiff1d(np.flatnonzero(of_point == 1), block.control.point)
     if len(single):
         names = block.points[single].astype(str).tolist()
         others = block.points[of_point > 1].astype(str).tolist()
-        said.append(f"{len(single)} points are measured in one photograph only: {in_words(names, others)}")
+        said.append(f"{counted(len(single), 'point')} measured in one photograph only: {in_words(names, others)}")
     return said
 
 

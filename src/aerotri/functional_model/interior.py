@@ -181,7 +181,11 @@ def _check_marks(column_row: np.ndarray, calibrated: np.ndarray, kind: str, imag
             file="fiducials.csv",
         )
     if not (np.isfinite(column_row).all() and np.isfinite(calibrated).all()):
-        raise InputError(f"a fiducial mark{of_image} is not a number", "correct it", file="fiducials.csv")
+        raise InputError(
+            f"a coordinate of a fiducial mark{of_image} is not a number",
+            "measure the mark again, or remove its row",
+            file="fiducials.csv",
+        )
 
 
 def _undetermined(kind: str, image: str, why: str) -> InputError:

@@ -91,7 +91,8 @@ class ErrorFunction:
             if not change.max() < FARTHEST_MM:
                 break
         raise InputError(
-            f"the image errors of group '{self.group}' fold the image over", "adjust with fewer additional parameters"
+            f"the image errors of group '{self.group}' are so large that neighbouring image points change places",
+            "adjust with fewer additional parameters",
         )
 
     def _by_position(self, xy: np.ndarray) -> np.ndarray:
@@ -126,7 +127,8 @@ class ErrorFunction:
             if not largest < FARTHEST_MM:
                 break
         raise InputError(
-            f"the lens of group '{self.group}' folds the image over", "adjust with fewer additional parameters"
+            f"the lens distortion of group '{self.group}' is so large that neighbouring image points change places",
+            "adjust with fewer additional parameters",
         )
 
 

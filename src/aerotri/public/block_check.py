@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.conventions import FilePath
+from aerotri.conventions import FilePath, counted
 from aerotri.formats.results.json_text import number_or_none
 from aerotri.observations import Block
 
@@ -162,7 +162,7 @@ def _is_said(text: str, said: tuple[str, ...]) -> bool:
         ending in text and any(words in one for one in said)
         for ending, words in (
             ("measured in one photograph only, left out", "measured in one photograph only"),
-            ("without image points, left out", "photographs have no image points"),
+            ("without image points, left out", " without image points ("),
         )
     )
 
@@ -174,16 +174,16 @@ def _heading(found: BlockCheck) -> list[str]:
         f"{block.name}: {where}; image points in {found.image_unit}, angles in {UNITS[found.angle_unit]}, "
         f"{block.rotation}"
     ]
-    strips = f" in {len(i.strips)} strips" if i.strips else ""
-    lines.append(f"{i.photographs} photographs{strips}")
+    strips = f" in {counted(len(i.strips), 'strip')}" if i.strips else ""
+    lines.append(f"{counted(i.photographs, 'photograph')}{strips}")
     lines += [
-        f"  camera {one.name}: {one.photographs} photographs, {one.model}, {one.size_px[0]} × {one.size_px[1]} px of "
-        f"{one.pixel_um:g} µm, focal length {one.focal_length_mm:g} mm"
+        f"  camera {one.name}: {counted(one.photographs, 'photograph')}, {one.model}, {one.size_px[0]} × "
+        f"{one.size_px[1]} px of {one.pixel_um:g} µm, focal length {one.focal_length_mm:g} mm"
         for one in i.cameras
     ]
     lines.append(
-        f"start values: {i.with_start_position} positions, {i.with_start_angles} attitudes; observed: "
-        f"{i.with_gnss} GNSS positions, {i.with_ins} INS attitudes"
+        f"start values: {counted(i.with_start_position, 'position')}, {counted(i.with_start_angles, 'attitude')}; "
+        f"observed: {counted(i.with_gnss, 'GNSS position')}, {counted(i.with_ins, 'INS attitude')}"
     )
     return [*lines, *_image_points(i), _ground("control points", i.control), _ground("check points", i.check)]
 
@@ -196,7 +196,8 @@ def _image_points(i: Inventory) -> list[str]:
     few = [f"{rays}: {count}" for rays, count in p.rays_per_point.items() if rays < MOST_RAYS]
     by_rays = ", ".join([*few, *([f"{MOST_RAYS} and more: {many}"] if many else [])])
     return [
-        f"{p.count} image points of {p.points} points, {p.median:.0f} in a photograph ({p.fewest} at least), "
+        f"{counted(p.count, 'image point')} of {counted(p.points, 'point')}, {p.median:.0f} in a photograph "
+        f"({p.fewest} at least), "
         f"σ {p.sigma_um:.3g} µm",
         f"  photographs a point: {p.mean_rays:.1f} on average; points by their number of photographs {by_rays}",
     ]
@@ -209,7 +210,7 @@ def _ground(what: str, points: GroundPointCounts) -> str:
         f"{count} {kind} only" for count, kind in ((points.plan_only, "X, Y"), (points.height_only, "Z")) if count
     ]
     lonely = len(points.without_image_points)
-    return f"{points.count} {what}, " + ", ".join(
+    return f"{counted(points.count, what.removesuffix('s'))}, " + ", ".join(
         [*partly, f"{points.with_image_points} with image points" + (f", {lonely} without" if lonely else "")]
     )
 

@@ -223,7 +223,11 @@ def read_request(request: Request) -> ReadBlock:
         reading = read_project(request)
         return ReadBlock(reading.block, reading.points, tuple(reading.messages), request.source)
     if request != type(request)(request.source, request.name, stated=request.stated):
-        raise InputError("a result is whole", "leave out what would add to it", request.source)
+        raise InputError(
+            "is the result of an adjustment, to which nothing can be added",
+            "leave the other arguments out, or give the block that was adjusted",
+            request.source,
+        )
     return ReadBlock(read_block(Path(request.source) / "block"), None, (), request.source, is_result=True)
 
 

@@ -127,7 +127,9 @@ def compare_parameters(
 
     choices = [parse_parameters(spec) for spec in sets]
     if AUTO in choices:
-        raise InputError("auto is no set to compare with others", "without sets all that auto compares are shown")
+        raise InputError(
+            "'auto' cannot be one of the sets", "leave the sets out: then all that 'auto' chooses from are compared"
+        )
     chosen = with_settings(block, robust=robust)
     with stage_report(progress) as report:
         found = pipeline.compare_parameters(chosen, choices or candidate_sets(chosen), folds, geoid, report.set_of)
@@ -229,7 +231,10 @@ def crosscheck(source: Adjustment | Block | FilePath, progress: ProgressLike = N
         found = _adjusted(source, report.iteration)
         if found.status != "converged":
             message = found.adjusted.outcome.message
-            raise InputError(f"{found.status}: {message}; there is no solution to check", "mend the block")
+            raise InputError(
+                f"{found.status}: {message}; there is no solution to check",
+                "find the cause first: `aerotri adjust` of this block names it",
+            )
         local = as_adjusted(found.record.local, found.record.system.unknowns.block)
         return Crosscheck(check(local, pipeline.adjust, lambda text: report.stage(text, None)), local)
 

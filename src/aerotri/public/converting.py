@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, counted
 from aerotri.observations import Block
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.blocks import ReadBlock, read, text_of_path
@@ -158,7 +158,11 @@ def _write_block(
 def _about_held(block: Block) -> tuple[str, ...]:
     """A sentence about control without error."""
     count = int((block.control.sigma[~block.control.is_check] == 0.0).sum())
-    return (f"{count} coordinates of control points have σ = 0: an adjustment holds them",) if count else ()
+    return (
+        (f"{counted(count, 'coordinate')} of control points with σ = 0: an adjustment holds them fixed",)
+        if count
+        else ()
+    )
 
 
 def _at_start_values(
@@ -173,7 +177,7 @@ def _at_start_values(
     used = np.ones(len(block.image_points), bool)
     oriented = OrientedBlock(block, block.images.centre, rotation, known, used)
     if oriented.oriented.any():
-        return oriented, ("orientations are those that the files gave, not adjusted",)
+        return oriented, ("the orientations are those of the files, not adjusted",)
     return (oriented, ()) if to == "patb" else (None, ())
 
 
@@ -197,6 +201,8 @@ def _adjusted(reading: ReadBlock, geoid: FilePath | None, report: StageReport) -
         done = adjust_keeping_system(reading.block, report.iteration, geoid=geoid)
     except AdjustmentFailedError as failure:
         raise InputError(
-            f"the block has to be adjusted first, and that failed: {failure}", "mend the block", source
+            f"the block has to be adjusted first, and that failed: {failure}",
+            "find the cause first: `aerotri adjust` of this block names it",
+            source,
         ) from None
     return oriented_from_adjusted(done.result)

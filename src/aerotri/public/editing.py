@@ -68,18 +68,21 @@ def _row(block: Block, stated: str | tuple[str, str], action: str) -> tuple[int,
     point = _index(block.points, point_name, "point")
     if not image_name:
         if action != "off" and point not in block.control.point:
-            raise InputError(f"'{point_name}' is no control or check point", "give a point that has coordinates")
+            raise InputError(f"'{point_name}' is not a control or check point", "name a point of control.csv")
         return EVERYWHERE, point, action
     image, rays = _index(block.images.names, image_name, "photograph"), block.image_points
     if not np.any((rays.image == image) & (rays.point == point)):
-        raise InputError(f"'{point_name}' is not measured in '{image_name}'", "correct the names")
+        raise InputError(f"'{point_name}' is not measured in '{image_name}'", "write both names as in image_points")
     return image, point, action
 
 
 def _index(names: np.ndarray, name: str, what: str) -> int:
     found = np.flatnonzero(names == name)
     if not len(found):
-        raise InputError(f"there is no {what} '{name}'", "correct the name")
+        raise InputError(
+            f"there is no {what} '{name}'",
+            f"write the name as in {'images.csv' if what == 'photograph' else 'image_points or control'}",
+        )
     return int(found[0])
 
 

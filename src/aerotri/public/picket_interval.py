@@ -160,7 +160,10 @@ def stated_gsd(
     if (scan_um is None) != (scale is None):
         raise InputError("--scan-um and --scale belong together", "give both, or --gsd")
     if both + (gsd is not None) + has_pilot != 1:
-        raise InputError("the photographs are not stated once", "give --scan-um and --scale, or --gsd, or --pilot")
+        raise InputError(
+            "the size of a pixel on the ground has to be given in exactly one way",
+            "give --scan-um and --scale, or --gsd, or --pilot",
+        )
     if has_pilot and not has_photographs:
         raise InputError("a pilot needs photographs", "give --photographs FOLDER")
     return 1e-6 * scan_um * scale if scan_um is not None and scale is not None else gsd

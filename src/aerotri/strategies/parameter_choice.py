@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, counted
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.observations import Block
 from aerotri.results.parameter_comparison import Choice, ParameterComparison, SetOutcome
@@ -73,7 +73,7 @@ def choose(comparison: ParameterComparison) -> Chosen:
     usable = [o for o in there if min(o.control.count) >= FEWEST_POINTS]
     if not usable:
         best = min(there, key=lambda o: o.bic)
-        why = f"fewer than {FEWEST_POINTS} control points can be predicted without themselves: by BIC alone"
+        why = f"fewer than {FEWEST_POINTS} control points can be predicted from the others: chosen by BIC alone"
         return Chosen(best.name, best.choice, f"additional parameters chosen: {best.name}; {why}")
     best = min(usable, key=lambda o: measure(o.control.difference))
     gains = {o.name: gain(o, best, (o.control.difference, best.control.difference)) for o in usable if o is not best}
@@ -85,15 +85,15 @@ def choose(comparison: ParameterComparison) -> Chosen:
 def _reason(found: SetOutcome, best: SetOutcome, alike: Sequence[SetOutcome], all_sets: Sequence[SetOutcome]) -> str:
     rms = ", ".join(f"{axis} {value:.3f}" for axis, value in zip("XYZ", found.control.rms, strict=True))
     text = (
-        f"additional parameters chosen: {found.name}; control points are predicted without themselves to {rms} m "
-        f"(RMS), {len(all_sets)} sets compared"
+        f"additional parameters chosen: {found.name}; control points, each left out in turn, are predicted to {rms} m "
+        f"(RMS); {counted(len(all_sets), 'set')} compared"
     )
     if len(alike) == 1:
         return text + "; every other set predicts them worse, by more than its standard error"
     others = ", ".join(o.name for o in alike if o is not found)
     if found is not best:
-        text += f"; {best.name} does so best"
-    return text + f"; the control cannot tell it from {others}, of these the residuals speak most for it (BIC)"
+        text += f"; {best.name} predicts them best"
+    return text + f"; the difference to {others} is within the uncertainty, and of these it has the best BIC"
 
 
 def measure(difference: np.ndarray) -> float:

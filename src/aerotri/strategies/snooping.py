@@ -41,6 +41,7 @@ from aerotri.adjustment.robust import LIMITS, normalised_lengths
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.adjustment.unknowns import State
+from aerotri.conventions import counted
 from aerotri.results.adjusted_block import Blunder
 from aerotri.statistics.summarise import count_observations
 from aerotri.strategies.removal import Found, blunders_of, with_tests_of, without_removed
@@ -212,7 +213,7 @@ def _in_words(prepared: Prepared, stand: _Stand, blunders: tuple[Blunder, ...]) 
     rays, said = sum(b.action == "removed" for b in blunders), []
     if rays:
         count = len(prepared.system.unknowns.rays.image)
-        said.append(f"data snooping removed {rays} of {count} rays as gross errors")
+        said.append(f"data snooping removed {rays} of {counted(count, 'ray')} as gross errors")
     for blunder in blunders:
         if blunder.action == "control removed":
             said.append(
@@ -230,7 +231,13 @@ def _in_words(prepared: Prepared, stand: _Stand, blunders: tuple[Blunder, ...]) 
     accused = u.points[stand.switches.control & (stand.tests.control.largest > limits.datum)]
     if len(accused):
         names = ", ".join(str(name) for name in u.block.points[accused])
-        said.append(f"control points {names} contradict the block, and too little control tells which is wrong")
+        said.append(
+            f"control contradicts the block at {names}, but there is too little control to tell which point is wrong: "
+            "compare their coordinates and pointings with the field book"
+        )
     if limits.spread > WORTH_SAYING:
-        said.append(f"the residuals are {limits.spread:.2f} times what the a-priori σ say: the tests allow for that")
+        said.append(
+            f"the residuals are {limits.spread:.2f} times as large as the a-priori σ: the limits of the tests were "
+            "raised by that factor"
+        )
     return said

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.ndimage import map_coordinates
 
-from aerotri.conventions import SIGMA_PER_MAD, InputError
+from aerotri.conventions import SIGMA_PER_MAD, InputError, counted
 from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.rasters.held import HeldRaster
 from aerotri.terrain.settings import ALIGNMENT, INTERPOLATION
@@ -112,7 +112,9 @@ class PointHeights:
         xyz = np.unique(xyz[np.isfinite(xyz).all(axis=1)], axis=0)
         xyz = xyz[np.unique(xyz[:, :2], axis=0, return_index=True)[1]]
         if len(xyz) < FEWEST:
-            raise InputError(f"{len(xyz)} points make no surface", "give more")
+            raise InputError(
+                f"{counted(len(xyz), 'point')} do not make a surface", "give at least three that do not lie on a line"
+            )
         area = float(np.prod(np.ptp(xyz[:, :2], axis=0)))
         return cls(xyz, triangulate(xyz, None, LARGEST_SIDE * np.sqrt(area / len(xyz))))
 

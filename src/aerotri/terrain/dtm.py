@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.adjustment.track import along_strip
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, counted
 from aerotri.deformation.block_models import strip_pairs
 from aerotri.deformation.model_geometry import geometry_of
 from aerotri.deformation.stereo_model import pair_model
@@ -134,7 +134,8 @@ def make_terrain_model(calibration: Adjustment, plan: TerrainPlan, report: Repor
     pickets = measure(photographs, known, options, plan.area, models, lambda share: tell("matching", share))
     if pickets.accepted.sum() < 3:
         raise InputError(
-            f"{int(pickets.accepted.sum())} pickets were accepted", "lower --threshold, or look at the photographs"
+            f"only {counted(int(pickets.accepted.sum()), 'ground point')} (pickets) could be measured and accepted",
+            "lower --threshold; check that the photographs overlap, are sharp and belong to this orientation",
         )
     pickets = with_error_pickets(pickets, gsd / base_ratio(photographs, pickets))
     tell("statistics", 0.97)

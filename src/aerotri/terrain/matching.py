@@ -69,7 +69,10 @@ def measure(
     gsd = float(np.median(photographs.gsd))
     nodes = grid_nodes(area, options.interval)
     if not len(nodes):
-        raise InputError(f"no picket lies in the area at an interval of {options.interval:g} m", "choose a smaller one")
+        raise InputError(
+            f"no ground point (picket) lies in the area at an interval of {options.interval:g} m",
+            "choose a smaller interval",
+        )
     levels = photographs.store.levels
     prior = first_prior(known, area, gsd, levels)
     work = [4.0**-k for k in range(levels)]

@@ -82,9 +82,11 @@ class TerrainSettings:
         if self.subset not in SUBSETS:
             raise InputError(f"there is no subset '{self.subset}'", f"choose one of {', '.join(SUBSETS)}")
         if self.window % 2 == 0 or self.window < 5:
-            raise InputError(f"a window of {self.window} has no middle", "give an odd number from 5 on")
+            raise InputError(f"a window of {self.window} pixels is not possible", "give an odd number from 5 on")
         if self.interval is not None and not self.interval > 0.0:
-            raise InputError(f"an interval of {self.interval:g} m is none", "give metres, or leave it out")
+            raise InputError(
+                f"an interval of {self.interval:g} m is not possible", "give metres greater than 0, or leave it out"
+            )
         if self.area is not None and not (self.area[0] < self.area[2] and self.area[1] < self.area[3]):
             raise InputError("the area is empty", "give X and Y of its lower left, then of its upper right corner")
         for name, value, low, high in (

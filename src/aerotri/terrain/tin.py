@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import Delaunay, KDTree
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, counted
 
 MOST_ROUNDS = 60
 """Rounds in which pieces of breaklines are halved; chosen [C]: breaklines that cross or touch at narrow angles would
@@ -86,7 +86,7 @@ def triangulate(
     InputError
     """
     if len(xyz) < 3:
-        raise InputError(f"{len(xyz)} points make no surface", "measure more pickets")
+        raise InputError(f"{counted(len(xyz), 'point')} do not make a surface", "measure more ground points (pickets)")
     source = order_in_plan(xyz)
     own = np.zeros(len(xyz)) if variance is None else variance[source]
     shared = np.zeros(len(xyz)) if common is None else common[source]
@@ -129,7 +129,9 @@ def _delaunay(plan: np.ndarray) -> Delaunay:
     try:
         return Delaunay(plan)
     except QhullError as error:
-        raise InputError("the points lie on a line and make no surface", "measure pickets in an area") from error
+        raise InputError(
+            "the points lie on a line and do not make a surface", "measure ground points (pickets) in an area"
+        ) from error
 
 
 def _plan_distance(a: np.ndarray, b: np.ndarray) -> float:
@@ -199,4 +201,4 @@ def _conforming(plan: np.ndarray, points: np.ndarray, segments: list[tuple[int, 
             halves += [(a, len(put)), (len(put), b)]
             put.append(0.5 * (put[a] + put[b]))
         pieces = np.vstack([pieces[~missing], np.array(halves)])
-    raise InputError("breaklines run so close together that they cannot be kept apart", "thin them out")
+    raise InputError("breaklines run so close together that they cannot be kept apart", "leave out some of them")

@@ -134,8 +134,8 @@ def map_incrementally(
                 largest = max(models.values(), key=lambda model: model.num_reg_images())
                 return _mapped(block, largest)
     raise InputError(
-        "no two photographs make a beginning for the orientation",
-        "check that they overlap, and the focal length and the size of pixels",
+        "no pair of photographs is good enough to start the orientation",
+        "check that the photographs overlap, and the focal length and the size of a pixel",
     )
 
 

@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from aerotri.conventions import SIGMA_PER_MAD, InputError
+from aerotri.conventions import SIGMA_PER_MAD, InputError, counted
 
 COLLINEAR = 0.03
 """Width over length of a set of points below which it is a line."""
@@ -63,7 +63,8 @@ def place(
     """
     if len(source) < 2 or (looking is None and len(source) < 3):
         raise InputError(
-            f"{len(source)} points place no block", "give three control points, or positions of the photographs"
+            f"{counted(len(source), 'known point is', 'known points are')} too few to place the block",
+            "give three control points, or positions of the photographs",
         )
     # triples are drawn by place: the same points in another order, or another frame, have to give the same
     order = np.lexsort(source.T)

@@ -128,9 +128,9 @@ def _plausible(stated: tuple[Camera, ...], found: tuple[Camera, ...]) -> tuple[t
         ratio = other.focal_length_mm / camera.focal_length_mm
         if abs(ratio - 1.0) > PLAUSIBLE:
             said.append(
-                f"the photographs make the principal distance of {camera.name} {other.focal_length_mm:.3g} mm, "
-                f"{100 * (ratio - 1):+.0f} % off what is stated: it is held at {camera.focal_length_mm:.4g} mm, "
-                "and heights above the ground hang on that; control points determine it"
+                f"the photographs alone give a principal distance of {other.focal_length_mm:.3g} mm for {camera.name}, "
+                f"{100 * (ratio - 1):+.0f} % off the stated one: it is held at {camera.focal_length_mm:.4g} mm. "
+                "Flying heights depend on it; control points determine it"
             )
             camera = _with_held_distance(camera)
         cameras.append(camera)
@@ -191,10 +191,11 @@ def _unplaced(block: Block, mapped: Mapped, looking: np.ndarray) -> Oriented:
     """Nothing says where the block is: its own frame, turned so that photographs look down on average."""
     if len(block.control):
         raise InputError(
-            "fewer than three control points are marked, and photographs have no positions", "mark more of them"
+            "fewer than three control points are marked, and the photographs have no positions",
+            "mark three or more control points, each in two photographs or more",
         )
     turn = _rotation_between(looking, np.array([0.0, 0.0, -1.0]))
-    said = "nothing says where the photographs were taken: scale, place and north of the block are arbitrary"
+    said = "neither control points nor positions are given: place, scale and north of the block are arbitrary"
     return Oriented(mapped.centre @ turn.T, turn @ mapped.rotation, mapped.cameras, None, (said,))
 
 

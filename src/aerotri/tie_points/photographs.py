@@ -126,7 +126,8 @@ def _stated(path: Path, tag: PhotographTags, cameras: tuple[Camera, ...]) -> Cam
     size = "{} × {}".format(*tag.size_px)
     known = ", ".join("{} {} × {}".format(camera.name, *camera.size_px) for camera in cameras)
     what = "no camera" if not fitting else f"{len(fitting)} cameras"
-    raise InputError(f"has {size} pixels, {what} of that size stated ({known})", "state one camera of that size", path)
+    message = f"has {size} pixels, and {what} of that size {'is' if len(fitting) < 2 else 'are'} described ({known})"
+    raise InputError(message, "describe one camera of that size in --camera FILE", path)
 
 
 def _from_tags(path: Path, tag: PhotographTags, stated: StatedCamera) -> Camera:

@@ -164,16 +164,16 @@ def _base_variance(base: Base, boundary: Boundary, surface: Surface, options: Si
 def _notes(part: Part, base_part: Part | None, base: Base, ground: float, options: SigmaOptions) -> tuple[str, ...]:
     notes = []
     if part.unseen > 0.0:
-        notes.append(f"{part.unseen:.4g} m² are seen by too few photographs of the block and are in no part of σ")
+        notes.append(f"{part.unseen:.4g} m² are seen by too few photographs of the block and are not included in σ")
     if part.between is None:
         notes.append("too few heights to tell how rough the ground is: interpolation is left out")
     if base_part is None and not isinstance(base, PlaneBase | SplineBase) and options.base_sigma <= 0.0:
-        notes.append("the base is taken for free of error: give --base-adjustment or --base-sigma")
+        notes.append("the base counts as free of error: give its σ with --base-adjustment or --base-sigma")
     if isinstance(base, SplineBase):
         judged = "the base is judged by how rough the ground outside the boundary is, carried inwards"
         notes.append(judged if ground > 0.0 else "too little ground outside the boundary to judge the base by")
     if isinstance(base, PlaneBase) and options.base_sigma <= 0.0:
-        notes.append(f"the base ({base.name}) is taken for free of error: --base-sigma states one")
+        notes.append(f"the base ({base.name}) counts as free of error: give its σ with --base-sigma")
     if options.boundary_sigma <= 0.0:
-        notes.append("the boundary is taken for free of error: --boundary-sigma states one")
+        notes.append("the boundary counts as free of error: give its σ with --boundary-sigma")
     return tuple(notes)

@@ -78,7 +78,10 @@ def pickets_of_names(block: Block, xyz: np.ndarray, names: list[list[str]], sigm
     row = {str(name): k for k, name in enumerate(block.images.names)}
     unknown = {name for own in names for name in own} - row.keys()
     if unknown:
-        raise InputError(f"pickets name the photograph '{min(unknown)}', which is not in the block", "correct them")
+        raise InputError(
+            f"the ground points (pickets) were measured in photograph '{min(unknown)}', which is not in the block",
+            "give the adjustment with which they were measured",
+        )
     start = np.concatenate([[0], np.cumsum([len(own) for own in names])]).astype(np.int64)
     image = np.array([row[name] for own in names for name in own], dtype=np.int64)
     sigma = np.repeat(np.broadcast_to(np.asarray(sigma_mm, dtype=float), (len(xyz),)), np.diff(start))

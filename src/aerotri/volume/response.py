@@ -176,7 +176,10 @@ def _summed(
     image = row_of[pickets.image]
     if (image < 0).any():
         name = u.block.images.names[pickets.image[int(np.argmax(image < 0))]]
-        raise InputError(f"a picket was measured in '{name}', which was not adjusted", "leave it out")
+        raise InputError(
+            f"a ground point (picket) was measured in photograph '{name}', which was not adjusted",
+            "measure again with this adjustment: `aerotri dtm`",
+        )
     points, along = _in_frame(calibration, pickets.xyz, np.asarray(gradient, dtype=float))
     bounds = chunk_bounds(np.diff(pickets.start).astype(float))
     arrays = _kernels.PicketArrays(pickets.start, image, 1.0 / pickets.sigma_mm, points, along, pickets.noise_share)
@@ -192,7 +195,9 @@ def _summed(
 
     worst = max(run_chunks(chunk, len(bounds)), default=-1)
     if worst >= 0:
-        raise InputError(f"the rays of picket {worst + 1} do not determine it", "leave it out")
+        raise InputError(
+            f"the rays of ground point (picket) {worst + 1} do not determine it", "remove its row from pickets.parquet"
+        )
     by_eo, by_interior, deposits = (np.sum([out[part] for out in outs], axis=0) for part in range(3))
     return by_eo, by_interior, deposits, float(sum(out[3][0] for out in outs))
 

@@ -96,7 +96,9 @@ def test_everything_from_its_own_file(files):
 def test_image_points_alone(files):
     reading = read_project(request(files))
     assert reading.block.settings.adjustment.datum == "minimal"
-    assert reading.messages == ("the standard deviation of image points is a pixel: state it with --image-sigma-px",)
+    assert reading.messages == (
+        "the standard deviation of image points is assumed as 1 pixel: state yours with --image-sigma-px",
+    )
     np.testing.assert_array_equal(reading.block.image_points.sigma, 0.005)
     assert np.isnan(reading.block.images.centre).all()
 
@@ -115,7 +117,7 @@ def test_photographs_of_other_folders_and_endings(files):
     assert reading.block.gnss_ins is not None
     assert reading.block.gnss_ins.image.tolist() == [0, 1, 2, 3]
     assert "other.csv: 4 photographs are named with another folder or file ending" in reading.messages
-    assert "other.csv: 1 photographs are not in the block and were left out: 'more.jpg'" in reading.messages
+    assert "other.csv: 1 photograph is not in the block and left out: 'more.jpg'" in reading.messages
     (files / "none.csv").write_text("x.jpg,1,2,3,.1,.1\n")
     with pytest.raises(
         InputError, match=r"none\.csv: names no photograph of the block: 'x\.jpg' is not among 'p0\.jpg'"
@@ -149,7 +151,7 @@ def test_points_never_measured_are_kept_and_said(files):
     (files / "more.csv").write_text((files / "gcp.csv").read_text() + "far,717100,1608050,100,.1,.1\n")
     reading = read_project(request(files, control=str(files / "more.csv")))
     assert reading.block.points[reading.block.control.point[-1]] == "far"
-    assert "more.csv: 1 points are not measured: 'far'" in reading.messages
+    assert "more.csv: 1 point is not measured: 'far'" in reading.messages
 
 
 def test_axes(files):
@@ -226,7 +228,7 @@ def test_what_is_added_to_a_whole_block(files):
 
     block = read_block(files / "block")
     write_block(replace(block, gnss_ins=None, control=type(block.control).empty()), files / "bare")
-    with pytest.raises(InputError, match="has its cameras"):
+    with pytest.raises(InputError, match="has cameras of its own"):
         read_project(request(files, "bare"))
     reading = read_project(
         request(files, "bare", camera=CameraSpec(), positions=str(files / "geo.csv"), control=str(files / "gcp.csv"))
@@ -260,7 +262,10 @@ def test_cameras_of_a_file(files):
 
 WRONG_CAMERAS = {
     "none": (CameraSpec(), "the camera is not known"),
-    "no pixel": (CameraSpec(size_px=(8000, 6000)), "the size of the image and of a pixel go together"),
+    "no pixel": (
+        CameraSpec(size_px=(8000, 6000)),
+        "the camera needs both the size of the photograph and the size of a pixel",
+    ),
     "no focal": (replace(SPEC, focal_length_mm=None), "the principal distance is not known"),
     "too small": (replace(SPEC, size_px=(800, 600)), "lies outside the format of camera 'P1'"),
 }
@@ -279,9 +284,13 @@ def test_camera_files_that_will_not_do(files):
             CAMERAS_TOML.replace("pixel_um", "pixel_um = 5.0\npixel", 1),
             "a.toml:4: unknown key 'camera.P1.pixel'",
         ),
-        ("b.toml", CAMERAS_TOML.replace("camera.cam", "camera.other"), "camera 'cam' is not among P1, other"),
+        (
+            "b.toml",
+            CAMERAS_TOML.replace("camera.cam", "camera.other"),
+            "camera 'cam' is not described; there are P1, other",
+        ),
         ("c.toml", "name = 1\n", "c.toml"),
-        ("d.txt", "nothing", "d.txt: is no camera"),
+        ("d.txt", "nothing", "d.txt: does not describe a camera"),
     ):
         (files / name).write_text(text)
         with pytest.raises(InputError, match=re.escape(says)):
@@ -294,30 +303,30 @@ def test_format_that_the_name_of_the_camera_tells(files):
     named = (files / "points.txt").read_text().replace(" cam\n", " H_40.0_30.0\n")
     (files / "named.txt").write_text(named)
     assert read_project(request(files, "named.txt")).block.cameras[0].name == "P1"
-    with pytest.raises(InputError, match=re.escape("tells a format of 40 × 30 mm, the options 32 × 24 mm")):
+    with pytest.raises(InputError, match=re.escape("has a format of 40 × 30 mm, the options give 32 × 24 mm")):
         read_project(request(files, "named.txt", camera=replace(SPEC, pixel_um=4.0)))
 
 
 STRANGE = {
     "no file": ({"source": "none.txt"}, "none.txt: there is no such file"),
     "kind": ({"source": "gcp.csv"}, "gcp.csv: is of no known format"),
-    "control kind": ({"control": "points.txt"}, "points.txt: is of no known kind of control points"),
+    "control kind": ({"control": "points.txt"}, "points.txt: is not in a known format of control points"),
     "control missing": ({"control": "none.csv"}, "none.csv: there is no such file"),
     "folder": ({"control": "patb"}, "patb: is"),
     "check": ({"control": "gcp.csv", "check": ("t1",)}, "--check t1: there is no such control point"),
-    "shift": ({"gnss_shift": "on"}, "--gnss-shift on"),
-    "axes": ({"axes": "zy"}, "--axes zy"),
+    "shift": ({"gnss_shift": "on"}, "--gnss-shift 'on' is not possible"),
+    "axes": ({"axes": "zy"}, "--axes 'zy' is not possible"),
     "two sigmas": ({"image_sigma_um": 1.0, "image_sigma_px": 1.0}, "exclude each other"),
-    "offset": ({"orientation": "opk.txt", "offset": "shift.xyz"}, "is no orientation of Pix4D"),
-    "prefix": ({"stated": Statements(control_prefix="t")}, "--control-prefix without control points"),
-    "patb": ({"stated": Statements(patb_rotation="up")}, "--patb-rotation up"),
+    "offset": ({"orientation": "opk.txt", "offset": "shift.xyz"}, "is not an orientation of Pix4D"),
+    "prefix": ({"stated": Statements(control_prefix="t")}, "--control-prefix is given, but no control points"),
+    "patb": ({"stated": Statements(patb_rotation="up")}, "--patb-rotation 'up' is not possible"),
     "crs": ({"stated": Statements(crs="UTM 47")}, "crs 'UTM 47' is not understood"),
     "crs unknown": ({"stated": Statements(crs="EPSG:99999999")}, "is not known to PROJ"),
     "heights": (
-        {"control": "gcp.csv", "stated": Statements(control_heights="geoid")}, "--control-heights geoid",
+        {"control": "gcp.csv", "stated": Statements(control_heights="geoid")}, "--control-heights 'geoid' is not possible",
     ),
     "no other heights": (
-        {"control": "gcp.csv", "stated": Statements(control_heights="ellipsoidal")}, "has no others",
+        {"control": "gcp.csv", "stated": Statements(control_heights="ellipsoidal")}, "is not needed",
     ),
     "alteration": (
         {"orientation": "opk.txt", "stated": Statements(linear_alteration_m=0.0)}, "--linear-alteration needs",

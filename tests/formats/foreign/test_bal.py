@@ -102,8 +102,8 @@ def test_what_bal_cannot_hold_is_said(small, tmp_path):
     )
     lost = write_bal(oriented_block(replace(block, control=control), points), tmp_path / "out.txt")
     assert lost == (
-        "could not be carried over: 1 control and check points",
-        "could not be carried over: 1 image points that were not used, or whose image or point is unknown",
+        "could not be carried over: 1 control or check point",
+        "could not be carried over: 1 image point not used in the adjustment, or of a photograph or point not adjusted",
     )
     again, same = read_bal(tmp_path / "out.txt")
     assert (len(again.image_points), len(same)) == (3, 2)
@@ -137,11 +137,11 @@ WRONG = {
     "cut off": (SMALL[:-10], None, "its first line announces 46"),
     "not a number": (SMALL.replace("1.5 2.5", "1.5 2,5"), 4, "'2,5' is not a finite number"),
     "nan": (SMALL.replace("\n450\n", "\nnan\n"), 21, "'nan' is not a finite number"),
-    "camera": (SMALL.replace("\n1 2 -7", "\n2 2 -7"), 5, "names a camera or point that there is not"),
-    "point": (SMALL.replace("\n1 2 -7", "\n1 3 -7"), 5, "names a camera or point that there is not"),
+    "camera": (SMALL.replace("\n1 2 -7", "\n2 2 -7"), 5, "names a camera or point that the file does not have"),
+    "point": (SMALL.replace("\n1 2 -7", "\n1 3 -7"), 5, "names a camera or point that the file does not have"),
     "far": (SMALL.replace("-7 8e1", "-7 8e14"), 5, "outside of any image"),
     "twice": (SMALL.replace("\n1 2 -7", "\n1 0 -7"), 5, "observed twice"),
-    "focal length": (SMALL.replace("\n450\n", "\n-450\n"), 21, "focal length is not positive"),
+    "focal length": (SMALL.replace("\n450\n", "\n-450\n"), 21, "focal length is not greater than 0"),
 }
 
 

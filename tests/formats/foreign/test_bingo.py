@@ -70,12 +70,12 @@ def test_small(tmp_path):
 def test_what_is_lost_is_said(tmp_path):
     block = oriented_sample().block
     assert write_bingo(block, tmp_path / "out.txt") == (
-        "could not be carried over: 1 camera(s) but for the name",
+        "could not be carried over: 1 camera, except the name",
         "could not be carried over: 4 orientations",
         "could not be carried over: 3 control points",
-        "could not be carried over: 1 check points",
-        "could not be carried over: the standard deviations of 4 control and check points",
-        "could not be carried over: 4 observed projection centres or attitudes",
+        "could not be carried over: 1 check point",
+        "could not be carried over: the standard deviations of 4 ground points (control and check)",
+        "could not be carried over: 4 observations of GNSS and INS",
     )
     again = read_bingo(tmp_path / "out.txt")
     np.testing.assert_allclose(again.xy, block.image_points.xy, rtol=0, atol=5.1e-7)
@@ -98,7 +98,7 @@ WRONG = {
     "far": (SMALL.replace("-2.25", "2e9"), 3, "outside of any image"),
     "photograph twice": (SMALL.replace("b.jpg", "a.jpg"), 6, "photograph 'a.jpg' is there twice, first in line 1"),
     "point twice": (SMALL.replace("GCP_1", "1"), 4, "twice in photograph 'a.jpg', first in line 3"),
-    "control character": (SMALL.replace("GCP_1", "G\x00"), 4, "is no name of a point"),
+    "control character": (SMALL.replace("GCP_1", "G\x00"), 4, "cannot be the name of a point"),
     "nothing measured": ("a.jpg cam\n-99\n", 1, "holds no image points"),
     "not utf-8": (SMALL.replace("GCP", "GÖP").encode("latin-1"), 4, "is not UTF-8"),
 }

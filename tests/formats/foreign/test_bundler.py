@@ -67,7 +67,7 @@ def test_conventions(folder):
     np.testing.assert_allclose(block.image_points.xy[0], [0.0201, 0.0402])
     assert reading.points is not None
     np.testing.assert_array_equal(reading.points, [[1, 2, 0], [0.5, 0, 1]])
-    assert reading.messages == ("1 photographs that Bundler did not orient were left out",)
+    assert reading.messages == ("left out: 1 photograph that Bundler did not orient",)
     # p = (0.1, 0.2), p' = 100·(1 + 0.1·0.05)·p
     np.testing.assert_allclose(prediction(block, reading.points)[0], [0.0201, 0.0402], rtol=1e-12)
     assert is_bundler(folder())
@@ -84,7 +84,7 @@ def test_photographs_without_a_list_have_numbers(folder):
 def test_a_track_with_two_points_of_a_photograph(folder):
     reading = read_bundler(folder(BUNDLE.replace("2 0 5 10.05 20.1 2 7 1 2", "3 0 5 10.05 20.1 2 7 1 2 0 9 3 3")))
     assert len(reading.block.image_points) == 4
-    assert "1 repeated measurements of a point in the same photograph were left out" in reading.messages
+    assert "left out: 1 repeated measurement of a point in the same photograph" in reading.messages
 
 
 def test_there_and_back(tmp_path):
@@ -131,16 +131,16 @@ WRONG = {
     "too long": (BUNDLE + "1 2 3\n", 24, "comes after the last point"),
     "word": (BUNDLE.replace("10.05", "10,05"), 20, "'10,05' is not a number"),
     "nan": (BUNDLE.replace("10.05", "nan"), 20, "'nan' is not a finite number"),
-    "camera": (BUNDLE.replace("2 7 1 2", "3 7 1 2"), 20, "'3' is no camera of the file"),
+    "camera": (BUNDLE.replace("2 7 1 2", "3 7 1 2"), 20, "'3' is not the number of a camera of the file"),
     "views": (BUNDLE.replace("2 0 5 10.05", "2.5 0 5 10.05"), 20, "'2.5' is no count"),
     "far": (BUNDLE.replace("20.1", "2e200"), 20, "is not possible"),
-    "rotation": (BUNDLE.replace("1 0 0\n0 1 0", "1 0 0\n0 2 0", 1), 4, "is no rotation"),
+    "rotation": (BUNDLE.replace("1 0 0\n0 1 0", "1 0 0\n0 2 0", 1), 4, "is not a rotation"),
     "rotation overflow": (BUNDLE.replace("1 0 0\n0 1 0", "1 0 0\n0 1e200 0", 1), 5, "is not possible"),
-    "focal length": (BUNDLE.replace("100 0.1", "-100 0.1", 1), 3, "is no principal distance"),
-    "no rays": (
+    "focal length": (BUNDLE.replace("100 0.1", "-100 0.1", 1), 3, "is not a possible principal distance"),
+    "no image points of oriented": (
         BUNDLE.replace("2 0 5 10.05 20.1 2 7 1 2", "0").replace("2 0 6 5.5 0 2 8 -5.5 0", "0"),
         None,
-        "no rays",
+        "no image points of oriented",
     ),
     "not utf-8": (BUNDLE.encode() + b"\xff", 24, "is not a number"),
 }

@@ -177,8 +177,8 @@ def test_what_colmap_cannot_hold_is_said(tmp_path):
     oriented = replace(oriented_block(replace(block, control=control), points), used=used)
     lost = write_colmap(oriented, tmp_path / "model")
     text = "\n".join(lost)
-    assert "1 control and check points" in text
-    assert "1 images without orientation" in text
+    assert "1 control or check point" in text
+    assert "1 photograph without orientation" in text
     assert "2 points with one ray" in text
     again, same = read_colmap(tmp_path / "model")
     assert len(again.images) == 2
@@ -208,7 +208,7 @@ def test_a_point_twice_in_an_image_is_taken_once(tmp_path):
             track.add_element(1, place)
         model.add_point3D_with_id(number, pycolmap.Point3D(xyz=np.ones(3), track=track))
     model.write_text(tmp_path)
-    with pytest.warns(UserWarning, match="1 repeated measurements"):
+    with pytest.warns(UserWarning, match="1 repeated measurement"):
         block, _ = read_colmap(tmp_path)
     assert block.points.tolist() == ["5", "6"]
     px = px_from_mm(block.image_points.xy, (800, 600), 1e-3)

@@ -44,7 +44,7 @@ def test_single_files(tmp_path):
     rays = read_ign_mes(write(tmp_path, "a.mes", MES))
     np.testing.assert_array_equal(rays.xy, [[10, 20], [1.5, 2.5]])
     assert (rays.images.tolist(), rays.points.tolist(), rays.unit) == (["a"], ["1", "t"], "px")
-    assert rays.messages == ("a.mes: 1 rows of 0 0 are not measured and were left out",)
+    assert rays.messages == ("a.mes: 1 row of 0 0 left out: not measured",)
     control = read_ign_app(write(tmp_path, "a.app", APP))
     assert control.points.tolist() == ["1", "2"]
     np.testing.assert_array_equal(control.xyz[1], [833670.94, 6281965.4, 52.63])
@@ -90,7 +90,7 @@ def residuals(reading):
     """Median residuals in pixels of all rays, and of those of control points, that the messages tell."""
     text = "\n".join(reading.messages)
     rays = re.search(r"fit the given orientations to ([\d.]+) px \(median of (\d+) rays\)", text)
-    control = re.search(r"fit their coordinates to ([\d.]+) px \((\d+)\)", text)
+    control = re.search(r"fit the given coordinates to ([\d.]+) px \(median of (\d+) rays\)", text)
     assert rays is not None
     assert control is not None
     return float(rays[1]), int(rays[2]), float(control[1]), int(control[2])
@@ -103,7 +103,7 @@ def test_ultracam_eagle(shared_data):
     assert (len(block.images), len(block.image_points), len(block.points), len(block.control)) == (7, 24, 10, 3)
     assert [camera.name for camera in block.cameras] == ["UCE-M3-f120-s06"]
     assert "camera 'UCE-M3-f120-s07' has no photographs and was left out" in reading.messages
-    assert "terrain_test0.mes: 7 rows of 0 0 are not measured and were left out" in reading.messages
+    assert "terrain_test0.mes: 7 rows of 0 0 left out: not measured" in reading.messages
     assert any("rotations are degrees, by the median residual" in said for said in reading.messages)
     # undulation of RAF20 there: 49.35 m
     np.testing.assert_allclose(block.control.xyz[0], [815601.51, 6283629.28, 54.96 - 49.346], atol=1e-3)

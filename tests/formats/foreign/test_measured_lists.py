@@ -45,7 +45,7 @@ def test_odm_positions(tmp_path):
     np.testing.assert_allclose(back.xyz, observed.xyz, atol=1e-6)
     np.testing.assert_allclose(back.sigma[:, 2], observed.sigma[:, 2], atol=1e-6)
     np.testing.assert_allclose(back.sigma[:, 0], observed.sigma[:, :2].max(axis=1), atol=1e-6)
-    with pytest.raises(InputError, match="begins with a coordinate system"):
+    with pytest.raises(InputError, match="needs a coordinate system"):
         write_any(replace(block, crs="local"), tmp_path / "geo2.txt", "odm-geo")
 
 

@@ -81,9 +81,9 @@ def test_conventions(folder):
     np.testing.assert_array_equal(block.gnss_ins.xyz, [[0, 0, 10.1]])
     np.testing.assert_array_equal(block.gnss_ins.sigma, [[0.5] * 3])
     assert reading.messages == (
-        "1 smaller reconstructions with 1 photographs were left out",
-        "1 image points of other photographs, or without object point, were left out",
-        "1 GNSS positions are observations with gps_dop as standard deviation",
+        "left out: 1 smaller reconstruction with 1 photograph",
+        "left out: 1 image point of other photographs, or without object point",
+        "1 GNSS position used as observations, with gps_dop as standard deviation",
         "coordinates are local, around latitude 14.5, longitude 101, height 0 m",
     )
     assert is_opensfm(folder())

@@ -90,7 +90,7 @@ def test_metashape_without_orientation(tmp_path):
     text = OPK + "a.jpg\t\t\t\t\t\t\nb.jpg\t4\t5\t6\t0\t0\t0\n"
     found = read(read_metashape, tmp_path, text)
     assert found.images.tolist() == ["b.jpg"]
-    assert found.messages == ("1 photographs without orientation were left out",)
+    assert found.messages == ("1 photograph without orientation left out",)
 
 
 def test_plain_and_named(tmp_path):
@@ -114,7 +114,7 @@ def test_there_and_back(tmp_path, writer, reader):
     rotation = oriented.rotation.copy()
     rotation[2] = np.nan
     lost = writer(replace(oriented, rotation=rotation), tmp_path / "out.txt")
-    assert lost[-1] == "could not be carried over: 1 photographs without orientation"
+    assert lost[-1] == "could not be carried over: 1 photograph without orientation"
     assert "could not be carried over: 74 image points" in lost
     found = reader(tmp_path / "out.txt")
     assert found.images.tolist() == ["p0.jpg", "p1.jpg", "p3.jpg"]

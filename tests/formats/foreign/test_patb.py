@@ -66,7 +66,7 @@ def test_conventions(tmp_path):
     np.testing.assert_array_equal(
         control.xyz, [[500000.5, 5700000.25, 100.125], [500010, 5700010, nan], [nan, nan, 120.5]]
     )
-    assert control.messages[0] == "1 points of classes 0 0 are no control and were left out"
+    assert control.messages[0] == "left out: 1 point of classes 0 0, which are not control"
     assert is_patb_im(tmp_path / "a.im")
     assert is_patb_ori(tmp_path / "a.ori")
     assert is_patb_con(tmp_path / "a.con")
@@ -90,9 +90,9 @@ def test_there_and_back(tmp_path, principal_point):
     block = oriented.block
     lost = write_patb(oriented, tmp_path / "patb")
     assert lost == (
-        "could not be carried over: 1 check points",
-        "could not be carried over: the standard deviations of 4 control and check points",
-        "could not be carried over: 4 observed projection centres or attitudes",
+        "could not be carried over: 1 check point",
+        "could not be carried over: the standard deviations of 4 ground points (control and check)",
+        "could not be carried over: 4 observations of GNSS and INS",
     )
     rays = read_patb_im(tmp_path / "patb" / "block.im")
     np.testing.assert_allclose(rays.xy + principal_point, block.image_points.xy, rtol=0, atol=5.1e-7)
@@ -114,7 +114,7 @@ def test_long_names_become_numbers(tmp_path):
     names = np.array([f"DJI_20211224092312_{i}.JPG" for i in range(4)])
     block = replace(oriented.block, images=replace(oriented.block.images, names=names))
     lost = write_patb(replace(oriented, block=block), tmp_path / "patb")
-    assert lost[-1] == "4 names are too long for PAT-B and were replaced by numbers, see names.csv"
+    assert lost[-1] == "4 names are too long for PAT-B and replaced by numbers, see names.csv"
     assert read_patb_im(tmp_path / "patb" / "block.im").images.tolist() == ["1", "2", "3", "4"]
     assert (tmp_path / "patb" / "names.csv").read_text().splitlines()[1] == 'photo,1,"DJI_20211224092312_0.JPG"'
 
@@ -144,14 +144,14 @@ def test_reprojection_settles_which_way_rotations_go(tmp_path, way):
 def test_what_cannot_be_settled_is_an_error():
     oriented = oriented_sample()
     same = {"one": oriented.rotation, "other": oriented.rotation @ np.eye(3)}
-    with pytest.raises(InputError, match="none clearly better"):
+    with pytest.raises(InputError, match="none fits the image points clearly better"):
         settle(oriented.block, oriented.centre, same, "state it")
     rays = replace(
         oriented.block.image_points,
         **{k: getattr(oriented.block.image_points, k)[:3] for k in ("image", "point", "xy", "sigma")},
     )
     few = replace(oriented.block, image_points=rays)
-    with pytest.raises(InputError, match="too few image points"):
+    with pytest.raises(InputError, match="too few points are measured"):
         settle(few, oriented.centre, same, "state it")
 
 
@@ -162,7 +162,7 @@ WRONG_IM = {
     "number": (IM.replace("2000.25", "2000,25"), 2, "'2000,25' is not a number"),
     "photograph twice": (IM.replace("  102 ", "  101 "), 5, "'101' is there twice"),
     "point twice": (IM.replace("        2 ", "        1 "), 3, "point '1' in photograph '101' is there twice"),
-    "principal distance": (IM.replace("152818.000", "-152818.0", 1), 1, "is not positive"),
+    "principal distance": (IM.replace("152818.000", "-152818.0", 1), 1, "is not greater than 0"),
     "far": (IM.replace("2000.25", "2e13"), 2, "outside of any image"),
 }
 WRONG_ORI = {

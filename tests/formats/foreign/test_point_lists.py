@@ -108,7 +108,7 @@ def test_widths_of_pix4d_lists(tmp_path, rest, sigma, angles):
 def test_pix4d_there_and_back(tmp_path):
     block = oriented_sample(shift=(717000.0, 1606000.0, 0.0)).block
     said = write_pix4d_gcp(block, tmp_path / "gcp.csv")
-    assert "1 check points are written as any other: the format knows no roles" in said
+    assert "1 check point written like control points: the format does not tell them apart" in said
     control = read_pix4d_gcp(tmp_path / "gcp.csv")
     np.testing.assert_allclose(control.xyz, block.control.xyz, rtol=0, atol=5.1e-7)
     np.testing.assert_array_equal(control.sigma, block.control.sigma)
@@ -126,8 +126,8 @@ def test_odm_control(tmp_path):
     assert found.points.tolist() == ["G1", "G2", "G3"]
     np.testing.assert_array_equal(found.xyz, [[100.5, 200.5, 30.25], [101, 201, np.nan], [102, 202, 0]])
     assert found.messages == (
-        "file.txt: the height of 1 points is 0 and taken as known: write NaN where it is not",
-        "file.txt: the height of 1 points is unknown",
+        "file.txt: the height of 1 point is 0 and taken as known: write NaN if it is unknown",
+        "file.txt: the height of 1 point is unknown",
     )
     rays = found.rays
     assert rays is not None
@@ -141,7 +141,7 @@ def test_odm_control(tmp_path):
 def test_odm_control_comes_back(tmp_path):
     block = replace(oriented_sample(shift=(717000.0, 1606000.0, 0.0)).block, crs="EPSG:32647")
     said = write_odm_gcp(block, tmp_path / "gcp_list.txt")
-    assert "1 check points are written as any other: the format knows no roles" in said
+    assert "1 check point written like control points: the format does not tell them apart" in said
     found = read_odm_gcp(tmp_path / "gcp_list.txt")
     assert found.crs == "EPSG:32647"
     places = {name: xyz for name, xyz in zip(found.points.tolist(), found.xyz, strict=True)}
@@ -149,7 +149,7 @@ def test_odm_control_comes_back(tmp_path):
         np.testing.assert_allclose(places[point], xyz, rtol=0, atol=5.1e-7)
     assert found.rays is not None
     assert len(found.rays.image) == np.isin(block.image_points.point, block.control.point).sum()
-    with pytest.raises(InputError, match="begins with a coordinate system"):
+    with pytest.raises(InputError, match="needs a coordinate system"):
         write_odm_gcp(replace(block, crs="local"), tmp_path / "none.txt")
 
 
@@ -161,9 +161,9 @@ def test_odm_positions(tmp_path):
     np.testing.assert_array_equal(found.sigma[0], [0.5, 0.5, 1])
     assert np.isnan(found.sigma[1:]).all()
     assert found.messages == (
-        "file.txt: the height of 1 photographs is 0 and taken as known: write NaN where it is not",
-        "file.txt: 1 positions without height were left out",
-        "file.txt: what follows the known columns in 1 rows was not carried over",
+        "file.txt: the height of 1 photograph is 0 and taken as known: write NaN if it is unknown",
+        "file.txt: 1 position without height left out",
+        "file.txt: what follows the known columns in 1 row was not carried over",
     )
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, mm_from_px
+from aerotri.conventions import FilePath, InputError, counted, mm_from_px
 from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.names_match import match_photographs
 from aerotri.formats.assembly.parts import OrientationList, PositionList, RayList, Reading, no_sigma
@@ -105,7 +105,11 @@ def with_rays(reading: Reading, rays: RayList, sigma_px: float = 1.0) -> Reading
     if len(first) < len(key):
         again = int(np.setdiff1d(np.arange(len(key)), first)[0])
         where = f"point '{points[both.point[again]]}' in photograph '{block.images.names[both.image[again]]}'"
-        raise InputError(f"{where} is measured in another file already", "keep one of the two", rays.path)
+        raise InputError(
+            f"{where} is measured in another file already",
+            "give one of the two files, or remove the row from one",
+            rays.path,
+        )
     known = None if reading.points is None else padded(reading.points, len(points))
     return Reading(replace(block, points=points, image_points=both), known, tuple(messages))
 
@@ -113,11 +117,16 @@ def with_rays(reading: Reading, rays: RayList, sigma_px: float = 1.0) -> Reading
 def _about_names(file: str, names: np.ndarray, index: np.ndarray, loosely: int, known: np.ndarray) -> list[str]:
     said = []
     if loosely:
-        said.append(f"{file}: {loosely} photographs are named with another folder or file ending")
+        said.append(
+            f"{file}: {counted(loosely, 'photograph is', 'photographs are')} named with another folder or file ending"
+        )
     missing = np.flatnonzero(index < 0)
     if len(missing):
         others = in_words(names[missing].astype(str).tolist(), _not_met(known, index))
-        said.append(f"{file}: {len(missing)} photographs are not in the block and were left out: {others}")
+        said.append(
+            f"{file}: {counted(len(missing), 'photograph is', 'photographs are')} not in the block and left out: "
+            f"{others}"
+        )
     return said
 
 
@@ -215,7 +224,7 @@ def _observed(block: Block, rows: np.ndarray, stated: Statements) -> Block:
 
 def _refuse_strangers(names: np.ndarray, index: np.ndarray, block: Block, file: os.PathLike[str]) -> None:
     if not len(names):
-        raise InputError("holds no photographs", "give a row for each", file)
+        raise InputError("holds no photographs", "give a row for every photograph", file)
     if not (index >= 0).any():
         others = in_words(names.astype(str).tolist(), block.images.names.astype(str).tolist())
         example = f"{others} is not among '{block.images.names[0]}' …"
@@ -252,7 +261,9 @@ def with_positions(reading: Reading, given: PositionList, stated: Statements) ->
     """
     block = reading.block
     if block.gnss_ins is not None:
-        raise InputError("the block has observed positions already", "give them once", given.path)
+        raise InputError(
+            "the block has observed positions already, from another file", "give one of the two files", given.path
+        )
     index, loosely = match_photographs(given.images, block.images.names)
     rows = np.flatnonzero(index >= 0)
     _refuse_strangers(given.images, index, block, given.path)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, counted
 from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.assemble import Statements, given_or_stated, padded, refuse_local
 from aerotri.formats.assembly.parts import PointList, Reading, no_sigma
@@ -27,7 +27,7 @@ def with_control(reading: Reading, given: PointList, stated: Statements) -> Read
     """
     block = reading.block
     if not len(given.points):
-        raise InputError("holds no points", "give a row for each", given.path)
+        raise InputError("holds no points", "give a row for every point", given.path)
     names = np.array([stated.control_prefix + name for name in given.points.tolist()], dtype=str)
     place = {name: i for i, name in enumerate(block.points.tolist())}
     measured = np.array([name in place for name in names.tolist()], bool)
@@ -42,14 +42,16 @@ def with_control(reading: Reading, given: PointList, stated: Statements) -> Read
     if not measured.all() and len(block.image_points):
         others = np.setdiff1d(block.points, names[measured]).astype(str).tolist()
         missing = in_words(names[~measured].tolist(), others)
-        messages.append(f"{given.path.name}: {int((~measured).sum())} points are not measured: {missing}")
+        messages.append(
+            f"{given.path.name}: {counted(int((~measured).sum()), 'point is', 'points are')} not measured: {missing}"
+        )
     for name in names.tolist():
         place.setdefault(name, len(place))
     point = np.array([place[name] for name in names.tolist()], dtype=np.int64)
     twice = np.isin(point, block.control.point)
     if twice.any():
-        message = f"point '{names[np.flatnonzero(twice)[0]]}' has coordinates already"
-        raise InputError(message, "give them once", given.path)
+        message = f"point '{names[np.flatnonzero(twice)[0]]}' has coordinates already, from another file"
+        raise InputError(message, "keep the row in one of the files", given.path)
     xyz, said = _in_block(block, given, stated)
     messages += said
     observed = no_sigma(0) if block.gnss_ins is None else block.gnss_ins.xyz
@@ -71,7 +73,9 @@ def with_control(reading: Reading, given: PointList, stated: Statements) -> Read
 def _in_block(block: Block, given: PointList, stated: Statements) -> tuple[np.ndarray, list[str]]:
     """(k, 3) coordinates in the block's CRS, and what to say of it."""
     if stated.control_heights not in HEIGHTS:
-        raise InputError(f"--control-heights {stated.control_heights}", f"it is {' or '.join(HEIGHTS)}")
+        raise InputError(
+            f"--control-heights '{stated.control_heights}' is not possible", f"give {' or '.join(HEIGHTS)}"
+        )
     if given.crs:
         refuse_local(block, given.crs, given.path)
         return placing.to_crs(given.xyz, given.crs, block.crs, stated.geoid), []
@@ -79,7 +83,10 @@ def _in_block(block: Block, given: PointList, stated: Statements) -> tuple[np.nd
         xyz = placing.from_ellipsoidal_heights(given.xyz, block.crs, stated.geoid)
         return xyz, [f"{given.path.name}: ellipsoidal heights were brought to those of {block.crs}"]
     if stated.control_heights == "ellipsoidal":
-        raise InputError(f"--control-heights ellipsoidal, but {block.crs} has no others", "leave it out")
+        raise InputError(
+            f"--control-heights ellipsoidal is not needed: all heights of {block.crs} are ellipsoidal",
+            "leave the option out, or name the height system in --crs, such as EPSG:25832+7837",
+        )
     return given.xyz, []
 
 
@@ -108,6 +115,6 @@ def block_with_check_points(block: Block, names: Sequence[str], prefix: str = ""
         own = np.flatnonzero((control == name) | (control == prefix + name))
         if not len(own):
             known = ", ".join(control[:8].tolist())
-            raise InputError(f"--check {name}: there is no such control point", f"there are {known}")
+            raise InputError(f"--check {name}: there is no such control point", f"known are {known}")
         is_check[own] = True
     return replace(block, control=replace(block.control, is_check=is_check))

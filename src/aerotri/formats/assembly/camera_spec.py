@@ -79,7 +79,9 @@ def freed(camera: Camera) -> Camera:
 
 def _from_file(path: Path, spec: CameraSpec) -> tuple[Camera, ...]:
     if spec.size_px is not None or spec.focal_length_mm is not None:
-        raise InputError("--camera and single values of the camera exclude each other", "state one of the two")
+        raise InputError(
+            "--camera FILE and single values of the camera exclude each other", "give the file or the values"
+        )
     if path.suffix == ".toml":
         # pydantic is imported by the settings model only when it is needed
         from aerotri.formats.block.settings import read_cameras_toml
@@ -93,25 +95,29 @@ def _from_file(path: Path, spec: CameraSpec) -> tuple[Camera, ...]:
         return (read_ign_camera(path, spec.pixel_um),)
     if not path.exists():
         raise InputError("there is no such file", "check the path", path)
-    raise InputError("is no camera", "give tables [camera.NAME] as in block.toml, in a .toml file", path)
+    raise InputError("does not describe a camera", "give tables [camera.NAME] as in block.toml, in a .toml file", path)
 
 
 def _from_options(spec: CameraSpec, named: np.ndarray, c_mm: np.ndarray) -> Camera:
     if spec.size_px is None or spec.pixel_um is None:
-        raise InputError("the size of the image and of a pixel go together", REMEDY)
+        raise InputError("the camera needs both the size of the photograph and the size of a pixel", REMEDY)
     focal = spec.focal_length_mm
     if focal is None:
         told = np.unique(c_mm[np.isfinite(c_mm)])
         if len(told) != 1:
-            many = "the principal distance is not known" if not len(told) else f"there are {len(told)} of them"
-            raise InputError(f"{many}", "state it: --focal-length-mm 35.0")
+            many = (
+                "the principal distance is not known"
+                if not len(told)
+                else f"the files give {len(told)} principal distances"
+            )
+            raise InputError(many, "state it: --focal-length-mm 35.0")
         focal = float(told[0])
     name = spec.name or (str(named[0]) if len(named) == 1 else "camera")
     half = tuple(size * spec.pixel_um * 5e-4 for size in spec.size_px)
     for camera in named.tolist():
         told_format = format_in_name(camera)
         if told_format and any(abs(2 * h / t - 1) > SAME_FORMAT for h, t in zip(half, told_format, strict=True)):
-            message = f"camera '{camera}' tells a format of {told_format[0]:g} × {told_format[1]:g} mm, the options "
+            message = f"camera '{camera}' has a format of {told_format[0]:g} × {told_format[1]:g} mm, the options give "
             raise InputError(f"{message}{2 * half[0]:g} × {2 * half[1]:g} mm", "correct --camera-size or --pixel-um")
     held = {"focal_length_mm": focal, "x0_mm": 0.0, "y0_mm": 0.0}
     interior = {element: Prior(value, fixed=True) for element, value in held.items()}
@@ -137,8 +143,10 @@ def camera_of_each(cameras: tuple[Camera, ...], named: list[str]) -> tuple[tuple
     place = {camera.name: i for i, camera in enumerate(cameras)}
     for name in named:
         if name not in place:
-            who = f"camera '{name}'" if name else "a photograph whose camera no file names"
-            raise InputError(f"{who} is not among {', '.join(place)}", "describe it, or state one camera for all")
+            known = ", ".join(place)
+            who = f"camera '{name}' is not described" if name else "no file says which camera took a photograph"
+            remedy = "describe it in --camera FILE, or state one camera for all photographs"
+            raise InputError(f"{who}; there are {known}", remedy)
     used = sorted({place[name] for name in named})
     index = np.searchsorted(used, [place[name] for name in named])
     left = [camera.name for i, camera in enumerate(cameras) if i not in used]

@@ -60,9 +60,11 @@ class ReadingOptions:
 
     def __post_init__(self) -> None:
         if self.axes not in AXES:
-            raise InputError(f"--axes {self.axes}", "it is xy or yx")
+            raise InputError(f"--axes '{self.axes}' is not possible", "give xy or yx")
         if self.patb_rotation is not None and self.patb_rotation not in ROTATIONS:
-            raise InputError(f"--patb-rotation {self.patb_rotation}", f"it is {' or '.join(ROTATIONS)}")
+            raise InputError(
+                f"--patb-rotation '{self.patb_rotation}' is not possible", f"give {' or '.join(ROTATIONS)}"
+            )
 
 
 Kinds = Mapping[str, tuple[Callable[[Path], bool], Callable[[Path, ReadingOptions], Any]]]
@@ -119,10 +121,14 @@ def _read(text: str, kinds: Kinds, what: str, options: ReadingOptions) -> Any:
     stated, path = split_kind(text, kinds)
     kind = kind_of(path, kinds) if stated is None else stated
     if kinds is ORIENTATIONS and kind != "pix4d-eo" and options.offset is not None:
-        raise InputError("is no orientation of Pix4D, to which an offset belongs", "leave --offset out", path)
+        raise InputError("is not an orientation of Pix4D; --offset is only for these", "leave --offset out", path)
     if kind is None:
         known = ", ".join(kinds)
-        raise InputError(f"is of no known kind of {what}", f"known are {known}; state it as kind:PATH", path)
+        raise InputError(
+            f"is not in a known format of {what}",
+            f"known are {known}; put the format before the path, as {next(iter(kinds))}:{path.name}",
+            path,
+        )
     if path.is_dir():
         raise InputError(f"is a folder, not a file of {what}", "give the file", path)
     return kinds[kind][1](path, options)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
 
+from aerotri.conventions import counted
 from aerotri.observations import Block
 
 Count = Callable[[Block], int]
@@ -25,28 +27,28 @@ def _control_sigmas(block: Block) -> int:
 
 
 THINGS: dict[str, tuple[Count, str]] = {
-    "cameras": (lambda block: len(block.cameras), "{} camera(s) but for the name"),
-    "principal points": (_principal_points, "the principal point of {} camera(s)"),
-    "lens": (_lens, "{} lens parameters; image points are as measured"),
-    "image points": (lambda block: len(block.image_points), "{} image points"),
+    "cameras": (lambda block: len(block.cameras), "{camera}, except the name"),
+    "principal points": (_principal_points, "the principal point of {camera}"),
+    "lens": (_lens, "{lens parameter}; image points are as measured"),
+    "image points": (lambda block: len(block.image_points), "{image point}"),
     "sigmas": (
         lambda block: len(np.unique(block.image_points.sigma)) - 1,
         "standard deviations of single image points",
     ),
-    "orientations": (lambda block: int(np.isfinite(block.images.centre).all(axis=1).sum()), "{} orientations"),
-    "control": (lambda block: int((~block.control.is_check).sum()), "{} control points"),
-    "check points": (lambda block: int(block.control.is_check.sum()), "{} check points"),
-    "control sigmas": (_control_sigmas, "the standard deviations of {} control and check points"),
+    "orientations": (lambda block: int(np.isfinite(block.images.centre).all(axis=1).sum()), "{orientation}"),
+    "control": (lambda block: int((~block.control.is_check).sum()), "{control point}"),
+    "check points": (lambda block: int(block.control.is_check.sum()), "{check point}"),
+    "control sigmas": (_control_sigmas, "the standard deviations of {ground point} (control and check)"),
     "gnss": (
         lambda block: 0 if block.gnss_ins is None else len(block.gnss_ins),
-        "{} observed projection centres or attitudes",
+        "{observation} of GNSS and INS",
     ),
-    "edits": (lambda block: 0 if block.edits is None else len(block.edits), "{} decisions on rays and points"),
-    "constraints": (lambda block: 0 if block.constraints is None else len(block.constraints), "{} constraints"),
-    "fiducials": (lambda block: 0 if block.fiducials is None else len(block.fiducials), "{} measured fiducials"),
+    "edits": (lambda block: 0 if block.edits is None else len(block.edits), "{decision} on rays and points"),
+    "constraints": (lambda block: 0 if block.constraints is None else len(block.constraints), "{constraint}"),
+    "fiducials": (lambda block: 0 if block.fiducials is None else len(block.fiducials), "{measured fiducial}"),
     "crs": (lambda block: int(block.crs != "local"), "the name of the coordinate system"),
 }
-"""Things by name: how many of them a block has, and words for them."""
+"""Things by name: how many of them a block has, and words for them; a noun in braces is written with its number."""
 
 
 def losses(block: Block, *held: str) -> tuple[str, ...]:
@@ -63,5 +65,10 @@ def losses(block: Block, *held: str) -> tuple[str, ...]:
     for name, (count, words) in THINGS.items():
         number = 0 if name in held else count(block)
         if number > 0:
-            said.append(f"could not be carried over: {words.format(number)}")
+            said.append(f"could not be carried over: {_with_number(words, number)}")
     return tuple(said)
+
+
+def _with_number(words: str, number: int) -> str:
+    """'{camera}, except the name' as '2 cameras, except the name'."""
+    return re.sub(r"\{(.+?)\}", lambda noun: counted(number, noun[1]), words)

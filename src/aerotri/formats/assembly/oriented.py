@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerotri.adjustment.ray_status import RayStatus
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, counted
 from aerotri.functional_model.additional_parameters import brown, parameter_sets
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block, Camera, Prior
@@ -70,7 +70,7 @@ class OrientedBlock:
     def unoriented(self) -> tuple[str, ...]:
         """A sentence on photographs without orientation, if there are any."""
         count = int((~self.oriented).sum())
-        return (f"could not be carried over: {count} photographs without orientation",) if count else ()
+        return (f"could not be carried over: {counted(count, 'photograph')} without orientation",) if count else ()
 
     def corrected_xy(self) -> np.ndarray:
         """(m, 2) mm, the rays free of Brown's and the linear errors; what the lens does is still in them."""
@@ -91,16 +91,20 @@ class OrientedBlock:
         block = self.block
         lost = []
         if len(block.control):
-            lost.append(f"{len(block.control)} control and check points")
+            lost.append(counted(len(block.control), "control or check point", "control and check points"))
         if block.gnss_ins is not None:
-            lost.append(f"{len(block.gnss_ins)} observed projection centres or attitudes")
+            lost.append(
+                counted(len(block.gnss_ins), "observed position or attitude", "observed positions or attitudes")
+            )
         if len(np.unique(block.image_points.sigma)) > 1:
             lost.append("the standard deviations of single image points")
         images, rays = int(np.sum(~self.oriented)), int(np.sum(~self.complete))
         if images:
-            lost.append(f"{images} images without orientation")
+            lost.append(f"{counted(images, 'photograph')} without orientation")
         if rays:
-            lost.append(f"{rays} image points that were not used, or whose image or point is unknown")
+            lost.append(
+                counted(rays, "image point") + " not used in the adjustment, or of a photograph or point not adjusted"
+            )
         if block.crs != "local":
             lost.append(f"the coordinate system {block.crs}")
         return tuple(f"could not be carried over: {what}" for what in lost)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, counted
 from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.formats import convert
 from aerotri.formats.assembly import kinds
@@ -115,7 +115,7 @@ def read_project(request: Request) -> Reading:
 def _options(request: Request) -> ReadingOptions:
     offset = None if request.offset is None else read_pix4d_offset(request.offset)
     if not request.control and request.stated.control_prefix:
-        raise InputError("--control-prefix without control points", "give them: --control FILE")
+        raise InputError("--control-prefix is given, but no control points", "give them: --control FILE")
     axes = kinds.axes_of(request.stated.crs) if request.axes is None else request.axes
     return ReadingOptions(axes, offset, request.stated.patb_rotation)
 
@@ -132,9 +132,9 @@ def _whole(request: Request) -> Reading | None:
         return None
     pixel_um, size_px = request.camera.pixel_um, request.camera.size_px
     if request.camera != CameraSpec(pixel_um=pixel_um, size_px=size_px):
-        raise InputError("has its cameras", "leave the camera out, but for the size of pixels", path)
+        raise InputError("has cameras of its own", "leave the options of the camera out; --pixel-um may stay", path)
     if size_px is not None and kind != "bundler":
-        raise InputError("has its cameras", "leave --camera-size out", path)
+        raise InputError("has cameras of its own", "leave --camera-size out", path)
     said = () if pixel_um is not None else (f"a pixel counts as {UNKNOWN_PIXEL_UM:g} µm: state it with --pixel-um",)
     if kind in ("bundler", "opensfm", "colmap"):
         pixel_um = UNKNOWN_PIXEL_UM if pixel_um is None else pixel_um
@@ -144,7 +144,7 @@ def _whole(request: Request) -> Reading | None:
         read = read_bundler(path, pixel_um, size_px) if kind == "bundler" else read_opensfm(path, pixel_um)
         return replace(read, messages=(*read.messages, *said))
     if pixel_um is not None:
-        raise InputError("has its cameras", "leave --pixel-um out", path)
+        raise InputError("has cameras of its own", "leave --pixel-um out", path)
     if kind == "block":
         return Reading(read_block(path, rays_needed=False))
     block, points = convert.read_any(path, kind)
@@ -171,7 +171,9 @@ def _parts(request: Request, options: ReadingOptions) -> _Parts:
     if kind in kinds.ORIENTATIONS:
         return _Parts(orientations=kinds.read_orientations(f"{kind}:{path}", options))
     known = ", ".join((*convert.RECOGNISERS, *FOLDERS, *kinds.RAYS, *kinds.ORIENTATIONS))
-    raise InputError("is of no known format", f"known are {known}; state it as kind:PATH", path)
+    raise InputError(
+        "is of no known format", f"known are {known}; put the format before the path, as FORMAT:{path.name}", path
+    )
 
 
 def _ign(folder: Path, request: Request) -> _Parts:
@@ -180,7 +182,7 @@ def _ign(folder: Path, request: Request) -> _Parts:
     pixel_um = UNKNOWN_PIXEL_UM if request.camera.pixel_um is None else request.camera.pixel_um
     cameras = tuple(read_ign_camera(path, pixel_um) for path in files_of(folder, ".txt") if is_ign_camera(path))
     if len({camera.name for camera in cameras}) < len(cameras):
-        raise InputError("two files describe the same camera", "keep one of them", folder)
+        raise InputError("two files in this folder describe the same camera", "keep one of them", folder)
     rays = tuple(read_ign_mes(path) for path in files_of(folder, ".mes"))
     control = tuple(read_ign_app(path) for path in files_of(folder, ".app"))
     said = f"a pixel counts as {pixel_um:g} µm: state it with --pixel-um"
@@ -201,7 +203,8 @@ def _patb(folder: Path, options: ReadingOptions) -> _Parts:
 def _only_one(folder: Path, ending: str) -> Path:
     found = files_of(folder, ending)
     if len(found) != 1:
-        raise InputError(f"holds {len(found)} files {ending}", "name the one with its kind, or keep one", folder)
+        message = f"holds {len(found)} files {ending}" if found else f"holds no file {ending}"
+        raise InputError(message, f"exactly one is needed in the folder; or give the {ending} file itself", folder)
     return found[0]
 
 
@@ -212,7 +215,11 @@ def _begin(request: Request, parts: _Parts) -> Reading:
         for image, camera in zip(part.images.tolist(), part.cameras.tolist(), strict=True):
             camera_of[image] = camera_of.get(image) or camera
     if not camera_of:
-        raise InputError("holds no photographs", "give a file with some", request.source)
+        raise InputError(
+            "holds no photographs",
+            "give a file with photographs, or their orientations with --orientations FILE",
+            request.source,
+        )
     named = np.array(sorted({name for name in camera_of.values() if name}), dtype=str)
     c_mm = np.concatenate([rays.focal_length_mm for rays in parts.rays]) if parts.rays else np.zeros(0)
     try:
@@ -245,7 +252,9 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
         raise InputError("--image-sigma-um and --image-sigma-px exclude each other", "state one of the two")
     if sigma_um is None and (sigma_px is not None or is_new):
         if sigma_px is None and len(rays):
-            messages.append("the standard deviation of image points is a pixel: state it with --image-sigma-px")
+            messages.append(
+                "the standard deviation of image points is assumed as 1 pixel: state yours with --image-sigma-px"
+            )
         sigma_px = 1.0 if sigma_px is None else sigma_px
         sigma_um = sigma_px * block.cameras[0].pixel_um
         sigma = np.repeat(sigma_px * pixel[:, None], 2, axis=1)
@@ -257,10 +266,13 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
         settings = replace(settings, adjustment=AdjustmentSettings(datum="minimal"))
     if request.gnss_shift is not None:
         if request.gnss_shift not in SHIFTS:
-            raise InputError(f"--gnss-shift {request.gnss_shift}", f"it is {', '.join(SHIFTS)}")
+            raise InputError(f"--gnss-shift '{request.gnss_shift}' is not possible", f"give {' or '.join(SHIFTS)}")
         settings = replace(settings, gnss=replace(settings.gnss, shift=request.gnss_shift))
     elif request.positions and settings.gnss.shift != "off":
-        messages.append(f"the block lets GNSS positions be shifted ({settings.gnss.shift}): --gnss-shift off does not")
+        messages.append(
+            f"the block estimates a shift of the GNSS positions (gnss.shift = {settings.gnss.shift}): "
+            "--gnss-shift off leaves it out"
+        )
     block = replace(block, settings=settings, image_points=replace(rays, sigma=sigma))
     messages += fit_of_start_values(block, request.stated.geoid)
     return replace(reading, block=block, messages=tuple(messages))
@@ -281,8 +293,12 @@ def fit_of_start_values(block: Block, geoid: FilePath | None = None) -> list[str
     said = []
     if found.count >= FEWEST:
         said.append(
-            f"image points fit the given orientations to {found.median_px:.3g} px (median of {found.count} rays)"
+            f"image points fit the given orientations to {found.median_px:.3g} px "
+            f"(median of {counted(found.count, 'ray')})"
         )
     if len(control):
-        said.append(f"those of control points fit their coordinates to {np.median(control):.3g} px ({len(control)})")
+        said.append(
+            f"image points of control points fit the given coordinates to {np.median(control):.3g} px "
+            f"(median of {counted(len(control), 'ray')})"
+        )
     return said

@@ -145,13 +145,16 @@ def settle(block: Block, centre: np.ndarray, choices: dict[str, np.ndarray], rem
     found = {name: reproject(block, centre, rotation) for name, rotation in choices.items()}
     if min(result.count for result in found.values()) < FEWEST:
         raise InputError(
-            f"the rotations may be read as {' or '.join(choices)}, and too few image points meet to tell", remedy
+            f"the rotations may be {' or '.join(choices)}: too few points are measured in several photographs to tell",
+            remedy,
         )
     median = {name: result.median_px for name, result in found.items()}
     best, second = sorted(median, key=lambda name: median[name])[:2]
     told = ", ".join(f"{name} {median[name]:.3g} px" for name in sorted(median, key=lambda name: median[name]))
     if not median[best] < CLEAR * median[second]:
-        raise InputError(f"the rotations may be read in several ways, none clearly better ({told})", remedy)
+        raise InputError(
+            f"the rotations may be read in several ways, and none fits the image points clearly better ({told})", remedy
+        )
     return best, f"rotations are {best}, by the median residual of the image points: {told}"
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from aerotri.conventions import counted
 from aerotri.formats.text.csv_text import is_blank
 from aerotri.formats.text.table_checks import image_index, refuse_duplicates, sigma_columns
 from aerotri.formats.text.tables import Columns, Table, read_table
@@ -51,18 +52,22 @@ def read_edits(
     role = np.flatnonzero(named & (action != "off"))
     if len(role):
         row = int(role[0])
-        raise table.error(row, f"action {action[row]} names an image", "leave image empty: it is the point's role")
+        raise table.error(
+            row,
+            f"action {action[row]} with a photograph",
+            "leave image empty: the point has this role in all photographs",
+        )
     stray = np.flatnonzero((action != "off") & ~np.isin(point, control.point))
     if len(stray):
         row = int(stray[0])
-        remedy = "roles are for points of control.csv"
-        raise table.error(row, f"point '{table.cell('point', row)}' is no control or check point", remedy)
+        remedy = "only points of control.csv can become control or check points"
+        raise table.error(row, f"point '{table.cell('point', row)}' is not a control or check point", remedy)
     measured = rays.image * np.int64(len(points)) + rays.point
     missing = np.flatnonzero(named & ~np.isin(image * np.int64(len(points)) + point, measured))
     if len(missing):
         row = int(missing[0])
-        where = f"point '{table.cell('point', row)}' is not measured in image '{table.cell('image', row)}'"
-        raise table.error(row, where, "correct the names, or remove the row")
+        where = f"point '{table.cell('point', row)}' is not measured in photograph '{table.cell('image', row)}'"
+        raise table.error(row, where, "write both names as in image_points, or remove the row")
     refuse_duplicates(table, (image + 1) * len(points) + point, lambda row: _about(table, row))
     reason = table.text["reason"].rows() if "reason" in table.text else np.full(table.length, "")
     return Edits(image, point, action, reason)
@@ -71,14 +76,14 @@ def read_edits(
 def _about(table: Table, row: int) -> str:
     image = table.cell("image", row)
     point = f"a decision on point '{table.cell('point', row)}'"
-    return f"{point} in image '{image}'" if image else point
+    return f"{point} in photograph '{image}'" if image else point
 
 
 def _refuse(table: Table, bad: np.ndarray, column: str, remedy: str) -> None:
     rows = np.flatnonzero(bad)
     if len(rows):
         row = int(rows[0])
-        raise table.error(row, f"{column} = '{table.cell(column, row)[:60]}'", remedy)
+        raise table.error(row, f"{column} = '{table.cell(column, row)[:60]}' is not possible", remedy)
 
 
 def _point_index(table: Table, points: np.ndarray) -> np.ndarray:
@@ -128,7 +133,9 @@ def _members(table: Table, row: int, kind: str, known: dict[str, int]) -> np.nda
     needed = POINTS_NEEDED[kind]
     if len(names) < needed or (kind in EXACTLY_TWO and len(names) > needed):
         most = "" if kind in EXACTLY_TWO else " or more"
-        raise table.error(row, f"{kind} has {len(names)} points", f"it needs {needed}{most}, separated by blanks")
+        raise table.error(
+            row, f"{kind} has {counted(len(names), 'point')}", f"it needs {needed}{most}, separated by blanks"
+        )
     for name in names:
         if name not in known:
             remedy = "name points of image_points or control"

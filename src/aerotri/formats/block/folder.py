@@ -137,8 +137,8 @@ def _images(path: Path, cameras: tuple[Camera, ...], radians: float) -> Images:
     table = read_table(path, IMAGE_COLUMNS)
     table.require("image", "camera")
     if not table.length:
-        raise InputError("holds no images", "give a row for every photograph", path)
-    refuse_duplicates(table, table.text["image"].index, lambda row: f"image '{table.cell('image', row)}'")
+        raise InputError("holds no photographs", "give a row for every photograph", path)
+    refuse_duplicates(table, table.text["image"].index, lambda row: f"photograph '{table.cell('image', row)}'")
     known = {camera.name: i for i, camera in enumerate(cameras)}
     column = table.text["camera"]
     code = np.array([known.get(name, -1) for name in column.names.to_pylist()])
@@ -170,7 +170,9 @@ def _check_names_in_settings(block: Block, settings: BlockToml) -> None:
     if groups not in ("camera", "block", "strip", *block.images.columns):
         there = ", ".join(("camera", "block", "strip", *block.images.columns))
         raise settings.error(
-            ("adjustment", "parameter_groups"), f"images.csv has no column '{groups}' to group by", f"there are {there}"
+            ("adjustment", "parameter_groups"),
+            f"images.csv has no column '{groups}' to group by",
+            f"known are {there}; or add the column",
         )
     points = np.array(adjustment.datum_points, dtype=str)
     missing = points[~np.isin(points, block.points)] if len(points) else points
@@ -184,5 +186,5 @@ def _check_names_in_settings(block: Block, settings: BlockToml) -> None:
     for image, _ in adjustment.datum_fixed:
         if image not in known:
             raise settings.error(
-                ("adjustment", "datum_fixed"), f"there is no image '{image}'", "name images of images.csv"
+                ("adjustment", "datum_fixed"), f"there is no photograph '{image}'", "name photographs of images.csv"
             )

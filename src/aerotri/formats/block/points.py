@@ -75,7 +75,7 @@ def read_image_points(
     refuse_duplicates(
         table,
         image * len(point.names) + point.index,
-        lambda row: f"point '{table.cell('point', row)}' in image '{table.cell('image', row)}'",
+        lambda row: f"point '{table.cell('point', row)}' in photograph '{table.cell('image', row)}'",
     )
     camera = images.camera[image]
     unit = settings.model.image_unit
@@ -179,7 +179,7 @@ def _is_check(table: Table) -> np.ndarray:
     role = table.text["role"].rows()
     other = np.flatnonzero((role != "control") & (role != "check"))
     if len(other):
-        raise table.error(int(other[0]), f"role = '{role[other[0]]}'", "a role is control or check")
+        raise table.error(int(other[0]), f"role = '{role[other[0]]}' is not possible", "a role is control or check")
     return role == "check"
 
 
@@ -214,13 +214,15 @@ def read_gnss_ins(path: Path | None, images: Images, radians: float) -> GnssIns 
         return None
     table.require("image")
     image = image_index(table, images)
-    refuse_duplicates(table, image, lambda row: f"image '{table.cell('image', row)}'")
+    refuse_duplicates(table, image, lambda row: f"photograph '{table.cell('image', row)}'")
     xyz, angles = three_or_none(table, ("X", "Y", "Z")), three_or_none(table, ("omega", "phi", "kappa"))
     nothing = np.flatnonzero(np.isnan(xyz[:, 0]) & np.isnan(angles[:, 0]))
     if len(nothing):
-        raise table.error(int(nothing[0]), "the row observes nothing", "give a position or angles, or remove the row")
+        raise table.error(
+            int(nothing[0]), "the row has neither a position nor angles", "give one of them, or remove the row"
+        )
     unknown = np.full(3, np.nan)
-    remedy = "give every observation its standard deviation"
+    remedy = "give a standard deviation for every position and angle"
     return GnssIns(
         image=image,
         xyz=xyz,

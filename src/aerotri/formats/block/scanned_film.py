@@ -46,7 +46,7 @@ def read_fiducials(
     refuse_duplicates(
         table,
         image * len(table.text["fiducial"].names) + table.text["fiducial"].index,
-        lambda row: f"fiducial '{name[row]}' of image '{table.cell('image', row)}'",
+        lambda row: f"fiducial '{name[row]}' of photograph '{table.cell('image', row)}'",
     )
     fiducials = Fiducials(image, name, table.stack("column", "row"))
     fits = {}
@@ -93,7 +93,9 @@ def refuse_unfitted(table: Table, image: np.ndarray, images: Images, fits: Mappi
     if len(rows):
         row = int(rows[0])
         raise table.error(
-            row, f"image '{table.cell('image', row)}' has no fiducials, others of its camera have", "measure them"
+            row,
+            f"photograph '{table.cell('image', row)}' has no fiducials, others of its camera have",
+            "measure them: rows in fiducials.csv",
         )
 
 

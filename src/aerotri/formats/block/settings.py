@@ -255,6 +255,6 @@ def fixed_element(text: str) -> tuple[str, str]:
     if not image or element not in ORIENTATION_ELEMENTS:
         raise InputError(
             f"datum_fixed = {text!r} names no orientation element",
-            f"write IMAGE:ELEMENT, the element one of {' '.join(ORIENTATION_ELEMENTS)}",
+            f"write PHOTOGRAPH:ELEMENT, the element one of {' '.join(ORIENTATION_ELEMENTS)}",
         )
     return image, element

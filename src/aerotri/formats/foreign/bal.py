@@ -122,7 +122,9 @@ def _parse(path: Path) -> tuple[int, int, np.ndarray, np.ndarray, np.ndarray]:
     wanted = 3 + 4 * m + CAMERA_VALUES * n_images + 3 * n_points
     if len(words) != wanted:
         raise InputError(
-            f"holds {len(words)} numbers, its first line announces {wanted}", "the file is cut off or not BAL", path
+            f"holds {len(words)} numbers, its first line announces {wanted}",
+            "give a whole BAL file; is this one cut off?",
+            path,
         )
     try:
         values = np.array(words[3:], dtype=float)
@@ -133,14 +135,24 @@ def _parse(path: Path) -> tuple[int, int, np.ndarray, np.ndarray, np.ndarray]:
         place = int(bad[0]) + 3
         word = words[place][:60].decode("utf-8", "replace")
         what = "is not possible" if np.isfinite(values[bad[0]]) else "is not a finite number"
-        raise InputError(f"'{word}' {what}", "repair the file", path, line_of_word(raw, place))
+        raise InputError(
+            f"'{word}' {what}",
+            "write plain numbers, or take the file from its source again",
+            path,
+            line_of_word(raw, place),
+        )
     observations = values[: 4 * m].reshape(m, 4)
     cameras = values[4 * m : 4 * m + CAMERA_VALUES * n_images].reshape(n_images, CAMERA_VALUES)
     _check_observations(observations, (n_images, n_points), raw, path)
     short = np.flatnonzero(cameras[:, 6] < SMALLEST_FOCAL_PX)
     if len(short):
         place = 3 + 4 * m + CAMERA_VALUES * int(short[0]) + 6
-        raise InputError("a focal length is not positive", "repair the camera", path, line_of_word(raw, place))
+        raise InputError(
+            "a focal length is not greater than 0",
+            "give it in pixels: the seventh of the nine values of a camera",
+            path,
+            line_of_word(raw, place),
+        )
     return n_images, n_points, observations, cameras, values[4 * m + CAMERA_VALUES * n_images :].reshape(n_points, 3)
 
 
@@ -157,11 +169,18 @@ def _check_observations(observations: np.ndarray, counts: tuple[int, int], raw: 
     bad = np.flatnonzero(((index < 0) | (index >= np.array(counts)) | (index != np.floor(index))).any(axis=1))
     if len(bad):
         line = line_of_word(raw, 3 + 4 * int(bad[0]))
-        raise InputError("an observation names a camera or point that there is not", "repair the line", path, line)
+        raise InputError(
+            "an observation names a camera or point that the file does not have",
+            "numbers count from 0 and stay below those of the first line",
+            path,
+            line,
+        )
     far = np.flatnonzero((np.abs(observations[:, 2:]) > FARTHEST_PX).any(axis=1))
     if len(far):
         line = line_of_word(raw, 3 + 4 * int(far[0]))
-        raise InputError("an image point lies outside of any image", "coordinates are pixels", path, line)
+        raise InputError(
+            "an image point lies outside of any image", "give coordinates in pixels from the image centre", path, line
+        )
     key = index[:, 0] * counts[1] + index[:, 1]
     _, first = np.unique(key, return_index=True)
     if len(first) < len(key):

@@ -106,7 +106,11 @@ def _check_rays(
 ) -> None:
     far = np.flatnonzero((np.abs(xy) > FARTHEST_MM).any(axis=1))
     if len(far):
-        raise file.error(row_of[int(far[0])], "an image point lies outside of any image", "coordinates are mm")
+        raise file.error(
+            row_of[int(far[0])],
+            "an image point lies outside of any image",
+            "give coordinates in mm from the image centre",
+        )
     _, first = np.unique(point, return_index=True)
     file.check_names(points, [row_of[i] for i in np.sort(first)], "point")
     key = image * np.int64(len(points)) + point

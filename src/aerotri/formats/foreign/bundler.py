@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, counted
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import Reading, texts
 from aerotri.formats.files.atomic import atomic_folder
@@ -70,10 +70,10 @@ class _Numbers:
     def error(self, place: int, message: str) -> InputError:
         word = self.words[place].decode("utf-8", "replace")[:60] if place < len(self.words) else "the end"
         line = line_of_word(self.raw, min(place, len(self.words) - 1) + len(HEADER.split()))
-        return InputError(f"'{word}' {message}", "repair the file", self.path, line)
+        return InputError(f"'{word}' {message}", "export the reconstruction again", self.path, line)
 
     def cut_off(self) -> InputError:
-        return self.error(len(self.words), "comes too early: the file is cut off")
+        return self.error(len(self.words), "comes too early, the file is cut off")
 
     def count(self, place: int, limit: float = 1e9) -> int:
         """A whole number that is not negative."""
@@ -107,11 +107,11 @@ def _content(path: Path) -> _Content:
     image = numbers.values[at]
     bad = np.flatnonzero((image != np.floor(image)) | (image < 0) | (image >= n_images))
     if len(bad):
-        raise numbers.error(int(at[bad[0]]), "is no camera of the file")
+        raise numbers.error(int(at[bad[0]]), "is not the number of a camera of the file")
     px = np.column_stack([numbers.values[at + 2], numbers.values[at + 3]]).reshape(-1, 2)
     far = np.flatnonzero((np.abs(px) > FARTHEST_PX).any(axis=1))
     if len(far):
-        raise numbers.error(int(at[far[0]]) + 2, "lies outside of any image")
+        raise numbers.error(int(at[far[0]]) + 2, "is an image coordinate outside of any image")
     _check_cameras(numbers, cameras)
     xyz = numbers.values[starts[:, None] + np.arange(3)].reshape(-1, 3)
     return _Content(cameras, xyz, image.astype(np.int64), point, px)
@@ -124,10 +124,10 @@ def _check_cameras(numbers: _Numbers, cameras: np.ndarray) -> None:
         odd = ~(skew < SKEW) | ~(np.linalg.det(rotation) > 0.0)
     bad = np.flatnonzero((cameras[:, 0] > 0.0) & odd)
     if len(bad):
-        raise numbers.error(2 + CAMERA_VALUES * int(bad[0]) + 3, "begins a matrix that is no rotation")
+        raise numbers.error(2 + CAMERA_VALUES * int(bad[0]) + 3, "begins a matrix that is not a rotation")
     negative = np.flatnonzero((cameras[:, 0] < SMALLEST_FOCAL_PX) & (cameras[:, 0] != 0.0))
     if len(negative):
-        raise numbers.error(2 + CAMERA_VALUES * int(negative[0]), "is no principal distance")
+        raise numbers.error(2 + CAMERA_VALUES * int(negative[0]), "is not a possible principal distance")
 
 
 def read_bundler(path: FilePath, pixel_um: float = 1.0, size_px: tuple[int, int] | None = None) -> Reading:
@@ -151,12 +151,12 @@ def read_bundler(path: FilePath, pixel_um: float = 1.0, size_px: tuple[int, int]
     names, messages = _names(path, len(content.cameras))
     oriented = content.cameras[:, 0] > 0.0
     if not oriented.all():
-        messages.append(f"{int((~oriented).sum())} photographs that Bundler did not orient were left out")
+        messages.append(f"left out: {counted(int((~oriented).sum()), 'photograph')} that Bundler did not orient")
     keep, repeated = _once_each(content, oriented)
     if repeated:
-        messages.append(f"{repeated} repeated measurements of a point in the same photograph were left out")
+        messages.append(f"left out: {counted(repeated, 'repeated measurement')} of a point in the same photograph")
     if not len(keep):
-        raise InputError("holds no rays of oriented photographs", "give a reconstruction with points", path)
+        raise InputError("holds no image points of oriented photographs", "give a reconstruction with points", path)
     number = np.cumsum(oriented) - 1
     image, point, px = number[content.image[keep]], content.point[keep], content.px[keep]
     used, point = np.unique(point, return_inverse=True)
@@ -193,7 +193,7 @@ def _names(path: Path, count: int) -> tuple[list[str], list[str]]:
     file = TextFile(place)
     if len(file) != count:
         message = f"names {len(file)} photographs, {path.name} has {count}"
-        raise InputError(message, "give the list that belongs to it", place)
+        raise InputError(message, "give the list.txt that belongs to the reconstruction", place)
     # a name may be followed by "0 focal-length"
     names = [line[0] if len(line) == 3 and is_number(line[2]) else " ".join(line) for line in file.words()]
     names = [name.replace("\\", "/").rsplit("/", 1)[-1] for name in names]

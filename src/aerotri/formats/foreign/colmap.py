@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, mm_from_px, px_from_mm
+from aerotri.conventions import FilePath, InputError, counted, mm_from_px, px_from_mm
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.foreign.colmap_binary import check_binary_model
@@ -253,7 +253,7 @@ def _once_each(image: np.ndarray, point: np.ndarray, px: np.ndarray) -> tuple[np
     _, first = np.unique(pairs, axis=0, return_index=True)
     if len(first) < len(image):
         count = len(image) - len(first)
-        warnings.warn(f"{count} repeated measurements of a point in the same image were left out", stacklevel=3)
+        warnings.warn(f"left out: {counted(count, 'repeated measurement')} of a point in the same image", stacklevel=3)
         keep = np.sort(first)
         return image[keep], point[keep], px[keep]
     return image, point, px
@@ -294,7 +294,7 @@ def write_colmap(oriented: OrientedBlock, folder: FilePath, binary: bool = True)
     lost = list(oriented.losses())
     single = int(np.sum(rays == 1))
     if single:
-        lost.append(f"could not be carried over: {single} points with one ray")
+        lost.append(f"could not be carried over: {counted(single, 'point')} with one ray")
     if freed is not block.image_points.xy:
         lost.append("image points are written free of the additional parameters, which COLMAP has no words for")
     return tuple(lost)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import RADIANS_PER, FilePath, InputError, mm_from_px
+from aerotri.conventions import RADIANS_PER, FilePath, InputError, counted, mm_from_px
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, RayList, no_sigma, texts
@@ -130,7 +130,7 @@ def read_ign_mes(path: FilePath) -> RayList:
         xy=px[measured],
         unit="px",
         focal_length_mm=np.full(len(images), np.nan),
-        messages=(f"{file.path.name}: {left} rows of 0 0 are not measured and were left out",) if left else (),
+        messages=(f"{file.path.name}: {counted(left, 'row')} of 0 0 left out: not measured",) if left else (),
     )
 
 

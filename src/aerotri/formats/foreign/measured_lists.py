@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, px_from_mm
+from aerotri.conventions import FilePath, InputError, counted, px_from_mm
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.text.text_lines import check_words
@@ -54,7 +54,10 @@ def write_ign_app(block: Block, path: FilePath) -> tuple[str, ...]:
     control = block.control
     rows = np.flatnonzero(np.isfinite(control.xyz).all(axis=1))
     if not len(rows):
-        raise InputError(f"block '{block.name}' has no control points known in X, Y and Z", "nothing can be written")
+        raise InputError(
+            f"block '{block.name}' has no control points known in X, Y and Z",
+            "add such points to control.csv, or write another format",
+        )
     names = block.points[control.point[rows]]
     check_words(names, "point", ".app")
     with atomic_file(path) as place, place.open("w", encoding="utf-8", newline="\n") as file:
@@ -62,8 +65,8 @@ def write_ign_app(block: Block, path: FilePath) -> tuple[str, ...]:
             file.write(f'"{name}" {APP_CODE} ' + " ".join(f"{value:.4f}" for value in xyz) + "\n")
     checks, partial = int(control.is_check[rows].sum()), len(control) - len(rows)
     said = (
-        (f"could not be carried over: {partial} points of which only plan position or height is known", partial),
-        (f"{checks} check points are written as any other: the format knows no roles", checks),
+        (f"could not be carried over: {counted(partial, 'point')} with only plan position or height", partial),
+        (f"{counted(checks, 'check point')} written like control points: the format does not tell them apart", checks),
     )
     return (*losses(block, "control", "check points"), *(words for words, count in said if count))
 
@@ -81,11 +84,16 @@ def write_odm_geo(block: Block, path: FilePath) -> tuple[str, ...]:
         When there are none, a name has a blank, or the block has no plane CRS.
     """
     if block.crs == "local" or "+" in block.crs:
-        raise InputError(f"geo.txt begins with a coordinate system, the block's is {block.crs}", "use EPSG:n")
+        raise InputError(
+            f"geo.txt needs a coordinate system EPSG:n, that of the block is '{block.crs}'",
+            "bring the block into such a system, or write another format",
+        )
     observed = block.gnss_ins
     rows = np.zeros(0, np.int64) if observed is None else np.flatnonzero(np.isfinite(observed.xyz).all(axis=1))
     if observed is None or not len(rows):
-        raise InputError(f"block '{block.name}' has no observed positions", "nothing can be written")
+        raise InputError(
+            f"block '{block.name}' has no observed positions", "add them in gnss_ins.csv, or write another format"
+        )
     names = block.images.names[observed.image[rows]]
     check_words(names, "photograph", "geo.txt")
     with atomic_file(path) as place, place.open("w", encoding="utf-8", newline="\n") as file:
@@ -94,7 +102,7 @@ def write_odm_geo(block: Block, path: FilePath) -> tuple[str, ...]:
             position = " ".join(f"{value:.6f}" for value in xyz)
             file.write(f"{name} {position} NaN NaN NaN {max(sigma[0], sigma[1]):.6f} {sigma[2]:.6f}\n")
     attitudes = int(np.isfinite(observed.angles).all(axis=1).sum())
-    said = (f"could not be carried over: {attitudes} observed attitudes",) if attitudes else ()
+    said = (f"could not be carried over: {counted(attitudes, 'observed attitude')}",) if attitudes else ()
     return (*losses(block, "gnss", "crs"), *said)
 
 

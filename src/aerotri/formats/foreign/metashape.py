@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import FilePath
+from aerotri.conventions import FilePath, counted
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, texts
@@ -70,7 +70,7 @@ def read_metashape(path: FilePath) -> OrientationList:
         np.full(len(names), ""),
         values[:, :3],
         rotation,
-        messages=(f"{left} photographs without orientation were left out",) if left else (),
+        messages=(f"{counted(left, 'photograph')} without orientation left out",) if left else (),
     )
 
 

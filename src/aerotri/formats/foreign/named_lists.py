@@ -215,7 +215,9 @@ def read_control_list(path: FilePath) -> PointList:
     roles = np.array(found.columns.get("role", ["control"] * len(names)))
     odd = np.flatnonzero((roles != "control") & (roles != "check"))
     if len(odd):
-        raise found.file.error(int(odd[0]) + 1, f"role = '{roles[odd[0]][:60]}'", "a role is control or check")
+        raise found.file.error(
+            int(odd[0]) + 1, f"role = '{roles[odd[0]][:60]}' is not possible", "a role is control or check"
+        )
     return PointList(
         found.file.path, names, xyz, _sigma(found, may_be_zero=True), roles == "check", crs,
         heights="ellipsoidal" if found.ellipsoidal else "", messages=_messages(found, "role"),

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, px_from_mm
+from aerotri.conventions import FilePath, InputError, counted, px_from_mm
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.parts import PointList, PositionList, RayList, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_file
@@ -151,7 +151,7 @@ def read_odm_gcp(path: FilePath) -> PointList:
             unit="px",
             focal_length_mm=np.full(len(image_place), np.nan),
         ),
-        messages=(*messages, *_about_heights(file.path, xyz[:, 2], "points")),
+        messages=(*messages, *_about_heights(file.path, xyz[:, 2], "point")),
     )
 
 
@@ -183,9 +183,11 @@ def _about_heights(path: Path, heights: np.ndarray, what: str) -> tuple[str, ...
     zero, unknown = int(np.sum(heights == 0.0)), int(np.isnan(heights).sum())
     said = []
     if zero:
-        said.append(f"{path.name}: the height of {zero} {what} is 0 and taken as known: write NaN where it is not")
+        said.append(
+            f"{path.name}: the height of {counted(zero, what)} is 0 and taken as known: write NaN if it is unknown"
+        )
     if unknown:
-        said.append(f"{path.name}: the height of {unknown} {what} is unknown")
+        said.append(f"{path.name}: the height of {counted(unknown, what)} is unknown")
     return tuple(said)
 
 
@@ -223,11 +225,11 @@ def read_odm_geo(path: FilePath) -> PositionList:
     angles = np.radians(values[:, 3:6])
     angles[np.isnan(angles).any(axis=1)] = np.nan
     there = ~np.isnan(values[:, 2])
-    said = [*messages, *_about_heights(file.path, values[there, 2], "photographs")]
+    said = [*messages, *_about_heights(file.path, values[there, 2], "photograph")]
     if not there.all():
-        said.append(f"{file.path.name}: {int((~there).sum())} positions without height were left out")
+        said.append(f"{file.path.name}: {counted(int((~there).sum()), 'position')} without height left out")
     if extra:
-        said.append(f"{file.path.name}: what follows the known columns in {extra} rows was not carried over")
+        said.append(f"{file.path.name}: what follows the known columns in {counted(extra, 'row')} was not carried over")
     return PositionList(
         file.path,
         texts(names)[there],
@@ -253,13 +255,19 @@ def write_odm_gcp(block: Block, path: FilePath) -> tuple[str, ...]:
     """
     rays, control = block.image_points, block.control
     if block.crs == "local" or "+" in block.crs:
-        raise InputError(f"gcp_list.txt begins with a coordinate system, the block's is {block.crs}", "use EPSG:n")
+        raise InputError(
+            f"gcp_list.txt needs a coordinate system EPSG:n, that of the block is '{block.crs}'",
+            "bring the block into such a system, or write another format",
+        )
     row_of_point = np.full(len(block.points), -1)
     row_of_point[control.point] = np.arange(len(control))
     plan = np.isfinite(control.xyz[:, :2]).all(axis=1)
     keep = np.flatnonzero((row_of_point[rays.point] >= 0) & np.append(plan, False)[row_of_point[rays.point]])
     if not len(keep):
-        raise InputError(f"block '{block.name}' has no image points of control with a plan position", "add some")
+        raise InputError(
+            f"block '{block.name}' has no image points of control points with X and Y",
+            "measure some, or write another format",
+        )
     check_words(block.images.names, "photograph", "gcp_list.txt")
     check_words(block.points[control.point], "point", "gcp_list.txt")
     with atomic_file(path) as place, place.open("w", encoding="utf-8", newline="\n") as file:
@@ -276,6 +284,10 @@ def write_odm_gcp(block: Block, path: FilePath) -> tuple[str, ...]:
     checks = int(control.is_check.sum())
     return (
         *lost,
-        *((f"could not be carried over: {others} image points of other points",) if others else ()),
-        *((f"{checks} check points are written as any other: the format knows no roles",) if checks else ()),
+        *((f"could not be carried over: {counted(others, 'image point')} of other points",) if others else ()),
+        *(
+            (f"{counted(checks, 'check point')} written like control points: the format does not tell them apart",)
+            if checks
+            else ()
+        ),
     )

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, mm_from_px, px_from_mm
+from aerotri.conventions import FilePath, InputError, counted, mm_from_px, px_from_mm
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import Reading, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_folder
@@ -131,7 +131,7 @@ def read_opensfm(path: FilePath, pixel_um: float = 1.0) -> Reading:
     if tracks.is_file():
         image, track, position, left = _tracks(tracks, list(shots), list(points))
         if left:
-            messages.append(f"{left} image points of other photographs, or without object point, were left out")
+            messages.append(f"left out: {counted(left, 'image point')} of other photographs, or without object point")
     else:
         image, track, position = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 2))
         messages.append(f"there is no {TRACKS} beside {path.name}: no image points")
@@ -143,7 +143,9 @@ def read_opensfm(path: FilePath, pixel_um: float = 1.0) -> Reading:
         xy[own] = mm_from_px(px, camera.size_px, camera.pixel_mm)
     observed = _positions(shots)
     if observed is not None:
-        messages.append(f"{len(observed)} GNSS positions are observations with gps_dop as standard deviation")
+        messages.append(
+            f"{counted(len(observed), 'GNSS position')} used as observations, with gps_dop as standard deviation"
+        )
     if chosen.has("reference_lla"):
         lla = [chosen.get("reference_lla").get(key).number() for key in ("latitude", "longitude", "altitude")]
         messages.append("coordinates are local, around latitude {:.9g}, longitude {:.9g}, height {:.6g} m".format(*lla))
@@ -182,7 +184,8 @@ def _largest(path: Path) -> tuple[_Node, list[str]]:
     nodes = [_Node(value, f"reconstruction {i}", path) for i, value in enumerate(content)]
     sizes = [len(node.get("shots").items()) for node in nodes]
     best = sizes.index(max(sizes))
-    others = f"{len(nodes) - 1} smaller reconstructions with {sum(sizes) - sizes[best]} photographs were left out"
+    smaller = counted(len(nodes) - 1, "smaller reconstruction")
+    others = f"left out: {smaller} with {counted(sum(sizes) - sizes[best], 'photograph')}"
     return nodes[best], [others] if len(nodes) > 1 else []
 
 

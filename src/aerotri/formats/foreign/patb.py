@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, counted
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, RayList, no_sigma, texts
@@ -83,7 +83,7 @@ def read_patb_im(path: FilePath) -> RayList:
     c = file.values([words[row][1] for row in heads], heads, "principal distance")
     small = np.flatnonzero(c < SMALLEST_POSITIVE)
     if len(small):
-        raise file.error(heads[int(small[0])], "the principal distance is not positive", "give µm")
+        raise file.error(heads[int(small[0])], "the principal distance is not greater than 0", "give it in µm")
     # one unit for the whole file, as writers have it
     in_mm = bool((c < SMALLEST_C_UM).all())
     scale = 1.0 if in_mm else 1e-3
@@ -96,7 +96,11 @@ def read_patb_im(path: FilePath) -> RayList:
     )
     far = np.flatnonzero((np.abs(xy) > FARTHEST_MM).any(axis=1))
     if len(far):
-        raise file.error(rows[int(far[0])], "an image point lies outside of any image", "coordinates are µm")
+        raise file.error(
+            rows[int(far[0])],
+            "an image point lies outside of any image",
+            "give coordinates in µm from the image centre",
+        )
     messages = ["coordinates are taken as mm: the principal distances are below 1000"] if in_mm else []
     if len({tuple(words[row][3:]) for row in rows}) > 1:
         messages.append("could not be carried over: the classes of the image points")
@@ -197,7 +201,7 @@ def read_patb_con(path: FilePath) -> PointList:
     kept = wanted.any(axis=1)
     messages = []
     if not kept.all():
-        messages.append(f"{int((~kept).sum())} points of classes 0 0 are no control and were left out")
+        messages.append(f"left out: {counted(int((~kept).sum()), 'point')} of classes 0 0, which are not control")
     if len({tuple(line[4:]) for line in words}) > 1:
         messages.append("could not be carried over: the classes of the control points, but for 0 as unknown")
     xyz = np.where(wanted, xyz, np.nan)[kept]
@@ -242,7 +246,9 @@ def write_patb(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:
             if lines and (name != "names.csv" or renamed):
                 (place / name).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
     lost = losses(block, "cameras", "principal points", "image points", "orientations", "control")
-    numbered = f"{len(renamed)} names are too long for PAT-B and were replaced by numbers, see names.csv"
+    numbered = (
+        f"{counted(len(renamed), 'name is', 'names are')} too long for PAT-B and replaced by numbers, see names.csv"
+    )
     return (*lost, *((numbered,) if renamed else ()), *oriented.unoriented())
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, counted
 from aerotri.formats.assembly.losses import losses
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import OrientationList, PointList, PositionList, no_sigma, texts
@@ -205,14 +205,17 @@ def write_pix4d_gcp(block: Block, path: FilePath) -> tuple[str, ...]:
     control = block.control
     rows = np.flatnonzero(np.isfinite(control.xyz).all(axis=1))
     if not len(rows):
-        raise InputError(f"block '{block.name}' has no control points known in X, Y and Z", "nothing can be written")
+        raise InputError(
+            f"block '{block.name}' has no control points known in X, Y and Z",
+            "add such points to control.csv, or write another format",
+        )
     sigma = np.column_stack([control.sigma[rows, :2].max(axis=1), control.sigma[rows, 2]])
     _write_list(path, block.points[control.point[rows]], np.hstack([control.xyz[rows], sigma]))
     partial = len(control) - len(rows)
     checks = int(control.is_check.sum())
     said = (
-        (f"could not be carried over: {partial} points of which only plan position or height is known", partial),
-        (f"{checks} check points are written as any other: the format knows no roles", checks),
+        (f"could not be carried over: {counted(partial, 'point')} with only plan position or height", partial),
+        (f"{counted(checks, 'check point')} written like control points: the format does not tell them apart", checks),
     )
     return (*losses(block, "control", "control sigmas", "check points"), *(words for words, count in said if count))
 
@@ -232,11 +235,13 @@ def write_pix4d_geo(block: Block, path: FilePath) -> tuple[str, ...]:
     observed = block.gnss_ins
     rows = np.zeros(0, np.int64) if observed is None else np.flatnonzero(np.isfinite(observed.xyz).all(axis=1))
     if observed is None or not len(rows):
-        raise InputError(f"block '{block.name}' has no observed positions", "nothing can be written")
+        raise InputError(
+            f"block '{block.name}' has no observed positions", "add them in gnss_ins.csv, or write another format"
+        )
     sigma = np.column_stack([observed.sigma[rows, :2].max(axis=1), observed.sigma[rows, 2]])
     _write_list(path, block.images.names[observed.image[rows]], np.hstack([observed.xyz[rows], sigma]))
     attitudes = int(np.isfinite(observed.angles).all(axis=1).sum())
-    said = (f"could not be carried over: {attitudes} observed attitudes",) if attitudes else ()
+    said = (f"could not be carried over: {counted(attitudes, 'observed attitude')}",) if attitudes else ()
     return (*losses(block, "gnss"), *said)
 
 

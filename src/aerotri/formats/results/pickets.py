@@ -114,7 +114,11 @@ def measured_pickets(table: pa.Table, path: Path | None = None) -> MeasuredPicke
     if "status" in table.column_names:
         used &= np.array(table.column("status").to_pylist(), dtype=str) == "accepted"
     if used.sum() < 3:
-        raise InputError("has hardly a picket that was accepted", "measure again", path)
+        raise InputError(
+            "has fewer than three accepted ground points (pickets)",
+            "measure again with a lower --threshold of `aerotri dtm`",
+            path,
+        )
     rows = np.flatnonzero(used)
     # what is drawn of them at random must not hang on the order of the file
     rows = rows[order_in_plan(xyz[rows])]

@@ -120,5 +120,5 @@ def image_index(table: Table, images: Images, may_be_empty: bool = False) -> np.
         remedy = "add it there, or remove its rows"
         if near:
             remedy = f"write it as there: {', '.join(repr(other) for other in near)}"
-        raise table.error(row, f"image '{name}' is not in the table of images", remedy)
+        raise table.error(row, f"photograph '{name}' is not in the table images", remedy)
     return index

@@ -80,7 +80,11 @@ class TextFile:
                 remedy = "write numbers with a point as decimal sign"
                 raise self.error(row, f"{what} '{word[:60]}' is not a number", remedy)
             if not abs(float(word)) <= LARGEST_NUMBER:
-                raise self.error(row, f"{what} '{word[:60]}' is not possible", "correct the number")
+                raise self.error(
+                    row,
+                    f"{what} '{word[:60]}' is not possible",
+                    "check the number; is the file damaged, or a column in the wrong place?",
+                )
         raise self.error(0, f"{what} cannot be read", "write plain numbers")
 
     def table(self, words: Sequence[Sequence[str]], rows: Sequence[int], what: str) -> np.ndarray:
@@ -100,7 +104,9 @@ class TextFile:
         """
         for name, row in zip(names, rows, strict=True):
             if not name or len(name) > LONGEST_NAME or re.search(CONTROL_CHARACTERS, name):
-                raise self.error(row, f"{name[:60]!r} is no name of a {what}", "names are short texts")
+                raise self.error(
+                    row, f"{name[:60]!r} cannot be the name of a {what}", "names are short texts on one line"
+                )
 
     def refuse_repeated(self, names: Sequence[str], rows: Sequence[int], what: str) -> None:
         """Refuse a file that names something twice.

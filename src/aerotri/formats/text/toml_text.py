@@ -141,7 +141,7 @@ def _value(value: Any) -> str:
     if isinstance(value, (int, np.integer)):
         return repr(int(value))
     if not math.isfinite(value):
-        raise InputError(f"a setting is {value}, no finite number", "repair it")
+        raise InputError(f"a setting is {value}, no finite number", "give a finite number")
     return repr(float(value))
 
 

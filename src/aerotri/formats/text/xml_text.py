@@ -33,7 +33,9 @@ def read_xml(path: Path) -> ElementTree.Element:
         return ElementTree.fromstring(DECLARATION.sub("", text, count=1))
     except ElementTree.ParseError as error:
         line = error.position[0] if error.position else None
-        raise InputError(f"is not XML: {str(error).split(':')[0]}", "repair the file", path, line) from error
+        raise InputError(
+            f"is not XML: {str(error).split(':')[0]}", "export the file again; is it cut off?", path, line
+        ) from error
     except (ValueError, LookupError) as error:
         raise InputError(f"is not XML: {error}", "save the file as UTF-8", path) from error
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.adjustment.ray_status import RayStatus
-from aerotri.conventions import MGON_PER_RADIAN
+from aerotri.conventions import MGON_PER_RADIAN, counted
 from aerotri.functional_model.additional_parameters import Parameter, format_parameters
 from aerotri.functional_model.additional_parameters import unit_of as unit_of_parameter
 from aerotri.functional_model.additional_parameters.family import NO_UNIT
@@ -324,7 +324,7 @@ def verdict_lines(outcome: Outcome) -> list[str]:
     """What the result is worth, and why: the first that is read."""
     first = [f"verdict: {outcome.verdict}"] if outcome.verdict else []
     more = len(outcome.reasons) - MOST_REASONS
-    rest = [f"  and {more} more reason{'s' * (more > 1)}, see adjustment.json"] if more > 0 else []
+    rest = [f"  and {counted(more, 'more reason')}, see adjustment.json"] if more > 0 else []
     return first + [f"  because {printable(reason, 500)}" for reason in outcome.reasons[:MOST_REASONS]] + rest
 
 
@@ -335,23 +335,26 @@ def summary_lines(adjusted: AdjustedBlock) -> list[str]:
     left_out = len(adjusted.rays.status) - used
     lines = [
         *verdict_lines(o),
-        f"{printable(adjusted.block.name)}: {o.status} after {o.iterations} iterations"
+        f"{printable(adjusted.block.name)}: {o.status} after {counted(o.iterations, 'iteration')}"
         + (f": {o.message}" * bool(o.message)),
         f"sigma0 {o.sigma0:.3f} ({o.sigma0_um:.2f} µm{pixel_text(o.sigma0_um, adjusted)})",
         f"redundancy {o.redundancy} = {o.observations} observations − {o.unknowns} unknowns"
-        + (f" + {o.conditions} conditions" if o.conditions else ""),
-        f"{len(adjusted.block.images)} photographs, {len(adjusted.block.points)} points, {used} rays"
-        + (f" ({left_out} left out)" if left_out else ""),
+        + (f" + {counted(o.conditions, 'condition')}" if o.conditions else ""),
+        f"{counted(len(adjusted.block.images), 'photograph')}, {counted(len(adjusted.block.points), 'point')}, "
+        f"{counted(used, 'ray')}" + (f" ({left_out} left out)" if left_out else ""),
     ]
-    for name, results in (("control points", adjusted.control), ("check points", adjusted.check)):
+    for name, results in (("control point", adjusted.control), ("check point", adjusted.check)):
         if len(results):
             s = ground_statistics(adjusted, results)
             d = metre_digits(results.sigma)
             rms = ", ".join(f"{axis} {value:.{d}f}" for axis, value in zip("XYZ", s.rms, strict=True))
-            lines.append(f"{len(results)} {name}: RMS {rms} m; RMSE_H {s.rmse_h:.{d}f}, RMSE_V {s.rmse_v:.{d}f} m")
+            accuracy = f"RMSE_H {s.rmse_h:.{d}f}, RMSE_V {s.rmse_v:.{d}f} m"
+            lines.append(f"{counted(len(results), name)}: RMS {rms} m; {accuracy}")
     additional = (p.kinds == "additional") & np.isin(p.status, ("estimated", "weighted"))
     if additional.any():
         removed = int(np.sum(p.status == "removed"))
-        lines.append(f"{additional.sum()} additional parameters" + (f", {removed} removed" if removed else ""))
+        lines.append(
+            counted(int(additional.sum()), "additional parameter") + (f", {removed} removed" if removed else "")
+        )
     warnings = [*o.warnings, *([asprs_warning(adjusted)] if asprs_warning(adjusted) else [])]
     return lines + [f"warning: {printable(text, 500)}" for text in warnings]
