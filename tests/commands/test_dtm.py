@@ -161,7 +161,7 @@ def test_interval_by_formula():
     printed = json.loads(run("predict", "picket-interval", "--scan-um", 28, "--scale", 7000, "--json"))
     np.testing.assert_allclose(printed["interval_m"]["plain"], [42.06, 46.49], atol=0.01)
     assert "older rule 30·GSD: 5.9 m" in run("predict", "picket-interval", "--gsd", 0.196)
-    with pytest.raises(InputError, match="not stated once"):
+    with pytest.raises(InputError, match="in exactly one way"):
         run("predict", "picket-interval", "--gsd", 0.2, "--scan-um", 28, "--scale", 7000)
 
 

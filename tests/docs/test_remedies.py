@@ -5,6 +5,11 @@ import re
 from functools import cache
 
 import pages
+import pytest
+
+from aerotri.reference.lookup import entries, find
+from aerotri.report.tables.adjustment import what_to_do
+from aerotri.results.adjusted_block import Outcome
 
 PAGE = pages.DOCS / "understand" / "remedies.md"
 SOURCE = pages.DOCS.parent / "src" / "aerotri"
@@ -52,3 +57,25 @@ def test_every_link_to_a_place_of_the_page_has_its_place():
     links = set(re.findall(r"\(#(message-[a-z0-9-]+)\)", page))
     assert len(anchors) >= 15
     assert links <= anchors
+
+
+def outcome(status, verdict):
+    return Outcome(status, "", 3, 1.0, 1.0, 1.0, 9, 4, 0, 5, verdict=verdict)
+
+
+@pytest.mark.parametrize(
+    ("status", "verdict"),
+    [("rank deficient", ""), ("not converged", ""), ("converged", "doubtful"), ("converged", "rejected")],
+)
+def test_a_result_that_is_not_accepted_leads_to_the_page(status, verdict):
+    (line,) = what_to_do(outcome(status, verdict))
+    place = re.search(r"remedies\.md#([a-z0-9-]+)$", line)
+    word = re.search(r"`aerotri explain ([a-z ]+)`", line)
+    assert place is not None
+    assert word is not None
+    assert f"({place[1]})=" in PAGE.read_text(encoding="utf-8")
+    assert [entry for entry in find(word[1], entries()) if entry.kind == "word of a result"]
+
+
+def test_an_accepted_result_needs_no_remedy():
+    assert what_to_do(outcome("converged", "accepted")) == []

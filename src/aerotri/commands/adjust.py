@@ -74,10 +74,11 @@ def run_adjust(
 def failure_text(failure: AdjustmentFailedError) -> str:
     """Why there is no result, with all reasons."""
     from aerotri.report.quality import printable
+    from aerotri.report.tables.adjustment import what_to_do
 
     outcome = failure.outcome
     causes = [f"because {printable(reason, 500)}" for reason in outcome.reasons if reason != outcome.message]
-    return "\n  ".join([str(failure), *causes])
+    return "\n  ".join([str(failure), *causes, *what_to_do(outcome)])
 
 
 def _tell_free(checked: FreeCheck, as_json: bool, console: Console) -> None:

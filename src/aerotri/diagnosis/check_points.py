@@ -151,7 +151,7 @@ def _rmse(name: str, rmse: float, expected: float, n: float, digits: int, distan
     grade: Grade = "accepted"
     if chi_square_p(n * (rmse / expected) ** 2, n) < SIGNIFICANCE:
         grade = graded(rmse / expected, POOR, WORTHLESS)
-    reason = f"{name} is {value}, {times(rmse / expected)} as large as the σ let expect"
+    reason = f"{name} is {value}, {times(rmse / expected)} as large as expected from the σ"
     return Finding(name, value, text, "larger than the σ say: systematic errors, or σ too small", "attention", grade,
                    reason if grade != "accepted" else "")  # fmt: skip
 

@@ -145,6 +145,9 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         "name": quality.printable(adjusted.block.name),
         "outcome": adjusted.outcome,
         "reasons": [quality.printable(reason, 1000) for reason in adjusted.outcome.reasons],
+        "what_to_do": [
+            text.replace("what", "What", 1).replace("`", "") for text in tables.what_to_do(adjusted.outcome)
+        ],
         "version": _version(),
         "cards": _cards(adjusted),
         "findings": diagnosis.findings(adjusted) if beside.lights is None else beside.lights,

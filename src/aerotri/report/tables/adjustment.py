@@ -328,6 +328,20 @@ def verdict_lines(outcome: Outcome) -> list[str]:
     return first + [f"  because {printable(reason, 500)}" for reason in outcome.reasons[:MOST_REASONS]] + rest
 
 
+REMEDIES = {"rank deficient": "message-no-result", "not converged": "message-not-converged"}
+"""Places in docs/understand/remedies.md by the status of an adjustment; a verdict has its own."""
+
+
+def what_to_do(outcome: Outcome) -> list[str]:
+    """Where to read on; nothing for a result that is accepted."""
+    word = outcome.status if outcome.status != "converged" else outcome.verdict
+    if word in ("", "accepted"):
+        return []
+    return [
+        f"what to do: `aerotri explain {word}`, or docs/understand/remedies.md#{REMEDIES.get(word, 'message-verdict')}"
+    ]
+
+
 def summary_lines(adjusted: AdjustedBlock) -> list[str]:
     """The result in a few lines of plain text for a terminal; names may hold any printable character, also brackets."""
     o, p = adjusted.outcome, adjusted.parameters
@@ -357,4 +371,4 @@ def summary_lines(adjusted: AdjustedBlock) -> list[str]:
             counted(int(additional.sum()), "additional parameter") + (f", {removed} removed" if removed else "")
         )
     warnings = [*o.warnings, *([asprs_warning(adjusted)] if asprs_warning(adjusted) else [])]
-    return lines + [f"warning: {printable(text, 500)}" for text in warnings]
+    return lines + [f"warning: {printable(text, 500)}" for text in warnings] + what_to_do(o)
