@@ -50,7 +50,7 @@ def test_table_and_files(folder, tmp_path, capsys):
 
 
 def test_what_cannot_be_compared(folder, tmp_path):
-    with pytest.raises(InputError, match="auto is no set"):
+    with pytest.raises(InputError, match="'auto' cannot be one of the sets"):
         run_compare_parameters(folder, ("auto",), 5, None, None, tmp_path / "o", False)
     with pytest.raises(InputError, match="unknown parameter family"):
         run_compare_parameters(folder, ("blu",), 5, None, None, tmp_path / "o", False)

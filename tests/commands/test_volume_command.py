@@ -113,7 +113,7 @@ def test_the_adjustment_of_a_base_is_told_by_the_file_beside_it(place, tmp_path)
     for name, text, like, says in (
         ("same", json.dumps({"adjustment": key}), wanted, "with the same adjustment"),
         ("other", json.dumps({"adjustment": "0"}), free, "with another adjustment"),
-        ("damaged", "[", free, "taken for free of error"),
+        ("damaged", "[", free, "counts as free of error"),
     ):
         (tmp_path / name).mkdir()
         (tmp_path / name / "before.tif").write_bytes((place / "before.tif").read_bytes())

@@ -49,7 +49,7 @@ def test_plots_and_pages(measured):
 def test_settings_are_refused(measured):
     photographs, result, _, _ = measured
     for match, options in (
-        ("no subset", {"subset": "third"}), ("no middle", {"window": 16}), ("edge 0.5", {"edge": 0.5}),
+        ("no subset", {"subset": "third"}), ("is not possible", {"window": 16}), ("edge 0.5", {"edge": 0.5}),
         ("threshold 2 is not possible", {"threshold": 2.0}), ("most_photographs 1", {"most_photographs": 1}),
         ("the area is empty", {"area": (1, 1, 0, 0)}), ("no known kind", {"breaklines": "lines.shp"}),
     ):  # fmt: skip

@@ -223,7 +223,7 @@ def test_a_sigma_given_too_small_accuses_no_good_rays():
     block, _ = small_block(3, flight=DENSE["flight"], tie_points=ties)
     result = snooped(block)
     assert removed(result).sum() < poisson.ppf(0.9995, 2.0 * ALPHA * len(block.image_points))
-    assert any("times what the a-priori σ say" in warning for warning in result.outcome.warnings)
+    assert any("times as large as the a-priori σ" in warning for warning in result.outcome.warnings)
 
 
 def test_two_rays_that_contradict_go_together():

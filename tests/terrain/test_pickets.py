@@ -231,5 +231,5 @@ def test_terrain_model_has_sigma_of_matching_and_adjustment(rendered):
     assert 0.5 < 1.4826 * np.median(np.abs(z)) < 1.6
     assert found.interpolation == pytest.approx(np.std(d), rel=0.6)
     assert (found.adjustment[found.pickets.accepted] >= 0.0).all()
-    with pytest.raises(InputError, match="no picket lies"):
+    with pytest.raises(InputError, match="no ground point"):
         make_terrain_model(rendered.calibration, replace(plan, area=Area(np.array([1.0, 1.0]), np.array([2.0, 2.0]))))
