@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from aerotri.diagnosis.inventory import Extent, GroundPointCounts, Inventory
 
 UNITS = {"deg": "degrees", "gon": "gon", "rad": "radians"}
+MOST_CAMERAS = 6
+"""Cameras that are named one by one in the text."""
 MOST_RAYS = 6
 """Photographs a point from which the numbers of points are added up in the text."""
 
@@ -179,8 +181,10 @@ def _heading(found: BlockCheck) -> list[str]:
     lines += [
         f"  camera {one.name}: {counted(one.photographs, 'photograph')}, {one.model}, {one.size_px[0]} × "
         f"{one.size_px[1]} px of {one.pixel_um:g} µm, focal length {one.focal_length_mm:g} mm"
-        for one in i.cameras
+        for one in i.cameras[:MOST_CAMERAS]
     ]
+    if len(i.cameras) > MOST_CAMERAS:
+        lines.append(f"  and {counted(len(i.cameras) - MOST_CAMERAS, 'more camera')}")
     lines.append(
         f"start values: {counted(i.with_start_position, 'position')}, {counted(i.with_start_angles, 'attitude')}; "
         f"observed: {counted(i.with_gnss, 'GNSS position')}, {counted(i.with_ins, 'INS attitude')}"
