@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from aerotri.adjustment.ray_status import RAY_STATUS
+from aerotri.diagnosis.work_items import KINDS
 from aerotri.reference.records import DescribedFile, Item, of_axes
 from aerotri.reference.words import MARKS, POINT_STATUS, RAY_STATUS_MEANING, REASONS
 from aerotri.statistics.set_aside import PHOTOGRAPH_REASONS, POINT_REASONS
@@ -187,6 +188,26 @@ COMPARED = (
     Item("gain_against", "text?", "The set that the gain refers to."),
     Item("verdict", "text?", "Whether the set earns its parameters, in a few words."),
 )
+WORK = (
+    Item(
+        "level",
+        "text",
+        "How urgent it is.",
+        values={"wrong": "chance does not explain it", "weak": "little holds or checks it", "doubtful": "worth a look"},
+    ),
+    Item("kind", "text", "What it is about.", values=dict.fromkeys(KINDS, "")),
+    Item("where", "text", "Where to look."),
+    Item("what", "text", "What was found."),
+    Item("times_limit", "number?", "How many times the limit it is."),
+    Item("do", "text", "What to do."),
+)
+EFFECTS_OF_PARAMETERS = (
+    Item("left_out", "text", "What is left out: nothing, all additional parameters, a family, or one parameter."),
+    Item("group", "text?", "Camera or group of a single parameter."),
+    Item("t", "number?", "Value over standard deviation of a single parameter."),
+    *of_axes("rms_{}", "number?", "Root mean square difference in {} at the check points without it.", "m"),
+    Item("verdict", "text?", "Whether leaving it out makes a difference."),
+)
 
 
 def adjust_tables() -> tuple[DescribedFile, ...]:
@@ -204,6 +225,13 @@ def adjust_tables() -> tuple[DescribedFile, ...]:
         table("parameters.csv", "Interior orientation, additional parameters, GNSS and INS parameters.", PARAMETERS),
         table("control.csv", "Residuals and reliability of the control points.", CONTROL),
         table("check.csv", "Differences at the check points.", GROUND),
+        table("work_list.csv", "What to look at next, the most urgent first.", WORK),
+        table(
+            "parameter_effects.csv",
+            "What the additional parameters bring at the check points.",
+            EFFECTS_OF_PARAMETERS,
+            "with additional parameters and check points",
+        ),
         table(
             "observations.csv",
             "Residuals of positions, angles and conditions.",

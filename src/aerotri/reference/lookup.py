@@ -101,14 +101,16 @@ def find(words: str, known: Sequence[Entry]) -> list[Entry]:
     asked = CAMERA.sub("camera.NAME.", " ".join(words.split()))
     for fold in (str, str.casefold):
         found = [
-            entry
-            for names_of in (_full_names, _short_names)
-            for entry in known
-            if fold(asked) in map(fold, names_of(entry))
+            entry for names in (_full_names, _short_names) for entry in known if fold(asked) in map(fold, names(entry))
         ]
         if found:
             return sorted(dict.fromkeys(found), key=lambda entry: KINDS.index(entry.kind))
     return []
+
+
+def names_of(entry: Entry) -> tuple[str, ...]:
+    """All names by which an entry is found, the full ones first."""
+    return (*_full_names(entry), *_short_names(entry))
 
 
 def near(words: str, known: Sequence[Entry]) -> list[str]:
