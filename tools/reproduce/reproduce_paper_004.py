@@ -37,34 +37,21 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from aerotri.conventions import mm_from_px
-from aerotri.pipeline import adjust_keeping_system
-from aerotri.rasters.images import create_image
-from aerotri.report.plots.canvas import GREY, INK, WIDTH, axes_at, new_figure, styled
-from aerotri.report.plots.rendering import save_plots
-from aerotri.simulation import parse_spec, simulate
-from aerotri.simulation.rendering import RenderOptions, Scene, make_scene, render
-from aerotri.terrain.compare import RasterHeights, compare
-from aerotri.terrain.dtm import TerrainPlan, make_terrain_model
-from aerotri.terrain.interval import (
-    K_MOUNTAINS,
-    K_PLAIN,
-    chosen_interval,
-    expected_error_pickets,
-    interval_by_formula,
-    interval_by_rule,
-)
-from aerotri.terrain.surface import grid_over
+import aerotri
+from aerotri import drawing, geometry, predict
 
 INTERVALS = (20.0, 30.0, 40.0, 60.0, 80.0, 100.0, 120.0)
 TERRAINS = {
     "plain": {"kind": "undulating", "height_m": 50.0, "relief_rms_m": 4.0, "wavelength_m": 500.0},
     "mountains": {"kind": "undulating", "height_m": 300.0, "relief_rms_m": 30.0, "wavelength_m": 450.0},
 }
-GRAIN = RenderOptions(noise=450.0, contrast=0.25, detail_px=2.5)
+LOOK = {"noise": 450.0, "contrast": 0.25, "detail_px": 2.5}
+MEAN, NOISE = 16000.0, LOOK["noise"]
+"""Grey values of the photographs: their mean and σ."""
 PATCHES = {"plain": (("rows", 0.12), ("pond", 0.04)), "mountains": (("rows", 0.12), ("dark", 0.12))}
 """Share of the ground that is fields of plants in rows, ponds that glitter anew in every photograph, or dark wood."""
 PATCH_RADIUS_M, ROWS_M, REACH_M = (25.0, 60.0), 7.0, 700.0
@@ -77,14 +64,14 @@ HEAD = """# Paper 004: error pickets and RMSE over the interval between pickets
 Rendered film-like photographs, 60 % end lap, GSD 1 m, windows of 11 px, threshold 0.90, matched at the paper's
 intervals. Error pickets are those that backward matching, a second place of nearly the same correlation, neighbours or
 the TIN speak against; the law e = p·S/PSI² has the p that fits all intervals best (Poisson counts)."""
-WINDOW_PX, CELL_M, GROUND_ROUNDS = 11, 5.0, 25
+WINDOW_PX, CELL_M, MOST_PHOTOGRAPHS, GROUND_ROUNDS = 11, 5.0, 5, 25
 AREAS = (
-    # area, scan µm, scale, k, intervals called optimal, of the paper's sections 3.1 to 3.4
-    ("Co Loa", 28.0, 7000.0, K_PLAIN, "30–40"),
-    ("Duong Lam 1, 2", 16.0, 33000.0, K_PLAIN, "50–70"),
-    ("Ba Vi 1", 20.0, 32000.0, K_PLAIN, "80–100"),
-    ("Ba Vi 2", 20.0, 32000.0, K_MOUNTAINS, "60–80"),
-    ("Lang Son", 32.0, 35000.0, K_MOUNTAINS, "80–100"),
+    # area, scan µm, scale, kind of terrain, intervals called optimal, of the paper's sections 3.1 to 3.4
+    ("Co Loa", 28.0, 7000.0, "plain", "30–40"),
+    ("Duong Lam 1, 2", 16.0, 33000.0, "plain", "50–70"),
+    ("Ba Vi 1", 20.0, 32000.0, "plain", "80–100"),
+    ("Ba Vi 2", 20.0, 32000.0, "mountains", "60–80"),
+    ("Lang Son", 32.0, 35000.0, "mountains", "80–100"),
 )
 
 
@@ -113,7 +100,7 @@ def main() -> None:
         figures[f"paper_004_{name}"] = draw(name, rows, area)
     lines += areas()
     print("\n".join(lines))
-    save_plots(figures, folder / "plots")
+    drawing.save_plots(figures, folder / "plots")
     print(f"\nplots in {folder / 'plots'}")
     if arguments.keep:
         (RESULTS / "paper_004.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -130,17 +117,18 @@ def areas() -> list[str]:
         "| area | scan µm | scale | chosen m | formula m | 30·GSD m |",
         "|---|---|---|---|---|---|",
     ]
-    for area_name, scan, scale, k, chosen in AREAS:
-        low, high = (interval_by_formula(scan, scale, value) for value in k)
-        rule = interval_by_rule(1e-6 * scan * scale)
-        lines.append(f"| {area_name} | {scan:.0f} | {scale:.0f} | {chosen} | {low:.0f}–{high:.0f} | {rule:.1f} |")
+    for area_name, scan, scale, kind, chosen in AREAS:
+        found = predict.picket_interval(scan_um=scan, scale=scale)
+        low, high = found.by_formula[kind]
+        lines.append(
+            f"| {area_name} | {scan:.0f} | {scale:.0f} | {chosen} | {low:.0f}–{high:.0f} | {found.older_rule:.1f} |"
+        )
     return lines
 
 
 def intervals_of(folder: Path, terrain: dict) -> tuple[list[Row], float]:
     """Every interval matched and judged, and the area in m²."""
-    folder.mkdir(parents=True, exist_ok=True)
-    spec = parse_spec({
+    flight = aerotri.simulate({
         "name": "pickets",
         "camera": {"rmk": {"preset": "rmk_top_15", "size_px": [800, 800], "pixel_um": 287.5}},
         "flight": {"gsd_m": 1.0, "strips": 1, "images_per_strip": 3, "end_lap": 0.6},
@@ -148,34 +136,26 @@ def intervals_of(folder: Path, terrain: dict) -> tuple[list[Row], float]:
         "tie_points": {"per_image": 80, "probability": 0.9, "sigma_um": 20.0},
         "control": {"distance_bases": 1.0, "sigma_m": [0.05, 0.05, 0.05]},
         "start_values": {"kind": "perturbed"},
-    })  # fmt: skip
-    block, truth = simulate(spec, 7)
-    scene = make_scene(spec, 7, block, truth, GRAIN)
-    paths = []
-    for k, name in enumerate(scene.names):
-        paths.append(folder / f"{name}.tif")
-        if not paths[-1].exists():
-            pixels = painted(scene, k, render(scene, k), patches(PATCHES[folder.name]))
-            with create_image(paths[-1], *pixels.shape[::-1], 1, "uint16") as writer:
-                writer.write(0, pixels[None])
-    calibration = adjust_keeping_system(block)
+    }, 7)  # fmt: skip
+    paint(flight, folder, patches(PATCHES[folder.name]))
+    result = aerotri.adjust(flight.block, explain=False)
     rows, area = [], 0.0
     for interval in INTERVALS:
-        plan = TerrainPlan(
-            np.arange(len(paths)), tuple(paths), interval, CELL_M, pairs=True, step=1, window_px=WINDOW_PX
+        found = aerotri.terrain(
+            result, folder / "painted", interval=interval, cell=CELL_M, pairs=True, step=1, window=WINDOW_PX,
+            most_photographs=MOST_PHOTOGRAPHS,
         )  # fmt: skip
-        found = make_terrain_model(calibration, plan)
-        p = found.pickets
+        p, grid = found.record.pickets, found.dsm.grid
         own = p.accepted
-        off = np.abs(p.xyz[own, 2] - scene.terrain.height(p.xyz[own, :2]))
-        grid = grid_over(p.xyz[own, :2], CELL_M)
+        off = np.abs(p.xyz[own, 2] - flight.true_heights(p.xyz[own, :2]))
         x, y = np.meshgrid(grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows)))
-        control = scene.terrain.height(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
-        judged = compare(RasterHeights(found.dsm.grid, found.dsm.z), RasterHeights(grid, control), grid)
+        true = flight.true_heights(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
+        control = aerotri.Surface.of_array(true, left=grid.left, top=grid.top, cell=CELL_M)
+        rmse = aerotri.compare(found.dsm, control).rmse
         gross = int((off > 3.0).sum())
         measured = int((own | p.errors).sum())
         holes = int((p.status != 1).sum()) - measured
-        rows.append(Row(interval, measured, int(p.errors.sum()), gross, judged.statistics.rmse, holes))
+        rows.append(Row(interval, measured, int(p.errors.sum()), gross, rmse, holes))
         area = area or float((p.status != 1).sum() * interval**2)
     return rows, area
 
@@ -193,28 +173,41 @@ def patches(shares: tuple[tuple[str, float], ...]) -> list[tuple[str, float, flo
     return out
 
 
-def painted(scene: Scene, image: int, pixels: np.ndarray, found: list) -> np.ndarray:
+def paint(flight, folder: Path, found: list) -> None:
+    """Photographs with their patches, in painted/; those that are there stay."""
+    names = flight.block.images.names.tolist()
+    (folder / "painted").mkdir(parents=True, exist_ok=True)
+    if all((folder / "painted" / f"{name}.tif").exists() for name in names):
+        return
+    flown = flight.save(folder / "flown", photographs=True, **LOOK) / "photographs"
+    for k, name in enumerate(names):
+        pixels = cv2.imread(str(flown / f"{name}.tif"), cv2.IMREAD_UNCHANGED)
+        cv2.imwrite(str(folder / "painted" / f"{name}.tif"), painted(flight, k, pixels, found))
+
+
+def painted(flight, image: int, pixels: np.ndarray, found: list) -> np.ndarray:
     """The photograph with its patches."""
-    camera, photographs = scene.camera(image).nominal, scene.photographs
+    camera, truth = flight.block.cameras[0], flight.truth
     column, row = np.meshgrid(np.arange(pixels.shape[1]) + 0.5, np.arange(pixels.shape[0]) + 0.5)
-    xy = mm_from_px(np.column_stack([column.ravel(), row.ravel()]), camera.size_px, camera.pixel_mm)
-    ray = np.column_stack([xy, np.full(len(xy), -camera.focal_length_mm)]) @ photographs.rotation[image].T
-    centre, height = photographs.centre[image], np.full(len(xy), scene.terrain.base)
+    xy = geometry.mm_from_px(np.column_stack([column.ravel(), row.ravel()]), camera.size_px, camera.pixel_mm)
+    rotation = geometry.rotation_from_angles(truth.angles[image], flight.block.rotation)
+    ray = np.column_stack([xy, np.full(len(xy), -camera.focal_length_mm)]) @ rotation.T
+    centre, height = truth.centre[image], np.full(len(xy), flight.plan.terrain.height_m)
     for _ in range(GROUND_ROUNDS):
         plan = centre[:2] + (height - centre[2])[:, None] * ray[:, :2] / ray[:, 2:]
-        height = scene.terrain.height(plan)
+        height = flight.true_heights(plan)
     out, rng = pixels.astype(float).ravel(), np.random.default_rng(image)
     for kind, x, y, radius, direction in found:
         own = np.flatnonzero(np.hypot(plan[:, 0] - x, plan[:, 1] - y) < radius)
         mean, size = LOOKS[kind]
         # light and shade of the ground stay a little; what a pond shows is never the same again
-        change = 0.15 * (out[own] - GRAIN.mean) * mean / GRAIN.mean
+        change = 0.15 * (out[own] - MEAN) * mean / MEAN
         if kind == "rows":
             phase = 2.0 * np.pi * (plan[own] @ (np.cos(direction), np.sin(direction))) / ROWS_M
             change = change + size * np.sin(phase)
         elif kind == "pond":
             change = size * rng.normal(size=len(own))
-        out[own] = mean + change + GRAIN.noise * rng.normal(size=len(own))
+        out[own] = mean + change + NOISE * rng.normal(size=len(own))
     return np.clip(np.rint(out), 0.0, 65535.0).astype(np.uint16).reshape(pixels.shape)
 
 
@@ -235,7 +228,7 @@ def tell(name: str, rows: list[Row], area: float) -> list[str]:
         "|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
-        expected, percent = expected_error_pickets(share, area, row.interval), 100.0 * row.errors / row.pickets
+        expected, percent = predict.error_pickets(share, area, row.interval), 100.0 * row.errors / row.pickets
         lines.append(
             f"| {row.interval:.0f} | {row.pickets} | {row.errors} | {percent:.1f} | {expected:.1f} | {row.holes} "
             f"| {row.gross} | {row.rmse:.3f} |"
@@ -243,10 +236,10 @@ def tell(name: str, rows: list[Row], area: float) -> list[str]:
     interval, rmse = np.array([r.interval for r in rows]), np.array([r.rmse for r in rows])
     slope, constant = np.polyfit(interval, rmse, 1)
     r2 = 1.0 - np.var(rmse - slope * interval - constant) / np.var(rmse)
-    errors, law = np.array([r.errors for r in rows]), expected_error_pickets(share, area, interval)
+    errors, law = np.array([r.errors for r in rows]), predict.error_pickets(share, area, interval)
     power = np.polyfit(np.log(interval[errors > 0]), np.log(errors[errors > 0]), 1, w=np.sqrt(errors[errors > 0]))[0]
     chi2 = float(np.sum((errors - law) ** 2 / law))
-    twice = chosen_interval(interval, rmse, 2.0 * rmse[0])
+    twice = np.exp(np.interp(np.log(2.0 * rmse[0]), np.maximum.accumulate(np.log(rmse)), np.log(interval)))
     return [
         *lines,
         "",
@@ -258,23 +251,23 @@ def tell(name: str, rows: list[Row], area: float) -> list[str]:
     ]
 
 
-@styled
+@drawing.styled
 def draw(name: str, rows: list[Row], area: float) -> Figure:
     """Error pickets and the law, RMSE on the right axis, as the paper's figures."""
     share = error_share(rows, area)
-    figure = new_figure(
+    figure = drawing.new_figure(
         4.2, f"Error pickets and RMSE – {name}", f"{area / 1e4:.0f} ha, GSD 1 m, window {WINDOW_PX} px, threshold 0.90"
     )  # fmt: skip
-    axes = axes_at(figure, 0.8, 0.9, WIDTH - 1.7, 2.5)
+    axes = drawing.axes_at(figure, 0.8, 0.9, drawing.WIDTH - 1.7, 2.5)
     interval = [row.interval for row in rows]
     fine = np.linspace(interval[0], interval[-1], 200)
-    axes.plot(interval, [row.errors for row in rows], "-o", ms=4, color=INK, label="error pickets")
-    axes.plot(fine, expected_error_pickets(share, area, fine), ":", color=INK, label="p·S/PSI²")
+    axes.plot(interval, [row.errors for row in rows], "-o", ms=4, color=drawing.INK, label="error pickets")
+    axes.plot(fine, predict.error_pickets(share, area, fine), ":", color=drawing.INK, label="p·S/PSI²")
     axes.set_xlabel("PSI [m]")
     axes.set_ylabel("number of error pickets")
     axes.set_ylim(bottom=0.0)
     right = axes.twinx()
-    right.plot(interval, [row.rmse for row in rows], "--s", ms=4, color=GREY, label="RMSE")
+    right.plot(interval, [row.rmse for row in rows], "--s", ms=4, color=drawing.GREY, label="RMSE")
     right.set_ylabel("RMSE [m]")
     right.set_ylim(bottom=0.0)
     handles = axes.get_legend_handles_labels()[0] + right.get_legend_handles_labels()[0]
