@@ -200,7 +200,7 @@ def test_places_that_do_not_meet(ten):
     away = replace(away, control=replace(away.control, xyz=away.control.xyz + np.where(checks, [5e5, 5e6, 0.0], 0.0)))
     assert said(away) == ""
     turned = replace(away, control=replace(away.control, xyz=away.control.xyz[:, [1, 0, 2]]))
-    assert "X and Y of one of them are exchanged" in said(turned)
+    assert "X and Y of one of the two look exchanged" in said(turned)
     assert "are both in metres?" in said(with_positions(ten, lambda xyz: 1000.0 * xyz))
     assert "are both in metres?" in said(with_control(ten, lambda xyz: 1e-5 * xyz))
     assert "not above it" in said(with_positions(ten, lambda xyz: xyz - [0.0, 0.0, 5000.0]))
@@ -210,6 +210,9 @@ def test_units_that_cannot_be(ten):
     """Image points in the wrong unit, angles in another one than stated."""
     small = replace(ten, image_points=replace(ten.image_points, xy=ten.image_points.xy * 0.01))
     assert "check image_unit, size_px and pixel_um" in said(small)
+    half = np.array(ten.cameras[0].half_format_mm)
+    corner = replace(ten, image_points=replace(ten.image_points, xy=ten.image_points.xy * 0.01 - 0.98 * half))
+    assert "check image_unit, size_px and pixel_um" in said(corner)
     assert said(with_image_points(ten, 0, lambda xy: 0.01 * xy)) == ""
     as_radians = with_attitudes(ten, lambda angles: angles * np.pi / 180.0)
     assert "half a circle in radians, but angle_unit says degrees" in said(as_radians)

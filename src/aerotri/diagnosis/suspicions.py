@@ -17,6 +17,8 @@ FEW_POINTS = 4
 SMALL_PART = 0.25
 """Share of the half format that the outermost image point of a camera should reach [C]: photographs are measured up to
 their edges, and a wrong unit or size is off by far more."""
+FEWEST_PLACES = 8
+"""Image points of a camera that tell what part of its format is measured [C]: two photographs with four each."""
 APART = 3.0
 """Distance of control from the photographs in plan, in the size of the larger of the two areas, from which it is asked
 whether both are in one system [C]."""
@@ -113,7 +115,7 @@ def _places(block: Block) -> list[str]:
         if _distance(ground, above) > APART:
             away = float(np.hypot(*(np.median(ground[:, :2], axis=0) - np.median(above[:, :2], axis=0))))
             turned = _distance(ground[:, [1, 0, 2]], above) <= APART
-            why = "X and Y of one of them are exchanged" if turned else "are both in the same coordinate system?"
+            why = "X and Y of one of the two look exchanged" if turned else "are both in the same coordinate system?"
             said.append(f"{what} {away:.4g} m from the {where}: {why}")
         elif not is_check:
             said += [*_spans(ground, above, where), *_heights(ground[:, 2], above[:, 2], where)]
@@ -144,17 +146,18 @@ def _heights(ground: np.ndarray, above: np.ndarray, what: str) -> list[str]:
 
 
 def _formats(block: Block) -> list[str]:
-    """Image points that fill only the middle of their format."""
+    """Image points that fill only the middle of their format, or one place of it, as millimetres read as pixels do."""
     said, rays = [], block.image_points
     camera = block.images.camera[rays.image]
     for number, one in enumerate(block.cameras):
         own = camera == number
         if not own.any() or one.fiducials:
             continue
-        reach = float((np.abs(rays.xy[own]) / np.array(one.half_format_mm)).max())
-        if reach < SMALL_PART:
+        place = rays.xy[own] / np.array(one.half_format_mm)
+        reach, spread = float(np.abs(place).max()), float(np.ptp(place, axis=0).max()) / 2.0
+        if min(reach, spread) < SMALL_PART and len(place) >= FEWEST_PLACES:
             said.append(
-                f"the image points of camera '{one.name}' reach to {100.0 * reach:.2g} % of its half format: check "
+                f"the image points of camera '{one.name}' fill {100.0 * min(reach, spread):.2g} % of its format: check "
                 "image_unit, size_px and pixel_um"
             )
     return said

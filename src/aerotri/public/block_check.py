@@ -81,8 +81,16 @@ class BlockCheck:
             *(f"note: {text}" for text in self.notes),
             *(f"warning: {text}" for text in self.warnings),
             *(f"missing: {text}" for text in self.missing),
-            "The block can be adjusted." if self.can_be_adjusted else "The block cannot be adjusted yet.",
+            self._conclusion(),
         ]
+
+    def _conclusion(self) -> str:
+        if not self.can_be_adjusted:
+            return "The block cannot be adjusted yet."
+        if not self.warnings:
+            return "The block can be adjusted."
+        which = "warning" if len(self.warnings) == 1 else f"{len(self.warnings)} warnings"
+        return f"The block can be adjusted, but look at the {which} above first."
 
     def __repr__(self) -> str:
         able = "can be adjusted" if self.can_be_adjusted else "cannot be adjusted"

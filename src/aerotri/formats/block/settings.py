@@ -166,7 +166,7 @@ def read_block_toml(path: Path) -> BlockToml:
 def _as_input_error(error: ValidationError | OverflowError, path: Path, text: str) -> InputError:
     if not isinstance(error, ValidationError):
         return InputError("holds a number too large to be read", "give a smaller number", path)
-    first = error.errors(include_url=False)[0]
+    first = _first(error)
     where = tuple(part for part in first["loc"])
     key = ".".join(str(part) for part in where) or "block.toml"
     line = line_of_key(text, where)
@@ -182,6 +182,12 @@ def _as_input_error(error: ValidationError | OverflowError, path: Path, text: st
         if kind == "string_type":
             remedy = "put names in quotes"
     return InputError(message, remedy, path, line)
+
+
+def _first(error: ValidationError) -> Any:
+    """The mistake to say first: a key that is unknown before one that is missing, which it may be misspelt."""
+    found = error.errors(include_url=False)
+    return next((one for one in found if one["type"] == "extra_forbidden"), found[0])
 
 
 def _reason(first: Any) -> str:
@@ -230,7 +236,7 @@ def checked_settings(table: str, values: Mapping[str, object]) -> dict[str, Any]
     try:
         model.model_validate(listed)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
+        first = _first(error)
         name = ".".join(str(part) for part in first["loc"])
         if first["type"] == "extra_forbidden":
             raise InputError(f"there is no setting '{name}'", _known_keys((table, name))) from None
