@@ -7,7 +7,6 @@ that Sphinx builds anew what has to be.
 from __future__ import annotations
 
 import importlib
-import json
 import pkgutil
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,7 +22,7 @@ from aerotri.reference.block_tables import block_table_files
 from aerotri.reference.command_lines import CommandLine, CommandOption, command_lines
 from aerotri.reference.files import described_files
 from aerotri.reference.records import DescribedFile, Item
-from aerotri.reference.schemas import json_files, schema_of
+from aerotri.reference.schemas import schema_name, schema_texts
 from aerotri.reference.words import MARKS, WORDS
 
 GROUPS = {
@@ -91,10 +90,8 @@ def write_pages(out: Path) -> None:
     (out / "commands").mkdir(parents=True, exist_ok=True)
     (out / "outputs").mkdir(exist_ok=True)
     (out / "schemas").mkdir(exist_ok=True)
-    for described in json_files():
-        _write(
-            out / "schemas" / _schema_name(described), json.dumps(schema_of(described), indent=2, ensure_ascii=False)
-        )
+    for name, text in schema_texts().items():
+        _write(out / "schemas" / name, text)
     _write(out / "block_toml.md", block_toml_page())
     _write(out / "block_tables.md", block_tables_page())
     _write(out / "simulation_toml.md", simulation_toml_page())
@@ -202,7 +199,8 @@ def outputs_page() -> str:
         "Every file that a command writes. Lengths on the ground are metres, image coordinates millimetres, angles "
         "degrees, unless a unit is given. Every standard deviation contains σ0. A cell that is not known is empty, "
         "a JSON value `null`. Names that begin with `x_` may change; all others stay.", "", SPOKEN, "",
-        "Each JSON file has a [JSON Schema](https://json-schema.org), linked where it is described.", "",
+        "Each JSON file has a [JSON Schema](https://json-schema.org), linked where it is described. The package brings "
+        "them along, in `aerotri/reference/schema_files`.", "",
     ]  # fmt: skip
     for place, (page, title) in GROUPS.items():
         own = [one for one in described_files() if one.place == place]
@@ -230,14 +228,7 @@ def _head_of(described: DescribedFile) -> Iterable[str]:
     if described.when:
         yield f"Written {described.when}."
     if described.form == "json":
-        yield f"{{download}}`JSON Schema <../schemas/{_schema_name(described)}>`"
-
-
-def _schema_name(described: DescribedFile) -> str:
-    """Name of the schema's file: that of the file, with the place where it is not alone of its name."""
-    alone = sum(one.name == described.name for one in json_files()) == 1
-    name = described.name if alone else described.label
-    return f"{_file_name(name.removesuffix('.json'))}.schema.json"
+        yield f"{{download}}`JSON Schema <../schemas/{schema_name(described)}>`"
 
 
 def _item_table(items: Sequence[Item], needed: bool = False) -> list[str]:

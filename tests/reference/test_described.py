@@ -16,7 +16,7 @@ from aerotri.reference.adjust_tables import RESIDUALS
 from aerotri.reference.block_keys import block_keys, block_tables, plan_keys, plan_tables, prior_keys
 from aerotri.reference.block_tables import READERS, block_table_files
 from aerotri.reference.files import described_files
-from aerotri.reference.schemas import json_files, schema_of
+from aerotri.reference.schemas import SHIPPED, json_files, schema_of, schema_texts
 from aerotri.simulation.spec import SimulationSpec
 from aerotri.terrain.picket_status import PicketStatus
 
@@ -113,3 +113,8 @@ def test_schemas_are_schemas(described):
     schema = schema_of(described)
     jsonschema.Draft202012Validator.check_schema(schema)
     assert json.loads(json.dumps(schema)) == schema
+
+
+def test_the_schemas_of_the_package_are_those_of_the_reference():
+    """`python -m aerotri.reference.schemas` writes them anew."""
+    assert {path.name: path.read_text(encoding="utf-8") for path in SHIPPED.glob("*.json")} == schema_texts()

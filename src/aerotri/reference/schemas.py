@@ -1,8 +1,14 @@
-"""JSON Schemas of the JSON files, made from the reference: what it does not name is not allowed."""
+"""JSON Schemas of the JSON files, made from the reference: what it does not name is not allowed.
+
+The folder `schema_files` beside this module holds them as files; `python -m aerotri.reference.schemas` writes them
+anew.
+"""
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from aerotri.reference.files import described_files
@@ -10,6 +16,9 @@ from aerotri.reference.records import DescribedFile, Item
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 TYPES = {"text": "string", "number": "number", "whole": "integer", "yes/no": "boolean", "object": "object"}
+
+SHIPPED = Path(__file__).parent / "schema_files"
+"""The schemas as files of the package."""
 
 
 @dataclass
@@ -48,6 +57,18 @@ def schema_of(described: DescribedFile) -> dict[str, Any]:
     return {"$schema": DRAFT, "title": described.label, "description": described.text, **_schema(root)}
 
 
+def schema_name(described: DescribedFile) -> str:
+    """Name of the schema's file: that of the file, with the place where it is not alone of its name."""
+    alone = sum(one.name == described.name for one in json_files()) == 1
+    name = (described.name if alone else described.label).removesuffix(".json")
+    return "_".join("".join(c if c.isalnum() else " " for c in name).split()) + ".schema.json"
+
+
+def schema_texts() -> dict[str, str]:
+    """The schemas as text, by the name of their file."""
+    return {schema_name(one): json.dumps(schema_of(one), indent=2, ensure_ascii=False) + "\n" for one in json_files()}
+
+
 def _path(name: str) -> list[str]:
     """'groups[].rms' as groups, [], rms."""
     parts: list[str] = []
@@ -83,3 +104,8 @@ def _object(node: _Node) -> dict[str, Any]:
         content["required"] = [name for name, below in named.items() if not below.is_optional]
     content["additionalProperties"] = _schema(node.keys["*"]) if "*" in node.keys else False
     return content
+
+
+if __name__ == "__main__":
+    for file_name, text in schema_texts().items():
+        (SHIPPED / file_name).write_text(text, encoding="utf-8")

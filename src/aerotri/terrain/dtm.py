@@ -132,14 +132,11 @@ def make_terrain_model(calibration: Adjustment, plan: TerrainPlan, report: Repor
     )  # fmt: skip
     models = models_of(calibration, photographs, plan.step) if plan.pairs else None
     pickets = measure(photographs, known, options, plan.area, models, lambda share: tell("matching", share))
-    if pickets.accepted.sum() < 3:
-        raise InputError(
-            f"only {counted(int(pickets.accepted.sum()), 'ground point')} (pickets) could be measured and accepted",
-            "lower --threshold; check that the photographs overlap, are sharp and belong to this orientation",
-        )
+    _refuse_few(pickets.accepted)
     pickets = with_error_pickets(pickets, gsd / base_ratio(photographs, pickets))
     tell("statistics", 0.97)
     adjustment = adjustment_variances(calibration, photographs.restitution, plan.rows, pickets)
+    _refuse_few(pickets.accepted & np.isfinite(adjustment[:, 2]))
     outcome = _surfaces(pickets, adjustment, interval, plan, 0.5 * plan.window_px * gsd)
     tell("surfaces", 1.0)
     number = _model_numbers(outcome[0], pickets) if models is not None else np.zeros((0, 0), np.int32)
@@ -148,6 +145,20 @@ def make_terrain_model(calibration: Adjustment, plan: TerrainPlan, report: Repor
         pickets, adjustment, ground, dsm, dtm, models, number, interval, source, dsm.grid.cell_x, interpolation,
         photographs,
     )  # fmt: skip
+
+
+def _refuse_few(accepted: np.ndarray) -> None:
+    """Three points make a surface.
+
+    Raises
+    ------
+    InputError
+    """
+    if accepted.sum() < 3:
+        raise InputError(
+            f"only {counted(int(accepted.sum()), 'ground point')} (pickets) could be measured and accepted",
+            "lower --threshold; check that the photographs overlap, are sharp and belong to this orientation",
+        )
 
 
 def _own_interval(photographs: Photographs, known: np.ndarray, gsd: float, plan: TerrainPlan) -> tuple[float, str]:

@@ -33,8 +33,9 @@ def terrain_json(outcome: TerrainOutcome, block: str, crs: str) -> dict[str, Any
         },
         "status": {status.text: int(n) for status, n in zip(PicketStatus, count, strict=True)},
         "sigma_Z_m": {
-            "median": float(np.median(np.sqrt(matching + adjustment))), "matching": float(np.median(np.sqrt(matching))),
-            "adjustment": float(np.median(np.sqrt(adjustment))), "interpolation": o.interpolation,
+            "median": float(np.nanmedian(np.sqrt(matching + adjustment))),
+            "matching": float(np.median(np.sqrt(matching))),
+            "adjustment": float(np.nanmedian(np.sqrt(adjustment))), "interpolation": o.interpolation,
         },
         "ray_sigma_px": float(_ray_sigma_mm(o) / pixel), "sigma0_rays": float(np.nan_to_num(p.sigma0)),
         "ground_share": float(o.ground[own].mean()),
