@@ -91,12 +91,12 @@ def _say(text: str) -> None:
 
 
 def _write(folder: Path, runs: list[Run], table: str, threads: int) -> None:
-    from aerotri.report.plots.rendering import save_plots
+    from aerotri import drawing
 
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "benchmark.md").write_text(table, encoding="utf-8")
     (folder / "benchmark.json").write_text(json.dumps([run.as_dict() for run in runs], indent=1), encoding="utf-8")
-    save_plots({"benchmark_adjust": plot_times(rows_of(runs), threads)}, folder)
+    drawing.save_plots({"benchmark_adjust": plot_times(rows_of(runs), threads)}, folder)
     _say(f"written to {folder}")
 
 

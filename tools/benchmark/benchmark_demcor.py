@@ -120,17 +120,22 @@ def _cases(folder: Path, result: Path, cells: int, arguments: argparse.Namespace
 
 def _make_dem(path: Path, middle: np.ndarray, width: float, cells: int, options: dict) -> None:
     """Hills of some ten metres and a roughness of 3 cm, rounded to centimetres."""
-    from aerotri.rasters.grids import Grid, RasterWriter
+    import rasterio
+    from rasterio.windows import Window
 
-    cell = width / cells
-    grid = Grid(cells, cells, float(middle[0]) - width / 2.0, float(middle[1]) + width / 2.0, cell, cell)
+    cell, left, top = width / cells, float(middle[0]) - width / 2.0, float(middle[1]) + width / 2.0
+    profile = {"driver": "GTiff", "width": cells, "height": cells, "count": 1, "dtype": "float32",
+               "tiled": True, "blockxsize": 512, "blockysize": 512,
+               "nodata": -9999.0, "BIGTIFF": "IF_SAFER", "num_threads": os.cpu_count() or 1,
+               "transform": rasterio.Affine(cell, 0.0, left, 0.0, -cell, top), **options}  # fmt: skip
     rng = np.random.default_rng(1)
-    x = grid.x(np.arange(cells))
-    with RasterWriter(path, grid, options=options, threads=os.cpu_count() or 1) as writer:
+    x = left + (np.arange(cells) + 0.5) * cell
+    with rasterio.Env(GDAL_CACHEMAX=256), rasterio.open(path, "w", **profile) as writer:
         for first in range(0, cells, WINDOW):
-            y = grid.y(np.arange(first, min(first + WINDOW, cells)))[:, None]
+            y = top - (np.arange(first, min(first + WINDOW, cells)) + 0.5)[:, None] * cell
             z = 60.0 + 20.0 * np.sin(x / 300.0) * np.cos(y / 250.0) + 0.03 * rng.standard_normal((len(y), cells))
-            writer.write(first, 0, np.round(z, 2).astype(np.float32))
+            rows = Window(0, first, cells, len(y))  # pyright: ignore[reportCallIssue]
+            writer.write(np.round(z, 2).astype(np.float32), 1, window=rows)
 
 
 def _row(case: Case, result: Path, arguments: argparse.Namespace) -> str:

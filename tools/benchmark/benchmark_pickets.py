@@ -8,6 +8,8 @@ place (TM_CCOEFF_NORMED, minMaxLoc). aerotri rectifies the template and the stri
 errors, in 16 bits, and goes from places to heights. Beside it stands OpenCV with rectification at every height: two
 remaps to a window, then the coefficient of the two.
 
+Measures the kernel of the search alone: imports inside on purpose.
+
 Last result, Brighton, two quiet cores:
 
     9999 nodes, 17 posts a side, 17 places; OpenCV 5.0.0
@@ -29,8 +31,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from aerotri.commands.console import Console
-from aerotri.commands.results import reopened
+import aerotri
 from aerotri.public.terrain import terrain_plan
 from aerotri.terrain._plan_kernels import Nodes, Plan
 from aerotri.terrain._search_kernels import find_heights
@@ -43,7 +44,7 @@ POSTS, HALF_RANGE, ROUNDS = 17, 8, 5
 
 def prepare(result: Path, folder: Path, count: int):
     """View, nodes (n, 3), pairs (n, 2), ranges and post size of nodes in the middle of the block."""
-    calibration = reopened(result, Console(quiet=True))
+    calibration = aerotri.open_result(result).record
     plan, _ = terrain_plan(calibration, [folder], TerrainSettings())
     photographs = photographs_of(calibration, plan.rows, plan.paths)
     known = calibration.result.points.xyz

@@ -23,10 +23,8 @@ from statistics import median
 
 from pyarrow import csv, parquet
 
-from adjusting.blocks import spec_of
-from aerotri.formats.block.folder import read_block
-from aerotri.formats.block.writer import write_block
-from aerotri.simulation import parse_spec, simulate
+import aerotri
+from adjusting.blocks import plan_of
 
 
 def main() -> None:
@@ -41,15 +39,15 @@ def main() -> None:
 
 
 def _reading(place: Path, photographs: int, repeats: int) -> None:
-    block, _ = simulate(parse_spec(spec_of(photographs)), 1)
+    block = aerotri.simulate(plan_of(photographs), 1).block
     print(f"{len(block.images)} photographs, {len(block.image_points)} image points, {len(block.points)} object points")
-    write_block(block, place / "csv")
-    write_block(block, place / "parquet", "parquet")
+    aerotri.convert(block, place / "csv")
+    aerotri.convert(block, place / "parquet", tables="parquet")
     del block
     works = {
-        "CSV, the block": lambda: read_block(place / "csv"),
+        "CSV, the block": lambda: aerotri.read_block(place / "csv"),
         "CSV, image points by pyarrow alone": lambda: csv.read_csv(place / "csv" / "image_points.csv"),
-        "Parquet, the block": lambda: read_block(place / "parquet"),
+        "Parquet, the block": lambda: aerotri.read_block(place / "parquet"),
         "Parquet, image points by pyarrow alone": lambda: parquet.read_table(
             place / "parquet" / "image_points.parquet"
         ),
@@ -61,7 +59,7 @@ def _reading(place: Path, photographs: int, repeats: int) -> None:
 def _starting(place: Path, repeats: int) -> None:
     started = [sys.executable, "-m", "aerotri.cli", "--help"]
     print(f"aerotri --help: {_median(lambda: _run(started), repeats):.2f} s")
-    write_block(simulate(parse_spec(spec_of(30)), 1)[0], place / "small")
+    aerotri.simulate(plan_of(30), 1).save(place / "small")
     adjusted = [sys.executable, "-m", "aerotri.cli", "adjust", str(place / "small"), "--no-plots"]
     adjusted += ["--out", str(place / "result")]
     cache = {"NUMBA_CACHE_DIR": str(place / "numba")}

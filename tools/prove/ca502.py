@@ -19,15 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.formats.assembly.assemble import Statements
-from aerotri.formats.assembly.camera_spec import CameraSpec
-from aerotri.formats.assembly.project import Request, read_project
-from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
-from aerotri.observations import Block, GnssIns, ImagePoints
-from aerotri.pipeline import AdjustmentFailedError, adjust
-from aerotri.public.adjustment import with_settings
-from aerotri.results.adjusted_block import AdjustedBlock
-from aerotri.statistics.set_aside import counts_by_reason, photograph_reasons, point_reasons
+import aerotri
+from aerotri import geometry
 
 PARAMETERS, ROBUST = "brown:K1+K2+K3+P1+P2", "huber"
 FOCAL_MM = {"S": 28.0, "A": 43.0, "D": 43.0, "W": 43.0, "X": 43.0}
@@ -48,7 +41,7 @@ y0_mm = {{ value = 0.0, sigma = 0.5 }}
 """
 
 
-def unoriented(folder: Path) -> Block:
+def unoriented(folder: Path) -> aerotri.Block:
     """The block of the files alone, every head a camera of its own; the first letter of a photograph is its head."""
     with tempfile.TemporaryDirectory() as place:
         bingo, cameras = Path(place) / "tp_bingo.txt", Path(place) / "cameras.toml"
@@ -56,18 +49,15 @@ def unoriented(folder: Path) -> Block:
         bingo.write_text(re.sub(r"^([ADSWX])(\d+) H_\S+", r"\1\2 \1", text, flags=re.MULTILINE), encoding="utf-8")
         parts = [CAMERA.format(name=name, focal=focal) for name, focal in FOCAL_MM.items()]
         cameras.write_text("\n".join(parts), encoding="utf-8")
-        stated = Statements(crs="EPSG:32647", control_prefix="GCP_", control_sigma_m=(0.02, 0.02, 0.03))
-        request = Request(
-            name="ca502",
-            source=str(bingo), positions=str(folder / "gnss_positions.csv"),
-            control=str(folder / "control_points.csv"), camera=CameraSpec(file=cameras), stated=stated,
+        block = aerotri.read(
+            bingo, name="ca502", positions=folder / "gnss_positions.csv", control=folder / "control_points.csv",
+            camera=cameras, crs="EPSG:32647", control_prefix="GCP_", control_sigma_m=(0.02, 0.02, 0.03),
             image_sigma_px=SIGMA_PX, gnss_shift="off",
-        )  # fmt: skip
-        block = read_project(request).block
-    return with_settings(block, {"additional_parameters": PARAMETERS, "robust": ROBUST})
+        ).block  # fmt: skip
+    return aerotri.with_settings(block, parameters=PARAMETERS, robust=ROBUST)
 
 
-def part_of(block: Block, keep: np.ndarray) -> Block:
+def part_of(block: aerotri.Block, keep: np.ndarray) -> aerotri.Block:
     """The block of some photographs (n,) bool."""
     row, images, rays, gnss = np.cumsum(keep) - 1, block.images, block.image_points, block.gnss_ins
     own, observed = keep[rays.image], keep[gnss.image]
@@ -79,59 +69,61 @@ def part_of(block: Block, keep: np.ndarray) -> Block:
             images, names=images.names[keep], camera=np.searchsorted(used, images.camera[keep]),
             strip=images.strip[keep], centre=images.centre[keep], angles=images.angles[keep],
         ),
-        image_points=ImagePoints(row[rays.image[own]], rays.point[own], rays.xy[own], rays.sigma[own]),
-        gnss_ins=GnssIns(
-            row[gnss.image[observed]], gnss.xyz[observed], gnss.sigma[observed], gnss.angles[observed],
-            gnss.angles_sigma[observed], gnss.time[observed],
+        image_points=replace(
+            rays, image=row[rays.image[own]], point=rays.point[own], xy=rays.xy[own], sigma=rays.sigma[own]
+        ),
+        gnss_ins=replace(
+            gnss, image=row[gnss.image[observed]], xyz=gnss.xyz[observed], sigma=gnss.sigma[observed],
+            angles=gnss.angles[observed], angles_sigma=gnss.angles_sigma[observed], time=gnss.time[observed],
         ),
     )  # fmt: skip
 
 
-def exposures(block: Block, first: int, count: int) -> Block:
+def exposures(block: aerotri.Block, first: int, count: int) -> aerotri.Block:
     """The block of some exposures in turn."""
     number = np.array([int(name[1:]) for name in block.images.names.tolist()])
     return part_of(block, np.isin(number, np.unique(number)[first : first + count]))
 
 
-def oriented(block: Block) -> Block:
+def oriented(block: aerotri.Block) -> aerotri.Block:
     """The block with start values: the nadir head as adjusted by itself, turned by the nominal mounting."""
     names = block.images.names.tolist()
     nadir = np.array([name[0] == NADIR for name in names])
-    of_nadir = adjust(part_of(block, nadir)).images
+    alone = aerotri.adjust(part_of(block, nadir), explain=False).adjusted.images
     row = {name[1:]: k for k, name in enumerate(n for n in names if n[0] == NADIR)}
     own = np.array([row.get(name[1:], -1) for name in names])
-    mounted = rotation_from_angles(np.radians([MOUNTING_DEG[name[0]] for name in names]))
-    rotation = rotation_from_angles(of_nadir.angles[own], block.rotation) @ mounted
+    mounted = geometry.rotation_from_angles(np.radians([MOUNTING_DEG[name[0]] for name in names]))
+    rotation = geometry.rotation_from_angles(alone.angles[own], block.rotation) @ mounted
     rotation[own < 0] = np.nan
-    centre, angles = of_nadir.centre[own], angles_from_rotation(rotation, block.rotation)
+    centre, angles = alone.centre[own], geometry.angles_from_rotation(rotation, block.rotation)
     centre[own < 0] = np.nan
     return replace(block, images=replace(block.images, centre=centre, angles=angles))
 
 
-def left_out_in_turn(block: Block, full: AdjustedBlock) -> Iterator[tuple[str, AdjustedBlock | str]]:
+def left_out_in_turn(block: aerotri.Block, full: aerotri.Adjustment) -> Iterator[tuple[str, aerotri.Adjustment | str]]:
     """Every control point as a check point, from the orientation of the full adjustment; why where there is none."""
-    images = replace(block.images, centre=full.images.centre, angles=full.images.angles)
-    for k, point in enumerate(block.control.point):
-        is_check = block.control.is_check.copy()
-        is_check[k] = True
-        variant = replace(block, images=images, control=replace(block.control, is_check=is_check))
+    start = full.adjusted
+    oriented = replace(block, images=replace(block.images, centre=start.images.centre, angles=start.images.angles))
+    for name in block.points[block.control.point].astype(str).tolist():
         try:
-            yield str(block.points[point]), adjust(variant, given_points=full.points.xyz)
-        except AdjustmentFailedError as failure:
-            yield str(block.points[point]), failure.outcome.message
+            yield name, aerotri.adjust(aerotri.edit(oriented, check=[name]), points=start.points.xyz)
+        except aerotri.AdjustmentFailedError as failure:
+            yield name, failure.outcome.message
 
 
-def print_table(result: AdjustedBlock, seconds: float) -> None:
-    o = result.outcome
+def print_table(found: aerotri.Adjustment, seconds: float) -> None:
+    result, o = found.adjusted, found.adjusted.outcome
     print("| status | iterations | seconds | σ0 µm | photographs | points | rays |\n|---|---|---|---|---|---|---|")
     print(
         f"| {o.status} | {o.iterations} | {seconds:.0f} | {o.sigma0_um:.2f} | {int((result.images.rays > 0).sum())} | "
         f"{int((result.points.rays > 0).sum())} | {int((result.rays.status == 0).sum())} |\n"
     )
     print("| set aside | reason | count |\n|---|---|---|")
-    for what, reasons in (("photographs", photograph_reasons(result)), ("points", point_reasons(result))):
-        for reason, count in counts_by_reason(reasons).items():
-            print(f"| {what} | {reason} | {count} |")
+    gone = found.set_aside
+    for kind in ("photograph", "point"):
+        reasons, counts = np.unique(gone["reason"][gone["kind"] == kind].astype(str), return_counts=True)
+        for reason, count in zip(reasons, counts, strict=True):
+            print(f"| {kind}s | {reason} | {count} |")
     print(f"\nVerdict: {o.verdict}; " + "; ".join(o.reasons) + "\n")
 
 
@@ -143,7 +135,7 @@ def main() -> None:
     options = parser.parse_args()
     block = oriented(exposures(unoriented(options.folder), 0, options.exposures))
     started = time.perf_counter()
-    result = adjust(block)
+    result = aerotri.adjust(block, explain=False)
     print_table(result, time.perf_counter() - started)
     if options.leave_out:
         print("| left out | dX m | dY m | dZ m | d/σ X | d/σ Y | d/σ Z |\n|---|---|---|---|---|---|---|")
@@ -151,9 +143,9 @@ def main() -> None:
             if isinstance(found, str):
                 print(f"| {name} | {found} | | | | | |")
                 continue
-            d, s = found.check.difference[0], found.check.sigma[0]
+            d, s = found.adjusted.check.difference[0], found.adjusted.check.sigma[0]
             cells = [f"{a:+.3f} ± {b:.3f}" for a, b in zip(d, s, strict=True)]
-            cells += [f"{a:+.1f}" for a in found.check.w[0]]
+            cells += [f"{a:+.1f}" for a in found.adjusted.check.w[0]]
             print("| " + " | ".join([name, *cells]) + " |", flush=True)
 
 

@@ -8,6 +8,8 @@ compiled, so that a thousand of them are cheap. A third each is killed
 - while the new result is being written, a random time after its hidden folder has appeared,
 - between two operations on files, counted by an audit hook, so that every step of the writing is met.
 
+Measures the commands from within: imports aerotri.cli on purpose.
+
     python tools/prove/kill.py          # a thousand kills, disk full, two at once; writes tools/results/kill.md
     python tools/prove/kill.py --kills 30 --only convert,volume --no-table
 """

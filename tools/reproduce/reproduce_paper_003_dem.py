@@ -37,43 +37,25 @@ the cones' lenses within the tiles, which neither 1–12 nor similarities of til
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
+import csv
 import shutil
 import tempfile
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from aerotri.commands.adjust import run_adjust
-from aerotri.commands.console import Console
-from aerotri.commands.demcor import run_demcor
-from aerotri.commands.imgeo import ImgeoOptions, run_imgeo
-from aerotri.commands.results import reopened
-from aerotri.commands.simulate import run_simulate
-from aerotri.deformation.dem_window import dem_models
-from aerotri.deformation.model_map import read_number_table
-from aerotri.deformation.photo_errors import seams_mm
-from aerotri.deformation.restitution import ABSORBED, restitution_of
-from aerotri.functional_model.additional_parameters import parameter_set, parse_parameters
-from aerotri.public.adjustment import Adjustment
-from aerotri.public.terrain import terrain
-from aerotri.rasters.grids import Grid, RasterReader
-from aerotri.report.plots.canvas import WIDTH, axes_at, new_figure, styled
-from aerotri.report.plots.rendering import save_plots
-from aerotri.simulation import parse_spec, simulate
-from aerotri.simulation.camera_errors.lens import format_grid
-from aerotri.simulation.rendering import RenderOptions
-from aerotri.simulation.simulate import true_image_errors
-from aerotri.terrain.settings import TerrainSettings
+import aerotri
+from aerotri import drawing, geometry, parameters
 
 SUBSETS = ("even", "odd")
 PIXELS, PIXEL_UM, GSD_M, TRUE_GSD_M = (575, 375), 180.0, 1.8, 0.09
 ERROR_PX, TIE_SIGMA_PX, INTERVAL_PX, TIES, SEED = 0.45, 0.1, 12.0, 1000, 11
-WINDOW_PX = TerrainSettings().window
+WINDOW_PX = 17
+"""Side of the windows that `aerotri.terrain` matches where nothing is stated."""
 SETS = {"1–12, 42–73": "bluh:1-12,ultracam_d:42-73", "42–73, field": "ultracam_d:42-73,collocation"}
 """The paper's parameters, and the tiles with a random field, which knows no lens."""
 TRUE_SET, EXACT = "1–12, 42–73", 0.02
@@ -106,7 +88,7 @@ start_values = {{ kind = "perturbed", position_sigma_m = 5.0, angle_sigma_deg = 
 class Pair:
     """A DEM of the even and one of the odd photographs on their common cells (rows, columns) m."""
 
-    grid: Grid
+    grid: Any
     even: np.ndarray
     odd: np.ndarray
 
@@ -133,17 +115,17 @@ def main() -> None:
     arguments = parser.parse_args()
     folder, told = arguments.folder or Path(tempfile.mkdtemp()), []
     for noise in arguments.noise:
-        here, looks = folder / f"grain_{noise:g}", RenderOptions(noise=noise)
-        erring = prepare(here, "known" if arguments.known else "erring", looks)
+        here = folder / f"grain_{noise:g}"
+        erring = prepare(here, "known" if arguments.known else "erring", noise)
         before = match(erring, "plain", "plain_dem")
-        still = match(prepare(here, "perfect", looks), "plain", "plain_dem")
+        still = match(prepare(here, "perfect", noise), "plain", "plain_dem")
         sets = [TRUE_SET] if arguments.known else list(SETS)
         corrected = {name: corrections(erring, name, before) for name in sets}
         lines = table(noise, before, corrected, still, clear_cells(erring, before))
         print("\n".join(lines), flush=True)
         told += lines
         figures = {f"even_odd_{k}": draw(name, noise, before, corrected[name]) for k, name in enumerate(sets)}
-        save_plots(figures, here / "plots")
+        drawing.save_plots(figures, here / "plots")
         print(f"plots in {here / 'plots'}")
         if arguments.keep and noise == KEPT_NOISE:
             shutil.copy(here / "plots" / "even_odd_1.png", RESULTS / "paper_003_dem.png")
@@ -151,7 +133,7 @@ def main() -> None:
         (RESULTS / "paper_003_dem.md").write_text("\n".join([HEAD, "```", *told, "```", TAIL]), encoding="utf-8")
 
 
-def prepare(folder: Path, name: str, looks: RenderOptions) -> Path:
+def prepare(folder: Path, name: str, noise: float) -> Path:
     """A rendered block with its adjustments, without additional parameters and with each set."""
     here, plan = folder / name, folder / name / "plan.toml"
     if not (here / "block" / "photographs").exists():
@@ -159,12 +141,10 @@ def prepare(folder: Path, name: str, looks: RenderOptions) -> Path:
         tie = TIE_SIGMA_PX * PIXEL_UM * (EXACT if name == "known" else 1.0)
         told = PLAN.format(name=name, px=PIXELS, pixel=PIXEL_UM, errors=ERRORS[name](), gsd=GSD_M, tie=tie, ties=TIES)
         plan.write_text(told, encoding="utf-8")
-        with contextlib.redirect_stdout(io.StringIO()):
-            run_simulate(plan, here / "block", SEED, True, looks)
+        aerotri.simulate(plan, SEED).save(here / "block", photographs=True, noise=noise)
     for result, spec in {"plain": "none", **SETS}.items() if name != "perfect" else (("plain", "none"),):
         if not (here / result / "solution.npz").exists():
-            with contextlib.redirect_stdout(io.StringIO()):
-                run_adjust(here / "block", here / result, spec, None, None, False, True, False)
+            aerotri.adjust(here / "block", parameters=spec, explain=False).save(here / result, plots=False)
     return here
 
 
@@ -175,13 +155,12 @@ def by_physics() -> str:
 def by_parameters() -> str:
     """The values of the paper's parameters that come nearest to the camera that errs by physics."""
     text = PLAN.format(name="known", px=PIXELS, pixel=PIXEL_UM, errors=by_physics(), gsd=GSD_M, tie=1.0, ties=TIES)
-    spec = parse_spec(tomllib.loads(text))
-    camera, field = simulate(spec, SEED)[0].cameras[0], next(iter(true_image_errors(spec, SEED).values()))
-    x, y = format_grid(camera.half_format_mm, 115, 75)
-    sets = [parameter_set(family, items, camera) for family, items in parse_parameters(SETS[TRUE_SET])]
-    design = np.concatenate([chosen.basis(x, y) for chosen in sets], axis=2)
-    values = np.linalg.lstsq(design.reshape(-1, design.shape[2]), field(x, y).ravel(), rcond=None)[0]
-    names = [name for chosen in sets for name in chosen.names]
+    flight = aerotri.simulate(tomllib.loads(text), SEED)
+    camera = flight.block.cameras[0]
+    true = flight.true_image_errors(nodes=115).field
+    xy = np.column_stack([true.x.ravel(), true.y.ravel()])
+    names, design = parameters.patterns(SETS[TRUE_SET], camera, xy)
+    values = np.linalg.lstsq(design.reshape(-1, design.shape[2]), true.d.ravel(), rcond=None)[0]
     pairs = ", ".join(f'"{name}" = {value:.9e}' for name, value in zip(names, values, strict=True))
     return f", errors = {{ parameters = {{ {pairs} }} }}"
 
@@ -191,13 +170,12 @@ ERRORS = {"perfect": str, "erring": by_physics, "known": by_parameters}
 
 def match(here: Path, result: str, name: str, photographs: str = "block/photographs", ideal: bool = False) -> Pair:
     """Both DEMs of a block, matched with the orientation of a result."""
-    calibration = reopened(here / result, Console(quiet=True))
     for subset in SUBSETS:
         target = here / f"{name}_{subset}"
         if (target / "dtm.json").exists():
             continue
-        model = terrain(
-            Adjustment(calibration), here / photographs, interval=INTERVAL_PX * GSD_M, cell=INTERVAL_PX * GSD_M,
+        model = aerotri.terrain(
+            here / result, here / photographs, interval=INTERVAL_PX * GSD_M, cell=INTERVAL_PX * GSD_M,
             pairs=True, step=1, subset=subset, edge=0.02, ideal=ideal,
         )  # fmt: skip
         model.save(target, plots=False)
@@ -206,37 +184,41 @@ def match(here: Path, result: str, name: str, photographs: str = "block/photogra
 
 def common(paths: list[Path]) -> Pair:
     """Two rasters with cells of one lattice, on the cells they share."""
-    readers = [RasterReader(path) for path in paths]
-    grids = [reader.grid for reader in readers]
-    cell = grids[0].cell_x
-    left, top = max(g.left for g in grids), min(g.top for g in grids)
-    right = min(g.left + g.columns * g.cell_x for g in grids)
-    low = max(g.top - g.rows * g.cell_y for g in grids)
-    grid = Grid(round((top - low) / cell), round((right - left) / cell), left, top, cell, cell)
-    z = []
-    for reader, g in zip(readers, grids, strict=True):
-        place = round((g.top - top) / cell), round((left - g.left) / cell)
-        z.append(reader.read(*place, grid.rows, grid.columns).astype(float))
-        reader.__exit__(None, None, None)
-    return Pair(grid, *z)
+    one, two = (aerotri.Surface(path) for path in paths)
+    g, other = one.grid, two.grid
+    left, top = max(g.left, other.left), min(g.top, other.top)
+    right = min(v.left + v.columns * v.cell_x for v in (g, other))
+    low = max(v.top - v.rows * v.cell_y for v in (g, other))
+    row, column = round((g.top - top) / g.cell_y), round((left - g.left) / g.cell_x)
+    grid = g.window(row, column, round((top - low) / g.cell_y), round((right - left) / g.cell_x))
+    return Pair(grid, part_of(one, grid), part_of(two, grid))
+
+
+def part_of(surface: aerotri.Surface, grid) -> np.ndarray:
+    """(rows, columns) of a surface on the cells of a grid of the same lattice; NaN beyond."""
+    g, out = surface.grid, np.full((grid.rows, grid.columns), np.nan)
+    row, column = round((g.top - grid.top) / g.cell_y), round((grid.left - g.left) / g.cell_x)
+    rows, columns = (np.arange(first, first + count) for first, count in ((row, grid.rows), (column, grid.columns)))
+    there = np.ix_((rows >= 0) & (rows < g.rows), (columns >= 0) & (columns < g.columns))
+    inside = rows[(rows >= 0) & (rows < g.rows)], columns[(columns >= 0) & (columns < g.columns)]
+    out[there] = surface.z[np.ix_(*inside)]
+    return out
 
 
 def corrections(here: Path, name: str, before: Pair) -> Corrected:
     return Corrected(foretold(here, name, before), by_demcor(here, name), by_imgeo(here, name))
 
 
-def models_of_cells(here: Path, subset: str, grid: Grid) -> tuple[tuple[tuple[str, str], ...], np.ndarray]:
+def models_of_cells(here: Path, subset: str, grid) -> tuple[tuple[tuple[str, str], ...], np.ndarray]:
     """The models of a DEM by number, and the number (rows, columns) that each cell belongs to; −1: none."""
     source = here / f"plain_dem_{subset}"
-    table = read_number_table(source / "models.csv")
-    x, y = grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows))
-    with RasterReader(source / "model.tif") as reader:
-        row, column = (np.round(v).astype(int) for v in (reader.grid.row(y), reader.grid.column(x)))
-        number = reader.read(int(row[0]), int(column[0]), len(row), len(column))
+    with (source / "models.csv").open(newline="", encoding="utf-8") as file:
+        table = {int(row["number"]): (row["left"], row["right"]) for row in csv.DictReader(file)}
+    number = part_of(aerotri.Surface(source / "model.tif"), grid)
     return tuple(table[k] for k in sorted(table)), np.where(np.isfinite(number), number, -1).astype(np.int32)
 
 
-def places(grid: Grid, z: np.ndarray) -> np.ndarray:
+def places(grid, z: np.ndarray) -> np.ndarray:
     """(n, 3) m of the cells."""
     x, y = np.meshgrid(grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows)))
     return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
@@ -244,12 +226,11 @@ def places(grid: Grid, z: np.ndarray) -> np.ndarray:
 
 def foretold(here: Path, name: str, found: Pair) -> np.ndarray:
     """(rows, columns) m, what the deformation of the models lets expect of the difference."""
-    calibration = reopened(here / name, Console(quiet=True))
-    restitution, parts = restitution_of(calibration, ABSORBED), []
+    result, parts, g = aerotri.open_result(here / name), [], found.grid
     for subset, z in zip(SUBSETS, (found.even, found.odd), strict=True):
-        names, number = models_of_cells(here, subset, found.grid)
-        models = dem_models(calibration, restitution, names)
-        parts.append(models.deformation_at(number.ravel(), places(found.grid, z))[:, 2].reshape(z.shape))
+        dem = aerotri.Surface.of_array(z, left=g.left, top=g.top, cell=g.cell_x)
+        models = here / f"plain_dem_{subset}" / "model.tif"
+        parts.append(aerotri.correct_dem(dem, result, models=models, orientation="absorbed").dz.z)
     return parts[0] - parts[1]
 
 
@@ -258,17 +239,21 @@ def clear_cells(here: Path, found: Pair) -> np.ndarray:
 
     A window of 17 pixels is a tenth of a tile of this camera, and 1/200 of one of the true camera.
     """
-    calibration = reopened(here / "plain", Console(quiet=True))
-    restitution, clear = restitution_of(calibration).true, np.isfinite(found.difference)
-    row = {str(name): k for k, name in enumerate(calibration.local.block.images.names)}
+    result, clear = aerotri.open_result(here / "plain"), np.isfinite(found.difference)
+    images, camera = result.adjusted.images, result.block.cameras[0]
+    rotation = geometry.rotation_from_angles(images.angles, result.block.rotation)
+    lines = np.array(drawing.seams(camera))
+    row = {str(name): k for k, name in enumerate(result.block.images.names)}
     for subset, z in zip(SUBSETS, (found.even, found.odd), strict=True):
         names, number = models_of_cells(here, subset, found.grid)
         clear &= maximum_filter(number, 3) == minimum_filter(number, 3)
         for side in (0, 1):
             photo = np.array([row[pair[side]] for pair in names])[number.ravel()]
-            u = np.einsum("nji,nj->ni", restitution.rotation[photo], places(found.grid, z) - restitution.centre[photo])
-            xy = -restitution.interior[photo, :1] * u[:, :2] / u[:, 2:]
-            for axis, seams in enumerate(seams_mm(calibration.local.block.cameras[0])):
+            u = np.einsum("nji,nj->ni", rotation[photo], places(found.grid, z) - images.centre[photo])
+            xy = -camera.focal_length_mm * u[:, :2] / u[:, 2:]
+            for axis in (0, 1):
+                # a seam has the same x, or the same y, at both ends
+                seams = lines[np.isclose(lines[:, 0, axis], lines[:, 1, axis]), 0, axis]
                 away = np.abs(xy[:, axis, None] - seams).min(axis=1) / (1e-3 * PIXEL_UM)
                 clear &= (away > 0.5 * WINDOW_PX + ERROR_PX).reshape(z.shape)
     return clear
@@ -279,10 +264,9 @@ def by_demcor(here: Path, name: str) -> Pair:
     for subset, out in zip(SUBSETS, outs, strict=True):
         source = here / f"plain_dem_{subset}"
         if not out.exists():
-            with contextlib.redirect_stdout(io.StringIO()):
-                run_demcor(
-                    here / name, source / "dsm.tif", out, None, source / "model.tif", None, str(here / "plain"), True
-                )
+            aerotri.correct_dem(
+                source / "dsm.tif", here / name, models=source / "model.tif", orientation=here / "plain"
+            ).save(out)
     return common(outs)
 
 
@@ -290,8 +274,7 @@ def by_imgeo(here: Path, name: str) -> Pair:
     photographs = f"ideal {name}"
     if not (here / photographs).exists():
         given = sorted((here / "block" / "photographs").glob("*.tif"))
-        with contextlib.redirect_stdout(io.StringIO()):
-            run_imgeo(here / name, given, here / photographs, ImgeoOptions("lanczos"), True)
+        aerotri.ideal_photographs(here / name, given, here / photographs, resampling="lanczos")
     return match(here, name, f"ideal_dem {name}", photographs, ideal=True)
 
 
@@ -309,7 +292,7 @@ def table(noise: float, before: Pair, corrected: dict[str, Corrected], still: Pa
         f"{'':<34}{'mean':>8}{'σ':>8}{'σ / noise':>11}{'clear: σ':>11}{'σ / noise':>11}",
     ]
 
-    def line(text: str, grid: Grid, values: np.ndarray) -> str:
+    def line(text: str, grid, values: np.ndarray) -> str:
         own = spread(values[inside(before.grid, clear, grid)])
         return (
             f"{text:<34}{CM * np.nanmean(values):>8.2f}{spread(values):>8.2f}{spread(values) / n:>11.2f}"
@@ -333,7 +316,7 @@ def table(noise: float, before: Pair, corrected: dict[str, Corrected], still: Pa
     return lines
 
 
-def inside(grid: Grid, chosen: np.ndarray, other: Grid) -> np.ndarray:
+def inside(grid, chosen: np.ndarray, other) -> np.ndarray:
     """The cells chosen on one grid on another grid of the same lattice; False beyond."""
     row = np.round(grid.row(other.y(np.arange(other.rows)))).astype(int)
     column = np.round(grid.column(other.x(np.arange(other.columns)))).astype(int)
@@ -343,7 +326,7 @@ def inside(grid: Grid, chosen: np.ndarray, other: Grid) -> np.ndarray:
     return out
 
 
-@styled
+@drawing.styled
 def draw(name: str, noise: float, before: Pair, corrected: Corrected):
     """Four maps with one scale."""
     panels = (
@@ -351,16 +334,18 @@ def draw(name: str, noise: float, before: Pair, corrected: Corrected):
         ("after demcor", corrected.demcor.grid, corrected.demcor.difference),
         ("after imgeo and new matching", corrected.imgeo.grid, corrected.imgeo.difference),
     )  # fmt: skip
-    width = (WIDTH - 2.65) / 2.0
+    width = (drawing.WIDTH - 2.65) / 2.0
     height = width * before.grid.rows / before.grid.columns
-    figure = new_figure(
+    figure = drawing.new_figure(
         2 * height + 2.2, "DEM of even less DEM of odd photographs",
         f"UltraCamD, 80 % flight, 60 % models; {name}; grain {noise:g}; cm at a GSD of 9 cm; blue: no common ground",
     )  # fmt: skip
     limit = CM * float(np.nanpercentile(np.abs(before.difference), 98))
     image = None
     for k, (title, grid, values) in enumerate(panels):
-        axes = axes_at(figure, 0.75 + (k % 2) * (width + 0.7), 0.65 + (1 - k // 2) * (height + 0.55), width, height)
+        axes = drawing.axes_at(
+            figure, 0.75 + (k % 2) * (width + 0.7), 0.65 + (1 - k // 2) * (height + 0.55), width, height
+        )
         extent = (grid.left, grid.left + grid.columns * grid.cell_x, grid.top - grid.rows * grid.cell_y, grid.top)
         axes.set_facecolor("#cfe0f2")
         tones = {"cmap": "Greys_r", "vmin": -limit, "vmax": limit}
@@ -368,7 +353,7 @@ def draw(name: str, noise: float, before: Pair, corrected: Corrected):
         axes.set_title(f"{title}: σ {spread(values):.1f} cm", fontsize=8.5, loc="left")
         axes.set_xlabel("X [m]" if k > 1 else "")
         axes.set_ylabel("Y [m]" if k % 2 == 0 else "")
-    scale = axes_at(figure, 0.75 + 2 * width + 0.85, 0.65, 0.14, 2 * height + 0.55)
+    scale = drawing.axes_at(figure, 0.75 + 2 * width + 0.85, 0.65, 0.14, 2 * height + 0.55)
     figure.colorbar(image, cax=scale).set_label("even − odd [cm]")
     return figure
 

@@ -8,12 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.crosscheck.start import intersect
-from aerotri.formats.assembly.oriented import OrientedBlock
-from aerotri.formats.foreign.colmap import write_colmap
-from aerotri.functional_model.rotation import rotation_from_angles
-from aerotri.observations import Block
-from aerotri.simulation import parse_spec, simulate
+import aerotri
+from aerotri import Block, geometry
 
 POSITION_M, ANGLE_DEG = 1.0, float(np.degrees(1e-3))
 STRIPS_PER_ROOT = 0.46
@@ -41,7 +37,7 @@ def layout(photographs: int) -> tuple[int, int, list[int]]:
     return strips, per_strip, [rest // crossing + (k < rest % crossing) for k in range(crossing)]
 
 
-def spec_of(photographs: int) -> dict:
+def plan_of(photographs: int) -> dict:
     """After the DSK-Saar block: UltraCamD, 9 cm, 80/40 %, 130 points a photograph, 6.5 rays a point, sparse control."""
     strips, per_strip, crossing = layout(photographs)
     positions = (np.arange(len(crossing)) + 0.5) / len(crossing)
@@ -66,26 +62,38 @@ def make_block(photographs: int, folder: Path, seed: int = 1) -> Path:
     """Simulate a block; writes block.pickle (block and start) and colmap/ (the same start), which it returns."""
     target = folder / f"saar_{photographs}_{seed}"
     target.mkdir(parents=True, exist_ok=True)
-    block, _ = simulate(parse_spec(spec_of(photographs)), seed)
+    block = aerotri.simulate(plan_of(photographs), seed).block
     start = common_start(block)
     with (target / "block.pickle").open("wb") as file:
         pickle.dump((block, start), file)
-    everything = np.ones(len(block.image_points), dtype=bool)
-    write_colmap(OrientedBlock(block, start.centre, start.rotation, start.points, everything), target / "colmap")
+    aerotri.convert(block, target / "colmap", "colmap", points=start.points, overwrite=True)
     return target
 
 
 def common_start(block: Block) -> Start:
     """The block's perturbed orientations, and the points intersected from them."""
-    rotation = rotation_from_angles(block.images.angles, block.rotation)
+    rotation = geometry.rotation_from_angles(block.images.angles, block.rotation)
     rays = block.image_points
     tangent = (rays.xy - np.array(block.cameras[0].principal_point_mm)) / block.cameras[0].focal_length_mm
     count = np.bincount(rays.point, minlength=len(block.points))
-    known = np.full((len(block.points), 3), np.nan)
-    points = intersect(block.images.centre, rotation, (rays.image, rays.point, tangent), known, 0.0)
+    points = _nearest_to_rays(block.images.centre, rotation, (rays.image, rays.point, tangent), count)
     if not np.isfinite(points[count >= 2]).all():
         raise ValueError("a point of the simulated block does not intersect")
     return Start(block.images.centre, rotation, points)
+
+
+def _nearest_to_rays(centre: np.ndarray, rotation: np.ndarray, rays: tuple, count: np.ndarray) -> np.ndarray:
+    """(N, 3) m, points nearest to their rays; NaN where there are fewer than two."""
+    image, point, tangent = rays
+    ray = np.einsum("mij,mj->mi", rotation[image], np.column_stack([tangent, -np.ones(len(tangent))]))
+    ray /= np.linalg.norm(ray, axis=1)[:, None]
+    across = np.eye(3) - ray[:, :, None] * ray[:, None, :]
+    normal, right = np.zeros((len(count), 3, 3)), np.zeros((len(count), 3))
+    np.add.at(normal, point, across)
+    np.add.at(right, point, np.einsum("mij,mj->mi", across, centre[image]))
+    points = np.full((len(count), 3), np.nan)
+    points[count >= 2] = np.linalg.solve(normal[count >= 2], right[count >= 2][:, :, None])[:, :, 0]
+    return points
 
 
 def load_block(folder: Path) -> tuple[Block, Start]:

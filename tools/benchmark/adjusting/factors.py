@@ -1,4 +1,7 @@
-"""The factor of our reduced normal matrix by other libraries: CHOLMOD (cvxopt) and Pardiso (pypardiso, MKL)."""
+"""The factor of our reduced normal matrix by other libraries: CHOLMOD (cvxopt) and Pardiso (pypardiso, MKL).
+
+Measures one factorisation of the normal equations: imports inside on purpose.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix
 
-from adjusting.blocks import common_start, load_block, spec_of
+import aerotri
+from adjusting.blocks import common_start, load_block, plan_of
 from adjusting.ours import WARM_UP, start_values, with_parameters
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.ray_status import ray_status
@@ -26,9 +30,7 @@ REPEATS = 5
 
 def measure(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
     """Seconds of one numeric factorisation and one solution, medians of five, and the error of the solution."""
-    from aerotri.simulation import parse_spec, simulate
-
-    small, _ = simulate(parse_spec(spec_of(WARM_UP)), 1)
+    small = aerotri.simulate(plan_of(WARM_UP), 1).block
     for block, start in ((small, common_start(small)), load_block(folder)):
         block = with_parameters(block, job["parameters"])
         values = start_values(block, start)

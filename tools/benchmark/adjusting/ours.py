@@ -1,12 +1,15 @@
-"""Our adjustment, phase by phase."""
+"""Our adjustment, phase by phase.
+
+Measures assembly, factorisation, iterations and cofactors one by one: imports inside on purpose.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from adjusting.blocks import Start, common_start, load_block, spec_of
+import aerotri
+from adjusting.blocks import Start, common_start, load_block, plan_of
 from adjusting.child import Memory, Timer
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.ray_status import ray_status
@@ -14,9 +17,6 @@ from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.start_values import local_origin
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import StartValues
-from aerotri.functional_model.additional_parameters import parse_parameters
-from aerotri.observations import Block
-from aerotri.simulation import parse_spec, simulate
 from aerotri.statistics.covariance import cofactors
 from aerotri.statistics.summarise import count_observations, summarise
 
@@ -24,19 +24,18 @@ PARAMETERS = {"none": "none", "44": "bluh:1-12,ultracam_d:42-73"}
 WARM_UP = 30
 
 
-def with_parameters(block: Block, name: str) -> Block:
+def with_parameters(block: aerotri.Block, name: str) -> aerotri.Block:
     """The block with a set of additional parameters to be estimated."""
-    adjustment = replace(block.settings.adjustment, additional_parameters=parse_parameters(PARAMETERS[name]))
-    return replace(block, settings=replace(block.settings, adjustment=adjustment))
+    return aerotri.with_settings(block, parameters=PARAMETERS[name])
 
 
-def start_values(block: Block, start: Start) -> StartValues:
+def start_values(block: aerotri.Block, start: Start) -> StartValues:
     """The common start, reduced to the local origin."""
     origin = local_origin(block)
     return StartValues(origin, start.rotation, start.centre - origin, start.points - origin)
 
 
-def run(block: Block, start: Start, timer: Timer) -> dict[str, Any]:
+def run(block: aerotri.Block, start: Start, timer: Timer) -> dict[str, Any]:
     """Adjust and take statistics; every phase timed."""
     with timer.phase("prepare"):
         values = start_values(block, start)
@@ -72,7 +71,7 @@ def _gauss_newton(system: NormalSystem, solution: Solution) -> None:
 
 def measure(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
     """Times and peak memory of our adjustment; kernels are compiled or loaded before the clock starts."""
-    small, _ = simulate(parse_spec(spec_of(WARM_UP)), 1)
+    small = aerotri.simulate(plan_of(WARM_UP), 1).block
     run(with_parameters(small, job["parameters"]), common_start(small), Timer())
     memory, timer = Memory(), Timer()
     block, start = load_block(folder)

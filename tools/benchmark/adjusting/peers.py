@@ -1,4 +1,8 @@
-"""The peers that adjust: Ceres with pycolmap's C++ reprojection cost, pycolmap's own adjuster, SciPy."""
+"""The peers that adjust: Ceres with pycolmap's C++ reprojection cost, pycolmap's own adjuster, SciPy.
+
+Measures other solvers on the equations of the independent model and on COLMAP's numbers of our points: imports inside
+on purpose.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+import aerotri
 from adjusting.blocks import load_block
 from adjusting.child import Memory, Timer
 from aerotri.formats.foreign.colmap import point_numbers
-from aerotri.observations import Block
 
 SCIPY_EVALUATIONS = 100
 LSMR = {"atol": 1e-12, "btol": 1e-12, "maxiter": 5000}
@@ -87,7 +91,7 @@ def measure_pycolmap(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _read(folder: Path) -> tuple[Block, Any, float]:
+def _read(folder: Path) -> tuple[aerotri.Block, Any, float]:
     import pycolmap
 
     block, _ = load_block(folder)
@@ -109,7 +113,7 @@ def _adjuster(model: Any, threads: int) -> Any:
     return pycolmap.create_default_ceres_bundle_adjuster(options, config, model)
 
 
-def _add_control(problem: Any, block: Block, model: Any, sigma_px: float) -> list[Any]:
+def _add_control(problem: Any, block: aerotri.Block, model: Any, sigma_px: float) -> list[Any]:
     """Control as Ceres' own prior on points, in the unit of the reprojection errors."""
     import pyceres
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.functional_model.additional_parameters import parse_parameters
-from aerotri.observations import Block, Prior
-from aerotri.observations.block import Constraints
+from aerotri import Block, with_settings
+from aerotri import observations as obs
 from defects_proof.flights import (
     Flight,
     corners,
@@ -21,11 +20,10 @@ from defects_proof.flights import (
     with_control,
     with_gnss,
     with_points,
-    with_settings,
 )
 
-FREE_FOCAL = {"focal_length_mm": Prior(100.0)}
-FREE_POINT = {"x0_mm": Prior(0.0), "y0_mm": Prior(0.0)}
+FREE_FOCAL = {"focal_length_mm": obs.Prior(100.0)}
+FREE_POINT = {"x0_mm": obs.Prior(0.0), "y0_mm": obs.Prior(0.0)}
 
 
 @dataclass(frozen=True)
@@ -179,9 +177,8 @@ def _parameters(seed: int) -> Iterator[Case]:
         ("two families that say the same", "ebner:all,gruen:all", 9, "ebner:all"),
         ("parameters and the turn of every photograph", "ebner:1-2,bluh:1-2", 1, "bluh:1-2"),
     ):
-        chosen_items, enough_items = parse_parameters(chosen), parse_parameters(enough)
-        yield Case(name, free, "not determined", with_settings(block, additional_parameters=chosen_items))
-        yield Case(name, 0, "", with_settings(block, additional_parameters=enough_items))
+        yield Case(name, free, "not determined", with_settings(block, parameters=chosen))
+        yield Case(name, 0, "", with_settings(block, parameters=enough))
 
 
 def _gnss(seed: int) -> Iterator[Case]:
@@ -211,13 +208,13 @@ def _conditions(seed: int) -> Iterator[Case]:
     c = corners(block, 6)
     true = block.control.xyz
     one = with_control(block, c[:1])
-    distance = Constraints(
+    distance = obs.Constraints(
         np.array(["distance"]), (c[1:3],), np.array([np.linalg.norm(true[c[1]] - true[c[2]])]), np.array([0.05])
     )
     yield Case("one control point and a distance", 3, "κ", replace(one, constraints=distance))
     direction = with_control(with_control(one, c[3:4], "YZ"), c[5:6], "Z")
     yield Case("one control point and a distance", 0, "", replace(direction, constraints=distance))
-    heights = Constraints(
+    heights = obs.Constraints(
         np.array(["height_difference"] * 2), (c[[0, 1]], c[[0, 2]]), true[c[1:3], 2] - true[c[0], 2], np.full(2, 0.05)
     )
     yield Case("one control point and level points", 2, "κ", replace(one, constraints=heights))

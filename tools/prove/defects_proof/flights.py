@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.functional_model.rotation import rotation_from_angles
-from aerotri.observations import Block, Camera, Control, ImagePoints, Images, Prior, Settings
-from aerotri.observations.block import AdjustmentSettings, GnssIns, GnssSettings
+from aerotri import Block, geometry
+from aerotri import observations as obs
 
 HEIGHT, BASE, SPACING, FOCAL = 1000.0, 300.0, 500.0, 100.0
 SIGMA_MM, SIGMA_CONTROL = 2e-3, 0.03
@@ -32,12 +31,13 @@ class Flight:
     seed: int = 1
 
 
-def camera(**priors: Prior) -> Camera:
+def camera(**priors: obs.Prior) -> obs.Camera:
     """A camera of 160 × 110 mm, held unless said otherwise."""
     held = {
-        "focal_length_mm": Prior(FOCAL, fixed=True), "x0_mm": Prior(0.0, fixed=True), "y0_mm": Prior(0.0, fixed=True),
+        "focal_length_mm": obs.Prior(FOCAL, fixed=True), "x0_mm": obs.Prior(0.0, fixed=True),
+        "y0_mm": obs.Prior(0.0, fixed=True),
     }  # fmt: skip
-    return Camera("cam", "frame", (16000, 11000), 10.0, held | priors, flight_axis="+y")
+    return obs.Camera("cam", "frame", (16000, 11000), 10.0, held | priors, flight_axis="+y")
 
 
 def flown(flight: Flight) -> Block:
@@ -56,24 +56,24 @@ def flown(flight: Flight) -> Block:
     xyz[:, :2] += rng.uniform(-40.0, 40.0, (len(xyz), 2))
     xyz[:, 2] = flight.relief * rng.uniform(-1.0, 1.0, len(xyz))
     names = np.array([f"p{k:03d}" for k in range(n)])
-    images = Images(names, np.zeros(n, np.int64), np.array([f"s{k}" for k in strip]), centre, angles)
-    settings = Settings(image_sigma_um=SIGMA_MM * 1e3, gnss=GnssSettings(shift="off"))
+    images = obs.Images(names, np.zeros(n, np.int64), np.array([f"s{k}" for k in strip]), centre, angles)
+    settings = obs.Settings(image_sigma_um=SIGMA_MM * 1e3, gnss=obs.GnssSettings(shift="off"))
     block = Block("proof", (camera(),), images, np.zeros(0, str), measured(images, xyz), settings=settings)
     return with_points(block, np.array([str(k) for k in range(len(xyz))]), xyz)
 
 
-def measured(images: Images, xyz: np.ndarray) -> ImagePoints:
+def measured(images: obs.Images, xyz: np.ndarray) -> obs.ImagePoints:
     """All rays inside the format."""
-    u = np.einsum("nki,npk->npi", rotation_from_angles(images.angles), xyz[None] - images.centre[:, None])
+    u = np.einsum("nki,npk->npi", geometry.rotation_from_angles(images.angles), xyz[None] - images.centre[:, None])
     xy = -FOCAL * u[..., :2] / u[..., 2:]
     image, point = np.nonzero((np.abs(xy) < [80.0, 55.0]).all(axis=-1))
-    return ImagePoints(image, point, xy[image, point], np.full((len(image), 2), SIGMA_MM))
+    return obs.ImagePoints(image, point, xy[image, point], np.full((len(image), 2), SIGMA_MM))
 
 
 def with_points(block: Block, names: np.ndarray, xyz: np.ndarray) -> Block:
     """The block with its points named, and their true coordinates kept as check points."""
     everywhere = np.arange(len(xyz))
-    truth = Control(everywhere, xyz, np.full(xyz.shape, SIGMA_CONTROL), np.ones(len(xyz), dtype=bool))
+    truth = obs.Control(everywhere, xyz, np.full(xyz.shape, SIGMA_CONTROL), np.ones(len(xyz), dtype=bool))
     return replace(block, points=names, control=truth)
 
 
@@ -85,7 +85,9 @@ def rays_of(block: Block) -> np.ndarray:
 def only_rays(block: Block, keep: np.ndarray) -> Block:
     """The block with some of its rays, (m,) bool."""
     rays = block.image_points
-    return replace(block, image_points=ImagePoints(rays.image[keep], rays.point[keep], rays.xy[keep], rays.sigma[keep]))
+    return replace(
+        block, image_points=obs.ImagePoints(rays.image[keep], rays.point[keep], rays.xy[keep], rays.sigma[keep])
+    )
 
 
 def with_control(block: Block, rows: np.ndarray, axes: str = "XYZ") -> Block:
@@ -102,19 +104,14 @@ def with_gnss(block: Block, shift: str = "off", drift: str = "off") -> Block:
     n = len(block.images)
     none = np.full((n, 3), np.nan)
     time = np.arange(n, dtype=float)
-    observed = GnssIns(np.arange(n), block.images.centre.copy(), np.full((n, 3), 0.05), none, none, time)
-    settings = replace(block.settings, gnss=GnssSettings(shift=shift, drift=drift))
+    observed = obs.GnssIns(np.arange(n), block.images.centre.copy(), np.full((n, 3), 0.05), none, none, time)
+    settings = replace(block.settings, gnss=obs.GnssSettings(shift=shift, drift=drift))
     return replace(block, gnss_ins=observed, settings=settings)
 
 
-def with_camera(block: Block, **priors: Prior) -> Block:
+def with_camera(block: Block, **priors: obs.Prior) -> Block:
     """The block with elements of the interior orientation free or observed."""
     return replace(block, cameras=(camera(**priors),))
-
-
-def with_settings(block: Block, **changes) -> Block:
-    """The block with other settings of its adjustment."""
-    return replace(block, settings=replace(block.settings, adjustment=replace(AdjustmentSettings(), **changes)))
 
 
 def corners(block: Block, count: int) -> np.ndarray:

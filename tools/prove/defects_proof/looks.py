@@ -1,4 +1,7 @@
-"""What the adjustment says of a block, and what dense algebra says of the same."""
+"""What the adjustment says of a block, and what dense algebra says of the same.
+
+Measures the search for rank defects: pivots of the factor, free directions, eigenvalues. Imports inside on purpose.
+"""
 
 from __future__ import annotations
 

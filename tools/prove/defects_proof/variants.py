@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerotri.observations import Block, Control, ImagePoints, Images
+from aerotri import Block
+from aerotri import observations as obs
 
 
 def permuted(block: Block) -> Block:
@@ -25,10 +26,12 @@ def permuted(block: Block) -> Block:
         changes["constraints"] = replace(block.constraints, points=of_conditions)
     return replace(
         block,
-        images=Images(i.names[image], i.camera[image], i.strip[image], i.centre[image], i.angles[image]),
+        images=obs.Images(i.names[image], i.camera[image], i.strip[image], i.centre[image], i.angles[image]),
         points=block.points[point],
-        image_points=ImagePoints(new_image[rays.image[ray]], new_point[rays.point[ray]], rays.xy[ray], rays.sigma[ray]),
-        control=Control(new_point[control.point[row]], control.xyz[row], control.sigma[row], control.is_check[row]),
+        image_points=obs.ImagePoints(
+            new_image[rays.image[ray]], new_point[rays.point[ray]], rays.xy[ray], rays.sigma[ray]
+        ),
+        control=obs.Control(new_point[control.point[row]], control.xyz[row], control.sigma[row], control.is_check[row]),
         **changes,
     )
 

@@ -1,4 +1,8 @@
-"""The damaged files that lie beside the project, given to the commands that open them: exit 2, one line, in time."""
+"""The damaged files that lie beside the project, given to the commands that open them: exit 2, one line, in time.
+
+Measures the commands themselves, and single readers whose commands need more than a test can make: imports inside on
+purpose.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +19,10 @@ from fuzzing import seeds
 from fuzzing.worker import MEMORY_BYTES, SECONDS, Target
 
 HOSTILE = seeds.DATA / "hostile"
-START_SECONDS = 60
-"""What the start of the program may take on a busy machine, beyond the time of the file."""
+START_SECONDS = 20
+"""What the start of the program may take of a processor, beyond the time of the file."""
+WALL_SECONDS = 900
+"""On the clock, for a program that waits and uses no processor; a busy machine makes the others slow too."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +170,7 @@ def _as_command(arguments: list[str]) -> tuple[int, float, str]:
     try:
         done = subprocess.run(
             [sys.executable, "-c", code, *arguments], capture_output=True, text=True, preexec_fn=_limited, check=False,
-            timeout=START_SECONDS + SECONDS, env=_environment(),
+            timeout=WALL_SECONDS, env=_environment(),
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         return -1, _seconds_of_children() - begun, "not within the time"
@@ -179,10 +185,11 @@ def _seconds_of_children() -> float:
 def _environment() -> dict[str, str]:
     import os
 
-    return os.environ | {"PYTHONPATH": os.pathsep.join([str(seeds.ROOT / "src"), str(seeds.ROOT / "tools")])}
+    return os.environ | {"PYTHONPATH": os.pathsep.join([str(seeds.ROOT / "src"), str(seeds.ROOT / "tools" / "prove")])}
 
 
 def _limited() -> None:
     # the program itself maps two to three GiB of libraries
     resource.setrlimit(resource.RLIMIT_AS, (4 * MEMORY_BYTES, 4 * MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_CPU, (START_SECONDS + int(SECONDS), START_SECONDS + int(SECONDS)))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

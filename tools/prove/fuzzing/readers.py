@@ -1,4 +1,7 @@
-"""Every reader of the program with good files to damage."""
+"""Every reader of the program with good files to damage.
+
+Measures single readers, of which some stand behind commands that take long: imports inside on purpose.
+"""
 
 from __future__ import annotations
 
@@ -139,24 +142,23 @@ def _detected(path: Path) -> None:
 
 
 def _blocks() -> list[Target]:
-    from aerotri.formats.block.folder import read_block
+    import aerotri
 
     targets = []
     for name, files in (("block", seeds.block_folder("csv")), ("block, film", seeds.film_folder()),
                         ("block, parquet", seeds.block_folder("parquet"))):  # fmt: skip
-        targets += [Target(name, files, tuple(files), read_block)] * 2
+        targets += [Target(name, files, tuple(files), aerotri.read_block)] * 2
     return targets
 
 
 def _results() -> list[Target]:
     """solution.npz with its block, reopened; the adjustment is not run again."""
-    from aerotri.commands.console import Console
-    from aerotri.commands.results import reopened
+    import aerotri
 
     targets = []
     for parameters in ("none", "bluh:1-4"):
         files = seeds.result_folder(parameters)
-        call = lambda folder: reopened(folder, Console(quiet=True))  # noqa: E731
+        call = aerotri.open_result
         targets += [Target("result", files, ("solution.npz",), call)] * 2
         targets.append(Target("result, its block", files, tuple(n for n in files if n != "solution.npz"), call))
     return targets

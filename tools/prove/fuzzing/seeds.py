@@ -18,6 +18,9 @@ DATA = ROOT.parent / "shared" / "data"
 EPSG = "EPSG:25832"
 EAST, NORTH = 500_000.0, 5_900_000.0
 POLYGON = [[[EAST + x, NORTH + y] for x, y in ((5, 5), (40, 5), (40, 30), (5, 30), (5, 5))]]
+PICKET_NUMBERS = ("node_X", "node_Y", "X", "Y", "Z", "sX", "sY", "sZ", "sX_matching", "sY_matching", "sZ_matching",
+                  "correlation")  # fmt: skip
+"""Columns of pickets.parquet."""
 LINES = [
     [[EAST + 5 + 10 * k, NORTH + 5.0, 3.0 + k] for k in range(4)],
     [[EAST, NORTH, 1.0], [EAST + 9, NORTH + 9, 2.0]],
@@ -37,7 +40,7 @@ def written(formats: tuple[str, ...]) -> dict[str, dict[str, bytes]]:
     """The small oriented block of the tests in these formats: content by path within a folder."""
     from dataclasses import replace
 
-    from aerotri.formats.convert import write_any
+    import aerotri
 
     sample = of_tests("oriented_sample").oriented_sample(shift=(717000.0, 1606000.0, 0.0))
     found = {}
@@ -45,7 +48,7 @@ def written(formats: tuple[str, ...]) -> dict[str, dict[str, bytes]]:
         local = format in ("bal", "colmap", "colmap-text", "bundler", "opensfm")
         block = sample.block if local else replace(sample.block, crs="EPSG:32647")
         with tempfile.TemporaryDirectory() as folder:
-            write_any(block, Path(folder) / "x", format, sample.points)
+            aerotri.convert(block, Path(folder) / "x", format, points=sample.points)
             found[format] = contents(Path(folder))
     return found
 
@@ -57,7 +60,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def block_folder(tables: str) -> dict[str, bytes]:
     """A block with everything a folder may hold, but scanned film."""
-    from aerotri.formats.block.folder import read_block, write_block
+    import aerotri
 
     samples, extras = of_tests("format_samples"), of_tests("test_block_extras")
     files = samples.SMALL | {
@@ -69,7 +72,7 @@ def block_folder(tables: str) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as folder:
         for name, text in files.items():
             (Path(folder) / name).write_text(text)
-        write_block(read_block(folder), Path(folder) / "x", "parquet")
+        aerotri.convert(aerotri.read_block(folder), Path(folder) / "x", tables="parquet")
         return contents(Path(folder) / "x")
 
 
@@ -83,8 +86,7 @@ def film_folder() -> dict[str, bytes]:
 
 def result_folder(parameters: str) -> dict[str, bytes]:
     """What an adjustment leaves of a small block: solution.npz and the block."""
-    from aerotri.commands.adjust import run_adjust
-    from aerotri.formats.block.folder import write_block
+    import aerotri
 
     small = of_tests("small_blocks")
     changes = {"flight": small.small_spec()["flight"] | {"strips": 2, "images_per_strip": 4, "cross_strips": []}}
@@ -93,9 +95,7 @@ def result_folder(parameters: str) -> dict[str, bytes]:
     block = small.with_adjustment(block, parameter_selection="on" if parameters != "none" else "off")
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
-        write_block(block, place / "block")
-        if run_adjust(place / "block", place / "result", None, None, None, False, True) != 0:
-            raise RuntimeError("the block of the seeds was not adjusted")
+        aerotri.adjust(block).save(place / "result", plots=False)
         files = contents(place / "result")
     return {name: files[name] for name in files if name.startswith("block/") or name == "solution.npz"}
 
@@ -197,10 +197,8 @@ def picket_table() -> bytes:
     import pyarrow as pa
     from pyarrow import parquet
 
-    from aerotri.formats.results.pickets import NUMBERS
-
     rng = np.random.default_rng(1)
-    columns: dict[str, Any] = {name: pa.array(rng.uniform(0.1, 50.0, 40)) for name in NUMBERS}
+    columns: dict[str, Any] = {name: pa.array(rng.uniform(0.1, 50.0, 40)) for name in PICKET_NUMBERS}
     columns["rays"] = pa.array([2] * 40, pa.int32())
     columns["photographs"] = pa.array([["a", "b"]] * 40, pa.list_(pa.string()))
     columns["status"] = pa.array(["accepted"] * 38 + ["no match"] * 2)

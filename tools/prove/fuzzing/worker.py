@@ -177,7 +177,7 @@ def _child(targets: Sequence[Target], seed: int, numbers: Sequence[int], folder:
 
 def run_one(target: Target, folder: Path, number: int) -> Found:
     """What a reader makes of the files of a folder."""
-    from aerotri.conventions import InputError
+    from aerotri import InputError
 
     _forget_peak()
     before, begun = _status("VmRSS"), time.process_time()

@@ -1,0 +1,96 @@
+"""Tools are built on the public package alone; a few measure its inside, and say so."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import aerotri
+from places import PROJECT
+
+TOOLS = PROJECT / "tools"
+INSIDE = {
+    "benchmark/adjusting/factors.py": "times one factorisation of the normal equations beside other libraries",
+    "benchmark/adjusting/ours.py": "times assembly, factorisation, iterations and cofactors one by one",
+    "benchmark/adjusting/peers.py": "gives other solvers the equations of the independent model",
+    "benchmark/benchmark_imgeo.py": "times the resampling kernel beside cv2.remap",
+    "benchmark/benchmark_pickets.py": "times the search kernel beside matchTemplate",
+    "benchmark/benchmark_volume.py": "times the response of a functional and a solution with the factor",
+    "prove/defects_proof/looks.py": "looks at pivots, free directions and eigenvalues of the factor",
+    "prove/fuzzing/hostile.py": "damaged files for single readers, and for the commands",
+    "prove/fuzzing/readers.py": "damaged files for single readers",
+    "prove/kill.py": "kills the commands from within",
+    "prove/metamorphic_photographs.py": "the first orientation in orders that no file gives",
+    "prove/volume_epochs.py": "the adjustment's part of σ alone, of pickets at stated places",
+    "prove/volume_proof/simulated.py": "every part of σ alone, of pickets at stated places",
+    "reproduce/paper_003_deformation/even_odd.py": "deformation at single points, by another orientation",
+    "reproduce/reproduce_paper_000.py": "the paper's formulas for two photographs, which no command uses",
+}
+"""Files of tools/ that may import modules within the package, and what they measure there."""
+COMMANDS = ("prove/fuzzing/hostile.py", "prove/kill.py")
+"""Of these, those that test the commands; the others run them as users do, in a process of their own."""
+
+
+def tools() -> list[str]:
+    return sorted(path.relative_to(TOOLS).as_posix() for path in TOOLS.rglob("*.py"))
+
+
+def inner_names(tree: ast.AST) -> Iterator[str]:
+    """What is used of the package that it does not export."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.startswith("aerotri."))
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "aerotri":
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+            yield from (name for name in names if name.removeprefix("aerotri.") not in aerotri.__all__)
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "aerotri":
+            yield from [] if node.attr in aerotri.__all__ else [f"aerotri.{node.attr}"]
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            # code in a text
+            yield from (part for part in ("from aerotri.", "import aerotri.") if part in node.value)
+
+
+@pytest.mark.parametrize("tool", tools())
+def test_only_what_the_package_exports(tool):
+    found = sorted(set(inner_names(ast.parse((TOOLS / tool).read_text(encoding="utf-8")))))
+    if tool in INSIDE:
+        assert found, f"{tool} imports nothing from within the package: strike it from the table"
+    else:
+        assert not found, f"{tool}: the public package lacks this, or the tool belongs into the table: {found}"
+
+
+@pytest.mark.parametrize("tool", sorted(INSIDE))
+def test_a_tool_that_looks_inside_says_so(tool):
+    text = ast.get_docstring(ast.parse((TOOLS / tool).read_text(encoding="utf-8"))) or ""
+    assert "on purpose" in " ".join(text.split())
+    assert "Measures" in text
+
+
+@pytest.mark.parametrize("tool", tools())
+def test_commands_are_run_as_users_do(tool):
+    found = [name for name in inner_names(ast.parse((TOOLS / tool).read_text(encoding="utf-8")))
+             if name.startswith(("aerotri.cli", "aerotri.commands"))]  # fmt: skip
+    assert not found or tool in COMMANDS
+
+
+@pytest.mark.parametrize(
+    ("code", "found"),
+    [
+        ("import aerotri\nfrom aerotri import predict as p\naerotri.adjust(1)", []),
+        ("from aerotri.pipeline import adjust", ["aerotri.pipeline.adjust"]),
+        ("import aerotri.pipeline", ["aerotri.pipeline"]),
+        ("from aerotri import pipeline", ["aerotri.pipeline"]),
+        ("import aerotri\naerotri.pipeline.adjust(1)", ["aerotri.pipeline"]),
+        ("exec('from aerotri.pipeline import adjust')", ["from aerotri."]),
+    ],
+)
+def test_what_counts_as_inside(code, found):
+    assert sorted(inner_names(ast.parse(code))) == found
+
+
+def test_the_table_names_files_that_are_there():
+    assert set(INSIDE) <= set(tools())
+    assert all(Path(TOOLS / name).is_file() for name in COMMANDS)
