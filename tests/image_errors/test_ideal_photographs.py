@@ -247,7 +247,7 @@ def test_strong_lens_moves_by_many_pixels():
 
 def test_errors_that_fold_the_image_are_refused():
     camera = camera_of("frame")
-    with pytest.raises(InputError, match="fold"):
+    with pytest.raises(InputError, match="change places"):
         ideal_map(errors_of(camera, brown=[5e-3]))
 
 

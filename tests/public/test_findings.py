@@ -131,7 +131,7 @@ def test_decisions_add_up(flight):
         ({"off": ["nobody"]}, "no point 'nobody'"),
         ({"off": [("C01", "9_999")]}, "no photograph '9_999'"),
         ({"off": [("C01", "2_006")]}, "not measured in '2_006'"),
-        ({"check": ["T000001"]}, "no control or check point"),
+        ({"check": ["T000001"]}, "not a control or check point"),
     ):
         with pytest.raises(InputError, match=said):
             aerotri.edit(block, **ask)
