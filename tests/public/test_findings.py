@@ -48,6 +48,21 @@ def test_true_errors_are_those_that_were_put_in(erring):
     np.testing.assert_allclose(table["dy"], -1e3 * (y * BROWN["K1"] * r2 + BROWN["P1"] * 2 * x * y), atol=1e-9)
 
 
+def test_a_true_lens_is_an_image_error_too():
+    """A forward lens that is estimated is found again; the error is k1·r³ but for terms of its square."""
+    plan = plan_with()
+    plan["camera"]["camera"]["errors"] = {"lens": {"k1": -0.004}}
+    flight = aerotri.simulate(plan, seed=2)
+    true = flight.true_image_errors(without_orientation=True)
+    found = aerotri.adjust(flight.block, parameters="lens:k1").image_errors(without_orientation=True)
+    assert true.rms_um > 2.0
+    assert (found - true).rms_um < 0.2 * true.rms_um
+    table = flight.true_image_errors().table
+    radius, c = np.hypot(table["x"], table["y"]), 8.8
+    length = np.hypot(table["dx"], table["dy"])
+    np.testing.assert_allclose(length, 4.0 * radius**3 / c**2, rtol=0.02, atol=1e-6)
+
+
 def test_days_of_one_camera_do_not_differ(erring):
     changes = erring[1].group_changes
     assert len(changes) == 1

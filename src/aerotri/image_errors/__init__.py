@@ -10,6 +10,7 @@ from aerotri.image_errors.field import (
     field_on_grid,
     field_without_orientation,
     largest_effects,
+    lens_errors,
     systematic_errors,
 )
 from aerotri.image_errors.groups import ImageGroup, image_group, image_groups, interior_elements
@@ -31,5 +32,6 @@ __all__ = [
     "image_groups",
     "interior_elements",
     "largest_effects",
+    "lens_errors",
     "systematic_errors",
 ]

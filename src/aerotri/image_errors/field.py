@@ -153,6 +153,19 @@ def field_of(
     return ErrorField(camera, group, x, y, errors.reshape(grid), np.zeros(grid), known, without_orientation)
 
 
+def lens_errors(
+    c: float, principal_point: tuple[float, float], lens_parameters: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> np.ndarray:
+    """(n, 2) mm, measured − ideal by a forward lens, at measured positions (n,) x and (n,) y in mm.
+
+    Parameters
+    ----------
+    c : mm, principal distance. principal_point : x0, y0 in mm. lens_parameters : (5,) in the order of `LENS_NAMES`.
+    """
+    x0, y0 = principal_point
+    return _lens((x - x0) / c, (y - y0) / c, c, lens_parameters)[0]
+
+
 def field_between(first: ErrorField, second: ErrorField) -> ErrorField:
     """First field less second on the same grid, the two taken as independent of each other.
 

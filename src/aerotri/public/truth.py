@@ -67,8 +67,9 @@ class TrueBlock:
         InputError
             For a camera or a day that the flight does not have.
         """
-        from aerotri.image_errors import field_of
+        from aerotri.image_errors import field_of, lens_errors
         from aerotri.simulation import true_image_errors
+        from aerotri.simulation.cameras import true_camera
 
         known = true_image_errors(self.plan, self.seed)
         chosen = next(iter(known))[0] if camera is None else camera
@@ -80,8 +81,13 @@ class TrueBlock:
         if asked not in days:
             raise InputError(f"there is no day '{day}'", f"the flight has {', '.join(filter(None, days)) or 'no days'}")
         own = next(one for one in self.block.cameras if one.name == chosen)
-        name = f"true, day {asked}" if asked else "true"
-        return ImageErrors(name, field_of(own, name, known[chosen, asked], nodes, without_orientation))
+        name, true = f"true, day {asked}" if asked else "true", true_camera(chosen, self.plan.camera[chosen])
+
+        def error(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+            lens = lens_errors(true.focal_length, (true.x0, true.y0), true.lens, x, y)
+            return known[chosen, asked](x, y) + lens
+
+        return ImageErrors(name, field_of(own, name, error, nodes, without_orientation))
 
     def heights(self, xy: np.ndarray) -> np.ndarray:
         """(n,) m, of the ground or of the roof over it, at (n, 2) in the coordinate system of the block."""

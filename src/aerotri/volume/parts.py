@@ -35,6 +35,8 @@ from aerotri.volume.triangles import areas, cut_to
 LATTICE_PATCH = 16
 """Nodes a side of the patch that stands for all cells of a raster; chosen [C]: two rows at its edge do not count, and
 the 11 × 11 cells left average the correlation of neighbours."""
+ROUNDING = 1e-9
+"""Share of an area that may be lost in summing its pieces [C]: a square millimetre of a square kilometre."""
 PATCH_CELLS = 512
 """Cells a side of the part of a raster whose roughness is taken."""
 
@@ -101,7 +103,8 @@ def part_of_pickets(
     used = triangles[pieces.triangle]
     roughness = roughness_of_pickets(pickets.xyz, noise, np.unique(used))
     between = None if roughness is None else ground_between(roughness, pickets.xyz, used, share, noise)
-    unseen = max(boundary.area - float(pieces.area.sum()), 0.0)
+    unseen = boundary.area - float(pieces.area.sum())
+    unseen = unseen if unseen > ROUNDING * boundary.area else 0.0
     measured = Measured(pickets, functional.gradient)
     return Part(calibration, response, between, len(pickets), len(pickets.image), unseen, measured)
 

@@ -129,7 +129,8 @@ def _legends(figure: Figure, effect: np.ndarray, redundancy: np.ndarray, uncontr
     ):
         if handles:
             figure.legend(
-                handles=handles, title=title, loc="upper left", bbox_to_anchor=(0.85 / width, top / height), ncols=6,
+                handles=handles, title=title, loc="upper left", bbox_to_anchor=(0.85 / width, top / height),
+                ncols=3 if len(handles) > CLASSES else CLASSES,
                 borderaxespad=0.0, handletextpad=0.3, columnspacing=1.1, alignment="left", title_fontsize=8.5,
             )  # fmt: skip
 
