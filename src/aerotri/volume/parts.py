@@ -36,7 +36,7 @@ LATTICE_PATCH = 16
 """Nodes a side of the patch that stands for all cells of a raster; chosen [C]: two rows at its edge do not count, and
 the 11 × 11 cells left average the correlation of neighbours."""
 ROUNDING = 1e-9
-"""Share of an area that may be lost in summing its pieces [C]: a square millimetre of a square kilometre."""
+"""Share of an area that may be lost in summing its pieces [C]: a square millimetre of a thousand square metres."""
 PATCH_CELLS = 512
 """Cells a side of the part of a raster whose roughness is taken."""
 
