@@ -12,6 +12,7 @@ from aerotri.coordinates.blocks import frame_of_block, needs_positions, transfor
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import GnssIns
 from aerotri.pipeline import adjust
+from aerotri.public.editing import edit
 from aerotri.results.in_crs import transform_result
 from small_blocks import small_block
 
@@ -385,6 +386,31 @@ def test_a_block_in_a_crs_equals_the_local_block(local_block, place):
         np.testing.assert_allclose(ours.w, theirs.w, atol=1e-3)
     given = block.control.xyz[~block.control.is_check]
     np.testing.assert_allclose(result.points.xyz[result.control.point] - given, result.control.difference, atol=1e-12)
+
+
+def test_decisions_about_control_count_in_the_crs(local_block):
+    """A point made a check point, or control, by the operator differs from its own coordinates, not from another's."""
+    frame = local_frame(UTM32, np.array([SAARBRUECKEN]))
+    block = moved_into(frame, local_block)
+    control = block.control
+    names = block.points[control.point]
+    rows = [int(np.flatnonzero(~control.is_check)[1]), int(np.flatnonzero(control.is_check)[0])]
+    decided = edit(block, check=[str(names[rows[0]])], control=[str(names[rows[1]])])
+    is_check, xyz = control.is_check.copy(), control.xyz.copy()
+    is_check[rows] = [True, False]
+    stated = replace(block, control=replace(control, is_check=is_check))
+    found, expected = (transform_result(adjust(transform_block(b, frame)), b, frame) for b in (decided, stated))
+    for ours, theirs in ((found.control, expected.control), (found.check, expected.check)):
+        assert ours.point.tolist() == theirs.point.tolist()
+        np.testing.assert_allclose(ours.difference, theirs.difference, atol=1e-6)
+        np.testing.assert_allclose(ours.w, theirs.w, atol=1e-3)
+        assert np.abs(ours.difference).max() < 1.0
+    out = int(np.flatnonzero(~control.is_check)[2])
+    xyz[out] = np.nan
+    off = edit(block, off=[str(names[out])])
+    without = replace(block, control=replace(control, xyz=xyz))
+    found, expected = (transform_result(adjust(transform_block(b, frame)), b, frame) for b in (off, without))
+    np.testing.assert_allclose(found.control.difference, expected.control.difference, atol=1e-6)
 
 
 def test_covariance_of_the_orientation_by_simulation(local_block):

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerotri.adjustment.prepare import with_edits
 from aerotri.coordinates.blocks import completed
 from aerotri.coordinates.local_frame import LocalFrame
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles, small_rotation_per_angle
@@ -82,10 +83,12 @@ def _ground_from_local(
     adjusted: AdjustedBlock, ground: GroundPointResults, points: PointResults, block: Block, frame: LocalFrame,
     is_check: bool,
 ) -> GroundPointResults:  # fmt: skip
+    # as the operator decided, who may have made a control point a check point
+    control = with_edits(block)[0].control
     row = np.full(len(block.points), -1)
-    own = np.flatnonzero(block.control.is_check == is_check)
-    row[block.control.point[own]] = own
-    given, sigma_given = block.control.xyz[row[ground.point]], block.control.sigma[row[ground.point]]
+    own = np.flatnonzero(control.is_check == is_check)
+    row[control.point[own]] = own
+    given, sigma_given = control.xyz[row[ground.point]], control.sigma[row[ground.point]]
     xyz = points.xyz[ground.point]
     difference = xyz - given
     if not frame.georeference.is_projected:
