@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from aerotri.public import parameters as parameters
     from aerotri.public import predict as predict
     from aerotri.public.adjustment import Adjustment as Adjustment
-    from aerotri.public.adjustment import adjust as adjust
-    from aerotri.public.adjustment import open_result as open_result
     from aerotri.public.block_check import check as check
     from aerotri.public.block_settings import with_settings as with_settings
     from aerotri.public.blocks import read as read
@@ -42,6 +40,8 @@ if TYPE_CHECKING:
     from aerotri.public.ideal import ideal_photographs as ideal_photographs
     from aerotri.public.image_errors import ImageErrors as ImageErrors
     from aerotri.public.models import deform as deform
+    from aerotri.public.results import adjust as adjust
+    from aerotri.public.results import open_result as open_result
     from aerotri.public.running import run as run
     from aerotri.public.simulating import example_flight as example_flight
     from aerotri.public.simulating import simulate as simulate
@@ -71,13 +71,13 @@ _PLACES = {
     "deform": "aerotri.public.models",
     "drawing": "aerotri.public.drawing",
     "edit": "aerotri.public.editing",
-    "adjust": "aerotri.public.adjustment",
+    "adjust": "aerotri.public.results",
     "convert": "aerotri.public.converting",
     "example_flight": "aerotri.public.simulating",
     "geometry": "aerotri.public.geometry",
     "ideal_photographs": "aerotri.public.ideal",
     "observations": "aerotri.observations",
-    "open_result": "aerotri.public.adjustment",
+    "open_result": "aerotri.public.results",
     "parameters": "aerotri.public.parameters",
     "predict": "aerotri.public.predict",
     "read": "aerotri.public.blocks",

@@ -12,14 +12,17 @@ from aerotri.cli.options import (
     ADJUSTMENT,
     ARGUMENTS,
     BLOCKS,
-    CAMERA,
     OUTPUT,
     BlockFolder,
+    CameraName,
+    CameraSize,
     ControlPrefix,
     GeoidGrid,
     Json,
     Overwrite,
     Seed,
+    StatedFocalLength,
+    StatedPixelSize,
 )
 from aerotri.conventions import InputError
 
@@ -34,16 +37,10 @@ def init(
     folder: Annotated[
         Path, typer.Argument(help="Folder of the new block; no file in it is replaced.", rich_help_panel=ARGUMENTS)
     ],
-    camera_name: Annotated[str, typer.Option(help="Name of the camera.", rich_help_panel=CAMERA)] = "camera",
-    camera_size: Annotated[
-        str, typer.Option(help="Columns and rows, pixels, as 8192x5460.", rich_help_panel=CAMERA)
-    ] = "",
-    pixel_um: Annotated[
-        float | None, typer.Option(min=1e-6, help="Size of a pixel, µm.", rich_help_panel=CAMERA)
-    ] = None,
-    focal_length_mm: Annotated[
-        float | None, typer.Option(min=1e-6, help="Focal length (principal distance), mm.", rich_help_panel=CAMERA)
-    ] = None,
+    camera_name: CameraName = "camera",
+    camera_size: CameraSize = "",
+    pixel_um: StatedPixelSize = None,
+    focal_length_mm: StatedFocalLength = None,
     json_: Json = False,
 ) -> None:
     """Begin a block: block.toml with every key explained, and empty tables with their columns."""

@@ -20,6 +20,8 @@ from aerotri.cli.options import (
     SIGMAS,
     AnglesSigma,
     CameraFile,
+    CameraName,
+    CameraSize,
     CheckPoints,
     ControlPrefix,
     ControlSigma,
@@ -33,6 +35,8 @@ from aerotri.cli.options import (
     PixelSize,
     PositionsSigma,
     Seed,
+    StatedFocalLength,
+    StatedPixelSize,
     SystemOfPhotographs,
 )
 from aerotri.tie_points.settings import DEFAULTS, LEAST
@@ -72,16 +76,10 @@ def convert(
         str, typer.Option(help="List of orientations, as start values.", rich_help_panel=INPUT)
     ] = "",
     camera: CameraFile = None,
-    camera_name: Annotated[str, typer.Option(help="Name of the camera.", rich_help_panel=CAMERA)] = "",
-    camera_size: Annotated[
-        str, typer.Option(help="Columns and rows, pixels, as 8192x5460.", rich_help_panel=CAMERA)
-    ] = "",
-    pixel_um: Annotated[
-        float | None, typer.Option(min=1e-6, help="Size of a pixel, µm.", rich_help_panel=CAMERA)
-    ] = None,
-    focal_length_mm: Annotated[
-        float | None, typer.Option(min=1e-6, help="Focal length (principal distance), mm.", rich_help_panel=CAMERA)
-    ] = None,
+    camera_name: CameraName = "",
+    camera_size: CameraSize = "",
+    pixel_um: StatedPixelSize = None,
+    focal_length_mm: StatedFocalLength = None,
     flight_axis: Annotated[
         str | None,
         typer.Option(help="Image axis along the flight: +x, -x, +y, -y.", rich_help_panel=CAMERA),

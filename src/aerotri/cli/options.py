@@ -98,6 +98,12 @@ CameraFile = Annotated[
         rich_help_panel=CAMERA,
     ),
 ]  # fmt: skip
+CameraName = Annotated[str, typer.Option(help="Name of the camera.", rich_help_panel=CAMERA)]
+CameraSize = Annotated[str, typer.Option(help="Columns and rows, pixels, as 8192x5460.", rich_help_panel=CAMERA)]
+StatedPixelSize = Annotated[float | None, typer.Option(min=1e-6, help="Size of a pixel, µm.", rich_help_panel=CAMERA)]
+StatedFocalLength = Annotated[
+    float | None, typer.Option(min=1e-6, help="Focal length (principal distance), mm.", rich_help_panel=CAMERA)
+]
 FocalLength = Annotated[
     float | None,
     typer.Option(min=1e-6, help="Focal length (principal distance), mm, in place of EXIF.", rich_help_panel=CAMERA),

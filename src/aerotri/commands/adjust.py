@@ -47,8 +47,8 @@ def run_adjust(
     refuse_foreign_folder(target, "adjustment.json")
 
     from aerotri.compiled import compilation_notice
-    from aerotri.public.adjustment import adjust
     from aerotri.public.progress import StageReport
+    from aerotri.public.results import adjust
     from aerotri.public.saving import write_adjustment
     from aerotri.results.failure import AdjustmentFailedError
 

@@ -21,7 +21,7 @@ def reopened(result: Path, console: Console) -> Adjustment:
         When the folder is no result, or the adjustment has not converged.
     """
     from aerotri.compiled import compilation_notice
-    from aerotri.public.adjustment import open_result
+    from aerotri.public.results import open_result
 
     console.progress(compilation_notice())
     found = open_result(result)

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 from aerotri.conventions import FilePath
 from aerotri.formats.assembly.assemble_control import block_with_check_points
 from aerotri.formats.block.unread import unread_in_words
-from aerotri.public.adjustment import Adjustment, adjust
+from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import StageReport
+from aerotri.public.results import adjust
 from aerotri.public.saving import RECORD, write_adjustment
 
 if TYPE_CHECKING:

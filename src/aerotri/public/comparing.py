@@ -241,7 +241,7 @@ def crosscheck(source: Adjustment | Block | FilePath, progress: ProgressLike = N
 
 def _adjusted(source: Adjustment | Block | FilePath, iteration: Callable[[int, float, float], None]) -> Adjustment:
     from aerotri.pipeline import adjust_keeping_system
-    from aerotri.public.adjustment import open_result
+    from aerotri.public.results import open_result
 
     if isinstance(source, Adjustment):
         return source

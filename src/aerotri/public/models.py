@@ -12,10 +12,11 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.deformation.block_models import BlockDeformation
 from aerotri.deformation.model_grid import Deformation
-from aerotri.public.adjustment import Adjustment, open_result
+from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.optional import optional_module
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.public.results import open_result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,8 +10,9 @@ import numpy as np
 import pyarrow as pa
 
 from aerotri.conventions import FilePath, InputError
-from aerotri.public.adjustment import Adjustment, open_result
+from aerotri.public.adjustment import Adjustment
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.public.results import open_result
 from aerotri.public.table import Table
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.conventions import FilePath
-from aerotri.public.adjustment import Adjustment, open_result
+from aerotri.public.adjustment import Adjustment
+from aerotri.public.results import open_result
 
 if TYPE_CHECKING:
     from aerotri.results.adjustment import Adjustment as Record

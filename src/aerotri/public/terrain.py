@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
-from aerotri.public.adjustment import Adjustment, open_result
+from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
+from aerotri.public.results import open_result
 from aerotri.public.surfaces import Surface, dataset_of
 from aerotri.public.table import Table
 from aerotri.terrain.settings import DEFAULTS, Subset, TerrainSettings

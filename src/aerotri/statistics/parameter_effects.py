@@ -72,6 +72,12 @@ class ParameterEffects:
     left_out: tuple[LeftOut, ...]
 
 
+def rms_by_axis(difference: np.ndarray) -> np.ndarray:
+    """(3,) m, RMS of differences (k, 3) m over the points that have the coordinate; NaN where none has."""
+    with np.errstate(invalid="ignore"):
+        return np.sqrt(np.nansum(difference**2, axis=0) / np.isfinite(difference).sum(axis=0))
+
+
 def parameter_effects(
     adjusted: AdjustedBlock, system: NormalSystem, solution: Solution, factor: Factor
 ) -> ParameterEffects | None:

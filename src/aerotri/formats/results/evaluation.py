@@ -6,7 +6,7 @@ import numpy as np
 
 from aerotri.diagnosis.work_items import PRIORITIES
 from aerotri.diagnosis.work_list import WorkList
-from aerotri.statistics.parameter_effects import ParameterEffects
+from aerotri.statistics.parameter_effects import ParameterEffects, rms_by_axis
 
 
 def work_columns(work: WorkList) -> dict[str, np.ndarray]:
@@ -26,7 +26,7 @@ def work_columns(work: WorkList) -> dict[str, np.ndarray]:
 def effects_columns(effects: ParameterEffects) -> dict[str, np.ndarray]:
     """RMS of the check points, m, as adjusted and with all, a family or one of the parameters left out."""
     found = effects.left_out
-    rms = np.array([_rms(effects.difference), *(_rms(one.difference) for one in found)])
+    rms = np.array([rms_by_axis(effects.difference), *(rms_by_axis(one.difference) for one in found)])
     columns: dict[str, np.ndarray] = {
         "left_out": np.array(["nothing", *(one.label for one in found)], dtype=object),
         "group": np.array(["", *(one.group for one in found)], dtype=object),
@@ -34,9 +34,3 @@ def effects_columns(effects: ParameterEffects) -> dict[str, np.ndarray]:
     }
     columns |= {f"rms_{axis}": rms[:, k] for k, axis in enumerate("XYZ")}
     return columns | {"verdict": np.array(["", *(one.verdict for one in found)], dtype=object)}
-
-
-def _rms(difference: np.ndarray) -> np.ndarray:
-    """(3,) m over the points with the coordinate."""
-    with np.errstate(invalid="ignore"):
-        return np.sqrt(np.nansum(difference**2, axis=0) / np.isfinite(difference).sum(axis=0))

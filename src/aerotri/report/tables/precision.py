@@ -10,7 +10,7 @@ import numpy as np
 from aerotri.report.quality import metre_digits
 from aerotri.report.tables.adjustment import Column, Table, table
 from aerotri.results.adjusted_block import AdjustedBlock
-from aerotri.statistics.parameter_effects import ParameterEffects
+from aerotri.statistics.parameter_effects import ParameterEffects, rms_by_axis
 from aerotri.statistics.precision import (
     HIGH_CORRELATION,
     NamedCorrelation,
@@ -102,10 +102,10 @@ def _pairs(title: str, found: Iterable[NamedCorrelation], photograph: bool) -> T
 
 def check_effects(effects: ParameterEffects, digits: int) -> Table:
     """RMS at check points as adjusted, and with all, with a family, with one parameter left out."""
-    rows: list[tuple[Any, ...]] = [("as adjusted", "", None, *_rms(effects.difference), None, "")]
-    before = _rms(effects.difference)
+    rows: list[tuple[Any, ...]] = [("as adjusted", "", None, *rms_by_axis(effects.difference).tolist(), None, "")]
+    before = rms_by_axis(effects.difference).tolist()
     for one in effects.left_out:
-        rms = _rms(one.difference)
+        rms = rms_by_axis(one.difference).tolist()
         share = 100.0 * (np.hypot(np.hypot(*rms[:2]), rms[2]) / np.hypot(np.hypot(*before[:2]), before[2]) - 1.0)
         label = {"all": "without any"}.get(one.label, f"without {one.label}")
         rows.append((label, one.group, one.t, *rms, float(share), one.verdict))
@@ -116,9 +116,3 @@ def check_effects(effects: ParameterEffects, digits: int) -> Table:
         Column("the parameter"),
     )  # fmt: skip
     return Table("Check points with parameters left out", columns, tuple(rows))
-
-
-def _rms(difference: np.ndarray) -> tuple[float, float, float]:
-    with np.errstate(invalid="ignore"):
-        x, y, z = np.sqrt(np.nansum(difference**2, axis=0) / np.isfinite(difference).sum(axis=0))
-    return float(x), float(y), float(z)
