@@ -92,7 +92,7 @@ def test_nodes_are_multiples_of_the_spacing():
     x, y = nodes_between(np.array([12.0, -7.0]), np.array([101.0, 33.0]), 10.0)
     np.testing.assert_array_equal(x, np.arange(10.0, 111.0, 10.0))
     np.testing.assert_array_equal(y, np.arange(40.0, -11.0, -10.0))
-    for wrong, message in ((0.0, "none"), (1e-3, "nodes"), (np.nan, "none")):
+    for wrong, message in ((0.0, "not possible"), (1e-3, "nodes"), (np.nan, "not possible")):
         with pytest.raises(InputError, match=message):
             nodes_between(np.zeros(2), np.full(2, 1e4), wrong)
 
