@@ -131,8 +131,8 @@ def block_toml_page() -> str:
         "hand, step by step: [your own block](../../start/own_block.md).", "", SPOKEN, "",
     ]  # fmt: skip
     prior = ["### value, sigma, fixed", "", "A parameter of `interior`, `brown` or `lens` is written as",
-             "`K1 = { value = 0.0 }` (free), `{ value = 101.4, sigma = 0.01 }` (observed) or",
-             "`{ fixed = true }` (held).", "", *_key_table(prior_keys()), ""]  # fmt: skip
+             "`focal_length_mm = { fixed = false }` (free), `{ value = 101.4, sigma = 0.01 }` (observed) or",
+             "`{ fixed = true }` (held). A free parameter starts at `value` where that is given.", "", *_key_table(prior_keys()), ""]  # fmt: skip
     return "\n".join([*lines, *_by_table(block_tables(), block_keys(), {"camera.NAME.interior": prior})])
 
 

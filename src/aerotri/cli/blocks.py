@@ -37,7 +37,7 @@ def init(
     folder: Annotated[
         Path, typer.Argument(help="Folder of the new block; no file in it is replaced.", rich_help_panel=ARGUMENTS)
     ],
-    camera_name: CameraName = "camera",
+    camera_name: CameraName = "main",
     camera_size: CameraSize = "",
     pixel_um: StatedPixelSize = None,
     focal_length_mm: StatedFocalLength = None,

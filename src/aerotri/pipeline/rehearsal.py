@@ -38,9 +38,7 @@ def rehearse(block: Block, geoid: FilePath | None = None) -> Rehearsal:
         adjustment = replace(adjustment, additional_parameters=())
         block = replace(block, settings=replace(block.settings, adjustment=adjustment))
     if not len(block.image_points):
-        return Rehearsal(
-            ("there are no image points: measure tie points, or give the photographs to aerotri tiepoints",)
-        )
+        return Rehearsal(_nothing_there(block))
     try:
         local = block if block.crs == "local" else transform_block(block, frame_of_block(block, geoid))
         prepared = prepare(local)
@@ -56,3 +54,17 @@ def rehearse(block: Block, geoid: FilePath | None = None) -> Rehearsal:
     )
     missing = (defects_in_words(looked.system, solution.defects),) if solution.defects else ()
     return Rehearsal(missing, looked.warnings)
+
+
+def _nothing_there(block: Block) -> tuple[str, ...]:
+    """What a block without image points lacks, all of it."""
+    said = ["there are no image points: measure tie points, or give the photographs to aerotri tiepoints"]
+    if not len(block.images):
+        said.insert(0, "there are no photographs: give a row in images.csv for each")
+    has_control = len(block.control) > block.control.is_check.sum()
+    if block.settings.adjustment.datum == "control" and not has_control and block.gnss_ins is None:
+        said.append(
+            "there is no control: give control points in control.csv or positions in gnss_ins.csv, or set "
+            'datum = "minimal" or "inner"'
+        )
+    return tuple(said)

@@ -151,19 +151,20 @@ def check(block: Block | FilePath, *, control_prefix: str = "", geoid: FilePath 
 def _read(place: Path) -> Block:
     from aerotri.formats.block.folder import read_block
 
-    # a block without image points is a block that has something missing
-    return read_block(place, rays_needed=False)
+    # a block without photographs or image points is a block that has something missing
+    return read_block(place, rays_needed=False, images_needed=False)
 
 
 def _of_folder(place: Path) -> tuple[Path, str, str, tuple[str, ...]]:
     """The folder, the units of its angles and image points, and sentences about what is not read in it."""
     from aerotri.formats.block.folder import settings_file
     from aerotri.formats.block.settings import read_block_toml
+    from aerotri.formats.block.template import example_in_words
     from aerotri.formats.block.unread import unread_in_words
 
     toml = settings_file(place)
     model = read_block_toml(toml).model
-    return toml.parent, model.angle_unit, model.image_unit, unread_in_words(toml)
+    return toml.parent, model.angle_unit, model.image_unit, (*example_in_words(toml, model), *unread_in_words(toml))
 
 
 def _is_said(text: str, said: tuple[str, ...]) -> bool:

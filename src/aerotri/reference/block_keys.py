@@ -12,7 +12,7 @@ from aerotri.formats.block.settings_model import BlockModel, PriorModel
 from aerotri.simulation.spec import PriorSpec, SimulationSpec
 
 PRIORS = (PriorModel, PriorSpec)
-PRIOR = "{ value, sigma } or { fixed = true }"
+PRIOR = "{ fixed = false } (free), { value, sigma } (observed) or { fixed = true } (held)"
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,8 @@ def test_every_key_stands_in_it():
     for path, words in (
         (("camera", "P1", "pixel_um"), "[unit µm; required]"),
         (("gnss", "shift"), '[one of off, block, strip; default "off"]'),
-        (("stochastic", "image_sigma_um"), "[unit µm; not set]"),
+        (("image_unit",), '[one of mm, um, px; default "mm"]'),
+        (("stochastic", "image_sigma_um"), "[unit µm] Set here to half a pixel, a usual value."),
     ):
         field = at_model(path)
         assert f"{' '.join(str(field.description).split())} {words}" in said, path
@@ -73,11 +74,12 @@ def at_model(path: tuple[str, ...]) -> Any:
 
 
 def test_what_is_written_is_read_as_the_defaults(tmp_path):
-    """As it stands it says the camera and nothing else; with every # away it is accepted too."""
+    """The camera, the unit and σ of the image points are in force; with every # away it is accepted too."""
     write_template(tmp_path / "new", CAMERA)
     model = read_block_toml(tmp_path / "new" / "block.toml").model
     camera = {"size_px": [8192, 5460], "pixel_um": 4.4, "focal_length_mm": 35.0}
-    assert model == BlockModel.model_validate({"camera": {"P1": camera}})
+    own = {"camera": {"P1": camera}, "image_unit": "px", "stochastic": {"image_sigma_um": 2.2}}
+    assert model == BlockModel.model_validate(own)
     text = (tmp_path / "new" / "block.toml").read_text(encoding="utf-8")
     (tmp_path / "new" / "block.toml").write_text(uncommented(text), encoding="utf-8")
     everything = read_block_toml(tmp_path / "new" / "block.toml").model
@@ -127,3 +129,20 @@ def test_nothing_is_replaced(tmp_path, capsys):
 def test_names_that_need_quotes(tmp_path):
     write_template(tmp_path / "new", NewCamera("Zenmuse P1 (2)"))
     assert list(read_block_toml(tmp_path / "new" / "block.toml").model.camera) == ["Zenmuse P1 (2)"]
+
+
+def test_all_that_is_missing_in_a_new_block_is_said_at_once(tmp_path, capsys):
+    """The example camera, photographs, image points and control; a camera that was stated is no example."""
+    assert invoke(["init", str(tmp_path / "new")]) == 0
+    capsys.readouterr()
+    assert invoke(["check", str(tmp_path / "new")]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in lines if line.startswith("note: camera 'main' is the example")]
+    missing = [line for line in lines if line.startswith("missing: ")]
+    for what, line in zip(("no photographs", "no image points", "no control"), missing, strict=True):
+        assert what in line
+    write_template(tmp_path / "stated", CAMERA)
+    found = aerotri.check(tmp_path / "stated")
+    assert (len(found.missing), found.notes) == (3, ())
+    with pytest.raises(InputError, match="holds no photographs"):
+        aerotri.read_block(tmp_path / "stated")

@@ -37,13 +37,14 @@ IMAGE_COLUMNS = Columns(
 )
 
 
-def read_block(path: FilePath, rays_needed: bool = True) -> Block:
+def read_block(path: FilePath, rays_needed: bool = True, images_needed: bool = True) -> Block:
     """A block from its folder.
 
     Parameters
     ----------
     path : the folder, or its block.toml.
     rays_needed : whether a block without image points is an error; photographs alone will do for what only needs them.
+    images_needed : whether a block without photographs is an error.
 
     Returns
     -------
@@ -64,7 +65,7 @@ def read_block(path: FilePath, rays_needed: bool = True) -> Block:
     cameras = settings.cameras()
     model = settings.model
     radians = RADIANS_PER[model.angle_unit]
-    images = _images(_required_table(folder, "images"), cameras, radians)
+    images = _images(_required_table(folder, "images"), cameras, radians, may_be_empty=not images_needed)
     fiducials, fits = read_fiducials(_table_file(folder, "fiducials"), images, cameras)
     if fiducials is not None and model.image_unit != "px":
         message = f"image_unit = '{model.image_unit}', but fiducials.csv says the photographs are scans"
@@ -133,15 +134,15 @@ def _table_file(folder: Path, name: str) -> Path | None:
     return found[0] if found else None
 
 
-def _images(path: Path, cameras: tuple[Camera, ...], radians: float) -> Images:
+def _images(path: Path, cameras: tuple[Camera, ...], radians: float, may_be_empty: bool) -> Images:
     table = read_table(path, IMAGE_COLUMNS)
     table.require("image", "camera")
-    if not table.length:
+    if not table.length and not may_be_empty:
         raise InputError("holds no photographs", "give a row for every photograph", path)
     refuse_duplicates(table, table.text["image"].index, lambda row: f"photograph '{table.cell('image', row)}'")
     known = {camera.name: i for i, camera in enumerate(cameras)}
     column = table.text["camera"]
-    code = np.array([known.get(name, -1) for name in column.names.to_pylist()])
+    code = np.array([known.get(name, -1) for name in column.names.to_pylist()], dtype=np.int64)
     camera = code[column.index]
     unknown = np.flatnonzero(camera < 0)
     if len(unknown):

@@ -138,7 +138,7 @@ def _image_sigma(
     )
     if given is None:
         sigma *= scale[:, None]
-        return sigma, float(np.median(sigma) * 1e3)
+        return sigma, float(np.median(sigma) * 1e3) if len(sigma) else float("nan")
     # an infinite σ marks the empty cells: the default is in µm, whatever unit the table has
     return np.where(np.isinf(sigma), given * 1e-3, sigma * scale[:, None]), float(given)
 

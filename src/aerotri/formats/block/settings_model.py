@@ -33,7 +33,7 @@ class Section(BaseModel):
 
 
 class PriorModel(Section):
-    """A start value with what is known of it: ``{ value, sigma }`` (no sigma: free) or ``fixed = true``."""
+    """``{ fixed = false }``: free. ``{ value, sigma }``: observed. ``{ value }``: free. ``{ fixed = true }``: held."""
 
     value: Real | None = key(None, "Start value, in the unit of the parameter.")
     sigma: Positive | None = key(

@@ -34,7 +34,6 @@ EXAMPLES: dict[str, Any] = {
     "camera.NAME.flight_axis": "+y",
     "camera.NAME.interior_orientation": "affine",
     "camera.NAME.fiducials": {"1": [-106.0, -106.0]},
-    "stochastic.image_sigma_um": 2.0,
     "stochastic.default_control_sigma_m": [0.02, 0.02, 0.03],
     "gnss.lever_arm_sigma_m": [0.01, 0.01, 0.01],
     "collocation.sigma_um": 2.0,
@@ -43,6 +42,11 @@ EXAMPLES: dict[str, Any] = {
 """What stands where there is no default: an example, never in force before the user takes the # away."""
 FREE = {"fixed": False}
 """The example of a parameter: an unknown without an observed value."""
+DECIDE = {
+    "image_unit": "Set here to px. Write the unit of your table.",
+    "stochastic.image_sigma_um": "Set here to half a pixel, a usual value. Write yours.",
+}
+"""Keys that everybody has to think about: they are in force, with a sentence on what stands there."""
 HEADING = (
     "The settings of a block. Every key stands here. A key behind a # has its default or is not set; to set it take "
     "the # away and change the value.",
@@ -61,7 +65,7 @@ class NewCamera:
     name : as images.csv is going to have it. size_px : columns and rows. pixel_um, focal_length_mm : as in block.toml.
     """
 
-    name: str = "camera"
+    name: str = "main"
     size_px: tuple[int, int] | None = None
     pixel_um: float | None = None
     focal_length_mm: float | None = None
@@ -73,6 +77,11 @@ class NewCamera:
         given = {"size_px": size, "pixel_um": self.pixel_um, "focal_length_mm": self.focal_length_mm}
         examples = {"size_px": [6000, 4000], "pixel_um": 4.0, "focal_length_mm": 24.0}
         return {name: examples[name] if value is None else value for name, value in given.items()}
+
+    @property
+    def decided(self) -> dict[str, Any]:
+        """What stands at the keys of `DECIDE`."""
+        return {"image_unit": "px", "stochastic.image_sigma_um": round(0.5 * self.values["pixel_um"], 3)}
 
     @property
     def is_example(self) -> bool:
@@ -104,6 +113,18 @@ def write_template(folder: FilePath, camera: NewCamera = NewCamera()) -> tuple[s
     return ("block.toml", *tables)
 
 
+def example_in_words(toml: Path, model: BlockModel) -> tuple[str, ...]:
+    """A sentence about each camera of a block.toml that still is the example of a new block."""
+    if _comment(EXAMPLE)[0] not in toml.read_text(encoding="utf-8"):
+        return ()
+    example = NewCamera().values
+    return tuple(
+        f"camera '{name}' is the example that aerotri init wrote: write size_px, pixel_um and focal_length_mm of yours"
+        for name, camera in model.camera.items()
+        if {key: getattr(camera, key) for key in example} == example
+    )
+
+
 def block_toml_text(camera: NewCamera = NewCamera()) -> str:
     """The text of a block.toml in which every key stands."""
     names = {
@@ -133,16 +154,20 @@ def _section(model: type[BaseModel], table: str, camera: NewCamera) -> Iterator[
 
 def _key(path: str, field: Any, camera: NewCamera) -> Iterator[str]:
     name = path.rpartition(".")[2]
-    yield from _comment(" ".join(part for part in (str(field.description), _facts(field)) if part))
-    if field.is_required():
+    is_set = path in DECIDE
+    yield from _comment(" ".join(part for part in (str(field.description), _facts(field, is_set)) if part))
+    if is_set:
+        yield from _comment(DECIDE[path])
+        yield f"{name} = {value_text(camera.decided[path])}"
+    elif field.is_required():
         yield f"{name} = {value_text(camera.values[name])}"
     else:
         yield f"#{name} = {value_text(_shown(path, field))}"
     yield ""
 
 
-def _facts(field: Any) -> str:
-    """Unit, words and default in brackets."""
+def _facts(field: Any, is_set: bool) -> str:
+    """Unit, words and default in brackets; `is_set` is whether the key is in force though it has no default."""
     unit = field.json_schema_extra["unit"]
     words = _words(field.annotation)
     facts = [f"unit {unit}"] if unit else []
@@ -151,7 +176,7 @@ def _facts(field: Any) -> str:
     if field.is_required():
         facts.append("required")
     elif field.default is None or _is_prior(field.annotation):
-        facts.append("not set")
+        facts += [] if is_set else ["not set"]
     else:
         facts.append(f"default {value_text(field.default)}")
     return f"[{'; '.join(facts)}]"

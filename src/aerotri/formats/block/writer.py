@@ -216,8 +216,13 @@ def _camera(camera: Camera) -> dict[str, Any]:
     }
     if camera.flight_axis is not None:
         content["flight_axis"] = camera.flight_axis
-    interior = {name: prior for name, prior in camera.interior.items() if name in INTERIOR_ELEMENTS and not prior.fixed}
-    for section, priors in (("interior", interior), ("brown", camera.brown), ("lens", camera.lens)):
+    unknown = {name: prior for name, prior in camera.interior.items() if name in INTERIOR_ELEMENTS and not prior.fixed}
+    if unknown:
+        # the start values stand above: focal_length_mm and principal_point_mm
+        content["interior"] = {
+            name: Inline({"fixed": False}) if prior.sigma is None else _prior(prior) for name, prior in unknown.items()
+        }
+    for section, priors in (("brown", camera.brown), ("lens", camera.lens)):
         if priors:
             content[section] = {name: _prior(prior) for name, prior in priors.items()}
     if camera.interior_orientation is not None:
