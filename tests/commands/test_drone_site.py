@@ -85,6 +85,7 @@ def test_from_photographs_to_the_true_volume(place, run_once):
     assert 0.8 < adjusted["sigma0"] < 1.2
     measured = read(place / "drone_project" / "volume" / "volume.json")
     assert invoke(commands()["volume"]) == 0
+    assert read(place / "drone_project" / "dtm" / "dtm.json")["ground_within"] == "pile.geojson"
     truth = read(place / "true_volume" / "volume.json")["net_m3"]
     assert abs(measured["net_m3"] - truth) < 3.0 * measured["sigma"]["sigma_m3"]
     assert measured["sigma"]["sigma_m3"] < 0.01 * truth

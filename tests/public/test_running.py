@@ -52,7 +52,8 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
     assert (tie[2]["control"], tie[2]["features"], tie[2]["seed"]) == ("gcp_list.txt", 2000, 4)
     assert adjust == ("adjust", (str(out / "block"), str(out / "result")), {"plots": True})
     assert "camera" not in tie[2]
-    assert terrain == ("terrain", (str(out / "result"), str(photographs)), {"interval": 5.0})
+    stated = {"interval": 5.0, "ground_within": "pile.gpkg"}
+    assert terrain == ("terrain", (str(out / "result"), str(photographs)), stated)
     assert volume[1] == (str(out / "dtm"),)
     assert (volume[2]["boundary"], volume[2]["base"]) == ("pile.gpkg", "lowest")
     assert volume[2]["adjustment"] == out / "result"
@@ -64,17 +65,21 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
     ]  # fmt: skip
     assert lines[1] == ["adjust", str(out / "block"), "--out", str(out / "result")]
     assert lines[3][:4] == ["volume", str(out / "dtm"), "--adjustment", str(out / "result")]
-    assert lines[3][-5:] == ["--boundary", "pile.gpkg", "--base", "lowest", "--no-plots"]
+    assert lines[3][-7:] == ["--boundary", "pile.gpkg", "--base", "lowest", "--layer", "dtm", "--no-plots"]
     assert project.block == "adjusted"
     assert project.volume is not None
 
 
 def test_the_layer_of_the_volume_is_told(fakes, photographs, tmp_path):
-    """The surface with objects where nothing is said; the ground alone where it is asked for."""
-    aerotri.run(photographs, tmp_path / "out", boundary="pile.gpkg", layer="dtm")
+    """The DTM where nothing is said, with all inside the boundary as ground; the surface with objects if asked for."""
+    aerotri.run(photographs, tmp_path / "out", boundary="pile.gpkg")
+    assert fakes.called[-2][2]["ground_within"] == "pile.gpkg"
     assert fakes.called[-1][2]["layer"] == "dtm"
     steps = json.loads((tmp_path / "out" / "run.json").read_text())["steps"]
+    assert steps[2]["arguments"][-2:] == ["--ground-within", "pile.gpkg"]
     assert steps[3]["arguments"][-2:] == ["--layer", "dtm"]
+    aerotri.run(photographs, tmp_path / "other", boundary="pile.gpkg", layer="dsm")
+    assert fakes.called[-1][2]["layer"] == "dsm"
 
 
 def test_what_is_said_of_photographs_is_refused_with_a_block(fakes, tmp_path):

@@ -117,6 +117,20 @@ def test_objects_are_no_ground():
     assert ground[~objects & np.isfinite(z)].mean() > 0.97
 
 
+def test_a_stockpile_within_its_outline_is_ground():
+    """A cone as steep as heaped sand goes as an object, and stays within an outline; the tree beside it goes anyway."""
+    y, x = np.mgrid[0:80, 0:80].astype(float)
+    pile = np.hypot(x - 40.0, y - 40.0) <= 10.0
+    z = 0.02 * x + 0.7 * np.maximum(10.0 - np.hypot(x - 40.0, y - 40.0), 0.0)
+    tree = np.hypot(x - 60.0, y - 40.0) <= 2.0
+    z[tree] += 6.0
+    assert not ground_cells(z, 1.0)[pile].all()
+    ground = ground_cells(z, 1.0, stated=pile)
+    assert ground[pile].all()
+    assert not ground[tree].any()
+    assert ground[~tree & ~pile].mean() > 0.97
+
+
 def test_breaklines_from_files(tmp_path):
     line = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 9.0, 8.0]]
     geojson = tmp_path / "lines.geojson"

@@ -29,7 +29,7 @@ from aerotri.cli.options import (
     SystemOfPhotographs,
 )
 from aerotri.tie_points.settings import DEFAULTS
-from aerotri.volume.settings import LAYER
+from aerotri.volume.settings import RUN_LAYER
 
 
 @app.command(
@@ -73,7 +73,7 @@ def run(
     base: Annotated[
         str, typer.Option(help="Base of the volume, as aerotri volume takes it.", rich_help_panel=SURFACE)
     ] = "",
-    layer: SurfaceLayer = LAYER,
+    layer: SurfaceLayer = RUN_LAYER,
     plots: Annotated[bool, typer.Option(help="Draw the plots of the adjustment.", rich_help_panel=OUTPUT)] = True,
     go_on: Annotated[
         bool,

@@ -111,6 +111,14 @@ def dtm(
         Path | None,
         typer.Option(help="Lines with heights: .gpkg, .geojson or .dxf.", rich_help_panel=INPUT),
     ] = None,
+    ground_within: Annotated[
+        str | None,
+        typer.Option(
+            help="Outline within which all is ground, a stockpile: .gpkg, .geojson or WKT. Elsewhere what is steep, as "
+            "a house, is taken off the DTM.",
+            rich_help_panel=INPUT,
+        ),
+    ] = None,
     ideal: Annotated[
         bool,
         typer.Option(
@@ -125,7 +133,7 @@ def dtm(
 
     settings = TerrainSettings(
         metres_or_auto(interval), cell, pairs, step, cast(Any, subset), area, window, threshold, agreeing, edge,
-        most_photographs, breaklines, ideal,
+        most_photographs, breaklines, ground_within, ideal,
     )  # fmt: skip
     raise typer.Exit(run_dtm(result, photographs, out, settings, plots, json_))
 

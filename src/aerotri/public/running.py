@@ -17,7 +17,7 @@ from aerotri.public.progress import Progress, ProgressLike, StageReport, stage_r
 from aerotri.public.run_steps import BLOCK, DTM, RECORD, REPORT, RESULT, Step, Verb, is_block, is_missing, steps_of
 from aerotri.results.failure import AdjustmentFailedError
 from aerotri.tie_points.settings import DEFAULTS
-from aerotri.volume.settings import LAYER, Layer
+from aerotri.volume.settings import RUN_LAYER, Layer
 
 if TYPE_CHECKING:
     from aerotri.observations import Block
@@ -113,7 +113,7 @@ def run(
     interval: float | None = None,
     boundary: Any = None,
     base: Any = None,
-    layer: Layer = LAYER,
+    layer: Layer = RUN_LAYER,
     plots: bool = True,
     go_on: bool = False,
     further: Mapping[Verb, Mapping[str, Any]] | None = None,
@@ -141,7 +141,8 @@ def run(
     interval : m between the points of the terrain (pickets); from the GSD and the relief where None.
     boundary : of a volume, see `aerotri.volume`; no volume where None.
     base : of the volume, see `aerotri.volume`.
-    layer : surface of the volume, 'dsm' with objects or 'dtm', the ground alone, see `aerotri.volume`.
+    layer : surface of the volume: 'dtm', within the boundary all that was measured, beside it the ground without
+        objects; or 'dsm', with objects everywhere.
     plots : draw the plots of the adjustment.
     go_on : go on after an adjustment that was rejected.
     further : more settings of a step by the name of its verb, {'terrain': {'window': 21}}.
@@ -179,7 +180,7 @@ def run(
             "parameters": parameters, "geoid": geoid, "control_prefix": "" if marked else control_prefix,
             "plots": plots, **(names if from_block else {}),
         },
-        "terrain": {"interval": interval},
+        "terrain": {"interval": interval, "ground_within": boundary},
         "volume": {"boundary": boundary, "base": base, "layer": layer} if not is_missing(boundary) else {},
     }  # fmt: skip
     for verb, more in (further or {}).items():

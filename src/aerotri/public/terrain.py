@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -22,9 +23,11 @@ from aerotri.terrain.settings import DEFAULTS, Subset, TerrainSettings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from shapely.geometry.base import BaseGeometry
 
     from aerotri.results.adjustment import Adjustment as Record
     from aerotri.terrain.dtm import TerrainOutcome, TerrainPlan
+    from aerotri.volume.boundary import Boundary
 
 RECORD = "dtm.json"
 PICKETS = "pickets.parquet"
@@ -72,6 +75,7 @@ class TerrainModel:
     block : name of the block. crs : its coordinate system.
     adjustment : key of the adjustment it was measured with.
     notes : what was done with the input before, in sentences.
+    ground_within : name of the outline within which all is ground; '' where there is none.
     """
 
     record: TerrainOutcome
@@ -79,6 +83,7 @@ class TerrainModel:
     crs: str
     adjustment: str
     notes: tuple[str, ...] = ()
+    ground_within: str = ""
 
     @cached_property
     def dsm(self) -> Surface:
@@ -120,7 +125,8 @@ class TerrainModel:
         """The content of dtm.json: interval, counts of pickets, σ."""
         from aerotri.formats.results.terrain import terrain_json
 
-        return terrain_json(self.record, self.block, self.crs) | {"adjustment": self.adjustment}
+        stated = {"adjustment": self.adjustment, "ground_within": self.ground_within}
+        return terrain_json(self.record, self.block, self.crs) | stated
 
     @property
     def plot(self) -> TerrainPlots:
@@ -197,6 +203,7 @@ def terrain(
     edge: float | None = DEFAULTS.edge,
     most_photographs: int = DEFAULTS.most_photographs,
     breaklines: FilePath | None = DEFAULTS.breaklines,
+    ground_within: BaseGeometry | FilePath | None = DEFAULTS.ground_within,
     ideal: bool = DEFAULTS.ideal,
     progress: ProgressLike = None,
 ) -> TerrainModel:
@@ -218,6 +225,8 @@ def terrain(
     edge : share of the format at its edge that is not used; 0.02, of pairs 0.10, where None.
     most_photographs : of a picket.
     breaklines : file of lines with heights: .gpkg, .geojson or .dxf.
+    ground_within : outline within which everything is ground, as `aerotri.volume` takes its boundary: a stockpile is
+        steep and would be taken off the DTM as an object.
     ideal : the photographs are those of `aerotri.ideal_photographs`, free of image errors.
     progress : as of `aerotri.adjust`.
 
@@ -239,7 +248,20 @@ def terrain(
     """
     lines = None if breaklines is None else Path(breaklines)
     settings = TerrainSettings(
-        interval, cell, pairs, step, subset, area, window, threshold, agreeing, edge, most_photographs, lines, ideal
+        interval,
+        cell,
+        pairs,
+        step,
+        subset,
+        area,
+        window,
+        threshold,
+        agreeing,
+        edge,
+        most_photographs,
+        lines,
+        ground_within,
+        ideal,
     )
     return measure_terrain(result, paths_of(photographs), settings, progress)
 
@@ -258,11 +280,16 @@ def measure_terrain(
 
     settings.check()
     record = (result if isinstance(result, Adjustment) else open_result(result)).record
+    block = record.result.block
     with stage_report(progress) as report:
         plan, notes = terrain_plan(record, photographs, settings)
+        name = ""
+        if settings.ground_within is not None:
+            outline = outline_of(settings.ground_within, block.crs)
+            plan, name = replace(plan, ground_within=outline.polygon), outline.name
+            notes = (*notes, outline.note) if outline.note else notes
         outcome = make_terrain_model(record, plan, report.stage)
-    block = record.result.block
-    return TerrainModel(outcome, str(block.name), block.crs, adjustment_key(record), notes)
+    return TerrainModel(outcome, str(block.name), block.crs, adjustment_key(record), notes, name)
 
 
 def terrain_plan(
@@ -299,6 +326,25 @@ def terrain_plan(
         most_photographs=s.most_photographs, breaklines=lines, ideal=s.ideal,
     )  # fmt: skip
     return plan, (note,) if note else ()
+
+
+def outline_of(stated: BaseGeometry | FilePath, crs: str) -> Boundary:
+    """A polygon as `aerotri.volume` takes its boundary, in the CRS of a block.
+
+    Raises
+    ------
+    InputError
+    """
+    from pyproj import CRS
+    from shapely.geometry.base import BaseGeometry
+
+    from aerotri.rasters.grids import horizontal_crs
+    from aerotri.volume.boundary import boundary_of, read_boundary
+
+    if isinstance(stated, BaseGeometry):
+        return boundary_of(stated, "the polygon given")
+    plane = horizontal_crs(crs)
+    return read_boundary(os.fspath(stated), CRS.from_user_input(plane).to_epsg() if plane else None)
 
 
 def _write(target: Path, model: TerrainModel, plots: bool) -> None:

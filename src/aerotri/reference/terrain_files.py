@@ -62,6 +62,7 @@ DTM_JSON = (
     Item("ray_sigma_px", "number", "Standard deviation of a matched image coordinate.", "px"),
     Item("sigma0_rays", "number", "How well the rays of a point meet, against their stated σ; 1 is as stated."),
     Item("ground_share", "number", "Share of the points that are ground, not objects."),
+    Item("ground_within", "text", "Outline within which all is ground; empty where none was given."),
     Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
 )
 DIFFERENCE = (

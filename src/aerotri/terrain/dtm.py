@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from aerotri.conventions import InputError, counted
 from aerotri.deformation.block_models import strip_pairs
 from aerotri.deformation.model_geometry import geometry_of
 from aerotri.deformation.stereo_model import pair_model
+from aerotri.rasters.grids import Grid, rasterise
 from aerotri.results.adjustment import Adjustment
 from aerotri.terrain.adjustment_part import adjustment_variances
 from aerotri.terrain.error_pickets import with_error_pickets
@@ -21,6 +23,9 @@ from aerotri.terrain.matching import measure
 from aerotri.terrain.photographs import Photographs, photographs_of
 from aerotri.terrain.pickets import Area, MatchOptions, Models, Pickets, footprint
 from aerotri.terrain.surface import Surface, grid_over, ground_cells, interpolation_error, surface_of
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
 
 BEST_END_LAP = 0.6
 """End lap of the pairs that are looked for: the usual one of aerial photographs [C]; less shows the ground too
@@ -42,6 +47,7 @@ class TerrainPlan:
     step : photographs from one of a pair to the other along the strip; None: what comes nearest to 60 % end lap.
     threshold, agreeing : correlations of `MatchOptions`.
     area : None: as far as the photographs reach. breaklines : (k, 3) m each.
+    ground_within : polygon within which all is ground, None: nowhere.
     ideal : whether the photographs have been freed of image errors.
     """
 
@@ -58,6 +64,7 @@ class TerrainPlan:
     edge: float = 0.10
     most_photographs: int = 5
     breaklines: tuple[np.ndarray, ...] = ()
+    ground_within: BaseGeometry | None = None
     ideal: bool = False
 
 
@@ -236,7 +243,7 @@ def _surfaces(
     cell = interval / CELLS_PER_INTERVAL if plan.cell is None else plan.cell
     grid = grid_over(xyz[:, :2], cell)
     dsm = surface_of(xyz, matching, interval, grid, plan.breaklines, between, shared)
-    of_cell = ground_cells(dsm.z, cell, blur)
+    of_cell = ground_cells(dsm.z, cell, blur, _cells_within(plan.ground_within, grid))
     row = np.clip(np.round(grid.row(xyz[:, 1])), 0, grid.rows - 1).astype(int)
     column = np.clip(np.round(grid.column(xyz[:, 0])), 0, grid.columns - 1).astype(int)
     is_ground = of_cell[row, column]
@@ -251,6 +258,15 @@ def _surfaces(
     known = np.isfinite(dsm.z)
     dtm = Surface(grid, np.where(known, dtm.z, np.nan), np.where(known, dtm.sigma, np.nan))
     return dsm, dtm, ground, between
+
+
+def _cells_within(polygon: BaseGeometry | None, grid: Grid) -> np.ndarray | None:
+    """(rows, columns) bool, cells that a polygon touches; None without one."""
+    if polygon is None:
+        return None
+    from shapely.geometry import mapping
+
+    return rasterise([(mapping(polygon), 1)], grid, 0, touched=True) == 1
 
 
 def _model_numbers(dsm: Surface, pickets: Pickets) -> np.ndarray:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
-from aerotri.conventions import LARGEST, InputError
+from aerotri.conventions import LARGEST, FilePath, InputError
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
 
 Subset = Literal["all", "even", "odd"]
 SUBSETS: tuple[Subset, ...] = get_args(Subset)
@@ -43,6 +46,7 @@ class TerrainSettings:
     edge : share of the format at its edge that is not used; None: 0.02, of pairs 0.10.
     most_photographs : of a picket.
     breaklines : file of lines with heights.
+    ground_within : outline within which all is ground, as `aerotri.volume` takes its boundary; None: nowhere.
     ideal : the photographs have been freed of image errors.
     """
 
@@ -58,6 +62,7 @@ class TerrainSettings:
     edge: float | None = None
     most_photographs: int = 8
     breaklines: Path | None = None
+    ground_within: BaseGeometry | FilePath | None = None
     ideal: bool = False
 
     @property

@@ -127,7 +127,7 @@ def interpolation_error(xyz: np.ndarray, node: np.ndarray, interval: float, vari
     return float(two * 2.0 ** -np.clip(power, LEAST_POWER, MOST_POWER))
 
 
-def ground_cells(z: np.ndarray, cell: float, blur: float = 0.0) -> np.ndarray:
+def ground_cells(z: np.ndarray, cell: float, blur: float = 0.0, stated: np.ndarray | None = None) -> np.ndarray:
     """(rows, columns) bool: cells of a surface that are ground and no object on it.
 
     The simple morphological filter [L: Pingel, Clarke, McBride 2013]: the surface is opened by ever wider discs; what
@@ -138,6 +138,7 @@ def ground_cells(z: np.ndarray, cell: float, blur: float = 0.0) -> np.ndarray:
     ----------
     blur : m beside an object that are no ground either: the windows of matching have some of the object in them, so
         that walls become slopes, whose feet no opening takes off.
+    stated : bool as z, cells that are ground whatever their shape: a stockpile is steeper than the filter allows.
     """
     known = np.isfinite(z)
     if not known.any():
@@ -148,15 +149,20 @@ def ground_cells(z: np.ndarray, cell: float, blur: float = 0.0) -> np.ndarray:
         opened = grey_opening(last, footprint=_disc(radius))
         objects |= last - opened > SMRF_SLOPE * radius * cell
         last = opened
+    if stated is not None:
+        objects &= ~stated
     reach = int(np.ceil(blur / cell))
     ground = known & ~_widened(objects, reach)
+    if stated is not None:
+        ground |= known & stated
     if not ground.any():
         return ground
     surface = _nearest(np.where(ground, z, np.nan), ground)
     slope = np.hypot(*np.gradient(surface, cell)) if min(z.shape) > 1 else np.zeros(z.shape)
     near = known & (np.abs(filled - surface) <= SMRF_HEIGHT_M + SMRF_SCALE * slope * cell)
     # what stands out after all is an object, and so is what its blur reaches
-    return near & ~_widened(known & ~near, reach)
+    found = near & ~_widened(known & ~near, reach)
+    return found if stated is None else found | (known & stated)
 
 
 def _nearest(values: np.ndarray, known: np.ndarray) -> np.ndarray:

@@ -44,6 +44,9 @@ class SigmaOptions:
 Layer = Literal["dsm", "dtm"]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
 LAYER: Layer = "dsm"
+RUN_LAYER: Layer = "dtm"
+"""Of `aerotri run`, which measures the DTM with all within the boundary as ground, a pile too; beside it objects are
+taken off, so that a tree does not lift the base."""
 """Of a terrain model the surface with objects: a filter that seeks the ground takes a pile for an object."""
 BASE, METHOD = "boundary", METHODS[0]
 """The base and the method that count where none is stated."""
