@@ -21,6 +21,7 @@ from aerotri.reference.block_keys import BlockKey, block_keys, block_tables, pla
 from aerotri.reference.block_tables import block_table_files
 from aerotri.reference.command_lines import CommandLine, CommandOption, command_lines
 from aerotri.reference.files import described_files
+from aerotri.reference.printed_words import PRINTED_WORDS
 from aerotri.reference.records import DescribedFile, Item
 from aerotri.reference.schemas import schema_name, schema_texts
 from aerotri.reference.words import MARKS, WORDS
@@ -132,7 +133,8 @@ def block_toml_page() -> str:
     ]  # fmt: skip
     prior = ["### value, sigma, fixed", "", "A parameter of `interior`, `brown` or `lens` is written as",
              "`focal_length_mm = { fixed = false }` (free), `{ value = 101.4, sigma = 0.01 }` (observed) or",
-             "`{ fixed = true }` (held). A free parameter starts at `value` where that is given.", "", *_key_table(prior_keys()), ""]  # fmt: skip
+             "`{ fixed = true }` (held). A free parameter starts at `value` where that is given.", "",
+             *_key_table(prior_keys()), ""]  # fmt: skip
     return "\n".join([*lines, *_by_table(block_tables(), block_keys(), {"camera.NAME.interior": prior})])
 
 
@@ -425,6 +427,9 @@ def words_page() -> str:
         rows = [(f"`{word.name}`", word.text, word.remedy or "–") for word in WORDS if word.place == place]
         title = f"{place[:1].upper()}{place[1:]}".replace("--check-free", "`--check-free`")
         lines += [f"## {title}", "", *_table(("word", "meaning", "what to do"), rows), ""]
+    lines += ["## Words that commands print", "", "Columns and JSON keys have their own entries.", ""]
+    rows = [(f"`{word.name}`", word.place, f"{word.text} {word.remedy}".strip()) for word in PRINTED_WORDS]
+    lines += [*_table(("word", "printed by", "meaning"), rows), ""]
     return "\n".join(lines)
 
 

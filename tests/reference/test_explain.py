@@ -2,17 +2,38 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import json
+import re
+import textwrap
 
 import pytest
 
 from aerotri.cli.app import app, invoke
+from aerotri.commands import compare, deform, dtm, volume
 from aerotri.conventions import InputError
 from aerotri.reference.block_keys import block_keys, plan_keys
 from aerotri.reference.command_lines import command_lines
 from aerotri.reference.files import described_files
-from aerotri.reference.lookup import command_entries, entries, find, names_of
+from aerotri.reference.lookup import FIRST, KINDS, command_entries, entries, find, names_of
+from aerotri.reference.printed_words import PRINTED_WORDS
 from aerotri.reference.words import WORDS
+from aerotri.report.tables import adjustment, work
+from aerotri.volume.accuracy import PARTS
+from aerotri.volume.settings import METHODS
+
+EVERYDAY = {
+    "a", "and", "are", "as", "at", "between", "beyond", "by", "counted", "covered", "end", "every", "expected", "f",
+    "g", "heights", "in", "inside", "lap", "lines", "moved", "nearby", "neighbouring", "not", "of", "over", "place",
+    "seen", "straight", "that", "the", "them", "to", "warning", "with", "without", "cm", "m", "m²", "m³", "mm", "px",
+    "µm",
+}  # fmt: skip
+"""Words of the printed lines that need no explanation: small words, units, parts of terms explained together."""
+PRINTING = (
+    adjustment.summary_lines, work.free_check_lines, volume.outcome_lines, compare._summary, deform._summary,
+    dtm._summary,
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -94,3 +115,51 @@ def test_commands_are_told_in_full():
         assert command.example.startswith(f"aerotri {command.name} "), command.name
         for option in command.options:
             assert option.text, (command.name, option.names)
+
+
+def printed_by(function):
+    """The words that stand in the texts with values, out of which a function makes the lines it prints."""
+    texts = [node for node in ast.walk(ast.parse(textwrap.dedent(inspect.getsource(function))))
+             if isinstance(node, ast.JoinedStr)]  # fmt: skip
+    constants = [part.value for text in texts for part in text.values if isinstance(part, ast.Constant)]
+    return {word for text in constants for word in re.findall(r"[^\W\d_][\w/̂]*(?:-parallax)?", text)}
+
+
+@pytest.mark.parametrize("function", PRINTING, ids=lambda f: f"{f.__module__.rsplit('.')[-1]}.{f.__name__}")
+def test_words_of_printed_lines_are_explained(function, known):
+    """Whatever a command adds to its lines has to be explained, or to be a word of every day."""
+    words = printed_by(function)
+    assert len(words) > 5 or function is work.free_check_lines
+    assert not {word for word in words - EVERYDAY if not find(word, known)}
+
+
+@pytest.mark.parametrize("word", [*PARTS, *METHODS, "cut", "fill", "net", "RMS", "RMSE_H", "RMSE_V", "σ0", "end lap"])
+def test_values_of_printed_lines_are_explained(word, known):
+    assert find(word, known)
+
+
+def test_the_key_of_adjustment_json_is_told_first(known):
+    for word in ("sigma0", "verdict", "redundancy", "rms"):
+        found = [entry for entry in find(word, known) if entry.kind in ("column", "JSON key")]
+        assert found[0].place == FIRST, word
+        assert len({entry.place for entry in found}) > 1
+
+
+def test_without_a_word_it_says_what_can_be_asked(capsys, known):
+    """Every kind with examples, which are found; as JSON all entries."""
+    assert invoke(["explain"]) == 0
+    said = capsys.readouterr().out
+    assert {entry.kind for entry in known} == set(KINDS)
+    for kind, examples in KINDS.items():
+        assert f"{kind} " in said
+        for example in examples:
+            assert example in said
+            assert kind in {entry.kind for entry in find(example, known)}, example
+    assert invoke(["explain", "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)) == len(known)
+
+
+def test_printed_words_are_one_each():
+    names = [word.name for word in PRINTED_WORDS]
+    assert len(set(names)) == len(names)
+    assert all(word.text.endswith(".") for word in PRINTED_WORDS)

@@ -17,16 +17,16 @@ from aerotri.cli.options import ARGUMENTS, HELP, Json
 )  # fmt: skip
 def explain(
     key: Annotated[
-        list[str],
+        list[str] | None,
         typer.Argument(
-            help="A key of block.toml, a column, a JSON key, a file, an option or a word of a result; before it the "
-            "file or command it belongs to, where it is to be that one.",
+            help="A key of block.toml, a column, a JSON key, a file, an option or a printed word; before it the "
+            "file or command it belongs to, where it is to be that one. Without it: what can be asked.",
             rich_help_panel=ARGUMENTS,
         ),
-    ],
+    ] = None,
     json_: Json = False,
 ) -> None:
-    """What a key, a column, a file, an option or a word of a result means."""
+    """What a key, a column, a file, an option or a printed word means."""
     from aerotri.commands.explain import run_explain
 
-    run_explain(" ".join(key), app, json_)
+    run_explain(" ".join(key or ()), app, json_)

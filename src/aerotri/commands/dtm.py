@@ -63,8 +63,8 @@ def _summary(content: dict[str, Any]) -> list[str]:
     lines = [
         f"{c['photographs']} photographs, GSD {c['gsd_m']:.3f} m; pickets every {c['interval_m']:g} m"
         f" ({c['interval_source']}), raster cells of {c['cell_m']:g} m",
-        f"{p['accepted']} of {p['seen']} nodes that are seen accepted, {p['errors']} error pickets, "
-        f"{p['stepped_aside']} stepped aside, {p['holes']} holes",
+        f"{p['accepted']} of {p['seen']} nodes that are seen accepted ({p['stepped_aside']} moved to a place nearby), "
+        f"{p['errors']} error pickets, {p['holes']} holes",
     ]
     reasons = [f"{n} {name}" for name, n in c["status"].items() if n and name not in ("accepted", "not seen")]
     if reasons:
@@ -72,7 +72,7 @@ def _summary(content: dict[str, Any]) -> list[str]:
     s = c["sigma_Z_m"]
     lines.append(
         f"σ of Z: median {s['median']:.3f} m (matching {s['matching']:.3f}, adjustment {s['adjustment']:.3f}; "
-        f"between pickets {s['interpolation']:.3f}); parallax of the rays σ̂ {c['ray_sigma_px']:.3f} px"
+        f"between pickets {s['interpolation']:.3f}); parallax of the rays {c['ray_sigma_px']:.3f} px"
     )
     lines.append(f"{c['ground_share'] * 100:.0f} % of the pickets are ground")
     return lines

@@ -55,7 +55,7 @@ class TerrainPlots:
         return plot_surface(self.record, self.block)
 
     def pickets(self) -> Figure:
-        """Where pickets are: accepted, stepped aside, in error, and the nodes that stayed holes."""
+        """Where pickets are: accepted, moved to a place nearby, in error, and the nodes that stayed holes."""
         from aerotri.report.plots.terrain import plot_pickets
 
         return plot_pickets(self.record, self.block)

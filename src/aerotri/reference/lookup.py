@@ -18,14 +18,27 @@ from aerotri.reference.block_keys import (
 )
 from aerotri.reference.command_lines import CommandLine
 from aerotri.reference.files import described_files
+from aerotri.reference.printed_words import PRINTED_WORDS
 from aerotri.reference.records import DescribedFile, Item
-from aerotri.reference.words import WORDS
+from aerotri.reference.words import WORDS, Word
 
-KINDS = (
-    "key of block.toml", "table of block.toml", "key of simulation.toml", "table of simulation.toml", "command", "file",
-    "column", "option", "parameter", "word of a result", "JSON key",
-)  # fmt: skip
-"""Kinds of entries in the order in which they are told."""
+KINDS = {
+    "key of block.toml": ("gnss.shift", "pixel_um"),
+    "table of block.toml": ("gnss", "stochastic"),
+    "key of simulation.toml": ("flight.gsd_m", "flight.strips"),
+    "table of simulation.toml": ("flight", "terrain"),
+    "command": ("adjust", "predict volume"),
+    "printed word": ("RMSE_V", "cut"),
+    "file": ("points.csv", "work_list.csv"),
+    "column": ("sZ", "points.csv sZ"),
+    "option": ("--robust", "adjust --robust"),
+    "parameter": ("brown.K1", "bluh.1"),
+    "word of a result": ("rejected", "rank deficient"),
+    "JSON key": ("sigma0", "adjustment.json redundancy"),
+}
+"""Kinds of entries in the order in which they are told, with two words to ask for each."""
+FIRST = "adjustment.json (result of adjust)"
+"""The file whose keys are told before those of other files."""
 CAMERA = re.compile(r"^camera\.[^.]+\.")
 NAMED = 5
 """Near names that are offered where a word is not known; chosen [C]: more are no help."""
@@ -68,10 +81,8 @@ def entries() -> tuple[Entry, ...]:
             *_tables("simulation.toml", plan_tables(), plan_keys()),
             *(entry for one in described_files() for entry in _of_file(one)),
             *_parameters(),
-            *(
-                Entry("word of a result", word.name, word.place, word.text, _facts({"what to do": word.remedy}), {})
-                for word in WORDS
-            ),
+            *(_word("printed word", word) for word in PRINTED_WORDS),
+            *(_word("word of a result", word) for word in WORDS),
         ]
     )
 
@@ -104,8 +115,13 @@ def find(words: str, known: Sequence[Entry]) -> list[Entry]:
             entry for names in (_full_names, _short_names) for entry in known if fold(asked) in map(fold, names(entry))
         ]
         if found:
-            return sorted(dict.fromkeys(found), key=lambda entry: KINDS.index(entry.kind))
+            return sorted(dict.fromkeys(found), key=_order)
     return []
+
+
+def _order(entry: Entry) -> int:
+    """The key of adjustment.json goes before what other files have under its name."""
+    return list(KINDS).index("file" if FIRST in (entry.place, f"{entry.name} ({entry.place})") else entry.kind)
 
 
 def names_of(entry: Entry) -> tuple[str, ...]:
@@ -154,6 +170,10 @@ def _short_names(entry: Entry) -> Iterator[str]:
 
 def _facts(facts: Mapping[str, str]) -> dict[str, str]:
     return {name: value for name, value in facts.items() if value}
+
+
+def _word(kind: str, word: Word) -> Entry:
+    return Entry(kind, word.name, word.place, word.text, _facts({"what to do": word.remedy}), {})
 
 
 def _key(file: str, key: BlockKey) -> Entry:

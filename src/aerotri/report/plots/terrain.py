@@ -104,13 +104,13 @@ def _plot_sigma(
 
 @styled
 def plot_pickets(outcome: TerrainOutcome, block_name: str) -> Figure:
-    """Where pickets are: accepted, stepped aside, in error by what shows it, and the nodes that stayed holes."""
+    """Where pickets are: accepted, moved nearby, in error by what shows it, and the nodes that stayed holes."""
     p = outcome.pickets
     seen = p.status != PicketStatus.NOT_SEEN
     holes = seen & (p.status >= PicketStatus.LOW_CORRELATION) & (p.status < PicketStatus.BACKWARD)
     subtitle = (
         f"{int(p.accepted.sum())} of {int(seen.sum())} nodes accepted, {int((p.accepted & (p.tries > 0)).sum())} of "
-        f"them stepped aside; {int(p.errors.sum())} error pickets, {int(holes.sum())} holes"
+        f"them moved to a place nearby; {int(p.errors.sum())} error pickets, {int(holes.sum())} holes"
     )
     grid = outcome.dsm.grid
     width, height = _size(grid, WIDTH - 1.4)
@@ -119,7 +119,7 @@ def plot_pickets(outcome: TerrainOutcome, block_name: str) -> Figure:
     size = float(np.clip(60.0 * width / np.sqrt(max(int(seen.sum()), 1)), 0.6, 12.0))
     own, aside = p.accepted & (p.tries == 0), p.accepted & (p.tries > 0)
     axes.scatter(*p.xyz[own, :2].T, s=size, c=LIGHT, lw=0, label="accepted")
-    axes.scatter(*p.xyz[aside, :2].T, s=size * 1.5, c=GREY, lw=0, label="stepped aside")
+    axes.scatter(*p.xyz[aside, :2].T, s=size * 1.5, c=GREY, lw=0, label="moved nearby")
     axes.scatter(*p.node[holes].T, s=size * 2, facecolors="none", edgecolors=ACCENT, lw=0.6, label="hole")
     for status, (mark, name) in ERROR_MARKS.items():
         wrong = p.status == status
