@@ -12,7 +12,7 @@ from typing import Any
 
 from numba import njit
 
-_state: dict[str, Any] = {"cached": True, "example": None}
+_state: dict[str, Any] = {"cached": True, "example": None, "said": False}
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -32,12 +32,18 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 def compilation_notice() -> str:
-    """A sentence for the user when kernels have to be compiled in this run; '' when they come from the cache."""
+    """A sentence for the user when kernels have to be compiled in this run; '' when they come from the cache.
+
+    It is given once: a command of several steps asks at each of them.
+    """
+    if _state["said"]:
+        return ""
+    notice = ""
     if not _state["cached"]:
-        return (
+        notice = (
             "compiling kernels; there is no writable place to keep them (set NUMBA_CACHE_DIR), so every run does this"
         )
-    example = _state["example"]
-    if example is None or any(Path(example.stats.cache_path).glob("*.nbi")):
-        return ""
-    return "compiling kernels, in this first run only (about 20 s)"
+    elif _state["example"] is not None and not any(Path(_state["example"].stats.cache_path).glob("*.nbi")):
+        notice = "compiling kernels, in this first run only (about 20 s)"
+    _state["said"] = bool(notice)
+    return notice

@@ -11,7 +11,7 @@ import pytest
 from aerotri.commands.adjust import run_adjust
 from aerotri.diagnosis import diagnose
 from aerotri.diagnosis.evidence import fit, gather
-from aerotri.diagnosis.free_model import connected_parts, free_model
+from aerotri.diagnosis.free_model import connected_parts, free_model, sub_block
 from aerotri.diagnosis.placement import lay_on
 from aerotri.diagnosis.sampling import ENOUGH_CONTROL, MOST_PHOTOGRAPHS, MOST_RAYS, sampled
 from aerotri.diagnosis.trials import FAILED, Trial, explains
@@ -65,6 +65,28 @@ def test_no_unit_is_said_where_nothing_tells_it():
     result = adjust(noisy)
     assert result.outcome.verdict != "accepted"
     assert not [cause for cause in diagnose(noisy, adjust, result) if "taken for what they are" in cause]
+
+
+def three_photographs(seed):
+    """Three photographs, the neighbours with seven points in common: too few for a pair to be oriented by itself."""
+    flight = {"gsd_m": 0.1, "strips": 1, "images_per_strip": 3, "end_lap": 0.6, "side_lap": 0.4,
+              "attitude_sigma_deg": [1.0, 1.0, 2.0], "position_sigma_m": [5.0, 5.0, 3.0]}  # fmt: skip
+    ties = {"per_image": 3, "probability": 1.0, "sigma_um": 2.0}
+    control = {"distance_bases": 1.0, "sigma_m": [0.03, 0.03, 0.05], "check_points": 0}
+    block, _ = small_block(seed, flight=flight, tie_points=ties, control=control)
+    most_rays = np.argsort(-np.bincount(block.image_points.point, minlength=len(block.points)), kind="stable")
+    return sub_block(block, np.arange(3), ~np.isin(np.arange(len(block.points)), most_rays[1:5]))[0]
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_three_photographs_begin_with_their_start_values(seed):
+    """X and Y of control exchanged are said; without start values there is no model of so few points."""
+    block = three_photographs(seed)
+    wrong = replace(block, control=replace(block.control, xyz=block.control.xyz[:, [1, 0, 2]]))
+    causes = diagnose(wrong, adjust, adjust(wrong))
+    assert [cause for cause in causes if cause.startswith("coordinates of control points fit")]
+    assert "X and Y exchanged" in causes[0]
+    assert free_model(without_start_values(block)) is None
 
 
 def test_the_model_of_the_image_points_leaves_a_mirrored_photograph_out():

@@ -86,6 +86,23 @@ def point_of(block):
     return block.control.point[0]
 
 
+def test_a_name_that_nothing_else_has_met_comes_first():
+    """The measured name of the missing control point, not the tie point that is a part of its name."""
+    known = ["7", "8", "C1"]
+    assert in_words(["C7"], known) == "'C7' (near: '7')"
+    assert in_words(["C7"], known, ["C1"]) == "'C7' (near: 'C1', '7')"
+    assert in_words(["c1"], ["C1", "C9"], ["C9"]) == "'c1' (near: 'C1')"
+
+
+@pytest.mark.parametrize("new", ["{}7", "X{}"])
+def test_renamed_control_is_near_its_measured_name(whole, new):
+    """Names such as GCP… are built alike: what is measured and has no coordinates is what is meant."""
+    chosen = int(np.flatnonzero(~whole.control.is_check)[0])
+    name = str(whole.points[whole.control.point[chosen]])
+    block = named(whole, lambda k: new.format(name) if k == chosen else None)
+    assert f"(near: '{name}'" in " ".join(partnerless_in_words(block))
+
+
 def test_control_without_any_partner_is_named(whole):
     block = named(whole, lambda k: without_letters(whole, k))
     with pytest.raises(AdjustmentFailedError) as failed:

@@ -1,7 +1,8 @@
 """The block built from its image points alone: no control, no GNSS, no start values can spoil it.
 
 A pair of photographs is oriented to one another, the others are resected one after the other from the points found so
-far, robustly (`adjustment.start_values`). A photograph whose measurements do not fit the others stays out.
+far, robustly (`adjustment.start_values`). A photograph whose measurements do not fit the others stays out. Only a
+block of so few points that no pair can be oriented begins with its start values, if the image points then fit them.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from aerotri.adjustment.start_values import (
     refine,
     start_values,
 )
-from aerotri.functional_model.rotation import angles_from_rotation
+from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Block, Control, ImagePoints, Images
 
 FEWEST_COMMON = 8
@@ -132,14 +133,14 @@ def bare_block(block: Block) -> Block:
 
 
 def free_model(block: Block) -> FreeModel | None:
-    """The model of a block's image points; None where no two photographs make a beginning.
+    """The model of a block's image points; None where neither two photographs nor start values make a beginning.
 
     Photographs whose rays miss, or that see the ground from the other side, are taken out and the model grown again.
     """
     bare = bare_block(block)
     pair = _first_pair(bare)
     if pair is None:
-        return None
+        return _from_start_values(block, bare)
     (i, j), rotation, centre = pair
     model = _grown(bare, np.array([i, j]), rotation, centre)
     for _ in range(3):
@@ -154,6 +155,16 @@ def free_model(block: Block) -> FreeModel | None:
         kept = np.setdiff1d(np.flatnonzero(model.joined), wrong)
         model = _grown(bare, kept, model.rotation[kept], model.centre[kept], again=True)
     return model
+
+
+def _from_start_values(block: Block, bare: Block) -> FreeModel | None:
+    """The model that start values of all photographs lead to; None where some are missing or the rays do not fit."""
+    own = block.images
+    if len(own) < 2 or not (np.isfinite(own.centre).all() and np.isfinite(own.angles).all()):
+        return None
+    rotation = rotation_from_angles(own.angles, block.rotation)
+    model = _grown(bare, np.arange(len(own)), rotation, own.centre, again=True)
+    return model if model.joined.all() and np.max(model.miss) < GOOD_PAIR and not len(_unfit(model)) else None
 
 
 def _unfit(model: FreeModel) -> np.ndarray:

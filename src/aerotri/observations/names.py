@@ -12,6 +12,7 @@ import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from difflib import SequenceMatcher
 
 import numpy as np
 
@@ -27,6 +28,7 @@ LOOK_ALIKE = str.maketrans(
 AS_DIGITS = str.maketrans("oil|", "0111")
 SIGNS = re.compile(r"[\s_\-./\\:#()\[\]'\"]+")
 ZEROS = re.compile(r"(?<!\d)0+(?=\d)")
+NUMBER = re.compile(r"\d+")
 BETWEEN = re.compile(r"(?<=[^\W\d_])(?=\d)|(?<=\d)(?=[^\W\d_])")
 """Where letters end and a number begins, and the reverse."""
 SHOWN, SHOWN_NEAR, MOST_COMPARED, MANY = 5, 2, 200, 50_000
@@ -111,12 +113,21 @@ def prefix_of(names: Iterable[str], known: Iterable[str]) -> str | None:
     return found.most_common(1)[0][0] if found else None
 
 
-def in_words(names: Sequence[str], known: Iterable[str]) -> str:
-    """The names, and behind each those that are near: "'1' (near: 'GCP1'), '7'"."""
+def in_words(names: Sequence[str], known: Iterable[str], left_over: Sequence[str] = ()) -> str:
+    """The names, and behind each those that are near: "'1' (near: 'GCP1'), '7'".
+
+    Parameters
+    ----------
+    left_over : names that nothing else has met: they come before those that only hold the name, or are held by it.
+    """
     near = near_names(names[:SHOWN], known)
     said = []
     for name in names[:SHOWN]:
-        others = ", ".join(_shown(other, name) for other in near[name][:SHOWN_NEAR])
+        meant = near[name]
+        if not any(set(_keys(name)) & set(_keys(other)) for other in meant):
+            alike = sorted(left_over, key=lambda other: -SequenceMatcher(None, name, other).ratio())
+            meant = tuple(dict.fromkeys((*alike, *meant)))
+        others = ", ".join(_shown(other, name) for other in meant[:SHOWN_NEAR])
         said.append(f"'{name}'" + (f" (near: {others})" if others else ""))
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return ", ".join(said) + more
@@ -152,13 +163,24 @@ def partnerless_in_words(block: Block) -> tuple[str, ...]:
             others = np.setdiff1d(block.image_points.point, block.control.point)
             measured = block.points[others].astype(str).tolist()
         names = block.points[block.control.point[own]].astype(str).tolist()
+        left_over = _left_over(measured, block.points[block.control.point].astype(str).tolist(), len(names))
         text = f"{len(names)} of {int((block.control.is_check == is_check).sum())} {what} have no image points: "
-        text += in_words(names, measured)
+        text += in_words(names, measured, left_over)
         prefix = prefix_of(names, measured)
         if prefix is not None:
             text += f"; --control-prefix {quoted(prefix)} would make them meet"
         said.append(text)
     return tuple(said)
+
+
+def _left_over(measured: list[str], controls: list[str], missing: int) -> list[str]:
+    """Measured names without coordinates that are built as those of control: as many as are missing at most.
+
+    Names that are numbers alone tell nothing: tie points have such, too.
+    """
+    forms = {form for name in controls if (form := NUMBER.sub("0", name.casefold())) != "0"}
+    found = [name for name in measured if NUMBER.sub("0", name.casefold()) in forms] if forms else []
+    return found if len(found) <= missing else []
 
 
 def quoted(text: str) -> str:

@@ -236,8 +236,8 @@ def _resample_all(
     from aerotri.image_errors.ideal_map import ideal_map
     from aerotri.image_errors.ideal_photographs import ideal_photograph
 
-    if jobs and compilation_notice():
-        report.stage(compilation_notice(), None)
+    if jobs and (notice := compilation_notice()):
+        report.stage(notice, None)
     maps: dict[int, IdealMap] = {}
     done = []
     for number, job in enumerate(jobs):

@@ -1,0 +1,35 @@
+"""What is said of kernels that have to be compiled."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from aerotri import compiled
+
+
+@pytest.fixture
+def new_process(monkeypatch, tmp_path):
+    """The state of a process that begins with an empty cache."""
+    example = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path)))
+    state = {"cached": True, "example": example, "said": False}
+    monkeypatch.setattr(compiled, "_state", state)
+    return state
+
+
+def test_the_notice_is_given_once(new_process):
+    """A command of several steps asks before each of them."""
+    assert "first run only" in compiled.compilation_notice()
+    assert compiled.compilation_notice() == ""
+
+
+def test_no_notice_with_kernels_in_the_cache(new_process, tmp_path):
+    (tmp_path / "kernel.nbi").touch()
+    assert compiled.compilation_notice() == ""
+
+
+def test_without_a_place_for_the_cache_it_is_said_once(new_process):
+    new_process["cached"] = False
+    assert "NUMBA_CACHE_DIR" in compiled.compilation_notice()
+    assert compiled.compilation_notice() == ""
