@@ -194,9 +194,9 @@ def test_there_and_back_by_the_command(folders, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("{block}", "x", "--to", "bingo", "--camera-size", "8192"), "--camera-size 8192 — give columns and rows"),
+        (("{block}", "x", "--to", "bingo", "--camera-size", "8192"), "--camera-size '8192' is not a size in pixels"),
         (("{block}", "x", "--control-sigma-m", "1,2"), "--control-sigma-m 1,2"),
-        (("{block}", "x", "--flight-axis", "up"), "--flight-axis up"),
+        (("{block}", "x", "--flight-axis", "up"), "--flight-axis 'up' is not an image axis"),
         (("{block}", "x", "--to", "pdf"), "'pdf' is not a format that is written — known are block, bal"),
     ],
 )

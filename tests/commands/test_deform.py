@@ -185,7 +185,7 @@ def test_command_line(erring_result, tmp_path):
 
     done = run("--pair", *PAIR, "--spacing", "50", "--no-plots")
     assert done.returncode == 0
-    assert done.stdout.startswith("pair 2_003, 2_004, free, ")
+    assert done.stdout.startswith("pair 2_003, 2_004, photographs oriented with additional parameters, ")
     assert "σ of dZ" in done.stdout
     assert (tmp_path / "result_deformation" / "dZ.tif").is_file()
     done = run("--pair", "2_003", "2_003")

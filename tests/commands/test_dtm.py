@@ -138,7 +138,7 @@ def _distance(xy: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     [
         (("--subset", "third"), "there is no subset"),
         (("--window", "16"), "a window of 16 pixels is not possible"),
-        (("--interval", "wide"), "--interval .wide. is none"),
+        (("--interval", "wide"), "--interval .wide. is not a number"),
         (("--breaklines", "lines.shp"), "no known kind"),
     ],
 )
@@ -160,7 +160,7 @@ def test_photographs_that_are_not_there(made, tmp_path):
 def test_interval_by_formula():
     printed = json.loads(run("predict", "picket-interval", "--scan-um", 28, "--scale", 7000, "--json"))
     np.testing.assert_allclose(printed["interval_m"]["plain"], [42.06, 46.49], atol=0.01)
-    assert "older rule 30·GSD: 5.9 m" in run("predict", "picket-interval", "--gsd", 0.196)
+    assert "older rule, 30 times the GSD: 5.9 m" in run("predict", "picket-interval", "--gsd", 0.196)
     with pytest.raises(InputError, match="in exactly one way"):
         run("predict", "picket-interval", "--gsd", 0.2, "--scan-um", 28, "--scale", 7000)
 

@@ -13,6 +13,7 @@ import pytest
 from aerotri.cli.app import app, invoke
 from aerotri.commands import compare, deform, dtm, volume
 from aerotri.conventions import InputError
+from aerotri.formats.block.settings import read_block_toml
 from aerotri.reference.block_keys import block_keys, plan_keys
 from aerotri.reference.command_lines import command_lines
 from aerotri.reference.files import described_files
@@ -20,6 +21,7 @@ from aerotri.reference.lookup import FIRST, KINDS, command_entries, entries, fin
 from aerotri.reference.printed_words import PRINTED_WORDS
 from aerotri.reference.words import WORDS
 from aerotri.report.tables import adjustment, work
+from aerotri.simulation.reading import read_spec
 from aerotri.volume.accuracy import PARTS
 from aerotri.volume.settings import METHODS
 
@@ -157,6 +159,31 @@ def test_without_a_word_it_says_what_can_be_asked(capsys, known):
             assert kind in {entry.kind for entry in find(example, known)}, example
     assert invoke(["explain", "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)) == len(known)
+
+
+BARE = "[camera.a]\nsize_px = [100, 80]\npixel_um = 5.0\nfocal_length_mm = 50.0\n"
+
+
+@pytest.mark.parametrize(
+    ("reader", "text"),
+    [
+        (read_block_toml, 'image_unit = "inch"\n' + BARE),
+        (read_block_toml, BARE.replace("5.0\n", "-5.0\n", 1)),
+        (read_block_toml, BARE + "[camera.a.interior]\nx0_mm = { value = 1.0, sigma = -1.0 }\n"),
+        (read_block_toml, BARE + "[camera.a.fiducials]\nF1 = [1.0]\n"),
+        (read_block_toml, BARE + "[adjustment]\nalpha = 2.0\n"),
+        (read_spec, 'name = "a"\n' + BARE + "[flight]\ngsd_m = -1.0\n"),
+    ],
+)
+def test_a_wrong_value_leads_to_an_entry(reader, text, tmp_path, known):
+    """The remedy says what to ask for, and that is found."""
+    path = tmp_path / "block.toml"
+    path.write_text(text)
+    with pytest.raises(InputError) as refused:
+        reader(path)
+    asked = refused.value.remedy.partition("aerotri explain ")[2]
+    assert asked
+    assert find(asked, known), asked
 
 
 def test_printed_words_are_one_each():

@@ -175,7 +175,7 @@ def test_significant_but_useless_is_said():
     assert found.against == "none"
     assert behind.against == "gruen:all"
     worse = "worse than gruen:all"
-    assert verdict(useless, found, behind) == f"significant but useless: no better than none; {worse}"
+    assert verdict(useless, found, behind) == f"significant, but no better than none; {worse}"
     assert verdict(replace(useless, significant=1), found, behind) == f"no better than none; {worse}"
     assert verdict(useless, Gain("none", 0.3, 0.1), Gain("gruen:all", -0.1, 0.1)) == "helps; as good as the best"
     assert verdict(useless, None, Gain("ebner:1-12", 0.0, 0.0)) == "the best"

@@ -65,7 +65,7 @@ def test_chosen_interval_is_where_the_error_reaches_the_tolerance():
 
 def test_interval_of_a_surface_gives_small_ground_pickets_enough():
     """Aerial photographs keep the formula; a drone's 100 m × 100 m the older rule, or 50 000 nodes."""
-    assert interval_of_surface(0.2, 0.1, 1e10) == (pytest.approx(44.72, abs=0.01), "100·√GSD")
-    assert interval_of_surface(0.02, 0.1, 1e4) == (pytest.approx(0.6), "30·GSD")
+    assert interval_of_surface(0.2, 0.1, 1e10) == (pytest.approx(44.72, abs=0.01), "100 · √GSD")
+    assert interval_of_surface(0.02, 0.1, 1e4) == (pytest.approx(0.6), "30 times the GSD")
     interval, source = interval_of_surface(0.02, 0.1, 2e5)
-    assert (interval, source) == (pytest.approx(2.0), "50000 nodes")
+    assert (interval, source) == (pytest.approx(2.0), "50000 places in the area")

@@ -48,7 +48,7 @@ def spread_points(points: np.ndarray, rays: np.ndarray) -> tuple[int, int, int]:
     xyz = points[good]
     first = int(np.argmax(np.linalg.norm(xyz - xyz.mean(axis=0), axis=1)))
     second = int(np.argmax(np.linalg.norm(xyz - xyz[first], axis=1)))
-    line = (xyz[second] - xyz[first]) / np.linalg.norm(xyz[second] - xyz[first])
+    line = (xyz[second] - xyz[first]) / max(float(np.linalg.norm(xyz[second] - xyz[first])), 1e-300)
     off = np.linalg.norm(np.cross(xyz - xyz[first], line), axis=1)
     return int(good[first]), int(good[second]), int(good[int(np.argmax(off))])
 

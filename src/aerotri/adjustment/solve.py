@@ -7,6 +7,7 @@ step and makes it lead downhill, `damping` says how much, `secants` learn the cu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -46,7 +47,7 @@ class SolveOptions:
     Parameters
     ----------
     robust : a key of `robust.STAGES`; each of its stages has `max_iterations`.
-    report : called after every iteration with (iteration, cost, damping), for progress.
+    report : called after every iteration with (iteration, σ0, damping), for progress.
     inspect : may stop the adjustment, whose status is `INTERRUPTED` then.
     step_tolerance : share of σ within which the last robust stage ends.
     """
@@ -103,13 +104,14 @@ class _Course:
 
     iteration: int
     report: Report | None
+    redundancy: int
     costs: list[float] = field(default_factory=list)
 
     def add(self, cost: float, damping: float) -> None:
         """Keep the cost after an iteration, and tell of it."""
         self.costs.append(cost)
         if self.report:
-            self.report(self.iteration, cost, damping)
+            self.report(self.iteration, math.sqrt(cost / max(self.redundancy, 1)), damping)
 
     def ended(self, status: str, at: Place) -> Solution:
         """The solution at a place."""
@@ -143,7 +145,7 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
 def _descend(system: NormalSystem, state: State, redundancy: int, options: SolveOptions, stage: Stage) -> Solution:
     """Gauss-Newton with the estimator of one stage."""
     at = _reweighted(system, place_at(system, state, LEAST_SQUARES), stage.name, redundancy)
-    course = _Course(stage.done, options.report, [at.equations.cost])
+    course = _Course(stage.done, options.report, redundancy, [at.equations.cost])
     last_iteration = stage.done + options.max_iterations
     damping, secants, scale_changes, last_decrement = Damping(), None, 0, np.inf
     while course.iteration < last_iteration:

@@ -168,7 +168,7 @@ def _tied(
 
 
 def _counting(report: Callable[[int, float, float], None], done: int) -> Callable[[int, float, float], None]:
-    return lambda iteration, cost, damping: report(done + iteration, cost, damping)
+    return lambda iteration, sigma0, damping: report(done + iteration, sigma0, damping)
 
 
 def _scale(system: NormalSystem, equations: NormalEquations, estimator: Estimator, redundancy: int) -> float:

@@ -64,11 +64,6 @@ class Console:
         elif self._is_due(is_new) or text.startswith("compiling"):
             self._line(text)
 
-    def iteration(self, number: int, cost: float, damping: float) -> None:
-        """Progress of the adjustment."""
-        damped = f", damped {damping:.0e}" if damping else ""
-        self.progress(f"iteration {number}: vᵀPv {cost:.6g}{damped}")
-
     def work(self, stage: str, share: float, detail: str = "") -> None:
         """Progress of work whose share (0 to 1) is known, with the time left; off a terminal a line every tenth."""
         is_new = stage != self._stage

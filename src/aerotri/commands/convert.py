@@ -69,10 +69,14 @@ def camera_spec(
     if size:
         found = re.fullmatch(r"([1-9][0-9]{0,6})\s*[x×,]\s*([1-9][0-9]{0,6})", size.strip())
         if not found:
-            raise InputError(f"--camera-size {size[:60]}", "give columns and rows, as 8192x5460")
+            raise InputError(
+                f"--camera-size '{size[:60]}' is not a size in pixels", "give columns and rows, such as 8192x5460"
+            )
         size_px = (int(found[1]), int(found[2]))
     if flight_axis is not None and flight_axis not in FLIGHT_AXES:
-        raise InputError(f"--flight-axis {flight_axis[:60]}", f"it is one of {', '.join(FLIGHT_AXES)}")
+        raise InputError(
+            f"--flight-axis '{flight_axis[:60]}' is not an image axis", f"give one of {', '.join(FLIGHT_AXES)}"
+        )
     return CameraSpec(file, name, size_px, pixel_um, focal_length_mm, flight_axis, free)
 
 

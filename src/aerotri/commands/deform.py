@@ -76,10 +76,11 @@ def run_deform(source: Path, options: DeformOptions, out: Path | None, plots: bo
 
 
 def _summary(content: dict[str, Any]) -> list[str]:
+    from aerotri.deformation.restitution import ORIENTED
     from aerotri.report.quality import printable
 
     c = content
-    lines = [f"{printable(c['title'])}, {c['variant']}, {c['nodes']} nodes every {c['spacing_m']:g} m"]
+    lines = [f"{printable(c['title'])}, {ORIENTED[c['variant']]}, {c['nodes']} nodes every {c['spacing_m']:g} m"]
     if "h_over_b" in c:
         lines.append(
             f"end lap {100 * c['end_lap']:.1f} %, h/b {c['h_over_b']:.2f}, base {c['base_mm']:.2f} mm, GSD "

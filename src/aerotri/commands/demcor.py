@@ -48,12 +48,13 @@ def run_demcor(
 
 
 def _summary(content: dict[str, Any]) -> list[str]:
+    from aerotri.deformation.restitution import ORIENTED
     from aerotri.report.quality import printable
 
     c = content
     lines = [
         f"{c['corrected']} of {c['cells']} cells corrected, {c['no_data']} without data, {c['outside_models']} outside "
-        f"the models; {len(c['models'])} model{'s' * (len(c['models']) != 1)}, {c['variant']}"
+        f"the models; {len(c['models'])} model{'s' * (len(c['models']) != 1)}, {ORIENTED[c['variant']]}"
     ]
     for when in ("before", "after"):
         s = c[when]

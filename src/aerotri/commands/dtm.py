@@ -28,7 +28,7 @@ def metres_or_auto(text: str) -> float | None:
     try:
         return stated_number(text)
     except ValueError:
-        raise InputError(f"--interval '{text}' is none", "give metres, or auto") from None
+        raise InputError(f"--interval '{text}' is not a number", "give metres, or auto") from None
 
 
 def run_dtm(

@@ -53,7 +53,7 @@ def _summary(content: dict[str, Any]) -> list[str]:
     for name, (low, high) in c["interval_m"].items():
         span = f"{low:.1f} m" if low == high else f"{low:.1f} … {high:.1f} m"
         lines.append(f"{name}: pickets every {span} (Tran 2007, k·√(P·Ma))")
-    lines.append(f"older rule 30·GSD: {c['older_rule_m']:.1f} m")
+    lines.append(f"older rule, 30 times the GSD: {c['older_rule_m']:.1f} m")
     if "pilot" in c:
         p = c["pilot"]
         lines.append(f"{'interval':>10}{'RMSE':>9}{'pickets':>9}{'errors':>8}")

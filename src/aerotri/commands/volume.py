@@ -88,6 +88,8 @@ def run_volume(
 
 def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
     """What the user reads of the volume."""
+    from aerotri.deformation.restitution import ORIENTED
+
     c, s = content, content["sigma"]
     sure = "" if s is None else f" ± {s['sigma_m3']:.4g} (1 σ)"
     lines = [
@@ -101,10 +103,11 @@ def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
                 f"ground expected beyond straight lines between heights: {s['curvature']['value_m3']:+.4g} ± "
                 f"{s['curvature']['sigma_m3']:.2g} m³, not in the volume, counted in σ as interpolation"
             )
-        where = "in the volume" if s["systematic"]["in_the_volume"] else "corrected for, would be"
+        where = "in the volume:" if s["systematic"]["in_the_volume"] else "corrected; uncorrected they would add"
         for one in s["systematic"]["variants"]:
             lines.append(
-                f"systematic, {one['variant']} orientation: {where} {one['value_m3']:+.4g} ± {one['sigma_m3']:.2g} m³"
+                f"systematic image errors, {ORIENTED[one['variant']]}: {where} {one['value_m3']:+.4g} ± "
+                f"{one['sigma_m3']:.2g} m³"
             )
     lines += [f"  {one['method']:<24} net {one['net_m3']:.6g} m³" for one in c["methods"]]
     return [*lines, *(f"note: {text}" for text in c["warnings"]), f"Written to {target}"]

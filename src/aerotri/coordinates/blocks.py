@@ -65,7 +65,7 @@ def transform_block(
         raise ValueError(f"block in {block.crs}, frame for {frame.crs}")
     if block.settings.earth_curvature != "off":
         raise InputError(
-            f"earth_curvature is for local blocks; a block in {block.crs} is adjusted on the curved earth anyway",
+            f"earth_curvature is a correction for local blocks; a block in {block.crs} needs none",
             'set earth_curvature = "off"',
             file="block.toml",
         )

@@ -167,7 +167,7 @@ def local_frame(
         lon, lat = reference.horizontal.transform(around[:, 0], around[:, 1])
         if not (np.isfinite(lon).all() and np.isfinite(lat).all()):
             raise InputError(
-                f"a position of the block is no place in {crs}", "correct it, or the crs", file="block.toml"
+                f"a position of the block lies outside {crs}", "check the coordinates and crs", file="block.toml"
             )
         origin = _middle(np.radians(lon), np.radians(lat))
     return _frame(reference, np.asarray(origin, dtype=float))

@@ -17,15 +17,21 @@ from aerotri.results.adjustment import Adjustment
 
 FREE, ABSORBED, GIVEN = "free", "absorbed", "given"
 VARIANTS = (FREE, ABSORBED)
+ORIENTED = {
+    FREE: "photographs oriented with additional parameters",
+    ABSORBED: "photographs oriented without additional parameters",
+    GIVEN: "photographs oriented as stated",
+}
+"""The variants in words."""
 
 SIGMA_INCLUDES = {
     FREE: (
-        "covariance of the additional parameters; the orientation cancels to first order; neither noise of matching "
-        "nor of measuring"
+        "with the uncertainty of the additional parameters; that of the orientation has nearly no effect; without the "
+        "noise of matching and measuring"
     ),
     ABSORBED: (
-        "covariance of the additional parameters, with what the orientation without parameters swallows of them; "
-        "neither noise of matching nor of measuring"
+        "with the uncertainty of the additional parameters, less what the orientation without them takes over; without "
+        "the noise of matching and measuring"
     ),
 }
 SIGMA_INCLUDES[GIVEN] = SIGMA_INCLUDES[ABSORBED] + "; the given orientation is taken for one of the same observations"

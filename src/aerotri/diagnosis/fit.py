@@ -63,7 +63,7 @@ def of_sigma0(adjusted: AdjustedBlock) -> list[Finding]:
     ratio, grade = _overall_ratio(adjusted), "accepted"
     if chi_square_p(o.redundancy * ratio**2, o.redundancy) < SIGNIFICANCE:
         grade = graded(ratio, POOR_FIT, NO_FIT)
-    reason = f"σ₀ is {o.sigma0:.3g}: the residuals are {times(ratio)} as large as the stated σ allow"
+    reason = f"σ₀ is {o.sigma0:.3g}: the residuals are {times(ratio)} as large as expected from the stated σ"
     return [Finding("σ₀", value, expected, says, "note" if o.sigma0 < NOTED_FIT else "attention", grade,
                     reason if grade != "accepted" else "")]  # fmt: skip
 
@@ -110,7 +110,7 @@ def _group(ratio: float, group: GroupFit) -> list[Finding]:
     grade = graded(ratio, POOR_FIT, NO_GROUP_FIT)
     unit, scale = ("°", np.degrees(1.0)) if group.unit == "rad" else (f" {group.unit}", 1.0)
     value, sigma = f"{group.rms * scale:.3g}{unit}", f"{group.sigma * scale:.3g}{unit}"
-    reason = f"{group.name}: residuals of {value} (RMS) are {times(ratio)} as large as their σ of {sigma} allow"
+    reason = f"{group.name}: residuals of {value} (RMS) are {times(ratio)} as large as expected from their σ of {sigma}"
     return doubt(f"residuals of {group.name}", f"RMS {value}, ratio {ratio:.2g}", f"σ {sigma}", grade, reason)
 
 

@@ -26,7 +26,7 @@ def verdict(outcome: SetOutcome, gain: Gain | None, behind: Gain | None) -> str:
         if gain.value > HELPS * gain.error:
             said.append("helps")
         else:
-            said.append(f"{'significant but useless: ' * mostly}no better than {gain.against}")
+            said.append(f"{'significant, but ' * mostly}no better than {gain.against}")
     if behind is not None and np.isfinite(behind.value):
         if behind.against == outcome.name:
             said.append("the best")

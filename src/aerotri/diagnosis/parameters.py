@@ -64,8 +64,9 @@ def of_gnss(adjusted: AdjustedBlock) -> list[Finding]:
     what = "drift" if ".drift_" in str(p.names[k]) else "shift"
     during = " within its strip" if what == "drift" else ""
     reason = (
-        f"the GNSS {what} in {letter} ({p.groups[k]}) is {amount[worst]:+.3g} m{during}, {times(float(size[worst]))} "
-        f"what the σ of the positions ({observed[worst]:.3g} m) allow{_with_principal_distance(adjusted, k)}"
+        f"the GNSS {what} in {letter} ({p.groups[k]}) is {amount[worst]:+.3g} m{during}, "
+        f"{times(float(size[worst]))} as large as expected from the σ of the positions ({observed[worst]:.3g} m)"
+        f"{_with_principal_distance(adjusted, k)}"
     )
     grade = graded(float(size[worst]), critical, np.inf)
     value, expected = f"{amount[worst]:+.3g} m", f"0 ± {observed[worst]:.3g} m"

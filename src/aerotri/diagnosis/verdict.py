@@ -67,7 +67,7 @@ def findings(adjusted: AdjustedBlock) -> list[Finding]:
 def _with_doubtful_sigma(finding: Finding, verdict: Grade) -> Finding:
     if finding.level != "good":
         return finding
-    says = f"no more than the σ allow, but the adjustment is {verdict}, and the σ with it"
+    says = f"as expected from the σ, but the adjustment is {verdict}, and so are its σ"
     return replace(finding, says=says, level="attention" if verdict == "rejected" else "note")
 
 

@@ -212,7 +212,8 @@ def with_control_prefix(block: Block, prefix: str) -> Block:
         problem = f"none of the {len(names)} control points without image points meets one by it" if names else (
             "all control points have image points under their own names")  # fmt: skip
         near = f": {in_words(names, block.points[sorted(measured)].astype(str).tolist())}" if names else ""
-        raise InputError(f"--control-prefix {quoted(prefix)}: {problem}{near}", "correct it, or leave it out")
+        remedy = "give what stands before the names in the image points, or leave it out"
+        raise InputError(f"--control-prefix {quoted(prefix)}: {problem}{near}", remedy)
     twice = np.isin(list(moved.values()), block.control.point)
     if twice.any():
         name = block.points[list(moved.values())[int(np.argmax(twice))]]

@@ -27,7 +27,7 @@ def adjust(block: Block, report: Report | None = None, given_points: np.ndarray 
 
     Parameters
     ----------
-    report : called after every iteration with (iteration, vᵀPv, damping).
+    report : called after every iteration with (iteration, σ0, damping).
     given_points : (N, 3) m, start values of object points; intersected where not given.
 
     Returns

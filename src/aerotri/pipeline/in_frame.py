@@ -42,6 +42,9 @@ def adjust_in_frame(
         result = transform_result(found.local, used, frame)
     except InputError as error:
         raise failure(
-            found.system, "not converged", f"the block ran away: {error}", found.solution.iterations
+            found.system,
+            "not converged",
+            f"coordinates left the range of the coordinate system: {error}",
+            found.solution.iterations,
         ) from error
     return replace(found, result=result, frame=frame)

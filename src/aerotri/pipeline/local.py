@@ -29,7 +29,7 @@ from aerotri.strategies.selection import select, with_findings_of, with_removed
 from aerotri.strategies.snooping import snoop
 
 Report = Callable[[int, float, float], None]
-"""Called after every iteration with (iteration, vᵀPv, damping)."""
+"""Called after every iteration with (iteration, σ0, damping)."""
 
 ROUNDS_OF_LOOSE_POINTS = 3
 """Times that a robust adjustment goes on without the points that its covariance shows to be loose."""

@@ -110,7 +110,7 @@ class AdjustmentPlots:
         from aerotri.report.plots.overview import plot_reliability
 
         if self.adjusted.effects is None:
-            raise InputError("the external reliability was not computed for this block", "")
+            raise InputError("this result has no external reliability", "adjust the block again with aerotri.adjust")
         return plot_reliability(self.adjusted)
 
     def height_accuracy(self) -> Figure:

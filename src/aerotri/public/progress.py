@@ -32,10 +32,10 @@ class StageReport:
         if self._tell is not None:
             self._tell(name, share)
 
-    def iteration(self, number: int, cost: float, damping: float) -> None:
+    def iteration(self, number: int, sigma0: float, damping: float) -> None:
         """An iteration of the adjustment: how many there will be is not known."""
-        damped = f", damped {damping:.0e}" if damping else ""
-        self.stage(f"iteration {number}: vᵀPv {cost:.6g}{damped}", None)
+        damped = ", steps shortened" if damping else ""
+        self.stage(f"iteration {number}: σ0 {sigma0:.4g}{damped}", None)
 
     def counted(self, name: str, done: int, count: int) -> None:
         """A piece of work out of several."""

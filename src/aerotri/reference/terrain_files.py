@@ -174,7 +174,7 @@ VOLUME_JSON = (
         "sigma.systematic.variants[].variant",
         "text",
         "Orientation.",
-        values={"free": "with parameters", "absorbed": "without"},
+        values={"free": "with additional parameters", "absorbed": "without them"},
     ),
     Item("sigma.systematic.variants[].value_m3", "number", "Wrong minus true volume.", "m³"),
     Item("sigma.systematic.variants[].sigma_m3", "number", "Standard deviation of it.", "m³"),

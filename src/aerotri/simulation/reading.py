@@ -42,7 +42,7 @@ def parse_spec(data: Mapping[str, Any], file: FilePath | None = None, text: str 
     try:
         return SimulationSpec.model_validate(data)
     except OverflowError:
-        raise InputError("holds a number too large to be read", "correct it", file) from None
+        raise InputError("holds a number too large to be read", "give a smaller number", file) from None
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
     keys = [str(part) for part in first["loc"] if part != "[key]"]
@@ -54,7 +54,13 @@ def parse_spec(data: Mapping[str, Any], file: FilePath | None = None, text: str 
     value = first["input"]
     given = "" if isinstance(value, Mapping | Table) else f" (given: {_shown(value)})"
     message = first["msg"].removeprefix("Value error, ").replace("Input should", "should")
-    raise InputError(f"'{name or 'spec'}': {message}{given}", "correct it", file, line)
+    raise InputError(f"'{name or 'spec'}': {message}{given}", _look_up(keys), file, line)
+
+
+def _look_up(keys: list[str]) -> str:
+    """Where the values stand that a key may have."""
+    named = ".".join(key for key in keys if not key.isdigit())
+    return f"what it may be: aerotri explain {named}" if named else "write key = value under [table]"
 
 
 def _shown(value: Any) -> str:

@@ -79,7 +79,7 @@ def summarise(
     sigma0 = float(np.sqrt(vtpv / freedom)) if freedom > 0.0 else np.nan
     outcome = Outcome(
         status=solution.status,
-        message="" if solution.status == "converged" else _message(solution),
+        message="" if solution.status == "converged" else _message(solution, sigma0),
         iterations=solution.iterations,
         sigma0=sigma0,
         sigma0_um=sigma0 * block.settings.image_sigma_um,
@@ -110,8 +110,8 @@ def summarise(
     )
 
 
-def _message(solution: Solution) -> str:
-    return f"no convergence within {solution.iterations} iterations, Σvᵀpv {solution.equations.cost:.6g}"
+def _message(solution: Solution, sigma0: float) -> str:
+    return f"no convergence within {solution.iterations} iterations, σ0 is {sigma0:.4g}"
 
 
 def weighted_sum(system: NormalSystem, solution: Solution) -> float:

@@ -2,7 +2,7 @@
 
 A set is judged by what it does where it was not fitted: at check points, and at control points predicted without
 themselves. Beside it stand what the image residuals say (σ0, AIC, BIC) and how many of its parameters are significant:
-a set can be significant and useless.
+a set can be significant, and check points still do not improve.
 
 AIC = r·ln(Ω/r) + 2k and BIC = r·ln(Ω/r) + k·ln r, with Ω = vᵀPv without the part of observed nodes, r the redundancy
 that the block has without additional parameters, and k the number of parameters: the orientation and the points, in

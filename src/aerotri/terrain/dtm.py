@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 BEST_END_LAP = 0.6
 """End lap of the pairs that are looked for: the usual one of aerial photographs [C]; less shows the ground too
 differently, more has a weak base."""
+GROUND = {"mountains": "mountains", "plain": "flat ground"}
+"""What the kinds of ground are called where they are said."""
 CELLS_PER_INTERVAL = 2
 """Cells of the raster between two pickets where no cell is stated; chosen [C]: one would cut off corners of the
 triangles, more only repeat their planes."""
@@ -172,10 +174,10 @@ def _own_interval(photographs: Photographs, known: np.ndarray, gsd: float, plan:
     """The interval (two digits) and where it comes from."""
     k, ground = k_of_slope(typical_slope(known))
     if plan.pairs:
-        return rounded(interval_of_gsd(gsd, k)), f"{1000 * k:g}·√GSD, {ground}"
+        return rounded(interval_of_gsd(gsd, k)), f"{1000 * k:g} · √GSD, as for {GROUND[ground]}"
     area = footprint(photographs) if plan.area is None else plan.area
     interval, source = interval_of_surface(gsd, k, float(np.prod(area.high - area.low)))
-    return rounded(interval), f"{source}, {ground}"
+    return rounded(interval), f"{source}, as for {GROUND[ground]}"
 
 
 def rounded(value: float) -> float:

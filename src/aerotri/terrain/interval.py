@@ -46,8 +46,8 @@ def interval_of_surface(gsd_m: float, k: float, area_m2: float) -> tuple[float, 
     closer = max(interval_by_rule(gsd_m), float(np.sqrt(area_m2 / FEWEST_NODES)))
     if closer < by_formula:
         by_rule = closer == interval_by_rule(gsd_m)
-        return closer, "30·GSD" if by_rule else f"{FEWEST_NODES} nodes"
-    return by_formula, f"{1000 * k:g}·√GSD"
+        return closer, "30 times the GSD" if by_rule else f"{FEWEST_NODES} places in the area"
+    return by_formula, f"{1000 * k:g} · √GSD"
 
 
 def k_of_slope(slope: float) -> tuple[float, str]:

@@ -110,7 +110,7 @@ def _geometry(blob: Any) -> tuple[str, list[list[np.ndarray]]]:
     if blob is None:
         return "", []
     if not isinstance(blob, bytes) or blob[:2] != b"GP" or len(blob) < 8:
-        raise ValueError("it is none of GeoPackage")
+        raise ValueError("it is not in the form of GeoPackage")
     envelope = (blob[3] >> 1) & 7
     if envelope >= len(ENVELOPE_BYTES):
         raise ValueError("its header is unknown")

@@ -150,7 +150,10 @@ def settle(block: Block, centre: np.ndarray, choices: dict[str, np.ndarray], rem
         )
     median = {name: result.median_px for name, result in found.items()}
     best, second = sorted(median, key=lambda name: median[name])[:2]
-    told = ", ".join(f"{name} {median[name]:.3g} px" for name in sorted(median, key=lambda name: median[name]))
+    told = ", ".join(
+        f"{name} " + (f"{median[name]:.3g} px" if np.isfinite(median[name]) else "has the points behind the camera")
+        for name in sorted(median, key=lambda name: median[name])
+    )
     if not median[best] < CLEAR * median[second]:
         raise InputError(
             f"the rotations may be read in several ways, and none fits the image points clearly better ({told})", remedy

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from aerotri.conventions import InputError
-from aerotri.formats.block.settings_model import BlockModel, CameraModel, CamerasModel
+from aerotri.formats.block.settings_model import BlockModel, CameraModel, CamerasModel, PriorModel
 from aerotri.formats.text.csv_text import BLANKS
 from aerotri.formats.text.tables import CONTROL_CHARACTERS, SMALLEST_POSITIVE
 from aerotri.formats.text.toml_text import line_of_key, read_toml
@@ -171,7 +171,7 @@ def _as_input_error(error: ValidationError | OverflowError, path: Path, text: st
     key = ".".join(str(part) for part in where) or "block.toml"
     line = line_of_key(text, where)
     kind, value = first["type"], first["input"]
-    remedy = "correct the value"
+    remedy = _look_up(where)
     if kind == "missing":
         message, remedy = f"key '{key}' is missing", f"add {where[-1]} = …"
     elif kind == "extra_forbidden":
@@ -182,6 +182,17 @@ def _as_input_error(error: ValidationError | OverflowError, path: Path, text: st
         if kind == "string_type":
             remedy = "put names in quotes"
     return InputError(message, remedy, path, line)
+
+
+def _look_up(where: tuple[Any, ...]) -> str:
+    """Where the values stand that a key may have."""
+    names = [str(part) for part in where if isinstance(part, str)]
+    if names and names[-1] in PriorModel.model_fields:
+        # of a parameter
+        names = names[-1:]
+    if "fiducials" in names:
+        names = names[: names.index("fiducials") + 1]
+    return f"what it may be: aerotri explain {'.'.join(names)}" if names else "write key = value under [table]"
 
 
 def _first(error: ValidationError) -> Any:
@@ -241,7 +252,7 @@ def checked_settings(table: str, values: Mapping[str, object]) -> dict[str, Any]
         if first["type"] == "extra_forbidden":
             raise InputError(f"there is no setting '{name}'", _known_keys((table, name))) from None
         reason = _reason(first)
-        raise InputError(f"{name} = {_shown(first['input'])}: {reason}", "correct the setting") from None
+        raise InputError(f"{name} = {_shown(first['input'])}: {reason}", _look_up((table, *first["loc"]))) from None
     found = {key: tuple(value) if isinstance(value, list) else value for key, value in listed.items()}
     if "additional_parameters" in found:
         found["additional_parameters"] = parse_parameters(listed["additional_parameters"])

@@ -113,8 +113,11 @@ def _check_arrays(archive: Archive, values: dict[str, Any]) -> None:
         (_is_bounded(values["origin"]), "its origin is not finite"),
         (_is_bounded(values["xy"]), "an image point is not finite"),
         (_is_bounded(values["shared"]), "a shared parameter is not finite"),
-        (_are_rotations(adjusted), "a rotation is none"),
-        (bool(inside) and len(held) == len(np.unique(held, axis=0)), "a coordinate that is held is none of its points"),
+        (_are_rotations(adjusted), "a rotation matrix is not orthogonal"),
+        (
+            bool(inside) and len(held) == len(np.unique(held, axis=0)),
+            "a held coordinate is of no point",
+        ),
         (bool(((status >= 0) & (status < len(RAY_STATUS))).all()), "a ray has an unknown status"),
         (bool(((weight >= 0.0) & (weight <= 1.0) | np.isnan(weight)).all()), "a weight is not between 0 and 1"),
         (bool(np.isnan(frame).all()) or _is_bounded(frame), "its local frame has no origin"),
