@@ -29,6 +29,7 @@ from aerotri.reference.words import MARKS, WORDS
 GROUPS = {
     "result of adjust": ("adjust", "Result of `aerotri adjust`"),
     "folder of compare-parameters": ("compare_parameters", "Folder of `aerotri compare-parameters`"),
+    "folder of halves": ("halves", "Folder of `aerotri halves`"),
     "folder of deform": ("deform", "Folder of `aerotri deform`"),
     "folder of demcor": ("demcor", "Files of `aerotri demcor`"),
     "folder of imgeo": ("imgeo", "Folder of `aerotri imgeo`"),
@@ -53,7 +54,7 @@ PYTHON = {
     ),
     "Adjustment": (
         "adjust", "open_result", "Adjustment", "Covariance", "Table", "with_settings", "changes",
-        "compare_parameters", "crosscheck", "parameters", "InputError", "AdjustmentFailedError",
+        "compare_parameters", "halves", "crosscheck", "parameters", "InputError", "AdjustmentFailedError",
     ),
     "Image errors, terrain, volume": (
         "ImageErrors", "deform", "correct_dem", "ideal_photographs", "terrain", "Surface", "compare", "volume", "run",

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from aerotri.public.covariance import Covariance as Covariance
     from aerotri.public.dem import correct_dem as correct_dem
     from aerotri.public.editing import edit as edit
+    from aerotri.public.halves import halves as halves
     from aerotri.public.ideal import ideal_photographs as ideal_photographs
     from aerotri.public.image_errors import ImageErrors as ImageErrors
     from aerotri.public.models import deform as deform
@@ -75,6 +76,7 @@ _PLACES = {
     "convert": "aerotri.public.converting",
     "example_flight": "aerotri.public.simulating",
     "geometry": "aerotri.public.geometry",
+    "halves": "aerotri.public.halves",
     "ideal_photographs": "aerotri.public.ideal",
     "observations": "aerotri.observations",
     "open_result": "aerotri.public.results",
@@ -116,6 +118,7 @@ __all__ = [
     "edit",
     "example_flight",
     "geometry",
+    "halves",
     "ideal_photographs",
     "observations",
     "open_result",

@@ -106,6 +106,7 @@ def _written(folder: Path) -> Written:
     whole = run("deform", result, out="whole")
     imgeo = run("imgeo", result, next(photographs.glob("*.tif")), out="ideal")
     compared = run("compare", pairs / "dtm.tif", pairs / "dsm.tif", "--align", "shift", out="compared")
+    halves = run("halves", second, "--division", "photographs", "--division", "strips", out="halves")
     sets = run("compare-parameters", folder / "plain", "--set", "none", "--set", "brown:K1", "--folds", "2", out="sets")
     checked = run("crosscheck", second, out="checked")
     run("init", folder / "begun")
@@ -120,7 +121,7 @@ def _written(folder: Path) -> Written:
     project = _project(run)
     places = {
         "block folder": (tiny, folder / "plain", project / "block"), "result of adjust": (first, second, result),
-        "folder of compare-parameters": (sets,), "folder of deform": (model, whole),
+        "folder of compare-parameters": (sets,), "folder of halves": (halves,), "folder of deform": (model, whole),
         "folder of demcor": (folder / "corrected",), "folder of imgeo": (imgeo,), "folder of crosscheck": (checked,),
         "folder of dtm": (pairs, project / "dtm"), "folder of compare": (compared,),
         "folder of volume": (project / "volume",), "truth of simulate": (tiny / "truth",),

@@ -19,6 +19,7 @@ from aerotri.cli.options import (
     ControlPrefix,
     GeoidGrid,
     Json,
+    ResultFolder,
     Robust,
 )
 
@@ -101,6 +102,29 @@ def diff(
     from aerotri.commands.diff import run_diff
 
     raise typer.Exit(run_diff(first, second, top, json_))
+
+
+@app.command(rich_help_panel=ADJUSTMENT, epilog="Example: aerotri halves frederiksstad_ultracam_result")
+def halves(
+    result: ResultFolder,
+    divisions: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--division",
+            help="photographs, strips, directions or time: how the photographs are divided. May be repeated. Default: "
+            "all.",
+            rich_help_panel=METHOD,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; default NAME_halves here.", rich_help_panel=OUTPUT)
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Adjust two halves of the photographs apart and compare them: model errors, found without control."""
+    from aerotri.commands.halves import run_halves
+
+    raise typer.Exit(run_halves(result, divisions or (), out, json_))
 
 
 @app.command(

@@ -85,7 +85,7 @@ def systematic_errors(
     d : (n, 2) mm, measured − ideal.
     covariance : (n, 2, 2) mm².
     """
-    d, jacobian, rows = _errors_with_jacobian(adjusted, image_group(adjusted.block, group, camera), x, y)
+    d, jacobian, rows = errors_with_jacobian(adjusted, image_group(adjusted.block, group, camera), x, y)
     return d, _propagated(jacobian, _covariance_of(adjusted, rows))
 
 
@@ -98,7 +98,7 @@ def field_on_grid(adjusted: AdjustedBlock, group: str, nx: int | None = None, ca
     """
     images = image_group(adjusted.block, group, camera)
     x, y = grid_nodes(images.camera, nx)
-    return _field(adjusted, images.camera, group, (x, y), _errors_with_jacobian(adjusted, images, x.ravel(), y.ravel()))
+    return _field(adjusted, images.camera, group, (x, y), errors_with_jacobian(adjusted, images, x.ravel(), y.ravel()))
 
 
 def field_without_orientation(
@@ -111,7 +111,7 @@ def field_without_orientation(
     """
     images = image_group(adjusted.block, group, camera)
     x, y = grid_nodes(images.camera, nx)
-    errors = _errors_with_jacobian(adjusted, images, x.ravel(), y.ravel())
+    errors = errors_with_jacobian(adjusted, images, x.ravel(), y.ravel())
     return _field(adjusted, images.camera, group, (x, y), errors, without_orientation=True)
 
 
@@ -122,8 +122,8 @@ def field_difference(
     one = image_group(adjusted.block, first, camera)
     x, y = grid_nodes(one.camera, nx)
     two = image_group(adjusted.block, second, camera)
-    d_one, jacobian_one, rows_one = _errors_with_jacobian(adjusted, one, x.ravel(), y.ravel())
-    d_two, jacobian_two, rows_two = _errors_with_jacobian(adjusted, two, x.ravel(), y.ravel())
+    d_one, jacobian_one, rows_one = errors_with_jacobian(adjusted, one, x.ravel(), y.ravel())
+    d_two, jacobian_two, rows_two = errors_with_jacobian(adjusted, two, x.ravel(), y.ravel())
     rows, column = np.unique(np.concatenate([rows_one, rows_two]), return_inverse=True)
     jacobian = np.zeros((*d_one.shape, len(rows)))
     # a parameter that both groups share counts once, by the difference of its partials
@@ -147,7 +147,7 @@ def field_of(
     x, y = grid_nodes(camera, nx)
     errors = d(x.ravel(), y.ravel())
     if without_orientation:
-        errors = _without_orientation(camera, x.ravel(), y.ravel(), errors, np.zeros((len(errors), 2, 0)))[0]
+        errors = take_off_orientation(camera, x.ravel(), y.ravel(), errors, np.zeros((len(errors), 2, 0)))[0]
     grid = (*x.shape, 2)
     known = np.ones(x.shape, dtype=bool)
     return ErrorField(camera, group, x, y, errors.reshape(grid), np.zeros(grid), known, without_orientation)
@@ -188,7 +188,7 @@ def largest_effects(adjusted: AdjustedBlock) -> np.ndarray:
     effects = np.full(len(adjusted.parameters), np.nan)
     for group in image_groups(adjusted.block):
         x, y = grid_nodes(group.camera)
-        _, jacobian, rows = _errors_with_jacobian(adjusted, group, x.ravel(), y.ravel())
+        _, jacobian, rows = errors_with_jacobian(adjusted, group, x.ravel(), y.ravel())
         longest = np.linalg.norm(jacobian, axis=1).max(axis=0, initial=0.0) * np.abs(adjusted.parameters.value[rows])
         effects[rows] = np.fmax(effects[rows], longest)
     return effects
@@ -218,7 +218,7 @@ def _field(
     (x, y), (d, jacobian, rows) = at, errors
     without_orientation |= bool(adjusted.parameters.is_node[rows].any())
     if without_orientation:
-        d, jacobian = _without_orientation(camera, x.ravel(), y.ravel(), d, jacobian)
+        d, jacobian = take_off_orientation(camera, x.ravel(), y.ravel(), d, jacobian)
     covariance = _propagated(jacobian, _covariance_of(adjusted, rows))
     sigma = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
     grid = (*x.shape, 2)
@@ -226,7 +226,7 @@ def _field(
     return ErrorField(camera, group, x, y, d.reshape(grid), sigma.reshape(grid), mask, without_orientation)
 
 
-def _without_orientation(
+def take_off_orientation(
     camera: Camera, x: np.ndarray, y: np.ndarray, d: np.ndarray, jacobian: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """d (n, 2) and its partials (n, 2, k) less the six orientation patterns that fit them best."""
@@ -261,7 +261,7 @@ def _covariance_of(adjusted: AdjustedBlock, rows: np.ndarray) -> np.ndarray:
     return np.where(varies[:, None] & varies[None, :], p.covariance[np.ix_(rows, rows)], 0.0)
 
 
-def _errors_with_jacobian(
+def errors_with_jacobian(
     adjusted: AdjustedBlock, group: ImageGroup, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """d (n, 2) mm, its partials (n, 2, k) by the k parameters in force, and their rows (k,) in the record."""

@@ -8,6 +8,7 @@ from aerotri.reference.adjust_contents import adjust_contents
 from aerotri.reference.adjust_tables import adjust_tables
 from aerotri.reference.block_files import block_files
 from aerotri.reference.block_tables import block_table_files
+from aerotri.reference.halves_files import halves_files
 from aerotri.reference.image_error_files import image_error_files
 from aerotri.reference.printed import printed_contents
 from aerotri.reference.records import DescribedFile
@@ -21,6 +22,7 @@ def described_files() -> tuple[DescribedFile, ...]:
         *block_table_files(),
         *adjust_contents(),
         *adjust_tables(),
+        *halves_files(),
         *image_error_files(),
         *terrain_files(),
         *block_files(),

@@ -100,7 +100,7 @@ def summarise(
         images=_images(system, solution, q, sigma0),
         points=points,
         rays=rays,
-        parameters=_parameters(system, solution, q, sigma0),
+        parameters=shared_parameters(system, solution, q, sigma0),
         control=control,
         check=check,
         groups=tuple(_groups(system, solution, q, rays, control) + extra_groups),
@@ -179,7 +179,7 @@ def _rays(system: NormalSystem, solution: Solution, q: Cofactors, status: np.nda
     return RayResults(v, r, w, weight, status)
 
 
-def _parameters(system: NormalSystem, solution: Solution, q: Cofactors, sigma0: float) -> SharedParameters:
+def shared_parameters(system: NormalSystem, solution: Solution, q: Cofactors, sigma0: float) -> SharedParameters:
     """The shared parameters but for the coordinates of points and what conditions brought along."""
     shared = system.unknowns.shared
     all_kinds = np.array(shared.kinds, dtype=object)
