@@ -1,8 +1,14 @@
 """Common to all tests: real data where it is, and small simulated blocks."""
 
+import os
 from pathlib import Path
 
 import pytest
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # the processors are taken by the processes of the tests: threads of each would only wait for one another
+    for setting in ("AEROTRI_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(setting, "1")
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 

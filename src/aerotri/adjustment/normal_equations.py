@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -29,6 +30,8 @@ from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, Symbolic
 from aerotri.adjustment.unknowns import State, Step, Unknowns
 from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.observations import CollocationSettings
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +142,7 @@ class NormalSystem:
             sums = self._sums[k]
             return _kernels.assemble(*self._bounds[k], problem, sums.offsets, sums.cleared(), self._work())
 
-        outcomes = run_chunks(chunk, len(self._bounds))
+        outcomes = self._over_chunks(chunk)
         n, s = len(u.images), len(u.shared)
         blocks, border, corner = np.zeros((len(u.block_row), 6, 6)), np.zeros((n, s, 6)), np.zeros((s, s))
         squares, squares_shared = np.zeros((n, 6)), np.array(self._prior_weight)
@@ -174,7 +177,7 @@ class NormalSystem:
                 *self._bounds[k], problem, sums.offsets[0], *sums.cleared_right(), self._work()
             )
 
-        outcomes = run_chunks(chunk, len(self._bounds))
+        outcomes = self._over_chunks(chunk)
         return self._summed(state, self.whitened_rows(state), outcomes, problem)
 
     def _summed(
@@ -265,7 +268,7 @@ class NormalSystem:
         points = np.empty((len(u.points), 3))
         problem = self.problem(state, estimator, damping)
         step = Directions(images, shared, points)
-        run_chunks(lambda k: _kernels.back_substitute(*self._bounds[k], problem, step, self._work()), len(self._bounds))
+        self._over_chunks(lambda k: _kernels.back_substitute(*self._bounds[k], problem, step, self._work()))
         return Step(images, shared, points)
 
     def whole_step(self, state: State, x: np.ndarray, damping: float, estimator: Estimator) -> Step | None:
@@ -287,7 +290,7 @@ class NormalSystem:
         """The state with every point moved, on its own and only downhill, to where its rays want it."""
         settled = replace(state, points=state.points.copy())
         problem = self.problem(settled, estimator)
-        run_chunks(lambda k: _kernels.settle_points(*self._bounds[k], problem, rounds, self._work()), len(self._bounds))
+        self._over_chunks(lambda k: _kernels.settle_points(*self._bounds[k], problem, rounds, self._work()))
         return settled
 
     def looseness(self, state: State, estimator: Estimator) -> np.ndarray:
@@ -318,7 +321,11 @@ class NormalSystem:
 
     def over_points(self, problem: Problem, kernel: Callable[[int, int, Problem, Work], object]) -> None:
         """kernel(first, last, problem, work) over ranges of points, in threads."""
-        run_chunks(lambda k: kernel(*self._bounds[k], problem, self._work()), len(self._bounds))
+        self._over_chunks(lambda k: kernel(*self._bounds[k], problem, self._work()))
+
+    def _over_chunks(self, function: Callable[[int], T]) -> list[T]:
+        """Of every chunk of points, in threads where there are many rays."""
+        return run_chunks(function, len(self._bounds), len(self.unknowns.rays.image))
 
     def without(self, rays_off: np.ndarray, control_off: np.ndarray) -> NormalSystem:
         """The same system with rays (m,) bool and the given coordinates of points (P,) bool switched off.
@@ -365,7 +372,7 @@ class NormalSystem:
         def reduce(c: int):
             _covariance_kernels.reduce_point_sides(*self._bounds[c], problem, free, *rights[c], self._work())
 
-        run_chunks(reduce, len(self._bounds))
+        self._over_chunks(reduce)
         right = np.concatenate(
             [np.sum([r[0] for r in rights], axis=0).reshape(6 * n, k), np.sum([r[1] for r in rights], axis=0)]
         )

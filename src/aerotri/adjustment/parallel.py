@@ -60,9 +60,19 @@ def chunk_bounds(work: np.ndarray, chunks: int = CHUNKS) -> list[tuple[int, int]
     return [(a, b) for a, b in pairwise(edges) if b > a]
 
 
-def run_chunks(function: Callable[[int], T], count: int) -> list[T]:
-    """function(0), …, function(count − 1) in threads; results in order."""
-    threads = min(thread_count(), count)
+FEW_RAYS = 4000
+"""Rays below which kernels run in the calling thread: beginning threads takes as long as their work, some
+milliseconds."""
+
+
+def run_chunks(function: Callable[[int], T], count: int, rays: float = np.inf) -> list[T]:
+    """function(0), …, function(count − 1) in threads; results in order.
+
+    Parameters
+    ----------
+    rays : in all chunks; of few no threads are begun.
+    """
+    threads = min(thread_count(), count) if rays >= FEW_RAYS else 1
     if threads <= 1:
         return [function(k) for k in range(count)]
     with ThreadPoolExecutor(threads) as pool:

@@ -91,7 +91,11 @@ def flat_basis(points: np.ndarray, kind: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _padded(a: np.ndarray, width: int, fill: float) -> np.ndarray:
-    return np.pad(a, ((0, 0), (0, width - a.shape[1])), constant_values=fill)
+    if a.shape[1] == width:
+        return a
+    wide = np.full((len(a), width), fill, a.dtype)
+    wide[:, : a.shape[1]] = a
+    return wide
 
 
 def _equations(c: Constraint, shared: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

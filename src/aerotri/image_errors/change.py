@@ -17,12 +17,12 @@ from itertools import combinations, pairwise
 
 import numpy as np
 from scipy.linalg import eigh, null_space
-from scipy.stats import f as f_distribution
 
 from aerotri.adjustment.shared_parameters import random_field
 from aerotri.functional_model.additional_parameters import Parameter, collocation, parameter_set
 from aerotri.image_errors.field import ErrorField, field_difference
 from aerotri.image_errors.groups import ImageGroup, image_groups
+from aerotri.quantiles import f_exceedance
 from aerotri.results.adjusted_block import AdjustedBlock
 
 ALPHA = 0.01
@@ -97,7 +97,7 @@ def change(adjusted: AdjustedBlock, first: str, second: str, camera: str | None 
     statistic = float(np.sum((directions[:, kept].T @ delta) ** 2)) / max(freedom, 1)
     field = field_difference(adjusted, first, second, camera=camera)
     noise_mm = float(np.sqrt(np.mean(np.sum(field.sigma**2, axis=-1))))
-    p = float(f_distribution.sf(statistic, freedom, redundancy)) if freedom else 1.0
+    p = f_exceedance(statistic, freedom, redundancy) if freedom else 1.0
     return Change(first, second, camera, field, statistic, freedom, p, noise_mm)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+
+from aerotri.quantiles import chi_square_quantile
 
 BOUNDS = (0.975, 0.025)
 """Of the confidence interval of an RMS, 95 %."""
@@ -37,7 +38,7 @@ class Accuracy:
         count = known.sum(axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):
             rms = np.sqrt(np.sum(np.where(known, difference, 0.0) ** 2, axis=0) / count)
-            low, high = (rms * np.sqrt(count / chi2.ppf(p, count)) for p in BOUNDS)
+            low, high = (rms * np.sqrt(count / chi_square_quantile(p, count)) for p in BOUNDS)
         return cls(difference, rms, low, high, count)
 
 

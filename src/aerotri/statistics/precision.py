@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
+from aerotri.quantiles import chi_square_quantile
 from aerotri.results.adjusted_block import AdjustedBlock, SharedParameters
 from aerotri.statistics.covariance import correlations
 
@@ -194,7 +194,7 @@ def ellipsoids(covariance: np.ndarray, probability: float | None = None) -> Elli
     columns = columns[:, :, ::-1].copy()
     columns[:, :, 2] *= np.sign(np.linalg.det(columns))[:, None]
     values[known], vectors[known] = rising[:, ::-1], columns
-    scale = 1.0 if probability is None else float(np.sqrt(chi2.ppf(probability, 3)))
+    scale = 1.0 if probability is None else float(np.sqrt(chi_square_quantile(probability, 3)))
     return Ellipsoids(scale * np.sqrt(np.maximum(values, 0.0)), vectors)
 
 

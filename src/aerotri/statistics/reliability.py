@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm
 
 from aerotri.observations import Block
+from aerotri.quantiles import normal_quantile
 from aerotri.results.adjusted_block import AdjustedBlock, Blunder, GroundPointResults, RayResults
 from aerotri.results.normalised import MIN_REDUNDANCY
 
@@ -41,12 +41,12 @@ class Reliability:
 
 def critical_value(alpha: float) -> float:
     """Two-sided limit of a standard normal test of level `alpha`: 3.29 for 0.1 %."""
-    return float(norm.ppf(1.0 - alpha / 2.0))
+    return normal_quantile(1.0 - alpha / 2.0)
 
 
 def noncentrality(alpha: float, power: float) -> float:
     """δ0 = z(1 − α/2) + z(power): 4.13 for 0.1 % and 80 %. Paper 002's 4.0 has 76 % there, not its 93 %."""
-    return critical_value(alpha) + float(norm.ppf(power))
+    return critical_value(alpha) + normal_quantile(power)
 
 
 def detectable_share(r: np.ndarray, alpha: float, power: float) -> np.ndarray:

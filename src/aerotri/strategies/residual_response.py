@@ -81,8 +81,7 @@ class ResidualResponse:
         root = np.sqrt(u.prior_weight)
         prior_xyz = u.prior_xyz + of_points * _inverse(root)
         system.unknowns = replace(u, rays=replace(u.rays, xy=xy), prior_xyz=prior_xyz)
-        equations = system.assemble(state, 0.0, LEAST_SQUARES)
-        right = equations.right.copy()
+        right = system.right_side(state, LEAST_SQUARES).right.copy()
         for rows, part in zip(self._rows, of_rows, strict=True):
             _add_rows(right, len(u.images), rows, part)
         # points that are not eliminated stand with the shared parameters
@@ -90,7 +89,7 @@ class ResidualResponse:
         right[columns] += (root * of_points)[u.kept_rows]
         step = system.back_substitute(state, self._factor.solve(right), 0.0, LEAST_SQUARES)
         there = u.advance(state, step)
-        residual = system.assemble(there, 0.0, LEAST_SQUARES).residual
+        residual = system.right_side(there, LEAST_SQUARES).residual
         gaps = [rows.gap + part for rows, part in zip(system.whitened_rows(there), of_rows, strict=True)]
         parts = [residual * u.rays.inv_sigma, root * (prior_xyz - there.points), *gaps]
         return np.concatenate([part.ravel() for part in parts])

@@ -13,10 +13,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
+from aerotri.quantiles import chi_square_quantile
 from aerotri.results.adjusted_block import AdjustedBlock, ObservationGroup
 from aerotri.results.variance_components import ChiSquareTest, VarianceComponent, VarianceComponents
 from aerotri.statistics.observation_groups import EXTRA_GROUPS, GroupFit, group_fits
@@ -196,7 +196,7 @@ def _test(group: str, ratio: float, freedom: float, alpha: float) -> ChiSquareTe
         nan = float("nan")
         return ChiSquareTest(group, ratio, freedom, nan, nan, nan, NOT_TESTABLE)
     statistic = freedom * ratio**2
-    low, high = (float(limit) for limit in chi2.ppf([alpha / 2.0, 1.0 - alpha / 2.0], freedom))
+    low, high = (float(limit) for limit in chi_square_quantile([alpha / 2.0, 1.0 - alpha / 2.0], freedom))
     verdict = TOO_SMALL if statistic > high else TOO_LARGE if statistic < low else AGREES
     return ChiSquareTest(group, ratio, freedom, statistic, low, high, verdict)
 

@@ -1,0 +1,22 @@
+"""Quantiles of the distributions that tests use, from scipy.special: scipy.stats takes half a second to import."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import fdtrc, gammaincinv, ndtri
+
+
+def normal_quantile(probability: float) -> float:
+    """x with P(z ≤ x) = probability for a standard normal z."""
+    return float(ndtri(probability))
+
+
+def chi_square_quantile(probability: ArrayLike, freedom: ArrayLike) -> np.ndarray:
+    """x with P(χ² ≤ x) = probability for χ² of `freedom` degrees of freedom, each of any shape."""
+    return 2.0 * np.asarray(gammaincinv(0.5 * np.asarray(freedom, float), probability))
+
+
+def f_exceedance(value: float, freedom: float, freedom_below: float) -> float:
+    """P(F ≥ value) for F of `freedom` over `freedom_below` degrees of freedom."""
+    return float(fdtrc(freedom, freedom_below, value))
