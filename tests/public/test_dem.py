@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 from dataclasses import replace
 
@@ -40,6 +41,17 @@ def test_what_is_taken_off_is_the_deformation(result, flat):
     # places of nodes and cells differ by half a cell, heights of the ground by some metres of a hundred
     assert np.nanmax(np.abs(off)) < 0.15 * size
     np.testing.assert_allclose(np.nanmedian(found.sigma_dz.z[cells]), np.nanmedian(model.sigma_dZ[inside]), rtol=0.2)
+
+
+def test_rasters_outlive_the_result_they_come_from(result, flat):
+    """`correct_dem(…).dz` keeps its file although nobody keeps the rest; without users nothing is left on the disk."""
+    dem, pair = flat
+    dz = aerotri.correct_dem(dem, result, pair=pair).dz
+    place = dz.path
+    assert np.isfinite(dz.z).all()
+    del dz
+    gc.collect()
+    assert not place.exists()
 
 
 def test_from_memory_as_from_files(result, flat, tmp_path):

@@ -59,18 +59,18 @@ class CorrectedDem:
 
     @property
     def dem(self) -> Surface:
-        """The corrected DEM, a raster on disk as long as this object is in use."""
-        return Surface(self.spool.folder / DEM)
+        """The corrected DEM, a raster on disk as long as it is in use."""
+        return Surface(self.spool.folder / DEM, keeper=self.spool)
 
     @property
     def dz(self) -> Surface:
-        """dZ taken off the DEM, m, a raster on disk as long as this object is in use."""
-        return Surface(self.spool.folder / DZ)
+        """dZ taken off the DEM, m, a raster on disk as long as it is in use."""
+        return Surface(self.spool.folder / DZ, keeper=self.spool)
 
     @property
     def sigma_dz(self) -> Surface:
-        """σ of dZ, m, on coarser cells, a raster on disk as long as this object is in use."""
-        return Surface(self.spool.folder / SIGMA_DZ)
+        """σ of dZ, m, on coarser cells, a raster on disk as long as it is in use."""
+        return Surface(self.spool.folder / SIGMA_DZ, keeper=self.spool)
 
     @cached_property
     def seams(self) -> Table:

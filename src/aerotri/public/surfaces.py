@@ -21,6 +21,7 @@ from aerotri.volume.settings import LAYER, Layer
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from aerotri.formats.files.spool import Spool
     from aerotri.public.table import Table
     from aerotri.rasters.metric import MetricReader
 
@@ -57,6 +58,7 @@ class Surface:
     source : GeoTIFF of heights, read when it is needed; or heights in memory.
     crs : of heights in memory, 'EPSG:25832', None for local coordinates; a file says it itself.
     name : as it stands in results; that of the file where empty.
+    keeper : what removes the file when nobody uses it any more, None for a file that stays.
 
     Examples
     --------
@@ -69,6 +71,7 @@ class Surface:
     source: Heights | FilePath
     crs: str | None = None
     name: str = ""
+    keeper: Spool | None = None
 
     @classmethod
     def of_array(

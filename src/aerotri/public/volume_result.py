@@ -167,8 +167,8 @@ class MeasuredVolume:
 
     @property
     def thickness(self) -> Surface:
-        """Surface less base inside the boundary, a raster on disk as long as this volume is in use."""
-        return Surface(self.spool.folder / THICKNESS)
+        """Surface less base inside the boundary, a raster on disk as long as it is in use."""
+        return Surface(self.spool.folder / THICKNESS, keeper=self.spool)
 
     @property
     def plot(self) -> VolumePlots:
