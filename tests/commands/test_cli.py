@@ -137,6 +137,7 @@ def test_bad_table_names_file_and_line(block_folder, tmp_path):
     assert "image_points.csv:21:" in done.stderr
 
 
+@pytest.mark.slow
 def test_convert_round_trip_through_colmap_and_bal(result_folder, tmp_path):
     for to, name in (("colmap", "model"), ("colmap-text", "text"), ("bal", "problem.txt")):
         done = run("convert", result_folder, tmp_path / name, "--to", to)
@@ -193,6 +194,7 @@ def test_help_and_version():
     assert run("--version").stdout.strip().count(".") == 2
 
 
+@pytest.mark.slow
 def test_read_only_installation_without_home(block_folder, tmp_path):
     """No writable place for compiled kernels: it runs, uncached, and says so."""
     package = PROJECT / "src" / "aerotri"

@@ -137,6 +137,7 @@ def _geopackage(path, statements: list[tuple]) -> None:
     database.close()
 
 
+@pytest.mark.slow
 def test_a_geopackage_whose_rows_never_end(tmp_path):
     path = tmp_path / "b.gpkg"
     endless = "WITH RECURSIVE c(geom) AS (SELECT 1 UNION ALL SELECT geom + 1 FROM c)"

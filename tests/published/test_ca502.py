@@ -21,6 +21,7 @@ def tool():
     return module
 
 
+@pytest.mark.slow
 def test_whole_block_converges_without_what_is_weak(tool, shared_data):
     """1265 photographs of five heads with their six control points; photograph D0627 has one ray. About a minute."""
     result = adjust(tool.oriented(tool.unoriented(shared_data("ca502"))))

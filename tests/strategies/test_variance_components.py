@@ -64,6 +64,7 @@ def wrongly_stated(case: str, seed: int):
     return with_scaled_sigmas(with_adjustment(block, parameter_groups=groups, variance_components="on"), wrong), wrong
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_components_recover_the_simulated_sigma_within_their_own(case):
     """ln(σ̂/σ) in units of its σ, component by component: |mean| < 3.3/√n, variance in the 99.9 % χ² band."""

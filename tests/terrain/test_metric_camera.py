@@ -22,6 +22,7 @@ def run(*arguments) -> dict:
     return json.loads(done.stdout) if "--json" in arguments else {}
 
 
+@pytest.mark.slow
 def test_metric_camera_against_its_dem(shared_data, tmp_path):
     """data/dmc_ngi, mountains, base over height .5: with the orientation it came with, against the DEM it came with.
 
