@@ -173,9 +173,7 @@ def _camera_differences(found: Adjustment, compared: ComparedPoints, variance: f
     cross = compared.cofactors.shared[np.ix_(one, two)]
     cofactors = [half.q.shared[np.ix_(k, k)] for half, k in zip(pair.halves, (one, two), strict=True)]
     covariance = variance * (cofactors[0] + cofactors[1] - cross - cross.T)
-    records = tuple(
-        _with_parameters(found, half, [keys[0][k] for k in one]) for half in pair.halves
-    )
+    records = tuple(_with_parameters(found, half, [keys[0][k] for k in one]) for half in pair.halves)
     first, second = (np.asarray(record.parameters.value, dtype=float)[: len(one)] for record in records)
     sigma = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
     shared = lists[0]
