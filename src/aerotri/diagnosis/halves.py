@@ -79,9 +79,9 @@ def _causes(record: HalvesRecord) -> tuple[str, ...]:
     said = [
         f"Errors of the camera are left over. They change {changes}, or they are constant and the parameters do not "
         "describe them.",
-        "What to do: look for a better set with `aerotri compare-parameters`. If the halves still differ, give groups of "
-        'photographs parameters of their own (parameter_groups = "strip", or a column of images.csv with parts of the '
-        "flight). More control or observed positions (RTK) make the remaining errors harmless.",
+        "What to do: look for a better set with `aerotri compare-parameters`. If the halves still differ, give groups "
+        'of photographs parameters of their own (parameter_groups = "strip", or a column of images.csv with parts of '
+        "the flight). More control or observed positions (RTK) make the remaining errors harmless.",
     ]
     if "photographs" in record.compared:
         said.insert(0, "Alternate photographs agree: the differences are no noise of the image points.")

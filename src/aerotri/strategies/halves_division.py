@@ -142,7 +142,7 @@ def _by_directions(flight: Flight) -> Division:
         way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     else:
         way = flight.x_axis
-    known = np.isfinite(way).all(axis=1)
+    known = np.asarray(np.isfinite(way).all(axis=1))
     if not known.any():
         return Division(np.zeros(len(way), np.int64), names, "no strip has two photographs: no direction is known")
     half = _sides(np.where(known[:, None], way, 0.0), flight.strip)
