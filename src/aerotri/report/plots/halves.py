@@ -62,7 +62,7 @@ def plot_field_difference(comparison: HalvesComparison, field: FieldDifference, 
     cell = width / field.x.shape[1]
     per_inch, size = per_inch_for(np.linalg.norm(field.d, axis=-1), LONGEST_IN_CELLS * cell)
     at, d = np.stack([field.x, field.y], axis=-1).reshape(-1, 2), field.d.reshape(-1, 2)
-    quiver = vectors(axes, at, d, per_inch, INK, zorder=3)
+    quiver = vectors(axes, at, d, per_inch, INK, zorder=3, clip_on=False)
     scale_vector(axes, quiver, size, per_inch, size_text(size, camera), 0.85, 0.25)
     _tone_bar(figure, mesh, 0.8 + width + 0.15, height, "larger of |dx|, |dy| over its σ")
     flight_arrow(figure, camera, 0.8 + width + 1.3, 0.85 + height / 2)
