@@ -102,6 +102,11 @@ class NormalSystem:
         return nodes + (int((self._prior_weight[~of_points] > 0.0).sum()) if len(of_points) else 0)
 
     @property
+    def chunks(self) -> list[tuple[int, int]]:
+        """Ranges of points with about equal work, first and end of each."""
+        return self._bounds
+
+    @property
     def fields(self) -> tuple[FieldPrior, ...]:
         """What is known beforehand of the random fields among the shared parameters."""
         return self._fields
@@ -115,7 +120,8 @@ class NormalSystem:
         other._fields = tuple(field_prior(f, block.settings) for f in self.unknowns.shared.fields)
         return other
 
-    def _work(self):
+    def work(self) -> Work:
+        """Room for one thread."""
         u = self.unknowns
         most = int((u.lens.columns >= 0).sum(axis=1).max(initial=0)) + u.rays.ap_index.shape[1] + 3
         return _point_kernels.scratch(self._max_rays, max(most, 1), len(u.shared))
@@ -140,9 +146,9 @@ class NormalSystem:
 
         def chunk(k: int):
             sums = self._sums[k]
-            return _kernels.assemble(*self._bounds[k], problem, sums.offsets, sums.cleared(), self._work())
+            return _kernels.assemble(*self._bounds[k], problem, sums.offsets, sums.cleared(), self.work())
 
-        outcomes = self._over_chunks(chunk)
+        outcomes = self.over_chunks(chunk)
         n, s = len(u.images), len(u.shared)
         blocks, border, corner = np.zeros((len(u.block_row), 6, 6)), np.zeros((n, s, 6)), np.zeros((s, s))
         squares, squares_shared = np.zeros((n, 6)), np.array(self._prior_weight)
@@ -174,10 +180,10 @@ class NormalSystem:
         def chunk(k: int):
             sums = self._sums[k]
             return _kernels.reduce_right_side(
-                *self._bounds[k], problem, sums.offsets[0], *sums.cleared_right(), self._work()
+                *self._bounds[k], problem, sums.offsets[0], *sums.cleared_right(), self.work()
             )
 
-        outcomes = self._over_chunks(chunk)
+        outcomes = self.over_chunks(chunk)
         return self._summed(state, self.whitened_rows(state), outcomes, problem)
 
     def _summed(
@@ -247,6 +253,17 @@ class NormalSystem:
             total += shared[field.columns].T @ field.weight @ shared[field.columns]
         return total
 
+    def prior_root(self) -> np.ndarray:
+        """(s, k) R with R·Rᵀ the weights of what is known beforehand of the shared parameters."""
+        known = np.flatnonzero(self._prior_weight > 0.0)
+        root = np.zeros((len(self._prior_weight), len(known)))
+        root[known, np.arange(len(known))] = np.sqrt(self._prior_weight[known])
+        for field in self._fields:
+            own = np.zeros((len(root), len(field.weight)))
+            own[field.columns] = np.linalg.cholesky(field.weight)
+            root = np.concatenate([root, own], axis=1)
+        return root
+
     def with_motions_at(self, state: State) -> NormalSystem:
         """The system with what the observations leave free of a free block linearised at `state`."""
         if not self.unknowns.block.settings.adjustment.is_free:
@@ -268,7 +285,7 @@ class NormalSystem:
         points = np.empty((len(u.points), 3))
         problem = self.problem(state, estimator, damping)
         step = Directions(images, shared, points)
-        self._over_chunks(lambda k: _kernels.back_substitute(*self._bounds[k], problem, step, self._work()))
+        self.over_chunks(lambda k: _kernels.back_substitute(*self._bounds[k], problem, step, self.work()))
         return Step(images, shared, points)
 
     def whole_step(self, state: State, x: np.ndarray, damping: float, estimator: Estimator) -> Step | None:
@@ -290,7 +307,7 @@ class NormalSystem:
         """The state with every point moved, on its own and only downhill, to where its rays want it."""
         settled = replace(state, points=state.points.copy())
         problem = self.problem(settled, estimator)
-        self._over_chunks(lambda k: _kernels.settle_points(*self._bounds[k], problem, rounds, self._work()))
+        self.over_chunks(lambda k: _kernels.settle_points(*self._bounds[k], problem, rounds, self.work()))
         return settled
 
     def looseness(self, state: State, estimator: Estimator) -> np.ndarray:
@@ -321,9 +338,9 @@ class NormalSystem:
 
     def over_points(self, problem: Problem, kernel: Callable[[int, int, Problem, Work], object]) -> None:
         """kernel(first, last, problem, work) over ranges of points, in threads."""
-        self._over_chunks(lambda k: kernel(*self._bounds[k], problem, self._work()))
+        self.over_chunks(lambda k: kernel(*self._bounds[k], problem, self.work()))
 
-    def _over_chunks(self, function: Callable[[int], T]) -> list[T]:
+    def over_chunks(self, function: Callable[[int], T]) -> list[T]:
         """Of every chunk of points, in threads where there are many rays."""
         return run_chunks(function, len(self._bounds), len(self.unknowns.rays.image))
 
@@ -370,9 +387,9 @@ class NormalSystem:
         rights = [(np.zeros((n, 6, k)), np.zeros((s, k))) for _ in self._bounds]
 
         def reduce(c: int):
-            _covariance_kernels.reduce_point_sides(*self._bounds[c], problem, free, *rights[c], self._work())
+            _covariance_kernels.reduce_point_sides(*self._bounds[c], problem, free, *rights[c], self.work())
 
-        self._over_chunks(reduce)
+        self.over_chunks(reduce)
         right = np.concatenate(
             [np.sum([r[0] for r in rights], axis=0).reshape(6 * n, k), np.sum([r[1] for r in rights], axis=0)]
         )

@@ -42,6 +42,14 @@ def adjust(
         ),
     ] = None,
     robust: Robust = None,
+    model_part: Annotated[
+        str | None,
+        typer.Option(
+            help="off: σ of the noise alone. on: strips or other groups of photographs that share errors are found, "
+            "and σ gets a model part. Default: as block.toml says.",
+            rich_help_panel=METHOD,
+        ),
+    ] = None,
     check: CheckPoints = None,
     control_prefix: ControlPrefix = "",
     geoid: GeoidGrid = None,
@@ -60,7 +68,11 @@ def adjust(
     from aerotri.commands.adjust import run_adjust
 
     names = tuple(check or ())
-    raise typer.Exit(run_adjust(block, out, parameters, robust, geoid, plots, json_, check_free, control_prefix, names))
+    raise typer.Exit(
+        run_adjust(
+            block, out, parameters, robust, geoid, plots, json_, check_free, control_prefix, names, model_part
+        )
+    )
 
 
 @app.command(rich_help_panel=ADJUSTMENT, epilog="Example: aerotri parameters --family dmc --out patterns")

@@ -53,16 +53,15 @@ def ground_statistics(adjusted: AdjustedBlock, results: GroundPointResults) -> G
     """Count, RMS, mean and largest difference by coordinate.
 
     The given coordinates enter the expected RMS with their own σ. Control points were adjusted: their differences are
-    residuals, whose expected size is σ·√r.
+    residuals, whose expected size is σ·√r. The σ of check points are total, with their model part.
     """
     d = results.difference
     given = np.isfinite(d)
     n = given.sum(axis=0)
     filled = np.where(given, d, 0.0)
     sigma = _sigma_given(adjusted, results)
-    variance = (
-        results.sigma**2 + sigma**2 if results is adjusted.check else (adjusted.outcome.sigma0 * sigma) ** 2 * results.r
-    )
+    of_residuals = (adjusted.outcome.sigma0 * sigma) ** 2 * results.r
+    variance = results.total_sigma**2 + sigma**2 if results is adjusted.check else of_residuals
     with np.errstate(invalid="ignore", divide="ignore"):
         rms = np.sqrt((filled**2).sum(axis=0) / n)
         mean = filled.sum(axis=0) / n

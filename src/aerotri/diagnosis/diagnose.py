@@ -123,12 +123,17 @@ def diagnose(
 
 
 def _without_choices(block: Block) -> Block:
-    """The block without settings that make an adjustment long: choice of parameters, variance components, snooping."""
+    """The block without what makes an adjustment long: choices, variance components, snooping, model part of σ."""
     own = block.settings.adjustment
     chosen = () if own.additional_parameters == AUTO else own.additional_parameters
     robust = "huber" if own.robust == "data-snooping" else own.robust
     plain = replace(
-        own, additional_parameters=chosen, parameter_selection="off", variance_components="off", robust=robust
+        own,
+        additional_parameters=chosen,
+        parameter_selection="off",
+        variance_components="off",
+        model_part="off",
+        robust=robust,
     )
     return block if plain == own else replace(block, settings=replace(block.settings, adjustment=plain))
 

@@ -15,6 +15,7 @@ from aerotri.pipeline.choosing import compare_parameters, with_choice, with_reas
 from aerotri.pipeline.components import with_variance_components
 from aerotri.pipeline.in_frame import adjust_in_frame
 from aerotri.pipeline.local import Report
+from aerotri.pipeline.model_part import with_model_part
 from aerotri.pipeline.verdict import causes, judged, with_outcome
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.adjustment import Adjustment
@@ -63,7 +64,7 @@ def adjust_keeping_system(
     found = adjust_in_frame(block, report, given_points, geoid)
     if block.settings.adjustment.variance_components == "on":
         found = with_variance_components(block, found, report, geoid)
-    found = judged(found)
+    found = judged(with_model_part(found))
     return found if compared is None else with_reason(found, compared)
 
 

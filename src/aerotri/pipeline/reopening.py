@@ -14,6 +14,7 @@ from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.formats.results.solution import SavedSolution
 from aerotri.observations import Block
 from aerotri.pipeline.local import undamped_factor
+from aerotri.pipeline.model_part import with_model_part
 from aerotri.pipeline.verdict import judged
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.in_crs import transform_result
@@ -54,7 +55,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     if saved.verdict:
         result = replace(result, outcome=replace(result.outcome, verdict=saved.verdict, reasons=saved.reasons))
     delivered = result if frame is None else transform_result(result, block, frame)
-    found = Adjustment(delivered, result, system, solution, frame)
+    found = with_model_part(Adjustment(delivered, result, system, solution, frame))
     return found if saved.verdict else judged(found)
 
 

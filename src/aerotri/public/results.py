@@ -29,6 +29,7 @@ def adjust(
     robust: Robust | None = None,
     datum: Datum | None = None,
     variance_components: Switch | None = None,
+    model_part: Switch | None = None,
     max_iterations: int | None = None,
     check: Sequence[str] = (),
     points: np.ndarray | None = None,
@@ -49,6 +50,8 @@ def adjust(
     robust : estimator that lowers the weight of gross errors; 'data-snooping' removes them one by one.
     datum : what fixes the block: its control, the 'minimal' or 'inner' datum of a free network, or 'fixed' elements.
     variance_components : 'on' estimates σ of every group of observations.
+    model_part : 'on' tests whether strips or other groups of photographs share errors, and adds a model part to σ where
+        they do.
     max_iterations : at most, in each stage of a robust estimator.
     check : names of control points that become check points: they are compared, not used.
     points : (N, 3) m, start values of the object points, where known from elsewhere.
@@ -88,7 +91,8 @@ def adjust(
 
     chosen = with_settings(
         block_with_check_points(as_block(block), check), parameters=parameters, parameter_selection=parameter_selection,
-        robust=robust, datum=datum, variance_components=variance_components, max_iterations=max_iterations,
+        robust=robust, datum=datum, variance_components=variance_components, model_part=model_part,
+        max_iterations=max_iterations,
     )  # fmt: skip
     unread = () if isinstance(block, Block) else unread_in_words(Path(block))
     with stage_report(progress) as report:

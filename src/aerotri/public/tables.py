@@ -22,10 +22,12 @@ from aerotri.formats.results.reliability_columns import control_columns
 from aerotri.public.table import Table
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 
-METRES = ("X", "Y", "Z", "X0", "Y0", "Z0", "sX", "sY", "sZ", "sX0", "sY0", "sZ0", "dX", "dY", "dZ")
-DEGREES = ("omega", "phi", "kappa", "s_omega", "s_phi", "s_kappa")
+METRES = tuple(f"{letter}{axis}{of}" for letter in ("", "s", "m", "t") for axis in "XYZ" for of in ("", "0"))
+DIFFERENCES = ("dX", "dY", "dZ")
+DEGREES = tuple(f"{letter}{angle}" for letter in ("", "s_", "m_", "t_") for angle in ("omega", "phi", "kappa"))
 UNITS = {
-    **dict.fromkeys(METRES, "m"), **dict.fromkeys(DEGREES, "°"), **dict.fromkeys(("x", "y", "vx", "vy"), "mm"),
+    **dict.fromkeys((*METRES, *DIFFERENCES), "m"), **dict.fromkeys(DEGREES, "°"),
+    **dict.fromkeys(("x", "y", "vx", "vy"), "mm"),
     **dict.fromkeys(("x_s_omega_mgon", "x_s_phi_mgon", "x_s_kappa_mgon"), "mgon"),
 }  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_tables import COMPARED, PARAMETERS, PLACE
+from aerotri.reference.adjust_tables import COMPARED, PARAMETERS, PLACE, with_totals
 from aerotri.reference.records import DescribedFile, Item, of_axes, within
 
 VERSION = Item("aerotri", "text", "Version of aerotri that wrote the file.")
@@ -33,6 +33,7 @@ def _ground_points(name: str, what: str) -> tuple[Item, ...]:
         Item(f"{name}.points[].point", "text", "Name of the point."),
         *of_axes(f"{name}.points[].d{{}}", "number?", "Adjusted minus given {}.", "m"),
         *of_axes(f"{name}.points[].s{{}}", "number?", "Standard deviation of the adjusted {}.", "m"),
+        *with_totals(f"{name}.points[].m{{}}", f"{name}.points[].t{{}}", "the adjusted {}", "m"),
     )
 
 
@@ -96,6 +97,24 @@ ADJUSTMENT = (
     Item("blunders[].w", "number?", "Normalised residual."),
     Item("blunders[].estimated_mm", "number?", "Size of the error that would explain it.", "mm"),
     Item("blunders[].action", "text", "What was done with it."),
+    Item("model_part", "object", "Model part of σ: errors that groups of photographs share."),
+    Item("model_part.scheme", "text", "Groups whose common errors make it, such as strip; empty where there is none."),
+    Item("model_part.clusters", "whole", "Number of these groups."),
+    Item("model_part.level", "number?", "Probability with which noise alone is taken for common errors."),
+    Item("model_part.tests[]", "object", "One entry a way to divide the photographs into groups."),
+    Item("model_part.tests[].scheme", "text", "What makes a group: strip, direction of flight, photograph, or a column "
+         "of images.csv."),
+    Item("model_part.tests[].clusters", "whole", "Number of groups; many strips are joined to fewer."),
+    Item("model_part.tests[].freedom", "whole", "Degrees of freedom of the test."),
+    Item("model_part.tests[].ratio", "number?", "Common errors over what noise explains; about 1 if there are none."),
+    Item("model_part.tests[].ratio_random", "number?", "The same of random groups of the same sizes."),
+    Item("model_part.tests[].p_noise", "number?", "Probability of such a ratio by noise alone."),
+    Item("model_part.tests[].p_random", "number?", "Probability of such a ratio by what random groups show."),
+    Item("model_part.tests[].counts", "yes/no", "Whether both probabilities are small enough."),
+    Item("model_part.tests[].reason", "text", "Why there was no test; else empty."),
+    Item("model_part.ratio_plan", "number", "Total σ over σ of the noise in X and Y, median of the points."),
+    Item("model_part.ratio_height", "number", "The same in Z."),
+    Item("model_part.reason", "text", "Why there is no model part; else empty."),
     Item("warnings[]", "text", "Sentences to read: what was left out, assumed or is weak."),
     Item("timings_s", "object", "Time by stage.", "s"),
     *(

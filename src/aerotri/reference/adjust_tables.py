@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 from aerotri.adjustment.ray_status import RAY_STATUS
 from aerotri.diagnosis.work_items import KINDS
-from aerotri.reference.records import DescribedFile, Item, of_axes
+from aerotri.reference.records import AXES, DescribedFile, Item, of_axes
 from aerotri.reference.words import MARKS, POINT_STATUS, RAY_STATUS_MEANING, REASONS
 from aerotri.statistics.set_aside import PHOTOGRAPH_REASONS, POINT_REASONS
 
@@ -17,6 +20,19 @@ EFFECTS = {
     "mde": "Marginally detectable error of {}: an error of this size is found with the probability adjustment.power.",
     "external": "Largest effect of an undetected error of {} on any result, in standard deviations of that result.",
 }
+WHERE_MODEL = " Only where groups of photographs share errors."
+
+
+def with_totals(model: str, total: str, what: str, unit: str, axes: Sequence[str] = AXES) -> tuple[Item, ...]:
+    """Columns of the model part of σ and of the total, which stand beside those of σ where there is a model part."""
+    whole = f"Total standard deviation of {what}, model part included.{WHERE_MODEL}"
+    found = (
+        *of_axes(model, "number?", f"Model part of the standard deviation of {what}.{WHERE_MODEL}", unit, axes),
+        *of_axes(total, "number?", whole, unit, axes),
+    )
+    return tuple(replace(item, optional=True) for item in found)
+
+
 STATUS = Item("status", "text", "Whether it took part in the adjustment.", values=POINT_STATUS)
 
 IMAGES = (
@@ -27,6 +43,8 @@ IMAGES = (
     *of_axes("{}", "number?", "Adjusted angle {}.", "deg", ANGLES),
     *of_axes("s{}0", "number?", "Standard deviation of {}0.", "m"),
     *of_axes("s_{}", "number?", "Standard deviation of {}.", "deg", ANGLES),
+    *with_totals("m{}0", "t{}0", "{}0", "m"),
+    *with_totals("m_{}", "t_{}", "{}", "deg", ANGLES),
     Item("rays", "whole", "Number of image points used."),
     STATUS,
     Item(
@@ -41,6 +59,7 @@ POINTS = (
     Item("point", "text", "Name of the object point."),
     *of_axes("{}", "number?", "Adjusted {}.", "m"),
     *of_axes("s{}", "number?", "Standard deviation of {}.", "m"),
+    *with_totals("m{}", "t{}", "{}", "m"),
     Item("rays", "whole", "Number of photographs used."),
     Item("max_abs_w", "number?", "Largest normalised residual of its image coordinates, without sign."),
     STATUS,
@@ -86,6 +105,13 @@ PARAMETERS = (
     Item("value", "number?", "Adjusted value.", "unit of the parameter"),
     Item("sigma", "number?", "Standard deviation of the value.", "unit of the parameter"),
     Item("t", "number?", "Value over standard deviation, without sign; below 2 it is not significant."),
+    *(
+        Item(name, "number?", f"{text}{WHERE_MODEL}", "unit of the parameter", optional=True)
+        for name, text in (
+            ("model_sigma", "Model part of the standard deviation."),
+            ("total_sigma", "Total standard deviation: noise and model part."),
+        )
+    ),
     Item("max_correlation", "number?", "Largest correlation with another of these parameters, −1 to 1."),
     Item("max_correlation_with", "text?", "The parameter it is most correlated with."),
     Item("total_correlation", "number?", "Correlation with all other parameters together, 0 to 1."),
@@ -119,6 +145,7 @@ GROUND = (
     Item("point", "text", "Name of the point."),
     *of_axes("d{}", "number?", "Adjusted minus given {}.", "m"),
     *of_axes("s{}", "number?", "Standard deviation of the adjusted {}.", "m"),
+    *with_totals("m{}", "t{}", "the adjusted {}", "m"),
     *of_axes("r{}", "number?", EFFECTS["r"].replace("{}", "the given {}")),
     *of_axes("w{}", "number?", EFFECTS["w"].replace("{}", "{} (check points: difference over its own σ)")),
     Item("rays", "whole", "Number of photographs used."),

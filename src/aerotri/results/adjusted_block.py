@@ -12,6 +12,7 @@ from aerotri.functional_model.additional_parameters import Parameter, is_grid
 from aerotri.observations import Block
 
 if TYPE_CHECKING:
+    from aerotri.results.model_part import ModelPart
     from aerotri.results.removal import Removal
     from aerotri.results.variance_components import VarianceComponents
 
@@ -58,12 +59,14 @@ class ImageResults:
     angles : (n, 3) rad, ω, φ, κ in the block's order.
     covariance : (n, 6, 6) of (X0, Y0, Z0, ω, φ, κ), m and rad, σ̂0² included; NaN where not available.
     rays : (n,) rays used.
+    model : (n, 6, 6) the model part of the covariance, see `statistics.model_part`; None where there is none.
     """
 
     centre: np.ndarray
     angles: np.ndarray
     covariance: np.ndarray
     rays: np.ndarray
+    model: np.ndarray | None = None
 
     @property
     def sigma(self) -> np.ndarray:
@@ -81,17 +84,25 @@ class PointResults:
     covariance : (N, 3, 3) m², σ̂0² included.
     rays : (N,) rays used.
     max_abs_w : (N,) largest |w| of the point's image coordinates.
+    model : (N, 3, 3) m² the model part of the covariance, see `statistics.model_part`; None where there is none.
     """
 
     xyz: np.ndarray
     covariance: np.ndarray
     rays: np.ndarray
     max_abs_w: np.ndarray
+    model: np.ndarray | None = None
 
     @property
     def sigma(self) -> np.ndarray:
-        """(N, 3) m."""
+        """(N, 3) m, of the noise."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    @property
+    def total_sigma(self) -> np.ndarray:
+        """(N, 3) m, with the model part."""
+        whole = self.covariance if self.model is None else self.covariance + self.model
+        return np.sqrt(np.diagonal(whole, axis1=1, axis2=2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +158,7 @@ class SharedParameters:
     max_correlation : (s,) the largest |r| with another shared parameter, signed; max_correlation_with : (s,) its name.
     total_correlation : (s,) B = 1 − 1/(N_ii·Q_ii) with N reduced to the shared parameters.
     status : (s,) str, 'estimated', 'weighted', 'fixed' or 'removed'; reason : (s,) str.
+    model_sigma : (s,) the model part of σ, see `statistics.model_part`; None where there is none.
     """
 
     names: np.ndarray
@@ -160,6 +172,7 @@ class SharedParameters:
     total_correlation: np.ndarray
     status: np.ndarray
     reason: np.ndarray
+    model_sigma: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.names)
@@ -196,6 +209,7 @@ class GroundPointResults:
     lone_sigma : (k, 3) m, of coordinates that are held (σ = 0), a priori, as all others predict them; NaN elsewhere.
         Their r is 0, and w is (given − predicted)/lone_sigma: what −v/(σ√r) tends to with σ.
     freedom : (3,) degrees of freedom of X, Y, Z of check points, see `check_freedom`; None where not computed.
+    model_sigma : (k, 3) m, the model part of σ of the adjusted coordinate; None where there is none.
     """
 
     point: np.ndarray
@@ -206,9 +220,15 @@ class GroundPointResults:
     rays: np.ndarray
     lone_sigma: np.ndarray | None = None
     freedom: np.ndarray | None = None
+    model_sigma: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.point)
+
+    @property
+    def total_sigma(self) -> np.ndarray:
+        """(k, 3) m, of the adjusted coordinate with the model part."""
+        return self.sigma if self.model_sigma is None else np.hypot(self.sigma, self.model_sigma)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +288,8 @@ class AdjustedBlock:
     """A block after its adjustment; what the later stages start from.
 
     `components` is there where `variance_components = "on"`: `block` then has the σ they led to. `removals` are those
-    of the selection of additional parameters, in order; `parameters` has them too, behind the others.
+    of the selection of additional parameters, in order; `parameters` has them too, behind the others. `model_part`
+    says where the model part of σ comes from, or why there is none; None before it is looked for.
     """
 
     block: Block
@@ -285,3 +306,4 @@ class AdjustedBlock:
     components: VarianceComponents | None = None
     effects: RayEffects | None = None
     removals: tuple[Removal, ...] = ()
+    model_part: ModelPart | None = None

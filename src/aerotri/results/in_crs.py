@@ -46,6 +46,40 @@ def _points_from_local(points: PointResults, frame: LocalFrame) -> PointResults:
     return replace(points, xyz=frame.from_local(points.xyz), covariance=covariance)
 
 
+def with_model_of(result: AdjustedBlock, local: AdjustedBlock, frame: LocalFrame | None) -> AdjustedBlock:
+    """The result with the model part of σ that was found in the local frame.
+
+    Parameters
+    ----------
+    result : in the CRS of the block, `local` : the same in the frame of the adjustment, with its model part.
+    """
+    points, images, local_images = local.points.model, local.images.model, local.images.model
+    if frame is not None and points is not None and local_images is not None:
+        jacobian = frame.crs_per_local(local.points.xyz)
+        points = jacobian @ points @ np.swapaxes(jacobian, 1, 2)
+        there = np.isfinite(local.images.centre).all(axis=1)
+        partials = orientation_partials(
+            local.images.centre[there], local.images.angles[there], frame, result.block.rotation
+        )
+        images = np.full_like(local_images, np.nan)
+        images[there] = partials @ local_images[there] @ np.swapaxes(partials, 1, 2)
+    result = replace(
+        result,
+        images=replace(result.images, model=images),
+        points=replace(result.points, model=points),
+        parameters=replace(result.parameters, model_sigma=local.parameters.model_sigma),
+        model_part=local.model_part,
+    )
+    return replace(result, control=_with_model(result, result.control), check=_with_model(result, result.check))
+
+
+def _with_model(result: AdjustedBlock, ground: GroundPointResults) -> GroundPointResults:
+    if result.points.model is None:
+        return replace(ground, model_sigma=None)
+    sigma = np.sqrt(np.diagonal(result.points.model[ground.point], axis1=1, axis2=2))
+    return replace(ground, model_sigma=np.where(np.isfinite(ground.sigma), sigma, np.nan))
+
+
 def _images_from_local(images: ImageResults, frame: LocalFrame, order: str) -> ImageResults:
     """Orientation in the CRS."""
     centre = frame.from_local(images.centre)

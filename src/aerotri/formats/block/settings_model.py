@@ -204,6 +204,10 @@ class AdjustmentModel(Section):
     variance_components: OffOn = key(
         "off", "on: the σ of image points, control, GNSS and INS are estimated from the residuals, group by group."
     )
+    model_part: OffOn = key(
+        "on", "on: strips, days and other groups of photographs are tested for errors that they share; where they do, "
+        "σ gets a model part (mX, mY, mZ) beside that of the noise. off: σ of the noise alone."
+    )  # fmt: skip
     alpha: Fraction = key(
         0.001, "Significance level of the tests of residuals: 0.001 means one false alarm in a thousand tests."
     )

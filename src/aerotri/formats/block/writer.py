@@ -185,6 +185,7 @@ def _settings(block: Block) -> dict[str, Any]:
             "datum_points": list(adjustment.datum_points),
             "datum_fixed": [f"{image}:{element}" for image, element in adjustment.datum_fixed],
             "variance_components": adjustment.variance_components,
+            "model_part": adjustment.model_part,
             "alpha": adjustment.alpha,
             "power": adjustment.power,
             "max_iterations": adjustment.max_iterations,

@@ -27,16 +27,18 @@ from aerotri.image_errors import interior_elements
 from aerotri.observations import Block
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Outcome
+from aerotri.results.model_part import ModelPart
 from aerotri.statistics.set_aside import photograph_reasons, point_reasons, status_columns
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 NEEDS_QUOTES = re.compile(r'[,"\r\n#]')
+NOT_LOOKED_FOR = "the adjustment has no result"
 TIMINGS = ("read", "start_values", "solve", "statistics", "plots", "write")
 PARAMETER_KEYS = (
-    "name", "group", "value", "sigma", "t", "max_correlation", "max_correlation_with", "total_correlation", "status",
-    "reason",
+    "name", "group", "value", "sigma", "t", "model_sigma", "total_sigma", "max_correlation", "max_correlation_with",
+    "total_correlation", "status", "reason",
 )  # fmt: skip
 
 
@@ -80,6 +82,7 @@ def adjustment_json(adjusted: AdjustedBlock) -> dict[str, Any]:
         "additional_parameters": _additional_parameters(adjusted),
         "cameras": _cameras(adjusted),
         "blunders": [_record(blunder) for blunder in adjusted.blunders],
+        "model_part": (adjusted.model_part or ModelPart(reason=NOT_LOOKED_FOR)).as_dict(),
     }
 
 
@@ -109,6 +112,7 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
         "additional_parameters": [],
         "cameras": [],
         "blunders": [],
+        "model_part": ModelPart(reason=NOT_LOOKED_FOR).as_dict(),
         "warnings": list(o.warnings),
         "timings_s": {key: float(o.timings_s.get(key, 0.0)) for key in TIMINGS},
     }
@@ -124,6 +128,11 @@ def image_columns(adjusted: AdjustedBlock) -> dict[str, np.ndarray]:
     columns |= _split(("omega", "phi", "kappa"), np.degrees(images.angles))
     columns |= _split(("sX0", "sY0", "sZ0"), sigma[:, :3])
     columns |= _split(("s_omega", "s_phi", "s_kappa"), np.degrees(sigma[:, 3:]))
+    if images.model is not None:
+        model = _root_of_diagonal(images.model)
+        for letter, values in (("m", model), ("t", np.hypot(sigma, model))):
+            columns |= _split((f"{letter}X0", f"{letter}Y0", f"{letter}Z0"), values[:, :3])
+            columns |= _split((f"{letter}_omega", f"{letter}_phi", f"{letter}_kappa"), np.degrees(values[:, 3:]))
     columns["rays"] = images.rays
     columns |= status_columns(photograph_reasons(adjusted))
     return columns | _split(("x_s_omega_mgon", "x_s_phi_mgon", "x_s_kappa_mgon"), sigma[:, 3:] * MGON_PER_RADIAN)
@@ -134,6 +143,9 @@ def point_columns(adjusted: AdjustedBlock) -> dict[str, np.ndarray]:
     points = adjusted.points
     columns = {"point": adjusted.block.points} | _split(("X", "Y", "Z"), points.xyz)
     columns |= _split(("sX", "sY", "sZ"), points.sigma)
+    if points.model is not None:
+        columns |= _split(("mX", "mY", "mZ"), _root_of_diagonal(points.model))
+        columns |= _split(("tX", "tY", "tZ"), points.total_sigma)
     columns |= {"rays": points.rays, "max_abs_w": points.max_abs_w}
     return columns | status_columns(point_reasons(adjusted))
 
@@ -141,8 +153,12 @@ def point_columns(adjusted: AdjustedBlock) -> dict[str, np.ndarray]:
 def parameter_columns(adjusted: AdjustedBlock) -> dict[str, np.ndarray]:
     """Columns of parameters.csv: all shared parameters, `x_kind` telling interior, additional and GNSS ones apart."""
     p = adjusted.parameters
-    return {
+    columns = {
         "name": p.names, "group": p.groups, "mark": p.marks, "value": p.value, "sigma": p.sigma, "t": _finite(p.t),
+    }  # fmt: skip
+    if p.model_sigma is not None:
+        columns |= {"model_sigma": p.model_sigma, "total_sigma": np.hypot(p.sigma, p.model_sigma)}
+    return columns | {
         "max_correlation": p.max_correlation, "max_correlation_with": p.max_correlation_with,
         "total_correlation": p.total_correlation, "status": p.status, "reason": p.reason, "x_kind": p.kinds,
     }  # fmt: skip
@@ -153,6 +169,9 @@ def ground_point_columns(adjusted: AdjustedBlock, results: GroundPointResults) -
     columns = {"point": adjusted.block.points[results.point]}
     for prefix, values in (("d", results.difference), ("s", results.sigma), ("r", results.r), ("w", results.w)):
         columns |= _split(tuple(prefix + axis for axis in "XYZ"), values)
+        if prefix == "s" and results.model_sigma is not None:
+            columns |= _split(("mX", "mY", "mZ"), results.model_sigma)
+            columns |= _split(("tX", "tY", "tZ"), results.total_sigma)
     return columns | {"rays": results.rays}
 
 
@@ -206,6 +225,10 @@ def write_csv(path: Path, columns: dict[str, np.ndarray]) -> None:
         csv.write_csv(with_plain_texts(pa.table(arrays)), file, options)
 
 
+def _root_of_diagonal(covariance: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+
+
 def _split(names: tuple[str, ...], values: np.ndarray) -> dict[str, np.ndarray]:
     return {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(names)}
 
@@ -220,8 +243,10 @@ def _ground_points(block: Block, results: GroundPointResults) -> dict[str, Any]:
         statistics["mean"][axis] = float(np.mean(d)) if len(d) else None
         statistics["max"][axis] = float(np.abs(d).max()) if len(d) else None
     names = block.points[results.point]
-    keys = ("dX", "dY", "dZ", "sX", "sY", "sZ")
-    rows = np.concatenate([results.difference, results.sigma], axis=1)
+    keys, rows = ("dX", "dY", "dZ", "sX", "sY", "sZ"), np.concatenate([results.difference, results.sigma], axis=1)
+    if results.model_sigma is not None:
+        keys = (*keys, "mX", "mY", "mZ", "tX", "tY", "tZ")
+        rows = np.concatenate([rows, results.model_sigma, results.total_sigma], axis=1)
     points = [
         {"point": str(name)} | {key: number_or_none(value) for key, value in zip(keys, row, strict=True)}
         for name, row in zip(names, rows, strict=True)
@@ -232,7 +257,8 @@ def _ground_points(block: Block, results: GroundPointResults) -> dict[str, Any]:
 def _additional_parameters(adjusted: AdjustedBlock) -> list[dict[str, Any]]:
     columns = parameter_columns(adjusted)
     rows = np.flatnonzero(adjusted.parameters.kinds == "additional")
-    return [{key: _plain(columns[key][row]) for key in PARAMETER_KEYS} for row in rows]
+    keys = [key for key in columns if key in PARAMETER_KEYS]
+    return [{key: _plain(columns[key][row]) for key in keys} for row in rows]
 
 
 def _cameras(adjusted: AdjustedBlock) -> list[dict[str, Any]]:

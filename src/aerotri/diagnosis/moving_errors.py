@@ -1,0 +1,42 @@
+"""Errors that strips, days or photographs have in common, in words."""
+
+from __future__ import annotations
+
+from aerotri.diagnosis.finding import Finding, times
+from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.model_part import ModelPart
+
+WORTH_SAYING = 1.05
+"""σ total over σ from which the model part is told: below, it changes no decision."""
+
+
+def model_part_in_words(part: ModelPart) -> str:
+    """What a surveyor has to know of the model part, '' where there is none to speak of."""
+    if not part.counts or max(part.ratio_plan, part.ratio_height) < WORTH_SAYING:
+        return ""
+    plan, height = (f"{ratio:.1f} times" for ratio in (part.ratio_plan, part.ratio_height))
+    return (
+        f"the errors of the photographs change {change_in_words(part.scheme)}, more than noise explains: from the "
+        f"noise alone heights would look {height} and positions {plan} too sure. The total σ (tX, tY, tZ) contain this"
+    )
+
+
+def change_in_words(scheme: str) -> str:
+    """Such as 'from strip to strip'."""
+    return "with the direction of flight" if scheme == "direction of flight" else f"from {scheme} to {scheme}"
+
+
+def of_model_part(adjusted: AdjustedBlock) -> list[Finding]:
+    """The test of clusters that led to the model part, or the largest of those that led to none."""
+    part = adjusted.model_part
+    tested = [] if part is None else [test for test in part.tests if not test.reason]
+    if part is None or not tested:
+        return []
+    test = next((test for test in tested if test.scheme == part.scheme), max(tested, key=lambda test: test.ratio))
+    name = f"errors common to a {test.scheme}"
+    value = f"{times(test.ratio)} as large as noise explains"
+    text = f"about 1; chance makes more with a probability of {100.0 * part.level:.2g} %"
+    said = model_part_in_words(part)
+    if not said:
+        return [Finding(name, value, text, "the noise explains them", "good")]
+    return [Finding(name, value, text, said, "attention")]

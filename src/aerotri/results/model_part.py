@@ -1,0 +1,73 @@
+"""The model part of σ: what the observations themselves show beyond white noise; of a result."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class ClusterTest:
+    """Whether the errors of clusters of photographs are larger than the rays' noise can explain.
+
+    Parameters
+    ----------
+    scheme : how the photographs were divided, such as 'strip'. clusters : how many there are.
+    freedom : degrees of freedom of the test.
+    ratio : how many times as large as the noise of the rays explains the clusters' common errors are (RMS, along the
+        weakest deformations of the block). ratio_random : the same of random divisions into as many clusters.
+    p_noise : probability of such a ratio by the noise of the rays alone. p_random : by what random divisions show. NaN
+        where there was no test.
+    counts : whether both are below the level of the test.
+    reason : why there was no test, '' otherwise.
+    """
+
+    scheme: str
+    clusters: int
+    freedom: int = 0
+    ratio: float = float("nan")
+    ratio_random: float = float("nan")
+    p_noise: float = float("nan")
+    p_random: float = float("nan")
+    counts: bool = False
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class ModelPart:
+    """What the model part of σ was derived from.
+
+    Parameters
+    ----------
+    scheme : of the clusters whose excess is the model part, '' where none counts.
+    clusters : their number. level : of the test.
+    tests : of all schemes.
+    ratio_plan, ratio_height : median of σ total over σ of the object points, 1 where there is no model part.
+    reason : why there is no model part, '' otherwise.
+    """
+
+    scheme: str = ""
+    clusters: int = 0
+    level: float = float("nan")
+    tests: tuple[ClusterTest, ...] = ()
+    ratio_plan: float = 1.0
+    ratio_height: float = 1.0
+    reason: str = ""
+
+    @property
+    def counts(self) -> bool:
+        """Whether there is a model part."""
+        return bool(self.scheme)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; None for what is not known."""
+
+        def plain(value: Any) -> Any:
+            return None if isinstance(value, float) and not np.isfinite(value) else value
+
+        own = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        own["tests"] = [{key: plain(value) for key, value in dataclasses.asdict(t).items()} for t in self.tests]
+        return {key: plain(value) for key, value in own.items()}

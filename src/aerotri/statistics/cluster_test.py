@@ -1,0 +1,226 @@
+"""Whether photographs of one cluster (a strip, a day) share errors: a test along the weakest deformations of a block.
+
+[D] At the solution the scores g_c = A_cᵀPv of clusters c (their rays, and GNSS and INS of their photographs) pull at
+the unknowns. Along directions y the pulls are u_c = yᵀg_c. With white noise they have the covariance σ0²·K,
+
+    K_cd = δ_cd·yᵀN_c·y − (N_c·y)ᵀ·Q·(N_d·y),
+
+N_c = A_cᵀPA_c; the second term is what the adjustment itself takes away. So uᵀK⁺u/σ0² is χ² with the rank of K as
+degrees of freedom, however few clusters there are. Errors that the rays of a cluster have in common do not average out
+within it and enlarge uᵀK⁺u.
+
+The directions are the weakest deformations of the block: of the covariance that clusters give to object points spread
+over the block, the eigenvectors of the largest eigenvalues.
+
+Residuals that are not white within a photograph (correlated matching, wrong weights) enlarge the sum for any division.
+So it is compared as well with that of random divisions of the photographs into clusters of the same sizes, by the F
+test. The scheme "photograph" is a random division itself, and stands for errors that the rays of one photograph share.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import chdtrc, fdtrc
+
+from aerotri.adjustment.kernel_records import Directions
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.solve import Solution
+from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.functional_model.observed_unknowns import Rows
+from aerotri.results.model_part import ClusterTest
+from aerotri.statistics import _cluster_kernels as _kernels
+from aerotri.statistics.clusters import FEWEST, PHOTOGRAPH, Clusters
+
+LEVEL = 0.001
+"""Probability with which white noise is taken for errors of clusters [C]: Baarda's level of a single test."""
+DIVISIONS = 3
+"""Random divisions of the photographs [C]: their degrees of freedom are three times those of the scheme."""
+MODES = 6
+"""Deformations looked at [C]: tilts and bends of the whole block; more cost time."""
+SAME = 1e-6
+"""Eigenvalue of K over the largest below which it is rounding."""
+SAMPLE = 12
+"""Object points that stand for the shape of the block [C]."""
+NUMBERS_AT_ONCE = 2e7
+"""Numbers of the right sides that are solved together [C]: 160 MB, of which three copies are made."""
+SAMPLED_FROM = 5000
+"""Object points among which those of the sample are looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """k directions in the space of the unknowns, and what the photographs do along them.
+
+    Parameters
+    ----------
+    y : the directions. scores : (n, k) pulls of the photographs. products : (n, k, k) their share of yᵀNy.
+    """
+
+    y: Directions
+    scores: np.ndarray
+    products: np.ndarray
+
+
+def weakest_modes(system: NormalSystem, solution: Solution, factor: Factor) -> Modes:
+    """The directions of the weakest deformations and the photographs' pulls along them.
+
+    Parameters
+    ----------
+    factor : undamped, at the solution.
+    """
+    u = system.unknowns
+    rows = _spread(solution.state.points, np.diff(u.rays.start), ~u.point_held.any(axis=1) & (u.kept < 0))
+    size = 3 * len(rows)
+    q, own = np.zeros((size, size)), np.zeros((size, size))
+    observed = np.flatnonzero((u.prior_weight > 0.0).any(axis=1) & (u.kept < 0))
+    at_observed, at_shared = np.zeros((len(observed), 3, size)), np.zeros((len(u.shared), size))
+    at_once = int(np.clip(NUMBERS_AT_ONCE / (3 * len(u.points)), 3, size))
+    for first in range(0, size, at_once):
+        columns = np.arange(first, min(first + at_once, size))
+        sides = np.zeros((len(u.points), 3, len(columns)))
+        sides[rows[columns // 3], columns % 3, np.arange(len(columns))] = 1.0
+        _, shared, points = system.solve_sides(solution.state, factor, sides, solution.estimator)
+        q[:, columns] = points[rows].reshape(size, -1)
+        at_observed[:, :, columns], at_shared[:, columns] = points[observed], shared
+    own += np.einsum("pia,pi,pib->ab", at_observed, u.prior_weight[observed], at_observed)
+    at_priors = system.prior_root().T @ at_shared
+    own += at_priors.T @ at_priors
+    values, vectors = np.linalg.eigh(0.5 * (q + q.T) - own)
+    chosen = vectors[:, ::-1][:, :MODES] / np.sqrt(np.maximum(values[::-1][:MODES], 1e-12 * values[-1]))
+    sides = np.zeros((len(u.points), 3, chosen.shape[1]))
+    sides[rows] = chosen.reshape(len(rows), 3, -1)
+    y = Directions(*system.solve_sides(solution.state, factor, sides, solution.estimator))
+    return _with_scores(system, solution, y)
+
+
+def _spread(points: np.ndarray, rays: np.ndarray, usable: np.ndarray) -> np.ndarray:
+    """Rows of well measured points far from one another in plan."""
+    candidates = np.flatnonzero(usable & (rays >= min(3, int(rays.max(initial=0)))))
+    step = max(len(candidates) // SAMPLED_FROM, 1)
+    candidates = candidates[::step]
+    xy = points[candidates, :2]
+    chosen = [int(np.argmin(np.linalg.norm(xy - np.median(xy, axis=0), axis=1)))]
+    apart = np.linalg.norm(xy - xy[chosen[0]], axis=1)
+    # half of them, so that no sample is full of points that stick out
+    for _ in range(min(SAMPLE, len(candidates)) - 1):
+        chosen.append(int(np.argmax(apart)))
+        apart = np.minimum(apart, np.linalg.norm(xy - xy[chosen[-1]], axis=1))
+    return candidates[np.array(chosen)]
+
+
+def _with_scores(system: NormalSystem, solution: Solution, y: Directions) -> Modes:
+    n, k = len(system.unknowns.images), y.images.shape[2]
+    parts = [_kernels.Scores(np.zeros((n, k)), np.zeros((n, k, k))) for _ in system.chunks]
+    problem = system.problem(solution.state, solution.estimator)
+    system.over_chunks(lambda c: _kernels.mode_scores(*system.chunks[c], problem, y, parts[c], system.work()))
+    scores, products = (np.sum([part[axis] for part in parts], axis=0) for axis in (0, 1))
+    for rows in system.whitened_rows(solution.state):
+        own, value = along(rows, y)
+        np.add.at(scores, rows.image[own], np.einsum("gkf,gk->gf", value, rows.gap[own]))
+        np.add.at(products, rows.image[own], np.einsum("gkf,gkh->gfh", value, value))
+    return Modes(y, scores, products)
+
+
+def along(rows: Rows, y: Directions) -> tuple[np.ndarray, np.ndarray]:
+    """Which observations belong to a photograph, and what directions y change their predictions by, (g, k, f)."""
+    own = rows.image >= 0
+    value = rows.by_image[own] @ y.images[rows.image[own]]
+    for c in range(rows.columns.shape[1]):
+        column = rows.columns[own, c]
+        there = column >= 0
+        value[there] += rows.by_shared[own][there, :, c, None] * y.shared[column[there]][:, None, :]
+    return own, value
+
+
+def sides_of_clusters(
+    system: NormalSystem, solution: Solution, clusters: Clusters, y: Directions
+) -> tuple[np.ndarray, np.ndarray]:
+    """A_cᵀP·A·y of every cluster and direction with the points eliminated (6·n + s, m·k), and what points take, (m·k)².
+
+    The misclosures in place of A·y where y has no direction.
+    """
+    u = system.unknowns
+    n, s, k = len(u.images), len(u.shared), max(y.images.shape[2], 1)
+    size = len(clusters) * k
+    parts = [_kernels.Sides(np.zeros((n, 6, size)), np.zeros((s, size)), np.zeros((size, size))) for _ in system.chunks]
+    problem, label = system.problem(solution.state, solution.estimator), clusters.label.astype(np.int64)
+    system.over_chunks(lambda c: _kernels.cluster_sides(*system.chunks[c], problem, label, y, parts[c], system.work()))
+    images, shared, own_products = (np.sum([part[axis] for part in parts], axis=0) for axis in (0, 1, 2))
+    for rows in system.whitened_rows(solution.state):
+        own, value = along(rows, y)
+        if not y.images.shape[2]:
+            value = rows.gap[own][:, :, None]
+        image = rows.image[own]
+        for f in range(k):
+            column = label[image] * k + f
+            pulls = np.einsum("gkt,gk->gt", rows.by_image[own], value[:, :, f])
+            for t in range(6):
+                np.add.at(images[:, t], (image, column), pulls[:, t])
+            for c in range(rows.columns.shape[1]):
+                at, there = rows.columns[own, c], rows.columns[own, c] >= 0
+                pull = np.sum(rows.by_shared[own][:, :, c] * value[:, :, f], axis=1)
+                np.add.at(shared, (at[there], column[there]), pull[there])
+    return np.concatenate([images.reshape(6 * n, size), shared]), own_products
+
+
+def compare_clusters(
+    system: NormalSystem, solution: Solution, factor: Factor, modes: Modes, clusters: Clusters, sigma0: float,
+    level: float,
+) -> ClusterTest:  # fmt: skip
+    """The test of one scheme.
+
+    Parameters
+    ----------
+    factor : undamped, at the solution. level : below which both probabilities have to be for the scheme to count.
+    """
+    m = len(clusters)
+    if m < FEWEST:
+        return ClusterTest(clusters.scheme, m, reason=too_few(m))
+    found, freedom = sum_of_squares(system, solution, factor, modes, clusters)
+    if freedom == 0:
+        return ClusterTest(clusters.scheme, m, reason="nothing checks the clusters against one another")
+    p_noise, ratio = float(chdtrc(freedom, found / sigma0**2)), float(np.sqrt(found / freedom)) / sigma0
+    if clusters.scheme == PHOTOGRAPH:
+        return ClusterTest(clusters.scheme, m, freedom, ratio, p_noise=p_noise, counts=p_noise < level)
+    of_random = _by_random_divisions(system, solution, factor, modes, clusters)
+    ratio_random = float(np.sqrt(of_random[0] / of_random[1])) / sigma0
+    p_random = float(fdtrc(freedom, of_random[1], (ratio / max(ratio_random, 1.0)) ** 2))
+    return ClusterTest(
+        clusters.scheme, m, freedom, ratio, ratio_random, p_noise, p_random, max(p_noise, p_random) < level
+    )
+
+
+def _by_random_divisions(
+    system: NormalSystem, solution: Solution, factor: Factor, modes: Modes, clusters: Clusters
+) -> tuple[float, int]:
+    """Sum of squares and degrees of freedom of random divisions into clusters of the same sizes."""
+    rng, total, freedom = np.random.default_rng(len(clusters.label)), 0.0, 0
+    for _ in range(DIVISIONS):
+        other = replace(clusters, label=rng.permutation(clusters.label))
+        found, own = sum_of_squares(system, solution, factor, modes, other)
+        total, freedom = total + found, freedom + own
+    return total, max(freedom, 1)
+
+
+def too_few(clusters: int) -> str:
+    """Why so few clusters are not tested."""
+    return f"{clusters} clusters leave {clusters - 1} degrees of freedom, too few to estimate a variance from"
+
+
+def sum_of_squares(
+    system: NormalSystem, solution: Solution, factor: Factor, modes: Modes, clusters: Clusters
+) -> tuple[float, int]:
+    """uᵀ·K⁺·u and the rank of K."""
+    m, k = len(clusters), modes.scores.shape[1]
+    sides, taken = sides_of_clusters(system, solution, clusters, modes.y)
+    covariance, pulls = -(taken + sides.T @ factor.solve(sides.copy())), np.zeros((m, k))
+    np.add.at(pulls, clusters.label, modes.scores)
+    for c in range(m):
+        own = slice(c * k, (c + 1) * k)
+        covariance[own, own] += modes.products[clusters.label == c].sum(axis=0)
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    there = values > SAME * values[-1]
+    squares = (vectors[:, there].T @ pulls.ravel()) ** 2 / values[there]
+    return float(squares.sum()), int(there.sum())

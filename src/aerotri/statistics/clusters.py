@@ -1,0 +1,120 @@
+"""Clusters of photographs: sets that may share an error, such as the strips of a flight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.adjustment.track import headings, order_of_exposure, strips_of_track
+from aerotri.adjustment.unknowns import State, Unknowns
+
+FEWEST = 5
+"""Clusters from which a jackknife is made [C]: a variance of four degrees of freedom has a σ of 35 % of itself as a
+standard deviation; of fewer clusters it says nothing."""
+MOST, MOST_OF_LARGE, LARGE = 30, 12, 5000
+"""Clusters at most, and at most in a block of more than LARGE photographs [C]: each costs a factorisation."""
+PHOTOGRAPH, PER_CLUSTER, MOST_AT_RANDOM = "photograph", 3, 15
+"""The scheme of errors of single photographs: photographs at random into clusters of PER_CLUSTER at least, so many at
+most. What belongs to photographs adds up in such clusters as it does alone."""
+SAME_WAY = np.radians(30.0)
+"""Strips whose directions differ by less were flown the same way."""
+
+
+@dataclass(frozen=True, eq=False)
+class Clusters:
+    """One way to divide the photographs.
+
+    Parameters
+    ----------
+    scheme : 'strip', 'direction of flight', a column of images.csv or PHOTOGRAPH.
+    label : (n,) number of every photograph's cluster, photographs as in `Unknowns`. names : (m,) of the clusters.
+    joined : how many groups of the scheme there are where neighbours were joined to fewer clusters; len(names) if not.
+    """
+
+    scheme: str
+    label: np.ndarray
+    names: tuple[str, ...]
+    joined: int
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+def cluster_schemes(unknowns: Unknowns, state: State) -> tuple[Clusters, ...]:
+    """Strips, directions of flight, every grouping column of images.csv and single photographs.
+
+    A scheme of one cluster is left out, and one that divides the photographs as another before it.
+    """
+    images, rows = unknowns.block.images, unknowns.images
+    strip, strip_names = _strips(unknowns, state)
+    found = [_limited("strip", strip, strip_names)]
+    way, way_names = _directions(state.centre, strip)
+    found.append(_limited("direction of flight", way, way_names))
+    for name, values in images.columns.items():
+        names, label = np.unique(values[rows].astype(str), return_inverse=True)
+        found.append(_limited(name, label, tuple(str(n) for n in names)))
+    kept: list[Clusters] = []
+    for clusters in found:
+        several = 2 <= len(clusters) <= len(rows) // 2
+        if several and not any(_alike(clusters, other) for other in kept):
+            kept.append(clusters)
+    return (*kept, _at_random(len(rows)))
+
+
+def _at_random(n: int) -> Clusters:
+    most = max(min(MOST_AT_RANDOM if n <= LARGE else MOST_OF_LARGE, n // PER_CLUSTER), 1)
+    label = np.random.default_rng(n).permutation(np.arange(n) % most)
+    return Clusters(PHOTOGRAPH, label, tuple(str(k + 1) for k in range(most)), n)
+
+
+def _strips(unknowns: Unknowns, state: State) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Strips in the order of exposure: by name, or found where the track turns."""
+    images, rows = unknowns.block.images, unknowns.images
+    named = images.strip[rows].astype(str)
+    if all(named.tolist()):
+        names = list(dict.fromkeys(named.tolist()))
+        return np.array([names.index(name) for name in named]), tuple(names)
+    order = order_of_exposure(state.centre, np.full(len(rows), ""), images.names[rows], _times(unknowns))
+    strip = np.empty(len(rows), dtype=np.int64)
+    strip[order] = strips_of_track(state.centre[order], np.full(len(rows), ""))
+    return strip, tuple(str(k + 1) for k in range(int(strip.max(initial=-1)) + 1))
+
+
+def _times(unknowns: Unknowns) -> np.ndarray:
+    observed, time = unknowns.block.gnss_ins, np.full(len(unknowns.block.images), np.nan)
+    if observed is not None:
+        time[observed.image] = observed.time
+    return time[unknowns.images]
+
+
+def _directions(centre: np.ndarray, strip: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Strips flown the same way together; the names are compass directions in degrees."""
+    heading = headings(centre, strip)
+    label, found = np.zeros(len(strip), dtype=np.int64), []
+    for number in np.unique(strip):
+        own = strip == number
+        angle = float(np.nan_to_num(heading[own][0]))
+        apart = [abs((angle - other + np.pi) % (2.0 * np.pi) - np.pi) for other in found]
+        if not apart or min(apart) > SAME_WAY:
+            found.append(angle)
+            apart.append(0.0)
+        label[own] = int(np.argmin(apart))
+    return label, tuple(f"{(90.0 - np.degrees(angle)) % 360.0:.0f}°" for angle in found)
+
+
+def _limited(scheme: str, label: np.ndarray, names: tuple[str, ...]) -> Clusters:
+    """At most MOST clusters, neighbours joined."""
+    most, count = MOST if len(label) <= LARGE else MOST_OF_LARGE, len(names)
+    if count <= most:
+        return Clusters(scheme, label, names, count)
+    joined = label * most // count
+    first = [names[int(np.flatnonzero(np.arange(count) * most // count == k)[0])] for k in range(most)]
+    last = [names[int(np.flatnonzero(np.arange(count) * most // count == k)[-1])] for k in range(most)]
+    labels = tuple(a if a == b else f"{a} to {b}" for a, b in zip(first, last, strict=True))
+    return Clusters(scheme, joined, labels, count)
+
+
+def _alike(first: Clusters, second: Clusters) -> bool:
+    pairs = set(zip(first.label.tolist(), second.label.tolist(), strict=True))
+    return len(first) == len(second) == len(pairs)

@@ -1,0 +1,241 @@
+"""The model part of σ: against dense algebra, and on simulated blocks with and without errors of strips."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aerotri.functional_model.additional_parameters import parse_parameters
+from aerotri.pipeline.chain import adjust_keeping_system
+from aerotri.simulation import parse_spec, simulate
+from aerotri.statistics.cluster_influence import influences, known_part
+from aerotri.statistics.cluster_test import compare_clusters, sum_of_squares, weakest_modes
+from aerotri.statistics.clusters import PHOTOGRAPH, Clusters, cluster_schemes
+from aerotri.statistics.covariance import cofactors
+from aerotri.statistics.model_part import compare_schemes, excess_of_clusters, positive_part
+from dense_algebra import dense_design
+from small_blocks import small_block, with_adjustment
+
+GNSS = {"sigma_m": [0.05, 0.05, 0.08], "shift_sigma_m": [0.2, 0.2, 0.2]}
+FLIGHT = {"gsd_m": 0.02, "strips": 8, "images_per_strip": 8, "end_lap": 0.7, "side_lap": 0.5, "heading_deg": 30.0,
+          "attitude_sigma_deg": [1, 1, 2], "position_sigma_m": [1, 1, 1]}  # fmt: skip
+DRONE = {
+    "name": "drone", "camera": {"p1": {"size_px": [8192, 5460], "pixel_um": 4.4, "focal_length_mm": 35.0}},
+    "flight": FLIGHT,
+    "terrain": {"kind": "undulating", "height_m": 100.0, "relief_rms_m": 4.0, "wavelength_m": 200.0},
+    "tie_points": {"per_image": 80, "probability": 0.9, "sigma_um": 2.0},
+    "control": {"positions": [[0.05, 0.05], [0.05, 0.95], [0.95, 0.05], [0.95, 0.95], [0.5, 0.5]],
+                "sigma_m": [0.01, 0.01, 0.01], "check_points": 0},
+    "start_values": {"kind": "perturbed", "position_sigma_m": 0.3, "angle_sigma_deg": 0.05},
+}  # fmt: skip
+
+
+def drone_block(seed: int, moving_um: float = 0.0):
+    """A drone block of eight strips; the lens of every strip errs by other terms of second and third order."""
+    block, truth = simulate(parse_spec(DRONE), seed)
+    block = with_adjustment(block, additional_parameters=parse_parameters("brown:K1+K2+P1+P2"))
+    if not moving_um:
+        return block, truth
+    rays, rng = block.image_points, np.random.default_rng(1000 + seed)
+    xy, strip = rays.xy.copy(), block.images.strip[rays.image].astype(str)
+    x, y = rays.xy[:, 0] / 18.0, rays.xy[:, 1] / 12.0
+    terms = np.stack([x * y, x * x, y * y, x * x * y, x * y * y, x**3], axis=1)
+    for name in np.unique(strip):
+        error = terms[strip == name] @ rng.normal(size=(6, 2))
+        xy[strip == name] += error * moving_um * 1e-3 / np.sqrt(np.mean(error**2))
+    return replace(block, image_points=replace(rays, xy=xy)), truth
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A small adjusted block with GNSS, and its dense equations by strip."""
+    found = adjust_keeping_system(small_block(5, "bluh:1-2", gnss=GNSS)[0])
+    system, design = found.system, dense_design(found)
+    u, solution = system.unknowns, found.solution
+    weight = u.rays.inv_sigma * np.sqrt(solution.equations.weight)[:, None]
+    gap = (solution.equations.residual * weight).ravel()
+    image = np.repeat(u.rays.image, 2)
+    observed = np.flatnonzero(u.prior_weight.any(axis=1))
+    rows, axes = np.nonzero(u.prior_weight)
+    gap = np.concatenate([gap, np.sqrt(u.prior_weight[rows, axes]) * (u.prior_xyz - solution.state.points)[rows, axes]])
+    image = np.concatenate([image, np.full(len(rows), -1)])
+    known = np.isfinite(np.array(u.shared.sigma))
+    own = (np.array(u.shared.observed) - solution.state.shared)[known] / np.array(u.shared.sigma)[known]
+    gap, image = np.concatenate([gap, own]), np.concatenate([image, np.full(len(own), -1)])
+    for rows_beside in system.whitened_rows(solution.state):
+        there = rows_beside.inv_sigma > 0.0
+        gap = np.concatenate([gap, rows_beside.gap[there]])
+        image = np.concatenate([image, np.repeat(rows_beside.image[:, None], there.shape[1], axis=1)[there]])
+    assert len(gap) == len(design)
+    assert len(observed)
+    clusters = cluster_schemes(u, solution.state)[0]
+    label = np.where(image >= 0, clusters.label[np.maximum(image, 0)], -1)
+    return found, design, gap, label, clusters
+
+
+def _flat(change):
+    return np.concatenate([change.images.ravel(), change.shared, change.points.ravel()])
+
+
+def _factor(found):
+    return found.system.factorise(found.solution.equations)
+
+
+def test_lowered_weights_are_those_of_dense_algebra(small):
+    """(N − t·N_c)⁻¹·g_c of every unknown."""
+    found, design, gap, label, clusters = small
+    scale = 1.0 / np.linalg.norm(design, axis=0)
+    for t in (0.3, 0.9):
+        changes = influences(found.system, found.solution, _factor(found), clusters, lowered=t, plain_share=0.0)
+        for c, change in enumerate(changes):
+            own = design[label == c] * scale
+            normal = (design * scale).T @ (design * scale) - t * own.T @ own
+            expected = np.linalg.solve(normal, own.T @ gap[label == c]) * scale
+            assert np.abs((_flat(change) - expected) / scale).max() < 1e-4 * np.abs(expected / scale).max()
+
+
+def test_without_lowering_it_is_the_whole_inverse(small):
+    found, design, gap, label, clusters = small
+    scale = 1.0 / np.linalg.norm(design, axis=0)
+    q = np.linalg.inv((design * scale).T @ (design * scale))
+    changes = influences(found.system, found.solution, _factor(found), clusters, plain_share=1.0)
+    for c, change in enumerate(changes):
+        expected = q @ (design[label == c] * scale).T @ gap[label == c]
+        assert _flat(change) / scale == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
+
+
+def test_near_the_whole_weight_it_is_the_adjustment_without_the_cluster(small):
+    """Delete-a-group: the change of points that the other strips determine, from one step of the smaller block."""
+    found, design, gap, label, clusters = small
+    u = found.system.unknowns
+    scale = 1.0 / np.linalg.norm(design, axis=0)
+    at = 6 * len(u.images) + len(u.shared)
+    changes = influences(found.system, found.solution, _factor(found), clusters, lowered=1.0 - 1e-9, plain_share=0.0)
+    first = next(iter(changes))
+    rest = design[label != 0] * scale
+    step = np.linalg.lstsq(rest, gap[label != 0], rcond=1e-12)[0] * scale
+    point = np.repeat(np.arange(len(u.points)), np.diff(u.rays.start))
+    outside = clusters.label[u.rays.image] != 0
+    seen = np.bincount(point[outside], minlength=len(u.points)) >= 3
+    expected = -step[at:].reshape(-1, 3)[seen]
+    assert seen.sum() > 10
+    assert np.abs(first.points[seen] - expected).max() < 1e-4 * np.abs(expected).max()
+
+
+def test_power_of_minus_one_half(small):
+    """The two weights stand for (I − H)^(−½): the changes are within a tenth of those of the matrix root."""
+    found, design, gap, label, clusters = small
+    scale = 1.0 / np.linalg.norm(design, axis=0)
+    q = np.linalg.inv((design * scale).T @ (design * scale))
+    for c, change in enumerate(influences(found.system, found.solution, _factor(found), clusters)):
+        own = design[label == c] * scale
+        values, vectors = np.linalg.eigh(own @ q @ own.T)
+        power = np.where(values < 1.0 - 1e-9, (1.0 - np.minimum(values, 1.0 - 1e-9)) ** -0.5, 0.0)
+        expected = q @ own.T @ (vectors @ (power * (vectors.T @ gap[label == c])))
+        sigma = np.sqrt(np.diagonal(q))
+        error = (_flat(change) / scale - expected) / sigma
+        assert np.sqrt(np.mean(error**2)) < 0.1 * np.sqrt(np.mean((expected / sigma) ** 2))
+
+
+def test_known_part(small):
+    """Q·N_0·Q of control and weighted parameters; with fewer columns than there are it is right on average."""
+    found, design, _, label, _ = small
+    u = found.system.unknowns
+    scale = 1.0 / np.linalg.norm(design, axis=0)
+    q = np.linalg.inv((design * scale).T @ (design * scale))
+    none = design[label < 0] * scale
+    expected = (scale[:, None] * (q @ none.T @ none @ q) * scale[None, :])[-3 * len(u.points) :, -3 * len(u.points) :]
+    points = known_part(found.system, found.solution, _factor(found), most=10_000)[2]
+    for k in range(0, len(u.points), 17):
+        own = slice(3 * k, 3 * k + 3)
+        assert points[k] == pytest.approx(expected[own, own], rel=1e-6, abs=1e-9)
+    few = known_part(found.system, found.solution, _factor(found), most=40)[2]
+    assert np.trace(few, axis1=1, axis2=2).sum() == pytest.approx(np.trace(points, axis1=1, axis2=2).sum(), rel=0.5)
+
+
+def test_sum_of_squares_is_that_of_dense_algebra(small):
+    """uᵀK⁺u from the whole covariance of the residuals."""
+    found, design, gap, label, clusters = small
+    clusters = replace(clusters, label=clusters.label % 4, names=clusters.names[:4])
+    modes = weakest_modes(found.system, found.solution, _factor(found))
+    y = np.concatenate([part.reshape(-1, modes.scores.shape[1]) for part in modes.y])
+    value, rank = sum_of_squares(found.system, found.solution, _factor(found), modes, clusters)
+    scale = 1.0 / np.linalg.norm(design, axis=0)
+    q = np.linalg.inv((design * scale).T @ (design * scale))
+    along = design @ y
+    m = len(clusters)
+    pick = np.concatenate([along * (label % 4 == c)[:, None] * (label >= 0)[:, None] for c in range(m)], axis=1)
+    hat = (design * scale) @ q @ (design * scale).T
+    covariance, u = pick.T @ (pick - hat @ pick), pick.T @ gap
+    values, vectors = np.linalg.eigh(covariance)
+    there = values > 1e-6 * values[-1]
+    assert rank == there.sum()
+    assert value == pytest.approx(np.sum((vectors[:, there].T @ u) ** 2 / values[there]), rel=1e-3)
+
+
+def test_positive_part():
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(4, 3, 3))
+    whole = root @ np.swapaxes(root, 1, 2)
+    assert positive_part(whole) == pytest.approx(whole)
+    assert np.linalg.eigvalsh(positive_part(whole - 2.0 * np.eye(3))).min() > -1e-12
+
+
+def _tested(block):
+    found = adjust_keeping_system(block)
+    factor = found.system.factorise(found.solution.equations)
+    return found, *compare_schemes(found.system, found.solution, factor, found.local.outcome.sigma0)
+
+
+def test_white_noise_is_no_error_of_strips():
+    """Six simulated blocks: none counts at one in a thousand, and the ratios are about 1."""
+    ratios = []
+    for seed in range(1, 7):
+        _, schemes, tests = _tested(drone_block(seed)[0])
+        assert schemes[0].scheme == "strip"
+        assert len(schemes[0]) == 8
+        assert not any(test.counts for test in tests)
+        ratios.append(tests[0].ratio)
+    assert 0.85 < np.mean(ratios) < 1.15
+
+
+def test_moving_errors_are_found_and_their_size_is_right():
+    """2 µm from strip to strip: found, and errors over σ fall from about two to about one."""
+    before, after = [], []
+    for seed in (1, 2, 3):
+        block, truth = drone_block(seed, 2.0)
+        found, schemes, tests = _tested(block)
+        assert tests[0].counts
+        assert tests[0].scheme == "strip"
+        assert tests[0].ratio > tests[0].ratio_random
+        system, solution, u = found.system, found.solution, found.system.unknowns
+        q = cofactors(system, solution.state, _factor(found), solution.estimator)
+        excess = excess_of_clusters(
+            system, solution, _factor(found), schemes[0], found.local.outcome.sigma0, q.images, q.shared, q.points
+        )
+        stated = found.local.points.covariance[u.points]
+        error = (found.local.points.xyz - truth.points)[u.points]
+        for part, covariance in ((before, stated), (after, stated + excess.points)):
+            part.append(np.mean(error**2 / np.diagonal(covariance, axis1=1, axis2=2)))
+    assert np.sqrt(np.mean(before)) > 1.6
+    assert 0.6 < np.sqrt(np.mean(after)) < 1.5
+
+
+def test_few_clusters_are_not_tested():
+    _found, schemes, tests = _tested(small_block(3)[0])
+    assert len(schemes[0]) < 5
+    assert "degrees of freedom" in tests[0].reason
+    assert schemes[-1].scheme == PHOTOGRAPH
+    assert not tests[-1].reason
+    assert not any(test.counts for test in tests)
+
+
+def test_random_divisions_have_no_excess():
+    found, schemes, _ = _tested(drone_block(4)[0])
+    system, solution = found.system, found.solution
+    modes = weakest_modes(system, solution, _factor(found))
+    label = np.random.default_rng(2).permutation(schemes[0].label)
+    clusters = Clusters("another", label, schemes[0].names, 8)
+    test = compare_clusters(system, solution, _factor(found), modes, clusters, found.local.outcome.sigma0, 0.001)
+    assert not test.counts
+    assert 0.7 < test.ratio < 1.4
