@@ -69,9 +69,7 @@ def adjust(
 
     names = tuple(check or ())
     raise typer.Exit(
-        run_adjust(
-            block, out, parameters, robust, geoid, plots, json_, check_free, control_prefix, names, model_part
-        )
+        run_adjust(block, out, parameters, robust, geoid, plots, json_, check_free, control_prefix, names, model_part)
     )
 
 

@@ -35,8 +35,10 @@ def of_points(adjusted: AdjustedBlock) -> list[Finding]:
     """Points measured in two photographs or more that were not adjusted; not those that the operator took out."""
     rays, status = adjusted.block.image_points, adjusted.rays.status
     asked = status != RayStatus.OFF
-    pairs = np.unique(np.column_stack([rays.point[asked], rays.image[asked]]), axis=0)
-    measured = np.flatnonzero(np.bincount(pairs[:, 0], minlength=len(adjusted.block.points)) >= 2)
+    # a point measured twice in one photograph counts once; one number for both sorts ten times faster than two
+    count = max(len(adjusted.block.images), 1)
+    point = np.unique(rays.point[asked].astype(np.int64) * count + rays.image[asked]) // count
+    measured = np.flatnonzero(np.bincount(point, minlength=len(adjusted.block.points)) >= 2)
     gone = measured[~np.isfinite(adjusted.points.xyz[measured, 0])]
     grade = graded(len(gone) / max(len(measured), 1), SOME_POINTS, MANY_POINTS)
     value = f"{len(gone)} of {len(measured)}"

@@ -25,6 +25,7 @@ from aerotri.strategies.half_covariance import HalfPair, shared_rows
 from aerotri.strategies.half_points import (
     FEWEST_CELLS,
     FEWEST_POINTS,
+    CellMeans,
     ComparedPoints,
     cells_in_plan,
     compare_points,
@@ -238,6 +239,6 @@ def _point_difference(
     )
 
 
-def _means(functions, difference: np.ndarray) -> np.ndarray:
+def _means(functions: CellMeans, difference: np.ndarray) -> np.ndarray:
     """(3·k,) the functions of differences that are transformed already."""
     return replace(functions, motions=None, solver=None).of(difference[:, :, None])[:, 0]

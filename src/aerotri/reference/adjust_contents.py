@@ -102,8 +102,11 @@ ADJUSTMENT = (
     Item("model_part.clusters", "whole", "Number of these groups."),
     Item("model_part.level", "number?", "Probability with which noise alone is taken for common errors."),
     Item("model_part.tests[]", "object", "One entry a way to divide the photographs into groups."),
-    Item("model_part.tests[].scheme", "text", "What makes a group: strip, direction of flight, photograph, or a column "
-         "of images.csv."),
+    Item(
+        "model_part.tests[].scheme",
+        "text",
+        "What makes a group: strip, direction of flight, photograph, or a column of images.csv.",
+    ),
     Item("model_part.tests[].clusters", "whole", "Number of groups; many strips are joined to fewer."),
     Item("model_part.tests[].freedom", "whole", "Degrees of freedom of the test."),
     Item("model_part.tests[].ratio", "number?", "Common errors over what noise explains; about 1 if there are none."),

@@ -20,7 +20,7 @@ class ClusterTest:
     ratio : how many times as large as the noise of the rays explains the clusters' common errors are (RMS, along the
         weakest deformations of the block). ratio_random : the same of random divisions into as many clusters.
     p_noise : probability of such a ratio by the noise of the rays alone. p_random : by what random divisions show. NaN
-        where there was no test.
+        where there was no test; those of random divisions as well where noise explains the ratio.
     counts : whether both are below the level of the test.
     reason : why there was no test, '' otherwise.
     """

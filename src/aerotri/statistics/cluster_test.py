@@ -184,6 +184,9 @@ def compare_clusters(
     p_noise, ratio = float(chdtrc(freedom, found / sigma0**2)), float(np.sqrt(found / freedom)) / sigma0
     if clusters.scheme == PHOTOGRAPH:
         return ClusterTest(clusters.scheme, m, freedom, ratio, p_noise=p_noise, counts=p_noise < level)
+    if p_noise >= level:
+        # whatever random divisions show, the scheme does not count; they take most of the time
+        return ClusterTest(clusters.scheme, m, freedom, ratio, p_noise=p_noise)
     of_random = _by_random_divisions(system, solution, factor, modes, clusters)
     ratio_random = float(np.sqrt(of_random[0] / of_random[1])) / sigma0
     p_random = float(fdtrc(freedom, of_random[1], (ratio / max(ratio_random, 1.0)) ** 2))
