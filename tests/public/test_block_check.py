@@ -220,6 +220,18 @@ def test_units_that_cannot_be(ten):
     assert "half a circle in gon, but angle_unit says degrees" in said(as_gon)
 
 
+def test_micrometres_and_metres_that_are_millimetres(ten):
+    """pixel_um in millimetres, σ of control in millimetres; as they should be nothing is said (the first test)."""
+    camera = ten.cameras[0]
+    tiny = replace(camera, pixel_um=camera.pixel_um * 1e-3)
+    assert "pixel_um is in micrometres" in said(replace(ten, cameras=(tiny, *ten.cameras[1:])))
+    sigma = ten.control.sigma.copy()
+    sigma[0] *= 1e3
+    text = said(replace(ten, control=replace(ten.control, sigma=sigma)))
+    assert f"({ten.points[ten.control.point[0]]})" in text
+    assert "is σ in metres?" in text
+
+
 def test_names_that_look_alike():
     assert alike(["GCP-01", "gcp 1", "GCP_2", "1_11", "11_1", "111", "A/IMG_1.jpg", "B/IMG_1.jpg"]) == [
         ("GCP-01", "gcp 1")

@@ -12,6 +12,10 @@ CHANGING = {
 """What changes where the halves of a division differ and those of alternate photographs do not."""
 
 
+AS_STATED = 1.1
+"""RMS of difference/σ of single points up to which their σ hold: a tenth changes no decision."""
+
+
 def division_sentence(one: HalvesComparison) -> str:
     """One division in a sentence."""
     what = DIVISIONS[one.division]
@@ -48,18 +52,21 @@ def conclusion(record: HalvesRecord) -> tuple[str, ...]:
 
 
 def _factors(record: HalvesRecord) -> tuple[str, ...]:
-    """By how much σ of ground points are too small."""
+    """By how much σ of ground points are too small: of means over areas, and of single points."""
     said = []
-    for what, name in (("heights", "ground points in height"), ("plan coordinates", "ground points in plan")):
+    for what, name, axes in (("Heights", "ground points in height", [2]), ("Plan", "ground points in plan", [0, 1])):
         found = [
-            (test.factor, one.division) for one in record.comparisons for own, test in one.tests
-            if own == name and test.differs
-        ]  # fmt: skip
-        if found:
-            factor, division = max(found)
+            (test.factor, one) for one in record.comparisons for own, test in one.tests if own == name and test.differs
+        ]
+        points = [(factor, one, one.points) for factor, one in found if one.points is not None]
+        if points:
+            factor, one, compared = max(points, key=lambda entry: entry[0])
+            single = compared.rms_z_of_points(axes)
+            of_single = f", of single points by {single:.1f}" if single > AS_STATED else "; σ of single points hold"
             said.append(
-                f"σ of {what} are too small by a factor of about {factor:.1f} ({DIVISIONS[division]}); use it until "
-                "check points say better."
+                f"{what}: means over areas of {compared.size:.3g} m differ by {factor:.1f} times their σ, single "
+                f"points by {single:.1f} times ({DIVISIONS[one.division]}). Until check points say better, multiply "
+                f"the σ of volumes and of means by {factor:.1f}{of_single}."
             )
     if not said:
         said.append("The camera differs between the halves; the ground points do not show it beyond their σ.")

@@ -29,6 +29,11 @@ HALF_CIRCLE = {"degrees": 180.0, "gon": 200.0, "radians": np.pi}
 """A turn of 180° in the units of angles."""
 NEAR_HALF = 0.05
 """Difference from a half circle, in half circles, up to which two strips count as flown in opposite directions."""
+SMALLEST_PIXEL_UM = 0.3
+"""Below the wavelength of light; the smallest pixels of sensors have 0.5 µm."""
+LARGE_SIGMA = 0.02
+"""σ of a control point in the extent of all, from which its unit is asked for [C]: control from a map 1:50 000 over a
+single photograph stays below."""
 FEWEST_IN_STRIP = 3
 """Photographs of a strip that tell its direction."""
 
@@ -47,6 +52,8 @@ def suspicions(block: Block, found: Inventory, angle_unit: str) -> tuple[str, ..
         *_alike(block),
         *_places(block),
         *_formats(block),
+        *_pixels(block),
+        *_control_sigma(block),
         *_angle_unit(block, angle_unit),
     )
 
@@ -99,6 +106,31 @@ def _alike(block: Block) -> list[str]:
             more = f" and {len(groups) - 3} more" if len(groups) > 3 else ""
             said.append(f"names of {what} look alike: {shown}{more}: are they the same?")
     return said
+
+
+def _pixels(block: Block) -> list[str]:
+    """Pixels smaller than any sensor has."""
+    return [
+        f"camera '{camera.name}' has pixels of {camera.pixel_um:.3g} µm: pixel_um is in micrometres, is it in "
+        "millimetres here?"
+        for camera in block.cameras
+        if camera.pixel_um < SMALLEST_PIXEL_UM
+    ]
+
+
+def _control_sigma(block: Block) -> list[str]:
+    """σ of control and check points that are large against the area they span."""
+    control = block.control
+    there = np.isfinite(control.xyz[:, :2]).all(axis=1)
+    span = float(np.hypot(*np.ptp(control.xyz[there, :2], axis=0))) if there.any() else 0.0
+    large = np.isfinite(control.xyz) & (control.sigma > LARGE_SIGMA * span)
+    if not span > 0.0 or not large.any():
+        return []
+    names = some(block.points[control.point[large.any(axis=1)]])
+    return [
+        f"σ of control or check points of up to {control.sigma[large].max():.4g} m ({names}), where all lie within "
+        f"{span:.4g} m: is σ in metres?"
+    ]
 
 
 def _places(block: Block) -> list[str]:

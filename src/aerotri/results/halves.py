@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -156,6 +156,11 @@ class PointDifference:
     def z(self) -> np.ndarray:
         """(k, 3) mean/σ of the cells."""
         return np.divide(self.mean, self.mean_sigma, out=np.zeros_like(self.mean), where=self.mean_sigma > 0.0)
+
+    def rms_z_of_points(self, axes: Sequence[int]) -> float:
+        """RMS of difference/σ of single points along axes (0, 1, 2: X, Y, Z); 1 where σ is right."""
+        d, sigma = self.d[:, axes], self.sigma[:, axes]
+        return float(np.sqrt(np.mean((d[sigma > 0.0] / sigma[sigma > 0.0]) ** 2))) if (sigma > 0.0).any() else 0.0
 
 
 @dataclass(frozen=True)

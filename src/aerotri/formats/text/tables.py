@@ -196,7 +196,8 @@ def _check_header(header: tuple[str, ...], columns: Columns, path: Path, line: i
         )
     unknown = [name for name in header if name not in columns.known and not name.startswith(IGNORED_PREFIX)]
     if unknown and not columns.free_text:
-        close = difflib.get_close_matches(unknown[0], columns.known, 1)
+        same = [name for name in columns.known if name.lower() == unknown[0].lower()]
+        close = same or difflib.get_close_matches(unknown[0], columns.known, 1)
         meant = f"did you mean '{close[0]}'? " if close else ""
         raise InputError(
             f"unknown column '{unknown[0]}'",

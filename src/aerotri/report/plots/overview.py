@@ -53,7 +53,8 @@ def all_plots(adjusted: AdjustedBlock, changes: Sequence[Change] = ()) -> dict[s
         if field.max > 0.0:
             figures[f"systematic_errors{suffix}"] = plot_systematic_errors(field, name)
         averaged = averaged_residuals(adjusted, group.name, camera=group.camera.name)
-        figures[f"averaged_residuals{suffix}"] = plot_averaged_residuals(averaged, name)
+        if averaged.shown.any():
+            figures[f"averaged_residuals{suffix}"] = plot_averaged_residuals(averaged, name)
     for number, change in enumerate(changes, start=1):
         figures["change" if number == 1 else f"change_{number}"] = plot_change(adjusted, change)
     if len(correlated_parameters(adjusted)) >= 2:
