@@ -239,7 +239,8 @@ def test_command_line(erring_result, erring, tmp_path):
     done = run("--pair", *PAIR, "--out", "out.tif")
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith(
-        "8100 of 8100 cells corrected, 0 without data, 0 outside the models; 1 model, photographs oriented with additional parameters\n"
+        "8100 of 8100 cells corrected, 0 without data, 0 outside the models; 1 model, "
+        "photographs oriented with additional parameters\n"
     )
     assert restored(wrong, tmp_path / "out.tif")
     old = (tmp_path / "out.tif").read_bytes()
