@@ -44,7 +44,8 @@ def test_command(adjusted, result, tmp_path, capsys):
 
 def test_refused_input(result, tmp_path):
     """A division that does not exist, a folder without a result: nothing is written."""
-    for folder, words, said in ((result, ["--division", "days"], "'days' is no division"), (tmp_path, [], "holds no adjustment")):
+    refused = (result, ["--division", "days"], "'days' is no division"), (tmp_path, [], "holds no adjustment")
+    for folder, words, said in refused:
         with pytest.raises(aerotri.InputError, match=said):
             invoke(["halves", str(folder), *words, "--out", str(tmp_path / "a")])
         assert not (tmp_path / "a").exists()
