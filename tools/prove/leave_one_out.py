@@ -1,6 +1,7 @@
 """Leave-one-out over the control points of a block: what each would be without itself, with and without GNSS.
 
-Every control point in turn becomes a check point; the last lines take all control away. Prints a Markdown table.
+Every control point in turn becomes a check point; the last lines take all control away. Prints a Markdown table:
+± is σ of the noise, tZ the total σ of the height, with the model part.
 
 Example: python tools/prove/leave_one_out.py cu_sbr_p1 --parameters brown:K1+K2+K3+P1+P2 --robust huber
 """
@@ -27,15 +28,16 @@ class Line:
 
     def cells(self) -> list[str]:
         if self.result is None:
-            return [self.control, self.left_out, self.reason, "", "", "", ""]
+            return [self.control, self.left_out, self.reason, "", "", "", "", ""]
         check = self.result.adjusted.check
         difference = check.difference if len(check) == 1 else np.nanmean(check.difference, axis=0, keepdims=True)
         sigma = check.sigma if len(check) == 1 else np.nanmean(check.sigma, axis=0, keepdims=True)
+        total = check.total_sigma if len(check) == 1 else np.nanmean(check.total_sigma, axis=0, keepdims=True)
         parameters = self.result.adjusted.parameters
         focal = np.flatnonzero(parameters.names == "focal_length_mm")
         c = f"{parameters.value[focal[0]]:.4f} ± {parameters.sigma[focal[0]]:.4f}" if len(focal) else "held"
         numbers = [f"{d:+.3f} ± {s:.3f}" for d, s in zip(difference[0], sigma[0], strict=True)]
-        return [self.control, self.left_out, *numbers, c, f"{self.result.sigma0_um:.2f}"]
+        return [self.control, self.left_out, *numbers, f"{total[0, 2]:.3f}", c, f"{self.result.sigma0_um:.2f}"]
 
 
 def line(name: str, block: aerotri.Block, left_out: str, full: aerotri.Adjustment) -> Line:
@@ -70,7 +72,7 @@ def main() -> None:
     parser.add_argument("--robust", help="robust estimator, in place of block.toml's")
     options = parser.parse_args()
     table = lines(aerotri.with_settings(options.block, parameters=options.parameters, robust=options.robust))
-    print("| datum | left out | dX m | dY m | dZ m | c mm | σ0 µm |\n|---|---|---|---|---|---|---|")
+    print("| datum | left out | dX m | dY m | dZ m | tZ m | c mm | σ0 µm |\n|---|---|---|---|---|---|---|---|")
     for entry in table:
         print("| " + " | ".join(entry.cells()) + " |")
     print()
