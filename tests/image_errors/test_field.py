@@ -63,7 +63,8 @@ def test_tile_shift_acts_in_its_tile_only(adjusted):
 def test_order_of_parameters_does_not_matter(adjusted):
     p = adjusted.parameters
     order = np.random.default_rng(3).permutation(len(p))
-    arrays = {name: getattr(p, name)[order] for name in p.__dataclass_fields__ if name != "covariance"}
+    arrays = {name: getattr(p, name) for name in p.__dataclass_fields__ if name != "covariance"}
+    arrays = {name: values[order] for name, values in arrays.items() if values is not None}
     shuffled = replace(p, covariance=p.covariance[np.ix_(order, order)], **arrays)
     for ours, theirs in zip(
         systematic_errors(adjusted, "ucd2", X, Y),

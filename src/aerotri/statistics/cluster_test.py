@@ -31,7 +31,7 @@ from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.results.model_part import ClusterTest
 from aerotri.statistics import _cluster_kernels as _kernels
-from aerotri.statistics.clusters import FEWEST, PHOTOGRAPH, Clusters
+from aerotri.statistics.clusters import FEWEST, PHOTOGRAPH, Clusters, divided_at_random
 
 LEVEL = 0.001
 """Probability with which white noise is taken for errors of clusters [C]: Baarda's level of a single test."""
@@ -201,7 +201,7 @@ def _by_random_divisions(
     """Sum of squares and degrees of freedom of random divisions into clusters of the same sizes."""
     rng, total, freedom = np.random.default_rng(len(clusters.label)), 0.0, 0
     for _ in range(DIVISIONS):
-        other = replace(clusters, label=rng.permutation(clusters.label))
+        other = replace(clusters, label=divided_at_random(solution.state.centre, clusters.label, rng))
         found, own = sum_of_squares(system, solution, factor, modes, other)
         total, freedom = total + found, freedom + own
     return total, max(freedom, 1)

@@ -59,12 +59,29 @@ def cluster_schemes(unknowns: Unknowns, state: State) -> tuple[Clusters, ...]:
         several = 2 <= len(clusters) <= len(rows) // 2
         if several and not any(_alike(clusters, other) for other in kept):
             kept.append(clusters)
-    return (*kept, _at_random(len(rows)))
+    return (*kept, _at_random(state.centre))
 
 
-def _at_random(n: int) -> Clusters:
+def order_by_place(centre: np.ndarray) -> np.ndarray:
+    """Photographs by their distance from the middle of all: an order that hangs on no name, row, shift or rotation."""
+    return np.argsort(np.linalg.norm(centre - centre.mean(axis=0), axis=1), kind="stable")
+
+
+def divided_at_random(centre: np.ndarray, label: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """(n,) labels exchanged at random among photographs with centres (n, 3), the same for any order of their rows."""
+    order = order_by_place(centre)
+    _, first, number = np.unique(label[order], return_index=True, return_inverse=True)
+    changed = np.empty(len(label), dtype=np.int64)
+    changed[order] = rng.permutation(np.argsort(np.argsort(first))[number])
+    return changed
+
+
+def _at_random(centre: np.ndarray) -> Clusters:
+    n = len(centre)
     most = max(min(MOST_AT_RANDOM if n <= LARGE else MOST_OF_LARGE, n // PER_CLUSTER), 1)
-    label = np.random.default_rng(n).permutation(np.arange(n) % most)
+    equal = np.empty(n, dtype=np.int64)
+    equal[order_by_place(centre)] = np.arange(n) % most
+    label = divided_at_random(centre, equal, np.random.default_rng(n))
     return Clusters(PHOTOGRAPH, label, tuple(str(k + 1) for k in range(most)), n)
 
 
