@@ -35,6 +35,7 @@ def read(path):
     return json.loads(path.read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_large_format_block(place):
     run = list(pages.follow(START / "large_format.md", place))
     assert [words[0] for words in run] == ["adjust", "adjust", "diff", "deform", "deform", "deform", "imgeo"]

@@ -9,6 +9,7 @@ import pytest
 
 from rendered_photographs import Lists, fly, write_gcp_list
 
+pytestmark = pytest.mark.slow
 HERE = Path(__file__).parent
 BLOCKS = HERE.parents[1] / "blocks"
 
