@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import fdtrc, gammaincinv, ndtri
+from scipy.special import chdtrc, fdtrc, gammaincinv, ndtri
 
 
 def normal_quantile(probability: float) -> float:
@@ -15,6 +15,11 @@ def normal_quantile(probability: float) -> float:
 def chi_square_quantile(probability: ArrayLike, freedom: ArrayLike) -> np.ndarray:
     """x with P(χ² ≤ x) = probability for χ² of `freedom` degrees of freedom, each of any shape."""
     return 2.0 * np.asarray(gammaincinv(0.5 * np.asarray(freedom, float), probability))
+
+
+def chi_square_exceedance(value: float, freedom: float) -> float:
+    """P(χ² ≥ value) for χ² of `freedom` degrees of freedom."""
+    return float(chdtrc(freedom, value))
 
 
 def f_exceedance(value: float, freedom: float, freedom_below: float) -> float:

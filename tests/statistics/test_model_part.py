@@ -230,6 +230,17 @@ def test_few_clusters_are_not_tested():
     assert not any(test.counts for test in tests)
 
 
+def test_columns_of_single_exposures_make_no_groups():
+    """A time or a station differs from photograph to photograph; a day is a group."""
+    block = small_block(3)[0]
+    number = np.arange(len(block.images))
+    columns = {"time": number.astype(str), "station": (number // 2).astype(str), "day": (number % 2).astype(str)}
+    found = adjust_keeping_system(replace(block, images=replace(block.images, columns=columns)))
+    schemes = {one.scheme for one in cluster_schemes(found.system.unknowns, found.solution.state)}
+    assert "day" in schemes
+    assert not schemes & {"time", "station"}
+
+
 def test_random_divisions_have_no_excess():
     found, schemes, _ = _tested(drone_block(4)[0])
     system, solution = found.system, found.solution

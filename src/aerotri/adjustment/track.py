@@ -11,6 +11,7 @@ import re
 import numpy as np
 
 from aerotri.functional_model.rotation import rotation_from_angles
+from aerotri.observations import Block
 
 TURN = np.radians(45.0)
 """Change of direction between two legs that ends a strip."""
@@ -28,6 +29,22 @@ def along_strip(centre: np.ndarray) -> np.ndarray:
     # a direction has no sign of its own
     along = along * np.sign(along[np.argmax(np.abs(along))])
     return np.argsort((centre - middle) @ along, kind="stable")
+
+
+def exposure_times(block: Block) -> np.ndarray:
+    """(n,) s, time of every photograph as GNSS or a column `time` of images.csv gives it, NaN where unknown."""
+    time = np.full(len(block.images), np.nan)
+    if "time" in block.images.columns:
+        for k, text in enumerate(block.images.columns["time"]):
+            try:
+                time[k] = float(text)
+            except ValueError:
+                continue
+    if block.gnss_ins is not None:
+        time[block.gnss_ins.image] = np.where(
+            np.isfinite(block.gnss_ins.time), block.gnss_ins.time, time[block.gnss_ins.image]
+        )
+    return time
 
 
 def order_of_exposure(centre: np.ndarray, strips: np.ndarray, names: np.ndarray, time: np.ndarray) -> np.ndarray:

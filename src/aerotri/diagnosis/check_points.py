@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import gammaincinv
 
 from aerotri.diagnosis.finding import SIGNIFICANCE, Finding, Grade, chi_square_p, graded, metre_digits, times
 from aerotri.diagnosis.geometry import usual_distance
+from aerotri.quantiles import chi_square_quantile
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 
 ENOUGH_CHECK_POINTS = 30
@@ -142,7 +142,7 @@ def _rmse(name: str, rmse: float, expected: float, n: float, digits: int, distan
         reason = f"{name} is {rmse:.3g} m, at a distance of {distance:.3g} m from the cameras"
         return Finding(name, f"{rmse:.3g} m", f"{expected:.3g} m from the σ", "no result", "attention", "rejected",
                        reason)  # fmt: skip
-    limit = expected * float(np.sqrt(2.0 * gammaincinv(n / 2.0, 0.975) / n))
+    limit = expected * float(np.sqrt(chi_square_quantile(0.975, n) / n))
     value = f"{rmse:.{digits}f} m"
     text = f"{expected:.{digits}f} m from the σ; at most {limit:.{digits}f} m (χ², 97.5 %)"
     if not rmse > limit:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import gammaincinv, ndtri
 
 from aerotri.adjustment.ray_status import RayStatus
 from aerotri.diagnosis.finding import (
@@ -16,6 +15,7 @@ from aerotri.diagnosis.finding import (
     pixel_text,
     times,
 )
+from aerotri.quantiles import chi_square_quantile, normal_quantile
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.statistics.observation_groups import GroupFit, group_fits
 
@@ -53,7 +53,7 @@ def of_sigma0(adjusted: AdjustedBlock) -> list[Finding]:
         says = "without redundancy nothing can be said"
         reason = f"redundancy {o.redundancy}: nothing controls the observations, σ is not known"
         return [Finding("σ₀", value, "–", says, "attention", "doubtful", reason)]
-    low, high = (float(np.sqrt(2.0 * gammaincinv(o.redundancy / 2.0, p) / o.redundancy)) for p in (0.025, 0.975))
+    low, high = (float(np.sqrt(chi_square_quantile(p, o.redundancy) / o.redundancy)) for p in (0.025, 0.975))
     expected = f"{low:.3f} to {high:.3f} (χ², 95 %) if the a-priori σ are right"
     if o.sigma0 < low:
         return [Finding("σ₀", value, expected, "observations fit better than their a-priori σ: σ too large", "note")]
@@ -153,7 +153,7 @@ def _worst(adjusted: AdjustedBlock, labels: list[str], w: np.ndarray, v: np.ndar
 def of_large_residuals(adjusted: AdjustedBlock) -> list[Finding]:
     """Image coordinates beyond the test, and how many chance leaves there."""
     settings = adjusted.block.settings.adjustment
-    critical = float(-ndtri(settings.alpha / 2.0))
+    critical = -normal_quantile(settings.alpha / 2.0)
     w = np.abs(adjusted.rays.w[adjusted.rays.status == RayStatus.USED])
     w = w[np.isfinite(w)]
     beyond = int(np.sum(w > critical))

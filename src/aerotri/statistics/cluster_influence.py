@@ -33,7 +33,7 @@ from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.statistics import _cluster_kernels as _kernels
 from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, sides_of_clusters
-from aerotri.statistics.clusters import Clusters
+from aerotri.statistics.clusters import Clusters, order_by_place
 
 LOWERED, PLAIN_SHARE = 0.9, 0.493
 """t and a of the power −½, see above."""
@@ -131,6 +131,9 @@ def known_part(
     u = system.unknowns
     n, s, count = len(u.images), len(u.shared), len(u.points)
     rows, axes = np.nonzero((u.prior_weight > 0.0) & (u.kept < 0)[:, None])
+    # the random sums below are to be the same for any order of the points
+    order = order_by_place(solution.state.points[rows])
+    rows, axes = rows[order], axes[order]
     root = system.prior_root()
     of_points, size = np.sqrt(u.prior_weight[rows, axes]), len(rows) + root.shape[1]
     mix = np.eye(size)

@@ -22,13 +22,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc, fdtrc
 
 from aerotri.adjustment.kernel_records import Directions
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.functional_model.observed_unknowns import Rows
+from aerotri.quantiles import chi_square_exceedance, f_exceedance
 from aerotri.results.model_part import ClusterTest
 from aerotri.statistics import _cluster_kernels as _kernels
 from aerotri.statistics.clusters import FEWEST, PHOTOGRAPH, Clusters, divided_at_random
@@ -181,7 +181,7 @@ def compare_clusters(
     found, freedom = sum_of_squares(system, solution, factor, modes, clusters)
     if freedom == 0:
         return ClusterTest(clusters.scheme, m, reason="nothing checks the clusters against one another")
-    p_noise, ratio = float(chdtrc(freedom, found / sigma0**2)), float(np.sqrt(found / freedom)) / sigma0
+    p_noise, ratio = chi_square_exceedance(found / sigma0**2, freedom), float(np.sqrt(found / freedom)) / sigma0
     if clusters.scheme == PHOTOGRAPH:
         return ClusterTest(clusters.scheme, m, freedom, ratio, p_noise=p_noise, counts=p_noise < level)
     if p_noise >= level:
@@ -189,7 +189,7 @@ def compare_clusters(
         return ClusterTest(clusters.scheme, m, freedom, ratio, p_noise=p_noise)
     of_random = _by_random_divisions(system, solution, factor, modes, clusters)
     ratio_random = float(np.sqrt(of_random[0] / of_random[1])) / sigma0
-    p_random = float(fdtrc(freedom, of_random[1], (ratio / max(ratio_random, 1.0)) ** 2))
+    p_random = f_exceedance((ratio / max(ratio_random, 1.0)) ** 2, freedom, of_random[1])
     return ClusterTest(
         clusters.scheme, m, freedom, ratio, ratio_random, p_noise, p_random, max(p_noise, p_random) < level
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.adjustment.track import headings, order_of_exposure, strips_of_track
+from aerotri.adjustment.track import exposure_times, headings, order_of_exposure, strips_of_track
 from aerotri.adjustment.unknowns import State, Unknowns
 
 FEWEST = 5
@@ -17,6 +17,8 @@ MOST, MOST_OF_LARGE, LARGE = 30, 12, 5000
 PHOTOGRAPH, PER_CLUSTER, MOST_AT_RANDOM = "photograph", 3, 15
 """The scheme of errors of single photographs: photographs at random into clusters of PER_CLUSTER at least, so many at
 most. What belongs to photographs adds up in such clusters as it does alone."""
+OF_ONE_EXPOSURE = ("time", "station")
+"""Columns of images.csv that have a value of their own for every exposure and make no groups."""
 SAME_WAY = np.radians(30.0)
 """Strips whose directions differ by less were flown the same way."""
 
@@ -47,11 +49,15 @@ def cluster_schemes(unknowns: Unknowns, state: State) -> tuple[Clusters, ...]:
     A scheme of one cluster is left out, and one that divides the photographs as another before it.
     """
     images, rows = unknowns.block.images, unknowns.images
-    strip, strip_names = _strips(unknowns, state)
+    order = _order_of_exposure(unknowns, state)
+    strip, strip_names = _strips(unknowns, state, order)
     found = [_limited("strip", strip, strip_names)]
-    way, way_names = _directions(state.centre, strip)
+    way, way_names = np.empty_like(strip), ()
+    way[order], way_names = _directions(state.centre[order], strip[order])
     found.append(_limited("direction of flight", way, way_names))
     for name, values in images.columns.items():
+        if name in OF_ONE_EXPOSURE:
+            continue
         names, label = np.unique(values[rows].astype(str), return_inverse=True)
         found.append(_limited(name, label, tuple(str(n) for n in names)))
     kept: list[Clusters] = []
@@ -62,9 +68,9 @@ def cluster_schemes(unknowns: Unknowns, state: State) -> tuple[Clusters, ...]:
     return (*kept, _at_random(state.centre))
 
 
-def order_by_place(centre: np.ndarray) -> np.ndarray:
-    """Photographs by their distance from the middle of all: an order that hangs on no name, row, shift or rotation."""
-    return np.argsort(np.linalg.norm(centre - centre.mean(axis=0), axis=1), kind="stable")
+def order_by_place(xyz: np.ndarray) -> np.ndarray:
+    """Rows of places by their distance from the middle of all: an order that hangs on no name, row, shift or turn."""
+    return np.argsort(np.linalg.norm(xyz - xyz.mean(axis=0), axis=1), kind="stable") if len(xyz) else np.arange(0)
 
 
 def divided_at_random(centre: np.ndarray, label: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -85,24 +91,24 @@ def _at_random(centre: np.ndarray) -> Clusters:
     return Clusters(PHOTOGRAPH, label, tuple(str(k + 1) for k in range(most)), n)
 
 
-def _strips(unknowns: Unknowns, state: State) -> tuple[np.ndarray, tuple[str, ...]]:
+def _order_of_exposure(unknowns: Unknowns, state: State) -> np.ndarray:
+    """(n,) order in which the photographs were taken, whatever the order of their rows."""
+    images, rows = unknowns.block.images, unknowns.images
+    named = images.strip[rows].astype(str)
+    strips = named if all(named.tolist()) else np.full(len(rows), "")
+    return order_of_exposure(state.centre, strips, images.names[rows], exposure_times(unknowns.block)[rows])
+
+
+def _strips(unknowns: Unknowns, state: State, order: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
     """Strips in the order of exposure: by name, or found where the track turns."""
     images, rows = unknowns.block.images, unknowns.images
     named = images.strip[rows].astype(str)
     if all(named.tolist()):
-        names = list(dict.fromkeys(named.tolist()))
+        names = list(dict.fromkeys(named[order].tolist()))
         return np.array([names.index(name) for name in named]), tuple(names)
-    order = order_of_exposure(state.centre, np.full(len(rows), ""), images.names[rows], _times(unknowns))
     strip = np.empty(len(rows), dtype=np.int64)
     strip[order] = strips_of_track(state.centre[order], np.full(len(rows), ""))
     return strip, tuple(str(k + 1) for k in range(int(strip.max(initial=-1)) + 1))
-
-
-def _times(unknowns: Unknowns) -> np.ndarray:
-    observed, time = unknowns.block.gnss_ins, np.full(len(unknowns.block.images), np.nan)
-    if observed is not None:
-        time[observed.image] = observed.time
-    return time[unknowns.images]
 
 
 def _directions(centre: np.ndarray, strip: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:

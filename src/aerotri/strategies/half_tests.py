@@ -8,8 +8,8 @@ from typing import cast
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ndtr
-from scipy.stats import f as f_distribution
 
+from aerotri.quantiles import f_exceedance
 from aerotri.results.halves import AgreementTest
 
 RANK = 1e-6
@@ -50,7 +50,7 @@ def agreement_of_root(z: np.ndarray, root: np.ndarray, redundancy: float, alpha:
         statistic=statistic,
         freedom=freedom,
         redundancy=redundancy,
-        p_statistic=float(f_distribution.sf(statistic, freedom, redundancy)),
+        p_statistic=f_exceedance(statistic, freedom, redundancy),
         rms_z=float(np.sqrt(np.mean(z**2))),
         p_rms=beyond_weighted_sum(float(z @ z), np.linalg.svd(root, compute_uv=False) ** 2, redundancy),
         alpha=alpha,

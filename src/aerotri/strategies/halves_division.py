@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.adjustment.track import headings, order_of_exposure, strips_of_track
+from aerotri.adjustment.track import exposure_times, headings, order_of_exposure, strips_of_track
 from aerotri.observations import Block
 
 FEWEST_PHOTOGRAPHS = 3
@@ -57,7 +57,7 @@ class Flight:
 def flight_of(block: Block, rows: np.ndarray, centre: np.ndarray, rotation: np.ndarray) -> Flight:
     """The flight of the photographs `rows` (k,) of a block, with their adjusted centres (k, 3) and rotations."""
     images = block.images
-    time, strip = _times(block)[rows], np.asarray(images.strip, dtype=object)[rows]
+    time, strip = exposure_times(block)[rows], np.asarray(images.strip, dtype=object)[rows]
     order = order_of_exposure(centre, strip, images.names[rows].astype(str), time)
     rows, centre, strip = rows[order], centre[order], strip[order]
     timed, named = bool(np.isfinite(time).all()), all(str(name) for name in strip)
@@ -68,22 +68,6 @@ def flight_of(block: Block, rows: np.ndarray, centre: np.ndarray, rotation: np.n
         rows, np.array([rank[int(value)] for value in number]), rotation[order][:, :2, 0], centre, timed, named,
         _stations(block, rows),
     )  # fmt: skip
-
-
-def _times(block: Block) -> np.ndarray:
-    """(n,) s, time of every photograph as GNSS or a column `time` gives it, NaN where unknown."""
-    time = np.full(len(block.images), np.nan)
-    if "time" in block.images.columns:
-        for k, text in enumerate(block.images.columns["time"]):
-            try:
-                time[k] = float(text)
-            except ValueError:
-                continue
-    if block.gnss_ins is not None:
-        time[block.gnss_ins.image] = np.where(
-            np.isfinite(block.gnss_ins.time), block.gnss_ins.time, time[block.gnss_ins.image]
-        )
-    return time
 
 
 def _stations(block: Block, rows: np.ndarray) -> np.ndarray:
