@@ -9,10 +9,10 @@ import numpy as np
 
 from aerotri.adjustment._point_kernels import E, linearise_point, reduce_point
 from aerotri.adjustment.kernel_records import Coupling, Elimination, Pattern
-from aerotri.compiled import kernel
+from aerotri.compiled import kernel, leaf_kernel
 
 
-@kernel
+@leaf_kernel
 def solve_lower_transposed(lower, rhs):
     """L⁻ᵀ·rhs in place, rhs (3, k)."""
     for t in range(rhs.shape[1]):
@@ -54,7 +54,7 @@ def coupling_scratch(work):
     return Coupling(np.empty((work.by_eo.shape[0], E, 3)), np.empty((len(work.union), 3)), np.empty((3, 3)))
 
 
-@kernel
+@leaf_kernel
 def couple_point(p, pattern, inverse, n_union, lower, work, coupling):
     """G in place of L⁻¹·N_pr in `work`, H and Q_pp of point p.
 
@@ -67,12 +67,14 @@ def couple_point(p, pattern, inverse, n_union, lower, work, coupling):
         solve_lower_transposed(lower, couple[q])
     solve_lower_transposed(lower, couple_shared[:, :n_union])
     _coupled_cofactors(p, n_union, pattern, inverse, work, coupling)
-    own = np.eye(3)
-    _solve_lower(lower, own)
-    solve_lower_transposed(lower, own)
     for a in range(3):
         for b in range(3):
-            value = own[a, b]
+            q_pp[a, b] = 1.0 if a == b else 0.0
+    _solve_lower(lower, q_pp)
+    solve_lower_transposed(lower, q_pp)
+    for a in range(3):
+        for b in range(3):
+            value = q_pp[a, b]
             for q in range(n_rays):
                 for t in range(E):
                     value += couple[q, a, t] * h[q, t, b]
@@ -81,7 +83,7 @@ def couple_point(p, pattern, inverse, n_union, lower, work, coupling):
             q_pp[a, b] = value
 
 
-@kernel
+@leaf_kernel
 def row_cofactor(q, row, other, i, inverse, work, coupling):
     """Cofactor between the predictions of the coordinates `row` and `other` of ray q in photograph i.
 
@@ -119,7 +121,7 @@ def row_cofactor(q, row, other, i, inverse, work, coupling):
     return explained
 
 
-@kernel
+@leaf_kernel
 def _solve_lower(lower, rhs):
     """L⁻¹·rhs in place, rhs (3, k)."""
     for t in range(rhs.shape[1]):
@@ -129,7 +131,7 @@ def _solve_lower(lower, rhs):
             rhs[a, t] /= lower[a, a]
 
 
-@kernel
+@leaf_kernel
 def _coupled_cofactors(p, n_union, pattern, inverse, work, coupling):
     """H = Q_rr·Gᵀ over the photographs and the shared parameters of point p; G lies in the couplings of `work`."""
     start, image, pair_block = pattern.start, pattern.image, pattern.pair_block

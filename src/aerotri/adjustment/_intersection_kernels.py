@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.compiled import kernel
+from aerotri.compiled import kernel, leaf_kernel
 
 ITERATIONS = 6
 """Solutions of a point, each with the weights of the one before, the first with equal ones [C]: with fewer a wrong ray
 still pulls, more change a start value by nothing that matters."""
 
 
-@kernel
+@leaf_kernel
 def smallest_eigenvalue(a):
     """Of a symmetric 3 × 3 matrix, in closed form."""
     mean = (a[0, 0] + a[1, 1] + a[2, 2]) / 3.0
@@ -27,7 +27,7 @@ def smallest_eigenvalue(a):
     return mean + 2.0 * p * np.cos(angle + 2.0 * np.pi / 3.0)
 
 
-@kernel
+@leaf_kernel
 def solve_three(a, b, x):
     """x = a⁻¹·b for a symmetric positive definite 3 × 3 matrix, by its adjugate."""
     c00 = a[1, 1] * a[2, 2] - a[1, 2] * a[1, 2]

@@ -10,7 +10,7 @@ import numpy as np
 from aerotri.adjustment._intersection_kernels import smallest_eigenvalue
 from aerotri.adjustment._robust_kernels import robust_factor
 from aerotri.adjustment.kernel_records import Work
-from aerotri.compiled import inlined, kernel
+from aerotri.compiled import inlined, kernel, leaf_kernel
 from aerotri.functional_model._kernels import linearise_ray
 
 E = 6
@@ -39,7 +39,7 @@ def scratch(max_rays, max_columns, n_shared):
     )
 
 
-@kernel
+@leaf_kernel
 def linearise_point(p, rays, table, values, points, weighting, work):
     """Whitened partials and misclosures of the rays of point p into `work`; its residuals and weights out.
 
@@ -111,7 +111,7 @@ def linearise_point(p, rays, table, values, points, weighting, work):
     return cost, n_union
 
 
-@kernel
+@leaf_kernel
 def point_normals(p, n_rays, points, damping, work, elimination):
     """Cholesky factor of the 3 × 3 normals of point p, and its right side times its inverse, into `elimination`.
 
@@ -175,7 +175,7 @@ def solve_transposed(lower, d):
         d[a] /= lower[a, a]
 
 
-@kernel
+@leaf_kernel
 def reduce_point(p, n_rays, n_union, points, damping, work, elimination):
     """Eliminate point p: `point_normals`, and the couplings L⁻¹·N_pe and L⁻¹·N_ps into `work`."""
     by_eo, by_pt, by_sh, columns, n_columns = work.by_eo, work.by_pt, work.by_sh, work.columns, work.n_columns

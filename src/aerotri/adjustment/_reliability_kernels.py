@@ -10,7 +10,7 @@ import numpy as np
 from aerotri.adjustment._covariance_kernels import couple_point, coupling_scratch, row_cofactor
 from aerotri.adjustment._point_kernels import E, linearise_point, reduce_point
 from aerotri.adjustment.kernel_records import Elimination, Pattern, RowPlace
-from aerotri.compiled import kernel
+from aerotri.compiled import kernel, leaf_kernel
 
 
 @kernel
@@ -101,7 +101,7 @@ def ray_effects(first, last, problem, inverse, measures, effects, work):
                 size[ray, row], unknown[ray, row], height[ray, row] = largest, which, up
 
 
-@kernel
+@leaf_kernel
 def row_changes(place, inverse, datum, work, coupling, change):
     """∇x = Q·aᵀ of one row: the point's three, the photograph's six unknowns, the shared parameters of the ray."""
     q, row, p, i = place.q, place.row, place.point, place.image

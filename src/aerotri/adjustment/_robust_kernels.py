@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.compiled import kernel
+from aerotri.compiled import kernel, leaf_kernel
 
 NONE, HUBER, DANISH, CAUCHY = 0, 1, 2, 3
 """Codes of the estimators, as solution.npz keeps them."""
@@ -15,7 +15,7 @@ ADAPTIVE, ADAPTIVE_STEPS, ADAPTIVE_PER_DECADE, ADAPTIVE_SPREAD = 16, 64, 4.0, 3.
 as good ones, odds 10^(−j/ADAPTIVE_PER_DECADE). Codes and the limit are all that solution.npz keeps of an estimator."""
 
 
-@kernel
+@leaf_kernel
 def robust_factor(error, estimator, limit):
     """Weight factor w and cost ρ of a ray with normalised length `error`: w = ρ'/(2·error), ρ ≈ error² for short ones.
 

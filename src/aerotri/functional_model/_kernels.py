@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerotri.compiled import kernel
+from aerotri.compiled import kernel, leaf_kernel
 
 
 class RayPartials(NamedTuple):
@@ -38,7 +38,7 @@ class RayList(NamedTuple):
     xy: np.ndarray
 
 
-@kernel
+@leaf_kernel
 def predict_ray(rotation, centre, point, interior, x, y, prediction):
     """Ideal image coordinates plus the lens errors of `interior`.
 
@@ -69,7 +69,7 @@ def predict_ray(rotation, centre, point, interior, x, y, prediction):
     prediction[1] = interior[0] * b_lens + interior[2] - correction_y
 
 
-@kernel
+@leaf_kernel
 def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orientation, by_point, by_interior):
     """As `predict_ray`, with the partials; they share their intermediates.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from aerotri.adjustment._point_kernels import E, linearise_point, reduce_point
 from aerotri.adjustment.kernel_records import Elimination
-from aerotri.compiled import kernel
+from aerotri.compiled import kernel, leaf_kernel
 
 
 class Sides(NamedTuple):
@@ -34,7 +34,7 @@ class Scores(NamedTuple):
     products: np.ndarray
 
 
-@kernel
+@leaf_kernel
 def ray_values(q, i, p, images, shared, points, work, values):
     """Whitened changes (2, k), out, of the ray q of point p in photograph i along k directions."""
     by_eo, by_pt, by_sh = work.by_eo, work.by_pt, work.by_sh
