@@ -5,45 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.pipeline.chain import adjust_keeping_system
-from aerotri.simulation import parse_spec, simulate
 from aerotri.statistics.cluster_influence import influences, known_part
 from aerotri.statistics.cluster_test import compare_clusters, sum_of_squares, weakest_modes
 from aerotri.statistics.clusters import PHOTOGRAPH, Clusters, cluster_schemes
 from aerotri.statistics.covariance import cofactors
 from aerotri.statistics.model_part import compare_schemes, excess_of_clusters, positive_part
 from dense_algebra import dense_design
-from small_blocks import small_block, with_adjustment
+from small_blocks import small_block
+from statistics_blocks import drone_block
 
 GNSS = {"sigma_m": [0.05, 0.05, 0.08], "shift_sigma_m": [0.2, 0.2, 0.2]}
-FLIGHT = {"gsd_m": 0.02, "strips": 8, "images_per_strip": 8, "end_lap": 0.7, "side_lap": 0.5, "heading_deg": 30.0,
-          "attitude_sigma_deg": [1, 1, 2], "position_sigma_m": [1, 1, 1]}  # fmt: skip
-DRONE = {
-    "name": "drone", "camera": {"p1": {"size_px": [8192, 5460], "pixel_um": 4.4, "focal_length_mm": 35.0}},
-    "flight": FLIGHT,
-    "terrain": {"kind": "undulating", "height_m": 100.0, "relief_rms_m": 4.0, "wavelength_m": 200.0},
-    "tie_points": {"per_image": 80, "probability": 0.9, "sigma_um": 2.0},
-    "control": {"positions": [[0.05, 0.05], [0.05, 0.95], [0.95, 0.05], [0.95, 0.95], [0.5, 0.5]],
-                "sigma_m": [0.01, 0.01, 0.01], "check_points": 0},
-    "start_values": {"kind": "perturbed", "position_sigma_m": 0.3, "angle_sigma_deg": 0.05},
-}  # fmt: skip
-
-
-def drone_block(seed: int, moving_um: float = 0.0):
-    """A drone block of eight strips; the lens of every strip errs by other terms of second and third order."""
-    block, truth = simulate(parse_spec(DRONE), seed)
-    block = with_adjustment(block, additional_parameters=parse_parameters("brown:K1+K2+P1+P2"))
-    if not moving_um:
-        return block, truth
-    rays, rng = block.image_points, np.random.default_rng(1000 + seed)
-    xy, strip = rays.xy.copy(), block.images.strip[rays.image].astype(str)
-    x, y = rays.xy[:, 0] / 18.0, rays.xy[:, 1] / 12.0
-    terms = np.stack([x * y, x * x, y * y, x * x * y, x * y * y, x**3], axis=1)
-    for name in np.unique(strip):
-        error = terms[strip == name] @ rng.normal(size=(6, 2))
-        xy[strip == name] += error * moving_um * 1e-3 / np.sqrt(np.mean(error**2))
-    return replace(block, image_points=replace(rays, xy=xy)), truth
 
 
 @pytest.fixture(scope="module")

@@ -70,7 +70,7 @@ class BlockDeformation:
     ----------
     variant, crs, ground, x, y, z, d, sigma : as in `Deformation`.
     models : the models. number : (ny, nx) which of them each node lies in, −1 where none sees it.
-    seams : steps between neighbouring models, the largest RMS first.
+    seams : steps between neighbouring models, the largest RMS first. change : as of `Restitution`.
     """
 
     variant: str
@@ -84,6 +84,7 @@ class BlockDeformation:
     models: tuple[BlockModel, ...]
     number: np.ndarray
     seams: tuple[Seam, ...]
+    change: str = ""
 
     @property
     def spacing(self) -> float:
@@ -178,7 +179,7 @@ def deform_block(
     return BlockDeformation(
         restitution.variant, calibration.result.block.crs, ground.text, x, y, z, d.reshape(*shape, 3),
         sigma.reshape(*shape, 3),
-        models, number, seams,
+        models, number, seams, restitution.change,
     )  # fmt: skip
 
 

@@ -94,6 +94,7 @@ class Deformation:
     region : (ny, nx) number of the pair of tiles that show a node, −1 off the model: dZ may jump between regions.
     base : (2, 2) m, plan positions of the projection centres.
     seams : lines (2, 2) m on which the tiles of the photographs meet, on the mean height of the ground.
+    change : as of `Restitution`.
     """
 
     title: str
@@ -112,6 +113,7 @@ class Deformation:
     region: np.ndarray
     base: np.ndarray
     seams: tuple[np.ndarray, ...]
+    change: str = ""
 
     @property
     def spacing(self) -> float:
@@ -217,7 +219,8 @@ def deform_pair(
     z = np.stack([ground.heights(x, np.full(len(x), value)) for value in y])
     centre = places.from_local(model.true.centre)
     return _on_nodes(
-        model, places, x, y, z, title=f"pair {names[0]}, {names[1]}", variant=restitution.variant, names=names,
+        model, places, x, y, z, title=f"pair {names[0]}, {names[1]}", variant=restitution.variant,
+        change=restitution.change, names=names,
         geometry=geometry_of(model, _local_level(places, centre, level)), crs=calibration.result.block.crs,
         ground=ground.text, base=centre[:, :2], seams=_seams(places, model, level),
     )  # fmt: skip
@@ -237,7 +240,8 @@ def deform_normal_case(
     x, y = nodes_between(low, high, spacing)
     return _on_nodes(
         model, Places(), x, y, np.zeros((len(y), len(x))), title=f"normal case, end lap {100.0 * end_lap:.1f} %",
-        variant=restitution.variant, names=None, geometry=geometry, crs="model", ground="flat",
+        variant=restitution.variant, change=restitution.change, names=None, geometry=geometry, crs="model",
+        ground="flat",
         base=model.true.centre[:, :2], seams=_seams(Places(), model, 0.0),
     )  # fmt: skip
 

@@ -47,7 +47,8 @@ class Restitution:
     true, used : the orientation after the self-calibration, and the one the models are restituted with.
     errors : image errors of the groups of photographs. group : (n,) which of them each photograph has.
     follows : (n, 9, p) partials of the used orientation by the additional parameters, as `absorbed_partials`.
-    covariance : (p, p) of the additional parameters, σ̂0² included.
+    covariance : (p, p) of the additional parameters, σ̂0² and the model part included.
+    change : how the errors of the photographs change that make the model part, '' where there is none.
     """
 
     variant: str
@@ -57,6 +58,15 @@ class Restitution:
     group: np.ndarray
     follows: np.ndarray
     covariance: np.ndarray
+    change: str = ""
+
+
+def sigma_in_words(variant: str, change: str) -> str:
+    """What σ of a deformation contains; variant and change as of `Restitution`."""
+    said = SIGMA_INCLUDES[variant]
+    if not change:
+        return said
+    return f"{said}; with the model part, because the errors of the photographs change {change}"
 
 
 def restitution_of(calibration: Adjustment, variant: str = FREE, used: Orientation | None = None) -> Restitution:
@@ -81,5 +91,8 @@ def restitution_of(calibration: Adjustment, variant: str = FREE, used: Orientati
         used, follows = absorbed_orientation(calibration).orientation, absorbed_partials(calibration)
     else:
         used = true
-    covariance = calibration.local.parameters.covariance[np.ix_(rows, rows)]
-    return Restitution(variant, true, used, errors, group, follows, covariance)
+    covariance = calibration.local.parameters.total_covariance[np.ix_(rows, rows)]
+    part = calibration.local.model_part
+    return Restitution(
+        variant, true, used, errors, group, follows, covariance, "" if part is None else part.change
+    )

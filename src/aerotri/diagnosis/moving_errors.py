@@ -16,14 +16,9 @@ def model_part_in_words(part: ModelPart) -> str:
         return ""
     plan, height = (f"{ratio:.1f} times" for ratio in (part.ratio_plan, part.ratio_height))
     return (
-        f"the errors of the photographs change {change_in_words(part.scheme)}, more than noise explains: from the "
+        f"the errors of the photographs change {part.change}, more than noise explains: from the "
         f"noise alone heights would look {height} and positions {plan} too sure. The total σ (tX, tY, tZ) contain this"
     )
-
-
-def change_in_words(scheme: str) -> str:
-    """Such as 'from strip to strip'."""
-    return "with the direction of flight" if scheme == "direction of flight" else f"from {scheme} to {scheme}"
 
 
 def of_model_part(adjusted: AdjustedBlock) -> list[Finding]:

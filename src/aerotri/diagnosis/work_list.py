@@ -116,7 +116,7 @@ def _parts(adjusted: AdjustedBlock, ties: Ties, limits: WorkLimits) -> list[Work
 
 def _photographs(adjusted: AdjustedBlock, ties: Ties, limits: WorkLimits) -> list[WorkItem]:
     """Photographs that little holds: few common points, none with any single neighbour, σ or residuals too large."""
-    names, sigma = adjusted.block.images.names, adjusted.images.sigma
+    names, sigma = adjusted.block.images.names, adjusted.images.total_sigma
     sizes = {
         "σ of the position": (np.linalg.norm(sigma[:, :3], axis=1), limits.sigma_ratio),
         "σ of the attitude": (np.linalg.norm(sigma[:, 3:], axis=1), limits.sigma_ratio),
@@ -182,7 +182,7 @@ def _points(adjusted: AdjustedBlock, limits: WorkLimits) -> list[WorkItem]:
     """Points with poor rays: they meet at a small angle, or leave a σ far beyond the usual."""
     points, names = adjusted.points, adjusted.block.points
     angle = np.degrees(intersection_angles(adjusted))
-    sigma = points.sigma
+    sigma = points.total_sigma
     there = (points.rays > 0) & np.isfinite(sigma).all(axis=1)
     if not there.any():
         return []

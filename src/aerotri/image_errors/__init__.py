@@ -13,7 +13,7 @@ from aerotri.image_errors.field import (
     lens_errors,
     systematic_errors,
 )
-from aerotri.image_errors.groups import ImageGroup, image_group, image_groups, interior_elements
+from aerotri.image_errors.groups import ImageGroup, image_group, image_groups, interior_elements, interior_model_sigmas
 
 __all__ = [
     "AveragedResiduals",
@@ -31,6 +31,7 @@ __all__ = [
     "image_group",
     "image_groups",
     "interior_elements",
+    "interior_model_sigmas",
     "largest_effects",
     "lens_errors",
     "systematic_errors",

@@ -258,7 +258,7 @@ def _covariance_of(adjusted: AdjustedBlock, rows: np.ndarray) -> np.ndarray:
     """(k, k) of some shared parameters; what was held has no variance, whatever the record keeps for it."""
     p = adjusted.parameters
     varies = np.isin(p.status[rows], ("estimated", "weighted"))
-    return np.where(varies[:, None] & varies[None, :], p.covariance[np.ix_(rows, rows)], 0.0)
+    return np.where(varies[:, None] & varies[None, :], p.total_covariance[np.ix_(rows, rows)], 0.0)
 
 
 def errors_with_jacobian(

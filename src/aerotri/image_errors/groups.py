@@ -77,11 +77,25 @@ def interior_elements(adjusted: AdjustedBlock, camera: Camera) -> tuple[np.ndarr
     values, sigmas : (3,) mm each, c, x0, y0; σ is 0 for an element that was held.
     """
     values = np.array([camera.interior[name].value for name in INTERIOR_ELEMENTS])
-    sigmas = np.zeros(3)
+    row = _interior_rows(adjusted, camera)
+    values[row >= 0] = adjusted.parameters.value[row[row >= 0]]
+    return values, _of_interior(adjusted, row, adjusted.parameters.sigma)
+
+
+def interior_model_sigmas(adjusted: AdjustedBlock, camera: Camera) -> np.ndarray | None:
+    """(3,) mm, the model part of σ of c, x0, y0, 0 for an element that was held; None where there is none."""
+    model = adjusted.parameters.model_sigma
+    return None if model is None else _of_interior(adjusted, _interior_rows(adjusted, camera), model)
+
+
+def _interior_rows(adjusted: AdjustedBlock, camera: Camera) -> np.ndarray:
+    """(3,) rows of c, x0, y0 among the shared parameters, −1 for one that is none."""
     p = adjusted.parameters
-    for i, name in enumerate(INTERIOR_ELEMENTS):
-        rows = np.flatnonzero((p.groups == camera.name) & (p.names == name) & (p.status != "removed"))
-        if len(rows):
-            values[i] = p.value[rows[0]]
-            sigmas[i] = 0.0 if p.status[rows[0]] == "fixed" else p.sigma[rows[0]]
-    return values, sigmas
+    own = (p.groups == camera.name) & (p.status != "removed")
+    rows = [np.flatnonzero(own & (p.names == name)) for name in INTERIOR_ELEMENTS]
+    return np.array([found[0] if len(found) else -1 for found in rows])
+
+
+def _of_interior(adjusted: AdjustedBlock, row: np.ndarray, values: np.ndarray) -> np.ndarray:
+    free = np.array([k >= 0 and adjusted.parameters.status[k] != "fixed" for k in row.tolist()])
+    return np.where(free, values[row] if len(values) else 0.0, 0.0)

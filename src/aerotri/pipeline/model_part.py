@@ -41,7 +41,7 @@ def with_model_part(found: Adjustment) -> Adjustment:
         factor.border_inverse(), found.local.points.covariance[u.points] / sigma0**2,
     )  # fmt: skip
     part = replace(part, scheme=chosen.scheme, clusters=len(chosen))
-    return _with(found, _spread_over_block(found, excess, part), begun)
+    return replace(_with(found, _spread_over_block(found, excess, part), begun), model=excess.root)
 
 
 def _chosen(schemes: tuple[Clusters, ...], tests: tuple[ClusterTest, ...]) -> Clusters | None:
@@ -57,14 +57,14 @@ def _spread_over_block(found: Adjustment, excess: Excess, part: ModelPart) -> Ad
     points[u.points], images[u.images] = excess.points, excess.images
     kinds = np.array(u.shared.kinds, dtype=object).astype(str)
     own = np.flatnonzero(~np.isin(kinds, OF_POINTS))
-    sigma = np.zeros(len(local.parameters))
-    sigma[: len(own)] = np.sqrt(np.diagonal(excess.shared)[own])
+    shared = np.zeros((len(local.parameters), len(local.parameters)))
+    shared[: len(own), : len(own)] = excess.shared[np.ix_(own, own)]
     model = np.sqrt(np.diagonal(points, axis1=1, axis2=2))
     return replace(
         local,
         points=replace(local.points, model=points),
         images=replace(local.images, model=images),
-        parameters=replace(local.parameters, model_sigma=sigma),
+        parameters=replace(local.parameters, model=shared),
         model_part=with_ratios(part, local.points.sigma, model),
     )
 

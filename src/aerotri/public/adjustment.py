@@ -267,7 +267,8 @@ class Adjustment:
         Returns
         -------
         Covariance
-            In the coordinate system of the block; m, rad, parameters in their unit; σ̂0² included.
+            In the coordinate system of the block; m, rad, parameters in their unit; σ̂0² included. `total` and
+            `total_sigma` contain the model part: errors that strips or other groups of photographs share.
 
         Raises
         ------

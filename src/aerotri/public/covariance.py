@@ -23,7 +23,8 @@ class Covariance:
     Parameters
     ----------
     names : (k,) such as 'T000457:X', '1_008:omega', 'bluh.1'.
-    matrix : (k, k); coordinates in m, angles in rad, parameters in their own unit.
+    matrix : (k, k); coordinates in m, angles in rad, parameters in their own unit. Of the noise.
+    model : (k, k), the model part: errors that groups of photographs share; None where there is none.
 
     Examples
     --------
@@ -37,11 +38,22 @@ class Covariance:
 
     names: tuple[str, ...]
     matrix: np.ndarray
+    model: np.ndarray | None = None
 
     @property
     def sigma(self) -> np.ndarray:
-        """(k,) standard deviations."""
+        """(k,) standard deviations, of the noise."""
         return np.sqrt(np.diagonal(self.matrix))
+
+    @property
+    def total(self) -> np.ndarray:
+        """(k, k) with the model part."""
+        return self.matrix if self.model is None else self.matrix + self.model
+
+    @property
+    def total_sigma(self) -> np.ndarray:
+        """(k,) standard deviations with the model part: tX, tY, tZ of the tables."""
+        return np.sqrt(np.diagonal(self.total))
 
     @property
     def correlation(self) -> np.ndarray:
@@ -55,9 +67,12 @@ class Covariance:
     def _repr_html_(self) -> str:
         """σ and correlations, as a notebook shows them."""
         names, sigma, r = self.names[:MOST_SHOWN], self.sigma, self.correlation
-        head = "".join(f"<th>{escape(name)}</th>" for name in names)
+        total = None if self.model is None else self.total_sigma
+        head = "" if total is None else "<th>total σ</th>"
+        head += "".join(f"<th>{escape(name)}</th>" for name in names)
         rows = "".join(
             f"<tr><th>{escape(name)}</th><td>{sigma[i]:.4g}</td>"
+            + ("" if total is None else f"<td>{total[i]:.4g}</td>")
             + "".join(f"<td>{r[i, j]:+.3f}</td>" for j in range(len(names)))
             + "</tr>"
             for i, name in enumerate(names)
@@ -82,11 +97,39 @@ def covariance_of(adjustment: Adjustment, names: list[str]) -> Covariance:
     system, solution = adjustment.system, adjustment.solution
     chosen = choose_unknowns(system.unknowns, names)
     factor = system.factorise(solution.equations)
-    q = joint_cofactors(system, solution.state, factor, solution.estimator, chosen)
+    q, model = joint_cofactors(system, solution.state, factor, solution.estimator, chosen, adjustment.model)
     turn = _into_crs(adjustment, chosen)
     whole = adjustment.result.outcome.sigma0**2 * turn @ q @ turn.T
-    wanted = _wanted(chosen)
-    return Covariance(tuple(label for one in chosen for label in one.labels), whole[np.ix_(wanted, wanted)])
+    wanted = np.ix_(_wanted(chosen), _wanted(chosen))
+    names = tuple(label for one in chosen for label in one.labels)
+    if model is None:
+        return Covariance(names, whole[wanted])
+    return Covariance(names, whole[wanted], _as_in_tables(adjustment, chosen, turn @ model @ turn.T)[wanted])
+
+
+def _as_in_tables(adjustment: Adjustment, chosen: list[Chosen], model: np.ndarray) -> np.ndarray:
+    """The joint model part with the variances of the tables, which are found point by point.
+
+    Without negative eigenvalues a joint matrix has larger variances than each of its parts has alone.
+    """
+    known = np.concatenate([_of_table(adjustment, one) for one in chosen])
+    own = np.diagonal(model)
+    scale = np.sqrt(np.divide(known, own, out=np.ones_like(own), where=own > 0.0))
+    return model * np.outer(scale, scale) + np.diag(np.where(own > 0.0, 0.0, known))
+
+
+def _of_table(adjustment: Adjustment, one: Chosen) -> np.ndarray:
+    """The variances of the model part of one point, photograph or parameter in the tables."""
+    from aerotri.statistics.joint_covariance import IMAGE, POINT
+
+    points, images = adjustment.result.points.model, adjustment.result.images.model
+    if one.kind == POINT and points is not None:
+        return np.diagonal(points[one.of_block])
+    if one.kind == IMAGE and images is not None:
+        return np.diagonal(images[one.of_block])
+    p, shared = adjustment.result.parameters, adjustment.system.unknowns.shared
+    row = np.flatnonzero((p.names == shared.names[one.row]) & (p.groups == shared.groups[one.row]))
+    return np.zeros(1) if p.model is None else p.model[row[:1], row[:1]]
 
 
 def _into_crs(adjustment: Adjustment, chosen: list[Chosen]) -> np.ndarray:

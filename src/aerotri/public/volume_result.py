@@ -138,7 +138,7 @@ class MeasuredVolume:
 
     @cached_property
     def parts(self) -> Table:
-        """The parts of σ, each alone, m³: adjustment, matching, interpolation, base, boundary.
+        """The parts of σ, each alone, m³: adjustment, its model part if any, matching, interpolation, base, boundary.
 
         Raises
         ------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_tables import COMPARED, PARAMETERS, PLACE, with_totals
+from aerotri.reference.adjust_tables import COMPARED, PARAMETERS, PLACE, WHERE_MODEL, with_totals
 from aerotri.reference.records import DescribedFile, Item, of_axes, within
 
 VERSION = Item("aerotri", "text", "Version of aerotri that wrote the file.")
@@ -85,12 +85,20 @@ ADJUSTMENT = (
     *within("additional_parameters[]", *(one for one in PARAMETERS if one.name not in ("mark", "x_kind"))),
     Item("cameras[]", "object", "Interior orientation of every camera after the adjustment."),
     Item("cameras[].name", "text", "Name of the camera."),
-    Item("cameras[].focal_length_mm", "number?", "Principal distance.", "mm"),
-    Item("cameras[].s_focal_length_mm", "number?", "Its standard deviation; 0: held.", "mm"),
-    Item("cameras[].x0_mm", "number?", "x of the principal point.", "mm"),
-    Item("cameras[].s_x0_mm", "number?", "Its standard deviation; 0: held.", "mm"),
-    Item("cameras[].y0_mm", "number?", "y of the principal point.", "mm"),
-    Item("cameras[].s_y0_mm", "number?", "Its standard deviation; 0: held.", "mm"),
+    *(
+        item
+        for name, what in (
+            ("focal_length_mm", "Principal distance."),
+            ("x0_mm", "x of the principal point."),
+            ("y0_mm", "y of the principal point."),
+        )
+        for item in (
+            Item(f"cameras[].{name}", "number?", what, "mm"),
+            Item(f"cameras[].s_{name}", "number?", "Its standard deviation; 0: held.", "mm"),
+            Item(f"cameras[].m_{name}", "number?", f"Model part of it.{WHERE_MODEL}", "mm", optional=True),
+            Item(f"cameras[].t_{name}", "number?", f"Total of both.{WHERE_MODEL}", "mm", optional=True),
+        )
+    ),
     Item("blunders[]", "object", "Suspected gross errors, the largest first."),
     Item("blunders[].image", "text", "Photograph; empty for a control point."),
     Item("blunders[].point", "text", "Point."),

@@ -6,7 +6,7 @@ from aerotri.reference.adjust_contents import BLOCK, VERSION
 from aerotri.reference.image_error_files import MODELS
 from aerotri.reference.records import DescribedFile, Item, of_axes
 from aerotri.terrain.picket_status import TEXTS, PicketStatus
-from aerotri.volume.accuracy import PARTS
+from aerotri.volume.accuracy import MODEL, PARTS
 from aerotri.volume.settings import METHODS
 
 DTM, COMPARE, VOLUME = (f"folder of {name}" for name in ("dtm", "compare", "volume"))
@@ -161,6 +161,13 @@ VOLUME_JSON = (
     Item("sigma.sigma_mean_height_m", "number", "The same over the area: of the mean height.", "m"),
     Item("sigma.parts_m3", "object", "The parts of the standard deviation, each alone.", "m³"),
     *(Item(f"sigma.parts_m3.{name}", "number", f"Part of {what}.", "m³") for name, what in PART_WORDS.items()),
+    Item(
+        f"sigma.parts_m3.{MODEL}",
+        "number",
+        "Part of errors that strips or other groups of photographs share. Only where the adjustment has a model part.",
+        "m³",
+        optional=True,
+    ),
     Item("sigma.curvature", "object?", "Terrain between the measured points, listed separately; null where not known."),
     Item("sigma.curvature.meaning", "text", "What it is, in words."),
     Item("sigma.curvature.in_the_volume", "yes/no", "Whether the volume contains it."),

@@ -70,8 +70,18 @@ class ImageResults:
 
     @property
     def sigma(self) -> np.ndarray:
-        """(n, 6) m and rad."""
+        """(n, 6) m and rad, of the noise."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    @property
+    def total_covariance(self) -> np.ndarray:
+        """(n, 6, 6), with the model part."""
+        return self.covariance if self.model is None else self.covariance + self.model
+
+    @property
+    def total_sigma(self) -> np.ndarray:
+        """(n, 6) m and rad, with the model part."""
+        return np.sqrt(np.diagonal(self.total_covariance, axis1=1, axis2=2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,10 +109,14 @@ class PointResults:
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
     @property
+    def total_covariance(self) -> np.ndarray:
+        """(N, 3, 3) m², with the model part."""
+        return self.covariance if self.model is None else self.covariance + self.model
+
+    @property
     def total_sigma(self) -> np.ndarray:
         """(N, 3) m, with the model part."""
-        whole = self.covariance if self.model is None else self.covariance + self.model
-        return np.sqrt(np.diagonal(whole, axis1=1, axis2=2))
+        return np.sqrt(np.diagonal(self.total_covariance, axis1=1, axis2=2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +172,7 @@ class SharedParameters:
     max_correlation : (s,) the largest |r| with another shared parameter, signed; max_correlation_with : (s,) its name.
     total_correlation : (s,) B = 1 − 1/(N_ii·Q_ii) with N reduced to the shared parameters.
     status : (s,) str, 'estimated', 'weighted', 'fixed' or 'removed'; reason : (s,) str.
-    model_sigma : (s,) the model part of σ, see `statistics.model_part`; None where there is none.
+    model : (s, s) the model part of the covariance, see `statistics.model_part`; None where there is none.
     """
 
     names: np.ndarray
@@ -172,7 +186,7 @@ class SharedParameters:
     total_correlation: np.ndarray
     status: np.ndarray
     reason: np.ndarray
-    model_sigma: np.ndarray | None = None
+    model: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.names)
@@ -181,6 +195,21 @@ class SharedParameters:
     def sigma(self) -> np.ndarray:
         """(s,)."""
         return np.sqrt(np.diagonal(self.covariance))
+
+    @property
+    def total_covariance(self) -> np.ndarray:
+        """(s, s), with the model part."""
+        return self.covariance if self.model is None else self.covariance + self.model
+
+    @property
+    def model_sigma(self) -> np.ndarray | None:
+        """(s,) the model part of σ, None where there is none."""
+        return None if self.model is None else np.sqrt(np.diagonal(self.model))
+
+    @property
+    def total_sigma(self) -> np.ndarray:
+        """(s,), with the model part."""
+        return np.sqrt(np.diagonal(self.total_covariance))
 
     @property
     def is_node(self) -> np.ndarray:

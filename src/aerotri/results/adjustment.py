@@ -8,6 +8,7 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.coordinates import LocalFrame
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.model_part import ModelRoot
 from aerotri.results.parameter_comparison import ParameterComparison
 
 
@@ -19,6 +20,7 @@ class Adjustment:
     ----------
     result : in the block's CRS. local : the same in the local frame, where `system` and `solution` live.
     frame : the local frame, None for a block in local coordinates.
+    model : what the model part of σ is made of, for σ of whatever follows from the unknowns; None where there is none.
     compared : the sets of additional parameters that were compared where the choice was left to the program.
     """
 
@@ -28,3 +30,4 @@ class Adjustment:
     solution: Solution
     frame: LocalFrame | None = None
     compared: ParameterComparison | None = None
+    model: ModelRoot | None = None

@@ -67,7 +67,7 @@ def with_model_of(result: AdjustedBlock, local: AdjustedBlock, frame: LocalFrame
         result,
         images=replace(result.images, model=images),
         points=replace(result.points, model=points),
-        parameters=replace(result.parameters, model_sigma=local.parameters.model_sigma),
+        parameters=replace(result.parameters, model=local.parameters.model),
         model_part=local.model_part,
     )
     return replace(result, control=_with_model(result, result.control), check=_with_model(result, result.check))

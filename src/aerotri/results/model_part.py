@@ -36,6 +36,24 @@ class ClusterTest:
     reason: str = ""
 
 
+@dataclass(frozen=True, eq=False)
+class ModelRoot:
+    """k columns F of what groups of photographs do to the unknowns, rows as in `Unknowns`, in the frame there.
+
+    F·Fᵀ less `noise` times the cofactors that come from the photographs is the model part of the covariance.
+
+    Parameters
+    ----------
+    images : (n, 6, k) of centre and rotation unknowns. shared : (s, k). points : (P, 3, k) m, in single precision.
+    noise : σ̂0² where F·Fᵀ contains the noise of the rays, 0 where it does not.
+    """
+
+    images: np.ndarray
+    shared: np.ndarray
+    points: np.ndarray
+    noise: float
+
+
 @dataclass(frozen=True)
 class ModelPart:
     """What the model part of σ was derived from.
@@ -61,6 +79,14 @@ class ModelPart:
     def counts(self) -> bool:
         """Whether there is a model part."""
         return bool(self.scheme)
+
+    @property
+    def change(self) -> str:
+        """How the errors change, such as 'from strip to strip'; '' where there is no model part."""
+        if not self.scheme:
+            return ""
+        with_direction = self.scheme == "direction of flight"
+        return "with the direction of flight" if with_direction else f"from {self.scheme} to {self.scheme}"
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON; None for what is not known."""

@@ -261,7 +261,7 @@ def _orientations(first: AdjustedBlock, second: AdjustedBlock) -> Differences:
     )
     if first.block.rotation != second.block.rotation:
         delta[:, 3:] = np.nan
-    return Differences(names, ORIENTATION, delta, second.images.sigma[j])
+    return Differences(names, ORIENTATION, delta, second.images.total_sigma[j])
 
 
 def _smallest_turn(angle: np.ndarray) -> np.ndarray:
@@ -271,7 +271,7 @@ def _smallest_turn(angle: np.ndarray) -> np.ndarray:
 
 def _points(first: AdjustedBlock, second: AdjustedBlock) -> Differences:
     names, i, j = _adjusted_by_both(first, second, lambda run: run.block.points, lambda run: run.points.rays)
-    return Differences(names, COORDINATES, second.points.xyz[j] - first.points.xyz[i], second.points.sigma[j])
+    return Differences(names, COORDINATES, second.points.xyz[j] - first.points.xyz[i], second.points.total_sigma[j])
 
 
 def _adjusted_by_both(

@@ -17,7 +17,10 @@ from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.unknowns import State, Unknowns
 from aerotri.conventions import InputError
+from aerotri.results.model_part import ModelRoot
 from aerotri.statistics.covariance import inner_datum, to_angles
+from aerotri.statistics.model_of_functions import known_root_of
+from aerotri.statistics.model_part import positive_part
 
 POINT, IMAGE, SHARED = "point", "image", "shared"
 AXES, ELEMENTS = ("X", "Y", "Z"), ("X0", "Y0", "Z0", "omega", "phi", "kappa")
@@ -101,11 +104,16 @@ class _Finder:
 
 
 def joint_cofactors(
-    system: NormalSystem, state: State, factor: Factor, estimator: Estimator, chosen: Sequence[Chosen]
-) -> np.ndarray:
+    system: NormalSystem, state: State, factor: Factor, estimator: Estimator, chosen: Sequence[Chosen],
+    root: ModelRoot | None = None,
+) -> tuple[np.ndarray, np.ndarray | None]:  # fmt: skip
     """(k, k) cofactors: 3 rows a point (X, Y, Z), 6 a photograph (X0, Y0, Z0, ω, φ, κ), one a shared parameter.
 
     In the frame of the adjustment; what is held has zeros. Angles at a middle angle of ±90° are NaN.
+
+    Returns
+    -------
+    cofactors, and (k, k) the model part of the covariance; None without `root`.
     """
     u = system.unknowns
     columns = [(k, axis) for k, one in enumerate(chosen) for axis in range(_size(one))]
@@ -117,8 +125,16 @@ def joint_cofactors(
         qa = np.stack([_taken(chosen[k], axis, inner.q_images, inner.q_shared, inner.q_points) for k, axis in columns])
         q = q - g @ qa.T - qa @ g.T + g @ inner.both @ g.T
     turn = _in_angles(u, state, chosen)
+    model = None
+    if root is not None:
+        of_root = np.stack([_taken(chosen[k], axis, root.images, root.shared, root.points) for k, axis in columns])
+        model = of_root @ of_root.T
+        if root.noise > 0.0:
+            own = known_root_of(system, shared, points)
+            model = model - root.noise * (q - own.T @ own)
+        model = turn @ positive_part(model[None])[0] @ turn.T
     q = turn @ q @ turn.T
-    return 0.5 * (q + q.T)
+    return 0.5 * (q + q.T), model
 
 
 def _size(one: Chosen) -> int:

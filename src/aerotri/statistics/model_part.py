@@ -15,7 +15,7 @@ import numpy as np
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
-from aerotri.results.model_part import ClusterTest, ModelPart
+from aerotri.results.model_part import ClusterTest, ModelPart, ModelRoot
 from aerotri.statistics.cluster_influence import influences, known_part
 from aerotri.statistics.cluster_test import LEVEL, compare_clusters, too_few, weakest_modes
 from aerotri.statistics.clusters import FEWEST, Clusters, cluster_schemes
@@ -32,11 +32,13 @@ class Excess:
     Parameters
     ----------
     images : (n, 6, 6) of X0, Y0, Z0, ω, φ, κ, m and rad. shared : (s, s). points : (P, 3, 3) m².
+    root : for functions of the unknowns.
     """
 
     images: np.ndarray
     shared: np.ndarray
     points: np.ndarray
+    root: ModelRoot
 
 
 def why_not(system: NormalSystem, solution: Solution, sigma0: float) -> str:
@@ -86,17 +88,21 @@ def excess_of_clusters(
     m = len(clusters)
     known = known_part(system, solution, factor)
     noise = [q - part for q, part in zip((q_images, q_shared, q_points), known, strict=True)]
-    images, shared, points = np.zeros_like(q_images), np.zeros_like(q_shared), np.zeros_like(q_points)
-    for change in influences(system, solution, factor, clusters):
-        images += change.images[:, :, None] * change.images[:, None, :]
-        shared += np.outer(change.shared, change.shared)
-        points += change.points[:, :, None] * change.points[:, None, :]
+    root = ModelRoot(
+        np.empty((*q_images.shape[:2], m)), np.empty((len(q_shared), m)), np.empty((len(q_points), 3, m), np.float32),
+        sigma0**2,
+    )  # fmt: skip
+    points = np.zeros_like(q_points)
     # as of a variance of m values about their mean [L]; it makes good for what only one cluster determines
     freedom = m / (m - 1)
-    images = positive_part(freedom * images - sigma0**2 * noise[0])
-    shared = positive_part((freedom * shared - sigma0**2 * noise[1])[None])[0]
+    for c, change in enumerate(influences(system, solution, factor, clusters)):
+        for into, values in zip((root.images, root.shared, root.points), change, strict=True):
+            into[..., c] = np.sqrt(freedom) * values
+        points += change.points[:, :, None] * change.points[:, None, :]
+    images = positive_part(root.images @ np.swapaxes(root.images, 1, 2) - sigma0**2 * noise[0])
+    shared = positive_part((root.shared @ root.shared.T - sigma0**2 * noise[1])[None])[0]
     points = positive_part(freedom * points - sigma0**2 * noise[2])
-    return Excess(orientation_cofactors(system.unknowns, solution.state, images), shared, points)
+    return Excess(orientation_cofactors(system.unknowns, solution.state, images), shared, points, root)
 
 
 def positive_part(covariance: np.ndarray) -> np.ndarray:

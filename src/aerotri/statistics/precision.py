@@ -1,6 +1,6 @@
 """How precise the unknowns are: correlations by name, the weakest parts, ellipsoids, theoretical and practical means.
 
-All from the covariances of a result; every σ contains σ̂0.
+All from the covariances of a result; every σ contains σ̂0, and the model part where there is one.
 """
 
 from __future__ import annotations
@@ -108,13 +108,13 @@ class WeakPart:
 def weakest_photographs(adjusted: AdjustedBlock, ratio: float = WEAK, most: int = 20) -> tuple[WeakPart, ...]:
     """Photographs with a σ of at least `ratio` times the median, the weakest first."""
     images = adjusted.images
-    return _weakest(images.sigma, adjusted.block.images.names, ORIENTATION, images.rays, ratio, most)
+    return _weakest(images.total_sigma, adjusted.block.images.names, ORIENTATION, images.rays, ratio, most)
 
 
 def weakest_points(adjusted: AdjustedBlock, ratio: float = WEAK, most: int = 20) -> tuple[WeakPart, ...]:
     """Points with a σ of at least `ratio` times the median, the weakest first."""
     points = adjusted.points
-    return _weakest(points.sigma, adjusted.block.points, ("X", "Y", "Z"), points.rays, ratio, most)
+    return _weakest(points.total_sigma, adjusted.block.points, ("X", "Y", "Z"), points.rays, ratio, most)
 
 
 def _weakest(
@@ -172,12 +172,12 @@ class Ellipsoids:
 
 def point_ellipsoids(adjusted: AdjustedBlock, probability: float | None = None) -> Ellipsoids:
     """Ellipsoids of the object points; see `ellipsoids`."""
-    return ellipsoids(adjusted.points.covariance, probability)
+    return ellipsoids(adjusted.points.total_covariance, probability)
 
 
 def centre_ellipsoids(adjusted: AdjustedBlock, probability: float | None = None) -> Ellipsoids:
     """Ellipsoids of the projection centres; see `ellipsoids`."""
-    return ellipsoids(adjusted.images.covariance[:, :3, :3], probability)
+    return ellipsoids(adjusted.images.total_covariance[:, :3, :3], probability)
 
 
 def ellipsoids(covariance: np.ndarray, probability: float | None = None) -> Ellipsoids:
@@ -214,7 +214,7 @@ class Precision:
 
 def theoretical_precision(adjusted: AdjustedBlock, chosen: np.ndarray | None = None) -> Precision:
     """Of the adjusted points, all or those chosen ((N,) bool)."""
-    return _precision(adjusted.points.sigma if chosen is None else adjusted.points.sigma[chosen])
+    return _precision(adjusted.points.total_sigma if chosen is None else adjusted.points.total_sigma[chosen])
 
 
 def practical_precision(adjusted: AdjustedBlock) -> Precision:

@@ -2,7 +2,8 @@
 
 [D] The ideal rays l = m − d(m; p) of a picket give dP = −G·(∂π/∂θ·dθ + ∂d/∂p·dp), G = (AᵀA)⁻¹Aᵀ of its intersection.
 With J = dP/dx over all unknowns x of the reduced system its covariance is σ̂0²·J·Q·Jᵀ, by a solution with the factor.
-It changes slowly over the ground: some pickets tell it for all.
+Where groups of photographs share errors it has a model part. It changes slowly over the ground: some pickets tell it
+for all.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from aerotri.deformation.model_grid import places_of
 from aerotri.deformation.restitution import Restitution
 from aerotri.functional_model.collinearity import linearise
 from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.model_of_functions import model_of_functions
 from aerotri.terrain.pickets import Pickets
 
 MOST_PLACES, AT_A_TIME = 500, 100
@@ -47,6 +49,11 @@ def adjustment_variances(
         q = factor.solve(j.reshape(-1, j.shape[2]).T)
         both = np.einsum("nau,unb->nab", j, q.reshape(j.shape[2], len(j), 3))
         covariance = calibration.local.outcome.sigma0**2 * both
+        if calibration.model is not None:
+            by_columns = np.ascontiguousarray(j.reshape(-1, j.shape[2]).T)
+            covariance = covariance + model_of_functions(
+                calibration.system, calibration.solution, calibration.model, by_columns, q, 3
+            )
         variances[part] = frame.variances(local[part], covariance)
     at = pickets.xyz[places, :2]
     values = NearestNDInterpolator(at, variances)(pickets.xyz[measured, :2])

@@ -28,6 +28,8 @@ the base."""
 SMOOTHEST_BELOW = 0.9
 """Exponent of the ground under a spline at most: what a ring shows as smooth need not be so far inwards."""
 PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")
+MODEL = "model"
+"""The part beside these where groups of photographs share errors: the model part of the adjustment."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class VolumeSigma:
 
     Parameters
     ----------
-    parts : by the names of `PARTS`, each alone; interpolation holds the curvature too.
+    parts : by the names of `PARTS` and perhaps `MODEL`, each alone; interpolation holds the curvature too.
     curvature : ground that straight lines between the heights are expected to leave out, m³ and its σ; not in the
         volume, None where not known.
     systematic : what uncorrected image errors add or would add.
@@ -85,6 +87,9 @@ def volume_sigma(
         "base": np.sqrt(ground),
         "boundary": np.sqrt(boundary_variance(surface, base, boundary, options.boundary_sigma)),
     }
+    if any(one.calibration.model is not None for one in both):
+        parts = {"adjustment": parts["adjustment"], MODEL: np.sqrt(sum(one.response.model for one in both))} | parts
+        said += [_model_in_words(one, parts) for one in both if one.response.model > 0.0]
     first = both[0]
     found = tuple(systematic(first.calibration, first.response, variant) for variant in ("free", "absorbed")
                   if len(first.response.by_parameters))  # fmt: skip
@@ -104,6 +109,17 @@ def _one_adjustment(once: float) -> str:
     if once > 0.0:
         said += f", among them those of {100.0 * once:.3g} % of the area, which has the same heights in both"
     return f"{said}; matching and interpolation are taken for independent where the heights differ"
+
+
+def _model_in_words(part: Part, parts: dict[str, float]) -> str:
+    """Why σ is larger than the noise makes it."""
+    found = part.calibration.local.model_part
+    change = "" if found is None else found.change
+    noise, total = parts["adjustment"], np.hypot(parts["adjustment"], parts[MODEL])
+    return (
+        f"the errors of the photographs change {change}, more than noise explains: with this model part the "
+        f"adjustment's share of σ is {total:.4g} m³ instead of {noise:.4g} m³"
+    )
 
 
 def boundary_variance(surface: Surface, base: Base, boundary: Boundary, sigma: float) -> float:

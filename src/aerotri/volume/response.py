@@ -6,7 +6,8 @@ N_k = A_kᵀW_kA_k, a change of θ moves P_k by −N_k⁻¹A_kᵀW_kB_k, so that
 
     Var V = σ̂0²·cᵀQc + Σ g_kᵀN_k⁻¹g_k,   Qc by one solution with the reduced factor of the final normal equations.
 
-The first part holds every correlation between pickets. An image error d that is not corrected moves V by
+The first part holds every correlation between pickets. Where groups of photographs share errors, it has a model part,
+see `statistics.model_of_functions`. An image error d that is not corrected moves V by
 Σ g_kᵀN_k⁻¹A_kᵀW_k·d, and where the orientation was adjusted without parameters by c times its change besides.
 """
 
@@ -29,6 +30,7 @@ from aerotri.image_errors.tile_grid import Tile, tiles_of
 from aerotri.observations import Camera
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.covariance import inner_datum
+from aerotri.statistics.model_of_functions import model_of_functions
 from aerotri.volume import _response_kernels as _kernels
 from aerotri.volume.pickets import Pickets
 
@@ -43,7 +45,7 @@ class Response:
     Parameters
     ----------
     unknowns : (6n + s,) c = ∂V/∂θ in the unknowns of the reduced system, zero where held. solved : Q·c.
-    variance : σ̂0²·cᵀQc, the part of the adjustment. noise : Σ gᵀN⁻¹g, the part of matching.
+    variance : σ̂0²·cᵀQc, the part of the adjustment. model : its model part. noise : Σ gᵀN⁻¹g, the part of matching.
     by_orientation : (n, 6) ∂V by projection centre and small rotation of the photographs of the system, held or not.
     by_interior : (L, 15) ∂V by the interior elements of the system's rows.
     by_parameters : (p,) change of V by an additional parameter that is left uncorrected, as `additional_rows`.
@@ -53,6 +55,7 @@ class Response:
     unknowns: np.ndarray
     solved: np.ndarray
     variance: float
+    model: float
     noise: float
     by_orientation: np.ndarray
     by_interior: np.ndarray
@@ -121,7 +124,11 @@ def respond(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, cor
     if u.block.settings.adjustment.datum == "inner" and u.motions.count:
         cofactor += _inner_correction(calibration, factor, c)
     variance = calibration.local.outcome.sigma0**2 * cofactor
-    return Response(c, solved, variance, noise, by_eo, by_interior, by_parameters, error)
+    model = 0.0
+    if calibration.model is not None:
+        solution, root = calibration.solution, calibration.model
+        model = float(model_of_functions(system, solution, root, c[:, None], solved[:, None])[0, 0, 0])
+    return Response(c, solved, variance, model, noise, by_eo, by_interior, by_parameters, error)
 
 
 def covariance(calibration: Adjustment, first: Response, second: Response) -> float:
@@ -162,7 +169,7 @@ def systematic(calibration: Adjustment, response: Response, variant: str = "free
         by_parameters += np.einsum("na,nap->p", response.by_orientation, follows[:, :6])
         by_parameters += np.einsum("na,nap->p", response.by_interior[:, :3], follows[first, 6:])
     rows = additional_rows(calibration)
-    q = calibration.local.parameters.covariance[np.ix_(rows, rows)]
+    q = calibration.local.parameters.total_covariance[np.ix_(rows, rows)]
     return Systematic(variant, value, float(np.sqrt(max(by_parameters @ q @ by_parameters, 0.0))))
 
 

@@ -23,7 +23,7 @@ from aerotri.conventions import MGON_PER_RADIAN
 from aerotri.formats.results.json_text import number_or_none, write_json
 from aerotri.formats.results.reliability_columns import control_columns, observation_columns, ray_columns
 from aerotri.formats.text.table_writer import with_plain_texts
-from aerotri.image_errors import interior_elements
+from aerotri.image_errors import interior_elements, interior_model_sigmas
 from aerotri.observations import Block
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Outcome
@@ -157,7 +157,7 @@ def parameter_columns(adjusted: AdjustedBlock) -> dict[str, np.ndarray]:
         "name": p.names, "group": p.groups, "mark": p.marks, "value": p.value, "sigma": p.sigma, "t": _finite(p.t),
     }  # fmt: skip
     if p.model_sigma is not None:
-        columns |= {"model_sigma": p.model_sigma, "total_sigma": np.hypot(p.sigma, p.model_sigma)}
+        columns |= {"model_sigma": p.model_sigma, "total_sigma": p.total_sigma}
     return columns | {
         "max_correlation": p.max_correlation, "max_correlation_with": p.max_correlation_with,
         "total_correlation": p.total_correlation, "status": p.status, "reason": p.reason, "x_kind": p.kinds,
@@ -267,6 +267,11 @@ def _cameras(adjusted: AdjustedBlock) -> list[dict[str, Any]]:
         entry: dict[str, Any] = {"name": camera.name}
         for name, value, sigma in zip(INTERIOR_ELEMENTS, *interior_elements(adjusted, camera), strict=True):
             entry |= {name: number_or_none(value), f"s_{name}": number_or_none(sigma)}
+        model = interior_model_sigmas(adjusted, camera)
+        if model is not None:
+            total = np.hypot(model, interior_elements(adjusted, camera)[1])
+            for letter, sigmas in (("m", model), ("t", total)):
+                entry |= {f"{letter}_{k}": number_or_none(v) for k, v in zip(INTERIOR_ELEMENTS, sigmas, strict=True)}
         cameras.append(entry)
     return cameras
 

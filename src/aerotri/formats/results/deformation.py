@@ -40,7 +40,7 @@ from aerotri.deformation.block_models import BlockDeformation, BlockModel, Seam
 from aerotri.deformation.dem_correction import DemOutcome
 from aerotri.deformation.dem_window import FIT_TOLERANCE_M, DemModels
 from aerotri.deformation.model_grid import Deformation
-from aerotri.deformation.restitution import SIGMA_INCLUDES
+from aerotri.deformation.restitution import sigma_in_words
 from aerotri.formats.results.json_text import number_or_none
 from aerotri.rasters.grids import Grid
 from aerotri.version import __version__
@@ -88,7 +88,7 @@ def deformation_json(deformation: Deformation, block: str) -> dict[str, Any]:
         "cm_per_um": g.cm_per_um,
         "spacing_m": d.spacing,
         "nodes": int(np.isfinite(d.d[..., 2]).sum()),
-        **_components(d.d, d.sigma, d.variant),
+        **_components(d.d, d.sigma), "sigma_includes": sigma_in_words(d.variant, d.change),
         "y_parallax_um": {"max": float(np.nanmax(parallax)), "rms": float(np.sqrt(np.nanmean(parallax**2)))},
         "contour_interval_m": contour_interval(low, high),
     }
@@ -108,7 +108,7 @@ def block_deformation_json(deformation: BlockDeformation, block: str) -> dict[st
         "ground": d.ground,
         "spacing_m": d.spacing,
         "nodes": int(np.isfinite(d.d[..., 2]).sum()),
-        **_components(d.d, d.sigma, d.variant),
+        **_components(d.d, d.sigma), "sigma_includes": sigma_in_words(d.variant, d.change),
         "contour_interval_m": contour_interval(low, high),
         "models": [_model(k, one, d.number) for k, one in enumerate(d.models)],
         "seams": {
@@ -148,7 +148,7 @@ def correction_json(outcome: DemOutcome, models: DemModels, grid: Grid, block: s
             "rms": float(np.sqrt(s[5] / n)) if s[0] else None,
         },
         "sigma_dZ": {**_statistics(sigma), "cell_m": outcome.sigma_grid.cell_x},
-        "sigma_includes": SIGMA_INCLUDES[models.restitution.variant],
+        "sigma_includes": sigma_in_words(models.restitution.variant, models.restitution.change),
         "seams": _steps(outcome, models),
         "accuracy_m": {"fit": FIT_TOLERANCE_M, "tables": models.table_accuracy_m},
         "halo_cells": outcome.halo,
@@ -156,10 +156,9 @@ def correction_json(outcome: DemOutcome, models: DemModels, grid: Grid, block: s
     }
 
 
-def _components(d: np.ndarray, sigma: np.ndarray, variant: str) -> dict[str, Any]:
+def _components(d: np.ndarray, sigma: np.ndarray) -> dict[str, Any]:
     out: dict[str, Any] = {f"d{axis}": _statistics(d[..., k]) for k, axis in enumerate("XYZ")}
-    out |= {f"sigma_d{axis}": _statistics(sigma[..., k]) for k, axis in enumerate("XYZ")}
-    return out | {"sigma_includes": SIGMA_INCLUDES[variant]}
+    return out | {f"sigma_d{axis}": _statistics(sigma[..., k]) for k, axis in enumerate("XYZ")}
 
 
 def _statistics(values: np.ndarray) -> dict[str, float | None]:

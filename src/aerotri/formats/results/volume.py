@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.version import __version__
-from aerotri.volume.accuracy import PARTS, VolumeSigma
+from aerotri.volume.accuracy import VolumeSigma
 from aerotri.volume.bases import Base, PlaneBase
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.compute import Volumes
@@ -66,7 +66,7 @@ def _sigma(sigma: VolumeSigma, volume: Volume, sources: Sources) -> dict[str, An
     return {
         "sigma_m3": sigma.total,
         "sigma_mean_height_m": sigma.total / volume.area,
-        "parts_m3": {name: sigma.parts[name] for name in PARTS},
+        "parts_m3": dict(sigma.parts),
         "curvature": None if sigma.curvature is None else {
             "meaning": CURVATURE, "in_the_volume": False, "value_m3": sigma.curvature[0],
             "sigma_m3": sigma.curvature[1],

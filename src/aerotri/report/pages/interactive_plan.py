@@ -100,15 +100,19 @@ def interactive_plan(adjusted: AdjustedBlock) -> InteractivePlan:
     )
 
 
+def _sigma_word(adjusted: AdjustedBlock) -> str:
+    return "σ" if adjusted.points.model is None else "total σ"
+
+
 def _photographs(adjusted: AdjustedBlock, here: Callable[[np.ndarray], np.ndarray], corners: np.ndarray) -> list[Spot]:
     block, images = adjusted.block, adjusted.images
-    sigma = images.sigma
+    sigma, word = images.total_sigma, _sigma_word(adjusted)
     d, at, outlines = metre_digits(sigma[:, :3]), here(images.centre[:, :2]), here(corners)
     spots = []
     for k in np.flatnonzero(np.isfinite(at).all(axis=1)):
         strip = f"strip {printable(block.images.strip[k])}, " if block.images.strip[k] else ""
         angles = ", ".join(f"{value:.1f}" for value in sigma[k, 3:] * MGON_PER_RADIAN)
-        text = f"{strip}{images.rays[k]} rays; σ X0, Y0, Z0 {_metres(sigma[k, :3], d)} m; ω, φ, κ {angles} mgon"
+        text = f"{strip}{images.rays[k]} rays; {word} X0, Y0, Z0 {_metres(sigma[k, :3], d)} m; ω, φ, κ {angles} mgon"
         outline = tuple(outlines[k].ravel().tolist()) if np.isfinite(outlines[k]).all() else ()
         spots.append(_spot("photograph", at[k], block.images.names[k], text, outline))
     return spots
@@ -134,10 +138,10 @@ def _worst_points(adjusted: AdjustedBlock, here: Callable[[np.ndarray], np.ndarr
     size, at = np.nan_to_num(points.max_abs_w), here(points.xyz[:, :2])
     rows = np.argsort(-size, kind="stable")[:WORST_POINTS]
     rows = rows[(size[rows] > critical) & np.isfinite(at[rows]).all(axis=1)]
-    d = metre_digits(points.sigma)
+    d, word = metre_digits(points.total_sigma), _sigma_word(adjusted)
     return [
         _spot("point", at[k], block.points[k],
-              f"{points.rays[k]} rays; largest |w| {size[k]:.1f}; σ X, Y, Z {_metres(points.sigma[k], d)} m")
+              f"{points.rays[k]} rays; largest |w| {size[k]:.1f}; {word} X, Y, Z {_metres(points.total_sigma[k], d)} m")
         for k in rows
     ]  # fmt: skip
 

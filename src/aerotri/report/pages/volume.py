@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from aerotri.report.pages.adjustment import data_address
 from aerotri.report.plots.rendering import RenderedPlot
 from aerotri.report.quality import printable, two_digits, with_sigma
+from aerotri.volume.accuracy import MODEL
 
 CAPTIONS = {
     "budget": (
@@ -71,6 +72,7 @@ def _budget(c: Mapping[str, Any]) -> str:
     if s is None:
         return ""
     largest = max(s["parts_m3"], key=s["parts_m3"].get)
+    largest = "errors that groups of photographs share" if largest == MODEL else largest
     known, wide = two_digits(s["sigma_m3"]), two_digits(1.96 * s["sigma_m3"])
     text = (
         f"The volume is known to {known} m³ (1 σ; 95 %: ± {wide} m³), as if the mean height were known to "

@@ -44,7 +44,8 @@ def plot_height_accuracy(adjusted: AdjustedBlock) -> Figure:
         f"median of the nearest {min(NEAREST, len(xy))} object points; of all points: median {np.median(sigma):.3f} m, "
         f"95 % below {np.quantile(sigma, 0.95):.3f} m; white: no points"
     )
-    figure = new_figure(1.1 + height + 0.75, f"σ of heights – {plain(adjusted.block.name)}", subtitle)
+    word = "σ" if adjusted.points.model is None else "Total σ"
+    figure = new_figure(1.1 + height + 0.75, f"{word} of heights – {plain(adjusted.block.name)}", subtitle)
     axes = plan.plan_axes(figure, (0.95, 1.1, width, height), extent, plan.axis_names(adjusted))
     step = max(extent.width, extent.height) / NODES
     x, y = np.arange(extent.left, extent.right, step), np.arange(extent.bottom, extent.top, step)
@@ -59,7 +60,7 @@ def plot_height_accuracy(adjusted: AdjustedBlock) -> Figure:
 
 def heights_with_sigma(adjusted: AdjustedBlock) -> np.ndarray:
     """(N,) bool, the object points whose height has a σ."""
-    sigma = adjusted.points.sigma[:, 2]
+    sigma = adjusted.points.total_sigma[:, 2]
     return np.isfinite(sigma) & np.isfinite(adjusted.points.xyz).all(axis=1) & (sigma > 0.0)
 
 
@@ -76,7 +77,7 @@ def median_around(xy: np.ndarray, values: np.ndarray, x: np.ndarray, y: np.ndarr
 
 def _heights(adjusted: AdjustedBlock) -> tuple[np.ndarray, np.ndarray]:
     there = heights_with_sigma(adjusted)
-    return adjusted.points.xyz[there, :2], adjusted.points.sigma[there, 2]
+    return adjusted.points.xyz[there, :2], adjusted.points.total_sigma[there, 2]
 
 
 def _classes(values: np.ndarray) -> tuple[BoundaryNorm, ListedColormap]:

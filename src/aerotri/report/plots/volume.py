@@ -27,7 +27,7 @@ from aerotri.report.plots.canvas import (
     styled,
 )
 from aerotri.report.quality import two_digits, with_sigma
-from aerotri.volume.accuracy import PARTS
+from aerotri.volume.accuracy import MODEL
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.compute import Volumes
 from aerotri.volume.sections import Profile, Sections, direction_of
@@ -40,6 +40,7 @@ CUT, FILL = "#7a2e0e", "#0b3d6b"
 COLOURS = LinearSegmentedColormap.from_list("cut_and_fill", [FILL, "#8fb4d6", "#ffffff", "#dfa684", CUT])
 WORDS = {
     "adjustment": "adjustment (orientation, self-calibration; all heights correlated)",
+    MODEL: "errors that groups of photographs share",
     "matching": "matching of the pickets",
     "interpolation": "ground between the pickets",
     "base": "base",
@@ -100,7 +101,7 @@ def plot_thickness(found: ThicknessMap, boundary: Boundary, volumes: Volumes, co
 def plot_budget(content: Mapping[str, Any]) -> Figure:
     """The parts of σ as bars, the total below them; what is no chance apart, with a scale of its own."""
     s = content["sigma"]
-    parts = [(WORDS[name], s["parts_m3"][name]) for name in PARTS]
+    parts = [(WORDS[name], s["parts_m3"][name]) for name in s["parts_m3"]]
     parts.append(("together (root of the sum of squares)", s["sigma_m3"]))
     apart = [] if s["curvature"] is None else [("ground beyond straight lines between heights", s["curvature"])]
     apart += [(SYSTEMATIC[one["variant"]], one) for one in s["systematic"]["variants"]]
@@ -118,9 +119,9 @@ def plot_budget(content: Mapping[str, Any]) -> Figure:
     axes = axes_at(figure, 4.15, 0.6 + (lower + 0.75 if apart else 0.0), WIDTH - 5.35, upper)
     texts = [_count(value) if value > 0.0 else "none stated" for _, value in parts]
     if s["curvature"] is None:
-        texts[PARTS.index("interpolation")] = "not known"
+        texts[list(s["parts_m3"]).index("interpolation")] = "not known"
     texts[-1] = _count(s["sigma_m3"])
-    colours = [LIGHT] * len(PARTS) + [ACCENT]
+    colours = [LIGHT] * len(s["parts_m3"]) + [ACCENT]
     _bars(axes, [name for name, _ in parts], [value for _, value in parts], texts, {"color": colours})
     axes.set_xlabel("σ [m³]")
     if apart:

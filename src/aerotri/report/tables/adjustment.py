@@ -12,7 +12,7 @@ from aerotri.conventions import MGON_PER_RADIAN, counted
 from aerotri.functional_model.additional_parameters import Parameter, format_parameters
 from aerotri.functional_model.additional_parameters import unit_of as unit_of_parameter
 from aerotri.functional_model.additional_parameters.family import NO_UNIT
-from aerotri.image_errors import interior_elements, largest_effects
+from aerotri.image_errors import interior_elements, interior_model_sigmas, largest_effects
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.report.quality import asprs_warning, ground_statistics, metre_digits, pixel_text, printable
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Outcome
@@ -140,14 +140,22 @@ def cameras(adjusted: AdjustedBlock) -> Table:
     rows = []
     for camera in adjusted.block.cameras:
         values, sigmas = interior_elements(adjusted, camera)
+        model = interior_model_sigmas(adjusted, camera)
+        sigmas = sigmas if model is None else np.hypot(sigmas, model)
         given = np.array([camera.interior[name].value for name in INTERIOR_ELEMENTS])
         for symbol, value, sigma, start in zip(("c", "x0", "y0"), values, sigmas, given, strict=True):
             rows.append(
                 (camera.name, symbol, float(value), float(sigma) if sigma > 0 else "held", float(value - start))
             )
-    columns = (Column("camera"), Column("element"), Column("value", "mm", ".4f"), Column("σ", "mm", ".4f"),
+    columns = (Column("camera"), Column("element"), Column("value", "mm", ".4f"),
+               Column(_sigma_word(adjusted), "mm", ".4f"),
                Column("change", "mm", "+.4f"))  # fmt: skip
     return Table("Interior orientation", columns, tuple(rows))
+
+
+def _sigma_word(adjusted: AdjustedBlock) -> str:
+    """What σ of the tables is called: the total where groups of photographs share errors."""
+    return "σ" if adjusted.points.model is None else "total σ"
 
 
 def film(adjusted: AdjustedBlock) -> Table:
@@ -180,7 +188,7 @@ def parameters(adjusted: AdjustedBlock) -> Table:
         (Column("group"), p.groups[rows]),
         (Column("mark"), p.marks[rows]),
         (Column("value", "", ".4e"), p.value[rows]),
-        (Column("σ", "", ".1e"), p.sigma[rows]),
+        (Column(_sigma_word(adjusted), "", ".1e"), p.total_sigma[rows]),
         (Column("unit"), [unit_of(name) for name in p.names[rows]]),
         (Column("effect", "µm", ".2f"), 1e3 * largest_effects(adjusted)[rows]),
         (Column("t", "", ".1f"), p.t[rows]),
@@ -231,6 +239,8 @@ def ground_points(adjusted: AdjustedBlock, results: GroundPointResults, title: s
         columns.append((Column(f"d{axis}", "m", f"+.{d}f"), results.difference[:, k]))
     for k, axis in enumerate("XYZ"):
         columns.append((Column(f"σ{axis}", "m", f".{d}f"), results.sigma[:, k]))
+    for k, axis in enumerate("XYZ" if results.model_sigma is not None else ""):
+        columns.append((Column(f"total σ{axis}", "m", f".{d}f"), results.total_sigma[:, k]))
     if np.isfinite(results.r).any():
         for k, axis in enumerate("XYZ"):
             columns.append((Column(f"r{axis}", "", ".2f"), results.r[:, k]))
@@ -246,7 +256,7 @@ def images(adjusted: AdjustedBlock, rows: np.ndarray | None = None, title: str =
         rows = np.arange(min(len(block.images), MOST_ROWS))
         if len(block.images) > MOST_ROWS:
             title += f", the first {MOST_ROWS} of {len(block.images)} (all: images.csv)"
-    sigma = result.sigma[rows]
+    sigma, word = result.total_sigma[rows], _sigma_word(adjusted)
     d = metre_digits(sigma[:, :3])
     columns = [(Column("photograph"), block.images.names[rows]), (Column("strip"), block.images.strip[rows]),
                (Column("rays", "", "d"), result.rays[rows])]  # fmt: skip
@@ -255,9 +265,9 @@ def images(adjusted: AdjustedBlock, rows: np.ndarray | None = None, title: str =
     for k, axis in enumerate("ωφκ"):
         columns.append((Column(axis, "°", ".5f"), np.degrees(result.angles[rows, k])))
     for k, axis in enumerate(("X0", "Y0", "Z0")):
-        columns.append((Column(f"σ{axis}", "m", f".{d}f"), sigma[:, k]))
+        columns.append((Column(f"{word}{axis}", "m", f".{d}f"), sigma[:, k]))
     for k, axis in enumerate("ωφκ"):
-        columns.append((Column(f"σ{axis}", "mgon", ".2f"), sigma[:, 3 + k] * MGON_PER_RADIAN))
+        columns.append((Column(f"{word}{axis}", "mgon", ".2f"), sigma[:, 3 + k] * MGON_PER_RADIAN))
     return table(title, *columns)
 
 
@@ -301,21 +311,21 @@ def blunders(adjusted: AdjustedBlock) -> Table:
 
 def weak_points(adjusted: AdjustedBlock, top: int = TOP_WEAK) -> Table:
     """Object points with the largest standard deviations."""
-    points = adjusted.points
-    size = np.nan_to_num(points.sigma, nan=-1.0, posinf=np.inf).max(axis=1, initial=-1.0)
+    points, sigma, word = adjusted.points, adjusted.points.total_sigma, _sigma_word(adjusted)
+    size = np.nan_to_num(sigma, nan=-1.0, posinf=np.inf).max(axis=1, initial=-1.0)
     rows = np.argsort(-size, kind="stable")[:top]
     rows = rows[size[rows] > 0.0]
-    d = metre_digits(points.sigma)
+    d = metre_digits(sigma)
     columns = [(Column("point"), adjusted.block.points[rows]), (Column("rays", "", "d"), points.rays[rows])]
     for k, axis in enumerate("XYZ"):
-        columns.append((Column(f"σ{axis}", "m", f".{d}f"), points.sigma[rows, k]))
+        columns.append((Column(f"{word}{axis}", "m", f".{d}f"), sigma[rows, k]))
     columns.append((Column("largest |w|", "", ".1f"), points.max_abs_w[rows]))
     return table(f"The {len(rows)} weakest points", *columns)
 
 
 def weak_images(adjusted: AdjustedBlock, top: int = TOP_WEAK) -> Table:
     """Photographs with the largest standard deviations of their projection centres."""
-    sigma = np.nan_to_num(adjusted.images.sigma[:, :3], nan=np.inf)
+    sigma = np.nan_to_num(adjusted.images.total_sigma[:, :3], nan=np.inf)
     rows = np.argsort(-np.linalg.norm(sigma, axis=1), kind="stable")[:top]
     return images(adjusted, rows, f"The {len(rows)} weakest photographs")
 

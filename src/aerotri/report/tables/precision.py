@@ -30,7 +30,8 @@ NAMED_FROM = 0.7
 
 def precision(adjusted: AdjustedBlock) -> Table:
     """Theoretical precision μ of the object points and practical precision at the check points."""
-    rows = [("theoretical, all points (μ = σ₀·√(tr Q/3n))", theoretical_precision(adjusted))]
+    of_model = "" if adjusted.points.model is None else ", with the model part"
+    rows = [(f"theoretical, all points (μ = σ₀·√(tr Q/3n){of_model})", theoretical_precision(adjusted))]
     for name, results in (("control", adjusted.control), ("check", adjusted.check)):
         if len(results):
             chosen = np.zeros(len(adjusted.block.points), bool)
@@ -39,7 +40,7 @@ def precision(adjusted: AdjustedBlock) -> Table:
     if len(adjusted.check):
         rows.append(("practical: differences at check points, with the errors of the given coordinates",
                      practical_precision(adjusted)))  # fmt: skip
-    form = f".{metre_digits(adjusted.points.sigma)}f"
+    form = f".{metre_digits(adjusted.points.total_sigma)}f"
     return table(
         "Precision of the object points",
         (Column("precision"), [name for name, _ in rows]),
@@ -51,7 +52,7 @@ def precision(adjusted: AdjustedBlock) -> Table:
 
 def ellipsoids(adjusted: AdjustedBlock) -> Table:
     """Semi-axes of the standard ellipsoids of points and projection centres: median, 95 % quantile, the largest."""
-    form = f".{metre_digits(adjusted.points.sigma)}f"
+    form = f".{metre_digits(adjusted.points.total_sigma)}f"
     rows = []
     for what, found, names in (
         ("object points", point_ellipsoids(adjusted), adjusted.block.points),
@@ -71,7 +72,8 @@ def ellipsoids(adjusted: AdjustedBlock) -> Table:
         Column("b, median", "m", form), Column("c, median", "m", form), Column("a rises by", "°", ".0f"),
         Column("a, 95 % below", "m", form), Column("a, largest", "m", form), Column("at"),
     )  # fmt: skip
-    return Table("Error ellipsoids (one σ, semi-axes a ≥ b ≥ c)", columns, tuple(rows))
+    sigma = "one σ" if adjusted.points.model is None else "one total σ"
+    return Table(f"Error ellipsoids ({sigma}, semi-axes a ≥ b ≥ c)", columns, tuple(rows))
 
 
 def correlations(adjusted: AdjustedBlock) -> Table:
