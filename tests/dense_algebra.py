@@ -58,7 +58,7 @@ def _observed(system, n: int, s: int, size: int):
             row = np.zeros(size)
             row[6 * n + column] = 1.0 / sigma
             yield row
-    for field in system.fields:
+    for field in system.joint_priors:
         rows = np.zeros((len(field.weight), size))
         rows[:, 6 * n + field.columns.start : 6 * n + field.columns.stop] = np.linalg.cholesky(field.weight).T
         yield from rows

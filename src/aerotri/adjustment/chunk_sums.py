@@ -10,11 +10,17 @@ from aerotri.functional_model.observed_unknowns import Rows
 
 
 class ChunkSums:
-    """Sums of one chunk of points, over the photographs and pairs that it touches and no others."""
+    """Sums of one chunk of points, over the photographs and pairs that it touches and no others.
+
+    Parameters
+    ----------
+    n_shared : how many of the shared parameters, from the first, act on rays.
+    """
 
     def __init__(self, unknowns: Unknowns, first: int, last: int, n_shared: int):
         image = unknowns.rays.image[unknowns.rays.start[first] : unknowns.rays.start[last]]
         pair = unknowns.pair_block[unknowns.pair_start[first] : unknowns.pair_start[last]]
+        self._shared = slice(0, n_shared)
         self._images = slice(int(image.min()), int(image.max()) + 1)
         n = len(unknowns.images)
         self._pairs = slice(int(pair.min()), int(pair.max()) + 1) if len(pair) else slice(n, n)
@@ -48,18 +54,18 @@ class ChunkSums:
         """Add to the matrix of all chunks."""
         blocks[self._images] += self._sums.diagonal
         blocks[self._pairs] += self._sums.pairs
-        border[self._images] += self._sums.border
-        corner += self._sums.corner
+        border[self._images, self._shared] += self._sums.border
+        corner[self._shared, self._shared] += self._sums.corner
 
     def add_squares_to(self, squares: np.ndarray, squares_shared: np.ndarray) -> None:
         """Add to the squares of the columns, before points are eliminated, of all chunks."""
         squares[self._images] += self._sums.squares
-        squares_shared += self._sums.squares_shared
+        squares_shared[self._shared] += self._sums.squares_shared
 
     def add_right_to(self, right: np.ndarray, right_shared: np.ndarray) -> None:
         """Add to the right side of all chunks."""
         right[self._images] += self._sums.right
-        right_shared += self._sums.right_shared
+        right_shared[self._shared] += self._sums.right_shared
 
 
 def add_squares(rows: Rows, blocks: np.ndarray, border: np.ndarray, corner: np.ndarray) -> None:

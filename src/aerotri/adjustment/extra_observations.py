@@ -5,9 +5,13 @@ What they need of unknowns of their own (shifts, drifts, boresight, planes) join
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from aerotri.adjustment.datum import ExtraObservations
+from aerotri.adjustment.exposures import exposures_of
+from aerotri.adjustment.position_errors import KIND, PositionPrior, error_nodes
 from aerotri.adjustment.unknowns import State, Unknowns, keep_points
 from aerotri.conventions import InputError
 from aerotri.functional_model.constraints import NO_BASIS, Constraint, ConstraintObservations, flat_basis
@@ -32,7 +36,38 @@ def extra_observations(unknowns: Unknowns, state: State) -> tuple[Unknowns, list
     if block.constraints is not None and len(block.constraints):
         unknowns, conditions = _constraints(block.constraints, unknowns, state)
         extras.append(conditions)
-    return unknowns, extras
+    # behind everything that acts on rays: the sums over points leave these columns out
+    with_errors = [_with_errors(e, unknowns, state) if isinstance(e, CentreObservations) else e for e in extras]
+    return unknowns, with_errors
+
+
+def _with_errors(observed: CentreObservations, unknowns: Unknowns, state: State) -> CentreObservations:
+    """The observed positions with unknowns for the errors that stay for a while, where these are known in size."""
+    block, settings = unknowns.block, unknowns.block.settings.gnss
+    sigma, time = settings.correlated_sigma_m, settings.correlation_time_s
+    if settings.correlated == "off" or sigma is None or time is None or not any(sigma):
+        return observed
+    exposures = exposures_of(block, unknowns.images[observed.image], state.centre[observed.image])
+    axes = [axis for axis in range(3) if sigma[axis] > 0.0]
+    nodes = error_nodes(exposures, time, len(axes))
+    m, first = len(nodes.rows), len(unknowns.shared)
+    names = observed.labels[nodes.rows]
+    columns = np.full((len(exposures), 3, 2), -1, dtype=np.int64)
+    weight, precision = np.zeros((m * len(axes), m * len(axes))), nodes.precision(time)
+    for number, axis in enumerate(axes):
+        start = first + number * m
+        for name in names:
+            unknowns.shared.add(f"gnss.error_{'XYZ'[axis]}", str(name), KIND)
+        columns[:, axis] = start + np.stack([nodes.before, nodes.after], axis=1)
+        own = slice(number * m, (number + 1) * m)
+        weight[own, own] = precision / sigma[axis] ** 2
+    unknowns.shared.position_errors.append(PositionPrior(slice(first, first + len(weight)), weight))
+    left = nodes.left[:, None] * np.square(sigma)
+    inv_sigma = np.where(
+        observed.inv_sigma > 0.0, 1.0 / np.sqrt(1.0 / np.maximum(observed.inv_sigma, 1e-300) ** 2 + left), 0.0
+    )
+    by_nodes = np.stack([nodes.by_before, nodes.by_after], axis=1)
+    return replace(observed, inv_sigma=inv_sigma, nodes=columns, by_nodes=by_nodes)
 
 
 def _used_rows(observed: GnssIns, unknowns: Unknowns, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -106,7 +141,7 @@ def _centres(observed: GnssIns, unknowns: Unknowns, state: State) -> CentreObser
         labels=block.images.names[observed.image[used]],
         image=row,
         xyz=xyz,
-        inv_sigma=np.where(known, 1.0 / observed.sigma[used], 0.0),
+        inv_sigma=np.where(known, 1.0 / (observed.sigma[used] * _noise_factor(unknowns)), 0.0),
         shift=shift,
         drift=drift,
         lever=_lever_columns(unknowns),
@@ -115,6 +150,12 @@ def _centres(observed: GnssIns, unknowns: Unknowns, state: State) -> CentreObser
         velocity=velocity,
         time=time,
     )
+
+
+def _noise_factor(unknowns: Unknowns) -> np.ndarray:
+    """(3,) factor of the σ of the table; 1 as long as it is not estimated."""
+    plan, height = unknowns.block.settings.gnss.noise_factor or (1.0, 1.0)
+    return np.array([plan, plan, height])
 
 
 def _lever_columns(unknowns: Unknowns) -> np.ndarray:

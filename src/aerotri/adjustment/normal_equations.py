@@ -25,6 +25,7 @@ from aerotri.adjustment.kernel_records import (
     Work,
 )
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
+from aerotri.adjustment.position_errors import KIND, PositionPrior
 from aerotri.adjustment.robust import Estimator, normalised_lengths
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, Symbolic
 from aerotri.adjustment.unknowns import State, Step, Unknowns
@@ -86,7 +87,9 @@ class NormalSystem:
         self._max_rays = int(counts.max(initial=1))
         n, s = len(unknowns.images), len(unknowns.shared)
         self.symbolic = Symbolic(n, unknowns.block_row, unknowns.block_col, position, s)
-        self._sums = [ChunkSums(unknowns, first, last, s) for first, last in self._bounds]
+        # errors of positions stand last in the list and act on no ray
+        of_rays = s - unknowns.shared.kinds.count(KIND)
+        self._sums = [ChunkSums(unknowns, first, last, of_rays) for first, last in self._bounds]
         sigma = np.array(unknowns.shared.sigma).reshape(-1)
         self._prior_weight = np.where(np.isfinite(sigma), 1.0 / sigma**2, 0.0)
         self._prior_value = np.array(unknowns.shared.observed).reshape(-1)
@@ -98,7 +101,7 @@ class NormalSystem:
     def n_shared_priors(self) -> int:
         """Observed shared parameters, nodes of random fields among them, coordinates of points apart."""
         of_points = np.array(self.unknowns.shared.kinds) == "point"
-        nodes = sum(len(field.weight) for field in self._fields)
+        nodes = sum(len(prior.weight) for prior in self.joint_priors)
         return nodes + (int((self._prior_weight[~of_points] > 0.0).sum()) if len(of_points) else 0)
 
     @property
@@ -110,6 +113,11 @@ class NormalSystem:
     def fields(self) -> tuple[FieldPrior, ...]:
         """What is known beforehand of the random fields among the shared parameters."""
         return self._fields
+
+    @property
+    def joint_priors(self) -> tuple[FieldPrior | PositionPrior, ...]:
+        """What is known beforehand of shared parameters together: random fields, errors of positions."""
+        return (*self._fields, *self.unknowns.shared.position_errors)
 
     def with_collocation(self, known: CollocationSettings) -> NormalSystem:
         """The same system with another covariance of the random fields."""
@@ -161,9 +169,9 @@ class NormalSystem:
             add_squares(observed, blocks, border, corner)
             add_own_squares(observed, squares, squares_shared)
         corner[np.diag_indices_from(corner)] += self._prior_weight
-        for field in self._fields:
-            corner[field.columns, field.columns] += field.weight
-            squares_shared[field.columns] += np.diagonal(field.weight)
+        for prior in self.joint_priors:
+            corner[prior.columns, prior.columns] += prior.weight
+            squares_shared[prior.columns] += np.diagonal(prior.weight)
         held_image, held_column = np.nonzero(~u.eo_free)
         blocks[held_image, held_column, held_column] = squares[held_image, held_column] = 1.0
         diagonal = np.arange(6)
@@ -198,10 +206,10 @@ class NormalSystem:
         gap = self._prior_value - state.shared
         right_shared += self._prior_weight * gap
         cost = sum(o[0] for o in outcomes) + sum(float(np.sum(observed.gap**2)) for observed in rows)
-        for field in self._fields:
-            pull = field.weight @ state.shared[field.columns]
-            right_shared[field.columns] -= pull
-            cost += float(state.shared[field.columns] @ pull)
+        for prior in self.joint_priors:
+            pull = prior.weight @ state.shared[prior.columns]
+            right_shared[prior.columns] -= pull
+            cost += float(state.shared[prior.columns] @ pull)
         return RightSide(
             right=np.concatenate([right.ravel(), right_shared]),
             cost=float(cost + np.sum(self._prior_weight * gap**2)),
@@ -249,8 +257,8 @@ class NormalSystem:
                 there = rows.columns[:, c] >= 0
                 value[there] += rows.by_shared[there, :, c, None] * shared[rows.columns[there, c]][:, None, :]
             total += np.einsum("gka,gkb->ab", value, value)
-        for field in self._fields:
-            total += shared[field.columns].T @ field.weight @ shared[field.columns]
+        for prior in self.joint_priors:
+            total += shared[prior.columns].T @ prior.weight @ shared[prior.columns]
         return total
 
     def prior_root(self) -> np.ndarray:
@@ -258,9 +266,9 @@ class NormalSystem:
         known = np.flatnonzero(self._prior_weight > 0.0)
         root = np.zeros((len(self._prior_weight), len(known)))
         root[known, np.arange(len(known))] = np.sqrt(self._prior_weight[known])
-        for field in self._fields:
-            own = np.zeros((len(root), len(field.weight)))
-            own[field.columns] = np.linalg.cholesky(field.weight)
+        for prior in self.joint_priors:
+            own = np.zeros((len(root), len(prior.weight)))
+            own[prior.columns] = np.linalg.cholesky(prior.weight)
             root = np.concatenate([root, own], axis=1)
         return root
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from aerotri.adjustment.position_errors import PositionPrior
 from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import (
     FAMILIES,
@@ -64,6 +65,7 @@ class SharedList:
     observed: list[float] = field(default_factory=list)
     sigma: list[float] = field(default_factory=list)
     fields: list[RandomField] = field(default_factory=list)
+    position_errors: list[PositionPrior] = field(default_factory=list)
 
     def add(
         self, name: str, group: str, kind: str, mark: str = "", prior: Prior = FREE, start: float | None = None

@@ -182,6 +182,8 @@ def _refuse_unknown(block: Block) -> None:
         (observed is not None and free, "a free datum beside observed projection centres"),
         (settings.gnss.lever_arm_sigma_m is not None, "a free lever arm"),
         (settings.gnss.time_offset != "off", "a time offset of GNSS"),
+        (settings.gnss.correlated != "off", "GNSS errors that stay for a while"),
+        (settings.gnss.noise_factor not in (None, (1.0, 1.0)), "a factor of the σ of GNSS"),
         (settings.refraction != "off" or settings.earth_curvature != "off", "refraction and earth curvature"),
         (bool(unknown), f"the parameters '{unknown[0] if unknown else ''}'"),
     ]

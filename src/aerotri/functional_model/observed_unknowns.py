@@ -1,6 +1,7 @@
 """Unknowns that were themselves observed: projection centres by GNSS, attitudes by INS.
 
-[L] X_gnss + v = X0 + R·lever_arm + shift + drift·(t − t_s) + velocity·time_offset; lever arm from the projection centre
+[L] X_gnss + v = X0 + R·lever_arm + shift + drift·(t − t_s) + velocity·time_offset + c(t); c: the error that stays for
+a while, interpolated between the two nodes around the exposure; lever arm from the projection centre
 to the antenna in the camera frame, t_s the mean time of the strip.
 [L] R_ins + v = R·R_boresight (R_boresight: INS → camera): δ = Log(R_model·R_obsᵀ) in object axes, and v = E⁻¹δ with E
 of the observed angles, so that the σ of ω, φ, κ apply as they are given. Body axes would swap ω and φ at κ = 90°.
@@ -57,6 +58,8 @@ class CentreObservations:
     shift, drift : (g, 3) shared parameter of each coordinate, −1 where there is none.
     lever : (3,) shared parameters of the lever arm, −1 where it is held at `lever_arm` (3,) m.
     offset : (g,) shared parameter of the time offset. velocity : (g, 3) m/s. time : (g,) s from the strip's mean.
+    nodes : (g, 3, 2) shared parameters of the errors that stay for a while, of every coordinate at the two nodes around
+        the exposure; None where there are none. by_nodes : (g, 2) their weights.
     """
 
     labels: np.ndarray
@@ -70,6 +73,8 @@ class CentreObservations:
     offset: np.ndarray
     velocity: np.ndarray
     time: np.ndarray
+    nodes: np.ndarray | None = None
+    by_nodes: np.ndarray | None = None
 
     @property
     def count(self) -> int:
@@ -96,6 +101,12 @@ class CentreObservations:
         columns = np.concatenate(
             [self.shift, self.drift, np.broadcast_to(self.lever, (g, 3)), self.offset[:, None]], axis=1
         )
+        if self.nodes is not None and self.by_nodes is not None:
+            weights = self.by_nodes[:, None, :]
+            predicted = predicted + np.sum(weights * _values(shared, self.nodes), axis=2)
+            columns = np.concatenate([columns, self.nodes.reshape(g, 6)], axis=1)
+            of_nodes = (np.eye(3)[None, :, :, None] * weights[:, None]).reshape(g, 3, 6)
+            by_shared = np.concatenate([by_shared, of_nodes], axis=2)
         gap = np.where(self.inv_sigma > 0.0, self.xyz - predicted, 0.0)
         return Rows(
             "projection centres", "m", self.labels, ("X", "Y", "Z"), self.image, gap, self.inv_sigma, by_image, columns,

@@ -289,13 +289,30 @@ class AdjustmentSettings:
 
 @dataclass(frozen=True)
 class GnssSettings:
-    """What `[gnss]` says. `lever_arm_m` runs from the projection centre to the antenna, in the camera frame."""
+    """What `[gnss]` says. `lever_arm_m` runs from the projection centre to the antenna, in the camera frame.
+
+    Parameters
+    ----------
+    correlated : 'on' where positions have errors that stay for a while.
+    correlation_time_s : τ of these errors, correlated_sigma_m : their σ of X, Y, Z; None: estimated from the block.
+    noise_factor : of the σ of the table, in plan and in height; None: estimated.
+    """
 
     shift: str = "off"
     drift: str = "off"
     lever_arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     lever_arm_sigma_m: tuple[float, float, float] | None = None
     time_offset: str = "off"
+    correlated: str = "off"
+    correlation_time_s: float | None = None
+    correlated_sigma_m: tuple[float, float, float] | None = None
+    noise_factor: tuple[float, float] | None = (1.0, 1.0)
+
+    @property
+    def to_estimate(self) -> bool:
+        """Whether errors that stay for a while are asked for and not known in full."""
+        known = self.correlation_time_s, self.correlated_sigma_m, self.noise_factor
+        return self.correlated == "on" and None in known
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,16 @@ from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.weak_geometry import go_on_without, minimise_tied
 from aerotri.diagnosis.common_height import common_height
 from aerotri.diagnosis.doubts import defects_in_words, doubts, failure, refuse_runaway
+from aerotri.diagnosis.position_errors import position_errors_in_words
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock, Blunder
 from aerotri.results.adjustment import Adjustment
+from aerotri.results.position_errors import PositionErrors
 from aerotri.results.removal import Removal
 from aerotri.statistics.loose_points import loose_by_rays, loose_in_words, loose_points, to_set_aside
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
 from aerotri.strategies.field_estimation import with_estimated_fields
+from aerotri.strategies.position_estimation import position_errors_of, with_position_errors
 from aerotri.strategies.removal import with_datum_of
 from aerotri.strategies.selection import select, with_findings_of, with_removed
 from aerotri.strategies.snooping import snoop
@@ -44,6 +47,7 @@ class _Stand:
     prepared, solution : the equations, and where they are solved.
     block : as it will be delivered.
     blunders : taken out by data snooping. removals : additional parameters that the selection took out.
+    position_errors : what was found of errors of positions that stay; None where they were not estimated.
     """
 
     prepared: Prepared
@@ -51,6 +55,7 @@ class _Stand:
     block: Block
     blunders: tuple[Blunder, ...] = ()
     removals: tuple[Removal, ...] = ()
+    position_errors: PositionErrors | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +83,7 @@ def adjust_local(block: Block, report: Report | None, given_points: np.ndarray |
     options = SolveOptions(settings.max_iterations, settings.robust, report)
     stand = _Stand(*_determined(minimise_tied(prepared, options, _redundancy)), block)
     stand = _without_gross_errors(stand, options)
-    stand = _with_fields(stand, options)
+    stand = _with_position_errors(_with_fields(stand, options), options)
     stand = _with_selected_parameters(stand, options)
     delivered = _without_loose_points(_delivered(stand), options)
     timings = {"start_values": started - begun, "solve": delivered.solved - started}
@@ -105,6 +110,12 @@ def _with_fields(stand: _Stand, options: SolveOptions) -> _Stand:
     """With the covariance of random fields estimated, where there are any."""
     system, solution = with_estimated_fields(stand.prepared.system, stand.solution, options)
     return replace(stand, prepared=replace(stand.prepared, system=system), solution=solution)
+
+
+def _with_position_errors(stand: _Stand, options: SolveOptions) -> _Stand:
+    """With errors of positions that stay for a while estimated, where they are asked for."""
+    prepared, solution, found = with_position_errors(stand.prepared, stand.solution, options)
+    return replace(stand, prepared=prepared, solution=solution, position_errors=found)
 
 
 def _with_selected_parameters(stand: _Stand, options: SolveOptions) -> _Stand:
@@ -147,12 +158,16 @@ def _with_words(delivered: _Delivered, timings: dict[str, float]) -> Adjustment:
     system, solution, sigma0 = stand.prepared.system, stand.solution, result.outcome.sigma0
     kept = np.union1d(loose_points(result), loose_by_rays(system, solution, sigma0))
     result = replace(result, parameters=with_removed(result.parameters, stand.removals), removals=stand.removals)
+    errors = position_errors_of(system, solution, delivered.factor, sigma0, stand.position_errors)
+    result = replace(result, position_errors=errors)
     timings = timings | {"statistics": time.perf_counter() - delivered.solved}
     said = (*result.outcome.warnings, *loose_in_words(result, kept), *inseparable(result.parameters))
     shared_height = common_height(system, solution, delivered.factor, sigma0)
     if shared_height is not None:
         sentence = shared_height.sentence(float(np.nanmedian(result.points.sigma[:, 2])))
         said += (sentence,) if sentence else ()
+    of_positions = position_errors_in_words(errors)
+    said += (of_positions,) if of_positions else ()
     outcome = replace(result.outcome, warnings=said, timings_s=timings)
     result = replace(result, block=stand.block, outcome=outcome, blunders=stand.blunders + result.blunders)
     return Adjustment(result, result, system, solution)

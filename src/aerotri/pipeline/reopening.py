@@ -49,6 +49,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     factor = undamped_factor(system, solution)
     result = replace(summarise(system, solution, factor, saved.ray_status, saved.warnings), block=local)
     result = replace(result, parameters=with_removed(result.parameters, removals), removals=removals)
+    result = replace(result, position_errors=saved.position_record())
     components = saved.component_record()
     if components is not None:
         result = with_components(result, components)

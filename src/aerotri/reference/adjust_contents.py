@@ -22,6 +22,33 @@ def _axes_object(name: str, text: str, unit: str = "m") -> tuple[Item, ...]:
     )
 
 
+def _gnss_errors() -> tuple[Item, ...]:
+    what = (
+        ("source", "text", "Where these errors come from: given in block.toml, or estimated from the block; empty "
+         "where positions are adjusted as independent.", ""),
+        ("plan_m", "number", "Standard deviation of these errors in X and Y.", "m"),
+        ("height_m", "number", "The same in Z.", "m"),
+        ("time", "number?", "Time after which such an error has fallen to 37 %.", "as time_unit says"),
+        ("time_unit", "text", "s, or exposures where the photographs have no times.", ""),
+        ("noise_factor_plan", "number", "Factor of the standard deviations of single positions in plan.", ""),
+        ("noise_factor_height", "number", "The same in height.", ""),
+        ("likelihood_ratio", "number?", "How much better such errors explain the positions than more noise does.", ""),
+        ("p", "number?", "Probability of as much by noise alone.", ""),
+        ("level", "number?", "Probability with which noise alone is taken for such errors.", ""),
+        ("neighbours", "number?", "Correlation of the residuals of photographs taken one after the other, where "
+         "positions are adjusted as independent.", ""),
+        ("neighbours_p", "number?", "Probability of such a correlation by noise alone.", ""),
+        ("exposures", "whole", "Photographs with a position.", ""),
+        ("flights", "whole", "Flights, or strips where the photographs have no times, in which these errors begin "
+         "anew.", ""),
+        ("nodes", "whole", "Times at which such an error of a coordinate is an unknown.", ""),
+        ("reason", "text", "Why nothing was tested; else empty.", ""),
+    )  # fmt: skip
+    text = "Errors of GNSS positions that stay for a while; null where there are no positions."
+    items = (Item(f"gnss_errors.{name}", kind, said, unit) for name, kind, said, unit in what)
+    return (Item("gnss_errors", "object?", text), *items)
+
+
 def _ground_points(name: str, what: str) -> tuple[Item, ...]:
     return (
         Item(name, "object", f"Differences at the {what} points."),
@@ -126,6 +153,7 @@ ADJUSTMENT = (
     Item("model_part.ratio_plan", "number", "Total σ over σ of the noise in X and Y, median of the points."),
     Item("model_part.ratio_height", "number", "The same in Z."),
     Item("model_part.reason", "text", "Why there is no model part; else empty."),
+    *_gnss_errors(),
     Item("warnings[]", "text", "Sentences to read: what was left out, assumed or is weak."),
     Item("timings_s", "object", "Time by stage.", "s"),
     *(

@@ -13,6 +13,7 @@ from aerotri.observations import Block
 
 if TYPE_CHECKING:
     from aerotri.results.model_part import ModelPart
+    from aerotri.results.position_errors import PositionErrors
     from aerotri.results.removal import Removal
     from aerotri.results.variance_components import VarianceComponents
 
@@ -336,3 +337,4 @@ class AdjustedBlock:
     effects: RayEffects | None = None
     removals: tuple[Removal, ...] = ()
     model_part: ModelPart | None = None
+    position_errors: PositionErrors | None = None

@@ -15,7 +15,8 @@ def observe_navigation(
 ) -> GnssIns | None:
     """What GNSS and INS say, None when both are off.
 
-    GNSS: X0 + R·lever_arm + shift + drift·(t − mean t of the strip) + noise. INS: the angles of R·R_boresight + noise.
+    GNSS: X0 + R·lever_arm + shift + drift·(t − mean t of the strip) + noise + errors that stay for a while.
+    INS: the angles of R·R_boresight + noise.
 
     Parameters
     ----------
@@ -27,6 +28,8 @@ def observe_navigation(
     nothing = np.full((n, 3), np.nan)
     xyz, sigma = _positions(gnss, flown, order, rng) if gnss is not None else (nothing, nothing)
     angles, angle_sigma = _attitudes(ins, flown, order, rng) if ins is not None else (nothing, nothing)
+    if gnss is not None and any(gnss.correlated_sigma_m):
+        xyz = xyz + _errors_that_stay(gnss, flown, rng)
     return GnssIns(np.arange(n), xyz, sigma, angles, angle_sigma, flown.time.copy())
 
 
@@ -41,6 +44,24 @@ def _positions(
     xyz = flown.centre + rotation_from_angles(flown.angles, order) @ np.array(spec.lever_arm_m)
     xyz = xyz + shift[strip_of_image] + drift[strip_of_image] * (flown.time - mean_time[strip_of_image])[:, None]
     return xyz + sigma * rng.normal(size=xyz.shape), sigma
+
+
+def _errors_that_stay(spec: GnssSpec, flown: FlownImages, rng: np.random.Generator) -> np.ndarray:
+    """(n, 3) m, a Gauss-Markov process of each coordinate: e(t) = e(t')·ρ + σ·√(1 − ρ²)·n, ρ = exp(−(t − t')/τ).
+
+    It begins anew on every day.
+    """
+    errors, noise = np.zeros((len(flown), 3)), rng.normal(size=(len(flown), 3))
+    order = np.lexsort((flown.time, flown.day))
+    last = -1
+    for k in order:
+        kept = 0.0
+        if last >= 0 and flown.day[last] == flown.day[k]:
+            kept = float(np.exp(-(flown.time[k] - flown.time[last]) / (spec.correlation_time_s or 1.0)))
+        before = errors[last] if last >= 0 else np.zeros(3)
+        errors[k] = kept * before + np.sqrt(1.0 - kept**2) * np.array(spec.correlated_sigma_m) * noise[k]
+        last = int(k)
+    return errors
 
 
 def _attitudes(

@@ -278,6 +278,18 @@ class GnssSpec(Table):
     shift_sigma_m: Triple = key((0.0, 0.0, 0.0), "Standard deviation of the shift of a strip.", "m")
     drift_sigma_m_s: Triple = key((0.0, 0.0, 0.0), "Standard deviation of the drift of a strip.", "m/s")
     lever_arm_m: Vector = key((0.0, 0.0, 0.0), "From the projection centre to the antenna, in the camera frame.", "m")
+    correlated_sigma_m: Triple = key(
+        (0.0, 0.0, 0.0), "Standard deviation of errors of X, Y, Z that stay for a while, beside sigma_m.", "m"
+    )
+    correlation_time_s: Positive | None = key(
+        None, "Time after which such an error has fallen to 37 %; needed where they are there.", "s"
+    )
+
+    @model_validator(mode="after")
+    def _with_time(self) -> GnssSpec:
+        if any(self.correlated_sigma_m) and self.correlation_time_s is None:
+            raise ValueError("correlated_sigma_m needs correlation_time_s, in seconds")
+        return self
 
 
 class InsSpec(Table):

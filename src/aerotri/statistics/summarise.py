@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.adjustment import position_errors
 from aerotri.adjustment.field_prior import FieldPrior
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.position_errors import PositionPrior
 from aerotri.adjustment.robust import weights_and_costs
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
@@ -31,8 +33,8 @@ from aerotri.statistics.external_reliability import ray_effects, row_effects
 from aerotri.statistics.held_control import HeldTests, held_tests
 from aerotri.statistics.reliability import detectable_share, suspected_blunders
 
-OF_POINTS = ("point", "constraint")
-"""Kinds of shared parameters that belong to object points and not to cameras or flights."""
+OF_POINTS = ("point", "constraint", position_errors.KIND)
+"""Kinds of shared parameters that belong to object points or single exposures and not to cameras or flights."""
 
 INSEPARABLE = 0.999
 """Correlation beyond which two parameters are reported as one."""
@@ -358,7 +360,10 @@ def _prior_group(system: NormalSystem, solution: Solution, q: Cofactors) -> list
     shared = system.unknowns.shared
     sigma = np.array(shared.sigma).reshape(-1)
     known = np.isfinite(sigma) & (np.array(shared.kinds, dtype=object) != "point").reshape(-1)
-    fields = [_field_group(field, solution, q) for field in system.fields]
+    fields = [_joint_group("collocation field", field, solution, q) for field in system.fields]
+    fields += [
+        _joint_group("position errors in time", prior, solution, q) for prior in system.unknowns.shared.position_errors
+    ]
     if not known.any():
         return fields
     normed = ((solution.state.shared - np.array(shared.observed)) / sigma)[known]
@@ -368,9 +373,9 @@ def _prior_group(system: NormalSystem, solution: Solution, q: Cofactors) -> list
     return [_group("weighted parameters", int(known.sum()), 1.0, rms, redundancy, pvv), *fields]
 
 
-def _field_group(field: FieldPrior, solution: Solution, q: Cofactors) -> ObservationGroup:
-    """The observation of a random field's nodes, whitened; its redundancy is the field's effective number."""
-    values = solution.state.shared[field.columns]
-    count, pvv = len(values), float(values @ field.weight @ values)
-    redundancy = count - float(np.sum(q.shared[field.columns, field.columns] * field.weight))
-    return _group("collocation field", count, 1.0, float(np.sqrt(pvv / count)), redundancy, pvv)
+def _joint_group(name: str, prior: FieldPrior | PositionPrior, solution: Solution, q: Cofactors) -> ObservationGroup:
+    """The observation of nodes together, whitened; its redundancy is their effective number."""
+    values = solution.state.shared[prior.columns]
+    count, pvv = len(values), float(values @ prior.weight @ values)
+    redundancy = count - float(np.sum(q.shared[prior.columns, prior.columns] * prior.weight))
+    return _group(name, count, 1.0, float(np.sqrt(pvv / count)), redundancy, pvv)

@@ -118,9 +118,11 @@ def _without(
 
 
 def with_findings_of(block: Block, used: Block) -> Block:
-    """A block with what the adjustment of another form of it found: parameters removed, covariance of the fields."""
+    """A block with what the adjustment of another form of it found: parameters removed, covariance of the fields and
+    of the positions."""
     adjustment = replace(block.settings.adjustment, parameters_removed=used.settings.adjustment.parameters_removed)
-    settings = replace(block.settings, adjustment=adjustment, collocation=used.settings.collocation)
+    found = used.settings
+    settings = replace(block.settings, adjustment=adjustment, collocation=found.collocation, gnss=found.gnss)
     return replace(block, settings=settings)
 
 

@@ -84,7 +84,9 @@ def test_what_is_written_is_read_as_the_defaults(tmp_path):
     (tmp_path / "new" / "block.toml").write_text(uncommented(text), encoding="utf-8")
     everything = read_block_toml(tmp_path / "new" / "block.toml").model
     assert everything.camera["P1"].interior.focal_length_mm == PriorModel()
-    assert everything.gnss == model.gnss.model_copy(update={"lever_arm_sigma_m": [0.01, 0.01, 0.01]})
+    assert everything.gnss == model.gnss.model_copy(
+        update={"lever_arm_sigma_m": [0.01, 0.01, 0.01], "correlation_time_s": 60.0, "correlated_sigma_m": [0.02, 0.03]}
+    )
 
 
 def test_tables_have_the_columns_of_their_readers(tmp_path):

@@ -78,6 +78,10 @@ class BlockToml:
                 if model.gnss.lever_arm_sigma_m is None
                 else _triple(model.gnss.lever_arm_sigma_m),
                 time_offset=model.gnss.time_offset,
+                correlated=model.gnss.correlated,
+                correlation_time_s=model.gnss.correlation_time_s,
+                correlated_sigma_m=_by_coordinate(model.gnss.correlated_sigma_m),
+                noise_factor=_factors(model.gnss.noise_factor),
             ),
             ins=InsSettings(model.ins.boresight, model.ins.drift),
             collocation=CollocationSettings(model.collocation.sigma_um, model.collocation.length_mm),
@@ -146,6 +150,17 @@ def _is_no_name(name: str) -> bool:
 
 def _triple(values: list[float]) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
+
+
+def _by_coordinate(values: list[float] | None) -> tuple[float, float, float] | None:
+    """σ of X, Y, Z from these, or from plan and height."""
+    if values is None:
+        return None
+    return _triple(values if len(values) == 3 else [values[0], values[0], values[1]])
+
+
+def _factors(values: list[float] | str) -> tuple[float, float] | None:
+    return None if isinstance(values, str) else (float(values[0]), float(values[1]))
 
 
 def read_block_toml(path: Path) -> BlockToml:
@@ -256,6 +271,10 @@ def checked_settings(table: str, values: Mapping[str, object]) -> dict[str, Any]
     found = {key: tuple(value) if isinstance(value, list) else value for key, value in listed.items()}
     if "additional_parameters" in found:
         found["additional_parameters"] = parse_parameters(listed["additional_parameters"])
+    if "correlated_sigma_m" in found:
+        found["correlated_sigma_m"] = _by_coordinate(listed["correlated_sigma_m"])
+    if "noise_factor" in found:
+        found["noise_factor"] = _factors(listed["noise_factor"])
     if "datum_fixed" in found:
         found["datum_fixed"] = tuple(fixed_element(text) for text in found["datum_fixed"])
     return found

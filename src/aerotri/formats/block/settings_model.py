@@ -17,11 +17,12 @@ from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAME
 
 Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(gt=0, ge=SMALLEST_POSITIVE, le=LARGEST)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST)]
 Fraction = Annotated[float, Field(gt=0, lt=1)]
 Pixels = Annotated[int, Field(gt=0, le=10_000_000)]
 Two = Annotated[list[Real], Field(min_length=2, max_length=2)]
 Three = Annotated[list[Real], Field(min_length=3, max_length=3)]
-ThreeNotNegative = Annotated[list[Annotated[float, Field(ge=0, le=LARGEST)]], Field(min_length=3, max_length=3)]
+ThreeNotNegative = Annotated[list[NotNegative], Field(min_length=3, max_length=3)]
 ThreePositive = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 OffOn = Literal["off", "on"]
 
@@ -250,6 +251,22 @@ class GnssModel(Section):
     time_offset: Literal["off", "block", "strip"] = key(
         "off", "Difference between the clocks of GNSS and camera as an unknown: one for the block, or one a strip. "
         "Needs the column time."
+    )  # fmt: skip
+    correlated: OffOn = key(
+        "off", "on: besides their noise, positions have errors that stay for seconds to minutes, alike for photographs "
+        "taken one after the other. Without it the errors of all positions are independent."
+    )  # fmt: skip
+    correlation_time_s: Positive | None = key(
+        None, "Time after which such an error has fallen to 37 %; estimated from the block where it is not given. "
+        "Where photographs have no times it is counted in exposures along the strip.", "s"
+    )  # fmt: skip
+    correlated_sigma_m: Annotated[list[NotNegative], Field(min_length=2, max_length=3)] | None = key(
+        None, "Standard deviation of such errors: in plan and height, or in X, Y and Z; estimated from the block where "
+        "it is not given.", "m"
+    )  # fmt: skip
+    noise_factor: Literal["estimated"] | Annotated[list[Positive], Field(min_length=2, max_length=2)] = key(
+        [1.0, 1.0], "Factor of the standard deviations in gnss_ins.csv, in plan and height. estimated: found together "
+        "with the errors that stay, where correlated = \"on\"."
     )  # fmt: skip
 
 

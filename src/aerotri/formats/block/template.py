@@ -36,6 +36,8 @@ EXAMPLES: dict[str, Any] = {
     "camera.NAME.fiducials": {"1": [-106.0, -106.0]},
     "stochastic.default_control_sigma_m": [0.02, 0.02, 0.03],
     "gnss.lever_arm_sigma_m": [0.01, 0.01, 0.01],
+    "gnss.correlation_time_s": 60.0,
+    "gnss.correlated_sigma_m": [0.02, 0.03],
     "collocation.sigma_um": 2.0,
     "collocation.length_mm": 10.0,
 }

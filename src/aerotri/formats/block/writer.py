@@ -14,7 +14,7 @@ from aerotri.formats.text.table_writer import check_names, write_table
 from aerotri.formats.text.toml_text import Inline, toml_of
 from aerotri.functional_model.additional_parameters import format_parameters
 from aerotri.observations import Block, Camera, Prior
-from aerotri.observations.block import INTERIOR_ELEMENTS
+from aerotri.observations.block import INTERIOR_ELEMENTS, GnssSettings
 
 ANGLE_UNIT = "deg"
 TABLE_NAMES = ("images", "image_points", "control", "gnss_ins", "fiducials", "edits", "constraints")
@@ -204,6 +204,19 @@ def _settings(block: Block) -> dict[str, Any]:
         content["collocation"] = {key: value for key, value in known.items() if value is not None}
     if settings.gnss.lever_arm_sigma_m is not None:
         content["gnss"]["lever_arm_sigma_m"] = list(settings.gnss.lever_arm_sigma_m)
+    content["gnss"] |= _correlated(settings.gnss)
+    return content
+
+
+def _correlated(gnss: GnssSettings) -> dict[str, Any]:
+    """What says that errors of positions stay for a while; nothing where it is not asked for."""
+    content: dict[str, Any] = {} if gnss.correlated == "off" else {"correlated": gnss.correlated}
+    if gnss.correlation_time_s is not None:
+        content["correlation_time_s"] = gnss.correlation_time_s
+    if gnss.correlated_sigma_m is not None:
+        content["correlated_sigma_m"] = list(gnss.correlated_sigma_m)
+    if gnss.noise_factor != (1.0, 1.0):
+        content["noise_factor"] = "estimated" if gnss.noise_factor is None else list(gnss.noise_factor)
     return content
 
 

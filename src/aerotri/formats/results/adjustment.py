@@ -83,6 +83,7 @@ def adjustment_json(adjusted: AdjustedBlock) -> dict[str, Any]:
         "cameras": _cameras(adjusted),
         "blunders": [_record(blunder) for blunder in adjusted.blunders],
         "model_part": (adjusted.model_part or ModelPart(reason=NOT_LOOKED_FOR)).as_dict(),
+        "gnss_errors": None if adjusted.position_errors is None else adjusted.position_errors.as_dict(),
     }
 
 
@@ -113,6 +114,7 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
         "cameras": [],
         "blunders": [],
         "model_part": ModelPart(reason=NOT_LOOKED_FOR).as_dict(),
+        "gnss_errors": None,
         "warnings": list(o.warnings),
         "timings_s": {key: float(o.timings_s.get(key, 0.0)) for key in TIMINGS},
     }

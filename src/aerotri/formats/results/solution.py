@@ -14,6 +14,7 @@ import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
+from aerotri.adjustment.unknowns import Unknowns
 from aerotri.conventions import FilePath
 from aerotri.coordinates import LocalFrame
 from aerotri.formats.files.npz import Archive
@@ -21,8 +22,10 @@ from aerotri.formats.results.json_text import json_text
 from aerotri.formats.results.solution_checks import SCHEMA, checked_values
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.position_errors import PositionErrors
 from aerotri.results.removal import Removal
 from aerotri.results.variance_components import VarianceComponents
+from aerotri.statistics.summarise import OF_POINTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +35,8 @@ class SavedSolution:
     Parameters
     ----------
     origin : (3,) m. rotation : (n, 3, 3). centre : (n, 3) m, points : (N, 3) m, from the origin; NaN if not adjusted.
-    shared : (s,) values, shared_names, shared_groups : (s,) str, shared_cofactor : (s, s), without σ̂0².
+    shared : (s,) values, shared_names, shared_groups : (s,) str, shared_cofactor : (s, s), without σ̂0², NaN of
+        what is not listed among the parameters.
     xy : (m, 2) mm, image points as adjusted, freed of refraction and earth curvature where the settings ask.
     frame_origin : (3,) of the local frame, NaN for a block in local coordinates; geoid : its grid file, '' if none.
     held : (k, 2) point and axis of coordinates held for the datum.
@@ -40,6 +44,7 @@ class SavedSolution:
     components : the variance components as JSON, '' where there are none; the block has the σ they led to.
     removals : the parameters that the selection took out, as JSON, '' where there are none.
     verdict, reasons : of the outcome; '' in results of versions that did not judge.
+    position_errors : what was said of the errors of positions as JSON, '' where there is nothing.
     """
 
     origin: np.ndarray
@@ -66,6 +71,7 @@ class SavedSolution:
     removals: str = ""
     verdict: str = ""
     reasons: tuple[str, ...] = ()
+    position_errors: str = ""
 
     def removal_records(self) -> tuple[Removal, ...]:
         """The parameters that the selection took out."""
@@ -74,6 +80,10 @@ class SavedSolution:
     def component_record(self) -> VarianceComponents | None:
         """The variance components; None where there are none."""
         return VarianceComponents.from_dict(json.loads(self.components)) if self.components else None
+
+    def position_record(self) -> PositionErrors | None:
+        """What was said of the errors of positions; None where there is nothing."""
+        return PositionErrors.from_dict(json.loads(self.position_errors)) if self.position_errors else None
 
 
 def write_solution(
@@ -94,7 +104,6 @@ def write_solution(
     centre, rotation, points = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((count, 3), np.nan)
     centre[u.images], rotation[u.images], points[u.points] = state.centre, state.rotation, state.points
     row, axis = np.nonzero(~u.point_free)
-    there = np.flatnonzero(result.parameters.status != "removed")
     np.savez_compressed(
         path,
         schema=SCHEMA,
@@ -105,7 +114,7 @@ def write_solution(
         shared=state.shared,
         shared_names=np.array(u.shared.names, dtype=str),
         shared_groups=np.array(u.shared.groups, dtype=str),
-        shared_cofactor=result.parameters.covariance[np.ix_(there, there)] / result.outcome.sigma0**2,
+        shared_cofactor=_shared_cofactor(u, result),
         xy=u.block.image_points.xy,
         frame_origin=np.full(3, np.nan) if frame is None else frame.origin,
         geoid=np.array("" if frame is None or frame.geoid is None else os.fspath(frame.geoid)),
@@ -121,8 +130,20 @@ def write_solution(
         verdict=np.array(result.outcome.verdict),
         reasons=np.array(result.outcome.reasons, dtype=str),
         removals=np.array(json.dumps([removal.as_dict() for removal in result.removals])),
+        position_errors=np.array("" if result.position_errors is None else json_text(result.position_errors.as_dict())),
         components=np.array("" if result.components is None else json_text(result.components.as_dict())),
     )
+
+
+def _shared_cofactor(unknowns: Unknowns, result: AdjustedBlock) -> np.ndarray:
+    """(s, s) cofactors of the shared parameters, NaN of those that stand for points or single exposures."""
+    there = np.flatnonzero(result.parameters.status != "removed")
+    kinds = np.array(unknowns.shared.kinds, dtype=object).astype(str)
+    listed = np.flatnonzero(~np.isin(kinds, OF_POINTS))
+    cofactor = np.full((len(kinds), len(kinds)), np.nan)
+    found = result.parameters.covariance[np.ix_(there, there)] / result.outcome.sigma0**2
+    cofactor[np.ix_(listed, listed)] = found
+    return cofactor
 
 
 def read_solution(path: FilePath, block: Block | None = None) -> SavedSolution:

@@ -13,6 +13,7 @@ from aerotri.adjustment.ray_status import RAY_STATUS
 from aerotri.adjustment.robust import CODES, WIDEST
 from aerotri.formats.files.npz import Archive, Shape
 from aerotri.observations import Block
+from aerotri.results.position_errors import PositionErrors
 from aerotri.results.removal import Removal
 from aerotri.results.variance_components import ChiSquareTest, VarianceComponent
 
@@ -28,7 +29,7 @@ overflow."""
 SCALARS = {"estimator_code": "iu", "estimator_limit": "f", "sigma0": "f", "iterations": "iu", "status": "U"} | {
     "geoid": "U", "components": "U", "removals": "U",
 }  # fmt: skip
-LATER = {"verdict": "U"}
+LATER = {"verdict": "U", "position_errors": "U"}
 """Texts that results of older versions do not have, '' there."""
 
 
@@ -149,6 +150,10 @@ def _check_json(archive: Archive, values: dict[str, Any]) -> None:
     removals = _json(archive, "removals", values["removals"] or "[]")
     if not isinstance(removals, list) or not all(_is_record(removal, Removal) for removal in removals):
         raise archive.error("holds no list of parameters that were taken out")
+    if values["position_errors"]:
+        errors = _json(archive, "position_errors", values["position_errors"])
+        if not _is_record(errors, PositionErrors):
+            raise archive.error("holds no record of the errors of positions")
     if not values["components"]:
         return
     content = _json(archive, "components", values["components"])
