@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -9,7 +11,8 @@ from scipy import stats
 from aerotri.conventions import InputError
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.simulation import simulate
-from aerotri.simulation.spec import TerrainSpec
+from aerotri.simulation.navigation import _errors_that_stay
+from aerotri.simulation.spec import GnssSpec, TerrainSpec
 from aerotri.simulation.terrain import make_terrain
 
 DENSE = {"distance_bases": 1.0, "check_points": 60, "sigma_m": [0.02, 0.03, 0.05]}
@@ -186,3 +189,35 @@ def test_a_hill_holds_its_volume():
     z = terrain.height(np.stack([x.ravel(), y.ravel()], axis=1))
     assert z.sum() * 16.0 == pytest.approx(2.0 * np.pi * 50.0**2 * 30.0, rel=1e-6)
     assert terrain.height(np.array([[1020.0, 1990.0]])) == pytest.approx(30.0)
+
+
+def test_errors_that_stay_have_their_size_and_time():
+    """Correlation ρ = exp(−Δt/τ) from exposure to exposure, σ throughout, and a new beginning every day."""
+    n = 4000
+    flown = SimpleNamespace(time=2.0 * np.arange(n), day=np.repeat(["1", "2"], n // 2))
+    flown = type("Flown", (SimpleNamespace,), {"__len__": lambda self: n})(**vars(flown))
+    spec = GnssSpec(sigma_m=(0.01, 0.01, 0.01), correlated_sigma_m=(0.1, 0.2, 0.3), correlation_time_s=10.0)
+    errors = _errors_that_stay(spec, flown, np.random.default_rng(1))
+    np.testing.assert_allclose(errors.std(axis=0), [0.1, 0.2, 0.3], rtol=0.15)
+    scaled = errors / [0.1, 0.2, 0.3]
+    neighbours = np.mean(scaled[1:] * scaled[:-1]) / np.mean(scaled**2)
+    assert abs(neighbours - np.exp(-0.2)) < 0.05
+    flown.day = np.arange(n).astype(str)
+    alone = _errors_that_stay(spec, flown, np.random.default_rng(1)) / [0.1, 0.2, 0.3]
+    assert abs(np.mean(alone[1:] * alone[:-1])) < 0.03
+
+
+def test_errors_that_stay_leave_the_other_random_numbers_alone(small_spec):
+    gnss = {"sigma_m": [0.02, 0.02, 0.03]}
+    plain, other = (
+        simulate(small_spec(gnss=given), 3)[0]
+        for given in (gnss, gnss | {"correlated_sigma_m": [0.0, 0.0, 0.5], "correlation_time_s": 20.0})
+    )
+    np.testing.assert_array_equal(plain.gnss_ins.xyz[:, :2], other.gnss_ins.xyz[:, :2])
+    np.testing.assert_array_equal(plain.image_points.xy, other.image_points.xy)
+    assert np.std(other.gnss_ins.xyz[:, 2] - plain.gnss_ins.xyz[:, 2]) > 0.05
+
+
+def test_errors_that_stay_need_a_time(small_spec):
+    with pytest.raises(InputError, match="correlation_time_s"):
+        small_spec(gnss={"sigma_m": [0.02, 0.02, 0.03], "correlated_sigma_m": [0.1, 0.1, 0.1]})

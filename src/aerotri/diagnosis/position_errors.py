@@ -6,6 +6,7 @@ from aerotri.diagnosis.finding import Finding
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.position_errors import PositionErrors
 
+NOISE = 'noise_factor = "estimated"'
 SETTING = 'correlated = "on" in [gnss] of block.toml'
 
 
@@ -15,18 +16,25 @@ def position_errors_in_words(errors: PositionErrors | None) -> str:
         return ""
     if errors.counts:
         return _of_model(errors)
-    if errors.neighbours_agree:
+    tested, alike = errors.likelihood_ratio == errors.likelihood_ratio, f"correlation {errors.neighbours:.2f}"
+    if not tested and not errors.neighbours_agree:
+        return ""
+    if not tested:
         return (
-            f"GNSS positions of neighbouring photographs have errors in common (correlation {errors.neighbours:.2f}; "
-            f"by chance with a probability of {_probability(errors.neighbours_p)}). The adjustment takes them for "
-            f"independent, and its σ are too small. Set {SETTING}"
+            f"GNSS positions of neighbouring photographs have errors in common ({alike}; by chance with a probability "
+            f"of {_probability(errors.neighbours_p)}). The adjustment takes them for independent, and σ may be "
+            f"too small. Set {SETTING}"
         )
-    if errors.likelihood_ratio == errors.likelihood_ratio:
-        return (
-            "GNSS positions show no errors that stay from photograph to photograph (by chance with a probability of "
-            f"{_probability(errors.p)}): they were adjusted as independent"
-        )
-    return ""
+    said = (
+        "GNSS positions show no errors that stay from photograph to photograph beside the noise that is stated (by "
+        f"chance with a probability of {_probability(errors.p)}): they were adjusted as independent"
+    )
+    if not errors.neighbours_agree:
+        return said
+    return (
+        f"{said}. Yet the residuals of neighbours are alike ({alike}): the stated σ are larger than the errors that "
+        f"the flight shows. {NOISE} estimates both"
+    )
 
 
 def _of_model(errors: PositionErrors) -> str:

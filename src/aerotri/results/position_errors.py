@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 
 NAN = float("nan")
+CHECK_LEVEL = 0.001
+"""Probability with which white noise is taken for residuals that are alike: the test is made in every block with
+positions."""
 
 
 @dataclass(frozen=True)
@@ -20,8 +23,8 @@ class PositionErrors:
     source : 'given' or 'estimated' where such errors are part of the model, '' where they are not.
     plan_m, height_m : their σ, m, σ̂0 included. time : after which they have fallen to 37 %, in `time_unit`.
     noise_factor_plan, noise_factor_height : of the σ of single positions in the table.
-    likelihood_ratio : gain of −2 ln L by such errors over white noise of any larger size. p : probability of such a
-        gain by white noise, level : below which they are part of the model.
+    likelihood_ratio : gain of −2 ln L by such errors over white noise alone, not smaller than stated. p : probability
+        of such a gain by white noise, level : below which they are part of the model.
     neighbours : correlation of the residuals of neighbouring exposures, beyond what the adjustment itself makes;
         tested where such errors are not part of the model. neighbours_p : probability of such a correlation by white
         noise.
@@ -54,7 +57,7 @@ class PositionErrors:
     @property
     def neighbours_agree(self) -> bool:
         """Whether residuals of neighbours are alike beyond chance though the model takes them for independent."""
-        return self.neighbours_p < self.level
+        return self.neighbours_p < CHECK_LEVEL
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON; None for what is not known."""

@@ -16,7 +16,7 @@ from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.system import build_system
 from aerotri.observations.block import GnssSettings
 from aerotri.quantiles import chi_square_exceedance
-from aerotri.results.position_errors import PositionErrors
+from aerotri.results.position_errors import CHECK_LEVEL, PositionErrors
 from aerotri.statistics.summarise import count_observations
 from aerotri.strategies.position_likelihood import (
     ErrorModel,
@@ -29,8 +29,6 @@ from aerotri.strategies.position_likelihood import (
 
 LEVEL = 0.01
 """Probability with which white noise alone is taken for errors that stay."""
-CHECK_LEVEL = 0.001
-"""The same for the warning of an adjustment without such errors: it is given in every block with positions."""
 MOST_EXPOSURES = 400
 """Exposures that the estimate looks at [C]: in larger blocks runs of neighbours; σ is then known to some 10 %."""
 MOST_CHECKED = 150
@@ -157,16 +155,15 @@ def position_errors_of(
         found = found or PositionErrors(source="given", time=settings.correlation_time_s or float("nan"))
         sigma = settings.correlated_sigma_m
         axes = sum(s > 0.0 for s in sigma)
-        size = {"plan_m": sigma0 * float(np.hypot(*sigma[:2])) / np.sqrt(2.0), "height_m": sigma0 * sigma[2]}
+        size = {"plan_m": sigma0 * float(np.hypot(*sigma[:2]) / np.sqrt(2.0)), "height_m": sigma0 * sigma[2]}
         return replace(found, **counts, **size, nodes=shared.kinds.count(KIND) // axes)
     found = replace(found or PositionErrors(), **counts)
-    if found.likelihood_ratio == found.likelihood_ratio:
-        return found
     if len(exposures) < FEWEST:
         return replace(found, reason=f"fewer than {FEWEST} photographs have positions")
     reduced = ReducedToPositions.of(system, solution, factor, MOST_CHECKED)
     correlation, p = (float("nan"), float("nan")) if reduced is None else neighbours(reduced)
-    return replace(found, neighbours=correlation, neighbours_p=p, level=CHECK_LEVEL)
+    tested = found.likelihood_ratio == found.likelihood_ratio
+    return replace(found, neighbours=correlation, neighbours_p=p, level=found.level if tested else CHECK_LEVEL)
 
 
 def neighbours(reduced: ReducedToPositions) -> tuple[float, float]:
