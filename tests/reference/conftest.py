@@ -16,6 +16,38 @@ from rendered_photographs import Lists, fly, write_gcp_list, write_positions
 from small_blocks import with_adjustment
 from ten_photographs import ten_photographs
 
+RIGGED = """
+name = "rigged"
+[camera.nadir]
+size_px = [6000, 4000]
+pixel_um = 4.0
+focal_length_mm = 25.0
+[camera.side]
+size_px = [6000, 4000]
+pixel_um = 4.0
+focal_length_mm = 35.0
+[flight]
+gsd_m = 0.1
+strips = 2
+images_per_strip = 4
+end_lap = 0.7
+side_lap = 0.5
+attitude_sigma_deg = [1.0, 1.0, 2.0]
+[tie_points]
+per_image = 40
+probability = 0.9
+sigma_um = 2.0
+[control]
+distance_bases = 3.0
+[start_values]
+kind = "perturbed"
+[rig.frame]
+reference = "nadir"
+[rig.frame.camera.side]
+position_m = [0.05, 0.0, 0.02]
+rotation_deg = [0.0, 30.0, 90.0]
+position_sigma_m = [0.005, 0.005, 0.005]
+"""
 TINY = """
 name = "tiny"
 [camera.cam]
@@ -99,6 +131,9 @@ def _written(folder: Path) -> Written:
     (folder / "tiny.toml").write_text(TINY)
     tiny = run("simulate", folder / "tiny.toml", "--render", "--seed", "3", out="tiny")
     result = run("adjust", tiny, "--no-plots", out="result")
+    (folder / "rigged.toml").write_text(RIGGED)
+    rigged = run("simulate", folder / "rigged.toml", "--seed", "3", out="rigged")
+    of_rig = run("adjust", rigged, "--no-plots", out="rig_result")
     photographs = tiny / "photographs"
     pairs = run("dtm", result, photographs, "--interval", "20", "--pairs", out="dtm")
     run("demcor", result, pairs / "dsm.tif", "--models", pairs / "model.tif", out="corrected/NAME.tif")
@@ -120,11 +155,12 @@ def _written(folder: Path) -> Written:
     run("predict picket-interval", "--pilot", result, "--photographs", photographs)
     project = _project(run)
     places = {
-        "block folder": (tiny, folder / "plain", project / "block"), "result of adjust": (first, second, result),
+        "block folder": (tiny, folder / "plain", project / "block"), "result of adjust": (first, second, result, of_rig),
         "folder of compare-parameters": (sets,), "folder of halves": (halves,), "folder of deform": (model, whole),
         "folder of demcor": (folder / "corrected",), "folder of imgeo": (imgeo,), "folder of crosscheck": (checked,),
         "folder of dtm": (pairs, project / "dtm"), "folder of compare": (compared,),
-        "folder of volume": (project / "volume",), "truth of simulate": (tiny / "truth",),
+        "folder of volume": (project / "volume",),
+        "truth of simulate": (tiny / "truth", rigged / "truth"),
         "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),
         "control_marks of tiepoints": (project / "block" / "control_marks",), "folder of run": (project,),
         "folder of parameters": (folder / "drawn",),

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, eigh
 from scipy.sparse import csr_array, vstack
 
-from aerotri.adjustment.datum import FOLLOWING, FREEDOMS, motions_of_images, motions_of_points
+from aerotri.adjustment.datum import FOLLOWING, FREEDOMS, motions_of_images, motions_of_points, rig_motions
 from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
 from aerotri.adjustment.null_space import NOT_DETERMINED
 from aerotri.adjustment.unknowns import State, Unknowns
@@ -58,6 +58,7 @@ class _Motions:
 
     place : (s,) column of a shared parameter that may follow, after the seven motions; −1 of the others.
     seen : (P,), active : (n,) bool, with a ray or, of points, a condition.
+    arms : (r, 7) what arms of rigid rigs that are held or observed notice.
     """
 
     images: np.ndarray
@@ -66,6 +67,7 @@ class _Motions:
     place: np.ndarray
     seen: np.ndarray
     active: np.ndarray
+    arms: np.ndarray
 
     @property
     def count(self) -> int:
@@ -114,15 +116,17 @@ def _motions(u: Unknowns, state: State) -> _Motions:
     used = (u.rays.inv_sigma > 0.0).any(axis=1)
     seen = (np.add.reduceat(used, u.rays.start[:-1], dtype=np.int64) > 0) | (u.kept >= 0)
     active = np.bincount(u.rays.image[used], minlength=len(u.images)) > 0
+    if u.rigging is not None:
+        active = np.bincount(u.rigging.lead[active], minlength=len(u.images))[u.rigging.lead] > 0
     middle = np.median(state.points[seen], axis=0) if seen.any() else np.zeros(3)
     points, images = motions_of_points(state.points - middle), motions_of_images(state.centre - middle)
     images[~active] = 0.0
-    shared = np.zeros((len(u.shared), 7))
+    shared, noticing = rig_motions(u, state)
     shared[u.kept_columns] = points[u.kept_rows]
     follows = np.isin(np.array(u.shared.kinds, dtype=object), FOLLOWING)
     place = np.where(follows, 6 + np.cumsum(follows), -1)
     images[:, 3:] = np.linalg.solve(u.turn(state), images[:, 3:])
-    return _Motions(images, points, shared, place, seen, active)
+    return _Motions(images, points, shared, place, seen, active, noticing)
 
 
 def _directions(motions: _Motions, size: int) -> np.ndarray:
@@ -176,6 +180,7 @@ def _rows(system: NormalSystem, state: State, motions: _Motions, diagonal: np.nd
         weight[known][:, None] * motions.points[known],
         strength[:3].max() * motions.points[held],
         np.where(strength > 0.0, strength, 1.0)[np.nonzero(held_element)[1], None] * motions.images[held_element],
+        motions.arms,
     ]
     of_motions = np.concatenate(moved)
     beside = np.zeros((len(of_motions), motions.count - 7))

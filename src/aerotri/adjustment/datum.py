@@ -76,9 +76,11 @@ def free_motions(unknowns: Unknowns, extras: Sequence[ExtraObservations], state:
     s = len(unknowns.shared)
     g_shared = np.zeros((s, 7))
     g_shared[unknowns.kept_columns] = motions_of_points(state.points)[unknowns.kept_rows]
+    arms, noticing = rig_motions(unknowns, state)
+    g_shared += arms
     along = [k for k in range(s) if unknowns.shared.kinds[k] in FOLLOWING and np.isinf(unknowns.shared.sigma[k])]
     g_images = motions_of_images(state.centre)
-    noticed = [np.zeros((0, 7 + len(along)))]
+    noticed = [np.concatenate([noticing, np.zeros((len(noticing), len(along)))], axis=1)]
     for extra in extras:
         rows = extra.rows(state.centre, state.rotation, state.shared)
         of_shared = np.zeros((*rows.gap.shape, s))
@@ -103,6 +105,30 @@ def free_motions(unknowns: Unknowns, extras: Sequence[ExtraObservations], state:
     shared = g_shared @ (left[:, real] * unit[:7, None])
     shared[along] += null[7:] @ combined
     return FreeMotions(left[:, real] * unit[:7, None], shared)
+
+
+def rig_motions(unknowns: Unknowns, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """What the seven motions do to the mountings on rigid rigs, and what notices them there.
+
+    A rig is turned and moved as a whole; with the scale of the block its arms grow. An arm that is held or observed
+    gives the block its scale.
+
+    Returns
+    -------
+    (s, 7) motions of the shared parameters, and (r, 7) rows of arms that are held, over 1 m, or observed, over σ.
+    """
+    moved, rows = np.zeros((len(unknowns.shared), 7)), [np.zeros((0, 7))]
+    if unknowns.rigging is not None:
+        mountings = unknowns.rigging.mountings
+        columns, arm = mountings.columns[:, :3].ravel(), mountings.values(state.shared)[:, :3].ravel()
+        free = columns >= 0
+        moved[columns[free], 6] = arm[free]
+        sigma = np.ones(len(columns))
+        sigma[free] = np.array(unknowns.shared.sigma)[columns[free]]
+        row = np.zeros((len(columns), 7))
+        row[:, 6] = arm / sigma
+        rows.append(row[arm / sigma != 0.0])
+    return moved, np.concatenate(rows)
 
 
 def motions_of_points(points: np.ndarray) -> np.ndarray:
@@ -182,6 +208,7 @@ def restore_datum(unknowns: Unknowns, state: State, reference: np.ndarray) -> St
             shared=state.shared + unknowns.motions.shared @ share,
         )
         state.shared[unknowns.kept_columns] = state.points[unknowns.kept_rows]
+        state = unknowns.with_followers(state)
         if np.abs(g @ share).max(initial=0.0) < 1e-9:
             break
     return state

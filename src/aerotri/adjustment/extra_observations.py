@@ -17,8 +17,9 @@ from aerotri.conventions import InputError
 from aerotri.functional_model.constraints import NO_BASIS, Constraint, ConstraintObservations, flat_basis
 from aerotri.functional_model.observed_unknowns import AttitudeObservations, CentreObservations
 from aerotri.functional_model.rotation import logarithm, rotation_from_angles
-from aerotri.observations import Prior
+from aerotri.observations import Block, Prior
 from aerotri.observations.block import Constraints, GnssIns
+from aerotri.observations.rigs import station_places
 
 LARGE_BORESIGHT = 0.2
 """Boresight (rad) beyond which the mean of the start values is taken out first, so that what is estimated is small."""
@@ -74,8 +75,28 @@ def _used_rows(observed: GnssIns, unknowns: Unknowns, values: np.ndarray) -> tup
     """Rows of gnss_ins with a value whose photograph takes part, and the photographs' rows."""
     row = np.full(len(unknowns.block.images), -1)
     row[unknowns.images] = np.arange(len(unknowns.images))
-    used = np.flatnonzero((row[observed.image] >= 0) & np.isfinite(values).any(axis=1))
+    there = (row[observed.image] >= 0) & np.isfinite(values).any(axis=1)
+    used = np.flatnonzero(there & once_a_station(unknowns.block, observed, there))
     return used, row[observed.image[used]]
+
+
+def once_a_station(block: Block, observed: GnssIns, there: np.ndarray) -> np.ndarray:
+    """(g,) bool, which rows of gnss_ins count on rigs: one a station, that of the reference camera where it has one.
+
+    Parameters
+    ----------
+    there : (g,) bool, rows that have a value.
+    """
+    places = station_places(block)
+    counts = np.ones(len(observed), dtype=bool)
+    if not places:
+        return counts
+    lead, follows = places.lead[observed.image], places.mounting[observed.image] >= 0
+    taken = set(observed.image[there & ~follows].tolist())
+    for k in np.flatnonzero(there & follows).tolist():
+        counts[k] = lead[k] not in taken
+        taken.add(lead[k])
+    return counts
 
 
 def _times(observed: GnssIns, used: np.ndarray, strips: np.ndarray, wanted: str) -> np.ndarray:

@@ -26,6 +26,8 @@ from aerotri.adjustment.kernel_records import (
 )
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.position_errors import KIND, PositionPrior
+from aerotri.adjustment.rig_reduction import RigFactor, RigReduction
+from aerotri.adjustment.rigging import Chain
 from aerotri.adjustment.robust import Estimator, normalised_lengths
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, Symbolic
 from aerotri.adjustment.unknowns import State, Step, Unknowns
@@ -64,10 +66,12 @@ class NormalEquations(RightSide):
     ----------
     matrix : of photographs and shared parameters.
     diagonal : (6·n + s,) of the same unknowns before the points are eliminated: what rounding is measured against.
+    chain : of rigid rigs, what leads from stations and mountings to the photographs; None without.
     """
 
     matrix: BorderedMatrix
     diagonal: np.ndarray
+    chain: Chain | None = None
 
 
 class NormalSystem:
@@ -86,7 +90,13 @@ class NormalSystem:
         self._bounds = chunk_bounds(counts * (counts + 4.0))
         self._max_rays = int(counts.max(initial=1))
         n, s = len(unknowns.images), len(unknowns.shared)
-        self.symbolic = Symbolic(n, unknowns.block_row, unknowns.block_col, position, s)
+        pattern = unknowns.block_row, unknowns.block_col
+        self._reduction = None if unknowns.rigging is None else RigReduction(unknowns.rigging, *pattern)
+        if self._reduction is None:
+            self.symbolic = Symbolic(n, *pattern, position, s)
+        else:
+            leads, pattern = self._reduction.leads, (self._reduction.block_row, self._reduction.block_col)
+            self.symbolic = Symbolic(len(leads), *pattern, position[leads], s)
         # errors of positions stand last in the list and act on no ray
         of_rays = s - unknowns.shared.kinds.count(KIND)
         self._sums = [ChunkSums(unknowns, first, last, of_rays) for first, last in self._bounds]
@@ -177,9 +187,13 @@ class NormalSystem:
         diagonal = np.arange(6)
         blocks[: len(u.images), diagonal, diagonal] *= 1.0 + damping
         corner[np.diag_indices_from(corner)] *= 1.0 + damping
+        chain = u.chain(state)
+        if chain is not None and u.rigging is not None:
+            u.rigging.add_squares(chain, squares, squares_shared)
         side = self._summed(state, rows, outcomes, problem)
         whole = np.concatenate([squares.ravel(), squares_shared]) * (1.0 + damping)
-        return NormalEquations(**side.__dict__, matrix=BorderedMatrix(blocks, border, corner), diagonal=whole)
+        matrix = BorderedMatrix(blocks, border, corner)
+        return NormalEquations(**side.__dict__, matrix=matrix, diagonal=whole, chain=chain)
 
     def right_side(self, state: State, estimator: Estimator) -> RightSide:
         """The right side of the undamped equations at `state` and the cost there: a third of the work of `assemble`."""
@@ -210,8 +224,9 @@ class NormalSystem:
             pull = prior.weight @ state.shared[prior.columns]
             right_shared[prior.columns] -= pull
             cost += float(state.shared[prior.columns] @ pull)
+        whole, chain = np.concatenate([right.ravel(), right_shared]), self.unknowns.chain(state)
         return RightSide(
-            right=np.concatenate([right.ravel(), right_shared]),
+            right=whole if self._reduction is None or chain is None else self._reduction.on_leads(whole, chain),
             cost=float(cost + np.sum(self._prior_weight * gap**2)),
             point_decrement=float(sum(o[1] for o in outcomes)),
             residual=problem.weighting.residual,
@@ -359,7 +374,11 @@ class NormalSystem:
         photograph that loses all its rays is held where it is.
         """
         u, other = self.unknowns, copy(self)
-        empty = np.bincount(u.rays.image[~rays_off], minlength=len(u.images)) == 0
+        carrier = u.rays.image if u.rigging is None else u.rigging.lead[u.rays.image]
+        empty = np.bincount(carrier[~rays_off], minlength=len(u.images)) == 0
+        if u.rigging is not None:
+            # what follows is held by its station
+            empty[u.rigging.followers] = False
         inv_sigma = np.where(rays_off[:, None], 0.0, u.rays.inv_sigma)
         weight = np.where(control_off[:, None], 0.0, u.prior_weight)
         rays, eo_free = replace(u.rays, inv_sigma=inv_sigma), u.eo_free & ~empty[:, None]
@@ -370,12 +389,25 @@ class NormalSystem:
         other._prior_weight[u.kept_columns[off]] = 0.0
         return other
 
-    def factorise(self, equations: NormalEquations) -> Factor:
+    def factorise(self, equations: NormalEquations) -> Factor | RigFactor:
         """Factor of the reduced matrix; valid until the next one."""
-        return self.symbolic.factorise(equations.matrix)
+        return self.factorise_like(equations, equations.matrix)
+
+    def factorise_like(self, equations: NormalEquations, matrix: BorderedMatrix) -> Factor | RigFactor:
+        """Factor of another matrix over the unknowns of some equations; valid until the next one."""
+        if self._reduction is None or equations.chain is None:
+            return self.symbolic.factorise(matrix)
+        reduced = self._reduction.reduced(matrix, equations.chain)
+        return RigFactor(self.symbolic.factorise(reduced), self._reduction, equations.chain)
+
+    def own_blocks(self, equations: NormalEquations) -> np.ndarray:
+        """(n, 6, 6) of the photographs, or of the stations where there are rigid rigs, all others known."""
+        if self._reduction is None or equations.chain is None:
+            return equations.matrix.blocks[: len(self.unknowns.images)].copy()
+        return self._reduction.reduced(equations.matrix, equations.chain).blocks[: len(self._reduction.leads)]
 
     def solve_sides(
-        self, state: State, factor: Factor, sides: np.ndarray, estimator: Estimator,
+        self, state: State, factor: Factor | RigFactor, sides: np.ndarray, estimator: Estimator,
         shared_sides: np.ndarray | None = None,
     ):  # fmt: skip
         """Columns Q·b for right sides b that act on the points, and on the shared parameters where given.

@@ -82,7 +82,7 @@ def _regularised(system: NormalSystem, equations: NormalEquations) -> Factor:
     blocks, corner = matrix.blocks.copy(), matrix.corner.copy()
     blocks[:n, diagonal, diagonal] += REGULARISATION * equations.diagonal[: 6 * n].reshape(n, 6)
     corner[np.diag_indices_from(corner)] += REGULARISATION * equations.diagonal[6 * n :]
-    return system.symbolic.factorise(BorderedMatrix(blocks, matrix.border, corner))
+    return system.factorise_like(equations, BorderedMatrix(blocks, matrix.border, corner))
 
 
 def _weak_directions(factor: Factor, length: np.ndarray, count: int, also: np.ndarray) -> np.ndarray:

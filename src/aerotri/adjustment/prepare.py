@@ -8,8 +8,8 @@ import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.ray_status import ray_status
+from aerotri.adjustment.rig_start import rig_start_values
 from aerotri.adjustment.robust import STAGES
-from aerotri.adjustment.start_values import start_values
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import (
     ORIENTATION_ELEMENTS,
@@ -21,6 +21,7 @@ from aerotri.conventions import InputError, counted
 from aerotri.functional_model.atmosphere import corrected_image_points
 from aerotri.observations import Block
 from aerotri.observations.names import partnerless_in_words
+from aerotri.observations.rigs import station_fault
 
 
 class NoStartValuesError(InputError):
@@ -51,7 +52,7 @@ def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
     """
     check_settings(block)
     block, off = with_edits(block)
-    start = start_values(block, given_points)
+    start = rig_start_values(block, given_points)
     if not np.isfinite(start.centre).all(axis=1).any():
         raise NoStartValuesError(
             "no photograph has start values, and none sees four known points",
@@ -103,6 +104,9 @@ def check_settings(block: Block) -> None:
             'give datum_fixed = ["PHOTOGRAPH:X0", …]',
             file="block.toml",
         )
+    fault = station_fault(block.images, block.cameras, block.rigs)
+    if fault is not None:
+        raise InputError(fault.message, fault.remedy, file="images.csv")
     names = set(block.images.names.tolist())
     for image, element in s.adjustment.datum_fixed:
         if image not in names or element not in ORIENTATION_ELEMENTS:

@@ -80,7 +80,7 @@ def start_values(block: Block, given_points: np.ndarray | None = None) -> StartV
     for tolerance in RESECTION_TOLERANCES:
         while True:
             intersect_into(points, block, directions, rotation, centre)
-            if not _resect_into(rotation, centre, points, block, directions, tolerance):
+            if not resect_into(rotation, centre, points, block, directions, tolerance):
                 break
             points = known.copy()
             intersect_into(points, block, directions, rotation, centre)
@@ -324,7 +324,7 @@ def intersect(
     return xyz
 
 
-def _resect_into(
+def resect_into(
     rotation: np.ndarray, centre: np.ndarray, points: np.ndarray, block: Block, directions: Directions, tolerance: float
 ) -> bool:
     """Resect photographs that see enough known points, those that see most of them first; whether any was added."""

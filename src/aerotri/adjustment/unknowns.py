@@ -12,7 +12,9 @@ import numpy as np
 
 from aerotri.adjustment import _pair_kernels
 from aerotri.adjustment.kernel_records import RayArrays
+from aerotri.adjustment.rigging import Chain, Rigging, rigging_of, with_leads
 from aerotri.adjustment.shared_parameters import LensTable, SharedList, lens_table, linear_columns
+from aerotri.conventions import InputError
 from aerotri.functional_model.rotation import (
     angles_from_rotation,
     exponential,
@@ -107,6 +109,7 @@ class Unknowns:
     kept : (P,) first of the three shared parameters that stand for a point which is not eliminated, −1 for the others.
     motions : what is free in a free block.
     pair_start, pair_block, block_row, block_col : pattern of the reduced normal matrix.
+    rigging : which photographs follow others on a rigid rig; None where none does.
     """
 
     block: Block
@@ -128,11 +131,19 @@ class Unknowns:
     pair_block: np.ndarray
     block_row: np.ndarray
     block_col: np.ndarray
+    rigging: Rigging | None = None
 
     @property
     def count(self) -> int:
         """Number of unknowns."""
-        return int(self.eo_free.sum() + self.point_free.sum() + len(self.shared))
+        followers = 0 if self.rigging is None else len(self.rigging.followers)
+        return int(self.eo_free.sum() - 6 * followers + self.point_free.sum() + len(self.shared))
+
+    def chain(self, state: State) -> Chain | None:
+        """What the orientations of photographs at `state` are of stations and mountings; None without rigid rigs."""
+        if self.rigging is None:
+            return None
+        return self.rigging.chain(state.rotation, state.shared, self.turn(state), self.eo_free)
 
     def interior(self, state: State) -> np.ndarray:
         """(L, 15) interior elements and lens parameters at `state`."""
@@ -159,13 +170,22 @@ class Unknowns:
                 angles + step.images[self.by_angles, 3:], self.block.rotation
             )
         return self.with_kept_points(
-            State(
-                centre=state.centre + step.images[:, :3],
-                rotation=rotation,
-                points=state.points + step.points,
-                shared=state.shared + step.shared,
+            self.with_followers(
+                State(
+                    centre=state.centre + step.images[:, :3],
+                    rotation=rotation,
+                    points=state.points + step.points,
+                    shared=state.shared + step.shared,
+                )
             )
         )
+
+    def with_followers(self, state: State) -> State:
+        """The state with the photographs of rigid rigs where their stations and mountings put them."""
+        if self.rigging is None:
+            return state
+        centre, rotation = self.rigging.placed(state.centre, state.rotation, state.shared)
+        return replace(state, centre=centre, rotation=rotation)
 
     @property
     def point_held(self) -> np.ndarray:
@@ -231,6 +251,7 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
     lens = lens_table(block, images, shared)
     xy = np.ascontiguousarray(block.image_points.xy[source])
     linear = linear_columns(block, images, ray_image, xy, shared)
+    rigging = rigging_of(block, images, shared, start.centre[images], start.rotation[images])
     pair_start, pair_block, block_row, block_col = _pattern(len(images), row_start, ray_image)
     prior_xyz, prior_weight, held = _control_priors(block, points, start.origin)
     unknowns = Unknowns(
@@ -262,16 +283,18 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
         pair_block=pair_block,
         block_row=block_row,
         block_col=block_col,
+        rigging=rigging,
     )
     xyz = np.where(held, prior_xyz, start.points[points])
     state = State(start.centre[images].copy(), start.rotation[images].copy(), xyz, np.array(shared.start))
-    return unknowns, state
+    return unknowns, unknowns.with_followers(state)
 
 
 def _sort_rays(block: Block, active: np.ndarray):
     """Active rays by point, points by their first photograph: neighbours in memory are neighbours in the air."""
     rows = np.flatnonzero(active)
-    images, ray_image = np.unique(block.image_points.image[rows], return_inverse=True)
+    images = with_leads(block, np.unique(block.image_points.image[rows]))
+    ray_image = np.searchsorted(images, block.image_points.image[rows])
     points, ray_point = np.unique(block.image_points.point[rows], return_inverse=True)
     first_image = np.full(len(points), len(images))
     np.minimum.at(first_image, ray_point, ray_image)
@@ -342,6 +365,12 @@ def hold_orientation(unknowns: Unknowns, held: tuple[tuple[str, str], ...]) -> U
     row = {str(name): k for k, name in enumerate(unknowns.block.images.names[unknowns.images])}
     for image, element in held:
         if image in row:
+            if unknowns.rigging is not None and unknowns.rigging.mounting[row[image]] >= 0:
+                raise InputError(
+                    f"datum_fixed holds '{image}:{element}', but the photograph follows another one on a rigid rig",
+                    "hold elements of photographs of the reference camera",
+                    file="block.toml",
+                )
             column = ORIENTATION_ELEMENTS.index(element)
             eo_free[row[image], column] = False
             by_angles[row[image]] |= column >= 3

@@ -24,6 +24,7 @@ from aerotri.adjustment.kernel_records import Inverse
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.ray_status import RayStatus, with_lonely_rays, with_weak_words
+from aerotri.adjustment.rigging import Rigging
 from aerotri.adjustment.robust import Estimator, normalised_lengths, scale_of
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, NotPositiveDefiniteError
@@ -182,12 +183,24 @@ def _scale(system: NormalSystem, equations: NormalEquations, estimator: Estimato
 def loose_alone(system: NormalSystem, state: State, equations: NormalEquations) -> np.ndarray:
     """Rows of the photographs that would be loose if all others were known; none where it is the datum."""
     n = len(system.unknowns.images)
+    if system.unknowns.rigging is not None:
+        return _loose_stations(system, state, equations, system.unknowns.rigging)
     normal = equations.matrix.blocks[:n] / _unit_products(system.unknowns, state)
     held = ~system.unknowns.eo_free
     diagonal = np.arange(6)
     normal[:, diagonal, diagonal] = np.where(held, HELD, normal[:, diagonal, diagonal])
     smallest = np.linalg.eigvalsh(normal)[:, 0]
     return _unless_many(np.flatnonzero(smallest * LOOSE**2 < 1.0), n)
+
+
+def _loose_stations(system: NormalSystem, state: State, equations: NormalEquations, rigging: Rigging) -> np.ndarray:
+    """As `loose_alone`, of the photographs of a station on a rigid rig together: what follows adds to what leads."""
+    u, leads = system.unknowns, rigging.leads
+    normal = system.own_blocks(equations) / _unit_products(u, state, rigging.lead)[leads]
+    diagonal = np.arange(6)
+    normal[:, diagonal, diagonal] = np.where(~u.eo_free[leads], HELD, normal[:, diagonal, diagonal])
+    loose = leads[np.linalg.eigvalsh(normal)[:, 0] * LOOSE**2 < 1.0]
+    return _unless_many(np.flatnonzero(np.isin(rigging.lead, loose)), len(u.images))
 
 
 def loose_together(system: NormalSystem, state: State, equations: NormalEquations) -> np.ndarray:
@@ -203,7 +216,8 @@ def _regularised_inverse(system: NormalSystem, equations: NormalEquations) -> In
     blocks[:n, diagonal, diagonal] *= 1.0 + REGULARISATION
     corner[np.diag_indices_from(corner)] *= 1.0 + REGULARISATION
     try:
-        return system.symbolic.factorise(BorderedMatrix(blocks, matrix.border, corner)).inverse_on_pattern()
+        regular = system.factorise_like(equations, BorderedMatrix(blocks, matrix.border, corner))
+        return regular.inverse_on_pattern()
     except NotPositiveDefiniteError:
         return None
 
@@ -261,15 +275,20 @@ def _worst(covariance: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, -1], 0.0)) if len(covariance) else np.zeros(0)
 
 
-def _unit_products(unknowns: Unknowns, state: State) -> np.ndarray:
+def _unit_products(unknowns: Unknowns, state: State, carrier: np.ndarray | None = None) -> np.ndarray:
     """(n, 6, 6) by which cofactors are multiplied, normals divided, to count positions in distances of the points.
 
     The distance of a photograph is the harmonic mean of its rays' lengths, on which points far away have no influence.
+
+    Parameters
+    ----------
+    carrier : (n,) the photograph that the rays of every photograph count for; itself where None.
     """
     rays, n = unknowns.rays, len(unknowns.images)
+    image = rays.image if carrier is None else carrier[rays.image]
     point = np.repeat(np.arange(len(unknowns.points)), np.diff(rays.start))
     reach = np.maximum(np.linalg.norm(state.points[point] - state.centre[rays.image], axis=1), 1e-300)
-    nearness = np.bincount(rays.image, 1.0 / reach, n) / np.maximum(np.bincount(rays.image, minlength=n), 1)
+    nearness = np.bincount(image, 1.0 / reach, n) / np.maximum(np.bincount(image, minlength=n), 1)
     unit = np.ones((n, 6))
     unit[:, :3] = nearness[:, None]
     return unit[:, :, None] * unit[:, None, :]

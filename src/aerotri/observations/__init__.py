@@ -24,9 +24,10 @@ from aerotri.observations.block import (
     ImagePoints,
     Images,
     InsSettings,
-    Prior,
     Settings,
 )
+from aerotri.observations.prior import Prior
+from aerotri.observations.rigs import Mounting, Rig
 
 __all__ = [
     "AdjustmentSettings",
@@ -40,6 +41,8 @@ __all__ = [
     "ImagePoints",
     "Images",
     "InsSettings",
+    "Mounting",
     "Prior",
+    "Rig",
     "Settings",
 ]

@@ -13,28 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.observations.prior import Prior
+from aerotri.observations.rigs import Rig
+
 INTERIOR_ELEMENTS = ("focal_length_mm", "x0_mm", "y0_mm")
 BROWN_NAMES = ("K1", "K2", "K3", "P1", "P2", "b1", "b2")
 LENS_NAMES = ("k1", "k2", "p1", "p2", "k3")
 INTERIOR_ORIENTATIONS = ("similarity", "affine", "projective")
 EDIT_ACTIONS = ("off", "check", "control")
 CONSTRAINT_KINDS = ("vertical", "horizontal", "height_difference", "distance", "plane", "line")
-
-
-@dataclass(frozen=True)
-class Prior:
-    """What is known of an unknown beforehand: its value, and whether it is held, observed with σ, or free."""
-
-    value: float = 0.0
-    sigma: float | None = None
-    fixed: bool = False
-
-    @property
-    def kind(self) -> str:
-        """'fixed', 'weighted' or 'free'."""
-        if self.fixed:
-            return "fixed"
-        return "free" if self.sigma is None else "weighted"
 
 
 @dataclass(frozen=True)
@@ -363,6 +350,7 @@ class Block:
     points : (N,) str, the names of all points measured or given.
     gnss_ins : None when nothing was observed.
     edits, fiducials, constraints : None when there are none.
+    rigs : cameras on one frame; the column `station` of the images says which photographs belong to one exposure.
     interior_fits : of scanned photographs by index, the `functional_model.interior.FiducialFit` that brought their
         image points from pixels of the scan to the mm that `image_points` holds.
     """
@@ -381,6 +369,7 @@ class Block:
     fiducials: Fiducials | None = None
     constraints: Constraints | None = None
     interior_fits: Mapping[int, Any] = field(default_factory=dict)
+    rigs: tuple[Rig, ...] = ()
 
     @property
     def counts(self) -> dict[str, int]:

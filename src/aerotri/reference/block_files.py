@@ -64,6 +64,21 @@ TRUTH_TABLES = (
         "Gross errors of given control.",
         (POINT, *of_axes("d{}", "number", "Error in {}.", "m")),
     ),
+    (
+        "rigs.csv",
+        "Mountings of the cameras on rigs, where there are any.",
+        (
+            Item("camera", "text", "Name of the camera."),
+            *of_axes("{}", "number", "{} of its projection centre in the frame of the reference camera.", "m", "xyz"),
+            *of_axes(
+                "{}",
+                "number",
+                "Angle {} of R, in X_reference = position + R·X_camera.",
+                "deg",
+                ("omega", "phi", "kappa"),
+            ),
+        ),
+    ),
 )
 RENDERED = (
     Item("photographs[]", "text", "Files of the photographs."),
@@ -129,7 +144,10 @@ RUN_JSON = (
 def block_files() -> tuple[DescribedFile, ...]:
     """The files of simulate, tiepoints, run and parameters, and the rest of a result."""
     return (
-        *(DescribedFile(name, TRUTH, "table", text, items) for name, text, items in TRUTH_TABLES),
+        *(
+            DescribedFile(name, TRUTH, "table", text, items, "with a rig" if name == "rigs.csv" else "")
+            for name, text, items in TRUTH_TABLES
+        ),
         DescribedFile(
             "surface.tif", TRUTH, "raster", "The true ground as a raster of heights, m.", when="with --render"
         ),

@@ -8,11 +8,13 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from aerotri.formats.block.settings_model import BlockModel, PriorModel
+from aerotri.formats.block.settings_model import BlockModel, PriorModel, ThreePriorsModel
 from aerotri.simulation.spec import PriorSpec, SimulationSpec
 
-PRIORS = (PriorModel, PriorSpec)
+PRIORS = (PriorModel, PriorSpec, ThreePriorsModel)
 PRIOR = "{ fixed = false } (free), { value, sigma } (observed) or { fixed = true } (held)"
+
+THREE = "{ value, sigma } (three numbers each; without sigma free), { value, fixed = true } (held)"
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ def _keys(model: type[BaseModel], table: str) -> list[BlockKey]:
             BlockKey(
                 name=path,
                 table=table,
-                kind=_prior(field.annotation) if inner else _kind(field.annotation, field.metadata),
+                kind=_kind_of_key(inner, field),
                 values=_words(field.annotation),
                 default=_written(field.default),
                 required=field.is_required(),
@@ -84,6 +86,12 @@ def _keys(model: type[BaseModel], table: str) -> list[BlockKey]:
             )
         )
     return found
+
+
+def _kind_of_key(inner: type[BaseModel] | None, field: Any) -> str:
+    if inner is ThreePriorsModel:
+        return THREE
+    return _prior(field.annotation) if inner else _kind(field.annotation, field.metadata)
 
 
 def _tables(model: type[BaseModel], table: str) -> list[tuple[str, str]]:

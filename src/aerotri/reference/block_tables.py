@@ -26,7 +26,9 @@ IMAGES = (
     Item(
         "*",
         "text?",
-        "Any other column groups photographs, such as day; name it in adjustment.parameter_groups.",
+        "Any other column groups photographs, such as day; name it in adjustment.parameter_groups. The column station "
+        "names the exposure of a rig: photographs that its cameras took together have the same one. Needed where "
+        "block.toml has a [rig.NAME]; empty: the photograph belongs to no station.",
         optional=True,
     ),
 )

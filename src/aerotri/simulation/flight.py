@@ -55,6 +55,7 @@ class FlownImages:
     planned_centre, centre : (n, 3) m.
     angles : (n, 3) rad, ω, φ, κ in the rotation order of the spec.
     time : (n,) s.
+    station : (n,) str, the exposure of a rig; None without rigs.
     """
 
     names: np.ndarray
@@ -65,6 +66,7 @@ class FlownImages:
     centre: np.ndarray
     angles: np.ndarray
     time: np.ndarray
+    station: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.names)
@@ -95,8 +97,9 @@ def flying_height(spec: FlightSpec, camera: Camera) -> float:
 
 
 def plan_flight(
-    spec: FlightSpec, cameras: Sequence[Camera], ground_m: float, rng: np.random.Generator
-) -> tuple[FlownImages, FlightFrame]:
+    spec: FlightSpec, cameras: Sequence[Camera], ground_m: float, rng: np.random.Generator,
+    leading: Sequence[str] | None = None,
+) -> tuple[FlownImages, FlightFrame]:  # fmt: skip
     """Projection centres and attitudes of all photographs.
 
     Parameters
@@ -105,9 +108,10 @@ def plan_flight(
     cameras : in the order of the spec.
     ground_m : mean level of the ground.
     rng : draws the deviations of the flight from the plan.
+    leading : names of the cameras that the plan is made for; all where None.
     """
-    index = {camera.name: i for i, camera in enumerate(cameras)}
-    used = [_known(index, name, "flight.cameras") for name in spec.cameras] or list(range(len(cameras)))
+    index = {camera.name: i for i, camera in enumerate(cameras) if leading is None or camera.name in leading}
+    used = [_known(index, name, "flight.cameras") for name in spec.cameras] or list(index.values())
     height = flying_height(spec, cameras[used[0]])
     frame = _frame(spec, cameras[used[0]], height)
     _refuse_too_many(spec, frame)
@@ -195,7 +199,9 @@ def _cross_strip(
     index: dict[str, int],
     height: float,
 ) -> _Strip:
-    camera = 0 if cross.camera is None else _known(index, cross.camera, f"flight.cross_strips.{number}.camera")
+    camera = next(iter(index.values()))
+    if cross.camera is not None:
+        camera = _known(index, cross.camera, f"flight.cross_strips.{number}.camera")
     end_lap = spec.end_lap if cross.end_lap is None else cross.end_lap
     base = _base(cameras[camera], height, end_lap)
     count = cross.images or int(np.ceil(2.0 * frame.half_axes[1] / base)) + 1

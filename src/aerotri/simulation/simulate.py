@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from aerotri.observations import (
     AdjustmentSettings,
     Block,
     Control,
+    GnssIns,
     GnssSettings,
     ImagePoints,
     Images,
@@ -27,6 +28,7 @@ from aerotri.simulation.measuring import Imaging, gross_errors, tie_rays
 from aerotri.simulation.navigation import observe_navigation
 from aerotri.simulation.projection import Photographs, Rays, TrueCamera
 from aerotri.simulation.random_streams import stream
+from aerotri.simulation.rigs import reference_cameras, stated_rigs, true_mountings, with_rigs
 from aerotri.simulation.spec import ControlSpec, SimulationSpec
 from aerotri.simulation.terrain import Terrain, make_terrain
 from aerotri.simulation.towers import build_towers, plumb_lines
@@ -74,7 +76,9 @@ def simulate(spec: SimulationSpec, seed: int) -> tuple[Block, Truth]:
     settings = _settings(spec)
     cameras = tuple(true_camera(name, camera) for name, camera in spec.camera.items())
     nominal = tuple(camera.nominal for camera in cameras)
-    flown, frame = plan_flight(spec.flight, nominal, spec.terrain.height_m, stream(seed, "flight"))
+    plan = stream(seed, "flight")
+    planned, frame = plan_flight(spec.flight, nominal, spec.terrain.height_m, plan, reference_cameras(spec))
+    flown, lead = with_rigs(planned, spec, stream(seed, "rigs"))
     imaging = _imaging(spec, cameras, flown, seed)
     terrain = make_terrain(spec.terrain, spec.flight.centre_m, stream(seed, "terrain"))
     scene = _scene(spec, flown, frame, terrain, imaging, seed)
@@ -87,10 +91,11 @@ def simulate(spec: SimulationSpec, seed: int) -> tuple[Block, Truth]:
         points=scene.names,
         image_points=image_points,
         control=control,
-        gnss_ins=observe_navigation(spec.gnss, spec.ins, flown, spec.rotation, stream(seed, "navigation")),
+        gnss_ins=_navigation(spec, planned, lead, seed),
         settings=settings,
         rotation=spec.rotation,
         constraints=None if spec.towers is None else plumb_lines(scene.towers, spec.towers.sigma_m),
+        rigs=stated_rigs(spec, stream(seed, "stated rigs")),
     )
     names, groups, values = _parameters(spec)
     truth = Truth(
@@ -106,8 +111,16 @@ def simulate(spec: SimulationSpec, seed: int) -> tuple[Block, Truth]:
         gross_error_mm=gross,
         control_blunders=wrong_control,
         control_blunder_m=blunders,
+        mountings=true_mountings(spec.rig),
     )
     return block, truth
+
+
+def _navigation(spec: SimulationSpec, planned: FlownImages, lead: np.ndarray, seed: int) -> GnssIns | None:
+    """What GNSS and INS say of the reference photographs, which stand for their stations."""
+    observed = observe_navigation(spec.gnss, spec.ins, planned, spec.rotation, stream(seed, "navigation"))
+    first = np.unique(lead, return_index=True)[1]
+    return None if observed is None else replace(observed, image=first[observed.image])
 
 
 def true_image_errors(spec: SimulationSpec, seed: int) -> dict[tuple[str, str], ImageError]:
@@ -252,6 +265,8 @@ def _images(spec: SimulationSpec, flown: FlownImages, seed: int) -> Images:
         centre = flown.centre + start.position_sigma_m * rng.normal(size=centre.shape)
         angles = flown.angles + np.radians(start.angle_sigma_deg) * rng.normal(size=angles.shape)
     columns = {"day": flown.day} if spec.flight.days else {}
+    if flown.station is not None:
+        columns["station"] = flown.station
     return Images(flown.names, flown.camera, flown.strip, centre, angles, columns)
 
 

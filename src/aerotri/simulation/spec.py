@@ -355,6 +355,47 @@ class AdjustmentSpec(Table):
     parameter_groups: str = key("camera", "As in block.toml.")
 
 
+class MountingSpec(Table):
+    """A camera of a rig in the frame of the reference camera: X_reference = position + R·X_camera."""
+
+    position_m: Vector = key((0.0, 0.0, 0.0), "True projection centre in the frame of the reference camera.", "m")
+    rotation_deg: Vector = key(..., "True angles omega, phi, kappa of R.", "deg")
+    stated_position_m: Vector | None = key(
+        None, "Position that the block states; the true one where it is not given.", "m"
+    )
+    stated_rotation_deg: Vector | None = key(
+        None, "Angles that the block states; the true ones where they are not given.", "deg"
+    )
+    position_sigma_m: tuple[Positive, Positive, Positive] | None = key(
+        None, "Standard deviation of the stated position, which errs by it; without it the position is free.", "m"
+    )
+    rotation_sigma_deg: tuple[Positive, Positive, Positive] | None = key(
+        None, "Standard deviation of the stated angles, which err by it; without it they are free.", "deg"
+    )
+    position_fixed: bool = key(False, "true: the block holds the position.")
+    rotation_fixed: bool = key(False, "true: the block holds the angles.")
+
+    @model_validator(mode="after")
+    def _fixed_or_observed(self) -> MountingSpec:
+        if (self.position_fixed and self.position_sigma_m) or (self.rotation_fixed and self.rotation_sigma_deg):
+            raise ValueError("what is fixed has no σ")
+        return self
+
+
+class RigSpec(Table):
+    """Cameras on one frame that are triggered together; the flight plan is that of the reference camera."""
+
+    reference: Name = key(..., "Camera whose position and rotation are those of the rig.")
+    camera: Annotated[dict[Name, MountingSpec], Field(min_length=1)] = key(
+        ..., "The other cameras, one table [rig.NAME.camera.NAME] each."
+    )
+    constraint: Literal["rigid", "weighted", "off"] = key("rigid", "What the block states, as in block.toml.")
+    play_position_m: NotNegative = key(0.0, "Standard deviation by which a camera moves between exposures.", "m")
+    play_rotation_deg: NotNegative = key(0.0, "Standard deviation by which a camera turns between exposures.", "deg")
+    stated_play_position_m: Positive = key(0.001, "play_position_m that the block states.", "m")
+    stated_play_rotation_deg: Positive = key(0.001, "play_rotation_deg that the block states.", "deg")
+
+
 class SimulationSpec(Table):
     """A simulated block from flight plan to start values."""
 
@@ -380,3 +421,4 @@ class SimulationSpec(Table):
     georeference: GeoreferenceSpec | None = key(None, "Where on Earth the flight takes place; a local block without.")
     photographs: PhotographSpec = key(PhotographSpec(), "How photographs are rendered.")
     adjustment: AdjustmentSpec = key(AdjustmentSpec(), "What block.toml shall say under [adjustment].")
+    rig: dict[Name, RigSpec] = key({}, "Rigs: cameras on one frame, one table [rig.NAME] each.")

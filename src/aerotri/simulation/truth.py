@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +38,7 @@ class Truth:
     image_errors : sampled fields.
     gross_errors : (k,) index into the block's image points; gross_error_mm : (k, 2).
     control_blunders : (b,) index into the block's control; control_blunder_m : (b, 3).
+    mountings : (6,) position, m, and angles, rad, by camera of a rig.
     """
 
     centre: np.ndarray
@@ -52,6 +53,7 @@ class Truth:
     gross_error_mm: np.ndarray
     control_blunders: np.ndarray
     control_blunder_m: np.ndarray
+    mountings: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 TRUTH = "truth"
@@ -115,6 +117,11 @@ def _write_tables(place: Path, block: Block, truth: Truth) -> None:
     blundered = (block.points[block.control.point[truth.control_blunders]],)
     blunder = np.round(truth.control_blunder_m, 6)
     _write(place / "control_blunders.csv", ["point", "dX", "dY", "dZ"], _rows(blundered, blunder))
+    if truth.mountings:
+        values = np.array(list(truth.mountings.values()))
+        values = np.hstack([np.round(values[:, :3], 6), np.round(np.degrees(values[:, 3:]), 9)])
+        header = ["camera", "x", "y", "z", "omega", "phi", "kappa"]
+        _write(place / "rigs.csv", header, _rows((truth.mountings,), values))
 
 
 def _write_image_errors(path: Path, samples: Sequence[ImageErrorSample]) -> None:

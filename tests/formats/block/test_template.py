@@ -14,7 +14,7 @@ import aerotri
 from aerotri import InputError
 from aerotri.cli.app import invoke
 from aerotri.formats.block.settings import read_block_toml
-from aerotri.formats.block.settings_model import BlockModel, PriorModel
+from aerotri.formats.block.settings_model import BlockModel, PriorModel, ThreePriorsModel
 from aerotri.formats.block.template import EMPTY_TABLES, NewCamera, block_toml_text, write_template
 from aerotri.formats.block.unread import TABLES
 
@@ -28,8 +28,9 @@ def keys(model: type[BaseModel], table: tuple[str, ...] = ()) -> list[tuple[str,
     found = []
     for name, field in model.model_fields.items():
         inner: Any = get_args(field.annotation)[1] if get_origin(field.annotation) is dict else field.annotation
-        if isinstance(inner, type) and issubclass(inner, BaseModel) and inner is not PriorModel:
-            found += keys(inner, (*table, name, "P1") if name == "camera" else (*table, name))
+        if isinstance(inner, type) and issubclass(inner, BaseModel) and inner not in (PriorModel, ThreePriorsModel):
+            named = {("camera",): "P1", ("rig",): "my_rig", ("rig", "my_rig", "camera"): "oblique"}.get((*table, name))
+            found += keys(inner, (*table, name) if named is None else (*table, name, named))
         else:
             found.append((*table, name))
     return found
@@ -37,7 +38,7 @@ def keys(model: type[BaseModel], table: tuple[str, ...] = ()) -> list[tuple[str,
 
 def uncommented(text: str) -> str:
     """The text with the # of every key taken away."""
-    return re.sub(r"^#(\w+ = )", r"\1", text, flags=re.MULTILINE)
+    return re.sub(r"^#(\w+ = |\[)", r"\1", text, flags=re.MULTILINE)
 
 
 def at(content: Any, path: tuple[str, ...]) -> Any:

@@ -20,7 +20,8 @@ from aerotri.formats.block.scanned_film import read_fiducials
 from aerotri.formats.block.writer import write_block
 from aerotri.formats.text.table_checks import refuse_duplicates, three_or_none
 from aerotri.formats.text.tables import Columns, as_str_array, read_table
-from aerotri.observations import Block, Camera, Images
+from aerotri.observations import Block, Camera, Images, Rig
+from aerotri.observations.rigs import station_fault
 
 if TYPE_CHECKING:
     from aerotri.formats.block.settings import BlockToml
@@ -65,7 +66,8 @@ def read_block(path: FilePath, rays_needed: bool = True, images_needed: bool = T
     cameras = settings.cameras()
     model = settings.model
     radians = RADIANS_PER[model.angle_unit]
-    images = _images(_required_table(folder, "images"), cameras, radians, may_be_empty=not images_needed)
+    rigs = settings.rigs()
+    images = _images(_required_table(folder, "images"), cameras, rigs, radians, may_be_empty=not images_needed)
     fiducials, fits = read_fiducials(_table_file(folder, "fiducials"), images, cameras)
     if fiducials is not None and model.image_unit != "px":
         message = f"image_unit = '{model.image_unit}', but fiducials.csv says the photographs are scans"
@@ -89,6 +91,7 @@ def read_block(path: FilePath, rays_needed: bool = True, images_needed: bool = T
         fiducials=fiducials,
         constraints=read_constraints(_table_file(folder, "constraints"), points),
         interior_fits=fits,
+        rigs=rigs,
     )
     _check_names_in_settings(block, settings)
     return block
@@ -134,7 +137,9 @@ def _table_file(folder: Path, name: str) -> Path | None:
     return found[0] if found else None
 
 
-def _images(path: Path, cameras: tuple[Camera, ...], radians: float, may_be_empty: bool) -> Images:
+def _images(
+    path: Path, cameras: tuple[Camera, ...], rigs: tuple[Rig, ...], radians: float, may_be_empty: bool
+) -> Images:
     table = read_table(path, IMAGE_COLUMNS)
     table.require("image", "camera")
     if not table.length and not may_be_empty:
@@ -154,7 +159,7 @@ def _images(path: Path, cameras: tuple[Camera, ...], radians: float, may_be_empt
         )
     nothing = np.full(table.length, "", dtype="<U1")
     grouping = {n: c.rows() for n, c in table.text.items() if n not in ("image", "camera", "strip")}
-    return Images(
+    images = Images(
         names=table.text["image"].rows(),
         camera=camera,
         strip=table.text["strip"].rows() if "strip" in table.text else nothing,
@@ -162,6 +167,12 @@ def _images(path: Path, cameras: tuple[Camera, ...], radians: float, may_be_empt
         angles=three_or_none(table, ("omega", "phi", "kappa")) * radians,
         columns=grouping,
     )
+    fault = station_fault(images, cameras, rigs)
+    if fault is not None and fault.image >= 0:
+        raise table.error(fault.image, fault.message, fault.remedy)
+    if fault is not None:
+        raise InputError(fault.message, fault.remedy, path, 1)
+    return images
 
 
 def _check_names_in_settings(block: Block, settings: BlockToml) -> None:

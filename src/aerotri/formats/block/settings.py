@@ -6,7 +6,7 @@ import difflib
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -22,6 +22,7 @@ from aerotri.observations import (
     CollocationSettings,
     GnssSettings,
     InsSettings,
+    Rig,
     Settings,
 )
 
@@ -64,6 +65,34 @@ class BlockToml:
             For a name that could not stand in a table.
         """
         return _camera_records(self.model.camera, self.error)
+
+    def rigs(self) -> tuple[Rig, ...]:
+        """The rig records.
+
+        Raises
+        ------
+        InputError
+            For a camera that does not exist or belongs to two rigs, and for a name that could not stand in a table.
+        """
+        taken: dict[str, str] = {}
+        for name, rig in self.model.rig.items():
+            if _is_no_name(name):
+                raise self.error(("rig", name), f"{name[:60]!r} is no name for a rig", "name it by a short text")
+            keys = {rig.reference: ("rig", name, "reference")}
+            if rig.reference in rig.camera:
+                message = f"the reference camera '{rig.reference}' has a mounting of its own"
+                remedy = f"remove [rig.{name}.camera.{rig.reference}]: its position and rotation are zero"
+                raise self.error(("rig", name, "camera", rig.reference), message, remedy)
+            keys |= {camera: ("rig", name, "camera", camera) for camera in rig.camera}
+            for camera, at in keys.items():
+                if camera not in self.model.camera:
+                    known = ", ".join(self.model.camera)
+                    raise self.error(at, f"there is no camera '{camera}'", f"there are {known}; or add [camera.…]")
+                if camera in taken:
+                    message = f"camera '{camera}' belongs to the rigs '{taken[camera]}' and '{name}'"
+                    raise self.error(at, message, "give every rig cameras of its own")
+                taken[camera] = name
+        return tuple(rig.rig(name) for name, rig in self.model.rig.items())
 
     def settings(self, image_sigma_um: float) -> Settings:
         """The settings record; `image_sigma_um` as it stands here or, where it does not, as the table's σ tell."""
@@ -232,10 +261,11 @@ def _known_keys(where: tuple[Any, ...]) -> str:
     """The keys there are where an unknown one was found, and the likely one."""
     model: Any = BlockModel
     for part in where[:-1]:
-        if model is BlockModel and part == "camera":
-            model = dict
-        elif model is dict:
-            model = CameraModel
+        inner = get_args(model) if get_origin(model) is dict else ()
+        if inner:
+            model = inner[1]
+        elif get_origin(model.model_fields[part].annotation) is dict:
+            model = model.model_fields[part].annotation
         else:
             annotation = model.model_fields[part].annotation
             options = [a for a in getattr(annotation, "__args__", ()) if isinstance(a, type)]

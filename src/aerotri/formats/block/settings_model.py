@@ -5,6 +5,7 @@ The reference of the documentation and `aerotri explain` are made from these des
 
 from __future__ import annotations
 
+from math import radians
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -12,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from aerotri.conventions import LARGEST
 from aerotri.formats.text.described_key import key
 from aerotri.formats.text.tables import SMALLEST_POSITIVE
-from aerotri.observations import Camera, Prior
+from aerotri.observations import Camera, Mounting, Prior, Rig
 from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
 
 Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
@@ -52,6 +53,32 @@ class PriorModel(Section):
     def prior(self, otherwise: float = 0.0) -> Prior:
         """The record; `otherwise` is the value where none is given."""
         return Prior(otherwise if self.value is None else self.value, self.sigma, self.fixed)
+
+
+class ThreePriorsModel(Section):
+    """Three elements: ``{ value, sigma }``: observed. ``{ value }``: free. ``{ value, fixed = true }``: held."""
+
+    value: Three | None = key(None, "The three values.")
+    sigma: ThreePositive | None = key(None, "Their standard deviations; without them the elements are free.")
+    fixed: bool | Annotated[list[bool], Field(min_length=3, max_length=3)] = key(
+        False, "true: the elements are held; or a list of three, for every element whether it is held."
+    )
+
+    @model_validator(mode="after")
+    def _fixed_or_observed(self) -> ThreePriorsModel:
+        if self.fixed is True and self.sigma is not None:
+            raise ValueError("fixed = true and a sigma exclude each other")
+        return self
+
+    def priors(self, unit: float = 1.0) -> tuple[Prior, Prior, Prior]:
+        """The records, in the unit of the program."""
+        value = self.value or [0.0, 0.0, 0.0]
+        held = self.fixed if isinstance(self.fixed, list) else [self.fixed] * 3
+        sigma = [None] * 3 if self.sigma is None else self.sigma
+        a, b, c = (
+            Prior(unit * v, None if s is None or h else unit * s, h) for v, s, h in zip(value, sigma, held, strict=True)
+        )
+        return a, b, c
 
 
 class InteriorModel(Section):
@@ -293,6 +320,59 @@ class CollocationModel(Section):
     )  # fmt: skip
 
 
+class MountingModel(Section):
+    """A camera of a rig in the frame of the reference camera: X_reference = position + R·X_camera. NAME is the
+    camera's."""
+
+    position_m: ThreePriorsModel = key(
+        ThreePriorsModel(), "Projection centre x, y, z in the frame of the reference camera: value, sigma (without it "
+        "free), or fixed = true.", "m"
+    )  # fmt: skip
+    rotation_deg: ThreePriorsModel = key(
+        ThreePriorsModel(), "Angles omega, phi, kappa of R, in the order that `rotation` says: value, sigma (without "
+        "it free), or fixed = true. Values within 10 degrees are good enough. Without values they are computed from "
+        "the orientations of the photographs.", "deg"
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _held_at_something(self) -> MountingModel:
+        if self.rotation_deg.value is None and self.rotation_deg.fixed is not False:
+            raise ValueError("rotation_deg is fixed without a value")
+        return self
+
+    def mounting(self) -> Mounting:
+        """The record."""
+        rotation = self.rotation_deg
+        return Mounting(self.position_m.priors(), rotation.priors(radians(1.0)), rotation.value is not None)
+
+
+class RigModel(Section):
+    """Cameras on one frame that are triggered together. The column station of images.csv says which photographs belong
+    to one exposure."""
+
+    reference: str = key(..., "Name of the camera whose position and rotation are those of the rig.")
+    constraint: Literal["rigid", "weighted", "off"] = key(
+        "rigid", "rigid: position and rotation of the cameras on the rig are the same at all exposures. weighted: they "
+        "may move between exposures by the σ play_position_m and play_rotation_deg. off: the cameras are independent."
+    )  # fmt: skip
+    play_position_m: Positive = key(0.001, 'constraint = "weighted": σ by which a camera moves between exposures.', "m")
+    play_rotation_deg: Positive = key(
+        0.001, 'constraint = "weighted": σ by which a camera turns between exposures.', "deg"
+    )
+    camera: dict[str, MountingModel] = key({}, "The other cameras of the rig, one table [rig.NAME.camera.NAME] each.")
+
+    def rig(self, name: str) -> Rig:
+        """The record."""
+        return Rig(
+            name,
+            self.reference,
+            {camera: mounting.mounting() for camera, mounting in self.camera.items()},
+            self.constraint,
+            float(self.play_position_m),
+            radians(self.play_rotation_deg),
+        )
+
+
 class BlockModel(Section):
     """block.toml."""
 
@@ -321,6 +401,7 @@ class BlockModel(Section):
         CollocationModel(), "The distortion model without assumptions about the camera (additional_parameters "
         "\"collocation\")."
     )  # fmt: skip
+    rig: dict[str, RigModel] = key({}, "Rigs: cameras on one frame, one table [rig.NAME] each.")
 
 
 class CamerasModel(Section):

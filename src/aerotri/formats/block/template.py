@@ -16,7 +16,7 @@ from pydantic_core import PydanticUndefined
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.block.points import CONTROL_COLUMNS, GNSS_COLUMNS, IMAGE_POINT_COLUMNS
-from aerotri.formats.block.settings_model import BlockModel, PriorModel, Section
+from aerotri.formats.block.settings_model import BlockModel, PriorModel, Section, ThreePriorsModel
 from aerotri.formats.block.unread import TABLES
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.text.tables import Columns
@@ -40,8 +40,12 @@ EXAMPLES: dict[str, Any] = {
     "gnss.correlated_sigma_m": [0.02, 0.03],
     "collocation.sigma_um": 2.0,
     "collocation.length_mm": 10.0,
+    "rig.NAME.camera.NAME.position_m": {"value": [0.0, -0.05, 0.02], "sigma": [0.01, 0.01, 0.01]},
+    "rig.NAME.camera.NAME.rotation_deg": {"value": [0.0, 45.0, 90.0]},
 }
 """What stands where there is no default: an example, never in force before the user takes the # away."""
+NAMES = {"rig.NAME.camera.NAME": "rig.my_rig.camera.oblique", "rig.NAME": "rig.my_rig"}
+"""Examples of names of rigs and of the cameras on them."""
 FREE = {"fixed": False}
 """The example of a parameter: an unknown without an observed value."""
 DECIDE = {
@@ -149,9 +153,17 @@ def _section(model: type[BaseModel], table: str, camera: NewCamera) -> Iterator[
         field = model.model_fields[name]
         path = f"{table}.{name}" if table else name
         named = f"{path}.NAME" if get_origin(field.annotation) is dict else path
+        lines = [f"[{_header(named, camera)}]", *_section(found, named, camera)]
         yield from _comment(str(field.description))
-        yield f"[{named.replace('NAME', key_text(camera.name))}]"
-        yield from _section(found, named, camera)
+        # most blocks have no rig, and one that is there must be whole
+        yield from [f"#{line}" if line and not line.startswith("#") and path == "rig" else line for line in lines]
+
+
+def _header(path: str, camera: NewCamera) -> str:
+    """The header of a table, with examples of names."""
+    for name, example in NAMES.items():
+        path = path.replace(name, example)
+    return path.replace("NAME", key_text(camera.name))
 
 
 def _key(path: str, field: Any, camera: NewCamera) -> Iterator[str]:
@@ -162,7 +174,7 @@ def _key(path: str, field: Any, camera: NewCamera) -> Iterator[str]:
         yield from _comment(DECIDE[path])
         yield f"{name} = {value_text(camera.decided[path])}"
     elif field.is_required():
-        yield f"{name} = {value_text(camera.values[name])}"
+        yield f"{name} = {value_text(camera.name if path == 'rig.NAME.reference' else camera.values[name])}"
     else:
         yield f"#{name} = {value_text(_shown(path, field))}"
     yield ""
@@ -186,7 +198,7 @@ def _facts(field: Any, is_set: bool) -> str:
 
 def _shown(path: str, field: Any) -> Any:
     """The default, or an example where there is none."""
-    if _is_prior(field.annotation):
+    if _is_prior(field.annotation) and path not in EXAMPLES:
         return FREE
     if path in EXAMPLES:
         return EXAMPLES[path]
@@ -202,12 +214,12 @@ def _comment(text: str) -> list[str]:
 def _table_of(annotation: Any) -> type[BaseModel] | None:
     """The model behind a key that is a table of its own, or a table of names; None of all others."""
     found = get_args(annotation)[1] if get_origin(annotation) is dict else annotation
-    is_table = isinstance(found, type) and issubclass(found, Section) and found is not PriorModel
+    is_table = isinstance(found, type) and issubclass(found, Section) and found not in (PriorModel, ThreePriorsModel)
     return found if is_table else None
 
 
 def _is_prior(annotation: Any) -> bool:
-    return annotation is PriorModel or PriorModel in get_args(annotation)
+    return annotation in (PriorModel, ThreePriorsModel) or PriorModel in get_args(annotation)
 
 
 def _words(annotation: Any) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.text.table_writer import check_names, write_table
 from aerotri.formats.text.toml_text import Inline, toml_of
 from aerotri.functional_model.additional_parameters import format_parameters
-from aerotri.observations import Block, Camera, Prior
+from aerotri.observations import Block, Camera, Mounting, Prior, Rig
 from aerotri.observations.block import INTERIOR_ELEMENTS, GnssSettings
 
 ANGLE_UNIT = "deg"
@@ -202,6 +202,8 @@ def _settings(block: Block) -> dict[str, Any]:
     known = {"sigma_um": settings.collocation.sigma_um, "length_mm": settings.collocation.length_mm}
     if any(value is not None for value in known.values()):
         content["collocation"] = {key: value for key, value in known.items() if value is not None}
+    if block.rigs:
+        content["rig"] = {rig.name: _rig(rig) for rig in block.rigs}
     if settings.gnss.lever_arm_sigma_m is not None:
         content["gnss"]["lever_arm_sigma_m"] = list(settings.gnss.lever_arm_sigma_m)
     content["gnss"] |= _correlated(settings.gnss)
@@ -244,6 +246,40 @@ def _camera(camera: Camera) -> dict[str, Any]:
     if camera.fiducials:
         content["fiducials"] = {name: list(xy) for name, xy in camera.fiducials.items()}
     return content
+
+
+def _rig(rig: Rig) -> dict[str, Any]:
+    content: dict[str, Any] = {
+        "reference": rig.reference,
+        "constraint": rig.constraint,
+        "play_position_m": rig.play_position_m,
+        "play_rotation_deg": float(np.degrees(rig.play_rotation)),
+    }
+    if rig.cameras:
+        content["camera"] = {name: _mounting(mounting) for name, mounting in rig.cameras.items()}
+    return content
+
+
+def _mounting(mounting: Mounting) -> dict[str, Any]:
+    content: dict[str, Any] = {"position_m": _three(mounting.position, 1.0)}
+    if mounting.known or any(prior.fixed for prior in mounting.rotation):
+        content["rotation_deg"] = _three(mounting.rotation, 1.0 / RADIANS_PER["deg"])
+    return content
+
+
+def _three(priors: tuple[Prior, Prior, Prior], per_unit: float) -> Mapping[str, Any]:
+    """Three elements, in the unit of the file."""
+    content: dict[str, Any] = {"value": [per_unit * prior.value for prior in priors]}
+    held, observed = [prior.fixed for prior in priors], [prior.sigma is not None for prior in priors]
+    if any(observed) and not all(s or h for s, h in zip(observed, held, strict=True)):
+        message = "a rig camera with some elements observed and others free cannot be written"
+        raise InputError(message, "give all three a σ, a very large one to those that are free")
+    if any(observed):
+        # the σ of a held element has no meaning
+        content["sigma"] = [per_unit * (1.0 if prior.sigma is None else prior.sigma) for prior in priors]
+    if any(held):
+        content["fixed"] = True if all(held) else held
+    return Inline(content)
 
 
 def _prior(prior: Prior) -> Mapping[str, Any]:
