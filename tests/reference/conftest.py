@@ -155,12 +155,14 @@ def _written(folder: Path) -> Written:
     run("predict picket-interval", "--pilot", result, "--photographs", photographs)
     project = _project(run)
     places = {
-        "block folder": (tiny, folder / "plain", project / "block"), "result of adjust": (first, second, result, of_rig),
+        "block folder": (tiny, folder / "plain", project / "block"),
+        "result of adjust": (first, second, result, of_rig),
         "folder of compare-parameters": (sets,), "folder of halves": (halves,), "folder of deform": (model, whole),
         "folder of demcor": (folder / "corrected",), "folder of imgeo": (imgeo,), "folder of crosscheck": (checked,),
         "folder of dtm": (pairs, project / "dtm"), "folder of compare": (compared,),
         "folder of volume": (project / "volume",),
         "truth of simulate": (tiny / "truth", rigged / "truth"),
+
         "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),
         "control_marks of tiepoints": (project / "block" / "control_marks",), "folder of run": (project,),
         "folder of parameters": (folder / "drawn",),
