@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import aerotri
 from aerotri.adjustment import rigging
 from aerotri.adjustment.prepare import prepare
 from aerotri.adjustment.unknowns import Step
 from aerotri.conventions import InputError
+from aerotri.formats.results.rigs import rig_columns, rigs_json
 from aerotri.functional_model.rotation import angles_from_rotation, logarithm, rotation_from_angles
 from aerotri.observations import AdjustmentSettings, GnssSettings, InsSettings, Mounting, Prior
 from aerotri.pipeline import adjust
@@ -341,6 +343,52 @@ def test_an_arm_that_is_known_gives_the_scale(simulated):
                                                         strict=True)))  # fmt: skip
     prepared = prepare(with_adjustment(block, datum="inner"))
     assert prepared.system.unknowns.motions.count == 6
+
+
+@pytest.mark.parametrize("steep", [75.0, 5.0])
+def test_a_saved_result_opens_as_it_was(simulated, tmp_path, monkeypatch, steep):
+    """Re-linearised at its solution, whichever angles the mountings have as unknowns."""
+    monkeypatch.setattr(rigging, "STEEP", np.radians(steep))
+    for known in (True, False):
+        found = aerotri.adjust(with_mountings(simulated[0], known=known))
+        found.save(tmp_path / "result", plots=False)
+        again = aerotri.open_result(tmp_path / "result")
+        np.testing.assert_allclose(again.adjusted.images.covariance, found.adjusted.images.covariance, rtol=1e-8)
+        for one, other in zip(again.adjusted.rigs, found.adjusted.rigs, strict=True):
+            np.testing.assert_allclose(one.angles, other.angles, atol=1e-12)
+            np.testing.assert_allclose(one.covariance, other.covariance, rtol=1e-6, atol=1e-18)
+
+
+def test_joint_covariance_of_photographs_of_a_station(simulated):
+    """Q of one photograph by columns is that on the pattern; lead and follower are as one where the arms are."""
+    found = aerotri.adjust(simulated[0])
+    block = simulated[0]
+    lead = int(np.flatnonzero(found.adjusted.images.rays > 40)[0])
+    names = [str(block.images.names[lead]), str(block.points[found.adjusted.points.rays > 3][0])]
+    joint = found.covariance(names).matrix
+    np.testing.assert_allclose(joint[:6, :6], found.adjusted.images.covariance[lead], rtol=1e-6, atol=1e-15)
+
+
+def test_mountings_of_the_result(simulated, adjusted):
+    """rigs.csv and adjustment.json say what the parameters say, in degrees, with the correlations."""
+    truth = simulated[1]
+    columns, content = rig_columns(adjusted.rigs), rigs_json(adjusted.rigs)
+    assert columns["camera"].tolist() == list(TWO)
+    assert columns["reference"].tolist() == ["nadir", "nadir"]
+    for k, camera in enumerate(TWO):
+        for element in ("x", "y", "z"):
+            value, sigma = values_of(adjusted)[camera, element]
+            assert (columns[element][k], columns[f"s{element}"][k]) == pytest.approx((value, sigma))
+            assert abs(value - true_values(truth)[camera, element]) < 4.5 * sigma
+        for element in ("omega", "phi", "kappa"):
+            value, sigma = np.degrees(values_of(adjusted)[camera, element])
+            assert (columns[element][k], columns[f"s_{element}"][k]) == pytest.approx((value, sigma))
+            assert content[k][element] == pytest.approx(value)
+        table = np.array([[row[e] for e in ("x", "y", "z", "omega", "phi", "kappa")] for row in
+                          content[k]["correlations"]])  # fmt: skip
+        np.testing.assert_allclose(np.diagonal(table), 1.0)
+        np.testing.assert_allclose(table, table.T)
+        assert (columns["stations"] > 5).all()
 
 
 def test_elements_of_a_follower_cannot_carry_the_datum(simulated):

@@ -162,7 +162,6 @@ def _written(folder: Path) -> Written:
         "folder of dtm": (pairs, project / "dtm"), "folder of compare": (compared,),
         "folder of volume": (project / "volume",),
         "truth of simulate": (tiny / "truth", rigged / "truth"),
-
         "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),
         "control_marks of tiepoints": (project / "block" / "control_marks",), "folder of run": (project,),
         "folder of parameters": (folder / "drawn",),

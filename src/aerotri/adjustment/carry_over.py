@@ -25,7 +25,7 @@ def with_shared(new: Unknowns, old: Unknowns, start: State, state: State) -> Sta
     for k, key in enumerate(zip(new.shared.names, new.shared.groups, strict=True)):
         if key in at:
             values[k] = state.shared[at[key]]
-    return replace(start, shared=values)
+    return new.with_followers(replace(start, shared=values))
 
 
 def reference_state(new: Unknowns, old: Unknowns, start: State, original: State) -> State:

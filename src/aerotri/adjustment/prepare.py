@@ -21,7 +21,7 @@ from aerotri.conventions import InputError, counted
 from aerotri.functional_model.atmosphere import corrected_image_points
 from aerotri.observations import Block
 from aerotri.observations.names import partnerless_in_words
-from aerotri.observations.rigs import rigs_in_force, station_fault
+from aerotri.observations.rigs import station_fault
 
 
 class NoStartValuesError(InputError):
@@ -94,7 +94,6 @@ def check_settings(block: Block) -> None:
     s = block.settings
     refused = [
         (s.adjustment.robust not in STAGES, f'robust = "{s.adjustment.robust}"', f"use {', '.join(STAGES)}"),
-        (bool(rigs_in_force(block, "weighted")), 'a rig with constraint = "weighted"', "use rigid or off"),
     ]
     for wrong, what, remedy in refused:
         if wrong:

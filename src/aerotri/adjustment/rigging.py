@@ -8,6 +8,7 @@ each, once a photograph and linearisation, and `rig_reduction` brings the normal
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import permutations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from aerotri.adjustment.shared_parameters import SharedList
 from aerotri.conventions import InputError
 from aerotri.functional_model.rotation import (
+    OMEGA_PHI_KAPPA,
     angles_from_rotation,
     cross_matrix,
     exponential,
@@ -143,7 +145,7 @@ class Rigging:
 
 def with_leads(block: Block, images: np.ndarray) -> np.ndarray:
     """Photographs that take part, and the reference photographs of their stations, which carry the unknowns."""
-    lead = station_places(block, "rigid").lead
+    lead = station_places(block).lead
     return np.union1d(images, lead[images])
 
 
@@ -156,7 +158,7 @@ def rigging_of(
     ----------
     images : (n,) rows of the block's photographs that take part. centre, rotation : (n, 3), (n, 3, 3) start values.
     """
-    places = station_places(block, "rigid")
+    places = station_places(block)
     if not (places.mounting[images] >= 0).any():
         return None
     row = np.full(len(block.images), -1)
@@ -215,10 +217,12 @@ def _prepared(
 ) -> tuple[tuple[Prior, ...], np.ndarray, np.ndarray]:
     """Priors and start values of the six elements, and the rotation that their angles stand before."""
     stated = np.array([prior.value for prior in mounting.elements])
-    mean = robust_mean(relative) if len(relative) else rotation_from_angles(stated[3:], order)
-    angles = angles_from_rotation(mean, order)
-    middle = angles[1 if order == "omega-phi-kappa" else 0]
+    at = rotation_from_angles(stated[3:], order)
+    mean = robust_mean(relative) if len(relative) else at
+    # of what is stated, where it is: another set-up of the same block has to come to the same unknowns
+    middle = angles_from_rotation(at if mounting.known else mean, order)[1 if order == OMEGA_PHI_KAPPA else 0]
     if abs(middle) < STEEP:
+        angles = angles_from_rotation(mean, order)
         # the nearest turn, so that a value observed at 180° is not 360° away
         angles = stated[3:] + np.remainder(angles - stated[3:] + np.pi, 2.0 * np.pi) - np.pi
         return mounting.elements, np.concatenate([stated[:3], angles]), np.eye(3)
@@ -229,8 +233,17 @@ def _prepared(
             "give its three angles the same σ, or hold all three",
             file="block.toml",
         )
-    held = given[0].fixed or given[0].sigma is not None
-    left = rotation_from_angles(stated[3:], order) if held else mean
-    start = angles_from_rotation(left.T @ mean, order) if given[0].sigma is not None else np.zeros(3)
+    left = at if mounting.known else _nearest_axes(mean)
     priors = tuple(Prior(0.0, prior.sigma, prior.fixed) for prior in given)
+    start = np.zeros(3) if given[0].fixed else angles_from_rotation(left.T @ mean, order)
     return (*mounting.position, *priors), np.concatenate([stated[:3], start]), left
+
+
+def _nearest_axes(rotation: np.ndarray) -> np.ndarray:
+    """(3, 3) of the 24 turns that lead axes into axes the one nearest to a rotation."""
+    turns = [
+        np.array(signs)[:, None] * np.eye(3)[list(order)]
+        for order in permutations(range(3))
+        for signs in product((1.0, -1.0), repeat=3)
+    ]
+    return max((turn for turn in turns if np.linalg.det(turn) > 0.0), key=lambda turn: float(np.sum(turn * rotation)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from aerotri.conventions import InputError
 from aerotri.crosscheck.comparison import CrosscheckResult, PeerCheck
 from aerotri.crosscheck.paper_check import check_with_paper
 from aerotri.observations import Block
@@ -22,7 +23,17 @@ def crosscheck(
     adjusted : a converged adjustment.
     adjust : adjusts a block; needed again for blocks freed of systematic errors or with fixed weights.
     report : called with what is being done.
+
+    Raises
+    ------
+    InputError
+        For a block with rigid rigs, which the peers do not know.
     """
+    if adjusted.rigs:
+        raise InputError(
+            "the cross-check knows no rigid rigs",
+            f'cross-check an adjustment with rig.{adjusted.rigs[0].rig}.constraint = "off"',
+        )
     tell: Callable[[str], None] = report or (lambda text: None)
     tell("adjusting through pycolmap")
     colmap = _colmap(adjusted, adjust)

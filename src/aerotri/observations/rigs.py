@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 STATION = "station"
 """The column of images.csv that says which photographs belong to one exposure."""
-CONSTRAINTS = ("rigid", "weighted", "off")
+CONSTRAINTS = ("rigid", "off")
 FREE = (Prior(), Prior(), Prior())
 
 
@@ -51,17 +51,13 @@ class Rig:
     ----------
     reference : the camera whose orientation is that of the rig.
     cameras : the mounting of every other camera.
-    constraint : of `CONSTRAINTS`. rigid: one mounting for all stations, without play. weighted: every photograph has
-        its own orientation, and its mounting is observed with the σ of the play. off: the cameras are independent.
-    play_position_m, play_rotation : σ of the play, m and rad, of every element.
+    constraint : of `CONSTRAINTS`. rigid: one mounting for all stations. off: the cameras are independent.
     """
 
     name: str
     reference: str
     cameras: Mapping[str, Mounting] = field(default_factory=dict)
     constraint: str = "rigid"
-    play_position_m: float = 0.001
-    play_rotation: float = float(np.radians(0.001))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,16 +79,11 @@ class StationPlaces:
         return bool((self.mounting >= 0).any())
 
 
-def rigs_in_force(block: Block, *constraints: str) -> tuple[Rig, ...]:
-    """The rigs of a block with one of the constraints."""
-    return tuple(rig for rig in block.rigs if rig.constraint in constraints)
-
-
-def station_places(block: Block, *constraints: str) -> StationPlaces:
-    """Where the photographs of the rigs with one of the constraints belong, rigid and weighted ones by default."""
+def station_places(block: Block) -> StationPlaces:
+    """Where the photographs of the rigid rigs belong."""
     n = len(block.images)
     lead, mounting, found = np.arange(n), np.full(n, -1), []
-    rigs = rigs_in_force(block, *(constraints or ("rigid", "weighted")))
+    rigs = [rig for rig in block.rigs if rig.constraint == "rigid"]
     if rigs and STATION in block.images.columns:
         station = np.asarray(block.images.columns[STATION], dtype=object)
         names = [camera.name for camera in block.cameras]

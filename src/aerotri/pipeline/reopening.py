@@ -41,7 +41,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     measured = replace(local, image_points=replace(local.image_points, xy=saved.xy))
     system, state = build_system(measured, start, saved.ray_status, held)
     _refuse_other_parameters(system, saved)
-    state = replace(state, shared=saved.shared)
+    state = system.unknowns.with_followers(replace(state, shared=saved.shared))
     estimator = Estimator(saved.estimator_code, saved.estimator_limit)
     system = system.with_motions_at(state)
     equations = system.assemble(state, 0.0, estimator)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_tables import COMPARED, PARAMETERS, PLACE, WHERE_MODEL, with_totals
+from aerotri.reference.adjust_tables import COMPARED, PARAMETERS, PLACE, RIGS, WHERE_MODEL, with_totals
 from aerotri.reference.records import DescribedFile, Item, of_axes, within
 
 VERSION = Item("aerotri", "text", "Version of aerotri that wrote the file.")
@@ -154,6 +154,17 @@ ADJUSTMENT = (
     Item("model_part.ratio_height", "number", "The same in Z."),
     Item("model_part.reason", "text", "Why there is no model part; else empty."),
     *_gnss_errors(),
+    Item("rigs[]", "object", "Cameras on rigid rigs; where there are any.", optional=True),
+    *within("rigs[]", *RIGS),
+    Item("rigs[].correlations[]", "object", "Correlations of the six elements, one entry an element."),
+    Item("rigs[].correlations[].element", "text", "The element."),
+    *of_axes(
+        "rigs[].correlations[].{}",
+        "number?",
+        "Its correlation with {}; empty for what is held.",
+        "",
+        ("x", "y", "z", "omega", "phi", "kappa"),
+    ),
     Item("warnings[]", "text", "Sentences to read: what was left out, assumed or is weak."),
     Item("timings_s", "object", "Time by stage.", "s"),
     *(

@@ -136,6 +136,7 @@ PARAMETERS = (
             "additional": "additional parameter (self-calibration)",
             "gnss": "shift, drift, lever arm or time offset of GNSS",
             "ins": "boresight or drift of the INS",
+            "rig": "position (m) or angle (rad) of a camera on a rig",
             "constraint": "unknown of a condition",
             "point": "coordinate of a point in a condition",
         },
@@ -235,6 +236,16 @@ EFFECTS_OF_PARAMETERS = (
     *of_axes("rms_{}", "number?", "Root mean square difference in {} at the check points without it.", "m"),
     Item("verdict", "text?", "Whether leaving it out makes a difference."),
 )
+RIGS = (
+    Item("rig", "text", "Name of the rig."),
+    Item("reference", "text", "Its reference camera."),
+    Item("camera", "text", "The camera, in the frame of the reference camera: X_reference = position + R·X_camera."),
+    *of_axes("{}", "number", "{} of its projection centre.", "m", ("x", "y", "z")),
+    *of_axes("{}", "number", "Angle {} of R.", "deg", ("omega", "phi", "kappa")),
+    *of_axes("s{}", "number", "Standard deviation of {}; 0: held.", "m", ("x", "y", "z")),
+    *of_axes("s_{}", "number", "Standard deviation of the angle {}; 0: held.", "deg", ("omega", "phi", "kappa")),
+    Item("stations", "whole", "Photographs of the camera that took part."),
+)
 
 
 def adjust_tables() -> tuple[DescribedFile, ...]:
@@ -265,6 +276,7 @@ def adjust_tables() -> tuple[DescribedFile, ...]:
             OBSERVATIONS,
             "where any were observed",
         ),
+        table("rigs.csv", "Position and rotation of the cameras on rigid rigs.", RIGS, "with a rig"),
         table(
             "parameter_changes.csv",
             "Change of the image errors between two groups of photographs, on a grid over the image.",

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from aerotri.results.model_part import ModelPart
     from aerotri.results.position_errors import PositionErrors
     from aerotri.results.removal import Removal
+    from aerotri.results.rigs import MountedCamera
     from aerotri.results.variance_components import VarianceComponents
 
 
@@ -167,7 +168,7 @@ class SharedParameters:
     ----------
     names : (s,) str such as 'focal_length_mm', 'bluh.1', 'brown.K1', 'gnss.shift_X'.
     groups : (s,) str, the camera, day or strip the parameter belongs to.
-    kinds : (s,) str, 'interior', 'additional', 'gnss' or 'ins'.
+    kinds : (s,) str, 'interior', 'additional', 'gnss', 'ins' or 'rig'.
     marks : (s,) str, P L D C of the family, '' otherwise.
     value : (s,); covariance : (s, s), σ̂0² included. Units: mm for interior elements, as the family states otherwise.
     max_correlation : (s,) the largest |r| with another shared parameter, signed; max_correlation_with : (s,) its name.
@@ -319,7 +320,8 @@ class AdjustedBlock:
 
     `components` is there where `variance_components = "on"`: `block` then has the σ they led to. `removals` are those
     of the selection of additional parameters, in order; `parameters` has them too, behind the others. `model_part`
-    says where the model part of σ comes from, or why there is none; None before it is looked for.
+    says where the model part of σ comes from, or why there is none; None before it is looked for. `rigs` are the
+    cameras of rigid rigs beside their reference cameras.
     """
 
     block: Block
@@ -338,3 +340,4 @@ class AdjustedBlock:
     removals: tuple[Removal, ...] = ()
     model_part: ModelPart | None = None
     position_errors: PositionErrors | None = None
+    rigs: tuple[MountedCamera, ...] = ()

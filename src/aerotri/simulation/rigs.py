@@ -91,8 +91,6 @@ def stated_rigs(spec: SimulationSpec, rng: np.random.Generator) -> tuple[Rig, ..
             rig.reference,
             {camera: _stated(mounting, rng) for camera, mounting in rig.camera.items()},
             rig.constraint,
-            rig.stated_play_position_m,
-            float(np.radians(rig.stated_play_rotation_deg)),
         )
         for name, rig in spec.rig.items()
     )

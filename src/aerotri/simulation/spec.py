@@ -389,11 +389,9 @@ class RigSpec(Table):
     camera: Annotated[dict[Name, MountingSpec], Field(min_length=1)] = key(
         ..., "The other cameras, one table [rig.NAME.camera.NAME] each."
     )
-    constraint: Literal["rigid", "weighted", "off"] = key("rigid", "What the block states, as in block.toml.")
+    constraint: Literal["rigid", "off"] = key("rigid", "What the block states, as in block.toml.")
     play_position_m: NotNegative = key(0.0, "Standard deviation by which a camera moves between exposures.", "m")
     play_rotation_deg: NotNegative = key(0.0, "Standard deviation by which a camera turns between exposures.", "deg")
-    stated_play_position_m: Positive = key(0.001, "play_position_m that the block states.", "m")
-    stated_play_rotation_deg: Positive = key(0.001, "play_rotation_deg that the block states.", "deg")
 
 
 class SimulationSpec(Table):

@@ -32,6 +32,7 @@ from aerotri.statistics.covariance import Cofactors, cofactors, correlations, or
 from aerotri.statistics.external_reliability import ray_effects, row_effects
 from aerotri.statistics.held_control import HeldTests, held_tests
 from aerotri.statistics.reliability import detectable_share, suspected_blunders
+from aerotri.statistics.rig_results import mounted_cameras
 
 OF_POINTS = ("point", "constraint", position_errors.KIND)
 """Kinds of shared parameters that belong to object points or single exposures and not to cameras or flights."""
@@ -109,6 +110,7 @@ def summarise(
         observations=observations,
         blunders=suspected_blunders(block, rays, control),
         effects=ray_effects(system, solution, q),
+        rigs=mounted_cameras(system, solution, q, sigma0),
     )
 
 

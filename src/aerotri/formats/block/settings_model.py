@@ -351,14 +351,10 @@ class RigModel(Section):
     to one exposure."""
 
     reference: str = key(..., "Name of the camera whose position and rotation are those of the rig.")
-    constraint: Literal["rigid", "weighted", "off"] = key(
-        "rigid", "rigid: position and rotation of the cameras on the rig are the same at all exposures. weighted: they "
-        "may move between exposures by the σ play_position_m and play_rotation_deg. off: the cameras are independent."
+    constraint: Literal["rigid", "off"] = key(
+        "rigid", "rigid: position and rotation of the cameras on the rig are the same at all exposures. off: the "
+        "cameras are independent."
     )  # fmt: skip
-    play_position_m: Positive = key(0.001, 'constraint = "weighted": σ by which a camera moves between exposures.', "m")
-    play_rotation_deg: Positive = key(
-        0.001, 'constraint = "weighted": σ by which a camera turns between exposures.', "deg"
-    )
     camera: dict[str, MountingModel] = key({}, "The other cameras of the rig, one table [rig.NAME.camera.NAME] each.")
 
     def rig(self, name: str) -> Rig:
@@ -368,8 +364,6 @@ class RigModel(Section):
             self.reference,
             {camera: mounting.mounting() for camera, mounting in self.camera.items()},
             self.constraint,
-            float(self.play_position_m),
-            radians(self.play_rotation_deg),
         )
 
 

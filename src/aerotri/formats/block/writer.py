@@ -252,8 +252,6 @@ def _rig(rig: Rig) -> dict[str, Any]:
     content: dict[str, Any] = {
         "reference": rig.reference,
         "constraint": rig.constraint,
-        "play_position_m": rig.play_position_m,
-        "play_rotation_deg": float(np.degrees(rig.play_rotation)),
     }
     if rig.cameras:
         content["camera"] = {name: _mounting(mounting) for name, mounting in rig.cameras.items()}

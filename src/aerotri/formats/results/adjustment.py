@@ -22,6 +22,7 @@ from aerotri.adjustment.ray_status import RAY_STATUS, RayStatus
 from aerotri.conventions import MGON_PER_RADIAN
 from aerotri.formats.results.json_text import number_or_none, write_json
 from aerotri.formats.results.reliability_columns import control_columns, observation_columns, ray_columns
+from aerotri.formats.results.rigs import rig_columns, rigs_json
 from aerotri.formats.text.table_writer import with_plain_texts
 from aerotri.image_errors import interior_elements, interior_model_sigmas
 from aerotri.observations import Block
@@ -45,7 +46,8 @@ PARAMETER_KEYS = (
 def write_result(adjusted: AdjustedBlock, folder: str | Path) -> None:
     """Write adjustment.json, images, points, parameters, control and check as CSV, and residuals.parquet.
 
-    observations.csv is written besides where positions, attitudes or conditions were observed.
+    observations.csv is written besides where positions, attitudes or conditions were observed, rigs.csv where there are
+    rigid rigs.
 
     Beside them variance_components.json where they were estimated. The files are written one after the other,
     adjustment.json last: who needs all or nothing passes a temporary folder and renames it.
@@ -65,6 +67,8 @@ def write_result(adjusted: AdjustedBlock, folder: str | Path) -> None:
     write_csv(folder / "check.csv", ground_point_columns(adjusted, adjusted.check))
     if adjusted.observations is not None:
         write_csv(folder / "observations.csv", observation_columns(adjusted))
+    if adjusted.rigs:
+        write_csv(folder / "rigs.csv", rig_columns(adjusted.rigs))
     _write_residuals(folder / "residuals.parquet", adjusted)
     if adjusted.components is not None:
         write_json(folder / "variance_components.json", adjusted.components.as_dict())
@@ -84,6 +88,7 @@ def adjustment_json(adjusted: AdjustedBlock) -> dict[str, Any]:
         "blunders": [_record(blunder) for blunder in adjusted.blunders],
         "model_part": (adjusted.model_part or ModelPart(reason=NOT_LOOKED_FOR)).as_dict(),
         "gnss_errors": None if adjusted.position_errors is None else adjusted.position_errors.as_dict(),
+        **({"rigs": rigs_json(adjusted.rigs)} if adjusted.rigs else {}),
     }
 
 

@@ -105,6 +105,8 @@ def unit_of(name: str) -> str:
     parameter = Parameter.of(name)
     if parameter.family == "gnss":
         return GNSS_UNITS.get(parameter.item.partition("_")[0], NO_UNIT)
+    if parameter.family == "rig":
+        return "m" if parameter.item in ("x", "y", "z") else "rad"
     return unit_of_parameter(name)
 
 

@@ -1,0 +1,142 @@
+"""A rig of five cameras, rigid and as five independent cameras (CU-SBR CA502): mountings, σ, control left out in turn.
+
+Only the BINGO file, the GNSS positions, the control points and the nominal mounting go in: no start values. The cameras
+as independent ones start from the orientations of the rigid adjustment.
+
+Example: python tools/prove/rigs.py ca502 --leave-out
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import aerotri
+from aerotri import geometry
+from aerotri.observations import Mounting, Prior, Rig
+from ca502 import MOUNTING_DEG, NADIR, exposures, left_out_in_turn, print_table, unoriented
+
+POSITION_M = {"A": (0, -0.05, 0.02), "D": (0, 0.05, 0.02), "W": (-0.05, 0, 0.02), "X": (0.05, 0, 0.02)}
+"""Nominal projection centres of the heads in the frame of the nadir head."""
+SIGMA_M = 0.02
+"""σ of a nominal position; the nominal angles are start values only."""
+
+
+def with_rig(block: aerotri.Block, constraint: str = "rigid") -> aerotri.Block:
+    """The block with its five heads on one rig; an exposure is a station."""
+    station = np.array([name[1:] for name in block.images.names.tolist()], dtype=object)
+    cameras = {
+        head: Mounting(
+            tuple(Prior(float(v), SIGMA_M) for v in position),
+            tuple(Prior(float(np.radians(v))) for v in MOUNTING_DEG[head]),
+        )
+        for head, position in POSITION_M.items()
+    }
+    rig = Rig("ca502", NADIR, cameras, constraint)
+    there = {camera.name for camera in block.cameras}
+    rig = replace(rig, cameras={head: mounting for head, mounting in rig.cameras.items() if head in there})
+    return replace(block, rigs=(rig,), images=replace(block.images, columns={"station": station}))
+
+
+def whole_stations(block: aerotri.Block) -> aerotri.Block:
+    """Photographs whose exposure has none of the nadir head stand alone."""
+    station = block.images.columns["station"].copy()
+    names = [camera.name for camera in block.cameras]
+    led = station[np.array([names[c] == NADIR for c in block.images.camera])]
+    station[~np.isin(station, led)] = ""
+    return replace(block, images=replace(block.images, columns={"station": station}))
+
+
+def relative(found: aerotri.Adjustment, block: aerotri.Block) -> dict[str, tuple[np.ndarray, np.ndarray, int]]:
+    """Median relative orientation of every head over the exposures (m and degrees), σ by its scatter, and count."""
+    images, order = found.adjusted.images, block.rotation
+    station = np.array([name[1:] for name in block.images.names.tolist()])
+    head = np.array([name[0] for name in block.images.names.tolist()])
+    there = np.isfinite(images.centre[:, 0])
+    lead = {s: k for k, s in enumerate(station) if head[k] == NADIR and there[k]}
+    out = {}
+    for name in POSITION_M:
+        rows = [k for k in np.flatnonzero((head == name) & there) if station[k] in lead]
+        at = np.array([lead[station[k]] for k in rows])
+        r_s = geometry.rotation_from_angles(images.angles[at], order)
+        arm = np.einsum("nji,nj->ni", r_s, images.centre[rows] - images.centre[at])
+        turn = np.swapaxes(r_s, 1, 2) @ geometry.rotation_from_angles(images.angles[rows], order)
+        angles = np.degrees(geometry.angles_from_rotation(turn, order))
+        angles = angles[0] + (angles - angles[0] + 180.0) % 360.0 - 180.0
+        six = np.concatenate([arm, angles], axis=1)
+        middle = np.median(six, axis=0)
+        spread = 1.4826 * np.median(np.abs(six - middle), axis=0)
+        out[name] = middle, spread * np.sqrt(np.pi / 2.0 / len(rows)), len(rows)
+    return out
+
+
+def mountings(found: aerotri.Adjustment) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Position (m) and angles (degrees) of every head of a rigid rig, and their σ."""
+    p, out = found.adjusted.parameters, {}
+    for name in POSITION_M:
+        rows = np.flatnonzero((p.kinds == "rig") & (p.groups == name))
+        unit = np.where(np.arange(len(rows)) < 3, 1.0, np.degrees(1.0))
+        out[name] = p.value[rows] * unit, p.sigma[rows] * unit
+    return out
+
+
+def print_mountings(rigid: aerotri.Adjustment, off: aerotri.Adjustment, block: aerotri.Block) -> None:
+    """Rigid and independent side by side."""
+    print("| head | element | rigid | σ | independent (median) | σ of it | difference over σ | exposures |")
+    print("|---|---|---|---|---|---|---|---|")
+    free = relative(off, block)
+    for name, (value, sigma) in mountings(rigid).items():
+        middle, spread, count = free[name]
+        for k, element in enumerate(("x m", "y m", "z m", "omega °", "phi °", "kappa °")):
+            other = value[k] + (middle[k] - value[k] + 180.0) % 360.0 - 180.0 if k > 2 else middle[k]
+            ratio = (other - value[k]) / np.hypot(sigma[k], spread[k])
+            numbers = " | ".join(f"{v:.4f}" for v in (value[k], sigma[k], other, spread[k]))
+            print(f"| {name} | {element} | {numbers} | {ratio:+.1f} | {count} |")
+    print()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, help="folder of the data")
+    parser.add_argument("--exposures", type=int, default=10**6, help="the first ones only")
+    parser.add_argument("--leave-out", action="store_true", help="every control point in turn")
+    options = parser.parse_args()
+    block = whole_stations(with_rig(exposures(unoriented(options.folder), 0, options.exposures)))
+    found = {}
+    for name in ("rigid", "off"):
+        own = block if name == "rigid" else replace(oriented_as(block, found["rigid"]), rigs=())
+        started = time.perf_counter()
+        found[name] = aerotri.adjust(own, explain=False)
+        print(f"\n## {'Rigid' if name == 'rigid' else 'Independent cameras'}\n")
+        print_table(found[name], time.perf_counter() - started)
+    print("## Relative orientations\n")
+    print_mountings(found["rigid"], found["off"], block)
+    if options.leave_out:
+        print("## Control left out in turn\n")
+        print("| left out | | dX m | dY m | dZ m | d/σ X | d/σ Y | d/σ Z |\n|---|---|---|---|---|---|---|---|")
+        for name in ("rigid", "off"):
+            own = block if name == "rigid" else replace(block, rigs=())
+            for point, left in left_out_in_turn(own, found[name]):
+                print(f"| {point} | {name} | {_row(left)}", flush=True)
+
+
+def oriented_as(block: aerotri.Block, found: aerotri.Adjustment) -> aerotri.Block:
+    """The block with the orientations of an adjustment as start values."""
+    images = found.adjusted.images
+    return replace(block, images=replace(block.images, centre=images.centre, angles=images.angles))
+
+
+def _row(left: aerotri.Adjustment | str) -> str:
+    if isinstance(left, str):
+        return f"{left} | | | | | |"
+    check = left.adjusted.check
+    cells = [f"{a:+.3f} ± {b:.3f}" for a, b in zip(check.difference[0], check.sigma[0], strict=True)]
+    return " | ".join(cells + [f"{a:+.1f}" for a in check.w[0]]) + " |"
+
+
+if __name__ == "__main__":
+    main()
