@@ -9,7 +9,9 @@ import pytest
 
 import aerotri
 from aerotri.adjustment import rigging
+from aerotri.adjustment.carry_over import start_values_at
 from aerotri.adjustment.prepare import prepare
+from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import Step
 from aerotri.conventions import InputError
 from aerotri.formats.results.rigs import rig_columns, rigs_json
@@ -411,6 +413,24 @@ def test_a_reference_photograph_without_image_points(simulated):
     error = result.images.centre[gone] - simulated[1].centre[gone]
     assert (np.abs(error) < 4.5 * result.images.sigma[gone, :3]).all()
     assert (result.images.sigma[gone, :3] < 1.0).all()
+
+
+def test_a_follower_without_a_reference_that_is_oriented(simulated):
+    """It is adjusted on its own."""
+    block = simulated[0]
+    lead = int(np.flatnonzero(block.images.camera == 0)[4])
+    follower = lead + 1
+    prepared = prepare(block)
+    u = prepared.system.unknowns
+    start = start_values_at(u, prepared.state)
+    start.centre[lead], start.rotation[lead] = np.nan, np.nan
+    status = np.where(np.isin(block.image_points.image, [lead]), 3, prepared.ray_status)
+    system, state = build_system(block, start, status)
+    rows = system.unknowns.images.tolist()
+    assert lead not in rows
+    assert np.isfinite(state.centre).all()
+    if follower in rows:
+        assert system.unknowns.rigging.mounting[rows.index(follower)] == -1
 
 
 def test_rays_without_a_station_stay_as_they_are(simulated):

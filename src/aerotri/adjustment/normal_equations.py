@@ -389,11 +389,11 @@ class NormalSystem:
         other._prior_weight[u.kept_columns[off]] = 0.0
         return other
 
-    def factorise(self, equations: NormalEquations) -> Factor | RigFactor:
+    def factorise(self, equations: NormalEquations) -> Factor:
         """Factor of the reduced matrix; valid until the next one."""
         return self.factorise_like(equations, equations.matrix)
 
-    def factorise_like(self, equations: NormalEquations, matrix: BorderedMatrix) -> Factor | RigFactor:
+    def factorise_like(self, equations: NormalEquations, matrix: BorderedMatrix) -> Factor:
         """Factor of another matrix over the unknowns of some equations; valid until the next one."""
         if self._reduction is None or equations.chain is None:
             return self.symbolic.factorise(matrix)
@@ -407,7 +407,7 @@ class NormalSystem:
         return self._reduction.reduced(equations.matrix, equations.chain).blocks[: len(self._reduction.leads)]
 
     def solve_sides(
-        self, state: State, factor: Factor | RigFactor, sides: np.ndarray, estimator: Estimator,
+        self, state: State, factor: Factor, sides: np.ndarray, estimator: Estimator,
         shared_sides: np.ndarray | None = None,
     ):  # fmt: skip
         """Columns Q·b for right sides b that act on the points, and on the shared parameters where given.

@@ -96,8 +96,8 @@ class RigReduction:
         return Inverse(blocks, border + of_mounting @ np.swapaxes(chain.by_mounting, 1, 2), inverse.corner)
 
 
-class RigFactor:
-    """A factor of the equations of stations and mountings that answers in the unknowns of the photographs, as `Factor`.
+class RigFactor(Factor):
+    """A factor of the equations of stations and mountings that answers in the unknowns of the photographs.
 
     Parameters
     ----------

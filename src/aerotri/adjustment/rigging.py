@@ -143,10 +143,22 @@ class Rigging:
         np.add.at(squares_shared, chain.columns[rows][there], of_mounting[there])
 
 
-def with_leads(block: Block, images: np.ndarray) -> np.ndarray:
-    """Photographs that take part, and the reference photographs of their stations, which carry the unknowns."""
-    lead = station_places(block).lead
-    return np.union1d(images, lead[images])
+def with_leads(block: Block, images: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Photographs that take part, and the reference photographs of their stations, which carry the unknowns.
+
+    Parameters
+    ----------
+    images : rows of the block's photographs. centre : (·, 3) start values of all, NaN where there is none.
+    """
+    return np.union1d(images, _oriented_places(block, centre).lead[images])
+
+
+def _oriented_places(block: Block, centre: np.ndarray) -> StationPlaces:
+    """Where the photographs belong; those whose reference photograph has no start value follow none."""
+    places = station_places(block)
+    there = np.isfinite(centre[places.lead, 0])
+    own = np.arange(len(there))
+    return StationPlaces(np.where(there, places.lead, own), np.where(there, places.mounting, -1), places.mountings)
 
 
 def rigging_of(
@@ -156,9 +168,10 @@ def rigging_of(
 
     Parameters
     ----------
-    images : (n,) rows of the block's photographs that take part. centre, rotation : (n, 3), (n, 3, 3) start values.
+    images : (n,) rows of the block's photographs that take part.
+    centre, rotation : (·, 3), (·, 3, 3) start values of all photographs of the block.
     """
-    places = station_places(block)
+    places = _oriented_places(block, centre)
     if not (places.mounting[images] >= 0).any():
         return None
     row = np.full(len(block.images), -1)
@@ -168,8 +181,8 @@ def rigging_of(
     number = np.full(len(places.mountings), -1)
     number[used] = np.arange(len(used))
     mounting = np.where(mounting >= 0, number[mounting], -1)
-    mountings = list_mountings(block, places, used, shared, relative_rotations(lead, mounting, rotation, len(used)))
-    return Rigging(lead, mounting, mountings)
+    relative = relative_rotations(lead, mounting, rotation[images], len(used))
+    return Rigging(lead, mounting, list_mountings(block, places, used, shared, relative))
 
 
 def relative_rotations(lead: np.ndarray, mounting: np.ndarray, rotation: np.ndarray, count: int) -> list[np.ndarray]:

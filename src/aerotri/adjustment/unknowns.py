@@ -246,12 +246,12 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
     ----------
     active : (m,) bool, rays of the block to adjust; their photographs and points have start values.
     """
-    source, images, points, ray_image, row_start = _sort_rays(block, active)
+    source, images, points, ray_image, row_start = _sort_rays(block, active, start.centre)
     shared = SharedList()
     lens = lens_table(block, images, shared)
     xy = np.ascontiguousarray(block.image_points.xy[source])
     linear = linear_columns(block, images, ray_image, xy, shared)
-    rigging = rigging_of(block, images, shared, start.centre[images], start.rotation[images])
+    rigging = rigging_of(block, images, shared, start.centre, start.rotation)
     pair_start, pair_block, block_row, block_col = _pattern(len(images), row_start, ray_image)
     prior_xyz, prior_weight, held = _control_priors(block, points, start.origin)
     unknowns = Unknowns(
@@ -290,10 +290,10 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
     return unknowns, unknowns.with_followers(state)
 
 
-def _sort_rays(block: Block, active: np.ndarray):
+def _sort_rays(block: Block, active: np.ndarray, centre: np.ndarray):
     """Active rays by point, points by their first photograph: neighbours in memory are neighbours in the air."""
     rows = np.flatnonzero(active)
-    images = with_leads(block, np.unique(block.image_points.image[rows]))
+    images = with_leads(block, np.unique(block.image_points.image[rows]), centre)
     ray_image = np.searchsorted(images, block.image_points.image[rows])
     points, ray_point = np.unique(block.image_points.point[rows], return_inverse=True)
     first_image = np.full(len(points), len(images))

@@ -240,6 +240,8 @@ def _likely_pairs(block: Block) -> Iterator[tuple[int, int]]:
 def sub_block(block: Block, images: np.ndarray, points: np.ndarray | None = None) -> tuple[Block, np.ndarray]:
     """A block of some photographs, and where their image points stand in the whole; points keep their index.
 
+    Cameras on rigs count as independent ones: some photographs are not whole stations.
+
     Parameters
     ----------
     images : indices. points : (N,) bool, points that are kept; all where None.
@@ -266,8 +268,9 @@ def sub_block(block: Block, images: np.ndarray, points: np.ndarray | None = None
         )  # fmt: skip
     fits = {int(number[k]): fit for k, fit in block.interior_fits.items() if number[k] >= 0}
     made = replace(
-        block, images=some, image_points=measured, gnss_ins=gnss, fiducials=None, edits=None, interior_fits=fits
-    )
+        block, images=some, image_points=measured, gnss_ins=gnss, fiducials=None, edits=None, interior_fits=fits,
+        rigs=(),
+    )  # fmt: skip
     return made, rows
 
 
