@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 import aerotri
 from aerotri.adjustment import rigging
@@ -458,3 +459,36 @@ def test_with_self_calibration_gross_errors_and_robust_weights(simulated):
     for key, true in true_values(truth).items():
         value, sigma = values_of(result)[key]
         assert abs(value - true) < 4.5 * sigma, key
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["free arms", "observed arms and GNSS"])
+def test_recovery(case):
+    """Normalised errors of mountings, a station, a photograph that follows and a point over 50 seeds: N(0, 1)."""
+    changes = {} if case == "free arms" else {"mounting": EXACT, **GNSS}
+    runs = [_normalised_errors(seed, **changes) for seed in range(1000, 1050)]
+    n = len(runs)
+    low, high = chi2.ppf([0.0005, 0.9995], n) / n
+    for name in runs[0][0]:
+        z = np.array([run[0][name] for run in runs])
+        assert abs(z.mean()) < 3.3 / np.sqrt(n), f"{name} is biased, mean z {z.mean():.2f}"
+        assert low < np.mean(z**2) < high, f"σ of {name} is wrong, mean z² {np.mean(z**2):.2f}"
+    total, redundancy = sum(run[1] for run in runs), sum(run[2] for run in runs)
+    low, high = chi2.ppf([0.0005, 0.9995], redundancy) / redundancy
+    assert low < total / redundancy < high
+
+
+def _normalised_errors(seed, **changes):
+    block, truth = rig_block(seed, cameras=TWO, **changes)
+    result = adjust(block)
+    found = values_of(result)
+    z = {key: (found[key][0] - true) / found[key][1] for key, true in true_values(truth).items()}
+    for name in ("1_003", "1_003_left"):
+        row = block.images.names.tolist().index(name)
+        found, true = result.images, truth
+        gap = np.concatenate([found.centre[row] - true.centre[row], found.angles[row] - true.angles[row]])
+        z |= {(name, k): value for k, value in enumerate(gap / result.images.sigma[row])}
+    point = int(np.flatnonzero(result.points.rays == 3)[seed % 5])
+    gap = (result.points.xyz[point] - truth.points[point]) / result.points.sigma[point]
+    z |= {("point", k): value for k, value in enumerate(gap)}
+    return z, result.outcome.vtpv, result.outcome.redundancy

@@ -46,7 +46,8 @@ def rig_start_values(block: Block, given_points: np.ndarray | None = None) -> St
 
 def _given(block: Block) -> np.ndarray:
     """(n,) bool, photographs with an orientation."""
-    return np.isfinite(block.images.centre).all(axis=1) & np.isfinite(block.images.angles).all(axis=1)
+    both = np.hstack([block.images.centre, block.images.angles])
+    return np.asarray(np.isfinite(both).all(axis=1))
 
 
 def _with_stations(block: Block, places: StationPlaces, given_points: np.ndarray | None) -> Block:

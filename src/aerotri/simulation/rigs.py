@@ -68,12 +68,10 @@ def with_rigs(flown: FlownImages, spec: SimulationSpec, rng: np.random.Generator
         camera += [int(flown.camera[k]), *(number[camera] for camera in cameras)]
         centre.append(flown.centre[k])
         turned.append(rotation[k])
-        for mounting in cameras.values() if rig is not None else ():
-            moved = rig.play_position_m * rng.normal(size=3)
-            about = np.radians(rig.play_rotation_deg) * rng.normal(size=3)
-            at = rotation_from_angles(np.radians(mounting.rotation_deg), spec.rotation)
-            centre.append(flown.centre[k] + rotation[k] @ (np.array(mounting.position_m) + moved))
-            turned.append(rotation[k] @ exponential(about) @ at)
+        if rig is not None:
+            for at, turn in _at_exposure(rig, spec.rotation, rng):
+                centre.append(flown.centre[k] + rotation[k] @ at)
+                turned.append(rotation[k] @ turn)
     rows = np.array(lead)
     return replace(
         flown, names=np.array(name), camera=np.array(camera, dtype=np.int64), strip=flown.strip[rows],
@@ -81,6 +79,17 @@ def with_rigs(flown: FlownImages, spec: SimulationSpec, rng: np.random.Generator
         angles=angles_from_rotation(np.array(turned), spec.rotation), time=flown.time[rows],
         station=flown.names[rows],
     ), rows  # fmt: skip
+
+
+def _at_exposure(rig: RigSpec, order: str, rng: np.random.Generator) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Position (3,) and rotation (3, 3) of every mounted camera at one exposure, its play included."""
+    out = []
+    for mounting in rig.camera.values():
+        moved = rig.play_position_m * rng.normal(size=3)
+        about = np.radians(rig.play_rotation_deg) * rng.normal(size=3)
+        turn = exponential(about) @ rotation_from_angles(np.radians(mounting.rotation_deg), order)
+        out.append((np.array(mounting.position_m) + moved, turn))
+    return out
 
 
 def stated_rigs(spec: SimulationSpec, rng: np.random.Generator) -> tuple[Rig, ...]:
