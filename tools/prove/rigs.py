@@ -84,6 +84,16 @@ def mountings(found: aerotri.Adjustment) -> dict[str, tuple[np.ndarray, np.ndarr
     return out
 
 
+def print_rig(rigid: aerotri.Adjustment) -> None:
+    """The mountings of the rigid rig with their σ."""
+    print("| head | " + " | ".join(f"{e} | σ" for e in ("x m", "y m", "z m", "omega °", "phi °", "kappa °")) + " |")
+    print("|---" * 13 + "|")
+    for name, (value, sigma) in mountings(rigid).items():
+        cells = " | ".join(f"{v:.4f} | {s:.4f}" for v, s in zip(value, sigma, strict=True))
+        print(f"| {name} | {cells} |")
+    print(flush=True)
+
+
 def print_mountings(rigid: aerotri.Adjustment, off: aerotri.Adjustment, block: aerotri.Block) -> None:
     """Rigid and independent side by side."""
     print("| head | element | rigid | σ | independent (median) | σ of it | difference over σ | exposures |")
@@ -113,6 +123,8 @@ def main() -> None:
         found[name] = aerotri.adjust(own, explain=False)
         print(f"\n## {'Rigid' if name == 'rigid' else 'Independent cameras'}\n")
         print_table(found[name], time.perf_counter() - started)
+        if name == "rigid":
+            print_rig(found[name])
     print("## Relative orientations\n")
     print_mountings(found["rigid"], found["off"], block)
     if options.leave_out:
