@@ -22,7 +22,7 @@ def dense_design(adjustment):
     rays, n, s, count = u.rays, len(u.images), len(u.shared), len(u.points)
     ray_point = np.repeat(np.arange(count), np.diff(rays.start))
     partials = linearise(
-        state.rotation, state.centre, state.points, u.interior(state), rays.image, ray_point, rays.lens_row, rays.xy
+        state.rotation, state.centre, state.points, u.interior(state), rays.image, ray_point, rays.lens_row, rays.at
     )
     rows = []
     for k in range(len(rays.image)):
@@ -59,8 +59,8 @@ def _observed(system, n: int, s: int, size: int):
             row[6 * n + column] = 1.0 / sigma
             yield row
     for field in system.joint_priors:
-        rows = np.zeros((len(field.weight), size))
-        rows[:, 6 * n + field.columns.start : 6 * n + field.columns.stop] = np.linalg.cholesky(field.weight).T
+        rows = np.zeros((field.rank, size))
+        rows[:, 6 * n + field.columns] = field.root().T
         yield from rows
 
 

@@ -61,6 +61,9 @@ def strasbourg():
     if not folder.exists():
         pytest.skip("real data 'dbat_sxb' is not beside the project (../shared/data)")
     block = read_dbat(folder)
+    # DBAT evaluates Brown's parameters at the measured image points
+    adjustment = replace(block.settings.adjustment, parameter_position="measured")
+    block = replace(block, settings=replace(block.settings, adjustment=adjustment))
     return block, adjust(block)
 
 
@@ -167,6 +170,9 @@ def roma():
     if not folder.exists():
         pytest.skip("real data 'dbat_roma' is not beside the project (../shared/data)")
     block = read_dbat(folder)
+    # DBAT evaluates Brown's parameters at the measured image points
+    adjustment = replace(block.settings.adjustment, parameter_position="measured")
+    block = replace(block, settings=replace(block.settings, adjustment=adjustment))
     return block, adjust(block)
 
 

@@ -46,7 +46,7 @@ def linearise_point(p, rays, table, values, points, weighting, work):
     Returns the cost of its rays and the number of shared parameters that act on them.
     """
     residual, weight, estimator, limit = weighting.residual, weighting.weight, weighting.estimator, weighting.limit
-    start, image, xy, inv_sigma = rays.start, rays.image, rays.xy, rays.inv_sigma
+    start, image, xy, at, inv_sigma = rays.start, rays.image, rays.xy, rays.at, rays.inv_sigma
     ap_index, ap_value = rays.ap_index, rays.ap_value
     lens_columns, eo_free, turn, kept = table.lens_columns, table.eo_free, table.turn, table.kept
     xyz, point_free = points.xyz, points.free
@@ -60,7 +60,7 @@ def linearise_point(p, rays, table, values, points, weighting, work):
         ray = start[p] + q
         i, lens = image[ray], lens_row[ray]
         linearise_ray(
-            rotation[i], centre[i], xyz[p], interior[lens], xy[ray, 0], xy[ray, 1],
+            rotation[i], centre[i], xyz[p], interior[lens], at[ray, 0], at[ray, 1],
             prediction, by_eo[q], by_pt[q], by_interior,
         )  # fmt: skip
         n = 0

@@ -15,7 +15,9 @@ def start_values_at(unknowns: Unknowns, state: State) -> StartValues:
     rotation, centre, points = np.full((n, 3, 3), np.nan), np.full((n, 3), np.nan), np.full((count, 3), np.nan)
     rotation[unknowns.images], centre[unknowns.images] = state.rotation, state.centre
     points[unknowns.points] = state.points
-    return StartValues(unknowns.origin, rotation, centre, points)
+    at = unknowns.block.image_points.xy.copy()
+    at[unknowns.rays.source] = unknowns.rays.at
+    return StartValues(unknowns.origin, rotation, centre, points, at)
 
 
 def with_shared(new: Unknowns, old: Unknowns, start: State, state: State) -> State:

@@ -11,7 +11,8 @@ import numpy as np
 
 from aerotri.adjustment.datum import ExtraObservations
 from aerotri.adjustment.exposures import exposures_of
-from aerotri.adjustment.position_errors import KIND, PositionPrior, error_nodes
+from aerotri.adjustment.joint_prior import JointPrior
+from aerotri.adjustment.position_errors import KIND, error_nodes
 from aerotri.adjustment.unknowns import State, Unknowns, keep_points
 from aerotri.conventions import InputError
 from aerotri.functional_model.constraints import NO_BASIS, Constraint, ConstraintObservations, flat_basis
@@ -62,7 +63,7 @@ def _with_errors(observed: CentreObservations, unknowns: Unknowns, state: State)
         columns[:, axis] = start + np.stack([nodes.before, nodes.after], axis=1)
         own = slice(number * m, (number + 1) * m)
         weight[own, own] = precision / sigma[axis] ** 2
-    unknowns.shared.position_errors.append(PositionPrior(slice(first, first + len(weight)), weight))
+    unknowns.shared.position_errors.append(JointPrior(np.arange(first, first + len(weight)), weight, len(weight)))
     left = nodes.left[:, None] * np.square(sigma)
     inv_sigma = np.where(
         observed.inv_sigma > 0.0, 1.0 / np.sqrt(1.0 / np.maximum(observed.inv_sigma, 1e-300) ** 2 + left), 0.0

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.adjustment.shared_parameters import RandomField
 from aerotri.observations import Settings
 
@@ -15,24 +14,11 @@ FIRST_LENGTH = 0.5
 """Correlation length to begin with, in half diagonals of the format [C]."""
 
 
-@dataclass(frozen=True, eq=False)
-class FieldPrior:
-    """The observation of the p nodes of a random field: 0, with a full weight matrix.
-
-    Parameters
-    ----------
-    columns : of the nodes in the shared list.
-    weight : (p, p) 1/mm², the inverse of their covariance.
-    """
-
-    columns: slice
-    weight: np.ndarray
-
-
-def field_prior(field: RandomField, settings: Settings) -> FieldPrior:
+def field_prior(field: RandomField, settings: Settings) -> JointPrior:
     """The prior of a field with the covariance that the settings say, or one to begin with."""
     sigma_um, length_mm = known_or_first(field, settings)
-    return FieldPrior(field.columns, field.prior_weight(sigma_um, length_mm)[0])
+    weight = field.prior_weight(sigma_um, length_mm)[0]
+    return JointPrior(np.arange(field.columns.start, field.columns.stop), weight, len(weight))
 
 
 def known_or_first(field: RandomField, settings: Settings) -> tuple[float, float]:

@@ -18,7 +18,7 @@ class RayArrays(NamedTuple):
     ----------
     start : (P + 1,) first ray of every point.
     image : (m,) photograph. lens_row : (m,) set of interior elements.
-    xy : (m, 2) mm, as measured.
+    xy : (m, 2) mm, as measured. at : (m, 2) mm, where parameters of the measured position are evaluated.
     inv_sigma : (m, 2) 1/mm.
     ap_index : (m, ka) shared parameters that act on the ray as additional parameters.
     ap_value : (m, 2, ka) their partials.
@@ -28,6 +28,7 @@ class RayArrays(NamedTuple):
     image: np.ndarray
     lens_row: np.ndarray
     xy: np.ndarray
+    at: np.ndarray
     inv_sigma: np.ndarray
     ap_index: np.ndarray
     ap_value: np.ndarray

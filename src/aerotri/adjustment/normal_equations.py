@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -12,7 +12,9 @@ import numpy as np
 from aerotri.adjustment import _covariance_kernels, _kernels, _point_kernels
 from aerotri.adjustment.chunk_sums import ChunkSums, add_gaps, add_own_squares, add_squares
 from aerotri.adjustment.datum import ExtraObservations, free_motions, observes_centres, without_motion
-from aerotri.adjustment.field_prior import FieldPrior, field_prior
+from aerotri.adjustment.deviations import deviation_priors, deviations_of
+from aerotri.adjustment.field_prior import field_prior
+from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.adjustment.kernel_records import (
     Directions,
     Inverse,
@@ -25,7 +27,7 @@ from aerotri.adjustment.kernel_records import (
     Work,
 )
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
-from aerotri.adjustment.position_errors import KIND, PositionPrior
+from aerotri.adjustment.position_errors import KIND
 from aerotri.adjustment.rig_reduction import RigFactor, RigReduction
 from aerotri.adjustment.rigging import Chain
 from aerotri.adjustment.robust import Estimator, normalised_lengths
@@ -104,15 +106,17 @@ class NormalSystem:
         self._prior_weight = np.where(np.isfinite(sigma), 1.0 / sigma**2, 0.0)
         self._prior_value = np.array(unknowns.shared.observed).reshape(-1)
         self._fields = tuple(field_prior(f, unknowns.block.settings) for f in unknowns.shared.fields)
+        self.deviations = deviations_of(unknowns.block, unknowns.shared)
+        self._deviations = deviation_priors(self.deviations, unknowns.block)
         # the kernels see no prior of a point that is not eliminated: it stands with the shared parameters
         self._point_prior = np.where((unknowns.kept < 0)[:, None], unknowns.prior_weight, 0.0)
 
     @property
     def n_shared_priors(self) -> int:
-        """Observed shared parameters, nodes of random fields among them, coordinates of points apart."""
+        """Observations of shared parameters, those of several together among them, coordinates of points apart."""
         of_points = np.array(self.unknowns.shared.kinds) == "point"
-        nodes = sum(len(prior.weight) for prior in self.joint_priors)
-        return nodes + (int((self._prior_weight[~of_points] > 0.0).sum()) if len(of_points) else 0)
+        together = sum(prior.rank for prior in self.joint_priors)
+        return together + (int((self._prior_weight[~of_points] > 0.0).sum()) if len(of_points) else 0)
 
     @property
     def chunks(self) -> list[tuple[int, int]]:
@@ -120,14 +124,29 @@ class NormalSystem:
         return self._bounds
 
     @property
-    def fields(self) -> tuple[FieldPrior, ...]:
+    def fields(self) -> tuple[JointPrior, ...]:
         """What is known beforehand of the random fields among the shared parameters."""
         return self._fields
 
     @property
-    def joint_priors(self) -> tuple[FieldPrior | PositionPrior, ...]:
-        """What is known beforehand of shared parameters together: random fields, errors of positions."""
-        return (*self._fields, *self.unknowns.shared.position_errors)
+    def deviation_priors(self) -> tuple[JointPrior, ...]:
+        """What is known beforehand of every one of `deviations`."""
+        return self._deviations
+
+    @property
+    def joint_priors(self) -> tuple[JointPrior, ...]:
+        """What is known beforehand of shared parameters together: random fields, groups, errors of positions."""
+        return (*self._fields, *self._deviations, *self.unknowns.shared.position_errors)
+
+    def with_deviations(self, sigma_um: Mapping[str, float]) -> NormalSystem:
+        """The same system with other sizes of the deviations from group to group (µm, by parameter)."""
+        block = self.unknowns.block
+        settings = replace(block.settings, deviations=replace(block.settings.deviations, sigma_um=dict(sigma_um)))
+        block = replace(block, settings=settings)
+        other = copy(self)
+        other.unknowns = replace(self.unknowns, block=block)
+        other._deviations = deviation_priors(self.deviations, block)
+        return other
 
     def with_collocation(self, known: CollocationSettings) -> NormalSystem:
         """The same system with another covariance of the random fields."""
@@ -179,9 +198,9 @@ class NormalSystem:
             add_squares(observed, blocks, border, corner)
             add_own_squares(observed, squares, squares_shared)
         corner[np.diag_indices_from(corner)] += self._prior_weight
-        for prior in self.joint_priors:
-            corner[prior.columns, prior.columns] += prior.weight
-            squares_shared[prior.columns] += np.diagonal(prior.weight)
+        for field in self.joint_priors:
+            corner[np.ix_(field.columns, field.columns)] += field.weight
+            squares_shared[field.columns] += np.diagonal(field.weight)
         held_image, held_column = np.nonzero(~u.eo_free)
         blocks[held_image, held_column, held_column] = squares[held_image, held_column] = 1.0
         diagonal = np.arange(6)
@@ -272,8 +291,8 @@ class NormalSystem:
                 there = rows.columns[:, c] >= 0
                 value[there] += rows.by_shared[there, :, c, None] * shared[rows.columns[there, c]][:, None, :]
             total += np.einsum("gka,gkb->ab", value, value)
-        for prior in self.joint_priors:
-            total += shared[prior.columns].T @ prior.weight @ shared[prior.columns]
+        for field in self.joint_priors:
+            total += shared[field.columns].T @ field.weight @ shared[field.columns]
         return total
 
     def prior_root(self) -> np.ndarray:
@@ -282,8 +301,8 @@ class NormalSystem:
         root = np.zeros((len(self._prior_weight), len(known)))
         root[known, np.arange(len(known))] = np.sqrt(self._prior_weight[known])
         for prior in self.joint_priors:
-            own = np.zeros((len(root), len(prior.weight)))
-            own[prior.columns] = np.linalg.cholesky(prior.weight)
+            own = np.zeros((len(root), prior.rank))
+            own[prior.columns] = prior.root()
             root = np.concatenate([root, own], axis=1)
         return root
 

@@ -27,19 +27,6 @@ NODE_STEP = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class PositionPrior:
-    """The observation of the p nodes of position errors: 0, with a full weight matrix.
-
-    Parameters
-    ----------
-    columns : of the nodes in the shared list. weight : (p, p) 1/m², the inverse of their covariance.
-    """
-
-    columns: slice
-    weight: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class ErrorNodes:
     """Where the process is an unknown, and how it acts on g exposures from there.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from aerotri.adjustment.position_errors import PositionPrior
+from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import (
     FAMILIES,
@@ -65,7 +65,7 @@ class SharedList:
     observed: list[float] = field(default_factory=list)
     sigma: list[float] = field(default_factory=list)
     fields: list[RandomField] = field(default_factory=list)
-    position_errors: list[PositionPrior] = field(default_factory=list)
+    position_errors: list[JointPrior] = field(default_factory=list)
 
     def add(
         self, name: str, group: str, kind: str, mark: str = "", prior: Prior = FREE, start: float | None = None
@@ -169,20 +169,48 @@ class LinearColumns:
     value: np.ndarray
 
 
-def linear_columns(
-    block: Block, images: np.ndarray, ray_image: np.ndarray, xy: np.ndarray, shared: SharedList
-) -> LinearColumns:
-    """Linear additional parameters, appended to `shared`, and their columns at the rays.
+@dataclass(frozen=True, eq=False)
+class FamilySets:
+    """A linear family: of every combination of camera and group its set, with its first column in the shared list."""
+
+    sets: dict[int, tuple[ParameterSet, int]]
+
+
+@dataclass(frozen=True, eq=False)
+class LinearParameters:
+    """The linear additional parameters of a block.
 
     Parameters
     ----------
-    images : (n,) photographs used; ray_image : (m,) index into `images`; xy : (m, 2) mm.
+    families : one record each. of_ray : (m,) combination of camera and group of every ray.
+    """
+
+    families: tuple[FamilySets, ...]
+    of_ray: np.ndarray
+
+    def columns(self, xy: np.ndarray) -> LinearColumns:
+        """The columns at positions (m, 2) mm of the rays."""
+        parts = [_family_columns(family.sets, self.of_ray, xy) for family in self.families]
+        if not parts:
+            return LinearColumns(np.zeros((len(xy), 0), np.int64), np.zeros((len(xy), 2, 0)))
+        return LinearColumns(
+            np.ascontiguousarray(np.concatenate([p.index for p in parts], axis=1)),
+            np.ascontiguousarray(np.concatenate([p.value for p in parts], axis=2)),
+        )
+
+
+def linear_parameters(block: Block, images: np.ndarray, ray_image: np.ndarray, shared: SharedList) -> LinearParameters:
+    """Linear additional parameters, appended to `shared`.
+
+    Parameters
+    ----------
+    images : (n,) photographs used; ray_image : (m,) index into `images`.
     """
     groups = group_of_images(block)[images]
     keys = list(zip(block.images.camera[images].tolist(), groups.tolist(), strict=True))
     number = {key: k for k, key in enumerate(dict.fromkeys(keys))}
     of_ray = np.array([number[key] for key in keys], dtype=np.int64)[ray_image]
-    parts = []
+    families = []
     for family, items in block.settings.adjustment.additional_parameters:
         if family in LINEAR_FAMILIES:
             first: dict[str, int] = {}
@@ -196,13 +224,8 @@ def linear_columns(
                         if family == collocation.FAMILY.name:
                             shared.fields.append(random_field(block, chosen, group, first[group]))
                     sets[key] = chosen, first[group]
-            parts.append(_family_columns(sets, of_ray, xy))
-    if not parts:
-        return LinearColumns(np.zeros((len(xy), 0), np.int64), np.zeros((len(xy), 2, 0)))
-    return LinearColumns(
-        np.ascontiguousarray(np.concatenate([p.index for p in parts], axis=1)),
-        np.ascontiguousarray(np.concatenate([p.value for p in parts], axis=2)),
-    )
+            families.append(FamilySets(sets))
+    return LinearParameters(tuple(families), of_ray)
 
 
 def _sets_by_camera(block: Block, family: str, items: tuple[str, ...]) -> dict[int, ParameterSet]:

@@ -7,9 +7,11 @@ is the camera's `flight_axis`; where it is not stated, all four are tried by the
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
+from aerotri.conventions import InputError
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block
 
@@ -92,6 +94,33 @@ def strips_of_track(centre: np.ndarray, names: np.ndarray) -> np.ndarray:
             number += 1
         strip[k] = number
     return strip
+
+
+def with_named_strips(block: Block) -> Block:
+    """The block with strips found where the track turns, if its photographs have none and its groups are strips.
+
+    Raises
+    ------
+    InputError
+        When there is no position to find them from.
+    """
+    images = block.images
+    if block.settings.adjustment.parameter_groups != "strip" or all(images.strip.astype(str).tolist()):
+        return block
+    centre = images.centre.copy()
+    if block.gnss_ins is not None:
+        known = np.isfinite(block.gnss_ins.xyz).all(axis=1)
+        centre[block.gnss_ins.image[known]] = block.gnss_ins.xyz[known]
+    if not np.isfinite(centre).all():
+        raise InputError(
+            'parameter_groups = "strip", but images.csv names no strips and not every photograph has a position',
+            "add a column strip to images.csv, or positions",
+            file="images.csv",
+        )
+    order = order_of_exposure(centre, np.full(len(images), ""), images.names, exposure_times(block))
+    strip = np.empty(len(images), dtype=object)
+    strip[order] = [f"strip {k + 1}" for k in strips_of_track(centre[order], np.full(len(images), ""))]
+    return replace(block, images=replace(images, strip=strip))
 
 
 def headings(centre: np.ndarray, strip: np.ndarray) -> np.ndarray:

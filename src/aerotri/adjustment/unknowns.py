@@ -13,7 +13,7 @@ import numpy as np
 from aerotri.adjustment import _pair_kernels
 from aerotri.adjustment.kernel_records import RayArrays
 from aerotri.adjustment.rigging import Chain, Rigging, rigging_of, with_leads
-from aerotri.adjustment.shared_parameters import LensTable, SharedList, lens_table, linear_columns
+from aerotri.adjustment.shared_parameters import LensTable, LinearParameters, SharedList, lens_table, linear_parameters
 from aerotri.conventions import InputError
 from aerotri.functional_model.rotation import (
     angles_from_rotation,
@@ -60,6 +60,7 @@ class Rays:
     image: np.ndarray
     lens_row: np.ndarray
     xy: np.ndarray
+    at: np.ndarray
     inv_sigma: np.ndarray
     ap_index: np.ndarray
     ap_value: np.ndarray
@@ -68,7 +69,7 @@ class Rays:
     def arrays(self) -> RayArrays:
         """As kernels take them."""
         return RayArrays(
-            self.start, self.image, self.lens_row, self.xy, self.inv_sigma, self.ap_index, self.ap_value,
+            self.start, self.image, self.lens_row, self.xy, self.at, self.inv_sigma, self.ap_index, self.ap_value,
         )  # fmt: skip
 
 
@@ -100,7 +101,7 @@ class Unknowns:
     images : (n,), points : (P,) rows of the block that take part.
     origin : (3,) m, the local origin.
     rays : the rays that take part.
-    lens : interior orientation rows.
+    lens : interior orientation rows. linear : the linear additional parameters at every ray.
     shared : the shared parameters.
     eo_free : (n, 6) bool, point_free : (P, 3) bool: False where a value is held.
     by_angles : (n,) bool: small rotations run along ω, φ, κ, so that single angles can be held.
@@ -118,6 +119,7 @@ class Unknowns:
     origin: np.ndarray
     rays: Rays
     lens: LensTable
+    linear: LinearParameters
     shared: SharedList
     eo_free: np.ndarray
     by_angles: np.ndarray
@@ -231,12 +233,14 @@ class StartValues:
     Parameters
     ----------
     origin : (3,) m. rotation : (n, 3, 3), centre : (n, 3), points : (N, 3), rows as in the block.
+    at : (m, 2) mm, where the rays are evaluated; as measured where None.
     """
 
     origin: np.ndarray
     rotation: np.ndarray
     centre: np.ndarray
     points: np.ndarray
+    at: np.ndarray | None = None
 
 
 def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tuple[Unknowns, State]:
@@ -250,7 +254,9 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
     shared = SharedList()
     lens = lens_table(block, images, shared)
     xy = np.ascontiguousarray(block.image_points.xy[source])
-    linear = linear_columns(block, images, ray_image, xy, shared)
+    at = xy if start.at is None else np.ascontiguousarray(start.at[source])
+    linear = linear_parameters(block, images, ray_image, shared)
+    columns = linear.columns(at)
     rigging = rigging_of(block, images, shared, start.centre, start.rotation)
     pair_start, pair_block, block_row, block_col = _pattern(len(images), row_start, ray_image)
     prior_xyz, prior_weight, held = _control_priors(block, points, start.origin)
@@ -264,12 +270,14 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
             image=ray_image,
             lens_row=lens.of_image[ray_image],
             xy=xy,
+            at=at,
             inv_sigma=1.0 / block.image_points.sigma[source],
-            ap_index=linear.index,
-            ap_value=linear.value,
+            ap_index=columns.index,
+            ap_value=columns.value,
             source=source,
         ),
         lens=lens,
+        linear=linear,
         shared=shared,
         eo_free=np.ones((len(images), 6), dtype=bool),
         by_angles=np.zeros(len(images), dtype=bool),

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
 from aerotri.adjustment.carry_over import reference_state, start_values_at, with_shared
 from aerotri.adjustment.kernel_records import Inverse
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
@@ -26,7 +27,7 @@ from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.ray_status import RayStatus, with_lonely_rays, with_weak_words
 from aerotri.adjustment.rigging import Rigging
 from aerotri.adjustment.robust import Estimator, normalised_lengths, scale_of
-from aerotri.adjustment.solve import Solution, SolveOptions, minimise
+from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, NotPositiveDefiniteError
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import State, Unknowns
@@ -151,7 +152,8 @@ def _tied(
         counted = replace(options, inspect=look if round_ < MOST_ROUNDS else None)
         if report is not None:
             counted = replace(counted, report=_counting(report, done))
-        solution = minimise(prepared.system, state, freedom, counted)
+        system, solution = minimise_at_adjusted(prepared.system, state, freedom, counted)
+        prepared = replace(prepared, system=system)
         done += solution.iterations
         ended = not solution.defects and solution.status in ("not converged", "converged")
         robust = solution.estimator.is_robust

@@ -138,6 +138,7 @@ class _PointCost(pyceres.CostFunction):  # pyright: ignore[reportUntypedBaseClas
         self._order, self._active, self._local = paper.order, layout.active, local
         self._mount = None if layout.mount is None else layout.mount[image]
         self._xy, self._inv_sigma, self._patterns = rays.xy[rows], rays.inv_sigma[rows], rays.patterns[rows]
+        self._at = rays.at[rows]
         self._rays = len(image)
         shared = int(layout.shared[0])
         point = layout.points[rays.point[rows.start]]
@@ -156,11 +157,11 @@ class _PointCost(pyceres.CostFunction):  # pyright: ignore[reportUntypedBaseClas
         point, elements = np.broadcast_to(parameters[0], (k, 3)), shared[local.elements]
         linear = np.einsum("kiq,kq->ki", self._patterns, shared[local.linear])
         if jacobians is None:
-            ideal = predict(pose, self._mount, point, elements, self._xy, self._order)
+            ideal = predict(pose, self._mount, point, elements, self._at, self._order)
             residuals[:] = ((np.stack(ideal, axis=1) + linear - self._xy) * self._inv_sigma).ravel()
             return True
         prediction, by_pose, by_elements = linearise(
-            pose, self._mount, point, elements, self._xy, self._order, self._active
+            pose, self._mount, point, elements, self._at, self._order, self._active
         )
         inv_sigma = self._inv_sigma[:, :, None]
         residuals[:] = ((prediction + linear - self._xy) * self._inv_sigma).ravel()

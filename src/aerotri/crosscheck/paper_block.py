@@ -72,7 +72,7 @@ class PaperRays:
 
     Parameters
     ----------
-    image, point, setup : (m,) rows; xy, inv_sigma : (m, 2).
+    image, point, setup : (m,) rows; xy, inv_sigma : (m, 2). at : (m, 2) mm, where parameters are evaluated.
     elements : (S, 15) shared entry of every element of `paper_rays.ELEMENTS`, for each setup (camera and group).
     linear : (S, q) shared entries of the linear patterns, −1 where a setup has fewer; patterns : (m, 2, q) mm, 0 there.
     """
@@ -81,6 +81,7 @@ class PaperRays:
     point: np.ndarray
     setup: np.ndarray
     xy: np.ndarray
+    at: np.ndarray
     inv_sigma: np.ndarray
     elements: np.ndarray
     linear: np.ndarray
@@ -131,13 +132,19 @@ class PaperBlock:
 
 
 def paper_block(
-    block: Block, used: np.ndarray, weight: np.ndarray, origin: np.ndarray, removed: Removed = frozenset()
+    block: Block,
+    used: np.ndarray,
+    weight: np.ndarray,
+    origin: np.ndarray,
+    at: np.ndarray | None = None,
+    removed: Removed = frozenset(),
 ) -> PaperBlock:
     """The block for an independent adjustment.
 
     Parameters
     ----------
     used : (m,) bool, rays that take part. weight : (m,) robust factors, kept as they are. origin : (3,) m, local.
+    at : (m, 2) mm, where parameters that are functions of the position are evaluated; as measured where None.
     removed : additional parameters that a selection took out.
 
     Raises
@@ -161,10 +168,11 @@ def paper_block(
     setup = np.array(of_image)[image]
     xy = block.image_points.xy[rows]
     inv_sigma = np.sqrt(weight[rows])[:, None] / block.image_points.sigma[rows]
-    lines, values = _patterns(block, setups, linear, setup, xy)
+    there = xy if at is None else at[rows]
+    lines, values = _patterns(block, setups, linear, setup, there)
     return PaperBlock(
         images, points, origin, block.rotation, shared,
-        PaperRays(image, point, setup, xy, inv_sigma, place[elements], _final(lines, place), values),
+        PaperRays(image, point, setup, xy, there, inv_sigma, place[elements], _final(lines, place), values),
         None if antennas is None else _replaced(antennas, place),
         *_control(block, points, origin),
     )  # fmt: skip
@@ -182,6 +190,7 @@ def _refuse_unknown(block: Block) -> None:
         (observed is not None and free, "a free datum beside observed projection centres"),
         (settings.gnss.lever_arm_sigma_m is not None, "a free lever arm"),
         (settings.gnss.time_offset != "off", "a time offset of GNSS"),
+        (settings.deviations.kind != "free", "deviations from group to group"),
         (settings.gnss.correlated != "off", "GNSS errors that stay for a while"),
         (settings.gnss.noise_factor not in (None, (1.0, 1.0)), "a factor of the σ of GNSS"),
         (settings.refraction != "off" or settings.earth_curvature != "off", "refraction and earth curvature"),

@@ -18,6 +18,8 @@ from aerotri.results.adjusted_block import AdjustedBlock, SharedParameters
 
 PEER = "independent model"
 QUESTION = "all unknowns with the forward model written from the papers alone, self-calibration included"
+FAR_OFF = 50.0
+"""Residual in σ from which a ray keeps its measured position, as the adjustment has it."""
 ELEMENTS = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
 KINDS = {"interior": "interior orientation", "additional": "additional parameters", "gnss": "GNSS shifts and drifts"}
 
@@ -37,7 +39,12 @@ def check_with_paper(adjusted: AdjustedBlock, adjust: Callable[[Block], Adjusted
     begun = time.perf_counter()
     try:
         paper = paper_block(
-            adjusted.block, used_rays(adjusted), adjusted.rays.weight, origin, _removed(adjusted.parameters)
+            adjusted.block,
+            used_rays(adjusted),
+            adjusted.rays.weight,
+            origin,
+            _positions(adjusted),
+            _removed(adjusted.parameters),
         )
     except UnknownToPaperError as unknown:
         return PeerCheck(PEER, QUESTION, "not available", str(unknown))
@@ -59,6 +66,18 @@ def check_with_paper(adjusted: AdjustedBlock, adjust: Callable[[Block], Adjusted
         notes=(*notes, *_notes(adjusted, solution)),
     )
     return judge(check, _counts_differ(adjusted, check)) if solution.converged else check
+
+
+def _positions(adjusted: AdjustedBlock) -> np.ndarray | None:
+    """(m, 2) mm, where the adjustment evaluates its parameters: adjusted image points; None: the measured ones.
+
+    A ray far off stays where it was measured, as there.
+    """
+    rays, v = adjusted.block.image_points, adjusted.rays.v
+    if adjusted.block.settings.adjustment.parameter_position == "measured":
+        return None
+    near = np.all(np.abs(v) <= FAR_OFF * rays.sigma, axis=1, keepdims=True)
+    return np.where(near, rays.xy + v, rays.xy)
 
 
 def _removed(parameters: SharedParameters) -> frozenset[tuple[str, str]]:

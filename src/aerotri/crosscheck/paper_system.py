@@ -67,7 +67,7 @@ def ray_rows(paper: PaperBlock, layout: Layout, x: np.ndarray, rows: slice) -> _
     mount = None if layout.mount is None else layout.mount[image]
     elements = x[layout.shared[rays.elements]][setup]
     prediction, by_pose, by_elements = linearise(
-        x[layout.poses[image]], mount, x[layout.points[point]], elements, rays.xy[rows], paper.order, layout.active
+        x[layout.poses[image]], mount, x[layout.points[point]], elements, rays.at[rows], paper.order, layout.active
     )
     linear = layout.shared[np.maximum(rays.linear, 0)][setup]
     active = layout.shared[rays.elements[:, layout.active]][setup]

@@ -93,6 +93,4 @@ def restitution_of(calibration: Adjustment, variant: str = FREE, used: Orientati
         used = true
     covariance = calibration.local.parameters.total_covariance[np.ix_(rows, rows)]
     part = calibration.local.model_part
-    return Restitution(
-        variant, true, used, errors, group, follows, covariance, "" if part is None else part.change
-    )
+    return Restitution(variant, true, used, errors, group, follows, covariance, "" if part is None else part.change)

@@ -254,6 +254,7 @@ class AdjustmentSettings:
 
     additional_parameters: tuple[tuple[str, tuple[str, ...]], ...] = ()
     parameter_groups: str = "camera"
+    parameter_position: str = "adjusted"
     parameter_selection: str = "off"
     t_limit: float = 1.0
     correlation_limit: float = 0.85
@@ -325,6 +326,20 @@ class CollocationSettings:
 
 
 @dataclass(frozen=True)
+class DeviationSettings:
+    """What `[deviations]` says of additional parameters that have values in several groups.
+
+    Parameters
+    ----------
+    kind : 'free', 'independent' or 'walk'.
+    sigma_um : σ of the deviations by parameter, as an image error; None: estimated from the block.
+    """
+
+    kind: str = "free"
+    sigma_um: Mapping[str, float] | None = None
+
+
+@dataclass(frozen=True)
 class Settings:
     """All settings of a block that are not measurements."""
 
@@ -332,6 +347,7 @@ class Settings:
     gnss: GnssSettings = GnssSettings()
     ins: InsSettings = InsSettings()
     collocation: CollocationSettings = CollocationSettings()
+    deviations: DeviationSettings = DeviationSettings()
     image_sigma_um: float = 1.0
     refraction: str = "off"
     earth_curvature: str = "off"

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from aerotri.adjustment.prepare import NoStartValuesError
+from aerotri.adjustment.track import with_named_strips
 from aerotri.conventions import FilePath
 from aerotri.functional_model.additional_parameters import AUTO
 from aerotri.observations import Block
@@ -57,7 +58,7 @@ def adjust_keeping_system(
     ----------
     geoid : grid of geoid undulations for a block whose CRS has none of its own.
     """
-    compared = None
+    compared, block = None, with_named_strips(block)
     if block.settings.adjustment.additional_parameters == AUTO:
         compared = compare_parameters(block, candidate_sets(block), geoid=geoid, report=report)
         block = with_choice(block, compared)

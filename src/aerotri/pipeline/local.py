@@ -21,10 +21,12 @@ from aerotri.diagnosis.position_errors import position_errors_in_words
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock, Blunder
 from aerotri.results.adjustment import Adjustment
+from aerotri.results.deviations import Deviations
 from aerotri.results.position_errors import PositionErrors
 from aerotri.results.removal import Removal
 from aerotri.statistics.loose_points import loose_by_rays, loose_in_words, loose_points, to_set_aside
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
+from aerotri.strategies.deviation_estimation import with_estimated_deviations
 from aerotri.strategies.field_estimation import with_estimated_fields
 from aerotri.strategies.position_estimation import position_errors_of, with_position_errors
 from aerotri.strategies.removal import with_datum_of
@@ -36,6 +38,10 @@ Report = Callable[[int, float, float], None]
 
 ROUNDS_OF_LOOSE_POINTS = 3
 """Times that a robust adjustment goes on without the points that its covariance shows to be loose."""
+DETERMINED_BY_NOISE = (
+    "the additional parameters are evaluated at the measured image points: at the adjusted ones they are not "
+    "determined, so only noise tells them from other unknowns. Adjust with fewer parameters"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +53,7 @@ class _Stand:
     prepared, solution : the equations, and where they are solved.
     block : as it will be delivered.
     blunders : taken out by data snooping. removals : additional parameters that the selection took out.
+    deviations : how much parameters differ between groups of photographs.
     position_errors : what was found of errors of positions that stay; None where they were not estimated.
     """
 
@@ -55,6 +62,7 @@ class _Stand:
     block: Block
     blunders: tuple[Blunder, ...] = ()
     removals: tuple[Removal, ...] = ()
+    deviations: Deviations | None = None
     position_errors: PositionErrors | None = None
 
 
@@ -83,7 +91,9 @@ def adjust_local(block: Block, report: Report | None, given_points: np.ndarray |
     options = SolveOptions(settings.max_iterations, settings.robust, report)
     stand = _Stand(*_determined(minimise_tied(prepared, options, _redundancy)), block)
     stand = _without_gross_errors(stand, options)
-    stand = _with_position_errors(_with_fields(stand, options), options)
+    stand = _with_fields(stand, options)
+    stand = _with_deviations(stand, options)
+    stand = _with_position_errors(stand, options)
     stand = _with_selected_parameters(stand, options)
     delivered = _without_loose_points(_delivered(stand), options)
     timings = {"start_values": started - begun, "solve": delivered.solved - started}
@@ -112,6 +122,12 @@ def _with_fields(stand: _Stand, options: SolveOptions) -> _Stand:
     return replace(stand, prepared=replace(stand.prepared, system=system), solution=solution)
 
 
+def _with_deviations(stand: _Stand, options: SolveOptions) -> _Stand:
+    """With the sizes of deviations from group to group estimated, where there are any."""
+    system, solution, found = with_estimated_deviations(stand.prepared.system, stand.solution, options)
+    return replace(stand, prepared=replace(stand.prepared, system=system), solution=solution, deviations=found)
+
+
 def _with_position_errors(stand: _Stand, options: SolveOptions) -> _Stand:
     """With errors of positions that stay for a while estimated, where they are asked for."""
     prepared, solution, found = with_position_errors(stand.prepared, stand.solution, options)
@@ -123,7 +139,11 @@ def _with_selected_parameters(stand: _Stand, options: SolveOptions) -> _Stand:
     if stand.block.settings.adjustment.parameter_selection == "on":
         found = select(stand.prepared, stand.solution, options)
         stand = replace(stand, prepared=found.prepared, solution=found.solution, removals=found.removals)
-    return replace(stand, block=with_findings_of(stand.block, stand.prepared.system.unknowns.block))
+    block = with_findings_of(stand.block, stand.prepared.system.unknowns.block)
+    if block.settings.adjustment.parameter_position != stand.block.settings.adjustment.parameter_position:
+        warnings = (*stand.prepared.warnings, DETERMINED_BY_NOISE)
+        stand = replace(stand, prepared=replace(stand.prepared, warnings=warnings))
+    return replace(stand, block=block)
 
 
 def _delivered(stand: _Stand) -> _Delivered:
@@ -157,11 +177,15 @@ def _with_words(delivered: _Delivered, timings: dict[str, float]) -> Adjustment:
     stand, result = delivered.stand, delivered.result
     system, solution, sigma0 = stand.prepared.system, stand.solution, result.outcome.sigma0
     kept = np.union1d(loose_points(result), loose_by_rays(system, solution, sigma0))
-    result = replace(result, parameters=with_removed(result.parameters, stand.removals), removals=stand.removals)
+    result = replace(
+        result, parameters=with_removed(result.parameters, stand.removals), removals=stand.removals,
+        deviations=stand.deviations,
+    )  # fmt: skip
     errors = position_errors_of(system, solution, delivered.factor, sigma0, stand.position_errors)
     result = replace(result, position_errors=errors)
     timings = timings | {"statistics": time.perf_counter() - delivered.solved}
-    said = (*result.outcome.warnings, *loose_in_words(result, kept), *inseparable(result.parameters))
+    tied = () if stand.deviations is None else (stand.deviations.sentence,)
+    said = (*result.outcome.warnings, *tied, *loose_in_words(result, kept), *inseparable(result.parameters))
     shared_height = common_height(system, solution, delivered.factor, sigma0)
     if shared_height is not None:
         sentence = shared_height.sentence(float(np.nanmedian(result.points.sigma[:, 2])))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from aerotri.adjustment.adjusted_positions import at_adjusted_positions
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.solve import Solution
@@ -19,6 +20,7 @@ from aerotri.pipeline.verdict import judged
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.in_crs import transform_result
 from aerotri.statistics.summarise import summarise
+from aerotri.strategies.deviation_estimation import ReducedToGroups, found_deviations
 from aerotri.strategies.selection import with_removed, without_parameters
 from aerotri.strategies.variance_components import with_components
 
@@ -44,11 +46,18 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     state = system.unknowns.with_followers(replace(state, shared=saved.shared))
     estimator = Estimator(saved.estimator_code, saved.estimator_limit)
     system = system.with_motions_at(state)
+    if saved.status == "converged":
+        system = at_adjusted_positions(system, state, estimator)
     equations = system.assemble(state, 0.0, estimator)
     solution = Solution(saved.status, state, equations, estimator, saved.iterations)
     factor = undamped_factor(system, solution)
     result = replace(summarise(system, solution, factor, saved.ray_status, saved.warnings), block=local)
-    result = replace(result, parameters=with_removed(result.parameters, removals), removals=removals)
+    deviations = None
+    if system.deviations and saved.status == "converged":
+        deviations = found_deviations(system, ReducedToGroups.of(system, solution, factor))
+    result = replace(
+        result, parameters=with_removed(result.parameters, removals), removals=removals, deviations=deviations
+    )
     result = replace(result, position_errors=saved.position_record())
     components = saved.component_record()
     if components is not None:

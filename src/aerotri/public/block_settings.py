@@ -10,7 +10,7 @@ from aerotri.conventions import FilePath
 from aerotri.observations import Block
 from aerotri.public.blocks import as_block
 
-TABLES = ("gnss", "ins", "collocation")
+TABLES = ("gnss", "ins", "collocation", "deviations")
 """Tables of block.toml beside [adjustment] that can be changed."""
 
 
@@ -22,7 +22,7 @@ def with_settings(block: Block | FilePath, *, parameters: str | None = None, **s
     block : a block, or the folder of one.
     parameters : additional parameters, as `aerotri.adjust` takes them.
     settings : by their names in [adjustment] of block.toml, such as `parameter_groups` or `correlation_limit`; the
-        tables `gnss`, `ins` and `collocation` as dictionaries. None: as the block has it.
+        tables `gnss`, `ins`, `collocation` and `deviations` as dictionaries. None: as the block has it.
 
     Returns
     -------

@@ -101,10 +101,10 @@ def covariance_of(adjustment: Adjustment, names: list[str]) -> Covariance:
     turn = _into_crs(adjustment, chosen)
     whole = adjustment.result.outcome.sigma0**2 * turn @ q @ turn.T
     wanted = np.ix_(_wanted(chosen), _wanted(chosen))
-    names = tuple(label for one in chosen for label in one.labels)
+    labels = tuple(label for one in chosen for label in one.labels)
     if model is None:
-        return Covariance(names, whole[wanted])
-    return Covariance(names, whole[wanted], _as_in_tables(adjustment, chosen, turn @ model @ turn.T)[wanted])
+        return Covariance(labels, whole[wanted])
+    return Covariance(labels, whole[wanted], _as_in_tables(adjustment, chosen, turn @ model @ turn.T)[wanted])
 
 
 def _as_in_tables(adjustment: Adjustment, chosen: list[Chosen], model: np.ndarray) -> np.ndarray:

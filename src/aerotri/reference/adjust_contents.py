@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from aerotri.reference.adjust_tables import COMPARED, PARAMETERS, PLACE, RIGS, WHERE_MODEL, with_totals
-from aerotri.reference.records import DescribedFile, Item, of_axes, within
+from aerotri.reference.records import DescribedFile, Item, Kind, of_axes, within
 
 VERSION = Item("aerotri", "text", "Version of aerotri that wrote the file.")
 BLOCK = Item("block", "text", "Name of the block.")
@@ -23,7 +23,7 @@ def _axes_object(name: str, text: str, unit: str = "m") -> tuple[Item, ...]:
 
 
 def _gnss_errors() -> tuple[Item, ...]:
-    what = (
+    what: tuple[tuple[str, Kind, str, str], ...] = (
         ("source", "text", "Where these errors come from: given in block.toml, or estimated from the block; empty "
          "where positions are adjusted as independent.", ""),
         ("plan_m", "number", "Standard deviation of these errors in X and Y.", "m"),
@@ -132,6 +132,21 @@ ADJUSTMENT = (
     Item("blunders[].w", "number?", "Normalised residual."),
     Item("blunders[].estimated_mm", "number?", "Size of the error that would explain it.", "mm"),
     Item("blunders[].action", "text", "What was done with it."),
+    Item("deviations", "object?", "How much parameters differ between groups of photographs ([deviations])."),
+    Item("deviations.kind", "text", "independent or walk, as in [deviations]."),
+    Item("deviations.total_um", "number", "Size of all deviations together as image error, µm."),
+    Item("deviations.ratio", "number", "−2 ln of the likelihood of one set for all over that of the groups."),
+    Item("deviations.p", "number", "Probability of such a ratio where the groups do not differ."),
+    Item("deviations.needed", "yes/no", "Whether that probability is below the significance level."),
+    Item("deviations.parameters[]", "object", "One entry a parameter."),
+    Item("deviations.parameters[].name", "text", "Name of the parameter."),
+    Item("deviations.parameters[].groups", "whole", "Number of groups that have a value."),
+    Item(
+        "deviations.parameters[].sigma_um",
+        "number",
+        "σ of the values about their mean, or of the step, as image error, µm; 0 where none is seen.",
+    ),
+    Item("deviations.parameters[].ratio", "number", "The same of this parameter alone."),
     Item("model_part", "object", "Model part of σ: errors that groups of photographs share."),
     Item("model_part.scheme", "text", "Groups whose common errors make it, such as strip; empty where there is none."),
     Item("model_part.clusters", "whole", "Number of these groups."),

@@ -12,6 +12,7 @@ from aerotri.functional_model.additional_parameters import Parameter, is_grid
 from aerotri.observations import Block
 
 if TYPE_CHECKING:
+    from aerotri.results.deviations import Deviations
     from aerotri.results.model_part import ModelPart
     from aerotri.results.position_errors import PositionErrors
     from aerotri.results.removal import Removal
@@ -127,7 +128,7 @@ class RayResults:
 
     Parameters
     ----------
-    v : (m, 2) mm, adjusted minus measured, in the plane corrected for the systematic image errors.
+    v : (m, 2) mm, adjusted minus measured.
     r : (m, 2) redundancy numbers.
     w : (m, 2) normalised residuals −v/(σ√r), σ a priori.
     weight : (m,) robust factor, 1 when off.
@@ -321,7 +322,8 @@ class AdjustedBlock:
     `components` is there where `variance_components = "on"`: `block` then has the σ they led to. `removals` are those
     of the selection of additional parameters, in order; `parameters` has them too, behind the others. `model_part`
     says where the model part of σ comes from, or why there is none; None before it is looked for. `rigs` are the
-    cameras of rigid rigs beside their reference cameras.
+    cameras of rigid rigs beside their reference cameras. `deviations` says how much parameters differ between groups of
+    photographs that are tied to one another.
     """
 
     block: Block
@@ -339,5 +341,6 @@ class AdjustedBlock:
     effects: RayEffects | None = None
     removals: tuple[Removal, ...] = ()
     model_part: ModelPart | None = None
+    deviations: Deviations | None = None
     position_errors: PositionErrors | None = None
     rigs: tuple[MountedCamera, ...] = ()

@@ -69,6 +69,7 @@ def with_model_of(result: AdjustedBlock, local: AdjustedBlock, frame: LocalFrame
         points=replace(result.points, model=points),
         parameters=replace(result.parameters, model=local.parameters.model),
         model_part=local.model_part,
+        deviations=local.deviations,
     )
     return replace(result, control=_with_model(result, result.control), check=_with_model(result, result.check))
 

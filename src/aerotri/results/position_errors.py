@@ -67,4 +67,5 @@ class PositionErrors:
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> PositionErrors:
         """The record of `as_dict`."""
-        return cls(**{key: NAN if value is None else value for key, value in content.items()})
+        known: dict[str, Any] = {key: NAN if value is None else value for key, value in content.items()}
+        return cls(**known)

@@ -70,7 +70,7 @@ def _side(
     image, lens = u.rays.image[rays], u.rays.lens_row[rays]
     point = np.full(len(image), row)
     partials = linearise(
-        state.rotation, state.centre, state.points, u.interior(state), image, point, lens, u.rays.xy[rays]
+        state.rotation, state.centre, state.points, u.interior(state), image, point, lens, u.rays.at[rays]
     )
     weight = u.rays.inv_sigma[rays] * np.sqrt(solution.equations.weight[rays])[:, None]
     gap = (solution.equations.residual[rays] * weight).ravel()

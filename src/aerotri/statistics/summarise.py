@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from aerotri.adjustment import position_errors
-from aerotri.adjustment.field_prior import FieldPrior
+from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.position_errors import PositionPrior
 from aerotri.adjustment.robust import weights_and_costs
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
@@ -201,6 +201,8 @@ def shared_parameters(system: NormalSystem, solution: Solution, q: Cofactors, si
     weighted = np.isfinite(np.array(shared.sigma).reshape(-1))
     for field in shared.fields:
         weighted[field.columns] = True
+    for deviation in system.deviations:
+        weighted[deviation.columns] = True
     weighted = weighted[rows]
     one_group = len(set(groups.tolist())) <= 1
     labels = np.array([n if one_group else f"{n} ({g})" for n, g in zip(names, groups, strict=True)], dtype=object)
@@ -362,9 +364,12 @@ def _prior_group(system: NormalSystem, solution: Solution, q: Cofactors) -> list
     shared = system.unknowns.shared
     sigma = np.array(shared.sigma).reshape(-1)
     known = np.isfinite(sigma) & (np.array(shared.kinds, dtype=object) != "point").reshape(-1)
-    fields = [_joint_group("collocation field", field, solution, q) for field in system.fields]
+    fields = [_joint_group("collocation field", [field], solution, q) for field in system.fields]
+    if system.deviations:
+        fields.append(_joint_group("deviations of groups", system.deviation_priors, solution, q))
     fields += [
-        _joint_group("position errors in time", prior, solution, q) for prior in system.unknowns.shared.position_errors
+        _joint_group("position errors in time", [prior], solution, q)
+        for prior in system.unknowns.shared.position_errors
     ]
     if not known.any():
         return fields
@@ -375,9 +380,11 @@ def _prior_group(system: NormalSystem, solution: Solution, q: Cofactors) -> list
     return [_group("weighted parameters", int(known.sum()), 1.0, rms, redundancy, pvv), *fields]
 
 
-def _joint_group(name: str, prior: FieldPrior | PositionPrior, solution: Solution, q: Cofactors) -> ObservationGroup:
-    """The observation of nodes together, whitened; its redundancy is their effective number."""
-    values = solution.state.shared[prior.columns]
-    count, pvv = len(values), float(values @ prior.weight @ values)
-    redundancy = count - float(np.sum(q.shared[prior.columns, prior.columns] * prior.weight))
+def _joint_group(name: str, priors: Sequence[JointPrior], solution: Solution, q: Cofactors) -> ObservationGroup:
+    """Observations of shared parameters together, whitened; their redundancy is the effective number of parameters."""
+    count, pvv, redundancy = sum(prior.rank for prior in priors), 0.0, 0.0
+    for prior in priors:
+        values, own = solution.state.shared[prior.columns], np.ix_(prior.columns, prior.columns)
+        pvv += float(values @ prior.weight @ values)
+        redundancy += prior.rank - float(np.sum(q.shared[own] * prior.weight))
     return _group(name, count, 1.0, float(np.sqrt(pvv / count)), redundancy, pvv)

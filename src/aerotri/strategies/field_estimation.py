@@ -17,10 +17,11 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import minimize
 
+from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
 from aerotri.adjustment.field_prior import known_or_first
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.shared_parameters import RandomField
-from aerotri.adjustment.solve import Solution, SolveOptions, minimise
+from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.observations import CollocationSettings
 from aerotri.statistics.summarise import count_observations, effective_redundancy, weighted_sum
@@ -115,7 +116,7 @@ def with_estimated_fields(
             break
         found = estimate_covariance(reduced, given, before)
         system = system.with_collocation(CollocationSettings(found.sigma_um, found.length_mm))
-        again = minimise(system, solution.state, redundancy, options)
+        system, again = minimise_at_adjusted(system, solution.state, redundancy, options)
         solution = replace(again, iterations=solution.iterations + again.iterations)
         if reduced.deviance(before) - reduced.deviance(found) < SETTLED:
             break

@@ -93,9 +93,9 @@ def _observed(half: Half) -> _Observed:
     for k in range(s):
         if np.isfinite(shared.sigma[k]) and shared.kinds[k] != "point":
             out["shared", shared.names[k], shared.groups[k]] = _unit(s, k, 1.0 / shared.sigma[k])
-    for number, field in enumerate(system.fields):
-        root = np.linalg.cholesky(field.weight).T
-        group = shared.groups[field.columns.start]
+    for number, field in enumerate(system.joint_priors):
+        root = field.root().T
+        group = shared.groups[field.columns[0]]
         for k, line in enumerate(root):
             row = np.zeros(s)
             row[field.columns] = line

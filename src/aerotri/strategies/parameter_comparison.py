@@ -19,11 +19,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
 from aerotri.adjustment.carry_over import start_values_at, with_shared
 from aerotri.adjustment.defects import checked_factor
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.prepare import Prepared
-from aerotri.adjustment.solve import Solution, SolveOptions, minimise
+from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import State, Unknowns
@@ -94,7 +95,7 @@ def _outcome(
     system: NormalSystem, state: State, choice: Choice, folds: int, options: SolveOptions
 ) -> tuple[SetOutcome, tuple[Unknowns, State] | None]:
     """What a set did, and where its adjustment stands if there is one."""
-    solution = minimise(system, state, count_observations(system).redundancy, options)
+    system, solution = minimise_at_adjusted(system, state, count_observations(system).redundancy, options)
     if solution.defects:
         return _failed(choice, f"rank deficient: {'; '.join(solution.defects)}"), None
     system, solution = with_estimated_fields(system, solution, options)
@@ -117,12 +118,16 @@ def _judged(system: NormalSystem, solution: Solution, factor: Factor, choice: Ch
         t = np.abs(state.shared[own]) / (sigma0 * np.sqrt(np.diagonal(cofactor)))
     effective, omega = float(len(own)), solution.equations.cost
     place = {int(column): k for k, column in enumerate(own)}
-    for field in system.fields:
-        at = np.array([place[c] for c in range(field.columns.start, field.columns.stop)])
+    for field in (*system.fields, *system.deviation_priors):
+        at = np.array([place[int(c)] for c in field.columns])
         values = state.shared[field.columns]
         effective -= float(np.sum(cofactor[np.ix_(at, at)] * field.weight))
         omega -= float(values @ field.weight @ values)
-    without = count_observations(system).redundancy + len(own) - sum(len(f.weight) for f in system.fields)
+    without = (
+        count_observations(system).redundancy
+        + len(own)
+        - sum(f.rank for f in (*system.fields, *system.deviation_priors))
+    )
     deviance = without * float(np.log(omega / without)) if without > 0 and omega > 0.0 else float("nan")
     bic = deviance + effective * float(np.log(max(without, 1)))
     if system.fields and np.isfinite(bic):

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
 from aerotri.adjustment.carry_over import reference_state, start_values_at, with_shared
 from aerotri.adjustment.exposures import exposures_of
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.position_errors import KIND
 from aerotri.adjustment.prepare import Prepared
-from aerotri.adjustment.solve import Solution, SolveOptions, minimise
+from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
 from aerotri.adjustment.system import build_system
 from aerotri.observations.block import GnssSettings
@@ -125,7 +126,7 @@ def _adjusted(
     held = list(zip(old.points[row].tolist(), axis.tolist(), strict=True)) if len(row) else None
     system, start = build_system(block, start_values_at(old, state), prepared.ray_status, held)
     begin = with_shared(system.unknowns, old, start, state)
-    again = minimise(system, begin, count_observations(system).redundancy, options)
+    system, again = minimise_at_adjusted(system, begin, count_observations(system).redundancy, options)
     reference = reference_state(system.unknowns, old, start, prepared.state)
     left = replace(prepared, system=system, state=reference)
     return left, replace(again, iterations=solution.iterations + again.iterations)

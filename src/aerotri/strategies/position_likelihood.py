@@ -12,6 +12,7 @@ positive; G and b are first brought to a noise of LEAST_NOISE, from where it is.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -242,7 +243,11 @@ def best_process(reduced: ReducedToPositions, given: Given, noise: ErrorModel) -
         start += [np.log(0.5 * factor * usual) for factor in noise.noise] if given.sigma is None else []
         start += [np.log(time)] if given.time is None else []
         starts.append(np.array(start))
-    return _best(reduced, lambda x: _model(x, given), bounds, starts if given.time is None else starts[:1])
+
+    def model(x: np.ndarray) -> ErrorModel:
+        return _model(x, given)
+
+    return _best(reduced, model, bounds, starts if given.time is None else starts[:1])
 
 
 def _model(x: np.ndarray, given: Given) -> ErrorModel:
@@ -256,7 +261,10 @@ def _model(x: np.ndarray, given: Given) -> ErrorModel:
     return ErrorModel(noise, sigma, values.pop(0) if given.time is None else given.time)
 
 
-def _best(reduced: ReducedToPositions, model, bounds, starts) -> tuple[ErrorModel, float]:
+def _best(
+    reduced: ReducedToPositions, model: Callable[[np.ndarray], ErrorModel], bounds: Sequence[tuple[float, float]],
+    starts: Sequence[np.ndarray],
+) -> tuple[ErrorModel, float]:  # fmt: skip
     low, high = np.array(bounds).T
     found = []
     for start in starts:
@@ -270,4 +278,4 @@ def _best(reduced: ReducedToPositions, model, bounds, starts) -> tuple[ErrorMode
             above, begin, method="L-BFGS-B", bounds=bounds, options={"eps": 1e-4, "ftol": 1e-7, "maxiter": 40}
         )
         found.append((model(end.x), float(end.fun) + zero))
-    return min(found, key=lambda pair: pair[1])
+    return found[int(np.argmin([deviance for _, deviance in found]))]

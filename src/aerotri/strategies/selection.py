@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
 from aerotri.adjustment.carry_over import reference_state, start_values_at, with_shared
 from aerotri.adjustment.prepare import Prepared
-from aerotri.adjustment.solve import Solution, SolveOptions, minimise
+from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import Unknowns
@@ -112,17 +113,30 @@ def _without(
     left = Prepared(system, start, prepared.ray_status, prepared.warnings)
     new = system.unknowns
     begin = with_shared(new, old, start, state)
-    again = minimise(system, begin, count_observations(system).redundancy, options)
+    system, again = minimise_at_adjusted(system, begin, count_observations(system).redundancy, options)
+    left = replace(left, system=system)
     reference = reference_state(new, old, start, prepared.state)
     return replace(left, state=reference), replace(again, iterations=solution.iterations + again.iterations)
 
 
 def with_findings_of(block: Block, used: Block) -> Block:
-    """A block with what the adjustment of another form of it found: parameters removed, covariance of the fields and
-    of the positions."""
-    adjustment = replace(block.settings.adjustment, parameters_removed=used.settings.adjustment.parameters_removed)
-    found = used.settings
-    settings = replace(block.settings, adjustment=adjustment, collocation=found.collocation, gnss=found.gnss)
+    """A block with what the adjustment of another form of it found.
+
+    Parameters removed, where they are evaluated, the covariance of fields and of errors of positions, and how
+    much groups differ.
+    """
+    found = used.settings.adjustment
+    adjustment = replace(
+        block.settings.adjustment, parameters_removed=found.parameters_removed,
+        parameter_position=found.parameter_position,
+    )  # fmt: skip
+    settings = replace(
+        block.settings,
+        adjustment=adjustment,
+        collocation=used.settings.collocation,
+        deviations=used.settings.deviations,
+        gnss=used.settings.gnss,
+    )
     return replace(block, settings=settings)
 
 

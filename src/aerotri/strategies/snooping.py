@@ -35,6 +35,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
 from aerotri.adjustment.carry_over import reference_state, with_shared
 from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.robust import LIMITS, normalised_lengths
@@ -202,7 +203,8 @@ def _finished(prepared: Prepared, stand: _Stand, options: SolveOptions) -> Snoop
     new = left.system.unknowns
     start = with_shared(new, old, left.state, stand.state)
     redundancy = count_observations(left.system).redundancy
-    solution = minimise(left.system, start, redundancy, _counting(options, stand.iterations))
+    system, solution = minimise_at_adjusted(left.system, start, redundancy, _counting(options, stand.iterations))
+    left = replace(left, system=system)
     solution = replace(solution, iterations=stand.iterations + solution.iterations)
     warnings = (*prepared.warnings, *_in_words(prepared, stand, blunders))
     state = reference_state(new, old, left.state, prepared.state)

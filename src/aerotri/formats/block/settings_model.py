@@ -204,6 +204,11 @@ class AdjustmentModel(Section):
         "camera", "Photographs that share one set of additional parameters: camera, block, strip, or the name of a "
         "column of images.csv, such as day."
     )  # fmt: skip
+    parameter_position: Literal["adjusted", "measured"] = key(
+        "adjusted", "Position in the photograph at which additional parameters are evaluated. adjusted: that of the "
+        "adjusted image point. measured: that of the measured one, as other programs do; the noise of the image points "
+        "then bends blocks that little else holds."
+    )  # fmt: skip
     parameter_selection: OffOn = key(
         "off", "on: additional parameters that are not significant or too highly correlated are removed, one after "
         "another, each with a new adjustment."
@@ -320,6 +325,20 @@ class CollocationModel(Section):
     )  # fmt: skip
 
 
+class DeviationsModel(Section):
+    """How additional parameters differ between the groups of `adjustment.parameter_groups`."""
+
+    kind: Literal["free", "independent", "walk"] = key(
+        "free", "free: the groups have nothing to do with one another. independent: the values of the groups scatter "
+        "about a mean that all photographs share. walk: they drift, from each group to the next in the order of flight."
+    )  # fmt: skip
+    sigma_um: dict[str, Positive] = key(
+        {}, "Standard deviation by parameter, as in \"brown.K1\" = 0.3: of the values about their mean, or of the step "
+        "from group to group; as image error, root mean square over the format. Empty: estimated from the block.",
+        "µm"
+    )  # fmt: skip
+
+
 class MountingModel(Section):
     """A camera of a rig in the frame of the reference camera: X_reference = position + R·X_camera. NAME is the
     camera's."""
@@ -395,6 +414,9 @@ class BlockModel(Section):
         CollocationModel(), "The distortion model without assumptions about the camera (additional_parameters "
         "\"collocation\")."
     )  # fmt: skip
+    deviations: DeviationsModel = key(
+        DeviationsModel(), "How additional parameters differ between groups of photographs."
+    )
     rig: dict[str, RigModel] = key({}, "Rigs: cameras on one frame, one table [rig.NAME] each.")
 
 

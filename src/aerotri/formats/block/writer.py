@@ -177,6 +177,7 @@ def _settings(block: Block) -> dict[str, Any]:
         "adjustment": {
             "additional_parameters": format_parameters(adjustment.additional_parameters),
             "parameter_groups": adjustment.parameter_groups,
+            "parameter_position": adjustment.parameter_position,
             "parameter_selection": adjustment.parameter_selection,
             "t_limit": adjustment.t_limit,
             "correlation_limit": adjustment.correlation_limit,
@@ -202,6 +203,8 @@ def _settings(block: Block) -> dict[str, Any]:
     known = {"sigma_um": settings.collocation.sigma_um, "length_mm": settings.collocation.length_mm}
     if any(value is not None for value in known.values()):
         content["collocation"] = {key: value for key, value in known.items() if value is not None}
+    if settings.deviations.kind != "free":
+        content["deviations"] = {"kind": settings.deviations.kind, "sigma_um": dict(settings.deviations.sigma_um or {})}
     if block.rigs:
         content["rig"] = {rig.name: _rig(rig) for rig in block.rigs}
     if settings.gnss.lever_arm_sigma_m is not None:

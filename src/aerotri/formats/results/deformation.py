@@ -88,7 +88,8 @@ def deformation_json(deformation: Deformation, block: str) -> dict[str, Any]:
         "cm_per_um": g.cm_per_um,
         "spacing_m": d.spacing,
         "nodes": int(np.isfinite(d.d[..., 2]).sum()),
-        **_components(d.d, d.sigma), "sigma_includes": sigma_in_words(d.variant, d.change),
+        **_components(d.d, d.sigma),
+        "sigma_includes": sigma_in_words(d.variant, d.change),
         "y_parallax_um": {"max": float(np.nanmax(parallax)), "rms": float(np.sqrt(np.nanmean(parallax**2)))},
         "contour_interval_m": contour_interval(low, high),
     }
@@ -108,7 +109,8 @@ def block_deformation_json(deformation: BlockDeformation, block: str) -> dict[st
         "ground": d.ground,
         "spacing_m": d.spacing,
         "nodes": int(np.isfinite(d.d[..., 2]).sum()),
-        **_components(d.d, d.sigma), "sigma_includes": sigma_in_words(d.variant, d.change),
+        **_components(d.d, d.sigma),
+        "sigma_includes": sigma_in_words(d.variant, d.change),
         "contour_interval_m": contour_interval(low, high),
         "models": [_model(k, one, d.number) for k, one in enumerate(d.models)],
         "seams": {

@@ -117,7 +117,8 @@ def unit_of_group(name: str) -> tuple[str, float]:
     if name == "attitudes" or name.startswith("INS"):
         return "mgon", MGON_PER_RADIAN
     # weighted parameters of many units are recorded in units of their own σ
-    return ("σ", 1.0) if name in ("weighted parameters", "collocation field", "position errors in time") else ("m", 1.0)
+    together = ("weighted parameters", "collocation field", "deviations of groups", "position errors in time")
+    return ("σ", 1.0) if name in together else ("m", 1.0)
 
 
 def observation_groups(adjusted: AdjustedBlock) -> Table:

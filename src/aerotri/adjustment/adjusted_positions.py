@@ -1,0 +1,129 @@
+"""Where additional parameters are evaluated: at the adjusted image points, not at the measured ones.
+
+[D] Families that are functions of the position in the photograph say measured = ideal + d(measured position without its
+error). Evaluated at the measured position m + e, the parameters p have the normal equations Σ B(m + e)ᵀ·P·v = 0 with
+B(m + e) = B(m) + B′·e, and E(B′·e·v) = σ²·B′·r, r the redundancy of the ray: not zero. The parameters lean towards what
+makes the photograph smaller. What a block determines well does not mind; the curvature of a block without positions of
+the projection centres is determined so weakly that this moved heights by five times their σ (CU-SBR, held by control
+alone). The adjusted position is free of it, because adjusted observations and residuals are not correlated.
+
+The positions follow the adjustment: adjusted with those of before, evaluated anew, adjusted again, until they stand.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.robust import Estimator
+from aerotri.adjustment.solve import INTERRUPTED, Solution, SolveOptions, minimise
+from aerotri.adjustment.unknowns import State
+from aerotri.functional_model.collinearity import INTERIOR_COLUMNS
+
+MOST_ROUNDS = 5
+"""Adjustments with new positions at most [C]: the second changes next to nothing."""
+MOST_STEPS = 8
+"""Steps of m = ideal + d(m) at most [C]: each shrinks the error by the slope of d, a few hundredths, rarely two
+tenths."""
+SETTLED, STANDING = 1e-4, 1e-3
+"""Change of the positions (root mean square, in σ of an image coordinate) below which one of these steps is the last,
+and below which the adjustment need not follow [C]: what is left of the bias is in proportion."""
+GROSS = 50.0
+"""Residual in σ from which a ray keeps its measured position [C]: a blunder has no adjusted one worth the name."""
+BROWN = np.array([name.startswith("brown.") for name in INTERIOR_COLUMNS])
+
+
+def acts_by_position(system: NormalSystem) -> bool:
+    """Whether an unknown parameter is a function of the position in the photograph."""
+    u = system.unknowns
+    if u.block.settings.adjustment.parameter_position == "measured":
+        return False
+    return bool(u.rays.ap_index.shape[1] or (u.lens.columns[:, BROWN] >= 0).any())
+
+
+def at_adjusted_positions(system: NormalSystem, state: State, estimator: Estimator) -> NormalSystem:
+    """The system with its parameters evaluated at the adjusted image points of a state.
+
+    A function of the state alone: the positions begin at the measured ones.
+    """
+    if not acts_by_position(system):
+        return system
+    rays = system.unknowns.rays
+    system = _evaluated_at(system, rays.xy)
+    for _ in range(MOST_STEPS):
+        residual = system.right_side(state, estimator).residual
+        gross = np.any(np.abs(residual * rays.inv_sigma) > GROSS, axis=1, keepdims=True)
+        before, system = system, _evaluated_at(system, np.where(gross, rays.xy, rays.xy - residual))
+        if _moved(before, system) < SETTLED:
+            break
+    return system
+
+
+def minimise_at_adjusted(
+    system: NormalSystem, state: State, redundancy: int, options: SolveOptions
+) -> tuple[NormalSystem, Solution]:
+    """As `solve.minimise`, with the parameters evaluated at the adjusted image points.
+
+    Parameters that are determined at the measured points alone, by their noise, stay there: the block of the system
+    then says so. An adjustment that does not converge stays there as well.
+
+    Returns
+    -------
+    The system with the positions of the solution, and the solution.
+    """
+    solution = first = minimise(system, state, redundancy, options)
+    if not acts_by_position(system):
+        return system, solution
+    for round_ in range(MOST_ROUNDS):
+        if solution.status != "converged":
+            break
+        there = at_adjusted_positions(system, solution.state, solution.estimator)
+        if round_ == MOST_ROUNDS - 1 or _moved(system, there) < STANDING:
+            equations = there.assemble(solution.state, 0.0, solution.estimator)
+            return there, replace(solution, equations=equations)
+        again = minimise(there, solution.state, redundancy, _counting(options, solution.iterations))
+        again = replace(again, iterations=solution.iterations + again.iterations)
+        if again.status != "converged" and again.status != INTERRUPTED:
+            return _at_measured_positions(system), replace(first, iterations=again.iterations)
+        system, solution = there, again
+    return system, solution
+
+
+def _at_measured_positions(system: NormalSystem) -> NormalSystem:
+    """The system with its parameters evaluated at the measured points, and a block that asks for it."""
+    other = _evaluated_at(system, system.unknowns.rays.xy)
+    block = other.unknowns.block
+    adjustment = replace(block.settings.adjustment, parameter_position="measured")
+    block = replace(block, settings=replace(block.settings, adjustment=adjustment))
+    other.unknowns = replace(other.unknowns, block=block)
+    return other
+
+
+def _evaluated_at(system: NormalSystem, at: np.ndarray) -> NormalSystem:
+    u, other = system.unknowns, copy(system)
+    columns = u.linear.columns(at)
+    rays = replace(u.rays, at=np.ascontiguousarray(at), ap_index=columns.index, ap_value=columns.value)
+    other.unknowns = replace(u, rays=rays)
+    return other
+
+
+def _moved(system: NormalSystem, there: NormalSystem) -> float:
+    """Root mean square change of the positions, in σ."""
+    rays = system.unknowns.rays
+    change = (there.unknowns.rays.at - rays.at) * rays.inv_sigma
+    return float(np.sqrt(np.mean(change**2))) if change.size else 0.0
+
+
+def _counting(options: SolveOptions, done: int) -> SolveOptions:
+    """The options, reporting iterations after those done."""
+    report = options.report
+    if report is None:
+        return options
+
+    def counted(iteration: int, sigma0: float, damping: float) -> None:
+        report(done + iteration, sigma0, damping)
+
+    return replace(options, report=counted)
