@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 
 import aerotri
-from aerotri import geometry
-from aerotri.observations import Mounting, Prior, Rig
+from aerotri import geometry, observations
 from ca502 import MOUNTING_DEG, NADIR, exposures, left_out_in_turn, print_table, unoriented
 
 POSITION_M = {"A": (0, -0.05, 0.02), "D": (0, 0.05, 0.02), "W": (-0.05, 0, 0.02), "X": (0.05, 0, 0.02)}
@@ -30,13 +29,13 @@ def with_rig(block: aerotri.Block, constraint: str = "rigid") -> aerotri.Block:
     """The block with its five heads on one rig; an exposure is a station."""
     station = np.array([name[1:] for name in block.images.names.tolist()], dtype=object)
     cameras = {
-        head: Mounting(
-            tuple(Prior(float(v), SIGMA_M) for v in position),
-            tuple(Prior(float(np.radians(v))) for v in MOUNTING_DEG[head]),
+        head: observations.Mounting(
+            tuple(observations.Prior(float(v), SIGMA_M) for v in position),
+            tuple(observations.Prior(float(np.radians(v))) for v in MOUNTING_DEG[head]),
         )
         for head, position in POSITION_M.items()
     }
-    rig = Rig("ca502", NADIR, cameras, constraint)
+    rig = observations.Rig("ca502", NADIR, cameras, constraint)
     there = {camera.name for camera in block.cameras}
     rig = replace(rig, cameras={head: mounting for head, mounting in rig.cameras.items() if head in there})
     return replace(block, rigs=(rig,), images=replace(block.images, columns={"station": station}))
