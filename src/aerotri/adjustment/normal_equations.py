@@ -100,7 +100,7 @@ class NormalSystem:
             leads, pattern = self._reduction.leads, (self._reduction.block_row, self._reduction.block_col)
             self.symbolic = Symbolic(len(leads), *pattern, position[leads], s)
         # errors of positions stand last in the list and act on no ray
-        of_rays = s - unknowns.shared.kinds.count(KIND)
+        of_rays = 1 + max((k for k, kind in enumerate(unknowns.shared.kinds) if kind != KIND), default=-1)
         self._sums = [ChunkSums(unknowns, first, last, of_rays) for first, last in self._bounds]
         sigma = np.array(unknowns.shared.sigma).reshape(-1)
         self._prior_weight = np.where(np.isfinite(sigma), 1.0 / sigma**2, 0.0)

@@ -99,8 +99,8 @@ def estimate(reduced: ReducedToPositions, settings: GnssSettings) -> tuple[Error
 def chance(gain: float) -> float:
     """Probability of a gain in −2 ln L by white noise.
 
-    Without errors that stay σ of plan and of height lie at their bound 0 and τ means nothing: below 0.05 in more than
-    half of all cases, else no more than χ² of two and three degrees of freedom in equal shares [C: by simulation].
+    Without errors that stay σ of plan and of height lie at their bound 0 and τ means nothing. In simulations the gain is
+    below 0.1 in half of all cases; χ² of two and three degrees of freedom in equal shares is a careful bound [C].
     """
     if gain <= 0.0:
         return 1.0
