@@ -6,8 +6,8 @@ from aerotri.diagnosis.finding import Finding, times
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.model_part import ModelPart
 
-WORTH_SAYING = 1.05
-"""σ total over σ from which the model part is told: below, it changes no decision."""
+WORTH_SAYING = 1.1
+"""σ total over σ from which the model part is told [C]: below, it changes no decision."""
 
 
 def model_part_in_words(part: ModelPart) -> str:
