@@ -23,6 +23,7 @@ INSIDE = {
     "prove/fuzzing/hostile.py": "damaged files for single readers, and for the commands",
     "prove/fuzzing/readers.py": "damaged files for single readers",
     "prove/kill.py": "kills the commands from within",
+    "prove/model_part.py": "every part of the covariance alone, of clusters of photographs",
     "prove/metamorphic_photographs.py": "the first orientation in orders that no file gives",
     "prove/volume_epochs.py": "the adjustment's part of σ alone, of pickets at stated places",
     "prove/volume_proof/simulated.py": "every part of σ alone, of pickets at stated places",
