@@ -7,6 +7,8 @@ orientation elements, the interior orientation, the lens parameters, heights of 
 area in the middle (a volume over its area), whose ground points are measured with the same lens errors. The same blocks
 without such errors have to be the same with the model part switched on and off.
 
+Measures the model part of each of them alone, which no command prints: it looks within the package on purpose.
+
 Example: python tools/prove/model_part.py --blocks 24 > tools/results/model_part.md
 """
 
