@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import Delaunay, KDTree
 
+from aerotri.adjustment.parallel import blas_threads
 from aerotri.conventions import InputError, counted
 
 MOST_ROUNDS = 60
@@ -58,7 +59,9 @@ class Tin:
         z, variance, away = (np.full(len(at), np.nan) for _ in range(3))
         if inside.any():
             t = triangle[inside]
-            transform = self.delaunay.transform[t]
+            # thousands of 2 × 2 systems: threads of the BLAS gain nothing, and were seen to wait for one another
+            with blas_threads(0.0):
+                transform = self.delaunay.transform[t]
             two = np.einsum("nij,nj->ni", transform[:, :2], at[inside] - transform[:, 2])
             weight = np.column_stack([two, 1.0 - two.sum(axis=1)])
             corner = self.delaunay.simplices[t]
