@@ -58,7 +58,7 @@ def _observed(system, n: int, s: int, size: int):
             row = np.zeros(size)
             row[6 * n + column] = 1.0 / sigma
             yield row
-    for field in system.joint_priors:
+    for field in system.priors.joint:
         rows = np.zeros((field.rank, size))
         rows[:, 6 * n + field.columns] = field.root().T
         yield from rows

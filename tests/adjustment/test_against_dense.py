@@ -102,7 +102,7 @@ def test_nodes_of_a_random_field(datum):
     block = with_adjustment(block, parameter_groups="day", datum=datum)
     known = CollocationSettings(sigma_um=3.0, length_mm=40.0)
     adjustment = adjust_keeping_system(replace(block, settings=replace(block.settings, collocation=known)))
-    assert len(adjustment.system.fields) == 2
+    assert len(adjustment.system.priors.fields) == 2
     design, q = dense_cofactors(adjustment)
     check(adjustment, q, design)
     names = adjustment.result.parameters.names.astype(str)

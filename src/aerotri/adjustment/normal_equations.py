@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -12,9 +12,6 @@ import numpy as np
 from aerotri.adjustment import _covariance_kernels, _kernels, _point_kernels
 from aerotri.adjustment.chunk_sums import ChunkSums, add_gaps, add_own_squares, add_squares
 from aerotri.adjustment.datum import ExtraObservations, free_motions, observes_centres, without_motion
-from aerotri.adjustment.deviations import deviation_priors, deviations_of
-from aerotri.adjustment.field_prior import field_prior
-from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.adjustment.kernel_records import (
     Directions,
     Inverse,
@@ -31,10 +28,11 @@ from aerotri.adjustment.position_errors import KIND
 from aerotri.adjustment.rig_reduction import RigFactor, RigReduction
 from aerotri.adjustment.rigging import Chain
 from aerotri.adjustment.robust import Estimator, normalised_lengths
+from aerotri.adjustment.shared_priors import SharedPriors
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, Symbolic
 from aerotri.adjustment.unknowns import State, Step, Unknowns
 from aerotri.functional_model.observed_unknowns import Rows
-from aerotri.observations import CollocationSettings
+from aerotri.observations import Settings
 
 T = TypeVar("T")
 
@@ -102,59 +100,21 @@ class NormalSystem:
         # errors of positions stand last in the list and act on no ray
         of_rays = 1 + max((k for k, kind in enumerate(unknowns.shared.kinds) if kind != KIND), default=-1)
         self._sums = [ChunkSums(unknowns, first, last, of_rays) for first, last in self._bounds]
-        sigma = np.array(unknowns.shared.sigma).reshape(-1)
-        self._prior_weight = np.where(np.isfinite(sigma), 1.0 / sigma**2, 0.0)
-        self._prior_value = np.array(unknowns.shared.observed).reshape(-1)
-        self._fields = tuple(field_prior(f, unknowns.block.settings) for f in unknowns.shared.fields)
-        self.deviations = deviations_of(unknowns.block, unknowns.shared)
-        self._deviations = deviation_priors(self.deviations, unknowns.block)
+        self.priors = SharedPriors.of(unknowns)
         # the kernels see no prior of a point that is not eliminated: it stands with the shared parameters
         self._point_prior = np.where((unknowns.kept < 0)[:, None], unknowns.prior_weight, 0.0)
-
-    @property
-    def n_shared_priors(self) -> int:
-        """Observations of shared parameters, those of several together among them, coordinates of points apart."""
-        of_points = np.array(self.unknowns.shared.kinds) == "point"
-        together = sum(prior.rank for prior in self.joint_priors)
-        return together + (int((self._prior_weight[~of_points] > 0.0).sum()) if len(of_points) else 0)
 
     @property
     def chunks(self) -> list[tuple[int, int]]:
         """Ranges of points with about equal work, first and end of each."""
         return self._bounds
 
-    @property
-    def fields(self) -> tuple[JointPrior, ...]:
-        """What is known beforehand of the random fields among the shared parameters."""
-        return self._fields
-
-    @property
-    def deviation_priors(self) -> tuple[JointPrior, ...]:
-        """What is known beforehand of every one of `deviations`."""
-        return self._deviations
-
-    @property
-    def joint_priors(self) -> tuple[JointPrior, ...]:
-        """What is known beforehand of shared parameters together: random fields, groups, errors of positions."""
-        return (*self._fields, *self._deviations, *self.unknowns.shared.position_errors)
-
-    def with_deviations(self, sigma_um: Mapping[str, float]) -> NormalSystem:
-        """The same system with other sizes of the deviations from group to group (µm, by parameter)."""
-        block = self.unknowns.block
-        settings = replace(block.settings, deviations=replace(block.settings.deviations, sigma_um=dict(sigma_um)))
-        block = replace(block, settings=settings)
+    def with_settings(self, settings: Settings) -> NormalSystem:
+        """The same system with the covariances of fields and deviations that other settings say."""
+        block = replace(self.unknowns.block, settings=settings)
         other = copy(self)
         other.unknowns = replace(self.unknowns, block=block)
-        other._deviations = deviation_priors(self.deviations, block)
-        return other
-
-    def with_collocation(self, known: CollocationSettings) -> NormalSystem:
-        """The same system with another covariance of the random fields."""
-        block = self.unknowns.block
-        block = replace(block, settings=replace(block.settings, collocation=known))
-        other = copy(self)
-        other.unknowns = replace(self.unknowns, block=block)
-        other._fields = tuple(field_prior(f, block.settings) for f in self.unknowns.shared.fields)
+        other.priors = self.priors.as_settings_say(self.unknowns, block)
         return other
 
     def work(self) -> Work:
@@ -188,7 +148,7 @@ class NormalSystem:
         outcomes = self.over_chunks(chunk)
         n, s = len(u.images), len(u.shared)
         blocks, border, corner = np.zeros((len(u.block_row), 6, 6)), np.zeros((n, s, 6)), np.zeros((s, s))
-        squares, squares_shared = np.zeros((n, 6)), np.array(self._prior_weight)
+        squares, squares_shared = np.zeros((n, 6)), np.array(self.priors.weight)
         for sums in self._sums:
             sums.add_matrix_to(blocks, border, corner)
             sums.add_squares_to(squares, squares_shared)
@@ -197,10 +157,7 @@ class NormalSystem:
         for observed in rows:
             add_squares(observed, blocks, border, corner)
             add_own_squares(observed, squares, squares_shared)
-        corner[np.diag_indices_from(corner)] += self._prior_weight
-        for field in self.joint_priors:
-            corner[np.ix_(field.columns, field.columns)] += field.weight
-            squares_shared[field.columns] += np.diagonal(field.weight)
+        self.priors.add_to(corner, squares_shared)
         held_image, held_column = np.nonzero(~u.eo_free)
         blocks[held_image, held_column, held_column] = squares[held_image, held_column] = 1.0
         diagonal = np.arange(6)
@@ -236,17 +193,12 @@ class NormalSystem:
             sums.add_right_to(right, right_shared)
         for observed in rows:
             add_gaps(observed, right, right_shared)
-        gap = self._prior_value - state.shared
-        right_shared += self._prior_weight * gap
         cost = sum(o[0] for o in outcomes) + sum(float(np.sum(observed.gap**2)) for observed in rows)
-        for prior in self.joint_priors:
-            pull = prior.weight @ state.shared[prior.columns]
-            right_shared[prior.columns] -= pull
-            cost += float(state.shared[prior.columns] @ pull)
+        together, alone = self.priors.add_gaps_to(right_shared, state.shared)
         whole, chain = np.concatenate([right.ravel(), right_shared]), self.unknowns.chain(state)
         return RightSide(
             right=whole if self._reduction is None or chain is None else self._reduction.on_leads(whole, chain),
-            cost=float(cost + np.sum(self._prior_weight * gap**2)),
+            cost=float(cost + together + alone),
             point_decrement=float(sum(o[1] for o in outcomes)),
             residual=problem.weighting.residual,
             weight=problem.weighting.weight,
@@ -282,7 +234,7 @@ class NormalSystem:
         images : (n, 6, k), shared : (s, k) the directions.
         """
         held = images[~self.unknowns.eo_free]
-        total = held.T @ held + shared.T @ (self._prior_weight[:, None] * shared)
+        total = held.T @ held + self.priors.products(shared)
         for rows in self.whitened_rows(state):
             value = np.zeros((*rows.gap.shape, shared.shape[1]))
             own = rows.image >= 0
@@ -291,20 +243,7 @@ class NormalSystem:
                 there = rows.columns[:, c] >= 0
                 value[there] += rows.by_shared[there, :, c, None] * shared[rows.columns[there, c]][:, None, :]
             total += np.einsum("gka,gkb->ab", value, value)
-        for field in self.joint_priors:
-            total += shared[field.columns].T @ field.weight @ shared[field.columns]
         return total
-
-    def prior_root(self) -> np.ndarray:
-        """(s, k) R with R·Rᵀ the weights of what is known beforehand of the shared parameters."""
-        known = np.flatnonzero(self._prior_weight > 0.0)
-        root = np.zeros((len(self._prior_weight), len(known)))
-        root[known, np.arange(len(known))] = np.sqrt(self._prior_weight[known])
-        for prior in self.joint_priors:
-            own = np.zeros((len(root), prior.rank))
-            own[prior.columns] = prior.root()
-            root = np.concatenate([root, own], axis=1)
-        return root
 
     def with_motions_at(self, state: State) -> NormalSystem:
         """The system with what the observations leave free of a free block linearised at `state`."""
@@ -403,9 +342,7 @@ class NormalSystem:
         rays, eo_free = replace(u.rays, inv_sigma=inv_sigma), u.eo_free & ~empty[:, None]
         other.unknowns = replace(u, rays=rays, prior_weight=weight, eo_free=eo_free)
         other._point_prior = np.where((u.kept < 0)[:, None], weight, 0.0)
-        other._prior_weight = self._prior_weight.copy()
-        off = control_off[u.kept_rows]
-        other._prior_weight[u.kept_columns[off]] = 0.0
+        other.priors = self.priors.without(u.kept_columns[control_off[u.kept_rows]])
         return other
 
     def factorise(self, equations: NormalEquations) -> Factor:

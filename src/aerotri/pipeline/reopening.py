@@ -53,7 +53,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     factor = undamped_factor(system, solution)
     result = replace(summarise(system, solution, factor, saved.ray_status, saved.warnings), block=local)
     deviations = None
-    if system.deviations and saved.status == "converged":
+    if system.priors.deviations and saved.status == "converged":
         deviations = found_deviations(system, ReducedToGroups.of(system, solution, factor))
     result = replace(
         result, parameters=with_removed(result.parameters, removals), removals=removals, deviations=deviations

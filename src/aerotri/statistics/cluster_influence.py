@@ -134,7 +134,7 @@ def known_part(
     # the random sums below are to be the same for any order of the points
     order = order_by_place(solution.state.points[rows])
     rows, axes = rows[order], axes[order]
-    root = system.prior_root()
+    root = system.priors.root()
     of_points, size = np.sqrt(u.prior_weight[rows, axes]), len(rows) + root.shape[1]
     mix = np.eye(size)
     if size > most:

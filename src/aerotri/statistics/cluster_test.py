@@ -85,7 +85,7 @@ def weakest_modes(system: NormalSystem, solution: Solution, factor: Factor) -> M
         q[:, columns] = points[rows].reshape(size, -1)
         at_observed[:, :, columns], at_shared[:, columns] = points[observed], shared
     own += np.einsum("pia,pi,pib->ab", at_observed, u.prior_weight[observed], at_observed)
-    at_priors = system.prior_root().T @ at_shared
+    at_priors = system.priors.root().T @ at_shared
     own += at_priors.T @ at_priors
     values, vectors = np.linalg.eigh(0.5 * (q + q.T) - own)
     chosen = vectors[:, ::-1][:, :MODES] / np.sqrt(np.maximum(values[::-1][:MODES], 1e-12 * values[-1]))

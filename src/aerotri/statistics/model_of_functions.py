@@ -69,4 +69,4 @@ def _observed(unknowns: Unknowns) -> np.ndarray:
 
 def _weighted(system: NormalSystem, shared: np.ndarray, observed: np.ndarray) -> np.ndarray:
     weight = np.sqrt(system.unknowns.prior_weight[_observed(system.unknowns)])[:, :, None]
-    return np.concatenate([system.prior_root().T @ shared, (weight * observed).reshape(-1, shared.shape[1])])
+    return np.concatenate([system.priors.root().T @ shared, (weight * observed).reshape(-1, shared.shape[1])])

@@ -59,7 +59,7 @@ def count_observations(system: NormalSystem) -> Counts:
     u = system.unknowns
     held_observed = int(((u.prior_weight > 0.0) & ~u.point_held).sum())
     extras = sum(extra.count for extra in system.extras)
-    observations = 2 * len(u.rays.image) + held_observed + extras + system.n_shared_priors
+    observations = 2 * len(u.rays.image) + held_observed + extras + system.priors.count
     conditions = u.motions.count if u.block.settings.adjustment.datum == "inner" else 0
     return Counts(observations, u.count + conditions, conditions)
 
@@ -201,7 +201,7 @@ def shared_parameters(system: NormalSystem, solution: Solution, q: Cofactors, si
     weighted = np.isfinite(np.array(shared.sigma).reshape(-1))
     for field in shared.fields:
         weighted[field.columns] = True
-    for deviation in system.deviations:
+    for deviation in system.priors.deviations:
         weighted[deviation.columns] = True
     weighted = weighted[rows]
     one_group = len(set(groups.tolist())) <= 1
@@ -364,9 +364,9 @@ def _prior_group(system: NormalSystem, solution: Solution, q: Cofactors) -> list
     shared = system.unknowns.shared
     sigma = np.array(shared.sigma).reshape(-1)
     known = np.isfinite(sigma) & (np.array(shared.kinds, dtype=object) != "point").reshape(-1)
-    fields = [_joint_group("collocation field", [field], solution, q) for field in system.fields]
-    if system.deviations:
-        fields.append(_joint_group("deviations of groups", system.deviation_priors, solution, q))
+    fields = [_joint_group("collocation field", [field], solution, q) for field in system.priors.fields]
+    if system.priors.deviations:
+        fields.append(_joint_group("deviations of groups", system.priors.deviation_priors, solution, q))
     fields += [
         _joint_group("position errors in time", [prior], solution, q)
         for prior in system.unknowns.shared.position_errors

@@ -63,16 +63,16 @@ class ReducedToGroups:
     @classmethod
     def of(cls, system: NormalSystem, solution: Solution, factor: Factor) -> ReducedToGroups:
         """From a solution and the factor of its undamped equations."""
-        columns = np.concatenate([one.columns for one in system.deviations])
-        ends = np.cumsum([0, *(len(one.columns) for one in system.deviations)])
+        columns = np.concatenate([one.columns for one in system.priors.deviations])
+        ends = np.cumsum([0, *(len(one.columns) for one in system.priors.deviations)])
         places = tuple(np.arange(a, b) for a, b in pairwise(ends.tolist()))
         normals = border_marginal(factor, columns)
         values = solution.state.shared[columns]
         right = normals @ values
-        for own, prior in zip(places, system.deviation_priors, strict=True):
+        for own, prior in zip(places, system.priors.deviation_priors, strict=True):
             normals[np.ix_(own, own)] -= prior.weight
         omega = weighted_sum(system, solution) + float(right @ values)
-        return cls(system.deviations, places, normals, right, omega, effective_redundancy(system, solution))
+        return cls(system.priors.deviations, places, normals, right, omega, effective_redundancy(system, solution))
 
     def deviance(self, log_variance: np.ndarray) -> tuple[float, np.ndarray]:
         """−2 ln L of the logarithms (t,) of the squares of the sizes in µm, and its derivatives by them."""
@@ -110,7 +110,7 @@ def with_estimated_deviations(
     -------
     System, solution, and what was found; None where no parameter has several groups.
     """
-    if not system.deviations or solution.status != "converged":
+    if not system.priors.deviations or solution.status != "converged":
         return system, solution, None
     settings = system.unknowns.block.settings
     given = settings.deviations.sigma_um
@@ -127,10 +127,9 @@ def with_estimated_deviations(
         x = _estimated(reduced, settings.image_sigma_um, x)
         if before is not None and reduced.deviance(before)[0] - reduced.deviance(x)[0] < SETTLED:
             break
-        sizes = np.exp(0.5 * x)
-        system = system.with_deviations(
-            {one.name: float(size) for one, size in zip(system.deviations, sizes, strict=True)}
-        )
+        sizes = zip(system.priors.deviations, np.exp(0.5 * x).tolist(), strict=True)
+        tied = replace(settings.deviations, sigma_um={one.name: size for one, size in sizes})
+        system = system.with_settings(replace(system.unknowns.block.settings, deviations=tied))
         system, again = minimise_at_adjusted(system, solution.state, redundancy, options)
         solution = replace(again, iterations=solution.iterations + again.iterations)
         if solution.status != "converged" or round_ == MOST_ROUNDS - 1:

@@ -69,7 +69,7 @@ class ReducedToFields:
         normals = border_marginal(factor, nodes)
         values, at = solution.state.shared[nodes], 0
         right = normals @ values
-        for field in system.fields:
+        for field in system.priors.fields:
             own = slice(at, at + len(field.weight))
             normals[own, own] -= field.weight
             at = own.stop
@@ -105,7 +105,7 @@ def with_estimated_fields(
     """
     settings = system.unknowns.block.settings
     given, redundancy = settings.collocation, count_observations(system).redundancy
-    if not system.fields or None not in (given.sigma_um, given.length_mm):
+    if not system.priors.fields or None not in (given.sigma_um, given.length_mm):
         return system, solution
     for _ in range(MOST_ROUNDS):
         before = covariance_in_use(system)
@@ -115,7 +115,8 @@ def with_estimated_fields(
             # what is not determined is named where the result is factorised
             break
         found = estimate_covariance(reduced, given, before)
-        system = system.with_collocation(CollocationSettings(found.sigma_um, found.length_mm))
+        collocation = CollocationSettings(found.sigma_um, found.length_mm)
+        system = system.with_settings(replace(system.unknowns.block.settings, collocation=collocation))
         system, again = minimise_at_adjusted(system, solution.state, redundancy, options)
         solution = replace(again, iterations=solution.iterations + again.iterations)
         if reduced.deviance(before) - reduced.deviance(found) < SETTLED:

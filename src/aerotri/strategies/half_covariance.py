@@ -93,7 +93,7 @@ def _observed(half: Half) -> _Observed:
     for k in range(s):
         if np.isfinite(shared.sigma[k]) and shared.kinds[k] != "point":
             out["shared", shared.names[k], shared.groups[k]] = _unit(s, k, 1.0 / shared.sigma[k])
-    for number, field in enumerate(system.joint_priors):
+    for number, field in enumerate(system.priors.joint):
         root = field.root().T
         group = shared.groups[field.columns[0]]
         for k, line in enumerate(root):

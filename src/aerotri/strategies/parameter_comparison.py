@@ -118,7 +118,7 @@ def _judged(system: NormalSystem, solution: Solution, factor: Factor, choice: Ch
         t = np.abs(state.shared[own]) / (sigma0 * np.sqrt(np.diagonal(cofactor)))
     effective, omega = float(len(own)), solution.equations.cost
     place = {int(column): k for k, column in enumerate(own)}
-    for field in (*system.fields, *system.deviation_priors):
+    for field in (*system.priors.fields, *system.priors.deviation_priors):
         at = np.array([place[int(c)] for c in field.columns])
         values = state.shared[field.columns]
         effective -= float(np.sum(cofactor[np.ix_(at, at)] * field.weight))
@@ -126,19 +126,19 @@ def _judged(system: NormalSystem, solution: Solution, factor: Factor, choice: Ch
     without = (
         count_observations(system).redundancy
         + len(own)
-        - sum(f.rank for f in (*system.fields, *system.deviation_priors))
+        - sum(f.rank for f in (*system.priors.fields, *system.priors.deviation_priors))
     )
     deviance = without * float(np.log(omega / without)) if without > 0 and omega > 0.0 else float("nan")
     bic = deviance + effective * float(np.log(max(without, 1)))
-    if system.fields and np.isfinite(bic):
-        fixed = len(own) - sum(len(field.weight) for field in system.fields) + HYPERPARAMETERS
+    if system.priors.fields and np.isfinite(bic):
+        fixed = len(own) - sum(len(field.weight) for field in system.priors.fields) + HYPERPARAMETERS
         reduced = ReducedToFields.of(system, solution, factor)
         log_determinant = reduced.deviance(covariance_in_use(system)) - reduced.freedom * np.log(
             weighted_sum(system, solution)
         )
         bic = without * np.log(solution.equations.cost / without) + log_determinant + fixed * np.log(without)
     predicted = predict_control(system, solution, factor, sigma0, folds)
-    known = settings.collocation if system.fields else None
+    known = settings.collocation if system.priors.fields else None
     return SetOutcome(
         name=set_name(choice),
         choice=choice,
