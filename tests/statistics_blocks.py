@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from aerotri.functional_model.additional_parameters import parse_parameters
+from aerotri.observations import Block
 from aerotri.simulation import parse_spec, simulate
 from small_blocks import with_adjustment
 
@@ -21,12 +22,8 @@ DRONE = {
 }  # fmt: skip
 
 
-def drone_block(seed: int, moving_um: float = 0.0):
-    """A drone block of eight strips; the lens of every strip errs by other terms of second and third order."""
-    block, truth = simulate(parse_spec(DRONE), seed)
-    block = with_adjustment(block, additional_parameters=parse_parameters("brown:K1+K2+P1+P2"))
-    if not moving_um:
-        return block, truth
+def with_changing_strips(block: Block, seed: int, moving_um: float) -> Block:
+    """The block with a lens that errs in every strip by other terms of second and third order, so many µm RMS."""
     rays, rng = block.image_points, np.random.default_rng(1000 + seed)
     xy, strip = rays.xy.copy(), block.images.strip[rays.image].astype(str)
     x, y = rays.xy[:, 0] / 18.0, rays.xy[:, 1] / 12.0
@@ -34,4 +31,11 @@ def drone_block(seed: int, moving_um: float = 0.0):
     for name in np.unique(strip):
         error = terms[strip == name] @ rng.normal(size=(6, 2))
         xy[strip == name] += error * moving_um * 1e-3 / np.sqrt(np.mean(error**2))
-    return replace(block, image_points=replace(rays, xy=xy)), truth
+    return replace(block, image_points=replace(rays, xy=xy))
+
+
+def drone_block(seed: int, moving_um: float = 0.0):
+    """A drone block of eight strips; the lens of every strip errs by other terms of second and third order."""
+    block, truth = simulate(parse_spec(DRONE), seed)
+    block = with_adjustment(block, additional_parameters=parse_parameters("brown:K1+K2+P1+P2"))
+    return (with_changing_strips(block, seed, moving_um) if moving_um else block), truth

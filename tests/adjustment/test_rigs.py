@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 import aerotri
 from aerotri.adjustment import rigging
@@ -19,6 +18,7 @@ from aerotri.formats.results.rigs import rig_columns, rigs_json
 from aerotri.functional_model.rotation import angles_from_rotation, logarithm, rotation_from_angles
 from aerotri.observations import AdjustmentSettings, GnssSettings, InsSettings, Mounting, Prior
 from aerotri.pipeline import adjust
+from normalised_errors import assert_normal
 from rig_blocks import EXACT, MOUNTINGS, rig_block
 from small_blocks import with_adjustment
 
@@ -467,15 +467,7 @@ def test_recovery(case):
     """Normalised errors of mountings, a station, a photograph that follows and a point over 50 seeds: N(0, 1)."""
     changes = {} if case == "free arms" else {"mounting": EXACT, **GNSS}
     runs = [_normalised_errors(seed, **changes) for seed in range(1000, 1050)]
-    n = len(runs)
-    low, high = chi2.ppf([0.0005, 0.9995], n) / n
-    for name in runs[0][0]:
-        z = np.array([run[0][name] for run in runs])
-        assert abs(z.mean()) < 3.3 / np.sqrt(n), f"{name} is biased, mean z {z.mean():.2f}"
-        assert low < np.mean(z**2) < high, f"σ of {name} is wrong, mean z² {np.mean(z**2):.2f}"
-    total, redundancy = sum(run[1] for run in runs), sum(run[2] for run in runs)
-    low, high = chi2.ppf([0.0005, 0.9995], redundancy) / redundancy
-    assert low < total / redundancy < high
+    assert_normal(runs, case)
 
 
 def _normalised_errors(seed, **changes):

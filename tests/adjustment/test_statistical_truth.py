@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.functional_model.rotation import logarithm, rotation_from_angles
@@ -17,6 +16,7 @@ from aerotri.observations import InsSettings
 from aerotri.observations.block import Constraints
 from aerotri.pipeline import adjust
 from aerotri.simulation import read_spec, simulate
+from normalised_errors import assert_normal
 from places import PROJECT
 from small_blocks import small_block, with_adjustment
 
@@ -142,15 +142,7 @@ def normalised_errors(parameters, changes, seed, prepare=None):
 def test_recovery(case):
     parameters, changes = CASES[case]
     runs = [normalised_errors(parameters, changes, seed, PREPARED.get(case)) for seed in SEEDS]
-    n = len(runs)
-    low, high = chi2.ppf([0.0005, 0.9995], n) / n
-    for name in runs[0][0]:
-        z = np.array([run[0][name] for run in runs])
-        assert abs(z.mean()) < 3.3 / np.sqrt(n), f"{case}: {name} is biased, mean z {z.mean():.2f}"
-        assert low < np.mean(z**2) < high, f"{case}: σ of {name} is wrong, mean z² {np.mean(z**2):.2f}"
-    total, redundancy = sum(run[1] for run in runs), sum(run[2] for run in runs)
-    low, high = chi2.ppf([0.0005, 0.9995], redundancy) / redundancy
-    assert low < total / redundancy < high, f"{case}: σ0² = {total / redundancy:.4f}"
+    assert_normal(runs, case)
 
 
 @pytest.fixture(scope="module")

@@ -15,9 +15,10 @@ Example: python tools/prove/model_part.py --blocks 24 > tools/results/model_part
 from __future__ import annotations
 
 import argparse
+import sys
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,11 @@ from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.truth import Truth
 from aerotri.volume.pickets import Pickets
 from aerotri.volume.response import respond
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+from small_blocks import with_adjustment
+from statistics_blocks import with_changing_strips
 
 MOVING_UM, SIGMA_UM = 2.0, 2.0
 INTERIOR = ("focal_length_mm", "x0_mm", "y0_mm")
@@ -60,22 +66,7 @@ def simulated(flight: Mapping[str, Any], seed: int, moving_um: float) -> tuple[B
     """A block and its truth; the lens of every strip errs by other terms of second and third order."""
     block, truth = simulate(parse_spec(drone(flight)), seed)
     block = with_adjustment(block, additional_parameters=parse_parameters("brown:K1+K2+P1+P2"))
-    if not moving_um:
-        return block, truth
-    rays, rng = block.image_points, np.random.default_rng(1000 + seed)
-    xy, strip = rays.xy.copy(), block.images.strip[rays.image].astype(str)
-    x, y = rays.xy[:, 0] / 18.0, rays.xy[:, 1] / 12.0
-    terms = np.stack([x * y, x * x, y * y, x * x * y, x * y * y, x**3], axis=1)
-    for name in np.unique(strip):
-        error = terms[strip == name] @ rng.normal(size=(6, 2))
-        xy[strip == name] += error * moving_um * 1e-3 / np.sqrt(np.mean(error**2))
-    return replace(block, image_points=replace(rays, xy=xy)), truth
-
-
-def with_adjustment(block: Block, **changed: Any) -> Block:
-    """The block with other settings of the adjustment."""
-    adjustment = replace(block.settings.adjustment, **changed)
-    return replace(block, settings=replace(block.settings, adjustment=adjustment))
+    return (with_changing_strips(block, seed, moving_um) if moving_um else block), truth
 
 
 def errors_over_sigma(found: Adjustment, truth: Truth) -> dict[str, tuple[np.ndarray, np.ndarray]]:
