@@ -4,6 +4,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# a busy machine makes no example wrong
+settings.register_profile("aerotri", deadline=None)
+settings.load_profile("aerotri")
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     # the processors are taken by the processes of the tests: threads of each would only wait for one another

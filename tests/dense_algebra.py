@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.functional_model.collinearity import linearise
+from aerotri.adjustment.scanned_rays import linearise_unknown_rays
 
 TINY = {
     "flight": {
@@ -21,9 +21,7 @@ def dense_design(adjustment):
     u = system.unknowns
     rays, n, s, count = u.rays, len(u.images), len(u.shared), len(u.points)
     ray_point = np.repeat(np.arange(count), np.diff(rays.start))
-    partials = linearise(
-        state.rotation, state.centre, state.points, u.interior(state), rays.image, ray_point, rays.lens_row, rays.at
-    )
+    partials, in_scan, by_scan = linearise_unknown_rays(u, state, np.arange(len(rays.image)))
     rows = []
     for k in range(len(rays.image)):
         block = np.zeros((2, 6 * n + s + 3 * count))
@@ -35,6 +33,9 @@ def dense_design(adjustment):
                 block[:, 6 * n + column] += partials.by_interior[k, :, t]
         for t in range(rays.ap_index.shape[1]):
             block[:, 6 * n + rays.ap_index[k, t]] += rays.ap_value[k, :, t]
+        for column, by_column in zip(in_scan[k], by_scan[k].T, strict=True):
+            if column >= 0:
+                block[:, 6 * n + column] += by_column
         p = ray_point[k]
         if u.kept[p] >= 0:
             block[:, 6 * n + u.kept[p] : 6 * n + u.kept[p] + 3] = partials.by_point[k]

@@ -34,8 +34,13 @@ def with_changing_strips(block: Block, seed: int, moving_um: float) -> Block:
     return replace(block, image_points=replace(rays, xy=xy))
 
 
-def drone_block(seed: int, moving_um: float = 0.0):
+def drone_block(seed: int, moving_um: float = 0.0, **flight):
     """A drone block of eight strips; the lens of every strip errs by other terms of second and third order."""
-    block, truth = simulate(parse_spec(DRONE), seed)
+    block, truth = simulate(parse_spec(DRONE | {"flight": FLIGHT | flight}), seed)
     block = with_adjustment(block, additional_parameters=parse_parameters("brown:K1+K2+P1+P2"))
     return (with_changing_strips(block, seed, moving_um) if moving_um else block), truth
+
+
+def few_strips(seed: int, moving_um: float = 0.0, strips: int = 3):
+    """The same of three strips or one, of twelve photographs each."""
+    return drone_block(seed, moving_um, strips=strips, images_per_strip=12)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import chdtrc, fdtrc, gammaincinv, ndtri
+from scipy.special import chdtrc, chndtrinc, fdtrc, gammaincinv, ndtri
 
 
 def normal_quantile(probability: float) -> float:
@@ -25,3 +25,8 @@ def chi_square_exceedance(value: float, freedom: float) -> float:
 def f_exceedance(value: float, freedom: float, freedom_below: float) -> float:
     """P(F ≥ value) for F of `freedom` over `freedom_below` degrees of freedom."""
     return float(fdtrc(freedom, freedom_below, value))
+
+
+def noncentrality(freedom: float, alpha: float, power: float) -> float:
+    """The δ0² at which χ² of `freedom` degrees of freedom exceeds its quantile of 1 − α with probability `power`."""
+    return float(chndtrinc(chi_square_quantile(1.0 - alpha, freedom), freedom, 1.0 - power))

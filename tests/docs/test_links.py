@@ -107,7 +107,7 @@ def test_all_pages_are_looked_at():
     [
         ("least_squares.md", ""),
         ("least_squares.md#datum", ""),
-        ("random_field.md#choosing-a-set", ""),
+        ("choice.md#choosing-a-set", ""),
         ("../validation/damaged.md#rank-defects", ""),
         ("../../tools/results/paper_003.md", ""),
         ("https://example.org/page", ""),

@@ -414,5 +414,5 @@ def test_family_of_another_camera_is_refused():
 def test_all_families_are_listed():
     assert set(FAMILIES) == {
         "bluh", "ultracam_d", "dmc", "ebner", "gruen", "fourier", "legendre", "chebyshev", "grid", "collocation",
-        "brown", "lens",
+        "brown", "lens", "interior",
     }  # fmt: skip

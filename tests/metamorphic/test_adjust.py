@@ -11,7 +11,7 @@ from transformations import about_z, both, largest_difference, moved, numbers_of
 from aerotri.functional_model.additional_parameters import AUTO, parse_parameters
 from aerotri.observations import GnssSettings
 from aerotri.observations.block import Edits
-from aerotri.pipeline import adjust, chain
+from aerotri.pipeline import adjust, choosing
 from small_blocks import ERRING, small_block, with_adjustment
 
 ALL = 1e-9
@@ -147,7 +147,7 @@ def test_variance_components():
 def few_sets(monkeypatch, order=1):
     """The choice among four sets, in their order or the other way round."""
     specs = ("none", "bluh:1-12", "brown", "ebner")[::order]
-    monkeypatch.setattr(chain, "candidate_sets", lambda block: tuple(parse_parameters(spec) for spec in specs))
+    monkeypatch.setattr(choosing, "sets_to_choose_from", lambda block: tuple(parse_parameters(spec) for spec in specs))
 
 
 def test_parameters_chosen_by_the_program(monkeypatch):

@@ -73,6 +73,9 @@ def with_points_in_order(content, old):
             order = np.argsort([old.get(name, name) for name in content[f"{kind}_points"]])
             for one in content["sets"]:
                 one[kind]["differences"] = [one[kind]["differences"][k] for k in order]
+                if kind == "control":
+                    said = one["prediction"]
+                    said["control"] = [said["control"][k] for k in order if said["control"]]
     return content
 
 

@@ -18,7 +18,7 @@ from aerotri.formats.foreign.bingo import write_bingo
 from aerotri.formats.foreign.metashape import write_metashape
 from aerotri.formats.foreign.pix4d import write_pix4d_gcp, write_pix4d_geo
 from aerotri.functional_model.additional_parameters import AUTO, parse_parameters
-from aerotri.pipeline import adjust, chain
+from aerotri.pipeline import adjust, choosing
 from small_blocks import small_block, with_adjustment
 
 ALL = 1e-9
@@ -112,7 +112,7 @@ def test_parameters_chosen_for_split_files(measured, tmp_path, monkeypatch):
     """`--parameters auto` for a block whose image points come from three files."""
     block, result, _ = measured
     sets = tuple(parse_parameters(spec) for spec in ("none", "bluh:1-12", "ebner"))
-    monkeypatch.setattr(chain, "candidate_sets", lambda block: sets)
+    monkeypatch.setattr(choosing, "sets_to_choose_from", lambda block: sets)
     rows = np.arange(len(block.image_points))
     rng = np.random.default_rng(9)
     found = []

@@ -50,7 +50,7 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
     tie, adjust, terrain, volume = fakes.called
     assert tie[1] == (str(photographs),)
     assert (tie[2]["control"], tie[2]["features"], tie[2]["seed"]) == ("gcp_list.txt", 2000, 4)
-    assert adjust == ("adjust", (str(out / "block"), str(out / "result")), {"plots": True})
+    assert adjust == ("adjust", (str(out / "block"), str(out / "result")), {"parameters": "auto", "plots": True})
     assert "camera" not in tie[2]
     stated = {"interval": 5.0, "ground_within": "pile.gpkg"}
     assert terrain == ("terrain", (str(out / "result"), str(photographs)), stated)
@@ -63,7 +63,7 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
         "0.02,0.02,0.03", "--control-prefix", "G", "--focal-length-mm", "8.8", "--seed", "4", "--check", "K1",
         "--features", "2000",
     ]  # fmt: skip
-    assert lines[1] == ["adjust", str(out / "block"), "--out", str(out / "result")]
+    assert lines[1] == ["adjust", str(out / "block"), "--out", str(out / "result"), "--parameters", "auto"]
     assert lines[3][:4] == ["volume", str(out / "dtm"), "--adjustment", str(out / "result")]
     assert lines[3][-7:] == ["--boundary", "pile.gpkg", "--base", "lowest", "--layer", "dtm", "--no-plots"]
     assert project.block == "adjusted"

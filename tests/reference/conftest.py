@@ -16,6 +16,30 @@ from rendered_photographs import Lists, fly, write_gcp_list, write_positions
 from small_blocks import with_adjustment
 from ten_photographs import ten_photographs
 
+ROLLING = """
+name = "rolling"
+[camera.cam]
+size_px = [4000, 3000]
+pixel_um = 2.4
+focal_length_mm = 8.8
+[camera.cam.rolling_shutter]
+readout_ms = 30.0
+[flight]
+gsd_m = 0.02
+strips = 2
+images_per_strip = 5
+end_lap = 0.8
+side_lap = 0.6
+speed_m_s = 8.0
+[tie_points]
+per_image = 40
+sigma_um = 0.8
+[control]
+distance_bases = 3
+sigma_m = [0.01, 0.01, 0.015]
+[gnss]
+sigma_m = [0.02, 0.02, 0.03]
+"""
 RIGGED = """
 name = "rigged"
 [camera.nadir]
@@ -134,6 +158,12 @@ def _written(folder: Path) -> Written:
     (folder / "rigged.toml").write_text(RIGGED)
     rigged = run("simulate", folder / "rigged.toml", "--seed", "3", out="rigged")
     of_rig = run("adjust", rigged, "--no-plots", out="rig_result")
+    (folder / "rolling.toml").write_text(ROLLING)
+    rolling = run("simulate", folder / "rolling.toml", "--seed", "3", out="rolling")
+    of_shutter = run("adjust", rolling, "--no-plots", out="rolling_result")
+    toml = (rigged / "block.toml").read_text().replace('constraint = "rigid"', 'constraint = "weighted"')
+    (rigged / "block.toml").write_text(toml)
+    of_weighted = run("adjust", rigged, "--no-plots", out="weighted_result")
     photographs = tiny / "photographs"
     pairs = run("dtm", result, photographs, "--interval", "20", "--pairs", out="dtm")
     run("demcor", result, pairs / "dsm.tif", "--models", pairs / "model.tif", out="corrected/NAME.tif")
@@ -156,12 +186,12 @@ def _written(folder: Path) -> Written:
     project = _project(run)
     places = {
         "block folder": (tiny, folder / "plain", project / "block"),
-        "result of adjust": (first, second, result, of_rig),
+        "result of adjust": (first, second, result, of_rig, of_weighted, of_shutter),
         "folder of compare-parameters": (sets,), "folder of halves": (halves,), "folder of deform": (model, whole),
         "folder of demcor": (folder / "corrected",), "folder of imgeo": (imgeo,), "folder of crosscheck": (checked,),
         "folder of dtm": (pairs, project / "dtm"), "folder of compare": (compared,),
         "folder of volume": (project / "volume",),
-        "truth of simulate": (tiny / "truth", rigged / "truth"),
+        "truth of simulate": (tiny / "truth", rigged / "truth", rolling / "truth"),
         "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),
         "control_marks of tiepoints": (project / "block" / "control_marks",), "folder of run": (project,),
         "folder of parameters": (folder / "drawn",),

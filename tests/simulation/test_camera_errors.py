@@ -13,8 +13,8 @@ from aerotri.functional_model.orientation_patterns import orientation_patterns
 from aerotri.simulation import read_spec, simulate, true_image_errors
 from aerotri.simulation.camera_errors import dmc, rms_mm, ultracam_d
 from aerotri.simulation.camera_errors.lens import random_lens
+from aerotri.simulation.camera_spec import CameraSpec
 from aerotri.simulation.cameras import block_camera
-from aerotri.simulation.spec import CameraSpec
 from places import PROJECT
 
 BLOCKS = PROJECT / "blocks"

@@ -8,10 +8,11 @@ import pytest
 from aerotri.conventions import InputError
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.simulation import simulate
+from aerotri.simulation.camera_spec import CameraSpec
 from aerotri.simulation.cameras import block_camera
 from aerotri.simulation.flight import flying_height, plan_flight
 from aerotri.simulation.presets import PRESETS
-from aerotri.simulation.spec import CameraSpec, FlightSpec
+from aerotri.simulation.spec import FlightSpec
 
 AXES = {"+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
 

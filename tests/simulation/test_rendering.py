@@ -180,7 +180,7 @@ def test_rays_end_on_the_first_roof_wall_or_ground():
     centre = np.array([-100.0, 0.0, 100.0])
     towards = np.array([[-60.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 2.0, 20.0], [22.0, 0.0, 0.0], [40.0, 0.0, 0.0]])
     slope = (towards - centre)[:, :2] / (towards - centre)[:, 2:]
-    found = _first_met(town, centre, slope)
+    found = _first_met(town, np.repeat(centre[None], len(slope), axis=0), slope)
     # ground before the house; its wall; its roof; the roof again, for the ground behind it; ground beyond the shadow
     np.testing.assert_allclose(found, [[-60.0, 0.0], [-5.0, 0.0], [0.0, 2.0], [-2.4, 0.0], [40.0, 0.0]], atol=1e-3)
 

@@ -81,3 +81,47 @@ def test_what_is_stated_errs_by_its_sigma():
 def test_wrong_rigs_are_refused(rig, says):
     with pytest.raises(InputError, match=says):
         simulate(parse_spec(rig_spec(rig=rig)), 1)
+
+
+@pytest.mark.parametrize(("preset", "cameras", "tilts"), [
+    ("oblique_5", 5, [0.0, 45.0, 45.0, 45.0, 45.0]),
+    ("two_head", 2, [14.0, 14.0]),
+    ("large_format_4", 4, [19.34, 19.34, 19.34, 19.34]),
+])  # fmt: skip
+def test_presets_fly(preset, cameras, tilts):
+    """Every head looks where the preset says, seen from a level frame, and sees points."""
+    spec = rig_spec()
+    del spec["camera"]
+    spec |= {"rig": {"frame": {"preset": preset, "play_rotation_deg": 0.0}}, "tie_points": {
+        "per_image": 12, "probability": 0.9, "sigma_um": 2.0}}  # fmt: skip
+    spec["flight"] = spec["flight"] | {"attitude_sigma_deg": [0.0, 0.0, 0.0], "cross_strips": []}
+    # oblique cameras look beyond a small block
+    spec["flight"] |= {"strips": 5, "images_per_strip": 12} if preset == "oblique_5" else {}
+    block, truth = simulate(parse_spec(spec), 1)
+    assert len(block.cameras) == cameras
+    axis = -rotation_from_angles(truth.angles)[:, :, 2]
+    for k, tilt in enumerate(tilts):
+        own = block.images.camera == k
+        np.testing.assert_allclose(np.degrees(np.arccos(-axis[own, 2])), tilt, atol=0.01)
+    assert len(np.unique(np.round(axis[:cameras], 6), axis=0)) == cameras
+    assert np.bincount(block.images.camera[block.image_points.image], minlength=cameras).min() > 20
+    # the heads of a rig look to all sides alike
+    assert np.abs(axis[:cameras, :2].mean(axis=0)).max() < 1e-9
+
+
+def test_keys_beside_a_preset_count():
+    spec = rig_spec()
+    spec["camera"] = {"nadir": {"focal_length_mm": 70.0}}
+    spec["rig"] = {"frame": {"preset": "oblique_5", "camera": {"fore": {"play_rotation_deg": 0.002}}}}
+    parsed = parse_spec(spec)
+    assert parsed.camera["nadir"].focal_length_mm == 70.0
+    assert parsed.camera["nadir"].size_px == (14204, 10652)
+    assert parsed.rig["frame"].camera["fore"].play_rotation_deg == 0.002
+    assert parsed.rig["frame"].camera["fore"].rotation_deg == (45.0, 0.0, 0.0)
+
+
+def test_an_unknown_preset_is_refused():
+    spec = rig_spec()
+    spec["rig"] = {"frame": {"preset": "nine_head"}}
+    with pytest.raises(InputError, match="nine_head"):
+        parse_spec(spec)

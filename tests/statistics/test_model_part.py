@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aerotri.adjustment.datum import motions_of_points
 from aerotri.pipeline.chain import adjust_keeping_system
 from aerotri.statistics.cluster_influence import influences, known_part
 from aerotri.statistics.cluster_test import compare_clusters, sum_of_squares, weakest_modes
@@ -12,7 +13,7 @@ from aerotri.statistics.clusters import PHOTOGRAPH, Clusters, cluster_schemes
 from aerotri.statistics.covariance import cofactors
 from aerotri.statistics.model_part import compare_schemes, excess_of_clusters, positive_part
 from dense_algebra import dense_design
-from small_blocks import small_block
+from small_blocks import small_block, with_adjustment
 from statistics_blocks import drone_block
 
 GNSS = {"sigma_m": [0.05, 0.05, 0.08], "shift_sigma_m": [0.2, 0.2, 0.2]}
@@ -222,3 +223,23 @@ def test_random_divisions_have_no_excess():
     test = compare_clusters(system, solution, _factor(found), modes, clusters, found.local.outcome.sigma0, 0.001)
     assert not test.counts
     assert 0.7 < test.ratio < 1.4
+
+
+@pytest.mark.parametrize("strips", [8, 3])
+def test_free_network_in_both_datums(strips):
+    """Inner: S·(minimal)·Sᵀ over all unknowns, S written out; the test does not depend on the datum."""
+    block, _ = drone_block(1, 2.0, strips=strips, images_per_strip=8, end_lap=0.6)
+    minimal, inner = (adjust_keeping_system(with_adjustment(block, datum=datum)) for datum in ("minimal", "inner"))
+    assert minimal.result.model_part.scheme == inner.result.model_part.scheme == "strip"
+    one, other = (next(t for t in found.result.model_part.tests if t.scheme == "strip") for found in (minimal, inner))
+    assert one.ratio == pytest.approx(other.ratio, rel=1e-3)
+    u, state = inner.system.unknowns, inner.solution.state
+    g = (motions_of_points(state.points) @ u.motions.basis).reshape(3 * len(u.points), -1)
+    columns = minimal.model.points.reshape(len(g), -1).astype(float)
+    expected = columns - g @ (np.linalg.pinv(g) @ columns)
+    found = inner.model.points.reshape(len(g), -1).astype(float)
+    variance = np.sum(expected**2, axis=1)
+    assert np.abs(np.sum(found**2, axis=1) - variance).max() < 0.02 * variance.max()
+    assert np.abs(np.linalg.pinv(g) @ found).max() < 1e-3 * np.abs(np.linalg.pinv(g) @ columns).max()
+    assert (inner.result.points.total_sigma >= inner.result.points.sigma * (1.0 - 1e-9)).all()
+    assert np.isfinite(inner.result.images.total_sigma).all()

@@ -14,9 +14,9 @@ from aerotri.functional_model.additional_parameters import AUTO, parse_parameter
 from aerotri.pipeline import adjust, adjust_keeping_system, compare_parameters
 from aerotri.report.tables.parameters import comparison_table
 from aerotri.report.tables.terminal import table_lines
-from aerotri.results.parameter_comparison import Accuracy, ParameterComparison, SetOutcome
+from aerotri.results.parameter_comparison import Accuracy, Evidence, ParameterComparison, SetOutcome
 from aerotri.strategies.control_prediction import folds_of, predict_control
-from aerotri.strategies.parameter_choice import Gain, candidate_sets, choose, gain, gains, measure, standings
+from aerotri.strategies.parameter_choice import Gain, candidate_sets, choose, distances, gain, gains, measure, standings
 from aerotri.strategies.parameter_comparison import set_name
 from small_blocks import small_block, with_adjustment
 
@@ -130,27 +130,53 @@ def made_up(name: str, scale: float, count: int, bic: float, seed: int = 0, poin
     return SetOutcome(set_name(choice), choice, "converged", count, count, count, 1.0, 2.0, bic, bic, d, d)
 
 
+def with_evidence(outcome: SetOutcome, mean: float, scatter: float, sigma_height: float = 0.1, seed: int = 3):
+    """Eight areas and five control points, −2 ln of the density of each `mean` more than of a set with 0."""
+    drawn = np.random.default_rng(seed)
+    common = drawn.normal(1000.0, 100.0, 13)
+    own = common + mean + scatter * np.random.default_rng(seed + outcome.count).normal(size=13)
+    return replace(outcome, evidence=Evidence(own[:8], np.zeros(0), own[8:], sigma_height))
+
+
 def comparison_of(*outcomes: SetOutcome) -> ParameterComparison:
     names = tuple(str(k) for k in range(40))
     return ParameterComparison("b", outcomes, 10, names, names, "off")
 
 
 def test_choice_of_the_one_that_predicts_better():
-    chosen = choose(comparison_of(made_up("none", 3.0, 0, 0.0), made_up("ebner", 1.0, 12, 500.0)))
+    none = with_evidence(made_up("none", 1.0, 0, 0.0), 30.0, 5.0)
+    ebner = with_evidence(made_up("ebner", 3.0, 12, 500.0), 0.0, 5.0)
+    chosen = choose(comparison_of(none, ebner))
     assert chosen.name == "ebner:1-12"
-    assert "every other set predicts them worse" in chosen.reason
+    assert "predict the image points of 8 areas of the block and 5 control points best" in chosen.reason
+    behind = distances(comparison_of(none, ebner))["none"]
+    assert behind.best == "ebner:1-12"
+    assert 13 * 20.0 < behind.value < 13 * 40.0
+    assert not behind.alike
 
 
-def test_where_the_control_cannot_tell_the_residuals_do():
-    ebner, none = made_up("ebner", 1.0, 12, 100.0, seed=1), made_up("none", 9.0, 0, 0.0)
-    bluh = made_up("bluh", 1.001, 12, 50.0, seed=1)
-    wavy = bluh.control.difference + 0.05 * np.sin(np.arange(120.0)).reshape(40, 3)
-    chosen = choose(comparison_of(ebner, replace(bluh, control=replace(bluh.control, difference=wavy)), none))
-    assert chosen.name.startswith("bluh")
-    assert "best BIC" in chosen.reason
+def test_of_sets_that_cannot_be_told_apart_the_one_with_the_larger_sigma():
+    ebner = with_evidence(made_up("ebner", 1.0, 12, 0.0), 0.0, 10.0, sigma_height=0.10)
+    gruen = with_evidence(made_up("gruen", 1.0, 44, 0.0), 2.0, 10.0, sigma_height=0.15)
+    none = with_evidence(made_up("none", 1.0, 0, 0.0), 90.0, 10.0, sigma_height=0.50)
+    chosen = choose(comparison_of(ebner, gruen, none))
+    assert chosen.name == "gruen:all"
+    assert (
+        "as well as ebner:1-12, and their σ are the largest of these. none is the best of the others" in chosen.reason
+    )
 
 
-def test_few_control_points_leave_it_to_bic():
+def test_an_area_that_a_set_cannot_predict_is_left_out_for_both():
+    ebner = with_evidence(made_up("ebner", 1.0, 12, 0.0), 0.0, 1.0)
+    none = with_evidence(made_up("none", 1.0, 0, 0.0), 20.0, 1.0)
+    areas = ebner.evidence.areas.copy()
+    areas[0] = np.nan
+    gap = replace(ebner, evidence=replace(ebner.evidence, areas=areas))
+    value = distances(comparison_of(gap, none))["none"].value
+    assert value == pytest.approx(12 * 20.0, abs=20.0)
+
+
+def test_a_small_block_leaves_it_to_bic():
     chosen = choose(comparison_of(made_up("none", 1.0, 0, 9.0, points=3), made_up("ebner", 1.0, 12, 5.0, points=3)))
     assert chosen.name == "ebner:1-12"
     assert "BIC alone" in chosen.reason

@@ -76,7 +76,7 @@ def painted(rendered: Rendered, folder, change):
             pixels = photograph.read(0, photograph.rows)[0].copy()
         column, row = np.meshgrid(np.arange(pixels.shape[1]) + 0.5, np.arange(pixels.shape[0]) + 0.5)
         half_c, half_r, per_mm = rendered.photographs().sensor[k]
-        c, x0, y0 = site.photos[0, k, 12:]
+        c, x0, y0 = site.photos[0, k, 12:15]
         ray = np.stack([(column - half_c) / per_mm - x0, (half_r - row) / per_mm - y0, np.full(column.shape, -c)])
         rotation = rendered.photographs().orientation.rotation[k]
         ray = np.tensordot(rotation, ray, 1)

@@ -250,6 +250,18 @@ def photographs_of_exif():
     )  # fmt: skip
 
 
+def test_time_column():
+    """Seconds of the day on which the first photograph was taken; empty where EXIF says none."""
+    from dataclasses import replace
+
+    day = 16975 * 86400.0
+    known = replace(photographs_of_exif(), time=np.array([day + 59519.0, np.nan]))
+    assert known.time_column(np.ones(2, bool))["time"].tolist() == ["59519", ""]
+    over_midnight = replace(known, time=np.array([day + 86399.5, day + 86401.0]))
+    assert over_midnight.time_column(np.ones(2, bool))["time"].tolist() == ["86399.5", "86401"]
+    assert photographs_of_exif().time_column(np.ones(2, bool)) == {}
+
+
 @pytest.mark.parametrize(("shift", "crs"), [(0.0, "EPSG:32632"), (3e6, "local")])
 def test_control_without_crs_keeps_positions(shift, crs, tmp_path):
     """EXIF is WGS 84: control near the photographs in their UTM zone is in it; what lies elsewhere is not."""

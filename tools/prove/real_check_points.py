@@ -3,7 +3,7 @@
 cu_sbr_p1 with and without RTK: every control point left out in turn, without RTK every pair as well. ca502: every
 control point in turn. dbat_sxb: four control points, the rest are check points. Printed are the RMS of the height
 errors, of them over the σ of the noise and over the total σ, and the same in plan; 1 is right, and over six points a
-right σ gives 0.35 to 1.9 in 99.9 % of the cases. Prints Markdown.
+right σ gives 0.22 to 2.0 in 99.9 % of the cases. Prints Markdown.
 
 Example: python tools/prove/real_check_points.py ../shared/data --blocks cu_sbr_p1 > tools/results/real_check_points.md
 """

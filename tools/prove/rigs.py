@@ -21,6 +21,7 @@ from ca502 import MOUNTING_DEG, NADIR, exposures, left_out_in_turn, print_table,
 
 POSITION_M = {"A": (0, -0.05, 0.02), "D": (0, 0.05, 0.02), "W": (-0.05, 0, 0.02), "X": (0.05, 0, 0.02)}
 """Nominal projection centres of the heads in the frame of the nadir head."""
+NAMES = {"rigid": "Rigid", "weighted": "Weighted", "off": "Independent cameras"}
 SIGMA_M = 0.02
 """σ of a nominal position; the nominal angles are start values only."""
 
@@ -108,31 +109,60 @@ def print_mountings(rigid: aerotri.Adjustment, off: aerotri.Adjustment, block: a
     print()
 
 
+def print_rigidity(found: aerotri.Adjustment) -> None:
+    """What the tests say of every head."""
+    tests = found.adjusted.rigidity
+    if tests is None:
+        return
+    print("| head | what | exposures | movement σ | ± | would be found | p | largest drift over σ | p of drift |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for one in tests.heads:
+        unit, name = (np.degrees(3600.0), "″") if one.what == "rotation" else (1000.0, "mm")
+        sizes = " | ".join(f"{unit * v:.1f}" for v in (one.movement, one.movement_sigma, one.movement_detectable))
+        drift = float(np.nanmax(np.abs(one.drift / one.drift_sigma)))
+        print(f"| {one.camera} | {one.what} {name} | {one.stations} | {sizes} | {one.movement_p:.2g} | {drift:.1f} | "
+              f"{one.drift_p:.2g} |")  # fmt: skip
+    print("\n" + "\n".join(text for text in found.adjusted.outcome.warnings if " rig " in text))
+    out = tests.stations
+    print(f"\nPhotographs out of place: {int(out.found.sum())} of {len(out)}\n", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="folder of the data")
     parser.add_argument("--exposures", type=int, default=10**6, help="the first ones only")
+    parser.add_argument(
+        "--constraints", default="rigid,off", help="in this order; each starts where the one before ends"
+    )
     parser.add_argument("--leave-out", action="store_true", help="every control point in turn")
+    parser.add_argument("--orientations", type=Path, help="file of start orientations; written where it is not there")
     options = parser.parse_args()
     block = whole_stations(with_rig(exposures(unoriented(options.folder), 0, options.exposures)))
-    found = {}
-    for name in ("rigid", "off"):
-        own = block if name == "rigid" else replace(oriented_as(block, found["rigid"]), rigs=())
+    found: dict[str, aerotri.Adjustment] = {}
+    for name in options.constraints.split(","):
+        own = replace(block, rigs=tuple(replace(rig, constraint=name) for rig in block.rigs))
+        if found:
+            own = oriented_as(own, next(reversed(found.values())))
+        elif options.orientations is not None and options.orientations.exists():
+            with np.load(options.orientations) as kept:
+                own = replace(own, images=replace(own.images, centre=kept["centre"], angles=kept["angles"]))
         started = time.perf_counter()
         found[name] = aerotri.adjust(own, explain=False)
-        print(f"\n## {'Rigid' if name == 'rigid' else 'Independent cameras'}\n")
+        print(f"\n## {NAMES[name]}\n")
         print_table(found[name], time.perf_counter() - started)
-        if name == "rigid":
+        if options.orientations is not None and not options.orientations.exists():
+            images = found[name].adjusted.images
+            np.savez(options.orientations, centre=images.centre, angles=images.angles)
+        if found[name].adjusted.rigs:
             print_rig(found[name])
-    print("## Relative orientations\n")
-    print_mountings(found["rigid"], found["off"], block)
-    if options.leave_out:
-        print("## Control left out in turn\n")
-        print("| left out | | dX m | dY m | dZ m | d/σ X | d/σ Y | d/σ Z |\n|---|---|---|---|---|---|---|---|")
-        for name in ("rigid", "off"):
-            own = block if name == "rigid" else replace(block, rigs=())
+            print_rigidity(found[name])
+        if options.leave_out:
+            print("| left out | | dX m | dY m | dZ m | d/σ X | d/σ Y | d/σ Z |\n|---|---|---|---|---|---|---|---|")
             for point, left in left_out_in_turn(own, found[name]):
                 print(f"| {point} | {name} | {_row(left)}", flush=True)
+    if {"rigid", "off"} <= found.keys():
+        print("\n## Relative orientations\n")
+        print_mountings(found["rigid"], found["off"], block)
 
 
 def oriented_as(block: aerotri.Block, found: aerotri.Adjustment) -> aerotri.Block:

@@ -12,6 +12,7 @@ from aerotri.adjustment._robust_kernels import robust_factor
 from aerotri.adjustment.kernel_records import Work
 from aerotri.compiled import inlined, kernel, leaf_kernel
 from aerotri.functional_model._kernels import linearise_ray
+from aerotri.functional_model._scan_kernels import place_in_scan, scan_partials
 
 E = 6
 """Elements of exterior orientation of a ray: projection centre and rotation."""
@@ -36,6 +37,8 @@ def scratch(max_rays, max_columns, n_shared):
         np.empty((3, n_shared)),
         np.empty((2, 15)),
         np.empty(2),
+        np.empty(3),
+        np.empty((3, 3)),
     )
 
 
@@ -52,18 +55,34 @@ def linearise_point(p, rays, table, values, points, weighting, work):
     xyz, point_free = points.xyz, points.free
     by_eo, by_pt, by_sh, whitened = work.by_eo, work.by_pt, work.by_sh, work.whitened
     columns, n_columns, union, place = work.columns, work.n_columns, work.union, work.place
-    by_interior, prediction = work.by_interior, work.prediction
+    by_interior, prediction, moved, rolled = work.by_interior, work.prediction, work.moved, work.turned
+    scans = values.scans
+    rate, readout, velocity, spin, scan_columns = (
+        scans.rate, scans.readout, scans.velocity, scans.spin, scans.columns,
+    )  # fmt: skip
+    n_scans = rate.shape[0]
     rotation, centre, interior, shared = values.rotation, values.centre, values.interior, values.shared
     lens_row = rays.lens_row
     cost, n_union = 0.0, 0
     for q in range(start[p + 1] - start[p]):
         ray = start[p] + q
         i, lens = image[ray], lens_row[ray]
+        of_rotation, of_centre, per_ms, tau = rotation[i], centre[i], 0.0, 0.0
+        if n_scans:
+            per_ms = rate[i, 0] * at[ray, 0] + rate[i, 1] * at[ray, 1]
+            tau = per_ms * readout[i]
+            if tau != 0.0:
+                place_in_scan(tau, rotation[i], centre[i], velocity[i], spin[i], moved, rolled)
+                of_rotation, of_centre = rolled, moved
         linearise_ray(
-            rotation[i], centre[i], xyz[p], interior[lens], at[ray, 0], at[ray, 1],
+            of_rotation, of_centre, xyz[p], interior[lens], at[ray, 0], at[ray, 1],
             prediction, by_eo[q], by_pt[q], by_interior,
         )  # fmt: skip
         n = 0
+        if n_scans and per_ms != 0.0:
+            n = scan_partials(
+                per_ms, tau, rotation[i], velocity[i], spin[i], by_eo[q], scan_columns[i], by_sh[q], columns[q], 0,
+            )  # fmt: skip
         for t in range(15):
             if lens_columns[lens, t] >= 0:
                 columns[q, n] = lens_columns[lens, t]

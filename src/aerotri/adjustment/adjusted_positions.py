@@ -8,6 +8,7 @@ the projection centres is determined so weakly that this moved heights by five t
 alone). The adjusted position is free of it, because adjusted observations and residuals are not correlated.
 
 The positions follow the adjustment: adjusted with those of before, evaluated anew, adjusted again, until they stand.
+So do the velocities of photographs with a rolling shutter, which come from the adjusted projection centres.
 """
 
 from __future__ import annotations
@@ -41,14 +42,21 @@ def acts_by_position(system: NormalSystem) -> bool:
     u = system.unknowns
     if u.block.settings.adjustment.parameter_position == "measured":
         return False
-    return bool(u.rays.ap_index.shape[1] or (u.lens.columns[:, BROWN] >= 0).any())
+    by_position = u.rays.ap_index.shape[1] > 0 or u.scanning is not None
+    return bool(by_position or (u.lens.columns[:, BROWN] >= 0).any())
+
+
+def follows_solution(system: NormalSystem) -> bool:
+    """Whether something is evaluated anew where the adjustment ended."""
+    return acts_by_position(system) or system.unknowns.scanning is not None
 
 
 def at_adjusted_positions(system: NormalSystem, state: State, estimator: Estimator) -> NormalSystem:
-    """The system with its parameters evaluated at the adjusted image points of a state.
+    """The system with its parameters evaluated at the adjusted image points of a state, and velocities by its centres.
 
     A function of the state alone: the positions begin at the measured ones.
     """
+    system = _on_track(system, state)
     if not acts_by_position(system):
         return system
     rays = system.unknowns.rays
@@ -75,18 +83,21 @@ def minimise_at_adjusted(
     The system with the positions of the solution, and the solution.
     """
     solution = first = minimise(system, state, redundancy, options)
-    if not acts_by_position(system):
+    if not follows_solution(system):
         return system, solution
     for round_ in range(MOST_ROUNDS):
         if solution.status != "converged":
             break
         there = at_adjusted_positions(system, solution.state, solution.estimator)
-        if round_ == MOST_ROUNDS - 1 or _moved(system, there) < STANDING:
+        change = max(_moved(system, there), _moved_by_velocity(system, there, solution.state))
+        if round_ == MOST_ROUNDS - 1 or change < STANDING:
             equations = there.assemble(solution.state, 0.0, solution.estimator)
             return there, replace(solution, equations=equations)
-        again = minimise(there, solution.state, redundancy, _counting(options, solution.iterations))
+        again = minimise(there, solution.state, redundancy, options.after(solution.iterations))
         again = replace(again, iterations=solution.iterations + again.iterations)
         if again.status != "converged" and again.status != INTERRUPTED:
+            if not acts_by_position(system):
+                return there, again
             return _at_measured_positions(system), replace(first, iterations=again.iterations)
         system, solution = there, again
     return system, solution
@@ -110,20 +121,34 @@ def _evaluated_at(system: NormalSystem, at: np.ndarray) -> NormalSystem:
     return other
 
 
+def _on_track(system: NormalSystem, state: State) -> NormalSystem:
+    """The system with the velocities of its photographs taken from the projection centres of a state."""
+    u = system.unknowns
+    if u.scanning is None:
+        return system
+    scanning = u.scanning.on_track(u.block, u.images, state.centre, state.rotation)
+    other = copy(system)
+    other.unknowns = replace(u, scanning=scanning)
+    return other
+
+
+def _moved_by_velocity(system: NormalSystem, there: NormalSystem, state: State) -> float:
+    """Root mean square change of the image points by other velocities, in σ, at most."""
+    u, other = system.unknowns, there.unknowns
+    if u.scanning is None or other.scanning is None:
+        return 0.0
+    rays, scanning = u.rays, other.scanning
+    change = np.linalg.norm(scanning.velocity - u.scanning.velocity, axis=1)[rays.image]
+    since = np.sum(scanning.rate[rays.image] * rays.at, axis=1) * scanning.readout(state.shared)[rays.image]
+    point = np.repeat(np.arange(len(u.points)), np.diff(rays.start))
+    distance = np.linalg.norm(state.points[point] - state.centre[rays.image], axis=1)
+    c = u.interior(state)[rays.lens_row, 0]
+    moved = c * change * np.abs(since) / np.maximum(distance, 1e-12) * rays.inv_sigma.max(axis=1)
+    return float(np.sqrt(np.mean(moved**2))) if len(moved) else 0.0
+
+
 def _moved(system: NormalSystem, there: NormalSystem) -> float:
     """Root mean square change of the positions, in σ."""
     rays = system.unknowns.rays
     change = (there.unknowns.rays.at - rays.at) * rays.inv_sigma
     return float(np.sqrt(np.mean(change**2))) if change.size else 0.0
-
-
-def _counting(options: SolveOptions, done: int) -> SolveOptions:
-    """The options, reporting iterations after those done."""
-    report = options.report
-    if report is None:
-        return options
-
-    def counted(iteration: int, sigma0: float, damping: float) -> None:
-        report(done + iteration, sigma0, damping)
-
-    return replace(options, report=counted)

@@ -108,7 +108,7 @@ def free_motions(unknowns: Unknowns, extras: Sequence[ExtraObservations], state:
 
 
 def rig_motions(unknowns: Unknowns, state: State) -> tuple[np.ndarray, np.ndarray]:
-    """What the seven motions do to the mountings on rigid rigs, and what notices them there.
+    """What the seven motions do to the mountings on rigid rigs and to readout times, and what notices them there.
 
     A rig is turned and moved as a whole; with the scale of the block its arms grow. An arm that is held or observed
     gives the block its scale.
@@ -118,8 +118,13 @@ def rig_motions(unknowns: Unknowns, state: State) -> tuple[np.ndarray, np.ndarra
     (s, 7) motions of the shared parameters, and (r, 7) rows of arms that are held, over 1 m, or observed, over σ.
     """
     moved, rows = np.zeros((len(unknowns.shared), 7)), [np.zeros((0, 7))]
-    if unknowns.rigging is not None:
-        mountings = unknowns.rigging.mountings
+    if unknowns.scanning is not None:
+        # velocities stand still while a block is scaled: a free readout time grows with it
+        readout = unknowns.scanning.columns[:, 0]
+        free = [k for k in np.unique(readout[readout >= 0]).tolist() if np.isinf(unknowns.shared.sigma[k])]
+        moved[free, 6] = state.shared[free]
+    mountings = unknowns.mountings
+    if mountings is not None:
         columns, arm = mountings.columns[:, :3].ravel(), mountings.values(state.shared)[:, :3].ravel()
         free = columns >= 0
         moved[columns[free], 6] = arm[free]

@@ -61,13 +61,34 @@ class Table(NamedTuple):
     kept: np.ndarray
 
 
+class Scans(NamedTuple):
+    """Photographs whose rows are exposed one after the other; arrays of length 0 where there is none.
+
+    Parameters
+    ----------
+    rate : (n, 2) s per ms and mm: a ray at (x, y) is exposed rate·(x, y)·readout after the middle of the readout.
+    readout : (n,) ms. velocity : (n, 3) m/s and spin : (n, 3) rad/s, both in the camera frame.
+    columns : (n, 3) shared parameter of the readout time, and the first of three of velocity and of spin; −1 none.
+    """
+
+    rate: np.ndarray
+    readout: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    columns: np.ndarray
+
+
 class Values(NamedTuple):
-    """Where the unknowns but the points stand: rotation (n, 3, 3), centre (n, 3), interior (L, 15), shared (s,)."""
+    """Where the unknowns but the points stand: rotation (n, 3, 3), centre (n, 3), interior (L, 15), shared (s,).
+
+    scans : what photographs of rolling shutters do while they are read.
+    """
 
     rotation: np.ndarray
     centre: np.ndarray
     interior: np.ndarray
     shared: np.ndarray
+    scans: Scans
 
 
 class Points(NamedTuple):
@@ -126,6 +147,7 @@ class Work(NamedTuple):
     union, place : (s,) the shared parameters of the point, and where each stands among them.
     couple, couple_shared : (q, 3, 6) and (3, s), L⁻¹·N_pe and L⁻¹·N_ps.
     by_interior, prediction : (2, 15) and (2,) of one ray.
+    moved, turned : (3,) and (3, 3), projection centre and rotation of one ray of a rolling shutter.
     """
 
     by_eo: np.ndarray
@@ -140,6 +162,8 @@ class Work(NamedTuple):
     couple_shared: np.ndarray
     by_interior: np.ndarray
     prediction: np.ndarray
+    moved: np.ndarray
+    turned: np.ndarray
 
 
 class Sums(NamedTuple):

@@ -26,13 +26,14 @@ from aerotri.adjustment.kernel_records import (
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.position_errors import KIND
 from aerotri.adjustment.rig_reduction import RigFactor, RigReduction
+from aerotri.adjustment.rig_ties import TieRows
 from aerotri.adjustment.rigging import Chain
 from aerotri.adjustment.robust import Estimator, normalised_lengths
 from aerotri.adjustment.shared_priors import SharedPriors
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor, Symbolic
 from aerotri.adjustment.unknowns import State, Step, Unknowns
 from aerotri.functional_model.observed_unknowns import Rows
-from aerotri.observations import Settings
+from aerotri.observations import Block, Settings
 
 T = TypeVar("T")
 
@@ -48,6 +49,7 @@ class RightSide:
     point_decrement : the points' part of the Newton decrement.
     residual : (m, 2) mm, measured − predicted, in ray order; weight : (m,) robust factors.
     undetermined : row of a point that its rays do not determine, −1 if there is none.
+    of_photographs : (6·n + s,) the right side before photographs follow others on a rigid rig.
     """
 
     right: np.ndarray
@@ -56,6 +58,7 @@ class RightSide:
     residual: np.ndarray
     weight: np.ndarray
     undetermined: int
+    of_photographs: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +124,8 @@ class NormalSystem:
         """Room for one thread."""
         u = self.unknowns
         most = int((u.lens.columns >= 0).sum(axis=1).max(initial=0)) + u.rays.ap_index.shape[1] + 3
+        if u.scanning is not None:
+            most += int(((u.scanning.columns >= 0) @ [1, 3, 3]).max(initial=0))
         return _point_kernels.scratch(self._max_rays, max(most, 1), len(u.shared))
 
     def problem(self, state: State, estimator: Estimator, damping: float = 0.0) -> Problem:
@@ -131,7 +136,9 @@ class NormalSystem:
             rays=u.rays.arrays(),
             pairs=Pairs(u.pair_start, u.pair_block),
             table=Table(u.lens.columns, u.eo_free.astype(float), u.turn(state), u.kept),
-            values=Values(np.ascontiguousarray(state.rotation), state.centre, u.interior(state), state.shared),
+            values=Values(
+                np.ascontiguousarray(state.rotation), state.centre, u.interior(state), state.shared, u.scans(state)
+            ),
             points=Points(state.points, u.prior_xyz, self._point_prior, u.point_free.astype(float)),
             weighting=Weighting(estimator.code, float(estimator.limit), np.empty((m, 2)), np.empty(m)),
             damping=float(damping),
@@ -158,6 +165,10 @@ class NormalSystem:
             add_squares(observed, blocks, border, corner)
             add_own_squares(observed, squares, squares_shared)
         self.priors.add_to(corner, squares_shared)
+        ties = self.tie_rows(state)
+        if ties is not None and u.ties is not None:
+            u.ties.add_to(ties, blocks, border, corner)
+            u.ties.add_squares(ties, squares, squares_shared)
         held_image, held_column = np.nonzero(~u.eo_free)
         blocks[held_image, held_column, held_column] = squares[held_image, held_column] = 1.0
         diagonal = np.arange(6)
@@ -195,6 +206,10 @@ class NormalSystem:
             add_gaps(observed, right, right_shared)
         cost = sum(o[0] for o in outcomes) + sum(float(np.sum(observed.gap**2)) for observed in rows)
         together, alone = self.priors.add_gaps_to(right_shared, state.shared)
+        ties = self.tie_rows(state)
+        if ties is not None and self.unknowns.ties is not None:
+            self.unknowns.ties.add_gaps(ties, right, right_shared)
+            cost += float(np.sum(ties.deviation**2))
         whole, chain = np.concatenate([right.ravel(), right_shared]), self.unknowns.chain(state)
         return RightSide(
             right=whole if self._reduction is None or chain is None else self._reduction.on_leads(whole, chain),
@@ -203,6 +218,7 @@ class NormalSystem:
             residual=problem.weighting.residual,
             weight=problem.weighting.weight,
             undetermined=max(o[2] for o in outcomes),
+            of_photographs=whole,
         )
 
     def whitened_rows(self, state: State) -> list[Rows]:
@@ -226,6 +242,20 @@ class NormalSystem:
             )
         return out
 
+    def tie_rows(self, state: State) -> TieRows | None:
+        """The deviations of photographs on weighted rigs, linearised at `state` and divided by σ."""
+        u = self.unknowns
+        if u.ties is None:
+            return None
+        return u.ties.whitened(u.ties.rows(state.centre, state.rotation, state.shared, u.turn(state), u.eo_free))
+
+    def with_movements(self, sigma: np.ndarray, block: Block) -> NormalSystem:
+        """The same system with other σ (k, 2) of the movements on weighted rigs, which `block` states."""
+        other = copy(self)
+        ties = None if self.unknowns.ties is None else self.unknowns.ties.with_sigma(sigma)
+        other.unknowns = replace(self.unknowns, ties=ties, block=block)
+        return other
+
     def products_beside(self, state: State, images: np.ndarray, shared: np.ndarray) -> np.ndarray:
         """VᵀAᵀA·V (k, k) of directions over all observations but image points, and over what is held.
 
@@ -242,6 +272,10 @@ class NormalSystem:
             for c in range(rows.columns.shape[1]):
                 there = rows.columns[:, c] >= 0
                 value[there] += rows.by_shared[there, :, c, None] * shared[rows.columns[there, c]][:, None, :]
+            total += np.einsum("gka,gkb->ab", value, value)
+        ties = self.tie_rows(state)
+        if ties is not None and self.unknowns.ties is not None:
+            value = self.unknowns.ties.along(ties, images, shared)
             total += np.einsum("gka,gkb->ab", value, value)
         return total
 
@@ -337,6 +371,9 @@ class NormalSystem:
         if u.rigging is not None:
             # what follows is held by its station
             empty[u.rigging.followers] = False
+        if u.ties is not None:
+            # what is tied has the others of its station
+            empty[np.union1d(u.ties.image, u.ties.lead)] = False
         inv_sigma = np.where(rays_off[:, None], 0.0, u.rays.inv_sigma)
         weight = np.where(control_off[:, None], 0.0, u.prior_weight)
         rays, eo_free = replace(u.rays, inv_sigma=inv_sigma), u.eo_free & ~empty[:, None]
@@ -364,13 +401,14 @@ class NormalSystem:
 
     def solve_sides(
         self, state: State, factor: Factor, sides: np.ndarray, estimator: Estimator,
-        shared_sides: np.ndarray | None = None,
+        shared_sides: np.ndarray | None = None, rows: np.ndarray | None = None,
     ):  # fmt: skip
         """Columns Q·b for right sides b that act on the points, and on the shared parameters where given.
 
         Parameters
         ----------
         sides : (P, 3, k). shared_sides : (s, k).
+        rows : the points that have sides or whose solution is wanted, where these are few; all unless given.
 
         Returns
         -------
@@ -385,7 +423,11 @@ class NormalSystem:
         def reduce(c: int):
             _covariance_kernels.reduce_point_sides(*self._bounds[c], problem, free, *rights[c], self.work())
 
-        self.over_chunks(reduce)
+        if rows is None:
+            self.over_chunks(reduce)
+        else:
+            for p in rows.tolist():
+                _covariance_kernels.reduce_point_sides(p, p + 1, problem, free, *rights[0], self.work())
         right = np.concatenate(
             [np.sum([r[0] for r in rights], axis=0).reshape(6 * n, k), np.sum([r[1] for r in rights], axis=0)]
         )
@@ -394,22 +436,32 @@ class NormalSystem:
             right[6 * n :] += shared_sides
         x = factor.solve(right)
         images, shared = np.ascontiguousarray(x[: 6 * n].reshape(n, 6, k)), np.ascontiguousarray(x[6 * n :])
-        return images, shared, self.expand_sides(state, images, shared, sides, estimator)
+        return images, shared, self.expand_sides(state, images, shared, sides, estimator, rows)
 
     def expand_sides(
-        self, state: State, images: np.ndarray, shared: np.ndarray, sides: np.ndarray, estimator: Estimator
-    ) -> np.ndarray:
-        """Solutions of the points (P, 3, k) from those of photographs (n, 6, k) and shared parameters (s, k)."""
+        self, state: State, images: np.ndarray, shared: np.ndarray, sides: np.ndarray, estimator: Estimator,
+        rows: np.ndarray | None = None,
+    ) -> np.ndarray:  # fmt: skip
+        """Solutions of the points (P, 3, k) from those of photographs (n, 6, k) and shared parameters (s, k).
+
+        Parameters
+        ----------
+        rows : of the points that are wanted, where these are few; the others are 0.
+        """
         u = self.unknowns
-        points = np.empty((len(u.points), 3, sides.shape[2]))
+        points = np.zeros((len(u.points), 3, sides.shape[2]))
         free = np.ascontiguousarray(sides * u.point_free[:, :, None])
-        solution = Directions(images, shared, points)
-        self.over_points(
-            self.problem(state, estimator),
-            lambda first, last, problem, work: _covariance_kernels.expand_point_sides(
-                first, last, problem, free, solution, work
-            ),
-        )
+        solution, problem = Directions(images, shared, points), self.problem(state, estimator)
+        if rows is None:
+            self.over_points(
+                problem,
+                lambda first, last, problem, work: _covariance_kernels.expand_point_sides(
+                    first, last, problem, free, solution, work
+                ),
+            )
+        else:
+            for p in rows.tolist():
+                _covariance_kernels.expand_point_sides(p, p + 1, problem, free, solution, self.work())
         points *= u.point_free[:, :, None]
         points[u.kept_rows] = shared[u.kept_columns]
         return points

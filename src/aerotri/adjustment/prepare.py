@@ -10,6 +10,7 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.ray_status import ray_status
 from aerotri.adjustment.rig_start import rig_start_values
 from aerotri.adjustment.robust import STAGES
+from aerotri.adjustment.scanning import motions_in_words
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import (
     ORIENTATION_ELEMENTS,
@@ -63,7 +64,9 @@ def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
     measured = _freed_of_the_air(block, start)
     system, state = build_system(measured, start, status)
     lonely = partnerless_in_words(block) if block.settings.adjustment.datum == "control" else ()
-    return Prepared(system, state, status, (*warnings, *lonely, *_held_in_words(system.unknowns)))
+    u = system.unknowns
+    of_motion = motions_in_words(u.block, u.images, u.scanning)
+    return Prepared(system, state, status, (*warnings, *lonely, *_held_in_words(u), *of_motion))
 
 
 def _held_in_words(unknowns: Unknowns) -> tuple[str, ...]:

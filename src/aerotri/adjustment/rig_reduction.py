@@ -112,6 +112,10 @@ class RigFactor(Factor):
         """C·(CᵀNC)⁻¹·Cᵀ·rhs, (6·n + s,) or (6·n + s, k)."""
         return self._reduction.expanded(self._factor.solve(self._reduction.reduced_side(rhs, self._chain)), self._chain)
 
+    def half_solve(self, rhs: np.ndarray) -> np.ndarray:
+        """H with HᵀH = rhsᵀ·C·(CᵀNC)⁻¹·Cᵀ·rhs."""
+        return self._factor.half_solve(self._reduction.reduced_side(rhs, self._chain))
+
     def border_normals(self) -> np.ndarray:
         """(s, s) the normal matrix of the shared parameters with the stations eliminated."""
         return self._factor.border_normals()

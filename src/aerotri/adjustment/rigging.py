@@ -161,10 +161,35 @@ def _oriented_places(block: Block, centre: np.ndarray) -> StationPlaces:
     return StationPlaces(np.where(there, places.lead, own), np.where(there, places.mounting, -1), places.mountings)
 
 
-def rigging_of(
+@dataclass(frozen=True, eq=False)
+class OnRigs:
+    """The photographs on rigs, n of them, as `Rigging` has them; `rigid` says of which mountings (k,) they follow."""
+
+    lead: np.ndarray
+    mounting: np.ndarray
+    mountings: Mountings
+    rigid: np.ndarray
+    movement: np.ndarray
+
+    @property
+    def tied(self) -> np.ndarray:
+        """Rows of the photographs on weighted rigs beside the reference photographs."""
+        return np.flatnonzero((self.mounting >= 0) & ~self.rigid[self.mounting])
+
+    @property
+    def rigging(self) -> Rigging | None:
+        """The rigid part; None where nothing follows."""
+        follows = (self.mounting >= 0) & self.rigid[self.mounting]
+        if not follows.any():
+            return None
+        own = np.arange(len(self.lead))
+        return Rigging(np.where(follows, self.lead, own), np.where(follows, self.mounting, -1), self.mountings)
+
+
+def photographs_on_rigs(
     block: Block, images: np.ndarray, shared: SharedList, centre: np.ndarray, rotation: np.ndarray
-) -> Rigging | None:
-    """The rigid rigs of a block, their mountings appended to `shared`; None where there are none.
+) -> OnRigs | None:
+    """The rigs of a block, their mountings appended to `shared`; None where there are none.
 
     Parameters
     ----------
@@ -182,7 +207,13 @@ def rigging_of(
     number[used] = np.arange(len(used))
     mounting = np.where(mounting >= 0, number[mounting], -1)
     relative = relative_rotations(lead, mounting, rotation[images], len(used))
-    return Rigging(lead, mounting, list_mountings(block, places, used, shared, relative))
+    mountings = list_mountings(block, places, used, shared, relative)
+    on = [places.mountings[k] for k in used.tolist()]
+    moves = [(rig.cameras[camera].movement_m, rig.cameras[camera].movement_rad) for rig, camera in on]
+    return OnRigs(
+        lead, mounting, mountings, np.array([rig.constraint == "rigid" for rig, _ in on]),
+        np.array([[0.0 if m is None else m, 0.0 if r is None else r] for m, r in moves]),
+    )  # fmt: skip
 
 
 def relative_rotations(lead: np.ndarray, mounting: np.ndarray, rotation: np.ndarray, count: int) -> list[np.ndarray]:

@@ -58,6 +58,17 @@ class SolveOptions:
     inspect: Inspect | None = None
     step_tolerance: float = ROBUST_STEP_TOLERANCE
 
+    def after(self, done: int) -> SolveOptions:
+        """The same, with the iterations reported counted on from those done."""
+        report = self.report
+        if report is None:
+            return self
+
+        def counted(iteration: int, sigma0: float, damping: float) -> None:
+            report(done + iteration, sigma0, damping)
+
+        return replace(self, report=counted)
+
 
 @dataclass(frozen=True, eq=False)
 class Solution:

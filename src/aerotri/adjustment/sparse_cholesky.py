@@ -315,9 +315,13 @@ class Factor:
         with blas_threads(self._symbolic.factor_entries * (rhs.size / len(rhs))):
             return self._solve(rhs)
 
-    def _solve(self, rhs: np.ndarray) -> np.ndarray:
+    def half_solve(self, rhs: np.ndarray) -> np.ndarray:
+        """(size, k) H with HᵀH = rhsᵀ·N⁻¹·rhs of the matrix N, rows in no order: half the work of a solution."""
+        with blas_threads(self._symbolic.factor_entries * (rhs.size / len(rhs)) / 2):
+            return self._half(rhs, self._permutation())
+
+    def _half(self, rhs: np.ndarray, permutation: np.ndarray) -> np.ndarray:
         s = self._symbolic
-        permutation = self._permutation()
         flat = rhs.reshape(len(permutation), -1)
         x = np.asfortranarray(flat[permutation] * self._scale[:, None])
         corner = slice(B * s.n, None)
@@ -331,6 +335,13 @@ class Factor:
                 x[front.scalar_rows] -= low @ x[own]
         if s.n_border:
             x[corner] = dtrsm(1.0, s.corner_factor, x[corner], lower=1)
+        return x
+
+    def _solve(self, rhs: np.ndarray) -> np.ndarray:
+        s = self._symbolic
+        permutation = self._permutation()
+        x, corner = self._half(rhs, permutation), slice(B * s.n, None)
+        if s.n_border:
             x[corner] = dtrsm(1.0, s.corner_factor, x[corner], lower=1, trans_a=1)
         for k in range(len(s.fronts) - 1, -1, -1):
             front = s.fronts[k]

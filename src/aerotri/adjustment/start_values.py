@@ -237,6 +237,8 @@ def refine(
         settings = replace(block.settings.adjustment, additional_parameters=(), datum=datum, datum_points=())
         bare = replace(
             block,
+            # what a rolling shutter does to start values does not matter, and its motion is not known yet
+            cameras=tuple(replace(camera, rolling_shutter=None) for camera in block.cameras),
             gnss_ins=centres,
             control=block.control if centres is None else Control.empty(),
             settings=replace(block.settings, adjustment=settings, gnss=GnssSettings(shift="off")),

@@ -11,8 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment import _pair_kernels
-from aerotri.adjustment.kernel_records import RayArrays
-from aerotri.adjustment.rigging import Chain, Rigging, rigging_of, with_leads
+from aerotri.adjustment.kernel_records import RayArrays, Scans
+from aerotri.adjustment.rig_ties import Ties
+from aerotri.adjustment.rigging import Chain, Mountings, OnRigs, Rigging, photographs_on_rigs, with_leads
+from aerotri.adjustment.scanning import NONE, Scanning, scanning_of
 from aerotri.adjustment.shared_parameters import LensTable, LinearParameters, SharedList, lens_table, linear_parameters
 from aerotri.conventions import InputError
 from aerotri.functional_model.rotation import (
@@ -111,6 +113,8 @@ class Unknowns:
     motions : what is free in a free block.
     pair_start, pair_block, block_row, block_col : pattern of the reduced normal matrix.
     rigging : which photographs follow others on a rigid rig; None where none does.
+    scanning : the rolling shutters; None where there is none.
+    ties : which photographs are tied to others on a weighted rig; None where none is.
     """
 
     block: Block
@@ -134,6 +138,15 @@ class Unknowns:
     block_row: np.ndarray
     block_col: np.ndarray
     rigging: Rigging | None = None
+    scanning: Scanning | None = None
+    ties: Ties | None = None
+
+    @property
+    def mountings(self) -> Mountings | None:
+        """The cameras on rigs; None where there are none."""
+        if self.rigging is not None:
+            return self.rigging.mountings
+        return None if self.ties is None else self.ties.mountings
 
     @property
     def count(self) -> int:
@@ -153,6 +166,10 @@ class Unknowns:
         free = self.lens.columns >= 0
         table[free] = state.shared[self.lens.columns[free]]
         return table
+
+    def scans(self, state: State) -> Scans:
+        """What photographs of rolling shutters do while they are read, as kernels take it."""
+        return NONE if self.scanning is None else self.scanning.arrays(state.shared)
 
     def turn(self, state: State) -> np.ndarray:
         """(n, 3, 3) δ = turn·q for the three rotation unknowns q: the identity, or ω, φ, κ where angles are held."""
@@ -257,8 +274,12 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
     at = xy if start.at is None else np.ascontiguousarray(start.at[source])
     linear = linear_parameters(block, images, ray_image, shared)
     columns = linear.columns(at)
-    rigging = rigging_of(block, images, shared, start.centre, start.rotation)
-    pair_start, pair_block, block_row, block_col = _pattern(len(images), row_start, ray_image)
+    on_rigs = photographs_on_rigs(block, images, shared, start.centre, start.rotation)
+    tied = np.zeros((0, 2), dtype=np.int64)
+    if on_rigs is not None:
+        tied = np.stack([on_rigs.lead[on_rigs.tied], on_rigs.tied], axis=1)
+    scanning = scanning_of(block, images, shared, start.centre[images], start.rotation[images])
+    pair_start, pair_block, block_row, block_col, tie_block = _pattern(len(images), row_start, ray_image, tied)
     prior_xyz, prior_weight, held = _control_priors(block, points, start.origin)
     unknowns = Unknowns(
         block=block,
@@ -291,7 +312,9 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
         pair_block=pair_block,
         block_row=block_row,
         block_col=block_col,
-        rigging=rigging,
+        rigging=None if on_rigs is None else on_rigs.rigging,
+        ties=None if on_rigs is None or not len(tied) else _ties(on_rigs, tie_block),
+        scanning=scanning,
     )
     xyz = np.where(held, prior_xyz, start.points[points])
     state = State(start.centre[images].copy(), start.rotation[images].copy(), xyz, np.array(shared.start))
@@ -315,16 +338,27 @@ def _sort_rays(block: Block, active: np.ndarray, centre: np.ndarray):
     return rows[order], images, points[order_of_points], ray_image[order].astype(np.int64), row_start
 
 
-def _pattern(n: int, row_start: np.ndarray, ray_image: np.ndarray):
-    """Pairs of photographs that share a point, as blocks of the reduced matrix: diagonal first, then row < column."""
+def _ties(on_rigs: OnRigs, block: np.ndarray) -> Ties:
+    """The photographs on weighted rigs, with the σ of their movements; those to be estimated begin without."""
+    rows = on_rigs.tied
+    return Ties(rows, on_rigs.lead[rows], block, on_rigs.mounting[rows], on_rigs.mountings, on_rigs.movement)
+
+
+def _pattern(n: int, row_start: np.ndarray, ray_image: np.ndarray, tied: np.ndarray):
+    """Pairs of photographs that share a point, as blocks of the reduced matrix: diagonal first, then row < column.
+
+    Pairs that are tied (t, 2) have a block of their own; its place comes last.
+    """
     counts = np.diff(row_start)
     pair_start = np.concatenate([[0], np.cumsum(counts * (counts - 1) // 2)]).astype(np.int64)
     codes = np.empty(pair_start[-1], dtype=np.int64)
     _pair_kernels.enumerate_pairs(row_start, ray_image, n, codes)
-    unique, pair_block = np.unique(codes, return_inverse=True)
+    codes = np.concatenate([codes, tied.min(axis=1, initial=n) * n + tied.max(axis=1, initial=0)])
+    unique, place = np.unique(codes, return_inverse=True)
+    pair_block, tie_block = place[: pair_start[-1]], place[pair_start[-1] :]
     block_row = np.concatenate([np.arange(n), unique // n])
     block_col = np.concatenate([np.arange(n), unique % n])
-    return pair_start, (pair_block + n).astype(np.int64), block_row, block_col
+    return pair_start, (pair_block + n).astype(np.int64), block_row, block_col, (tie_block + n).astype(np.int64)
 
 
 def _control_priors(block: Block, points: np.ndarray, origin: np.ndarray):

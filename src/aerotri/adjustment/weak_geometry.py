@@ -145,13 +145,10 @@ def _tied(
     """
     round_ = 0
     settled: tuple[Prepared, Solution] | None = None
-    report = options.report
     while True:
         freedom = redundancy(prepared.system)
         look = _Look(freedom, whole)
-        counted = replace(options, inspect=look if round_ < MOST_ROUNDS else None)
-        if report is not None:
-            counted = replace(counted, report=_counting(report, done))
+        counted = replace(options.after(done), inspect=look if round_ < MOST_ROUNDS else None)
         system, solution = minimise_at_adjusted(prepared.system, state, freedom, counted)
         prepared = replace(prepared, system=system)
         done += solution.iterations
@@ -168,10 +165,6 @@ def _tied(
             settled = prepared, replace(solution, iterations=done)
         prepared, state = set_aside(prepared, solution.state, look.photographs, look.points)
         round_ += 1
-
-
-def _counting(report: Callable[[int, float, float], None], done: int) -> Callable[[int, float, float], None]:
-    return lambda iteration, sigma0, damping: report(done + iteration, sigma0, damping)
 
 
 def _scale(system: NormalSystem, equations: NormalEquations, estimator: Estimator, redundancy: int) -> float:

@@ -27,12 +27,18 @@ def crosscheck(
     Raises
     ------
     InputError
-        For a block with rigid rigs, which the peers do not know.
+        For a block with rigid rigs or a rolling shutter, which the peers do not know.
     """
     if adjusted.rigs:
         raise InputError(
             "the cross-check knows no rigid rigs",
             f'cross-check an adjustment with rig.{adjusted.rigs[0].rig}.constraint = "off"',
+        )
+    if adjusted.rolling_shutters is not None:
+        camera = adjusted.rolling_shutters.readouts[0].camera
+        raise InputError(
+            "the cross-check knows no rolling shutter",
+            f"cross-check an adjustment without [camera.{camera}.rolling_shutter]",
         )
     tell: Callable[[str], None] = report or (lambda text: None)
     tell("adjusting through pycolmap")

@@ -29,7 +29,7 @@ LAST_STEP_M = 5e-3
 class Models(NamedTuple):
     """M stereo models.
 
-    photos : (M, 4, 15) used left, used right, true left, true right, as in `_photo_kernels`.
+    photos : (M, 4, 23) used left, used right, true left, true right, as in `_photo_kernels`.
     source : (M, 2) image errors of left and right. errors : of all groups of photographs.
     """
 

@@ -71,7 +71,7 @@ class DemModels:
     table_accuracy_m: float
 
     def photos(self, x: float, y: float, chosen: np.ndarray | None = None) -> np.ndarray:
-        """(M, 4, 15) photographs of models for coordinates X − x, Y − y, Z of the DEM.
+        """(M, 4, 23) photographs of models for coordinates X − x, Y − y, Z of the DEM.
 
         Around a place the CRS is an affine image of the frame, exact enough for the deformation over some kilometres:
         it changes by millimetres where the place is wrong by metres.

@@ -22,11 +22,13 @@ class Orientation:
     centre : (n, 3) m, in the local frame of the block.
     rotation : (n, 3, 3) camera → object.
     interior : (n, 3) mm, c, x0, y0.
+    scan : (n, 8) of rolling shutters, as the last of `_photo_kernels`; None without.
     """
 
     centre: np.ndarray
     rotation: np.ndarray
     interior: np.ndarray
+    scan: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.centre)
@@ -38,7 +40,8 @@ class Orientation:
 
     def take(self, rows: np.ndarray | list[int]) -> Orientation:
         """The orientation of some photographs."""
-        return Orientation(self.centre[rows], self.rotation[rows], self.interior[rows])
+        scan = None if self.scan is None else self.scan[rows]
+        return Orientation(self.centre[rows], self.rotation[rows], self.interior[rows], scan)
 
 
 def calibrated_orientation(calibration: Adjustment) -> Orientation:
@@ -46,6 +49,17 @@ def calibrated_orientation(calibration: Adjustment) -> Orientation:
     adjusted = calibration.local
     rotation = rotation_from_angles(adjusted.images.angles, adjusted.block.rotation)
     return Orientation(adjusted.images.centre, rotation, interior_of_images(adjusted))
+
+
+def scan_of_images(calibration: Adjustment) -> np.ndarray | None:
+    """(n, 8) what rolling shutters do, of every photograph of the block after its adjustment; None without."""
+    u, shared = calibration.system.unknowns, calibration.solution.state.shared
+    if u.scanning is None:
+        return None
+    found = np.zeros((len(calibration.local.block.images), 8))
+    velocity, spin = u.scanning.motion(shared)
+    found[u.images] = np.concatenate([velocity, spin, u.scanning.rate * u.scanning.readout(shared)[:, None]], axis=1)
+    return found
 
 
 def interior_of_images(adjusted: AdjustedBlock) -> np.ndarray:
@@ -90,10 +104,11 @@ def orientation_of_result(calibration: Adjustment, other: Adjustment) -> Orienta
 
 
 def photo_rows(orientation: Orientation, local: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """(n, 15) photographs as kernels take them, for coordinates Δ of which local + axes·Δ is the place in the frame."""
+    """(n, 23) photographs as kernels take them, for coordinates Δ of which local + axes·Δ is the place in the frame."""
     to_camera = np.swapaxes(orientation.rotation, 1, 2)
     u = np.concatenate([to_camera @ axes, to_camera @ (local - orientation.centre)[:, :, None]], axis=2)
-    return np.concatenate([u.reshape(-1, 12), orientation.interior], axis=1)
+    scan = np.zeros((len(u), 8)) if orientation.scan is None else orientation.scan
+    return np.concatenate([u.reshape(-1, 12), orientation.interior, scan], axis=1)
 
 
 def row_of_image(block: Block, name: str) -> int:

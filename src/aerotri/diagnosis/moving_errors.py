@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aerotri.diagnosis.finding import Finding, times
 from aerotri.results.adjusted_block import AdjustedBlock
-from aerotri.results.model_part import ModelPart
+from aerotri.results.model_part import FIELD, ModelPart
 
 WORTH_SAYING = 1.1
 """σ total over σ from which the model part is told [C]: below, it changes no decision."""
@@ -17,8 +17,22 @@ def model_part_in_words(part: ModelPart) -> str:
     plan, height = (f"{ratio:.1f} times" for ratio in (part.ratio_plan, part.ratio_height))
     return (
         f"the errors of the photographs change {part.change}, more than noise explains: from the "
-        f"noise alone heights would look {height} and positions {plan} too sure. The total σ (tX, tY, tZ) contain this"
+        f"noise alone heights would look {height} and positions {plan} too sure. The total σ (tX, tY, tZ) contain "
+        f"this{_by_field(part)}"
     )
+
+
+def _by_field(part: ModelPart) -> str:
+    """How it was found where the groups are too few."""
+    if part.method != FIELD:
+        return ""
+    size = next(test for test in part.tests if test.scheme == part.scheme).field_um
+    shown = f"The total σ are therefore computed from the residuals, which show image errors of about {size:.2g} µm"
+    if part.clusters == 1:
+        return f". One strip cannot be compared with others. {shown}"
+    group = "strip" if part.scheme == "strip" else "group"
+    of = "" if group == part.scheme else f" ({part.scheme})"
+    return f". {part.clusters} {group}s{of} are too few for a comparison. {shown} in every {group}"
 
 
 def of_model_part(adjusted: AdjustedBlock) -> list[Finding]:

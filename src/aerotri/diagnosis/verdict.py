@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from aerotri.diagnosis import check_points, fit, geometry, left_out, moving_errors, parameters, position_errors
+from aerotri.diagnosis import (
+    check_points,
+    fit,
+    geometry,
+    left_out,
+    moving_errors,
+    parameters,
+    position_errors,
+    rigidity,
+)
 from aerotri.diagnosis.finding import GRADES, Finding, Grade
 from aerotri.results.adjusted_block import AdjustedBlock
 
@@ -19,6 +28,7 @@ RULES: tuple[Rule, ...] = (
     check_points.of_means,
     moving_errors.of_model_part,
     position_errors.of_positions,
+    rigidity.of_rigs,
     left_out.of_photographs,
     left_out.of_points,
     left_out.of_loose_points,

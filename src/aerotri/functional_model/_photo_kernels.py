@@ -1,6 +1,8 @@
 """Photographs as kernels take them: projection with its partials, and image errors from tables over tiles.
 
-photos : (M, 4, 15) or (1, n, 15); the last index is U (3, 4) row by row with u = U·(x, y, z, 1), then c, x0, y0 in mm
+photos : (M, 4, 23) or (1, n, 23); the last index is U (3, 4) row by row with u = U·(x, y, z, 1), then c, x0, y0 in mm;
+then of a rolling shutter velocity (3) m/s, rates of rotation (3) rad/s and s per mm along x and y (2): a ray at (x, y)
+is exposed τ = s·(x, y) after the middle of the readout, and u is (I − [ω]×·τ)·(u − v·τ); zeros without
 """
 
 from __future__ import annotations
@@ -59,11 +61,28 @@ def image_error(s, x, y, table):
 
 
 @kernel
+def in_scan(photos, m, k, u1, u2, u3):
+    """u of a point when its row is exposed; the row is that of the ideal position, found in two steps [C]: they leave
+    less than a thousandth of a pixel of some ten."""
+    v1, v2, v3 = u1, u2, u3
+    for _ in range(2):
+        scale = -photos[m, k, 12] / v3
+        x, y = photos[m, k, 13] + scale * v1, photos[m, k, 14] + scale * v2
+        tau = photos[m, k, 21] * x + photos[m, k, 22] * y
+        p1, p2, p3 = u1 - photos[m, k, 15] * tau, u2 - photos[m, k, 16] * tau, u3 - photos[m, k, 17] * tau
+        t1, t2, t3 = photos[m, k, 18] * tau, photos[m, k, 19] * tau, photos[m, k, 20] * tau
+        v1, v2, v3 = p1 - t2 * p3 + t3 * p2, p2 - t3 * p1 + t1 * p3, p3 - t1 * p2 + t2 * p1
+    return v1, v2, v3
+
+
+@kernel
 def project(photos, m, k, x, y, z):
     """(x, y) mm in photograph k of model m, and u3, which is negative in front of the camera."""
     u1 = photos[m, k, 0] * x + photos[m, k, 1] * y + photos[m, k, 2] * z + photos[m, k, 3]
     u2 = photos[m, k, 4] * x + photos[m, k, 5] * y + photos[m, k, 6] * z + photos[m, k, 7]
     u3 = photos[m, k, 8] * x + photos[m, k, 9] * y + photos[m, k, 10] * z + photos[m, k, 11]
+    if photos[m, k, 21] != 0.0 or photos[m, k, 22] != 0.0:
+        u1, u2, u3 = in_scan(photos, m, k, u1, u2, u3)
     scale = -photos[m, k, 12] / u3
     return photos[m, k, 13] + scale * u1, photos[m, k, 14] + scale * u2, u3
 
@@ -73,7 +92,10 @@ def partials(photos, m, k, x, y, z):
     """Partials of x, then of y, in photograph k of model m by the point."""
     u1 = photos[m, k, 0] * x + photos[m, k, 1] * y + photos[m, k, 2] * z + photos[m, k, 3]
     u2 = photos[m, k, 4] * x + photos[m, k, 5] * y + photos[m, k, 6] * z + photos[m, k, 7]
-    inverse = -1.0 / (photos[m, k, 8] * x + photos[m, k, 9] * y + photos[m, k, 10] * z + photos[m, k, 11])
+    u3 = photos[m, k, 8] * x + photos[m, k, 9] * y + photos[m, k, 10] * z + photos[m, k, 11]
+    if photos[m, k, 21] != 0.0 or photos[m, k, 22] != 0.0:
+        u1, u2, u3 = in_scan(photos, m, k, u1, u2, u3)
+    inverse = -1.0 / u3
     a, b, f = u1 * inverse, u2 * inverse, photos[m, k, 12] * inverse
     v0, v1, v2 = photos[m, k, 8], photos[m, k, 9], photos[m, k, 10]
     return (

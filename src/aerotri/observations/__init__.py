@@ -29,6 +29,7 @@ from aerotri.observations.block import (
 )
 from aerotri.observations.prior import Prior
 from aerotri.observations.rigs import Mounting, Rig
+from aerotri.observations.rolling_shutter import RollingShutter
 
 __all__ = [
     "AdjustmentSettings",
@@ -46,5 +47,6 @@ __all__ = [
     "Mounting",
     "Prior",
     "Rig",
+    "RollingShutter",
     "Settings",
 ]

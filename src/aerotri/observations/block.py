@@ -15,6 +15,7 @@ import numpy as np
 
 from aerotri.observations.prior import Prior
 from aerotri.observations.rigs import Rig
+from aerotri.observations.rolling_shutter import RollingShutter
 
 INTERIOR_ELEMENTS = ("focal_length_mm", "x0_mm", "y0_mm")
 BROWN_NAMES = ("K1", "K2", "K3", "P1", "P2", "b1", "b2")
@@ -40,6 +41,7 @@ class Camera:
     flight_axis : image axis along the flight ('+x', '-x', '+y', '-y') or None when not stated.
     fiducials : calibrated positions (x, y) in mm of the fiducial marks of a film camera, by name.
     interior_orientation : one of `INTERIOR_ORIENTATIONS`, how scans of a film camera are brought to the marks.
+    rolling_shutter : None where all rows are exposed at once.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Camera:
     flight_axis: str | None = None
     fiducials: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     interior_orientation: str | None = None
+    rolling_shutter: RollingShutter | None = None
 
     @property
     def pixel_mm(self) -> float:

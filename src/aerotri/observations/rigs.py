@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 STATION = "station"
 """The column of images.csv that says which photographs belong to one exposure."""
-CONSTRAINTS = ("rigid", "off")
+CONSTRAINTS = ("rigid", "weighted", "off")
 FREE = (Prior(), Prior(), Prior())
 
 
@@ -31,11 +31,14 @@ class Mounting:
     ----------
     position : m, the projection centre. rotation : rad, ω, φ, κ of R in the block's order of rotations.
     known : whether a rotation was stated; where it was not, it follows from the photographs' own orientations.
+    movement_m, movement_rad : σ of its movements between exposures on a weighted rig; None: to be estimated.
     """
 
     position: tuple[Prior, Prior, Prior] = FREE
     rotation: tuple[Prior, Prior, Prior] = FREE
     known: bool = True
+    movement_m: float | None = 0.0
+    movement_rad: float | None = None
 
     @property
     def elements(self) -> tuple[Prior, ...]:
@@ -51,7 +54,8 @@ class Rig:
     ----------
     reference : the camera whose orientation is that of the rig.
     cameras : the mounting of every other camera.
-    constraint : of `CONSTRAINTS`. rigid: one mounting for all stations. off: the cameras are independent.
+    constraint : of `CONSTRAINTS`. rigid: one mounting for all stations. weighted: every photograph may deviate from it.
+        off: the cameras are independent.
     """
 
     name: str
@@ -80,10 +84,10 @@ class StationPlaces:
 
 
 def station_places(block: Block) -> StationPlaces:
-    """Where the photographs of the rigid rigs belong."""
+    """Where the photographs of rigid and weighted rigs belong."""
     n = len(block.images)
     lead, mounting, found = np.arange(n), np.full(n, -1), []
-    rigs = [rig for rig in block.rigs if rig.constraint == "rigid"]
+    rigs = [rig for rig in block.rigs if rig.constraint != "off"]
     if rigs and STATION in block.images.columns:
         station = np.asarray(block.images.columns[STATION], dtype=object)
         names = [camera.name for camera in block.cameras]

@@ -12,16 +12,18 @@ from aerotri.adjustment.track import with_named_strips
 from aerotri.conventions import FilePath
 from aerotri.functional_model.additional_parameters import AUTO
 from aerotri.observations import Block
-from aerotri.pipeline.choosing import compare_parameters, with_choice, with_reason
+from aerotri.pipeline.choosing import choose_parameters, with_reason
 from aerotri.pipeline.components import with_variance_components
 from aerotri.pipeline.in_frame import adjust_in_frame
 from aerotri.pipeline.local import Report
 from aerotri.pipeline.model_part import with_model_part
+from aerotri.pipeline.shutter_test import with_shutter_test
 from aerotri.pipeline.verdict import causes, judged, with_outcome
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.failure import AdjustmentFailedError
-from aerotri.strategies.parameter_choice import candidate_sets
+from aerotri.strategies.parameter_comparison import Progress
+from aerotri.strategies.shutter_test import asks_for_test
 
 
 def adjust(block: Block, report: Report | None = None, given_points: np.ndarray | None = None) -> AdjustedBlock:
@@ -51,22 +53,28 @@ def adjust_keeping_system(
     report: Report | None = None,
     given_points: np.ndarray | None = None,
     geoid: FilePath | None = None,
+    tested: bool = True,
+    sets: Progress | None = None,
 ) -> Adjustment:
     """As `adjust`, with the equations and the solution beside the result.
 
     Parameters
     ----------
     geoid : grid of geoid undulations for a block whose CRS has none of its own.
+    tested : whether a rolling shutter is held against the block without it.
+    sets : called before each set of additional parameters that is tried, where they are to be chosen.
     """
-    compared, block = None, with_named_strips(block)
+    choice, block = None, with_named_strips(block)
     if block.settings.adjustment.additional_parameters == AUTO:
-        compared = compare_parameters(block, candidate_sets(block), geoid=geoid, report=report)
-        block = with_choice(block, compared)
+        choice = choose_parameters(block, geoid, sets)
+        block = choice.block
     found = adjust_in_frame(block, report, given_points, geoid)
     if block.settings.adjustment.variance_components == "on":
         found = with_variance_components(block, found, report, geoid)
     found = judged(with_model_part(found))
-    return found if compared is None else with_reason(found, compared)
+    if tested and asks_for_test(block):
+        found = with_shutter_test(found, report)
+    return found if choice is None else with_reason(found, choice)
 
 
 def adjust_and_explain(
@@ -74,20 +82,25 @@ def adjust_and_explain(
     report: Report | None = None,
     geoid: FilePath | None = None,
     say: Callable[[str], None] = lambda text: None,
+    sets: Progress | None = None,
 ) -> Adjustment:
     """As `adjust_keeping_system`; where the block is not accepted, what explains it stands first among the reasons.
 
     Parameters
     ----------
-    say : told when the search for it begins.
+    say : told when the search for it begins. sets : as of `adjust_keeping_system`.
     """
 
     def explained(found: Adjustment | None) -> tuple[str, ...]:
         say("looking for what explains it")
-        return causes(block, found, lambda changed: adjust_keeping_system(changed, geoid=geoid).result, geoid)
+
+        def again(changed: Block) -> AdjustedBlock:
+            return adjust_keeping_system(changed, geoid=geoid, tested=False).result
+
+        return causes(_as_chosen(block, found), found, again, geoid)
 
     try:
-        found = adjust_keeping_system(block, report, geoid=geoid)
+        found = adjust_keeping_system(block, report, geoid=geoid, sets=sets)
     except AdjustmentFailedError as error:
         o = error.outcome
         raise AdjustmentFailedError(replace(o, reasons=(*explained(None), *o.reasons))) from error
@@ -100,3 +113,13 @@ def adjust_and_explain(
     if outcome.verdict == "accepted":
         return found
     return with_outcome(found, replace(outcome, reasons=(*explained(found), *outcome.reasons)))
+
+
+def _as_chosen(block: Block, found: Adjustment | None) -> Block:
+    """The block with the additional parameters that were chosen for it, not to choose them again."""
+    settings = block.settings
+    if found is None or settings.adjustment.additional_parameters != AUTO:
+        return block
+    chosen = found.result.block.settings.adjustment.additional_parameters
+    adjustment = replace(settings.adjustment, additional_parameters=chosen)
+    return replace(block, settings=replace(settings, adjustment=adjustment))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from aerotri.adjustment.datum import FREEDOMS, nothing_holds
-from aerotri.adjustment.prepare import prepare
+from aerotri.adjustment.prepare import Prepared, prepare
 from aerotri.adjustment.solve import SolveOptions
 from aerotri.conventions import FilePath
 from aerotri.coordinates.blocks import frame_of_block, transform_block
@@ -16,12 +16,33 @@ from aerotri.pipeline.local import Report
 from aerotri.pipeline.verdict import with_outcome
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.parameter_comparison import Choice, ParameterComparison
-from aerotri.strategies.parameter_choice import choose
-from aerotri.strategies.parameter_comparison import Progress, compare_sets
+from aerotri.strategies.moving_sets import moving_outcomes, names_of_strips
+from aerotri.strategies.parameter_choice import Chosen, choose, sets_to_choose_from
+from aerotri.strategies.parameter_comparison import (
+    Candidate,
+    Progress,
+    SetComparer,
+    compare_sets,
+    set_name,
+    with_candidate,
+)
+from aerotri.strategies.parameter_sample import sampled_status
 
 FOLDS = 10
 """Parts in which control points are left out: with ten the sets are told apart as well as with every point by itself,
 where there are many."""
+CHOICE_TOLERANCE = 0.1
+"""Share of σ within which an adjustment ends that is made for the choice [C]: what it moves is far below what tells two
+sets apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterChoice:
+    """The sets that were compared, the one that was chosen, and the block that takes it."""
+
+    compared: ParameterComparison
+    chosen: Chosen
+    block: Block
 
 
 def compare_parameters(
@@ -41,6 +62,46 @@ def compare_parameters(
     choices : as `parse_parameters` returns them. folds : parts in which control points are left out, one by one where
         there are no more points than that. progress : called before each set. report : after every iteration.
     """
+    prepared = _prepared_without(block, geoid)
+    settings = prepared.system.unknowns.block.settings.adjustment
+    options = SolveOptions(settings.max_iterations, settings.robust, report)
+    return compare_sets(prepared, choices, folds, options, progress)
+
+
+def choose_parameters(
+    block: Block,
+    geoid: FilePath | None = None,
+    progress: Progress | None = None,
+) -> ParameterChoice:
+    """Choose the additional parameters of a block by what they predict, large blocks by a sample.
+
+    Where no set can be adjusted there are none: the adjustment then says what is wrong with the block.
+    """
+    prepared = _prepared_without(block, geoid)
+    settings = prepared.system.unknowns.block.settings.adjustment
+    options = SolveOptions(settings.max_iterations, settings.robust, step_tolerance=CHOICE_TOLERANCE)
+    strips = names_of_strips(prepared)
+    comparer = SetComparer(prepared, FOLDS, options, sampled_status(prepared), strips)
+    sets, outcomes = sets_to_choose_from(block), []
+    for number, choice in enumerate(sets, start=1):
+        if progress is not None:
+            progress(number, len(sets) + 1, set_name(choice))
+        outcomes.append(comparer.outcome(Candidate(choice)))
+    if progress is not None:
+        progress(len(sets) + 1, len(sets) + 1, "parameters that change")
+    outcomes += moving_outcomes(comparer, prepared, strips, outcomes)
+    compared = comparer.comparison(outcomes)
+    if any(outcome.converged for outcome in outcomes):
+        chosen = choose(compared)
+    else:
+        chosen = Chosen("none", (), "no set of additional parameters could be adjusted: adjusted without")
+    return ParameterChoice(
+        compared, chosen, with_candidate(block, Candidate(chosen.choice, chosen.groups, chosen.kind), strips)
+    )
+
+
+def _prepared_without(block: Block, geoid: FilePath | None) -> Prepared:
+    """The block in the frame of its adjustment, without additional parameters."""
     settings = block.settings.adjustment
     robust = "huber" if settings.robust == "data-snooping" else settings.robust
     plain = replace(settings, additional_parameters=(), parameter_selection="off", robust=robust)
@@ -50,17 +111,11 @@ def compare_parameters(
     prepared = prepare(block)
     if nothing_holds(prepared.system.unknowns, prepared.system.extras):
         raise failure(prepared.system, "rank deficient", f"the datum is free in {', '.join(FREEDOMS)}")
-    return compare_sets(prepared, choices, folds, SolveOptions(settings.max_iterations, robust, report), progress)
+    return prepared
 
 
-def with_choice(block: Block, compared: ParameterComparison) -> Block:
-    """The block with the additional parameters that the comparison speaks for."""
-    adjustment = replace(block.settings.adjustment, additional_parameters=choose(compared).choice)
-    return replace(block, settings=replace(block.settings, adjustment=adjustment))
-
-
-def with_reason(found: Adjustment, compared: ParameterComparison) -> Adjustment:
+def with_reason(found: Adjustment, choice: ParameterChoice) -> Adjustment:
     """The adjustment with the comparison, and why its parameters were chosen among the warnings."""
     outcome = found.result.outcome
-    found = with_outcome(found, replace(outcome, warnings=(choose(compared).reason, *outcome.warnings)))
-    return replace(found, compared=compared)
+    found = with_outcome(found, replace(outcome, warnings=(choice.chosen.reason, *outcome.warnings)))
+    return replace(found, compared=choice.compared)

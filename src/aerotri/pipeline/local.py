@@ -18,6 +18,7 @@ from aerotri.adjustment.weak_geometry import go_on_without, minimise_tied
 from aerotri.diagnosis.common_height import common_height
 from aerotri.diagnosis.doubts import defects_in_words, doubts, failure, refuse_runaway
 from aerotri.diagnosis.position_errors import position_errors_in_words
+from aerotri.diagnosis.rigidity import movements_in_words, rigidity_in_words
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock, Blunder
 from aerotri.results.adjustment import Adjustment
@@ -25,11 +26,13 @@ from aerotri.results.deviations import Deviations
 from aerotri.results.position_errors import PositionErrors
 from aerotri.results.removal import Removal
 from aerotri.statistics.loose_points import loose_by_rays, loose_in_words, loose_points, to_set_aside
+from aerotri.statistics.rigidity import rigidity_of
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
 from aerotri.strategies.deviation_estimation import with_estimated_deviations
 from aerotri.strategies.field_estimation import with_estimated_fields
 from aerotri.strategies.position_estimation import position_errors_of, with_position_errors
 from aerotri.strategies.removal import with_datum_of
+from aerotri.strategies.rig_estimation import with_estimated_movements
 from aerotri.strategies.selection import select, with_findings_of, with_removed
 from aerotri.strategies.snooping import snoop
 
@@ -54,6 +57,7 @@ class _Stand:
     block : as it will be delivered.
     blunders : taken out by data snooping. removals : additional parameters that the selection took out.
     deviations : how much parameters differ between groups of photographs.
+    movements : (k, 2) bool, which σ of movements on weighted rigs were estimated.
     position_errors : what was found of errors of positions that stay; None where they were not estimated.
     """
 
@@ -64,6 +68,7 @@ class _Stand:
     removals: tuple[Removal, ...] = ()
     deviations: Deviations | None = None
     position_errors: PositionErrors | None = None
+    movements: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +98,7 @@ def adjust_local(block: Block, report: Report | None, given_points: np.ndarray |
     stand = _without_gross_errors(stand, options)
     stand = _with_fields(stand, options)
     stand = _with_deviations(stand, options)
+    stand = _with_movements(stand, options)
     stand = _with_position_errors(stand, options)
     stand = _with_selected_parameters(stand, options)
     delivered = _without_loose_points(_delivered(stand), options)
@@ -126,6 +132,13 @@ def _with_deviations(stand: _Stand, options: SolveOptions) -> _Stand:
     """With the sizes of deviations from group to group estimated, where there are any."""
     system, solution, found = with_estimated_deviations(stand.prepared.system, stand.solution, options)
     return replace(stand, prepared=replace(stand.prepared, system=system), solution=solution, deviations=found)
+
+
+def _with_movements(stand: _Stand, options: SolveOptions) -> _Stand:
+    """With the σ of movements on weighted rigs estimated, where the block does not state them."""
+    system, solution, estimated = with_estimated_movements(stand.prepared.system, stand.solution, options)
+    prepared = replace(stand.prepared, system=system)
+    return replace(stand, prepared=prepared, solution=solution, movements=estimated)
 
 
 def _with_position_errors(stand: _Stand, options: SolveOptions) -> _Stand:
@@ -182,7 +195,8 @@ def _with_words(delivered: _Delivered, timings: dict[str, float]) -> Adjustment:
         deviations=stand.deviations,
     )  # fmt: skip
     errors = position_errors_of(system, solution, delivered.factor, sigma0, stand.position_errors)
-    result = replace(result, position_errors=errors)
+    rigidity = rigidity_of(system, solution, delivered.factor, result.outcome)
+    result = replace(result, position_errors=errors, rigidity=rigidity)
     timings = timings | {"statistics": time.perf_counter() - delivered.solved}
     tied = () if stand.deviations is None else (stand.deviations.sentence,)
     said = (*result.outcome.warnings, *tied, *loose_in_words(result, kept), *inseparable(result.parameters))
@@ -192,9 +206,20 @@ def _with_words(delivered: _Delivered, timings: dict[str, float]) -> Adjustment:
         said += (sentence,) if sentence else ()
     of_positions = position_errors_in_words(errors)
     said += (of_positions,) if of_positions else ()
+    said += rigidity_in_words(rigidity)
+    if result.rig_movements is not None and stand.movements is not None:
+        movements = replace(result.rig_movements, estimated=stand.movements[_cameras_that_move(system)])
+        result = replace(result, rig_movements=movements)
+        said += movements_in_words(movements)
     outcome = replace(result.outcome, warnings=said, timings_s=timings)
     result = replace(result, block=stand.block, outcome=outcome, blunders=stand.blunders + result.blunders)
     return Adjustment(result, result, system, solution)
+
+
+def _cameras_that_move(system: NormalSystem) -> np.ndarray:
+    """Rows of the mountings of weighted rigs that photographs have."""
+    ties = system.unknowns.ties
+    return np.zeros(0, dtype=np.int64) if ties is None else np.unique(ties.mounting)
 
 
 def _redundancy(system: NormalSystem) -> int:

@@ -11,10 +11,20 @@ from aerotri.diagnosis.moving_errors import model_part_in_words
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.in_crs import with_model_of
-from aerotri.results.model_part import ClusterTest, ModelPart
+from aerotri.results.model_part import FIELD, GROUPS, ClusterTest, ModelPart
+from aerotri.statistics.cluster_fields import root_of_field
 from aerotri.statistics.cluster_test import LEVEL
-from aerotri.statistics.clusters import PHOTOGRAPH, Clusters
-from aerotri.statistics.model_part import Excess, compare_schemes, excess_of_clusters, why_not, with_ratios
+from aerotri.statistics.clusters import PHOTOGRAPH
+from aerotri.statistics.covariance import cofactors, inner_datum
+from aerotri.statistics.model_part import (
+    Excess,
+    compare_few,
+    compare_schemes,
+    excess_of_clusters,
+    excess_of_root,
+    why_not,
+    with_ratios,
+)
 from aerotri.statistics.summarise import OF_POINTS
 
 
@@ -27,27 +37,38 @@ def with_model_part(found: Adjustment) -> Adjustment:
         return _with(found, replace(found.local, model_part=ModelPart(reason=reason)), begun)
     factor = system.factorise(solution.equations)
     schemes, tests = compare_schemes(system, solution, factor, sigma0)
+    tests, fields = compare_few(system, solution, factor, schemes, tests, sigma0)
     part = ModelPart(level=LEVEL, tests=tests)
-    chosen = _chosen(schemes, tests)
+    chosen = _chosen(tests)
     if chosen is None:
         untested = all(test.reason for test in tests)
         reason = (
             tests[0].reason if untested and tests else "no group of photographs has errors that noise does not explain"
         )
         return _with(found, replace(found.local, model_part=replace(part, reason=reason)), begun)
-    u = system.unknowns
-    excess = excess_of_clusters(
-        system, solution, factor, chosen, sigma0, factor.inverse_on_pattern().blocks[: len(u.images)].copy(),
-        factor.border_inverse(), found.local.points.covariance[u.points] / sigma0**2,
-    )  # fmt: skip
-    part = replace(part, scheme=chosen.scheme, clusters=len(chosen))
+    u, clusters = system.unknowns, schemes[chosen]
+    part = replace(part, scheme=clusters.scheme, clusters=len(clusters), method=FIELD if chosen in fields else GROUPS)
+    inner = None
+    if u.block.settings.adjustment.datum == "inner" and u.motions.count:
+        inner = inner_datum(system, solution.state, factor, solution.estimator)
+    if chosen in fields:
+        root = root_of_field(system, solution, factor, clusters, fields[chosen], inner)
+        excess = excess_of_root(system, solution, root)
+    elif inner is not None:
+        q = cofactors(system, solution.state, factor, solution.estimator)
+        excess = excess_of_clusters(system, solution, factor, clusters, sigma0, q.images, q.shared, q.points, inner)
+    else:
+        excess = excess_of_clusters(
+            system, solution, factor, clusters, sigma0, factor.inverse_on_pattern().blocks[: len(u.images)].copy(),
+            factor.border_inverse(), found.local.points.covariance[u.points] / sigma0**2,
+        )  # fmt: skip
     return replace(_with(found, _spread_over_block(found, excess, part), begun), model=excess.root)
 
 
-def _chosen(schemes: tuple[Clusters, ...], tests: tuple[ClusterTest, ...]) -> Clusters | None:
-    """The scheme with the largest ratio of those that count; single photographs where no other does."""
+def _chosen(tests: tuple[ClusterTest, ...]) -> int | None:
+    """The number of the scheme with the largest ratio of those that count; single photographs where no other does."""
     counting = [(test.scheme != PHOTOGRAPH, test.ratio, k) for k, test in enumerate(tests) if test.counts]
-    return schemes[max(counting)[2]] if counting else None
+    return max(counting)[2] if counting else None
 
 
 def _spread_over_block(found: Adjustment, excess: Excess, part: ModelPart) -> AdjustedBlock:

@@ -19,6 +19,7 @@ from aerotri.pipeline.model_part import with_model_part
 from aerotri.pipeline.verdict import judged
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.in_crs import transform_result
+from aerotri.statistics.rigidity import rigidity_of
 from aerotri.statistics.summarise import summarise
 from aerotri.strategies.deviation_estimation import ReducedToGroups, found_deviations
 from aerotri.strategies.selection import with_removed, without_parameters
@@ -58,7 +59,8 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     result = replace(
         result, parameters=with_removed(result.parameters, removals), removals=removals, deviations=deviations
     )
-    result = replace(result, position_errors=saved.position_record())
+    rigidity = rigidity_of(system, solution, factor, result.outcome)
+    result = replace(result, position_errors=saved.position_record(), rigidity=rigidity)
     components = saved.component_record()
     if components is not None:
         result = with_components(result, components)

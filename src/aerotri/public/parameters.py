@@ -80,8 +80,8 @@ def draw_parameters(out: FilePath, family: str | None = None) -> tuple[str, ...]
     from aerotri.functional_model.additional_parameters import FAMILIES
     from aerotri.report.plots.overview import save_plots
     from aerotri.report.plots.parameters import plot_pattern_sheets
+    from aerotri.simulation.camera_spec import CameraSpec
     from aerotri.simulation.cameras import block_camera
-    from aerotri.simulation.spec import CameraSpec
 
     _refuse_unknown(family)
     drawn = [name for name in FAMILIES if family in (None, name)]

@@ -97,12 +97,15 @@ def adjust(
     unread = () if isinstance(block, Block) else unread_in_words(Path(block))
     with stage_report(progress) as report:
         if points is not None:
-            return Adjustment(adjust_keeping_system(chosen, report.iteration, points, geoid), unread)
+            found = adjust_keeping_system(chosen, report.iteration, points, geoid, sets=report.set_of)
+            return Adjustment(found, unread)
         metric, note = in_metres(chosen, geoid)
         if explain:
-            found = adjust_and_explain(metric, report.iteration, geoid, lambda text: report.stage(text, None))
+            found = adjust_and_explain(
+                metric, report.iteration, geoid, lambda text: report.stage(text, None), report.set_of
+            )
         else:
-            found = adjust_keeping_system(metric, report.iteration, geoid=geoid)
+            found = adjust_keeping_system(metric, report.iteration, geoid=geoid, sets=report.set_of)
         return Adjustment(found, (*((note,) if note else ()), *unread))
 
 

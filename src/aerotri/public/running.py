@@ -137,7 +137,8 @@ def run(
     crs : coordinate system; that of the control where '', else UTM of EXIF.
     geoid : grid of geoid undulations for its heights.
     seed : the same seed gives the same result.
-    parameters : additional parameters of the adjustment, see `aerotri.adjust`.
+    parameters : additional parameters of the adjustment, see `aerotri.adjust`; those of the block where None, of
+        photographs 'auto'.
     interval : m between the points of the terrain (pickets); from the GSD and the relief where None.
     boundary : of a volume, see `aerotri.volume`; no volume where None.
     base : of the volume, see `aerotri.volume`.
@@ -177,7 +178,8 @@ def run(
             "crs": crs, "geoid": geoid, "seed": seed, **({} if from_block else names),
         },
         "adjust": {
-            "parameters": parameters, "geoid": geoid, "control_prefix": "" if marked else control_prefix,
+            "parameters": parameters or (None if from_block else "auto"), "geoid": geoid,
+            "control_prefix": "" if marked else control_prefix,
             "plots": plots, **(names if from_block else {}),
         },
         "terrain": {"interval": interval, "ground_within": boundary},

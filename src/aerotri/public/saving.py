@@ -31,7 +31,7 @@ RESULT_NAMES = (
     RECORD, "images.csv", "points.csv", "residuals.parquet", "parameters.csv", "control.csv", "check.csv",
     "block", "solution.npz", "plots", "report.html", "observations.csv", "check_free.json", "variance_components.json",
     "parameter_changes.json", "parameter_changes.csv", "compare_parameters.json", "compare_parameters.csv",
-    "work_list.csv", "parameter_effects.csv", "rigs.csv",
+    "work_list.csv", "parameter_effects.csv", "rigs.csv", "rig_stations.csv", "rig_movements.csv",
 )  # fmt: skip
 
 

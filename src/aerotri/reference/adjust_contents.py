@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from aerotri.reference.adjust_models import gnss_errors, movements, rigidity, rolling_shutters
 from aerotri.reference.adjust_tables import COMPARED, PARAMETERS, PLACE, RIGS, WHERE_MODEL, with_totals
-from aerotri.reference.records import DescribedFile, Item, Kind, of_axes, within
+from aerotri.reference.records import DescribedFile, Item, of_axes, within
 
 VERSION = Item("aerotri", "text", "Version of aerotri that wrote the file.")
 BLOCK = Item("block", "text", "Name of the block.")
@@ -20,33 +21,6 @@ def _axes_object(name: str, text: str, unit: str = "m") -> tuple[Item, ...]:
         Item(name, "object", f"{text}, by axis.", unit),
         *of_axes(f"{name}.{{}}", "number?", f"{text} in {{}}.", unit),
     )
-
-
-def _gnss_errors() -> tuple[Item, ...]:
-    what: tuple[tuple[str, Kind, str, str], ...] = (
-        ("source", "text", "Where these errors come from: given in block.toml, or estimated from the block; empty "
-         "where positions are adjusted as independent.", ""),
-        ("plan_m", "number", "Standard deviation of these errors in X and Y.", "m"),
-        ("height_m", "number", "The same in Z.", "m"),
-        ("time", "number?", "Time after which such an error has fallen to 37 %.", "as time_unit says"),
-        ("time_unit", "text", "s, or exposures where the photographs have no times.", ""),
-        ("noise_factor_plan", "number", "Factor of the standard deviations of single positions in plan.", ""),
-        ("noise_factor_height", "number", "The same in height.", ""),
-        ("likelihood_ratio", "number?", "How much better such errors explain the positions than more noise does.", ""),
-        ("p", "number?", "Probability of as much by noise alone.", ""),
-        ("level", "number?", "Probability with which noise alone is taken for such errors.", ""),
-        ("neighbours", "number?", "Correlation of the residuals of photographs taken one after the other, where "
-         "positions are adjusted as independent.", ""),
-        ("neighbours_p", "number?", "Probability of such a correlation by noise alone.", ""),
-        ("exposures", "whole", "Photographs with a position.", ""),
-        ("flights", "whole", "Flights, or strips where the photographs have no times, in which these errors begin "
-         "anew.", ""),
-        ("nodes", "whole", "Times at which such an error of a coordinate is an unknown.", ""),
-        ("reason", "text", "Why nothing was tested; else empty.", ""),
-    )  # fmt: skip
-    text = "Errors of GNSS positions that stay for a while; null where there are no positions."
-    items = (Item(f"gnss_errors.{name}", kind, said, unit) for name, kind, said, unit in what)
-    return (Item("gnss_errors", "object?", text), *items)
 
 
 def _ground_points(name: str, what: str) -> tuple[Item, ...]:
@@ -136,7 +110,7 @@ ADJUSTMENT = (
     Item("deviations.kind", "text", "independent or walk, as in [deviations]."),
     Item("deviations.total_um", "number", "Size of all deviations together as image error, µm."),
     Item("deviations.ratio", "number", "−2 ln of the likelihood of one set for all over that of the groups."),
-    Item("deviations.p", "number", "Probability of such a ratio where the groups do not differ."),
+    Item("deviations.p", "number", "Probability of such differences by chance where the groups do not differ."),
     Item("deviations.needed", "yes/no", "Whether that probability is below the significance level."),
     Item("deviations.parameters[]", "object", "One entry a parameter."),
     Item("deviations.parameters[].name", "text", "Name of the parameter."),
@@ -146,10 +120,17 @@ ADJUSTMENT = (
         "number",
         "σ of the values about their mean, or of the step, as image error, µm; 0 where none is seen.",
     ),
-    Item("deviations.parameters[].ratio", "number", "The same of this parameter alone."),
+    Item("deviations.parameters[].sigma", "number", "The same in the unit of the parameter."),
+    Item("deviations.parameters[].ratio", "number", "−2 ln of the likelihood without its deviations over that with."),
     Item("model_part", "object", "Model part of σ: errors that groups of photographs share."),
     Item("model_part.scheme", "text", "Groups whose common errors make it, such as strip; empty where there is none."),
     Item("model_part.clusters", "whole", "Number of these groups."),
+    Item(
+        "model_part.method",
+        "text",
+        "Where it is from. groups: the differences between the groups. field: random fields of image errors, where the "
+        "groups are fewer than five or one is too large. Empty where there is none.",
+    ),
     Item("model_part.level", "number?", "Probability with which noise alone is taken for common errors."),
     Item("model_part.tests[]", "object", "One entry a way to divide the photographs into groups."),
     Item(
@@ -164,12 +145,14 @@ ADJUSTMENT = (
     Item("model_part.tests[].p_noise", "number?", "Probability of such a ratio by noise alone."),
     Item("model_part.tests[].p_random", "number?", "Probability of such a ratio by what random groups show."),
     Item("model_part.tests[].counts", "yes/no", "Whether both probabilities are small enough."),
+    Item("model_part.tests[].field_um", "number?", "σ of the random field of every group, where there is one.", "µm"),
+    Item("model_part.tests[].field_mm", "number?", "Its correlation length in the image.", "mm"),
     Item("model_part.tests[].reason", "text", "Why there was no test; else empty."),
     Item("model_part.ratio_plan", "number", "Total σ over σ of the noise in X and Y, median of the points."),
     Item("model_part.ratio_height", "number", "The same in Z."),
     Item("model_part.reason", "text", "Why there is no model part; else empty."),
-    *_gnss_errors(),
-    Item("rigs[]", "object", "Cameras on rigid rigs; where there are any.", optional=True),
+    *gnss_errors(),
+    Item("rigs[]", "object", "Cameras on rigs; where there are any.", optional=True),
     *within("rigs[]", *RIGS),
     Item("rigs[].correlations[]", "object", "Correlations of the six elements, one entry an element."),
     Item("rigs[].correlations[].element", "text", "The element."),
@@ -180,6 +163,10 @@ ADJUSTMENT = (
         "",
         ("x", "y", "z", "omega", "phi", "kappa"),
     ),
+    Item("rig_movements[]", "object", "How cameras move on weighted rigs; where there are any.", optional=True),
+    *within("rig_movements[]", *movements()),
+    *rigidity(),
+    *rolling_shutters(),
     Item("warnings[]", "text", "Sentences to read: what was left out, assumed or is weak."),
     Item("timings_s", "object", "Time by stage.", "s"),
     *(
@@ -351,6 +338,19 @@ COMPARE_PARAMETERS = (
     Item("sets[].collocation.sigma_um", "number?", "Its standard deviation.", "µm"),
     Item("sets[].collocation.length_mm", "number?", "Its correlation length.", "mm"),
     *_gain("sets[].gain", "Gain over the best of the smaller sets it contains; null where there is none."),
+    Item("sets[].groups", "text?", "Column of images.csv whose groups have values of their own; empty: one for all."),
+    Item("sets[].kind", "text", "How these values are tied: free, independent or walk."),
+    Item("sets[].p", "number?", "Probability of their differences by chance."),
+    Item("sets[].prediction", "object", "What predictions of parts of the block by everything else say of the set."),
+    Item("sets[].prediction.areas[]", "number?", "−2 ln of the density of the image points of every area."),
+    Item("sets[].prediction.strips[]", "number?", "The same of every strip."),
+    Item("sets[].prediction.control[]", "number?", "The same of every control point."),
+    Item("sets[].prediction.sigma_height", "number?", "RMS of the σ of predicted heights.", "m"),
+    Item("sets[].prediction.best", "text?", "The set that predicts best."),
+    Item(
+        "sets[].prediction.value", "number?", "Sum of control and the mean of areas and strips, less that of the best."
+    ),
+    Item("sets[].prediction.standard_error", "number?", "Standard error of value."),
     *_gain("sets[].behind", "How it stands against the best of all sets; null where it has no result."),
 )
 CHOICE = Item("choice", "text", "Which set auto would take and why, in a sentence.")

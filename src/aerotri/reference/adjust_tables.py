@@ -214,6 +214,13 @@ COMPARED = (
     ),
     Item("gain", "number?", "Gain over the best of the smaller sets it contains: 0.1 is 10 % smaller RMS."),
     Item("gain_against", "text?", "The set that the gain refers to."),
+    Item(
+        "prediction",
+        "number?",
+        "−2 ln of the density with which areas, strips and control points are predicted by "
+        "everything else, less that of the best set: 0 is the best.",
+    ),
+    Item("prediction_error", "number?", "Standard error of prediction."),
     Item("verdict", "text?", "Whether the set earns its parameters, in a few words."),
 )
 WORK = (
@@ -246,6 +253,45 @@ RIGS = (
     *of_axes("s_{}", "number", "Standard deviation of the angle {}; 0: held.", "deg", ("omega", "phi", "kappa")),
     Item("stations", "whole", "Photographs of the camera that took part."),
 )
+RIG_MOVEMENTS = (
+    Item("image", "text", "Name of the photograph."),
+    Item("station", "text", "Its exposure."),
+    Item("rig", "text", "Name of the rig."),
+    Item("camera", "text", "Camera."),
+    *of_axes("moved_{}", "number", "Deviation from its place on the rig along {} of the reference camera.", "m",
+             ("x", "y", "z")),
+    *of_axes("turned_{}", "number", "Rotation from its place on the rig about {} of the reference camera.", "deg",
+             ("x", "y", "z")),
+    *of_axes("s_moved_{}", "number", "Standard deviation of the deviation along {}.", "m", ("x", "y", "z")),
+    *of_axes("s_turned_{}", "number", "Standard deviation of the rotation about {}.", "deg", ("x", "y", "z")),
+)  # fmt: skip
+RIG_STATIONS = (
+    Item("image", "text", "Name of the photograph."),
+    Item("station", "text", "Its exposure."),
+    Item("rig", "text", "Name of the rig."),
+    Item("camera", "text", "Camera."),
+    *of_axes(
+        "turned_{}",
+        "number?",
+        "Rotation about {} of the reference camera that would suit its rays better than its place on the rig.",
+        "deg",
+        ("x", "y", "z"),
+    ),
+    *of_axes("s_turned_{}", "number?", "Standard deviation of the rotation about {}.", "deg", ("x", "y", "z")),
+    Item("freedom", "whole", "Degrees of freedom of the test, 6 where its rays fix all of position and rotation."),
+    Item("f", "number?", "Value of the F test; about 1 where the photograph is in its place."),
+    Item("p", "number", "Probability of such a value by chance."),
+    Item("found", "yes/no", "Whether it is out of its place, all photographs of rigs taken together (Holm)."),
+)
+MOTIONS = (
+    Item("image", "text", "Name of the photograph."),
+    *of_axes("v{}", "number", "Velocity in {} while the photograph was read; with an EPSG code in east, north and up.",
+             "m/s"),
+    *of_axes("w{}", "number", "Rate of rotation about the {} axis of the camera.", "deg/s", ("x", "y", "z")),
+    Item("source", "text", "Where the velocity comes from.", values={
+        "time": "times of the photograph and its neighbours", "strip": "the other photographs of its strip",
+        "speed": "the direction of its neighbours and the stated speed", "unknown": "nowhere, it is zero"}),
+)  # fmt: skip
 
 
 def adjust_tables() -> tuple[DescribedFile, ...]:
@@ -276,7 +322,20 @@ def adjust_tables() -> tuple[DescribedFile, ...]:
             OBSERVATIONS,
             "where any were observed",
         ),
-        table("rigs.csv", "Position and rotation of the cameras on rigid rigs.", RIGS, "with a rig"),
+        table("rigs.csv", "Position and rotation of the cameras on rigs.", RIGS, "with a rig"),
+        table(
+            "rig_movements.csv",
+            "Deviation of every photograph from its place on a weighted rig.",
+            RIG_MOVEMENTS,
+            "with a weighted rig",
+        ),
+        table(
+            "rig_stations.csv",
+            "Test of every photograph of a rigid rig against its place.",
+            RIG_STATIONS,
+            "with a rigid rig",
+        ),
+        table("motion.csv", "How photographs moved while they were read.", MOTIONS, "with a rolling shutter"),
         table(
             "parameter_changes.csv",
             "Change of the image errors between two groups of photographs, on a grid over the image.",

@@ -65,6 +65,20 @@ TRUTH_TABLES = (
         (POINT, *of_axes("d{}", "number", "Error in {}.", "m")),
     ),
     (
+        "readout.csv",
+        "Readout times of rolling shutters, where there are any.",
+        (Item("camera", "text", "Name of the camera."), Item("readout_ms", "number", "Readout time.", "ms")),
+    ),
+    (
+        "motion.csv",
+        "How photographs moved while they were read, where there are rolling shutters.",
+        (
+            NAME,
+            *of_axes("v{}", "number", "Velocity in {}.", "m/s"),
+            *of_axes("w{}", "number", "Rate of rotation about the {} axis of the camera.", "deg/s", ("x", "y", "z")),
+        ),
+    ),
+    (
         "rigs.csv",
         "Mountings of the cameras on rigs, where there are any.",
         (
@@ -80,6 +94,11 @@ TRUTH_TABLES = (
         ),
     ),
 )
+TRUTH_WHEN = {
+    "rigs.csv": "with a rig",
+    "readout.csv": "with a rolling shutter",
+    "motion.csv": "with a rolling shutter",
+}
 RENDERED = (
     Item("photographs[]", "text", "Files of the photographs."),
     Item("seed", "whole", "Seed of the random numbers."),
@@ -145,7 +164,7 @@ def block_files() -> tuple[DescribedFile, ...]:
     """The files of simulate, tiepoints, run and parameters, and the rest of a result."""
     return (
         *(
-            DescribedFile(name, TRUTH, "table", text, items, "with a rig" if name == "rigs.csv" else "")
+            DescribedFile(name, TRUTH, "table", text, items, TRUTH_WHEN.get(name, ""))
             for name, text, items in TRUTH_TABLES
         ),
         DescribedFile(

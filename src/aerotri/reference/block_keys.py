@@ -9,7 +9,8 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from aerotri.formats.block.settings_model import BlockModel, PriorModel, ThreePriorsModel
-from aerotri.simulation.spec import PriorSpec, SimulationSpec
+from aerotri.simulation.camera_spec import PriorSpec
+from aerotri.simulation.spec import SimulationSpec
 
 PRIORS = (PriorModel, PriorSpec, ThreePriorsModel)
 PRIOR = "{ fixed = false } (free), { value, sigma } (observed) or { fixed = true } (held)"

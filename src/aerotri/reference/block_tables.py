@@ -28,7 +28,8 @@ IMAGES = (
         "text?",
         "Any other column groups photographs, such as day; name it in adjustment.parameter_groups. The column station "
         "names the exposure of a rig: photographs that its cameras took together have the same one. Needed where "
-        "block.toml has a [rig.NAME]; empty: the photograph belongs to no station.",
+        "block.toml has a [rig.NAME]; empty: the photograph belongs to no station. The column time, in seconds, says "
+        "when a photograph was taken; the velocities of rolling shutters come from it where gnss_ins.csv has no times.",
         optional=True,
     ),
 )

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from aerotri.results.model_part import ModelPart
     from aerotri.results.position_errors import PositionErrors
     from aerotri.results.removal import Removal
-    from aerotri.results.rigs import MountedCamera
+    from aerotri.results.rigidity import Rigidity
+    from aerotri.results.rigs import MountedCamera, RigMovements
+    from aerotri.results.rolling_shutter import RollingShutters
     from aerotri.results.variance_components import VarianceComponents
 
 
@@ -169,7 +171,7 @@ class SharedParameters:
     ----------
     names : (s,) str such as 'focal_length_mm', 'bluh.1', 'brown.K1', 'gnss.shift_X'.
     groups : (s,) str, the camera, day or strip the parameter belongs to.
-    kinds : (s,) str, 'interior', 'additional', 'gnss', 'ins' or 'rig'.
+    kinds : (s,) str, 'interior', 'additional', 'gnss', 'ins', 'rig' or 'rolling_shutter'.
     marks : (s,) str, P L D C of the family, '' otherwise.
     value : (s,); covariance : (s, s), σ̂0² included. Units: mm for interior elements, as the family states otherwise.
     max_correlation : (s,) the largest |r| with another shared parameter, signed; max_correlation_with : (s,) its name.
@@ -322,8 +324,9 @@ class AdjustedBlock:
     `components` is there where `variance_components = "on"`: `block` then has the σ they led to. `removals` are those
     of the selection of additional parameters, in order; `parameters` has them too, behind the others. `model_part`
     says where the model part of σ comes from, or why there is none; None before it is looked for. `rigs` are the
-    cameras of rigid rigs beside their reference cameras. `deviations` says how much parameters differ between groups of
-    photographs that are tied to one another.
+    cameras of rigs beside their reference cameras, `rigidity` the tests whether they keep their places, `rig_movements`
+    how they move on weighted rigs.
+    `deviations` says how much parameters differ between groups of photographs that are tied to one another.
     """
 
     block: Block
@@ -344,3 +347,6 @@ class AdjustedBlock:
     deviations: Deviations | None = None
     position_errors: PositionErrors | None = None
     rigs: tuple[MountedCamera, ...] = ()
+    rigidity: Rigidity | None = None
+    rolling_shutters: RollingShutters | None = None
+    rig_movements: RigMovements | None = None

@@ -14,12 +14,14 @@ class FoundDeviation:
     ----------
     name : of the parameter. groups : how many have a value.
     sigma_um : σ of the values about their mean, or of the steps, as image error over the format; 0 where none is seen.
+    sigma : the same in the unit of the parameter.
     ratio : −2·ln of the likelihood ratio against no deviation of this parameter.
     """
 
     name: str
     groups: int
     sigma_um: float
+    sigma: float
     ratio: float
 
 
@@ -33,7 +35,7 @@ class Deviations:
     found : every parameter.
     total_um : root of the sum of squares of all sizes.
     ratio : −2·ln of the restricted likelihood ratio against one set of values for all photographs.
-    p : its probability where there are no deviations. needed : whether it is below the significance level.
+    p : probability of what was found where there are no deviations. needed : whether it is below the level of the test.
     """
 
     kind: str
@@ -52,7 +54,13 @@ class Deviations:
             "p": self.p,
             "needed": self.needed,
             "parameters": [
-                {"name": one.name, "groups": one.groups, "sigma_um": one.sigma_um, "ratio": one.ratio}
+                {
+                    "name": one.name,
+                    "groups": one.groups,
+                    "sigma_um": one.sigma_um,
+                    "sigma": one.sigma,
+                    "ratio": one.ratio,
+                }
                 for one in self.found
             ],
         }

@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+GROUPS, FIELD = "groups", "field"
+"""Where the model part is from: the differences of many groups, or random fields of few."""
+
 
 @dataclass(frozen=True)
 class ClusterTest:
@@ -22,6 +25,7 @@ class ClusterTest:
     p_noise : probability of such a ratio by the noise of the rays alone. p_random : by what random divisions show. NaN
         where there was no test; those of random divisions as well where noise explains the ratio.
     counts : whether both are below the level of the test.
+    field_um, field_mm : σ and correlation length of the random field of every cluster; NaN where there was none.
     reason : why there was no test, '' otherwise.
     """
 
@@ -34,6 +38,8 @@ class ClusterTest:
     p_random: float = float("nan")
     counts: bool = False
     reason: str = ""
+    field_um: float = float("nan")
+    field_mm: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +67,8 @@ class ModelPart:
     Parameters
     ----------
     scheme : of the clusters whose excess is the model part, '' where none counts.
-    clusters : their number. level : of the test.
+    clusters : their number. method : GROUPS where σ is from the clusters themselves, FIELD where they are too few and a
+        random field of each stands for them. level : of the test.
     tests : of all schemes.
     ratio_plan, ratio_height : median of σ total over σ of the object points, 1 where there is no model part.
     reason : why there is no model part, '' otherwise.
@@ -69,6 +76,7 @@ class ModelPart:
 
     scheme: str = ""
     clusters: int = 0
+    method: str = ""
     level: float = float("nan")
     tests: tuple[ClusterTest, ...] = ()
     ratio_plan: float = 1.0
@@ -85,6 +93,8 @@ class ModelPart:
         """How the errors change, such as 'from strip to strip'; '' where there is no model part."""
         if not self.scheme:
             return ""
+        if self.clusters == 1:
+            return "with the position in the image"
         with_direction = self.scheme == "direction of flight"
         return "with the direction of flight" if with_direction else f"from {self.scheme} to {self.scheme}"
 

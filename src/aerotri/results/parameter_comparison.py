@@ -43,6 +43,27 @@ class Accuracy:
 
 
 @dataclass(frozen=True, eq=False)
+class Evidence:
+    """What observations that had no part in it say of a set: −2 ln of the density with which it predicts them.
+
+    Parameters
+    ----------
+    areas, strips : (a,), (s,) of the image points of every area of the block and of every strip, predicted by all
+        other observations; NaN where they cannot be.
+    control : (k,) of every control point, predicted without itself; NaN where nothing else determines it.
+    sigma_height : RMS in m of the σ of the heights so predicted, NaN where there are none.
+    """
+
+    areas: np.ndarray
+    strips: np.ndarray
+    control: np.ndarray
+    sigma_height: float
+
+
+NOTHING_KNOWN = Evidence(np.zeros(0), np.zeros(0), np.zeros(0), float("nan"))
+
+
+@dataclass(frozen=True, eq=False)
 class SetOutcome:
     """What one set of additional parameters did.
 
@@ -54,6 +75,10 @@ class SetOutcome:
     sigma0, sigma0_um : σ̂0, and times the a-priori σ of an image coordinate.
     aic, bic : see above. check, control : at check points; at control points predicted without themselves.
     sigma_um, length_mm : of a random field, NaN elsewhere.
+    evidence : what observations say that had no part in it.
+    groups : column of images.csv ('strip' among them) whose groups have values of their own, '' where there are none.
+    kind : how they are tied, 'independent' or 'walk'. p : probability of their differences where there are none.
+    ratio : −2·ln of the restricted likelihood ratio against one set of values for all photographs.
     """
 
     name: str
@@ -70,6 +95,11 @@ class SetOutcome:
     control: Accuracy
     sigma_um: float = float("nan")
     length_mm: float = float("nan")
+    evidence: Evidence = NOTHING_KNOWN
+    groups: str = ""
+    kind: str = "free"
+    p: float = float("nan")
+    ratio: float = float("nan")
 
     @property
     def converged(self) -> bool:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.observations import Camera, Prior
+from aerotri.observations import Camera, Prior, RollingShutter
 from aerotri.observations.block import LENS_NAMES
+from aerotri.observations.rolling_shutter import READING
+from aerotri.simulation.camera_spec import CameraSpec, PriorSpec, RollingShutterSpec
 from aerotri.simulation.projection import TrueCamera
-from aerotri.simulation.spec import CameraSpec, InteriorName, PriorSpec
+from aerotri.simulation.spec_table import InteriorName
 
 
 def block_camera(name: str, spec: CameraSpec) -> Camera:
@@ -27,7 +29,13 @@ def block_camera(name: str, spec: CameraSpec) -> Camera:
         brown={str(key): _prior(prior, 0.0) for key, prior in spec.brown.items()},
         lens={str(key): _prior(prior, 0.0) for key, prior in spec.lens.items()},
         flight_axis=spec.flight_axis,
+        rolling_shutter=None if spec.rolling_shutter is None else _stated_shutter(spec.rolling_shutter),
     )
+
+
+def _stated_shutter(spec: RollingShutterSpec) -> RollingShutter:
+    readout = _prior(spec.stated, spec.readout_ms)
+    return RollingShutter(readout, spec.row_direction, spec.motion, rotation=spec.rotation)
 
 
 def true_camera(name: str, spec: CameraSpec) -> TrueCamera:
@@ -40,7 +48,16 @@ def true_camera(name: str, spec: CameraSpec) -> TrueCamera:
         x0=spec.principal_point_mm[0] + wrong.get("x0_mm", 0.0),
         y0=spec.principal_point_mm[1] + wrong.get("y0_mm", 0.0),
         lens=np.array([lens.get(key, 0.0) for key in LENS_NAMES]),
+        scan=_true_scan(spec),
     )
+
+
+def _true_scan(spec: CameraSpec) -> np.ndarray:
+    """(2,) s per mm: a ray at (x, y) is exposed scan·(x, y) after the middle of the readout."""
+    if spec.rolling_shutter is None:
+        return np.zeros(2)
+    size_mm = np.array(spec.size_px) * spec.pixel_um * 1e-3
+    return 1e-3 * spec.rolling_shutter.readout_ms * np.array(READING[spec.rolling_shutter.row_direction]) / size_mm
 
 
 def _prior(spec: PriorSpec, value: float) -> Prior:

@@ -11,7 +11,7 @@ from aerotri.conventions import InputError
 from aerotri.memory import fitting, refuse_beyond_memory
 from aerotri.observations import Camera
 from aerotri.simulation.camera_errors import ImageError
-from aerotri.simulation.projection import Photographs, Rays, inside_format, measured_positions, visible_rays
+from aerotri.simulation.projection import Photographs, Rays, inside_format, measured_rays, visible_rays
 from aerotri.simulation.spec import GrossErrorSpec, TiePointSpec
 
 PILOT_SHARE = 1.4
@@ -50,8 +50,8 @@ class Imaging:
         """Rays to (N, 3) m with ideal positions, all that may lie inside the format once d is added."""
         return visible_rays(self.photographs, points, self.reach_mm)
 
-    def measure(self, ideal: Rays, margin_px: float) -> tuple[Rays, np.ndarray]:
-        """The rays at their measured positions without noise, only those inside the format.
+    def measure(self, points: np.ndarray, ideal: Rays, margin_px: float) -> tuple[Rays, np.ndarray]:
+        """The rays to (N, 3) m at their measured positions without noise, only those inside the format.
 
         Returns
         -------
@@ -62,7 +62,8 @@ class Imaging:
         for k, camera in enumerate(self.cameras):
             for day in np.unique(self.day):
                 own = np.flatnonzero((camera_of_ray == k) & (day_of_ray == day))
-                xy[own], solved = measured_positions(ideal.xy[own], self.fields[camera.name, str(day)])
+                field = self.fields[camera.name, str(day)]
+                xy[own], solved = measured_rays(self.photographs, points, ideal.take(own), field)
                 ok[own] = solved & inside_format(xy[own], camera, margin_px)
         kept = np.flatnonzero(ok)
         return Rays(ideal.image, ideal.point, xy).take(kept), kept
@@ -102,7 +103,7 @@ def tie_rays(
         if spec.rays_per_point is not None:
             probability = _probability(spec, rays, draw, len(points))
         chosen = _choose(spec, rays, draw, probability, len(points))
-        measured, kept = imaging.measure(rays.take(chosen), spec.margin_px)
+        measured, kept = imaging.measure(points, rays.take(chosen), spec.margin_px)
         draw = draw[chosen][kept]
         per_point = np.bincount(measured.point, minlength=len(points))
         usable = np.flatnonzero(per_point >= spec.min_rays)

@@ -9,12 +9,14 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from aerotri.functional_model.additional_parameters.lens import distort
-from aerotri.functional_model.rotation import rotation_from_angles
+from aerotri.functional_model.rotation import exponential, rotation_from_angles
 from aerotri.observations import Camera
 
 Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """An image error d: (n,) x, (n,) y in mm → (n, 2) mm."""
 
+SCAN_STEPS = 4
+"""Steps to the row in which a ray is exposed [C]: each shrinks the error to some hundredths."""
 STEEPEST = 1.4  # rad off the vertical up to which a footprint is searched
 
 
@@ -27,6 +29,8 @@ class TrueCamera:
     nominal : the camera as the block states it.
     focal_length, x0, y0 : mm.
     lens : (5,) forward lens parameters.
+    scan : (2,) s per mm: a ray at (x, y) is exposed scan·(x, y) after the middle of the readout; 0 for all rows at
+        once.
     """
 
     nominal: Camera
@@ -34,22 +38,46 @@ class TrueCamera:
     x0: float
     y0: float
     lens: np.ndarray
+    scan: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Of n photographs while they are read: velocity (n, 3) m/s, object frame; spin (n, 3) rad/s, camera frame."""
+
+    velocity: np.ndarray
+    spin: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class Photographs:
-    """True orientation of n photographs: centre (n, 3) m, rotation (n, 3, 3), camera (n,) index into cameras."""
+    """True orientation of n photographs: centre (n, 3) m, rotation (n, 3, 3), camera (n,) index into cameras.
+
+    motion : while they are read; None without rolling shutters.
+    """
 
     centre: np.ndarray
     rotation: np.ndarray
     camera: np.ndarray
     cameras: tuple[TrueCamera, ...]
+    motion: Motion | None = None
 
     @classmethod
     def of(
-        cls, centre: np.ndarray, angles: np.ndarray, order: str, camera: np.ndarray, cameras: Sequence[TrueCamera]
-    ) -> Photographs:
-        return cls(centre, rotation_from_angles(angles, order), camera, tuple(cameras))
+        cls, centre: np.ndarray, angles: np.ndarray, order: str, camera: np.ndarray, cameras: Sequence[TrueCamera],
+        motion: Motion | None = None,
+    ) -> Photographs:  # fmt: skip
+        return cls(centre, rotation_from_angles(angles, order), camera, tuple(cameras), motion)
+
+    def during_readout(self, image: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Centres (m, 3) and rotations (m, 3, 3) when the rows of positions `at` (m, 2) mm are exposed."""
+        centre, rotation = self.centre[image], self.rotation[image]
+        if self.motion is None:
+            return centre, rotation
+        scan = np.array([camera.scan for camera in self.cameras])[self.camera[image]]
+        since = np.sum(scan * np.nan_to_num(at), axis=1)[:, None]
+        turn = exponential(self.motion.spin[image] * since)
+        return centre + self.motion.velocity[image] * since, rotation @ turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +96,9 @@ class Rays:
         return Rays(self.image[which], self.point[which], self.xy[which])
 
 
-def project(photographs: Photographs, points: np.ndarray, image: np.ndarray, point: np.ndarray) -> np.ndarray:
+def project(
+    photographs: Photographs, points: np.ndarray, image: np.ndarray, point: np.ndarray, at: np.ndarray | None = None
+) -> np.ndarray:
     """Ideal image positions of rays; NaN behind the camera.
 
     u = Rᵀ(X − X0), x = −c·u1/u3 + x0, y alike; a forward lens acts on the tangents before.
@@ -77,12 +107,33 @@ def project(photographs: Photographs, points: np.ndarray, image: np.ndarray, poi
     ----------
     points : (N, 3) m.
     image, point : (m,) index.
+    at : (m, 2) mm, positions whose rows say when rays are exposed; the ideal ones unless given.
 
     Returns
     -------
     (m, 2) mm.
     """
-    u = np.einsum("mji,mj->mi", photographs.rotation[image], points[point] - photographs.centre[image])
+    found = _projected(photographs, points[point], image, np.zeros((len(image), 2)) if at is None else at)
+    for _ in range(SCAN_STEPS if at is None and photographs.motion is not None else 0):
+        found = _projected(photographs, points[point], image, found)
+    return found
+
+
+def measured_rays(
+    photographs: Photographs, points: np.ndarray, ideal: Rays, field: Field
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `measured_positions` of rays; with a rolling shutter the row that is measured says when a ray is exposed."""
+    measured, solved = measured_positions(ideal.xy, field)
+    for _ in range(SCAN_STEPS if photographs.motion is not None else 0):
+        there = project(photographs, points, ideal.image, ideal.point, measured)
+        measured, solved = measured_positions(there, field)
+    return measured, solved
+
+
+def _projected(photographs: Photographs, xyz: np.ndarray, image: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """(m, 2) mm of points (m, 3), exposed as the rows of positions `at` (m, 2) are."""
+    centre, rotation = photographs.during_readout(image, at)
+    u = np.einsum("mji,mj->mi", rotation, xyz - centre)
     depth = np.where(u[:, 2] < 0.0, -u[:, 2], np.nan)
     a, b = u[:, 0] / depth, u[:, 1] / depth
     xy = np.empty((len(image), 2))

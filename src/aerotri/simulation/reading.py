@@ -13,7 +13,8 @@ from pydantic import ValidationError
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.text.toml_text import read_toml
 from aerotri.simulation import spec as spec_module
-from aerotri.simulation.spec import SimulationSpec, Table
+from aerotri.simulation.spec import SimulationSpec
+from aerotri.simulation.spec_table import Table
 
 
 def read_spec(path: FilePath) -> SimulationSpec:

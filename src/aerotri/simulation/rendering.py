@@ -24,7 +24,7 @@ from aerotri.simulation import _rendering_kernels as kernels
 from aerotri.simulation.camera_errors import ImageError
 from aerotri.simulation.cameras import true_camera
 from aerotri.simulation.flight import flying_height
-from aerotri.simulation.projection import Photographs, TrueCamera, measured_positions, project
+from aerotri.simulation.projection import Photographs, Rays, TrueCamera, measured_rays, project
 from aerotri.simulation.random_streams import stream
 from aerotri.simulation.rendering_texture import Texture
 from aerotri.simulation.simulate import true_image_errors
@@ -116,7 +116,7 @@ def make_scene(
     gsd = flying_height(spec.flight, first) * first.pixel_mm / first.focal_length_mm
     return Scene(
         names=images.names,
-        photographs=Photographs.of(truth.centre, truth.angles, block.rotation, images.camera, cameras),
+        photographs=Photographs.of(truth.centre, truth.angles, block.rotation, images.camera, cameras, truth.motion),
         fields=tuple(fields[block.cameras[c].name, str(d)] for c, d in zip(images.camera, day, strict=True)),
         terrain=make_terrain(spec.terrain, spec.flight.centre_m, stream(seed, "terrain")),
         texture=Texture(options.detail_px * gsd, seed),
@@ -260,7 +260,8 @@ def _targets_seen(scene: Scene, image: int) -> tuple[np.ndarray, np.ndarray]:
     ideal = project(scene.photographs, targets, np.full(len(targets), image), index)
     camera = scene.camera(image).nominal
     ahead = (np.abs(ideal) < 1.1 * np.array(camera.half_format_mm)).all(axis=1)
-    measured, _ = measured_positions(ideal[ahead], scene.fields[image])
+    seen = Rays(np.full(int(ahead.sum()), image), index[ahead], ideal[ahead])
+    measured, _ = measured_rays(scene.photographs, targets, seen, scene.fields[image])
     return targets[ahead], px_from_mm(measured, camera.size_px, camera.pixel_mm)
 
 
@@ -274,8 +275,9 @@ def _ground_function(scene: Scene, image: int, tile: Tile) -> Callable[[np.ndarr
         measured = mm_from_px(column_row, camera.size_px, camera.pixel_mm)
         ideal = measured - field(*np.clip(measured, low, high).T)
         direction = _undistorted((ideal - (true.x0, true.y0)) / true.focal_length, true.lens)
-        ray = np.column_stack([direction, -np.ones(len(direction))]) @ photographs.rotation[image].T
-        return _on_terrain(scene, image, ray)
+        centre, rotation = photographs.during_readout(np.full(len(measured), image), measured)
+        ray = np.einsum("nij,nj->ni", rotation, np.column_stack([direction, -np.ones(len(direction))]))
+        return _on_terrain(scene, image, centre, ray)
 
     return ground
 
@@ -290,14 +292,14 @@ def _undistorted(bent: np.ndarray, lens: np.ndarray) -> np.ndarray:
     return ideal
 
 
-def _on_terrain(scene: Scene, image: int, ray: np.ndarray) -> np.ndarray:
-    """(n, 2) X, Y where rays (n, 3) from a photograph meet the terrain.
+def _on_terrain(scene: Scene, image: int, centre: np.ndarray, ray: np.ndarray) -> np.ndarray:
+    """(n, 2) X, Y where rays (n, 3) of a photograph from their centres (n, 3) meet the terrain.
 
     Raises
     ------
     InputError
     """
-    centre, name = scene.photographs.centre[image], scene.names[image]
+    name = scene.names[image]
     if (ray[:, 2] >= 0.0).any():
         raise InputError(f"photograph '{name}' looks over the horizon", "tilt it less to have it rendered")
     slope = ray[:, :2] / ray[:, 2:]
@@ -306,13 +308,13 @@ def _on_terrain(scene: Scene, image: int, ray: np.ndarray) -> np.ndarray:
     height = np.full(len(ray), scene.terrain.base)
     active = np.arange(len(ray))
     for _ in range(RAY_ITERATIONS):
-        plan = centre[:2] + (height[active] - centre[2])[:, None] * slope[active]
+        plan = centre[active, :2] + (height[active] - centre[active, 2])[:, None] * slope[active]
         new = scene.terrain.height(plan)
         change = np.abs(new - height[active])
         height[active] = new
         active = active[change > RAY_TOLERANCE_M]
         if not len(active):
-            return centre[:2] + (height - centre[2])[:, None] * slope
+            return centre[:, :2] + (height - centre[:, 2])[:, None] * slope
     raise InputError(f"the terrain hides itself in photograph '{name}'", "render flatter terrain, or tilt less")
 
 
@@ -323,7 +325,7 @@ def _first_met(terrain: Terrain, centre: np.ndarray, slope: np.ndarray) -> np.nd
     """
 
     def plan(height: np.ndarray, which: np.ndarray | slice = np.s_[:]) -> np.ndarray:
-        return centre[:2] + (height - centre[2])[:, None] * slope[which]
+        return centre[which, :2] + (height - centre[which, 2])[:, None] * slope[which]
 
     low, high = terrain.reach
     steps = int((high - low) * float(np.hypot(*slope.T).max(initial=0.0)) / STEP_M) + 1

@@ -58,6 +58,10 @@ def with_rigs(flown: FlownImages, spec: SimulationSpec, rng: np.random.Generator
     number = {name: k for k, name in enumerate(spec.camera)}
     rigs = {number[rig.reference]: rig for rig in spec.rig.values()}
     rotation = rotation_from_angles(flown.angles, spec.rotation)
+    for reference, rig in rigs.items():
+        tilt = rotation_from_angles(np.radians(rig.tilt_deg), spec.rotation)
+        own = flown.camera == reference
+        rotation[own] = rotation[own] @ tilt
     lead, name, camera, centre, turned = [], [], [], [], []
     for k in range(len(flown)):
         rig = rigs.get(int(flown.camera[k]))
@@ -69,7 +73,7 @@ def with_rigs(flown: FlownImages, spec: SimulationSpec, rng: np.random.Generator
         centre.append(flown.centre[k])
         turned.append(rotation[k])
         if rig is not None:
-            for at, turn in _at_exposure(rig, spec.rotation, rng):
+            for at, turn in _at_exposure(rig, spec.rotation, k / max(len(flown) - 1, 1) - 0.5, rng):
                 centre.append(flown.centre[k] + rotation[k] @ at)
                 turned.append(rotation[k] @ turn)
     rows = np.array(lead)
@@ -81,12 +85,19 @@ def with_rigs(flown: FlownImages, spec: SimulationSpec, rng: np.random.Generator
     ), rows  # fmt: skip
 
 
-def _at_exposure(rig: RigSpec, order: str, rng: np.random.Generator) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Position (3,) and rotation (3, 3) of every mounted camera at one exposure, its play included."""
+def _at_exposure(rig: RigSpec, order: str, tau: float, rng: np.random.Generator) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Position (3,) and rotation (3, 3) of every mounted camera at one exposure, its play and drift included.
+
+    Parameters
+    ----------
+    tau : −½ at the first exposure, ½ at the last.
+    """
     out = []
     for mounting in rig.camera.values():
-        moved = rig.play_position_m * rng.normal(size=3)
-        about = np.radians(rig.play_rotation_deg) * rng.normal(size=3)
+        position = rig.play_position_m if mounting.play_position_m is None else mounting.play_position_m
+        rotation = rig.play_rotation_deg if mounting.play_rotation_deg is None else mounting.play_rotation_deg
+        moved = position * rng.normal(size=3)
+        about = np.radians(rotation) * rng.normal(size=3) + tau * np.radians(mounting.drift_rotation_deg)
         turn = exponential(about) @ rotation_from_angles(np.radians(mounting.rotation_deg), order)
         out.append((np.array(mounting.position_m) + moved, turn))
     return out

@@ -25,8 +25,9 @@ from aerotri.simulation.cameras import true_camera
 from aerotri.simulation.flight import FlightFrame, FlownImages, plan_flight
 from aerotri.simulation.ground_points import ControlPoints, choose_seen, lay_out_control, tie_candidates
 from aerotri.simulation.measuring import Imaging, gross_errors, tie_rays
+from aerotri.simulation.motion import true_motion, true_readouts
 from aerotri.simulation.navigation import observe_navigation
-from aerotri.simulation.projection import Photographs, Rays, TrueCamera
+from aerotri.simulation.projection import Motion, Photographs, Rays, TrueCamera
 from aerotri.simulation.random_streams import stream
 from aerotri.simulation.rigs import reference_cameras, stated_rigs, true_mountings, with_rigs
 from aerotri.simulation.spec import ControlSpec, SimulationSpec
@@ -79,7 +80,8 @@ def simulate(spec: SimulationSpec, seed: int) -> tuple[Block, Truth]:
     plan = stream(seed, "flight")
     planned, frame = plan_flight(spec.flight, nominal, spec.terrain.height_m, plan, reference_cameras(spec))
     flown, lead = with_rigs(planned, spec, stream(seed, "rigs"))
-    imaging = _imaging(spec, cameras, flown, seed)
+    motion = true_motion(spec, planned, lead, seed)
+    imaging = _imaging(spec, cameras, flown, motion, seed)
     terrain = make_terrain(spec.terrain, spec.flight.centre_m, stream(seed, "terrain"))
     scene = _scene(spec, flown, frame, terrain, imaging, seed)
     image_points, wrong_rays, gross = _observe(spec, scene, imaging, seed)
@@ -112,6 +114,8 @@ def simulate(spec: SimulationSpec, seed: int) -> tuple[Block, Truth]:
         control_blunders=wrong_control,
         control_blunder_m=blunders,
         mountings=true_mountings(spec.rig),
+        motion=motion,
+        readout_ms=true_readouts(spec),
     )
     return block, truth
 
@@ -136,14 +140,16 @@ def true_image_errors(spec: SimulationSpec, seed: int) -> dict[tuple[str, str], 
     return image_error_fields(cameras, errors, days, seed)
 
 
-def _imaging(spec: SimulationSpec, cameras: tuple[TrueCamera, ...], flown: FlownImages, seed: int) -> Imaging:
+def _imaging(
+    spec: SimulationSpec, cameras: tuple[TrueCamera, ...], flown: FlownImages, motion: Motion | None, seed: int
+) -> Imaging:
     fields = true_image_errors(spec, seed)
     reach = []
     for camera in cameras:
         x, y = format_grid(camera.nominal.half_format_mm, *SAMPLES)
         own = [field(x, y) for (name, _), field in fields.items() if name == camera.nominal.name]
         reach.append(REACH * float(np.abs(own).max()))
-    photographs = Photographs.of(flown.centre, flown.angles, spec.rotation, flown.camera, cameras)
+    photographs = Photographs.of(flown.centre, flown.angles, spec.rotation, flown.camera, cameras, motion)
     return Imaging(photographs, flown.day, fields, reach)
 
 
@@ -184,7 +190,7 @@ def _measured_signals(
     spec: SimulationSpec, layout: ControlPoints, xyz: np.ndarray, imaging: Imaging
 ) -> tuple[ControlPoints, np.ndarray, Rays]:
     """The signalised points in use and their rays: every image that sees one measures it."""
-    rays, _ = imaging.measure(imaging.rays(xyz), spec.tie_points.margin_px)
+    rays, _ = imaging.measure(xyz, imaging.rays(xyz), spec.tie_points.margin_px)
     used = choose_seen(layout, np.bincount(rays.point, minlength=len(xyz)), spec.control.check_points)
     number = np.full(len(xyz), -1)
     number[used] = np.arange(len(used))
@@ -267,6 +273,8 @@ def _images(spec: SimulationSpec, flown: FlownImages, seed: int) -> Images:
     columns = {"day": flown.day} if spec.flight.days else {}
     if flown.station is not None:
         columns["station"] = flown.station
+    if any(camera.rolling_shutter is not None for camera in spec.camera.values()) and spec.gnss is None:
+        columns["time"] = np.array([f"{t:.4f}" for t in flown.time])
     return Images(flown.names, flown.camera, flown.strip, centre, angles, columns)
 
 

@@ -5,103 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import Field, model_validator
 
-from aerotri.conventions import LARGEST
 from aerotri.formats.text.described_key import key
-from aerotri.simulation.presets import PRESETS
-
-Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, gt=0.0, le=LARGEST, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(strict=True, ge=0.0, le=LARGEST, allow_inf_nan=False)]
-Lap = Annotated[float, Field(strict=True, ge=0.0, le=0.95)]
-Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
-Probability = Annotated[float, Field(strict=True, gt=0.0, le=1.0)]
-Count = Annotated[int, Field(strict=True, ge=1, le=2**31 - 1)]
-Number0 = Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)]
-Name = Annotated[str, StringConstraints(min_length=1)]
-InteriorName = Literal["focal_length_mm", "x0_mm", "y0_mm"]
-BrownName = Literal["K1", "K2", "K3", "P1", "P2", "b1", "b2"]
-LensName = Literal["k1", "k2", "p1", "p2", "k3"]
-Triple = tuple[NotNegative, NotNegative, NotNegative]
-Vector = tuple[Number, Number, Number]
-
-
-class Table(BaseModel):
-    """A table of the spec: unknown keys are refused, values never change."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class PriorSpec(Table):
-    """What the block says of an unknown beforehand; without a value the camera's own."""
-
-    value: Number | None = key(
-        None, "Start value that the block states; the camera's own where it is not given.", "unit of the parameter"
-    )
-    sigma: Positive | None = key(
-        None, "Standard deviation that the block states; without it the parameter is free.", "unit of the parameter"
-    )
-    fixed: bool = key(False, "true: the block holds the value.")
-
-
-class PhysicalErrorSpec(Table):
-    """Image errors from the physics of the camera.
-
-    `rms_um` is the RMS of a coordinate of the error over the format. `weights` sets the relative sizes of the causes
-    (see `camera_errors`), `seed` fixes the camera while the seed of the simulation changes.
-    """
-
-    rms_um: Positive = key(..., "RMS of the image error in a coordinate, over the format.", "µm")
-    day_change_um: NotNegative = key(0.0, "RMS of the change of the image error from day to day.", "µm")
-    seed: Number0 | None = key(
-        None, "Seed of the camera; the camera then stays the same when the simulation takes another seed."
-    )
-    weights: dict[str, NotNegative] = key(
-        {}, "Relative sizes of the causes of the error; the known causes are named where one is wrong."
-    )
-
-
-class ErrorSpec(Table):
-    """What is wrong with a camera. `interior` is true minus calibrated; `parameters` by name, 'bluh.1'."""
-
-    parameters: dict[str, Number] = key(
-        {}, 'True additional parameters by name, such as "bluh.1" = 1e-4.', "unit of the parameter"
-    )
-    brown: dict[BrownName, Number] = key({}, "True lens parameters of Brown.", "as in block.toml")
-    lens: dict[LensName, Number] = key({}, "True lens parameters of the OpenCV model.", "as in block.toml")
-    interior: dict[InteriorName, Number] = key({}, "True less stated interior orientation.", "mm")
-    physical: PhysicalErrorSpec | None = key(None, "Image errors from the physics of the camera.")
-
-
-class CameraSpec(Table):
-    """A camera as block.toml has it, and its errors."""
-
-    model: Literal["frame", "ultracam_d", "dmc"] = key("frame", "Kind of camera, as in block.toml.")
-    size_px: tuple[Count, Count] = key(..., "Columns, rows.", "px")
-    pixel_um: Positive = key(..., "Size of a pixel.", "µm")
-    focal_length_mm: Positive = key(..., "Principal distance.", "mm")
-    principal_point_mm: tuple[Number, Number] = key((0.0, 0.0), "Principal point x0, y0.", "mm")
-    flight_axis: Literal["+x", "-x", "+y", "-y"] = key("+y", "Image axis along the flight.")
-    interior: dict[InteriorName, PriorSpec] = key(
-        {}, "What the block states of the interior orientation, as in block.toml.", "mm"
-    )
-    brown: dict[BrownName, PriorSpec] = key({}, "What the block states of Brown's lens parameters.", "as in block.toml")
-    lens: dict[LensName, PriorSpec] = key(
-        {}, "What the block states of the OpenCV lens parameters.", "as in block.toml"
-    )
-    errors: ErrorSpec = key(ErrorSpec(), "What is wrong with the camera in truth.")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_preset(cls, data: Any) -> Any:
-        if not isinstance(data, Mapping) or "preset" not in data:
-            return data
-        own = dict(data)
-        name = own.pop("preset")
-        if not isinstance(name, str) or name not in PRESETS:
-            raise ValueError(f"preset '{name}' is not known; known are {', '.join(PRESETS)}")
-        return {**PRESETS[name], **own}
+from aerotri.simulation.camera_spec import CameraSpec
+from aerotri.simulation.rig_presets import with_rig_presets
+from aerotri.simulation.spec_table import (
+    Count,
+    Lap,
+    Name,
+    NotNegative,
+    Number,
+    Number0,
+    Positive,
+    Probability,
+    Share,
+    Table,
+    Triple,
+    Vector,
+)
 
 
 class CrossStripSpec(Table):
@@ -374,6 +296,14 @@ class MountingSpec(Table):
     )
     position_fixed: bool = key(False, "true: the block holds the position.")
     rotation_fixed: bool = key(False, "true: the block holds the angles.")
+    play_position_m: NotNegative | None = key(None, "As in [rig.NAME], of this camera alone.", "m")
+    play_rotation_deg: NotNegative | None = key(None, "As in [rig.NAME], of this camera alone.", "deg")
+    drift_rotation_deg: Vector = key(
+        (0.0, 0.0, 0.0),
+        "Rotation from the first to the last exposure, about the axes of the reference camera; the true angles hold "
+        "in the middle.",
+        "deg",
+    )
 
     @model_validator(mode="after")
     def _fixed_or_observed(self) -> MountingSpec:
@@ -389,7 +319,10 @@ class RigSpec(Table):
     camera: Annotated[dict[Name, MountingSpec], Field(min_length=1)] = key(
         ..., "The other cameras, one table [rig.NAME.camera.NAME] each."
     )
-    constraint: Literal["rigid", "off"] = key("rigid", "What the block states, as in block.toml.")
+    constraint: Literal["rigid", "weighted", "off"] = key("rigid", "What the block states, as in block.toml.")
+    tilt_deg: Vector = key(
+        (0.0, 0.0, 0.0), "Angles omega, phi, kappa of the reference camera in a frame that looks straight down.", "deg"
+    )
     play_position_m: NotNegative = key(0.0, "Standard deviation by which a camera moves between exposures.", "m")
     play_rotation_deg: NotNegative = key(0.0, "Standard deviation by which a camera turns between exposures.", "deg")
 
@@ -419,4 +352,12 @@ class SimulationSpec(Table):
     georeference: GeoreferenceSpec | None = key(None, "Where on Earth the flight takes place; a local block without.")
     photographs: PhotographSpec = key(PhotographSpec(), "How photographs are rendered.")
     adjustment: AdjustmentSpec = key(AdjustmentSpec(), "What block.toml shall say under [adjustment].")
-    rig: dict[Name, RigSpec] = key({}, "Rigs: cameras on one frame, one table [rig.NAME] each.")
+    rig: dict[Name, RigSpec] = key(
+        {}, 'Rigs: cameras on one frame, one table [rig.NAME] each; preset = "oblique_5" (a nadir and four oblique '
+        'cameras), "two_head" or "large_format_4" takes a known one with its cameras.'
+    )  # fmt: skip
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_rig_presets(cls, data: Any) -> Any:
+        return with_rig_presets(data) if isinstance(data, Mapping) and "rig" in data else data

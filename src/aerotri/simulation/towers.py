@@ -50,7 +50,7 @@ def build_towers(
     for attempt in range(ATTEMPTS):
         drawn = _drawn(spec.towers, spec.terrain.height_m, flown, imaging, on_ground, rng)
         xyz = drawn if attempt == 0 else np.where(np.isin(np.arange(len(xyz)), weak)[:, None, None], drawn, xyz)
-        rays, _ = imaging.measure(imaging.rays(xyz.reshape(-1, 3)), spec.tie_points.margin_px)
+        rays, _ = imaging.measure(xyz.reshape(-1, 3), imaging.rays(xyz.reshape(-1, 3)), spec.tie_points.margin_px)
         weak = np.flatnonzero((np.bincount(rays.point, minlength=2 * len(xyz)) < 2).reshape(-1, 2).any(axis=1))
         if not len(weak):
             names = [f"W{k + 1:03d}_{end}" for k in range(len(xyz)) for end in ("foot", "top")]

@@ -12,6 +12,7 @@ import numpy as np
 from aerotri.conventions import FilePath
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.observations import Block
+from aerotri.simulation.projection import Motion
 from aerotri.spreadsheet import plain_row
 
 
@@ -39,6 +40,7 @@ class Truth:
     gross_errors : (k,) index into the block's image points; gross_error_mm : (k, 2).
     control_blunders : (b,) index into the block's control; control_blunder_m : (b, 3).
     mountings : (6,) position, m, and angles, rad, by camera of a rig.
+    motion : of the photographs while they are read, readout_ms by camera; None and empty without rolling shutters.
     """
 
     centre: np.ndarray
@@ -54,6 +56,8 @@ class Truth:
     control_blunders: np.ndarray
     control_blunder_m: np.ndarray
     mountings: Mapping[str, np.ndarray] = field(default_factory=dict)
+    motion: Motion | None = None
+    readout_ms: Mapping[str, float] = field(default_factory=dict)
 
 
 TRUTH = "truth"
@@ -117,11 +121,21 @@ def _write_tables(place: Path, block: Block, truth: Truth) -> None:
     blundered = (block.points[block.control.point[truth.control_blunders]],)
     blunder = np.round(truth.control_blunder_m, 6)
     _write(place / "control_blunders.csv", ["point", "dX", "dY", "dZ"], _rows(blundered, blunder))
+    if truth.motion is not None:
+        _write_motion(place, block, truth, truth.motion)
     if truth.mountings:
         values = np.array(list(truth.mountings.values()))
         values = np.hstack([np.round(values[:, :3], 6), np.round(np.degrees(values[:, 3:]), 9)])
         header = ["camera", "x", "y", "z", "omega", "phi", "kappa"]
         _write(place / "rigs.csv", header, _rows((truth.mountings,), values))
+
+
+def _write_motion(place: Path, block: Block, truth: Truth, motion: Motion) -> None:
+    readouts = np.array(list(truth.readout_ms.values()))[:, None]
+    _write(place / "readout.csv", ["camera", "readout_ms"], _rows((truth.readout_ms,), readouts))
+    values = np.hstack([np.round(motion.velocity, 6), np.round(np.degrees(motion.spin), 6)])
+    header = ["image", "vX", "vY", "vZ", "wx", "wy", "wz"]
+    _write(place / "motion.csv", header, _rows((block.images.names,), values))
 
 
 def _write_image_errors(path: Path, samples: Sequence[ImageErrorSample]) -> None:

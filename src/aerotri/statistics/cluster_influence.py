@@ -34,6 +34,7 @@ from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.statistics import _cluster_kernels as _kernels
 from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, sides_of_clusters
 from aerotri.statistics.clusters import Clusters, order_by_place
+from aerotri.statistics.covariance import InnerDatum
 
 LOWERED, PLAIN_SHARE = 0.9, 0.493
 """t and a of the power −½, see above."""
@@ -121,12 +122,16 @@ def _with_lower_weights(
 
 
 def known_part(
-    system: NormalSystem, solution: Solution, factor: Factor, most: int = 48
+    system: NormalSystem, solution: Solution, factor: Factor, most: int = 48, inner: InnerDatum | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Q·N_0·Q of photographs (n, 6, 6), shared parameters (s, s) and points (P, 3, 3).
 
     N_0 are the observations that belong to no photograph: control, weighted parameters, random fields. It is a sum over
     columns r of its root; of more than `most` columns that many random sums with signs stand for all [L: Hutchinson].
+
+    Parameters
+    ----------
+    factor : undamped, at the solution. inner : the inner datum, None where there is none.
     """
     u = system.unknowns
     n, s, count = len(u.images), len(u.shared), len(u.points)
@@ -146,7 +151,7 @@ def known_part(
         sides = np.zeros((count, 3, part.shape[1]))
         sides[rows, axes] = of_points[:, None] * part[: len(rows)]
         found = system.solve_sides(solution.state, factor, sides, solution.estimator, root @ part[len(rows) :])
-        of_images, of_shared, at_points = found
+        of_images, of_shared, at_points = found if inner is None else inner.moved(*found)
         images += of_images @ np.swapaxes(of_images, 1, 2)
         shared += of_shared @ of_shared.T
         points += at_points @ np.swapaxes(at_points, 1, 2)

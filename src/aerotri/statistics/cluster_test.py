@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.adjustment.datum import motions_of_points
 from aerotri.adjustment.kernel_records import Directions
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
@@ -31,7 +32,7 @@ from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.quantiles import chi_square_exceedance, f_exceedance
 from aerotri.results.model_part import ClusterTest
 from aerotri.statistics import _cluster_kernels as _kernels
-from aerotri.statistics.clusters import FEWEST, PHOTOGRAPH, Clusters, divided_at_random
+from aerotri.statistics.clusters import ALONE, FEWEST, PHOTOGRAPH, Clusters, divided_at_random
 
 LEVEL = 0.001
 """Probability with which white noise is taken for errors of clusters [C]: Baarda's level of a single test."""
@@ -76,23 +77,37 @@ def weakest_modes(system: NormalSystem, solution: Solution, factor: Factor) -> M
     q, own = np.zeros((size, size)), np.zeros((size, size))
     observed = np.flatnonzero((u.prior_weight > 0.0).any(axis=1) & (u.kept < 0))
     at_observed, at_shared = np.zeros((len(observed), 3, size)), np.zeros((len(u.shared), size))
+    wanted = np.union1d(rows, observed)
     at_once = int(np.clip(NUMBERS_AT_ONCE / (3 * len(u.points)), 3, size))
     for first in range(0, size, at_once):
         columns = np.arange(first, min(first + at_once, size))
         sides = np.zeros((len(u.points), 3, len(columns)))
         sides[rows[columns // 3], columns % 3, np.arange(len(columns))] = 1.0
-        _, shared, points = system.solve_sides(solution.state, factor, sides, solution.estimator)
+        _, shared, points = system.solve_sides(solution.state, factor, sides, solution.estimator, rows=wanted)
         q[:, columns] = points[rows].reshape(size, -1)
         at_observed[:, :, columns], at_shared[:, columns] = points[observed], shared
     own += np.einsum("pia,pi,pib->ab", at_observed, u.prior_weight[observed], at_observed)
     at_priors = system.priors.root().T @ at_shared
     own += at_priors.T @ at_priors
-    values, vectors = np.linalg.eigh(0.5 * (q + q.T) - own)
+    estimable = _estimable(system, solution, rows)
+    values, vectors = np.linalg.eigh(estimable @ (0.5 * (q + q.T) - own) @ estimable)
     chosen = vectors[:, ::-1][:, :MODES] / np.sqrt(np.maximum(values[::-1][:MODES], 1e-12 * values[-1]))
     sides = np.zeros((len(u.points), 3, chosen.shape[1]))
     sides[rows] = chosen.reshape(len(rows), 3, -1)
-    y = Directions(*system.solve_sides(solution.state, factor, sides, solution.estimator))
-    return _with_scores(system, solution, y)
+    # only the sample has sides, so that no other point has to be looked at before the solution
+    images, shared, _ = system.solve_sides(solution.state, factor, sides, solution.estimator, rows=rows)
+    points = system.expand_sides(solution.state, images, shared, sides, solution.estimator)
+    return _with_scores(system, solution, Directions(images, shared, points))
+
+
+def _estimable(system: NormalSystem, solution: Solution, rows: np.ndarray) -> np.ndarray:
+    """Projection of coordinates of points to what a free block determines: no motion of the whole."""
+    free, size = system.unknowns.motions, 3 * len(rows)
+    if not system.unknowns.block.settings.adjustment.is_free or not free.count:
+        return np.eye(size)
+    moved = (motions_of_points(solution.state.points[rows]) @ free.basis).reshape(size, -1)
+    moved = moved / np.maximum(np.linalg.norm(moved, axis=0), 1e-300)
+    return np.eye(size) - moved @ np.linalg.pinv(moved)
 
 
 def _spread(points: np.ndarray, rays: np.ndarray, usable: np.ndarray) -> np.ndarray:
@@ -176,8 +191,9 @@ def compare_clusters(
     factor : undamped, at the solution. level : below which both probabilities have to be for the scheme to count.
     """
     m = len(clusters)
-    if m < FEWEST:
-        return ClusterTest(clusters.scheme, m, reason=too_few(m))
+    reason = untestable(clusters)
+    if reason:
+        return ClusterTest(clusters.scheme, m, reason=reason)
     found, freedom = sum_of_squares(system, solution, factor, modes, clusters)
     if freedom == 0:
         return ClusterTest(clusters.scheme, m, reason="nothing checks the clusters against one another")
@@ -207,9 +223,14 @@ def _by_random_divisions(
     return total, max(freedom, 1)
 
 
-def too_few(clusters: int) -> str:
-    """Why so few clusters are not tested."""
-    return f"{clusters} clusters leave {clusters - 1} degrees of freedom, too few to estimate a variance from"
+def untestable(clusters: Clusters) -> str:
+    """Why clusters are too few, or one of them is too large, to estimate a variance from; '' where they are not."""
+    m, share = len(clusters), float(np.bincount(clusters.label).max() / len(clusters.label))
+    if m < FEWEST:
+        return f"{m} clusters leave {m - 1} degrees of freedom, too few to estimate a variance from"
+    if share > ALONE:
+        return f"one cluster has {100.0 * share:.0f} % of the photographs and holds the block alone"
+    return ""
 
 
 def sum_of_squares(
@@ -218,7 +239,8 @@ def sum_of_squares(
     """uᵀ·K⁺·u and the rank of K."""
     m, k = len(clusters), modes.scores.shape[1]
     sides, taken = sides_of_clusters(system, solution, clusters, modes.y)
-    covariance, pulls = -(taken + sides.T @ factor.solve(sides.copy())), np.zeros((m, k))
+    half = factor.half_solve(sides)
+    covariance, pulls = -(taken + half.T @ half), np.zeros((m, k))
     np.add.at(pulls, clusters.label, modes.scores)
     for c in range(m):
         own = slice(c * k, (c + 1) * k)

@@ -12,6 +12,8 @@ from aerotri.adjustment.unknowns import State, Unknowns
 FEWEST = 5
 """Clusters from which a jackknife is made [C]: a variance of four degrees of freedom has a σ of 35 % of itself as a
 standard deviation; of fewer clusters it says nothing."""
+ALONE = 0.7
+"""Share of the photographs from which a cluster holds the block alone [C]: the others show little of its errors."""
 MOST, MOST_OF_LARGE, LARGE = 30, 12, 5000
 """Clusters at most, and at most in a block of more than LARGE photographs [C]: each costs a factorisation."""
 PHOTOGRAPH, PER_CLUSTER, MOST_AT_RANDOM = "photograph", 3, 15
@@ -46,7 +48,8 @@ class Clusters:
 def cluster_schemes(unknowns: Unknowns, state: State) -> tuple[Clusters, ...]:
     """Strips, directions of flight, every grouping column of images.csv and single photographs.
 
-    A scheme of one cluster is left out, and one that divides the photographs as another before it.
+    A scheme of one cluster is left out unless the block is one strip, and one that divides the photographs as another
+    before it.
     """
     images, rows = unknowns.block.images, unknowns.images
     order = _order_of_exposure(unknowns, state)
@@ -62,7 +65,7 @@ def cluster_schemes(unknowns: Unknowns, state: State) -> tuple[Clusters, ...]:
         found.append(_limited(name, label, tuple(str(n) for n in names)))
     kept: list[Clusters] = []
     for clusters in found:
-        several = 2 <= len(clusters) <= len(rows) // 2
+        several = 2 <= len(clusters) <= len(rows) // 2 or (clusters.scheme == "strip" and len(clusters) == 1)
         if several and not any(_alike(clusters, other) for other in kept):
             kept.append(clusters)
     return (*kept, _at_random(state.centre))

@@ -23,6 +23,7 @@ class InnerDatum:
     ----------
     images (n, 6, d), shared (s, d), points (P, 3, d) : the d free motions G in the unknowns.
     q_images, q_shared, q_points : Q·Aᵀ, of the same shapes. both : (d, d), A·Q·Aᵀ.
+    conditions : (P, 3, d) Aᵀ, of the points alone.
     """
 
     images: np.ndarray
@@ -32,6 +33,14 @@ class InnerDatum:
     q_shared: np.ndarray
     q_points: np.ndarray
     both: np.ndarray
+    conditions: np.ndarray
+
+    def moved(
+        self, images: np.ndarray, shared: np.ndarray, points: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """S·x of k columns x: photographs (n, 6, k), shared parameters (s, k), points (P, 3, k)."""
+        motion = np.einsum("pid,pik->dk", self.conditions, points)
+        return images - self.images @ motion, shared - self.shared @ motion, points - self.points @ motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +108,7 @@ def inner_datum(system: NormalSystem, state: State, factor: Factor, estimator: E
     a[rows] = np.linalg.solve(g_datum.T @ g_datum, g_datum.T).T.reshape(-1, 3, d)
     q_images, q_shared, q_points = system.solve_sides(state, factor, a, estimator)
     both = np.einsum("pia,pib->ab", a, q_points)
-    return InnerDatum(g_images, g_shared, g_points, q_images, q_shared, q_points, both)
+    return InnerDatum(g_images, g_shared, g_points, q_images, q_shared, q_points, both, a)
 
 
 def transform_datum(minimal: Cofactors, inner: InnerDatum) -> Cofactors:

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.scanned_rays import linearise_unknown_rays
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
-from aerotri.functional_model.collinearity import linearise
 
 NOT_PREDICTED = 1e-9
 """Share of a coordinate's own normal equation below which the rest does not determine it."""
@@ -66,12 +66,9 @@ def _side(
 ) -> tuple[np.ndarray, float, float]:
     """N_fi (6·n + s,) with the point's own free coordinates eliminated, the pull λ_i, and N_ii reduced likewise."""
     u, state = system.unknowns, solution.state
-    rays = slice(int(u.rays.start[row]), int(u.rays.start[row + 1]))
+    rays = np.arange(int(u.rays.start[row]), int(u.rays.start[row + 1]))
     image, lens = u.rays.image[rays], u.rays.lens_row[rays]
-    point = np.full(len(image), row)
-    partials = linearise(
-        state.rotation, state.centre, state.points, u.interior(state), image, point, lens, u.rays.at[rays]
-    )
+    partials, in_scan, by_scan = linearise_unknown_rays(u, state, rays)
     weight = u.rays.inv_sigma[rays] * np.sqrt(solution.equations.weight[rays])[:, None]
     gap = (solution.equations.residual[rays] * weight).ravel()
     by_point = (partials.by_point * weight[:, :, None]).reshape(-1, 3)
@@ -95,4 +92,5 @@ def _side(
     by_patterns = np.sum(u.rays.ap_value[rays].reshape(len(image), 2, -1) * at_rays, axis=1)
     index = u.rays.ap_index[rays]
     np.add.at(of_shared, index[index >= 0], by_patterns[index >= 0])
+    np.add.at(of_shared, in_scan[in_scan >= 0], np.sum(by_scan * at_rays, axis=1)[in_scan >= 0])
     return side, float(by_point[:, axis] @ gap), float(by_point[:, axis] @ own)

@@ -17,22 +17,27 @@ from aerotri.statistics.model_part import positive_part
 
 
 def model_of_functions(
-    system: NormalSystem, solution: Solution, root: ModelRoot, unknowns: np.ndarray, solved: np.ndarray, size: int = 1
-) -> np.ndarray:
+    system: NormalSystem, solution: Solution, root: ModelRoot, unknowns: np.ndarray, solved: np.ndarray, size: int = 1,
+    cofactors: np.ndarray | None = None,
+) -> np.ndarray:  # fmt: skip
     """(k/size, size, size) model parts of every `size` functions that follow one another.
 
     Parameters
     ----------
     unknowns : (6n + s, k) partials C of the functions by the unknowns of the reduced system. solved : Q·C.
+    cofactors : (k/size, size, size) CᵀQC in the datum of the block, where it is not that of Q. Of what is known
+        beforehand of a free block, as a σ of the principal distance, the datum takes nothing away.
     """
     n = 6 * len(root.images)
     count = unknowns.shape[1] // size
     along = (root.images.reshape(n, -1).T @ unknowns[:n] + root.shared.T @ unknowns[n:]).reshape(-1, count, size)
     found = np.einsum("mki,mkj->kij", along, along)
     if root.noise > 0.0:
-        both = np.einsum(
-            "uki,ukj->kij", unknowns.reshape(-1, count, size), solved.reshape(-1, count, size), optimize=True
-        )
+        both = cofactors
+        if both is None:
+            both = np.einsum(
+                "uki,ukj->kij", unknowns.reshape(-1, count, size), solved.reshape(-1, count, size), optimize=True
+            )
         known = known_root(system, solution, solved).reshape(-1, count, size)
         found = found - root.noise * (both - np.einsum("mki,mkj->kij", known, known))
     return positive_part(found)

@@ -16,13 +16,16 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.results.model_part import ClusterTest, ModelPart, ModelRoot
+from aerotri.statistics.cluster_fields import Field, compare_field
 from aerotri.statistics.cluster_influence import influences, known_part
-from aerotri.statistics.cluster_test import LEVEL, compare_clusters, too_few, weakest_modes
-from aerotri.statistics.clusters import FEWEST, Clusters, cluster_schemes
-from aerotri.statistics.covariance import orientation_cofactors
+from aerotri.statistics.cluster_test import LEVEL, compare_clusters, untestable, weakest_modes
+from aerotri.statistics.clusters import LARGE, PHOTOGRAPH, Clusters, cluster_schemes
+from aerotri.statistics.covariance import InnerDatum, orientation_cofactors
 
 FEWEST_PHOTOGRAPHS = 10
 """Photographs from which clusters are looked for [C]."""
+POINTS_AT_ONCE = 4096
+"""Object points whose columns are held in double precision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +49,6 @@ def why_not(system: NormalSystem, solution: Solution, sigma0: float) -> str:
     u = system.unknowns
     if u.block.settings.adjustment.model_part == "off":
         return "switched off"
-    if u.block.settings.adjustment.is_free:
-        return "the datum is free"
     if len(u.images) < FEWEST_PHOTOGRAPHS:
         return f"there are fewer than {FEWEST_PHOTOGRAPHS} photographs"
     if solution.status != "converged" or not sigma0 > 0.0:
@@ -65,18 +66,38 @@ def compare_schemes(
     factor : undamped, at the solution.
     """
     schemes = cluster_schemes(system.unknowns, solution.state)
-    tested = sum(len(clusters) >= FEWEST for clusters in schemes)
+    tested = sum(not untestable(clusters) for clusters in schemes)
     if not tested:
-        return schemes, tuple(ClusterTest(c.scheme, len(c), reason=too_few(len(c))) for c in schemes)
+        return schemes, tuple(ClusterTest(c.scheme, len(c), reason=untestable(c)) for c in schemes)
     modes = weakest_modes(system, solution, factor)
     return schemes, tuple(
         compare_clusters(system, solution, factor, modes, clusters, sigma0, LEVEL / tested) for clusters in schemes
     )
 
 
+def compare_few(
+    system: NormalSystem, solution: Solution, factor: Factor, schemes: tuple[Clusters, ...],
+    tests: tuple[ClusterTest, ...], sigma0: float,
+) -> tuple[tuple[ClusterTest, ...], dict[int, Field]]:  # fmt: skip
+    """Schemes of too few clusters tested by random fields, where no scheme of strips, days … could be tested otherwise.
+
+    Returns
+    -------
+    the tests, and the fields by the number of their scheme.
+    """
+    several = [k for k, one in enumerate(schemes) if one.scheme != PHOTOGRAPH]
+    if any(not tests[k].reason for k in several) or len(system.unknowns.images) > LARGE:
+        return tests, {}
+    found = {
+        k: compare_field(system, solution, factor, schemes[k], sigma0, LEVEL / len(several)) for k in several
+    }  # fmt: skip
+    compared = tuple(found[k][0] if k in found else test for k, test in enumerate(tests))
+    return compared, {k: field for k, (_, field) in found.items()}
+
+
 def excess_of_clusters(
     system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters, sigma0: float,
-    q_images: np.ndarray, q_shared: np.ndarray, q_points: np.ndarray,
+    q_images: np.ndarray, q_shared: np.ndarray, q_points: np.ndarray, inner: InnerDatum | None = None,
 ) -> Excess:  # fmt: skip
     """The model part.
 
@@ -84,9 +105,10 @@ def excess_of_clusters(
     ----------
     factor : undamped, at the solution; invalid afterwards.
     q_images (n, 6, 6) in rotation unknowns, q_shared (s, s), q_points (P, 3, 3) : cofactors.
+    inner : the inner datum of all of them, None where there is none.
     """
     m = len(clusters)
-    known = known_part(system, solution, factor)
+    known = known_part(system, solution, factor, inner=inner)
     noise = [q - part for q, part in zip((q_images, q_shared, q_points), known, strict=True)]
     root = ModelRoot(
         np.empty((*q_images.shape[:2], m)), np.empty((len(q_shared), m)), np.empty((len(q_points), 3, m), np.float32),
@@ -96,12 +118,25 @@ def excess_of_clusters(
     # as of a variance of m values about their mean [L]; it makes good for what only one cluster determines
     freedom = m / (m - 1)
     for c, change in enumerate(influences(system, solution, factor, clusters)):
-        for into, values in zip((root.images, root.shared, root.points), change, strict=True):
-            into[..., c] = np.sqrt(freedom) * values
-        points += change.points[:, :, None] * change.points[:, None, :]
+        columns = tuple(part[..., None] for part in change)
+        columns = columns if inner is None else inner.moved(*columns)
+        for into, values in zip((root.images, root.shared, root.points), columns, strict=True):
+            into[..., c : c + 1] = np.sqrt(freedom) * values
+        points += columns[2] @ np.swapaxes(columns[2], 1, 2)
     images = positive_part(root.images @ np.swapaxes(root.images, 1, 2) - sigma0**2 * noise[0])
     shared = positive_part((root.shared @ root.shared.T - sigma0**2 * noise[1])[None])[0]
     points = positive_part(freedom * points - sigma0**2 * noise[2])
+    return Excess(orientation_cofactors(system.unknowns, solution.state, images), shared, points, root)
+
+
+def excess_of_root(system: NormalSystem, solution: Solution, root: ModelRoot) -> Excess:
+    """The model part F·Fᵀ of a root that has no noise in it."""
+    images = root.images @ np.swapaxes(root.images, 1, 2)
+    points = np.empty((len(root.points), 3, 3))
+    for first in range(0, len(points), POINTS_AT_ONCE):
+        own = root.points[first : first + POINTS_AT_ONCE].astype(float)
+        points[first : first + POINTS_AT_ONCE] = own @ np.swapaxes(own, 1, 2)
+    shared = root.shared @ root.shared.T
     return Excess(orientation_cofactors(system.unknowns, solution.state, images), shared, points, root)
 
 

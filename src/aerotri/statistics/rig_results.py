@@ -15,9 +15,12 @@ from aerotri.statistics.covariance import Cofactors
 def mounted_cameras(system: NormalSystem, solution: Solution, q: Cofactors, sigma0: float) -> tuple[MountedCamera, ...]:
     """Every camera of a rigid rig beside the reference camera, in the frame of that."""
     u = system.unknowns
-    if u.rigging is None:
+    mountings = u.mountings
+    if mountings is None:
         return ()
-    mountings = u.rigging.mountings
+    every = np.concatenate([
+        part.mounting for part in (u.rigging, u.ties) if part is not None
+    ])  # fmt: skip
     position, rotation = mountings.at(solution.state.shared)
     angles = angles_from_rotation(rotation, mountings.order)
     rig = {camera: rig for rig in u.block.rigs for camera in rig.cameras}
@@ -29,7 +32,7 @@ def mounted_cameras(system: NormalSystem, solution: Solution, q: Cofactors, sigm
             position=position[k],
             angles=angles[k],
             covariance=sigma0**2 * _cofactor(mountings, k, angles[k], solution.state.shared, q.shared),
-            stations=int((u.rigging.mounting == k).sum()),
+            stations=int((every == k).sum()),
         )
         for k, camera in enumerate(mountings.cameras)
     )

@@ -32,7 +32,9 @@ from aerotri.statistics.covariance import Cofactors, cofactors, correlations, or
 from aerotri.statistics.external_reliability import ray_effects, row_effects
 from aerotri.statistics.held_control import HeldTests, held_tests
 from aerotri.statistics.reliability import detectable_share, suspected_blunders
+from aerotri.statistics.rig_movements import movement_groups, rig_movements
 from aerotri.statistics.rig_results import mounted_cameras
+from aerotri.statistics.rolling_results import rolling_shutters
 
 OF_POINTS = ("point", "constraint", position_errors.KIND)
 """Kinds of shared parameters that belong to object points or single exposures and not to cameras or flights."""
@@ -58,7 +60,7 @@ def count_observations(system: NormalSystem) -> Counts:
     """Counts of the adjustment that `system` stands for; an inner datum has a condition for all that is free."""
     u = system.unknowns
     held_observed = int(((u.prior_weight > 0.0) & ~u.point_held).sum())
-    extras = sum(extra.count for extra in system.extras)
+    extras = sum(extra.count for extra in system.extras) + (0 if u.ties is None else u.ties.count)
     observations = 2 * len(u.rays.image) + held_observed + extras + system.priors.count
     conditions = u.motions.count if u.block.settings.adjustment.datum == "inner" else 0
     return Counts(observations, u.count + conditions, conditions)
@@ -111,6 +113,8 @@ def summarise(
         blunders=suspected_blunders(block, rays, control),
         effects=ray_effects(system, solution, q),
         rigs=mounted_cameras(system, solution, q, sigma0),
+        rolling_shutters=rolling_shutters(system, solution, q, sigma0),
+        rig_movements=rig_movements(system, solution, q.inverse, sigma0),
     )
 
 
@@ -308,7 +312,7 @@ def _groups(
                 rms = float(np.sqrt(np.mean(d[known] ** 2)))
                 apriori = float(np.median(s[known]))
                 groups.append(_group(name, int(known.sum()), apriori, rms, float(r[known].sum()), pvv))
-    return groups + _prior_group(system, solution, q)
+    return groups + _prior_group(system, solution, q) + movement_groups(system, solution.state, q.inverse)
 
 
 def _group(name: str, count: int, apriori: float, rms: float, redundancy: float, pvv: float) -> ObservationGroup:

@@ -74,12 +74,26 @@ class ReducedToGroups:
         omega = weighted_sum(system, solution) + float(right @ values)
         return cls(system.priors.deviations, places, normals, right, omega, effective_redundancy(system, solution))
 
+    def alone(self, k: int) -> ReducedToGroups:
+        """What the block says of the groups' values of parameter k where all others have one value for all groups."""
+        own, count = self.places[k], len(self.right)
+        means = [
+            np.isin(np.arange(count), at).astype(float)
+            for one, at in zip(self.deviations, self.places, strict=True)
+            if one is not self.deviations[k] and not one.about_zero
+        ]
+        columns = np.column_stack([np.eye(count)[:, own], *means])
+        return replace(
+            self, deviations=(self.deviations[k],), places=(np.arange(len(own)),),
+            normals=columns.T @ self.normals @ columns, right=columns.T @ self.right,
+        )  # fmt: skip
+
     def deviance(self, log_variance: np.ndarray) -> tuple[float, np.ndarray]:
         """−2 ln L of the logarithms (t,) of the squares of the sizes in µm, and its derivatives by them."""
         normals, weights = self.normals.copy(), []
         for one, own, x in zip(self.deviations, self.places, log_variance, strict=True):
             weights.append(one.weight(float(np.exp(0.5 * x))))
-            normals[np.ix_(own, own)] += weights[-1]
+            normals[np.ix_(own, own)] += weights[-1] + one.of_mean
         scale = 1.0 / np.sqrt(np.diagonal(normals))
         try:
             factor = cho_factor(normals * scale[:, None] * scale, lower=True, overwrite_a=True)
@@ -166,16 +180,26 @@ def found_deviations(system: NormalSystem, reduced: ReducedToGroups) -> Deviatio
     x = np.array([2.0 * np.log(known[one.name]) for one in reduced.deviations])
     deviance, nothing = reduced.deviance(x)[0], np.full(len(x), low)
     ratio = max(reduced.deviance(nothing)[0] - deviance, 0.0)
-    common = _common_ratio(reduced, sigma_um)
-    p = 0.5 * float(chi_square_exceedance(common, 1.0)) if common > 0.0 else 1.0
-    found = []
+    p, found = _probability(reduced, sigma_um), []
     for k, one in enumerate(reduced.deviations):
         seen = x[k] > low + 1e-6
         without = np.where(np.arange(len(x)) == k, low, x)
         gain = max(reduced.deviance(without)[0] - deviance, 0.0) if seen else 0.0
-        found.append(FoundDeviation(one.name, len(one.groups), float(np.exp(0.5 * x[k])) if seen else 0.0, gain))
+        size = float(np.exp(0.5 * x[k])) if seen else 0.0
+        found.append(FoundDeviation(one.name, len(one.groups), size, 1e-3 * size / one.size_mm, gain))
     total = float(np.sqrt(sum(one.sigma_um**2 for one in found)))
     return Deviations(settings.deviations.kind, tuple(found), total, ratio, p, p < settings.adjustment.alpha)
+
+
+def _probability(reduced: ReducedToGroups, sigma_um: float) -> float:
+    """Of what the block shows where nothing deviates: all parameters by one common size, or one of them alone.
+
+    So many tests, and the smallest of their probabilities counts as many times [L: Bonferroni].
+    """
+    count = len(reduced.deviations)
+    tested = [reduced, *(reduced.alone(k) for k in range(count) if count > 1)]
+    ratio = max(_common_ratio(one, sigma_um) for one in tested)
+    return min(0.5 * float(chi_square_exceedance(ratio, 1.0)) * len(tested), 1.0) if ratio > 0.0 else 1.0
 
 
 def _common_ratio(reduced: ReducedToGroups, sigma_um: float) -> float:

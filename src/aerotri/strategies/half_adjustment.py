@@ -125,7 +125,7 @@ def adjust_half(whole: Whole, images: np.ndarray, other: np.ndarray, hold: Hold)
         found = _solved(whole, block, status)
     except HalfFailedError:
         # pieces without a tie to one another may not be held each by itself
-        largest = _of_largest_piece(block, status)
+        largest = of_largest_piece(block, status)
         if (largest == status).all():
             raise
         found = _solved(whole, block, largest)
@@ -229,7 +229,7 @@ def _with_conditions_left(block: Block, status: np.ndarray) -> Block:
     return replace(block, constraints=left)
 
 
-def _of_largest_piece(block: Block, status: np.ndarray) -> np.ndarray:
+def of_largest_piece(block: Block, status: np.ndarray) -> np.ndarray:
     """The status of rays with those outside the largest piece of photographs that points tie together set aside."""
     rays, used = block.image_points, status == RayStatus.USED
     incidence = coo_array(

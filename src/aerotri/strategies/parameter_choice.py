@@ -1,9 +1,11 @@
-"""Which set of additional parameters to take, by cross-validation over the control points.
+"""Which set of additional parameters to take: the one that predicts best what it was not fitted to.
 
-[C] The measure is the geometric mean of the RMS in X, Y and Z at control points predicted without themselves: it needs
-no weights between plan and height. Sets whose measure differs from the best by less than the standard error of the
-difference (bootstrap over the points, the same points for both) cannot be told apart by the control; among them the
-image residuals decide, by BIC.
+[C] Image points of every area and of every strip, and every control point, are predicted by all other observations, and
+the density with which that is done counts, σ of the prediction included: a set with small errors and smaller σ
+loses. −2 ln of it is summed: the mean of areas and strips, which are the same image points, and the control. The
+standard error of a difference between two sets follows from how much the areas, the strips and the control points
+differ in it. Sets within twice the standard error of the best (Student's t of few areas) cannot be told apart; among
+them the one with the largest σ of heights is taken. Blocks too small to be divided are judged by BIC.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
 from aerotri.conventions import InputError, counted
 from aerotri.functional_model.additional_parameters import parse_parameters
@@ -21,14 +24,23 @@ from aerotri.results.parameter_comparison import Choice, ParameterComparison, Se
 RESAMPLES = 400
 """Bootstrap samples of the control points: the standard error from them is itself good to 1/√800, 3.5 % [D]; more
 would not change a choice."""
-FEWEST_POINTS = 4
-"""Control points below which cross-validation says nothing."""
+ALIKE = 0.975
+"""Probability of Student's t whose quantile, in standard errors, is the bound within which two sets are alike [C]: two
+standard errors, more where the standard error itself follows from few areas."""
+NEGLIGIBLE = 4.0
+"""Difference of −2 ln of the density within which two sets are alike whatever its standard error [C]: a likelihood
+ratio of 7."""
 
-COMMON = ("bluh:1-12", "brown", "ebner", "gruen", "fourier:2x2", "legendre:5x5", "collocation")
+COMMON = ("brown", "lens:k1+k2+k3+p1+p2", "bluh:1-12", "gruen", "legendre:5x5", "collocation:13x9")
 OF_MODEL = {
-    "ultracam_d": ("ultracam_d:42-73", "bluh:1-12,ultracam_d:42-73", "ultracam_d:42-73,collocation"),
-    "dmc": ("dmc", "bluh:1-12,dmc:30-41+74-77", "dmc:30-41+74-77,collocation"),
+    "ultracam_d": ("ultracam_d:42-73", "bluh:1-12,ultracam_d:42-73", "ultracam_d:42-73,collocation:13x9"),
+    "dmc": ("dmc", "bluh:1-12,dmc:30-41+74-77", "dmc:30-41+74-77,collocation:13x9"),
 }
+
+
+OF_SMALL_BLOCKS = ("brown:K1+K2+K3+P1+P2", "lens:k1+k2+k3+p1+p2", "bluh:1-12", "none")
+FEW_PHOTOGRAPHS = 18
+"""Photographs below which only sets of a dozen parameters are tried [C]."""
 
 
 @dataclass(frozen=True)
@@ -41,26 +53,62 @@ class Gain:
 
 
 @dataclass(frozen=True)
+class Behind:
+    """How much worse than the best a set predicts: the difference of −2 ln of the density, and its standard error.
+
+    Parameters
+    ----------
+    areas : how many areas the standard error follows from.
+    """
+
+    best: str
+    value: float
+    error: float
+    areas: int
+
+    @property
+    def alike(self) -> bool:
+        """Whether the two cannot be told apart."""
+        bound = float(stdtrit(max(self.areas - 1, 1), ALIKE))
+        return self.value <= max(bound * self.error, NEGLIGIBLE)
+
+
+@dataclass(frozen=True)
 class Chosen:
-    """The set to take, and why."""
+    """The set to take, and why.
+
+    Parameters
+    ----------
+    groups, kind : of values that change, as of `SetOutcome`.
+    """
 
     name: str
     choice: Choice
     reason: str
+    groups: str = ""
+    kind: str = "free"
+
+
+def sets_to_choose_from(block: Block) -> tuple[Choice, ...]:
+    """The sets of `candidate_sets`, of small blocks those with few parameters."""
+    if len(block.images) >= FEW_PHOTOGRAPHS:
+        return candidate_sets(block)
+    return tuple(parse_parameters(spec) for spec in OF_SMALL_BLOCKS)
 
 
 def candidate_sets(block: Block) -> tuple[Choice, ...]:
     """The sets worth comparing for the cameras of a block, none among them."""
     models = {block.cameras[k].model for k in set(block.images.camera.tolist())}
-    specs = ["none", COMMON[0]]
+    specs: list[str] = list(COMMON)
     for model, own in OF_MODEL.items():
         if model in models:
             specs += own
-    return tuple(parse_parameters(spec) for spec in (*specs, *COMMON[1:]))
+    # without parameters a strong lens does not converge: from where the others ended it costs least to see that
+    return tuple(parse_parameters(spec) for spec in (*specs, "none"))
 
 
 def choose(comparison: ParameterComparison) -> Chosen:
-    """The set that the control points and, where they cannot tell, the residuals speak for.
+    """The set that predicts best, or the most cautious one of those that cannot be told from it.
 
     Raises
     ------
@@ -70,30 +118,79 @@ def choose(comparison: ParameterComparison) -> Chosen:
     there = [o for o in comparison.outcomes if o.converged]
     if not there:
         raise InputError("the block cannot be adjusted with any set of additional parameters", "try --parameters none")
-    usable = [o for o in there if min(o.control.count) >= FEWEST_POINTS]
-    if not usable:
-        best = min(there, key=lambda o: o.bic)
-        why = f"fewer than {FEWEST_POINTS} control points can be predicted from the others: chosen by BIC alone"
-        return Chosen(best.name, best.choice, f"additional parameters chosen: {best.name}; {why}")
-    best = min(usable, key=lambda o: measure(o.control.difference))
-    gains = {o.name: gain(o, best, (o.control.difference, best.control.difference)) for o in usable if o is not best}
-    alike = [o for o in usable if o is best or gains[o.name].value >= -gains[o.name].error]
-    found = min(alike, key=lambda o: o.bic)
-    return Chosen(found.name, found.choice, _reason(found, best, alike, usable))
+    behind = distances(comparison)
+    if not behind:
+        found = min(there, key=lambda o: o.bic)
+        why = "the block is too small to predict one part by another: chosen by BIC alone"
+        return _chosen(found, f"additional parameters chosen: {found.name}; {why}")
+    alike = [o for o in there if o.name in behind and behind[o.name].alike]
+    found = max(alike, key=lambda o: (np.nan_to_num(o.evidence.sigma_height), o.effective))
+    return _chosen(found, _reason(found, alike, behind, comparison))
 
 
-def _reason(found: SetOutcome, best: SetOutcome, alike: Sequence[SetOutcome], all_sets: Sequence[SetOutcome]) -> str:
-    rms = ", ".join(f"{axis} {value:.3f}" for axis, value in zip("XYZ", found.control.rms, strict=True))
-    text = (
-        f"additional parameters chosen: {found.name}; control points, each left out in turn, are predicted to {rms} m "
-        f"(RMS); {counted(len(all_sets), 'set')} compared"
+def _chosen(found: SetOutcome, reason: str) -> Chosen:
+    return Chosen(found.name, found.choice, reason, found.groups, found.kind)
+
+
+def _reason(
+    found: SetOutcome, alike: Sequence[SetOutcome], behind: dict[str, Behind], comparison: ParameterComparison
+) -> str:
+    count, points = len(found.evidence.areas), int(np.isfinite(found.evidence.control).sum())
+    by = f"the image points of {count} areas of the block"
+    if points:
+        by += f" and {counted(points, 'control point')}"
+    text = f"additional parameters chosen: {found.name}, which predict {by} best, each from everything else"
+    if len(alike) > 1:
+        others = ", ".join(o.name for o in alike if o is not found)
+        text = (
+            f"additional parameters chosen: {found.name}. They predict {by}, each from everything else, as well as "
+            f"{others}, and their σ are the largest of these"
+        )
+    name, next_best = min(
+        ((name, b) for name, b in behind.items() if not b.alike), key=lambda one: one[1].value, default=("", None)
     )
-    if len(alike) == 1:
-        return text + "; every other set predicts them worse, by more than its standard error"
-    others = ", ".join(o.name for o in alike if o is not found)
-    if found is not best:
-        text += f"; {best.name} predicts them best"
-    return text + f"; the difference to {others} is within the uncertainty, and of these it has the best BIC"
+    if next_best is not None:
+        times = next_best.value / max(next_best.error, 1e-9)
+        text += f". {name} is the best of the others, worse by {times:.0f} times the standard error of the difference"
+    if found.groups:
+        text += f". The parameters change by {found.groups} (probability of this by chance {found.p:.0e})"
+    return text + f"; {counted(len(comparison.outcomes), 'set')} compared"
+
+
+def distances(comparison: ParameterComparison) -> dict[str, Behind]:
+    """How much worse than the best every set predicts; empty where the block is too small to say."""
+    there = [o for o in comparison.outcomes if o.converged and _deviance(o.evidence.areas).size]
+    if not there:
+        return {}
+    totals = [_between(o, there[0])[0] for o in there]
+    best = there[int(np.nanargmin(totals))] if np.isfinite(totals).any() else there[0]
+    return {o.name: Behind(best.name, *_between(o, best), len(o.evidence.areas)) for o in there}
+
+
+def _between(outcome: SetOutcome, best: SetOutcome) -> tuple[float, float]:
+    """Difference of −2 ln of the densities of two sets, and its standard error."""
+    own, other = outcome.evidence, best.evidence
+    pairs = ((own.areas, other.areas), (own.strips, other.strips), (own.control, other.control))
+    sums = [_sum_of(first - second) for first, second in pairs]
+    parts = [one for one in sums[:2] if one is not None]
+    if not parts:
+        return float("nan"), float("nan")
+    value, error = np.mean(parts, axis=0)
+    if sums[2] is not None:
+        value, error = value + sums[2][0], float(np.hypot(error, sums[2][1]))
+    return float(value), float(error)
+
+
+def _sum_of(differences: np.ndarray) -> tuple[float, float] | None:
+    """Sum of differences that are known, and its standard error; None of fewer than two."""
+    known = _deviance(differences)
+    if len(known) < 2:
+        return None
+    return float(known.sum()), float(np.std(known, ddof=1) * np.sqrt(len(known)))
+
+
+def _deviance(values: np.ndarray) -> np.ndarray:
+    return values[np.isfinite(values)]
 
 
 def measure(difference: np.ndarray) -> float:
@@ -104,11 +201,15 @@ def measure(difference: np.ndarray) -> float:
 
 def gain(outcome: SetOutcome, other: SetOutcome, differences: tuple[np.ndarray, np.ndarray]) -> Gain:
     """How much smaller the measure of a set is than another's, at the same points (k, 3) m of both."""
-    own, against = differences
+    return Gain(other.name, *reduction(*differences))
+
+
+def reduction(own: np.ndarray, against: np.ndarray) -> tuple[float, float]:
+    """How much smaller the measure of differences (k, 3) m is than that of others there, and its standard error."""
     known = np.isfinite(own).all(axis=1) & np.isfinite(against).all(axis=1)
     own, against = own[known] ** 2, against[known] ** 2
     if not len(own):
-        return Gain(other.name, float("nan"), float("nan"))
+        return float("nan"), float("nan")
     # drawing goes by place: the same points in another order have to give the same
     order = np.lexsort(np.hstack([own, against]).T)
     own, against = own[order], against[order]
@@ -116,7 +217,7 @@ def gain(outcome: SetOutcome, other: SetOutcome, differences: tuple[np.ndarray, 
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.exp(0.5 * np.mean(np.log(chosen @ own) - np.log(chosen @ against), axis=1))
         value = 1.0 - float(np.exp(0.5 * np.mean(np.log(own.sum(axis=0)) - np.log(against.sum(axis=0)))))
-    return Gain(other.name, value, float(np.nanstd(ratio)))
+    return value, float(np.nanstd(ratio))
 
 
 def gains(comparison: ParameterComparison) -> dict[str, Gain]:

@@ -10,12 +10,15 @@ every set the same, are eliminated from either [L: Akaike 1974, Schwarz 1978; th
 its effective number, the trace of its hat matrix, in AIC; BIC stands for −2 ln of the marginal likelihood, which of a
 field is known: ν·ln(Ω/ν) + ln|I + K·N|, see `field_estimation`, and 2·ln r for σ_d and ℓ. Of robust adjustments Ω is
 Σρ, and what it says an approximation.
+
+Parameters may also have values for every strip, or every group of a column of images.csv, that scatter about a mean or
+drift, see `deviation_estimation`. Such a set is compared where the differences are significant.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,14 +33,17 @@ from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import State, Unknowns
 from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import format_parameters
-from aerotri.observations import Block
+from aerotri.observations import Block, DeviationSettings
 from aerotri.results.parameter_comparison import Accuracy, Choice, ParameterComparison, SetOutcome
 from aerotri.statistics.summarise import count_observations, effective_redundancy, weighted_sum
-from aerotri.strategies.control_prediction import predict_control
+from aerotri.strategies.control_prediction import control_rows, predict_control
+from aerotri.strategies.deviation_estimation import with_estimated_deviations
 from aerotri.strategies.field_estimation import ReducedToFields, covariance_in_use, with_estimated_fields
+from aerotri.strategies.parameter_evidence import Divisions, divisions_of, evidence_of
 
 SIGNIFICANT_T = 1.96
 """|p|/σ from which a parameter counts as significant: 95 % of the normal distribution, two-sided [L]."""
+NOWHERE = Accuracy.of(np.zeros((0, 3)))
 HYPERPARAMETERS = 2
 """Parameters of a random field's covariance that BIC counts: σ_d and the correlation length."""
 
@@ -47,6 +53,99 @@ Progress = Callable[[int, int, str], None]
 def set_name(choice: Choice) -> str:
     """The specification of a choice as on the command line."""
     return ",".join(format_parameters(choice)) or "none"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A set of additional parameters: one for each camera, or one for each group of a column, tied as `kind` says."""
+
+    choice: Choice
+    groups: str = ""
+    kind: str = "free"
+
+    @property
+    def name(self) -> str:
+        """As in tables: 'brown:K1+K2', 'brown:K1+K2, by strip'."""
+        return set_name(self.choice) + (f", by {self.groups}" if self.groups else "")
+
+
+class SetComparer:
+    """Adjusts one block with one set after the other, each from where the last one ended.
+
+    Parameters
+    ----------
+    prepared : the block with any set. folds : of the cross-validation over control points.
+    status : (m,) of the rays, where not all that are used shall be. strips : (n,) names of the strips for sets that
+        change by strip, where the block names none.
+    """
+
+    def __init__(
+        self, prepared: Prepared, folds: int, options: SolveOptions, status: np.ndarray | None = None,
+        strips: np.ndarray | None = None,
+    ) -> None:  # fmt: skip
+        u = prepared.system.unknowns
+        self._block, self._folds, self._options = u.block, folds, options
+        self._status = prepared.ray_status if status is None else status
+        self._strips = strips
+        self._start, self._last = start_values_at(u, prepared.state), None
+        self._divisions: Divisions | None = None
+        self._names: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+
+    def outcome(self, candidate: Candidate) -> SetOutcome:
+        """The block adjusted with a set, and what speaks for it."""
+        try:
+            block = with_candidate(self._block, candidate, self._strips)
+            system, state = build_system(block, self._start, self._status)
+        except InputError as error:
+            return _failed(candidate, error.message)
+        if self._last is not None:
+            state = with_shared(system.unknowns, self._last[0], state, self._last[1])
+        if self._divisions is None:
+            # the same points and divisions for every set
+            self._divisions = divisions_of(system.unknowns, state)
+            self._names = _check_points(system.unknowns), _control_points(system.unknowns)
+        found, adjusted = self._adjusted(system, state, candidate)
+        if adjusted is not None:
+            self._last = adjusted
+            self._start = start_values_at(*adjusted)
+        return found
+
+    def comparison(self, outcomes: Sequence[SetOutcome]) -> ParameterComparison:
+        """Outcomes together, with what they have in common."""
+        check, control = self._names
+        folds = min(self._folds, max(len(control), 1))
+        return ParameterComparison(str(self._block.name), tuple(outcomes), folds, check, control, self._options.robust)
+
+    def _adjusted(
+        self, system: NormalSystem, state: State, candidate: Candidate
+    ) -> tuple[SetOutcome, tuple[Unknowns, State] | None]:
+        """What a set did, and where its adjustment stands if there is one."""
+        options = self._options
+        system, solution = minimise_at_adjusted(system, state, count_observations(system).redundancy, options)
+        if solution.defects:
+            return _failed(candidate, f"rank deficient: {'; '.join(solution.defects)}"), None
+        system, solution = with_estimated_fields(system, solution, options)
+        system, solution, deviations = with_estimated_deviations(system, solution, options)
+        factor, defects = checked_factor(system, solution.state, solution.equations, solution.estimator)
+        if factor is None:
+            return _failed(candidate, f"rank deficient: {'; '.join(defects)}"), None
+        if solution.status != "converged":
+            return _failed(candidate, solution.status), None
+        found = self._judged(system, solution, factor, candidate)
+        if deviations is not None:
+            found = replace(found, p=deviations.p, ratio=deviations.ratio)
+        return found, (system.unknowns, solution.state)
+
+    def _judged(self, system: NormalSystem, solution: Solution, factor: Factor, candidate: Candidate) -> SetOutcome:
+        u = system.unknowns
+        freedom = effective_redundancy(system, solution)
+        sigma0 = float(np.sqrt(weighted_sum(system, solution) / freedom)) if freedom > 0.0 else float("nan")
+        predicted = predict_control(system, solution, factor, sigma0, self._folds)
+        found = _fitted(system, solution, factor, candidate, sigma0)
+        assert self._divisions is not None
+        evidence = evidence_of(system, solution, factor, self._status, self._divisions, predicted, sigma0**2)
+        check, control = Accuracy.of(_check_differences(u, solution.state)), Accuracy.of(predicted.difference)
+        return replace(found, check=check, control=control, evidence=evidence)
 
 
 def compare_sets(
@@ -59,61 +158,38 @@ def compare_sets(
     prepared : the block with any set. folds : of the cross-validation over control points.
     progress : called before each set with its number from 1, how many there are, and its name.
     """
-    u = prepared.system.unknowns
-    start, last = start_values_at(u, prepared.state), None
-    outcomes = []
+    comparer, outcomes = SetComparer(prepared, folds, options), []
     for number, choice in enumerate(choices, start=1):
         if progress is not None:
             progress(number, len(choices), set_name(choice))
-        block = _with_choice(u.block, choice)
-        try:
-            system, state = build_system(block, start, prepared.ray_status)
-        except InputError as error:
-            outcomes.append(_failed(choice, error.message))
-            continue
-        if last is not None:
-            state = with_shared(system.unknowns, last[0], state, last[1])
-        outcome, adjusted = _outcome(system, state, choice, folds, options)
-        outcomes.append(outcome)
-        if adjusted is not None:
-            last = adjusted
-            start = start_values_at(*adjusted)
-    control = u.block.points[_control_points(u.block, u)]
-    check = u.block.points[_check_points(u.block, u)]
-    return ParameterComparison(
-        str(u.block.name), tuple(outcomes), min(folds, max(len(control), 1)), tuple(map(str, check)),
-        tuple(map(str, control)), options.robust,
-    )  # fmt: skip
+        outcomes.append(comparer.outcome(Candidate(choice)))
+    return comparer.comparison(outcomes)
 
 
-def _with_choice(block: Block, choice: Choice) -> Block:
-    adjustment = replace(block.settings.adjustment, additional_parameters=choice, parameters_removed=())
-    return replace(block, settings=replace(block.settings, adjustment=adjustment))
+def with_candidate(block: Block, candidate: Candidate, strips: np.ndarray | None) -> Block:
+    """The block with a set of parameters, and with named strips where these have values of their own.
+
+    Parameters
+    ----------
+    strips : (n,) names of the strips, None where some photograph has none.
+    """
+    settings = block.settings
+    adjustment = replace(settings.adjustment, additional_parameters=candidate.choice, parameters_removed=())
+    if candidate.groups:
+        adjustment = replace(adjustment, parameter_groups=candidate.groups)
+        settings = replace(settings, deviations=DeviationSettings(candidate.kind))
+    if candidate.groups == "strip" and strips is not None:
+        block = replace(block, images=replace(block.images, strip=strips))
+    return replace(block, settings=replace(settings, adjustment=adjustment))
 
 
-def _outcome(
-    system: NormalSystem, state: State, choice: Choice, folds: int, options: SolveOptions
-) -> tuple[SetOutcome, tuple[Unknowns, State] | None]:
-    """What a set did, and where its adjustment stands if there is one."""
-    system, solution = minimise_at_adjusted(system, state, count_observations(system).redundancy, options)
-    if solution.defects:
-        return _failed(choice, f"rank deficient: {'; '.join(solution.defects)}"), None
-    system, solution = with_estimated_fields(system, solution, options)
-    factor, defects = checked_factor(system, solution.state, solution.equations, solution.estimator)
-    if factor is None:
-        return _failed(choice, f"rank deficient: {'; '.join(defects)}"), None
-    where = system.unknowns, solution.state
-    if solution.status != "converged":
-        return _failed(choice, solution.status), None
-    return _judged(system, solution, factor, choice, folds), where
-
-
-def _judged(system: NormalSystem, solution: Solution, factor: Factor, choice: Choice, folds: int) -> SetOutcome:
+def _fitted(
+    system: NormalSystem, solution: Solution, factor: Factor, candidate: Candidate, sigma0: float
+) -> SetOutcome:
+    """What the observations say that a set was fitted to."""
     u, state, settings = system.unknowns, solution.state, system.unknowns.block.settings
     own = np.flatnonzero(np.array(u.shared.kinds, dtype=object) == "additional")
     cofactor = factor.border_inverse()[np.ix_(own, own)]
-    freedom = effective_redundancy(system, solution)
-    sigma0 = float(np.sqrt(weighted_sum(system, solution) / freedom)) if freedom > 0.0 else float("nan")
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.abs(state.shared[own]) / (sigma0 * np.sqrt(np.diagonal(cofactor)))
     effective, omega = float(len(own)), solution.equations.cost
@@ -137,11 +213,10 @@ def _judged(system: NormalSystem, solution: Solution, factor: Factor, choice: Ch
             weighted_sum(system, solution)
         )
         bic = without * np.log(solution.equations.cost / without) + log_determinant + fixed * np.log(without)
-    predicted = predict_control(system, solution, factor, sigma0, folds)
     known = settings.collocation if system.priors.fields else None
     return SetOutcome(
-        name=set_name(choice),
-        choice=choice,
+        name=candidate.name,
+        choice=candidate.choice,
         status="converged",
         count=len(own),
         effective=effective,
@@ -150,26 +225,33 @@ def _judged(system: NormalSystem, solution: Solution, factor: Factor, choice: Ch
         sigma0_um=sigma0 * settings.image_sigma_um,
         aic=deviance + 2.0 * effective,
         bic=float(bic),
-        check=Accuracy.of(_check_differences(u, state)),
-        control=Accuracy.of(predicted.difference),
+        check=NOWHERE,
+        control=NOWHERE,
         sigma_um=float("nan") if known is None or known.sigma_um is None else known.sigma_um,
         length_mm=float("nan") if known is None or known.length_mm is None else known.length_mm,
+        groups=candidate.groups,
+        kind=candidate.kind,
     )
 
 
-def _failed(choice: Choice, status: str) -> SetOutcome:
-    nan, nothing = float("nan"), Accuracy.of(np.zeros((0, 3)))
-    return SetOutcome(set_name(choice), choice, status, 0, nan, 0, nan, nan, nan, nan, nothing, nothing)
+def _failed(candidate: Candidate, status: str) -> SetOutcome:
+    nan = float("nan")
+    return SetOutcome(
+        candidate.name, candidate.choice, status, 0, nan, 0, nan, nan, nan, nan, NOWHERE, NOWHERE,
+        groups=candidate.groups, kind=candidate.kind,
+    )  # fmt: skip
 
 
-def _check_points(block: Block, unknowns: Unknowns) -> np.ndarray:
-    """Index of the check points that are adjusted."""
+def _check_points(unknowns: Unknowns) -> tuple[str, ...]:
+    """Names of the check points that are adjusted."""
+    block = unknowns.block
     point = block.control.point[block.control.is_check]
-    return point[np.isin(point, unknowns.points)]
+    return tuple(map(str, block.points[point[np.isin(point, unknowns.points)]]))
 
 
-def _control_points(block: Block, unknowns: Unknowns) -> np.ndarray:
-    return unknowns.points[np.flatnonzero((unknowns.prior_weight > 0.0).any(axis=1))]
+def _control_points(unknowns: Unknowns) -> tuple[str, ...]:
+    """Names of the points whose coordinates are observed."""
+    return tuple(map(str, unknowns.block.points[unknowns.points[control_rows(unknowns)]]))
 
 
 def _check_differences(unknowns: Unknowns, state: State) -> np.ndarray:

@@ -122,8 +122,8 @@ def _without(
 def with_findings_of(block: Block, used: Block) -> Block:
     """A block with what the adjustment of another form of it found.
 
-    Parameters removed, where they are evaluated, the covariance of fields and of errors of positions, and how
-    much groups differ.
+    Parameters removed, where they are evaluated, the covariance of fields and of errors of positions, how much
+    groups differ, and how cameras move on weighted rigs.
     """
     found = used.settings.adjustment
     adjustment = replace(
@@ -137,7 +137,7 @@ def with_findings_of(block: Block, used: Block) -> Block:
         deviations=used.settings.deviations,
         gnss=used.settings.gnss,
     )
-    return replace(block, settings=settings)
+    return replace(block, settings=settings, rigs=used.rigs)
 
 
 def without_parameters(block: Block, names: Sequence[tuple[str, str]]) -> Block:

@@ -133,7 +133,7 @@ def _start(prepared: Prepared, solution: Solution, options: SolveOptions) -> _St
     if solution.status == "converged" and tests.rays.joint.max(initial=0.0) <= GROSS:
         return stand
     redundancy = count_observations(system).redundancy
-    robust = minimise(system, prepared.state, redundancy, replace(_counting(options, stand.iterations), robust="huber"))
+    robust = minimise(system, prepared.state, redundancy, replace(options.after(stand.iterations), robust="huber"))
     stand = replace(stand, state=robust.state, iterations=stand.iterations + robust.iterations)
     return _switched(prepared, stand, _far_off(prepared, robust), False, options, whole=True)
 
@@ -167,7 +167,7 @@ def _switched(
         found = with_tests_of(found, which, stand.tests)
     gone = 2 * int((~participants(system.unknowns, switches).rays).sum())
     redundancy = max(count_observations(system).redundancy - gone, 1)
-    counting = replace(_counting(options, stand.iterations), max_iterations=options.max_iterations if whole else 1)
+    counting = replace(_unweighted(options, stand.iterations), max_iterations=options.max_iterations if whole else 1)
     switched = switched_system(system, switches)
     try:
         solution = minimise(switched, stand.state, redundancy, counting)
@@ -182,16 +182,9 @@ def _switched(
     return _Stand(switches, solution.state, tests, iterations, frozen, returned, found)
 
 
-def _counting(options: SolveOptions, done: int) -> SolveOptions:
-    """The options without robust weights, reporting iterations after those done."""
-    report = options.report
-    if report is None:
-        return replace(options, robust="off")
-
-    def counted(k: int, cost: float, damping: float) -> None:
-        report(done + k, cost, damping)
-
-    return replace(options, robust="off", report=counted)
+def _unweighted(options: SolveOptions, done: int) -> SolveOptions:
+    """The options without robust weights, counting on from the iterations done."""
+    return replace(options.after(done), robust="off")
 
 
 def _finished(prepared: Prepared, stand: _Stand, options: SolveOptions) -> Snooped:
@@ -203,7 +196,7 @@ def _finished(prepared: Prepared, stand: _Stand, options: SolveOptions) -> Snoop
     new = left.system.unknowns
     start = with_shared(new, old, left.state, stand.state)
     redundancy = count_observations(left.system).redundancy
-    system, solution = minimise_at_adjusted(left.system, start, redundancy, _counting(options, stand.iterations))
+    system, solution = minimise_at_adjusted(left.system, start, redundancy, _unweighted(options, stand.iterations))
     left = replace(left, system=system)
     solution = replace(solution, iterations=stand.iterations + solution.iterations)
     warnings = (*prepared.warnings, *_in_words(prepared, stand, blunders))

@@ -23,7 +23,7 @@ and image errors that change little across the format converge in a few steps.""
 class View(NamedTuple):
     """n photographs about a piece of ground, their pixels cut out.
 
-    photos : (1, n, 15) as in `_photo_kernels`. source : (n,) image errors. errors : of all groups of photographs.
+    photos : (1, n, 23) as in `_photo_kernels`. source : (n,) image errors. errors : of all groups of photographs.
     sensor : (n, 3) half columns, half rows, pixels per mm. centres : (n, 3) m.
     crops : (n, 5) offset into pixels, first row, first column, rows, columns, of the level. pixels : (·,) uint16.
     scale : pixels of the level per pixel of the photograph. edge : share of the format at its edge not used.

@@ -8,13 +8,15 @@ for all.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from aerotri.deformation.absorbed import additional_rows, shared_columns
 from aerotri.deformation.model_grid import places_of
 from aerotri.deformation.restitution import Restitution
-from aerotri.functional_model.collinearity import linearise
+from aerotri.functional_model.collinearity import RayPartials, linearise
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.model_of_functions import model_of_functions
 from aerotri.terrain.pickets import Pickets
@@ -62,6 +64,27 @@ def adjustment_variances(
     return out
 
 
+def _by_scans(calibration: Adjustment, rays: RayPartials, own: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Of every unknown of rolling shutters that a ray may have: its shared parameter (r,), −1 none, partials (r, 2).
+
+    Parameters
+    ----------
+    own : (r,) photographs of the system.
+    """
+    u, state = calibration.system.unknowns, calibration.solution.state
+    if u.scanning is None:
+        return
+    scans, rotation = u.scans(state), state.rotation[own]
+    rate = np.sum(scans.rate[own] * rays.prediction, axis=1)[:, None]
+    tau = rate[:, :, None] * scans.readout[own][:, None, None]
+    by_way, by_turn = rays.by_orientation[:, :, :3] @ rotation, rays.by_orientation[:, :, 3:] @ rotation
+    moved = np.einsum("rka,ra->rk", by_way, scans.velocity[own]) + np.einsum("rka,ra->rk", by_turn, scans.spin[own])
+    yield scans.columns[own, 0], rate * moved
+    for first, by in ((scans.columns[own, 1], by_way), (scans.columns[own, 2], by_turn)):
+        for axis in range(3):
+            yield np.where(first >= 0, first + axis, -1), tau[:, :, 0] * by[:, :, axis]
+
+
 def _by_unknowns(
     calibration: Adjustment, restitution: Restitution, rows: np.ndarray, local: np.ndarray, photographs: np.ndarray
 ) -> np.ndarray:
@@ -97,6 +120,10 @@ def _by_unknowns(
         if has.any():
             e = -np.einsum("rik,rk->ri", gain[has], rays.by_interior[has][:, :, k])
             np.add.at(j, (picket[has][:, None], np.arange(3), first_shared + free[has, k][:, None]), e)
+    for columns, effect in _by_scans(calibration, rays, own):
+        there = columns >= 0
+        e = -np.einsum("rik,rk->ri", gain[there], effect[there])
+        np.add.at(j, (picket[there][:, None], np.arange(3), first_shared + columns[there][:, None]), e)
     columns = shared_columns(calibration)
     if len(additional_rows(calibration)):
         for g, errors in enumerate(restitution.errors):

@@ -17,7 +17,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.deformation.error_tables import ErrorTables, error_tables
 from aerotri.deformation.model_grid import Places, mean_ground, places_of
-from aerotri.deformation.orientation import Orientation, photo_rows
+from aerotri.deformation.orientation import Orientation, photo_rows, scan_of_images
 from aerotri.deformation.photo_errors import PhotoErrors
 from aerotri.deformation.restitution import FREE, Restitution, restitution_of
 from aerotri.rasters.images import open_photograph
@@ -137,7 +137,7 @@ class Site:
     Parameters
     ----------
     place : (3,) in the CRS. local : (3,), axes : (3, 3), local + axes·Δ lies in the frame.
-    photos : (1, n, 15), centres : (n, 3) m, both in Δ.
+    photos : (1, n, 23), centres : (n, 3) m, both in Δ.
     """
 
     photographs: Photographs
@@ -186,7 +186,7 @@ class Site:
         x, y = (np.array([low[a] - reach, high[a] + reach]) for a in range(2))
         corners = np.stack(np.meshgrid(x, y, [low[2], high[2]]), axis=-1).reshape(-1, 3)
         u = corners @ self.photos[0, k, :12].reshape(3, 4)[:, :3].T + self.photos[0, k, :12].reshape(3, 4)[:, 3]
-        c, x0, y0 = self.photos[0, k, 12:]
+        c, x0, y0 = self.photos[0, k, 12:15]
         if not (u[:, 2] < 0.0).all():
             return None
         half_c, half_r, per_mm = self.photographs.sensor[k]
@@ -220,7 +220,8 @@ def photographs_of(
             raise InputError("is scanned film, which matching does not read", "resample it to its fiducials", path)
         if not restitution.true.known[row]:
             raise InputError("is not oriented", "leave it out, or adjust it", path)
-    places, orientation = places_of(calibration), restitution.true.take(rows)
+    places = places_of(calibration)
+    orientation = replace(restitution.true, scan=scan_of_images(calibration)).take(rows)
     cameras = [block.cameras[c] for c in block.images.camera[rows]]
     pixel = min(camera.pixel_mm for camera in cameras)
     if ideal:

@@ -20,6 +20,11 @@ LENS = ("k1", "k2", "p1", "p2", "k3")
 REMEDY = "state what is missing: --focal-length-mm 8.8 --pixel-um 2.4, or --camera FILE with tables [camera.NAME]"
 
 
+DAY_S = 86400.0
+TIME = "time"
+"""Column of images.csv."""
+
+
 @dataclass(frozen=True, eq=False)
 class PhotographSet:
     """Photographs, n of them, in the order of their names.
@@ -30,6 +35,7 @@ class PhotographSet:
     cameras : the cameras; camera : (n,) index into them.
     lon_lat_height : (n, 3) degrees and m; sigma_m : (n, 3) m; NaN where not known.
     ellipsoidal : (n,) bool, whether the height is said to count from the ellipsoid.
+    time : (n,) s by the clock of the camera, NaN where not known.
     """
 
     paths: tuple[Path, ...]
@@ -39,6 +45,7 @@ class PhotographSet:
     lon_lat_height: np.ndarray
     sigma_m: np.ndarray
     ellipsoidal: np.ndarray
+    time: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.paths)
@@ -55,7 +62,15 @@ class PhotographSet:
             lon_lat_height=self.lon_lat_height[rows],
             sigma_m=self.sigma_m[rows],
             ellipsoidal=self.ellipsoidal[rows],
+            time=None if self.time is None else self.time[rows],
         )
+
+    def time_column(self, keep: np.ndarray) -> dict[str, np.ndarray]:
+        """The column `time` of images.csv for photographs (n,) bool: s of the day on which the first was taken."""
+        if self.time is None or not np.isfinite(self.time[keep]).any():
+            return {}
+        since = self.time[keep] - np.floor(np.nanmin(self.time[keep]) / DAY_S) * DAY_S
+        return {TIME: np.array(["" if np.isnan(t) else f"{t:.10g}" for t in since], dtype=object)}
 
 
 @dataclass(frozen=True)
@@ -96,6 +111,7 @@ def find_photographs(folder: Path, stated: StatedCamera = StatedCamera()) -> Pho
         lon_lat_height=np.array([tag.lon_lat_height for tag in tags]),
         sigma_m=np.array([tag.sigma_m for tag in tags]),
         ellipsoidal=np.array([tag.ellipsoidal for tag in tags]),
+        time=np.array([tag.time for tag in tags]),
     )
 
 

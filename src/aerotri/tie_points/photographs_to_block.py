@@ -199,7 +199,7 @@ def _bare_block(
         name=photographs.paths[0].resolve().parent.name,
         cameras=cameras,
         images=Images(photographs.names[keep], photographs.camera[keep], np.full(count, ""), no_sigma(count),
-                      no_sigma(count)),
+                      no_sigma(count), photographs.time_column(keep)),
         points=np.array([f"tp{number:0{width}d}" for number in range(len(tracks))], dtype=str),
         image_points=ImagePoints(index[tracks.image], tracks.of_ray, xy, np.repeat(sigma[:, None], 2, axis=1)),
         settings=_settings(cameras, 1e3 * float(np.median(sigma)) if len(sigma) else 1.0),

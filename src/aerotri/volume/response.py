@@ -127,7 +127,8 @@ def respond(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, cor
     model = 0.0
     if calibration.model is not None:
         solution, root = calibration.solution, calibration.model
-        model = float(model_of_functions(system, solution, root, c[:, None], solved[:, None])[0, 0, 0])
+        own = np.full((1, 1, 1), cofactor)
+        model = float(model_of_functions(system, solution, root, c[:, None], solved[:, None], 1, own)[0, 0, 0])
     return Response(c, solved, variance, model, noise, by_eo, by_interior, by_parameters, error)
 
 

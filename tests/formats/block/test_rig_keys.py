@@ -75,9 +75,28 @@ def test_written_and_read_again(rig_folder, tmp_path, tables):
     assert_same_block(again, block)
     (a,), (b,) = again.rigs, block.rigs
     assert (a.name, a.reference, a.constraint) == (b.name, b.reference, "off")
+    assert (a.cameras["side"].movement_m, a.cameras["side"].movement_rad) == (0.0, None)
     for one, other in zip(a.cameras["side"].elements, b.cameras["side"].elements, strict=True):
         assert (one.value, one.fixed) == (pytest.approx(other.value, rel=1e-14), other.fixed)
         assert one.sigma == (None if other.sigma is None else pytest.approx(other.sigma, rel=1e-14))
+
+
+MOVES = """constraint = "weighted"
+[rig.two.camera.side]
+movement_m = {}
+movement_deg = {}
+"""
+
+
+@pytest.mark.parametrize(("position", "rotation"), [("0.01", "0.002"), ('"estimated"', '"estimated"'), ("0.0", "0.0")])
+def test_movements_are_written_and_read_again(rig_folder, tmp_path, position, rotation):
+    block = read_block(rig_folder(TOML.replace("[rig.two.camera.side]", MOVES.format(position, rotation))))
+    write_block(block, tmp_path / "again")
+    for one in (block, read_block(tmp_path / "again")):
+        side = one.rigs[0].cameras["side"]
+        assert one.rigs[0].constraint == "weighted"
+        assert side.movement_m == (None if "est" in position else float(position))
+        assert side.movement_rad == (None if "est" in rotation else pytest.approx(np.radians(float(rotation))))
 
 
 WRONG_TOML = {

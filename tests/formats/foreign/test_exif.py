@@ -36,6 +36,15 @@ def test_position_and_camera(tmp_path):
     assert np.isnan(tags.sigma_m).all()
 
 
+def test_time(tmp_path):
+    """When the photograph was taken, with the fraction of a second where it is told; nothing where it is no time."""
+    whole = photograph(tmp_path / "a.jpg", {36867: "2016:06:23 16:31:59"}).time
+    assert whole % 86400.0 == 16 * 3600 + 31 * 60 + 59
+    assert photograph(tmp_path / "b.jpg", {36867: "2016:06:23 16:31:59", 37521: "25"}).time == whole + 0.25
+    assert np.isnan(photograph(tmp_path / "c.jpg", {36867: "0000:00:00 00:00:00"}).time)
+    assert np.isnan(photograph(tmp_path / "d.jpg").time)
+
+
 def test_pixel_of_the_focal_plane_belongs_to_the_size_as_taken(tmp_path):
     """3.3 µm, of a photograph reduced to half."""
     own = {37386: 35.0, 41989: 35, 41486: 1.0 / 3.3e-4, 41488: 3, 40962: 160, 40963: 120}

@@ -19,7 +19,7 @@ from aerotri.formats.block.points import read_control, read_gnss_ins, read_image
 from aerotri.formats.block.scanned_film import read_fiducials
 from aerotri.formats.block.writer import write_block
 from aerotri.formats.text.table_checks import refuse_duplicates, three_or_none
-from aerotri.formats.text.tables import Columns, as_str_array, read_table
+from aerotri.formats.text.tables import Columns, Table, as_str_array, read_table
 from aerotri.observations import Block, Camera, Images, Rig
 from aerotri.observations.rigs import station_fault
 
@@ -167,12 +167,28 @@ def _images(
         angles=three_or_none(table, ("omega", "phi", "kappa")) * radians,
         columns=grouping,
     )
+    if any(one.rolling_shutter is not None for one in cameras) and "time" in grouping:
+        _refuse_odd_times(table, images.columns["time"])
     fault = station_fault(images, cameras, rigs)
     if fault is not None and fault.image >= 0:
         raise table.error(fault.image, fault.message, fault.remedy)
     if fault is not None:
         raise InputError(fault.message, fault.remedy, path, 1)
     return images
+
+
+def _refuse_odd_times(table: Table, times: np.ndarray) -> None:
+    """Times that give no velocity: they would be passed over in silence."""
+    for row, text in enumerate(times.tolist()):
+        try:
+            usable = not text or np.isfinite(float(text))
+        except ValueError:
+            usable = False
+        if not usable:
+            raise table.error(
+                row, f"time = '{text[:40]}' is no number, and a camera has a rolling shutter",
+                "give seconds, such as 45296.25 for 12:34:56.25, or leave it empty",
+            )  # fmt: skip
 
 
 def _check_names_in_settings(block: Block, settings: BlockToml) -> None:

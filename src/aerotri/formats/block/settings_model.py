@@ -8,77 +8,27 @@ from __future__ import annotations
 from math import radians
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from aerotri.conventions import LARGEST
+from aerotri.formats.block.settings_types import (
+    Fraction,
+    NotNegative,
+    OffOn,
+    Pixels,
+    Positive,
+    PriorModel,
+    RollingShutterModel,
+    Section,
+    Three,
+    ThreeNotNegative,
+    ThreePositive,
+    ThreePriorsModel,
+    Two,
+)
 from aerotri.formats.text.described_key import key
-from aerotri.formats.text.tables import SMALLEST_POSITIVE
 from aerotri.observations import Camera, Mounting, Prior, Rig
 from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
-
-Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[float, Field(gt=0, ge=SMALLEST_POSITIVE, le=LARGEST)]
-NotNegative = Annotated[float, Field(ge=0, le=LARGEST)]
-Fraction = Annotated[float, Field(gt=0, lt=1)]
-Pixels = Annotated[int, Field(gt=0, le=10_000_000)]
-Two = Annotated[list[Real], Field(min_length=2, max_length=2)]
-Three = Annotated[list[Real], Field(min_length=3, max_length=3)]
-ThreeNotNegative = Annotated[list[NotNegative], Field(min_length=3, max_length=3)]
-ThreePositive = Annotated[list[Positive], Field(min_length=3, max_length=3)]
-OffOn = Literal["off", "on"]
-
-
-class Section(BaseModel):
-    """A table of block.toml: unknown keys are refused."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
-
-
-class PriorModel(Section):
-    """``{ fixed = false }``: free. ``{ value, sigma }``: observed. ``{ value }``: free. ``{ fixed = true }``: held."""
-
-    value: Real | None = key(None, "Start value, in the unit of the parameter.")
-    sigma: Positive | None = key(
-        None, "Standard deviation of the value, in the same unit: the value is an observation. Without it the "
-        "parameter is free."
-    )  # fmt: skip
-    fixed: bool = key(False, "true: the value is held and is no unknown.")
-
-    @model_validator(mode="after")
-    def _fixed_or_observed(self) -> PriorModel:
-        if self.fixed and self.sigma is not None:
-            raise ValueError("fixed = true and a sigma exclude each other")
-        return self
-
-    def prior(self, otherwise: float = 0.0) -> Prior:
-        """The record; `otherwise` is the value where none is given."""
-        return Prior(otherwise if self.value is None else self.value, self.sigma, self.fixed)
-
-
-class ThreePriorsModel(Section):
-    """Three elements: ``{ value, sigma }``: observed. ``{ value }``: free. ``{ value, fixed = true }``: held."""
-
-    value: Three | None = key(None, "The three values.")
-    sigma: ThreePositive | None = key(None, "Their standard deviations; without them the elements are free.")
-    fixed: bool | Annotated[list[bool], Field(min_length=3, max_length=3)] = key(
-        False, "true: the elements are held; or a list of three, for every element whether it is held."
-    )
-
-    @model_validator(mode="after")
-    def _fixed_or_observed(self) -> ThreePriorsModel:
-        if self.fixed is True and self.sigma is not None:
-            raise ValueError("fixed = true and a sigma exclude each other")
-        return self
-
-    def priors(self, unit: float = 1.0) -> tuple[Prior, Prior, Prior]:
-        """The records, in the unit of the program."""
-        value = self.value or [0.0, 0.0, 0.0]
-        held = self.fixed if isinstance(self.fixed, list) else [self.fixed] * 3
-        sigma = [None] * 3 if self.sigma is None else self.sigma
-        a, b, c = (
-            Prior(unit * v, None if s is None or h else unit * s, h) for v, s, h in zip(value, sigma, held, strict=True)
-        )
-        return a, b, c
 
 
 class InteriorModel(Section):
@@ -146,6 +96,11 @@ class CameraModel(Section):
         {}, "Scanned film: calibrated position x, y of every fiducial mark, by its name in fiducials.csv.", "mm"
     )
 
+    rolling_shutter: RollingShutterModel = key(
+        RollingShutterModel(), "Rolling shutter: the rows are exposed one after the other. It acts where readout_ms is "
+        "given."
+    )  # fmt: skip
+
     @model_validator(mode="after")
     def _focal_length_positive(self) -> CameraModel:
         given = self.interior.focal_length_mm
@@ -171,6 +126,7 @@ class CameraModel(Section):
             flight_axis=self.flight_axis,
             fiducials={name: (float(x), float(y)) for name, (x, y) in self.fiducials.items()},
             interior_orientation=self.interior_orientation,
+            rolling_shutter=self.rolling_shutter.rolling_shutter(),
         )
 
 
@@ -196,9 +152,9 @@ class AdjustmentModel(Section):
     """How the block is adjusted."""
 
     additional_parameters: list[str] = key(
-        [], "Parameters of systematic image errors (self-calibration): FAMILY:ITEMS, items joined by + and ranges by "
-        "-, such as \"bluh:1-8+12\" or \"brown:K1+K2+P1+P2\"; \"auto\" compares the families by cross-validation. "
-        "`aerotri parameters` lists them. Empty: none."
+        ["auto"], "Parameters of systematic image errors (self-calibration): FAMILY:ITEMS, items joined by + and "
+        "ranges by -, such as \"bluh:1-8+12\" or \"brown:K1+K2+P1+P2\"; \"auto\" takes the set that predicts parts of "
+        "the block best that it was not fitted to. `aerotri parameters` lists them. Empty: none."
     )  # fmt: skip
     parameter_groups: str = key(
         "camera", "Photographs that share one set of additional parameters: camera, block, strip, or the name of a "
@@ -326,7 +282,8 @@ class CollocationModel(Section):
 
 
 class DeviationsModel(Section):
-    """How additional parameters differ between the groups of `adjustment.parameter_groups`."""
+    """How additional parameters differ between the groups of `adjustment.parameter_groups`. Family interior of
+    `additional_parameters` stands for the interior orientation."""
 
     kind: Literal["free", "independent", "walk"] = key(
         "free", "free: the groups have nothing to do with one another. independent: the values of the groups scatter "
@@ -353,6 +310,15 @@ class MountingModel(Section):
         "the orientations of the photographs.", "deg"
     )  # fmt: skip
 
+    movement_m: NotNegative | Literal["estimated"] = key(
+        0.0, "Standard deviation of the movements of the projection centre between exposures, an axis, where "
+        'constraint = "weighted". "estimated": from the block.', "m"
+    )  # fmt: skip
+    movement_deg: NotNegative | Literal["estimated"] = key(
+        "estimated", "Standard deviation of the rotations of the camera between exposures, an axis, where "
+        'constraint = "weighted". "estimated": from the block.', "deg"
+    )  # fmt: skip
+
     @model_validator(mode="after")
     def _held_at_something(self) -> MountingModel:
         if self.rotation_deg.value is None and self.rotation_deg.fixed is not False:
@@ -362,7 +328,11 @@ class MountingModel(Section):
     def mounting(self) -> Mounting:
         """The record."""
         rotation = self.rotation_deg
-        return Mounting(self.position_m.priors(), rotation.priors(radians(1.0)), rotation.value is not None)
+        return Mounting(
+            self.position_m.priors(), rotation.priors(radians(1.0)), rotation.value is not None,
+            None if isinstance(self.movement_m, str) else self.movement_m,
+            None if isinstance(self.movement_deg, str) else radians(self.movement_deg),
+        )  # fmt: skip
 
 
 class RigModel(Section):
@@ -370,9 +340,9 @@ class RigModel(Section):
     to one exposure."""
 
     reference: str = key(..., "Name of the camera whose position and rotation are those of the rig.")
-    constraint: Literal["rigid", "off"] = key(
-        "rigid", "rigid: position and rotation of the cameras on the rig are the same at all exposures. off: the "
-        "cameras are independent."
+    constraint: Literal["rigid", "weighted", "off"] = key(
+        "rigid", "rigid: position and rotation of the cameras on the rig are the same at all exposures. weighted: they "
+        "may move a little from exposure to exposure. off: the cameras are independent."
     )  # fmt: skip
     camera: dict[str, MountingModel] = key({}, "The other cameras of the rig, one table [rig.NAME.camera.NAME] each.")
 

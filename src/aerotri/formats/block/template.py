@@ -33,6 +33,8 @@ EXAMPLES: dict[str, Any] = {
     "name": "my_block",
     "camera.NAME.flight_axis": "+y",
     "camera.NAME.interior_orientation": "affine",
+    "camera.NAME.rolling_shutter.readout_ms": {"value": 30.0},
+    "camera.NAME.rolling_shutter.speed_m_s": 8.0,
     "camera.NAME.fiducials": {"1": [-106.0, -106.0]},
     "stochastic.default_control_sigma_m": [0.02, 0.02, 0.03],
     "gnss.lever_arm_sigma_m": [0.01, 0.01, 0.01],

@@ -13,7 +13,7 @@ from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.text.table_writer import check_names, write_table
 from aerotri.formats.text.toml_text import Inline, toml_of
 from aerotri.functional_model.additional_parameters import format_parameters
-from aerotri.observations import Block, Camera, Mounting, Prior, Rig
+from aerotri.observations import Block, Camera, Mounting, Prior, Rig, RollingShutter
 from aerotri.observations.block import INTERIOR_ELEMENTS, GnssSettings
 
 ANGLE_UNIT = "deg"
@@ -248,6 +248,25 @@ def _camera(camera: Camera) -> dict[str, Any]:
         content["interior_orientation"] = camera.interior_orientation
     if camera.fiducials:
         content["fiducials"] = {name: list(xy) for name, xy in camera.fiducials.items()}
+    if camera.rolling_shutter is not None:
+        content["rolling_shutter"] = _rolling_shutter(camera.rolling_shutter)
+    return content
+
+
+def _rolling_shutter(shutter: RollingShutter) -> dict[str, Any]:
+    content: dict[str, Any] = {
+        "readout_ms": _prior(shutter.readout_ms),
+        "row_direction": shutter.row_direction,
+        "motion": shutter.motion,
+        "rotation": shutter.rotation,
+        "test": shutter.test,
+    }
+    if shutter.motion == "photograph":
+        content["motion_sigma_m_s"] = shutter.motion_sigma_m_s
+    if shutter.rotation == "photograph":
+        content["rotation_sigma_deg_s"] = shutter.rotation_sigma / RADIANS_PER["deg"]
+    if shutter.speed_m_s is not None:
+        content["speed_m_s"] = shutter.speed_m_s
     return content
 
 
@@ -265,6 +284,10 @@ def _mounting(mounting: Mounting) -> dict[str, Any]:
     content: dict[str, Any] = {"position_m": _three(mounting.position, 1.0)}
     if mounting.known or any(prior.fixed for prior in mounting.rotation):
         content["rotation_deg"] = _three(mounting.rotation, 1.0 / RADIANS_PER["deg"])
+    if mounting.movement_m != 0.0:
+        content["movement_m"] = "estimated" if mounting.movement_m is None else mounting.movement_m
+    if mounting.movement_rad is not None:
+        content["movement_deg"] = mounting.movement_rad / RADIANS_PER["deg"]
     return content
 
 

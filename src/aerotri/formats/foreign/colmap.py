@@ -24,13 +24,19 @@ from aerotri.conventions import FilePath, InputError, counted, mm_from_px, px_fr
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.foreign.colmap_binary import check_binary_model
+from aerotri.formats.foreign.colmap_rigs import (
+    COLMAP_FROM_CAMERA,
+    add_frames,
+    add_rigs,
+    rigs_of_model,
+    stations_of_model,
+)
 from aerotri.formats.text.tables import CONTROL_CHARACTERS, LARGEST_NUMBER, LONGEST_NAME
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Prior, Settings
 from aerotri.observations.block import LENS_NAMES
+from aerotri.observations.rigs import STATION
 
-COLMAP_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
-"""COLMAP's cameras have y down and look along +z, those here y up and look along −z."""
 LENS_OF_MODEL: Mapping[str, tuple[str, ...]] = {
     "SIMPLE_PINHOLE": (),
     "PINHOLE": (),
@@ -87,6 +93,10 @@ def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndar
     cameras, camera_place = _cameras_of(model, pixel_um, folder)
     ids = sorted(model.images)
     images = _images_of(model, ids, camera_place, folder)
+    names = {number: cameras[place].name for number, place in camera_place.items()}
+    rigs = rigs_of_model(model, names, Block.rotation)
+    if rigs:
+        images = replace(images, columns={STATION: stations_of_model(model, ids, names, rigs)})
     _check_images(images, folder)
     image, point_id, px = _observations(model, ids)
     image, point_id, px = _once_each(image, point_id, px)
@@ -113,6 +123,7 @@ def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndar
             adjustment=AdjustmentSettings(additional_parameters=_free_parameters(cameras), datum="minimal"),
             image_sigma_um=pixel_um,
         ),
+        rigs=rigs,
     )
     return block, _points_of(model, numbers, folder)
 
@@ -288,10 +299,10 @@ def write_colmap(oriented: OrientedBlock, folder: FilePath, binary: bool = True)
     if not len(keep):
         raise InputError(f"block '{block.name}' has no oriented image points", "adjust it first")
     freed, cameras = _freed(oriented)
-    model = _model(oriented, cameras, freed, keep)
+    model, lost_rigs = _model(oriented, cameras, freed, keep)
     with atomic_folder(folder, own=OWN_ENTRIES) as place:
         (model.write_binary if binary else model.write_text)(place)
-    lost = list(oriented.losses())
+    lost = [*oriented.losses(), *lost_rigs]
     single = int(np.sum(rays == 1))
     if single:
         lost.append(f"could not be carried over: {counted(single, 'point')} with one ray")
@@ -309,7 +320,10 @@ def _freed(oriented: OrientedBlock) -> tuple[np.ndarray, list[Camera]]:
     return oriented.corrected_xy(), [replace(camera, brown={}) for camera in cameras]
 
 
-def _model(oriented: OrientedBlock, cameras: list[Camera], xy: np.ndarray, keep: np.ndarray) -> Any:
+def _model(
+    oriented: OrientedBlock, cameras: list[Camera], xy: np.ndarray, keep: np.ndarray
+) -> tuple[Any, tuple[str, ...]]:
+    """The model, and what of its rigs could not be carried over, in words."""
     import pycolmap
 
     block, rays = oriented.block, oriented.block.image_points
@@ -317,9 +331,9 @@ def _model(oriented: OrientedBlock, cameras: list[Camera], xy: np.ndarray, keep:
     for number, camera in enumerate(cameras, 1):
         name, values = colmap_camera(camera)
         width, height = camera.size_px
-        model.add_camera_with_trivial_rig(
-            pycolmap.Camera(camera_id=number, model=name, width=width, height=height, params=values)
-        )
+        model.add_camera(pycolmap.Camera(camera_id=number, model=name, width=width, height=height, params=values))
+    written = add_rigs(model, oriented)
+    add_frames(model, written, oriented)
     keep = keep[np.argsort(rays.image[keep], kind="stable")]
     bounds = np.searchsorted(rays.image[keep], np.arange(len(block.images) + 1))
     number_of_point = point_numbers(block.points)
@@ -334,21 +348,17 @@ def _model(oriented: OrientedBlock, cameras: list[Camera], xy: np.ndarray, keep:
             camera_id=int(block.images.camera[row]) + 1,
             image_id=row + 1,
         )
-        model.add_image_with_trivial_frame(image, _pose(oriented, row))
+        image.frame_id = int(written.frame[row])
+        model.add_image(image)
         for place, point in enumerate(rays.point[own].tolist()):
             tracks.setdefault(point, pycolmap.Track()).add_element(row + 1, place)
     for point, track in tracks.items():
         model.add_point3D_with_id(
             int(number_of_point[point]), pycolmap.Point3D(xyz=oriented.points[point], track=track)
         )
-    return model
-
-
-def _pose(oriented: OrientedBlock, row: int) -> Any:
-    import pycolmap
-
-    rotation = COLMAP_FROM_CAMERA @ oriented.rotation[row].T
-    return pycolmap.Rigid3d(np.column_stack([rotation, -rotation @ oriented.centre[row]]))
+    for number in written.from_world:
+        model.register_frame(number)
+    return model, written.lost
 
 
 def colmap_camera(camera: Camera) -> tuple[str, list[float]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,8 @@ EXIF_WIDTH, EXIF_HEIGHT = 40962, 40963
 """Pixels of the photograph as it was taken."""
 UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0, 5: 1e-3}
 """Millimetres of the units of the focal plane's resolution."""
+TAKEN, FRACTION = 36867, 37521
+"""When the photograph was taken, and digits after the seconds."""
 LATITUDE_REF, LATITUDE, LONGITUDE_REF, LONGITUDE, ALTITUDE_REF, ALTITUDE, ERROR = 1, 2, 3, 4, 5, 6, 31
 """Of the GPS directory; the last is the horizontal positioning error, m."""
 LONG_SIDE_35MM = 36.0
@@ -46,6 +49,7 @@ class PhotographTags:
     lon_lat_height : (3,) degrees and m, NaN where not said.
     ellipsoidal : whether the height is said to count from the ellipsoid.
     sigma_m : (3,) east, north, up, NaN where not said.
+    time : s since the beginning of 1970, by the clock of the camera, NaN where not said.
     """
 
     size_px: tuple[int, int]
@@ -56,6 +60,7 @@ class PhotographTags:
     lon_lat_height: np.ndarray
     ellipsoidal: bool
     sigma_m: np.ndarray
+    time: float = float("nan")
 
 
 def read_exif(path: FilePath) -> PhotographTags:
@@ -88,7 +93,18 @@ def read_exif(path: FilePath) -> PhotographTags:
         lon_lat_height=lon_lat_height,
         ellipsoidal=ellipsoidal,
         sigma_m=_sigma(gps, xmp),
+        time=_time(own),
     )
+
+
+def _time(own: dict[int, Any]) -> float:
+    """s since the beginning of 1970 by the clock of the camera, with the fraction of a second where it is told."""
+    try:
+        taken = datetime.strptime(_text(own.get(TAKEN)), "%Y:%m:%d %H:%M:%S").replace(tzinfo=UTC)
+    except ValueError:
+        return float("nan")
+    fraction = _text(own.get(FRACTION)).strip()
+    return taken.timestamp() + (float(f"0.{fraction}") if fraction.isdecimal() else 0.0)
 
 
 def _without_tags(path: Path, error: Exception) -> PhotographTags:

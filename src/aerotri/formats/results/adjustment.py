@@ -22,13 +22,21 @@ from aerotri.adjustment.ray_status import RAY_STATUS, RayStatus
 from aerotri.conventions import MGON_PER_RADIAN
 from aerotri.formats.results.json_text import number_or_none, write_json
 from aerotri.formats.results.reliability_columns import control_columns, observation_columns, ray_columns
-from aerotri.formats.results.rigs import rig_columns, rigs_json
+from aerotri.formats.results.rigs import (
+    movement_columns,
+    movements_json,
+    rig_columns,
+    rigidity_json,
+    rigs_json,
+    station_columns,
+)
 from aerotri.formats.text.table_writer import with_plain_texts
 from aerotri.image_errors import interior_elements, interior_model_sigmas
 from aerotri.observations import Block
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Outcome
 from aerotri.results.model_part import ModelPart
+from aerotri.results.rolling_shutter import Motions
 from aerotri.statistics.set_aside import photograph_reasons, point_reasons, status_columns
 
 if TYPE_CHECKING:
@@ -46,8 +54,8 @@ PARAMETER_KEYS = (
 def write_result(adjusted: AdjustedBlock, folder: str | Path) -> None:
     """Write adjustment.json, images, points, parameters, control and check as CSV, and residuals.parquet.
 
-    observations.csv is written besides where positions, attitudes or conditions were observed, rigs.csv where there are
-    rigid rigs.
+    observations.csv is written besides where positions, attitudes or conditions were observed, rigs.csv and
+    rig_stations.csv or rig_movements.csv where there are rigs, motion.csv where there are rolling shutters.
 
     Beside them variance_components.json where they were estimated. The files are written one after the other,
     adjustment.json last: who needs all or nothing passes a temporary folder and renames it.
@@ -69,6 +77,12 @@ def write_result(adjusted: AdjustedBlock, folder: str | Path) -> None:
         write_csv(folder / "observations.csv", observation_columns(adjusted))
     if adjusted.rigs:
         write_csv(folder / "rigs.csv", rig_columns(adjusted.rigs))
+    if adjusted.rigidity is not None:
+        write_csv(folder / "rig_stations.csv", station_columns(adjusted.rigidity.stations, adjusted.block.images.names))
+    if adjusted.rolling_shutters is not None:
+        write_csv(folder / "motion.csv", motion_columns(adjusted.block, adjusted.rolling_shutters.motions))
+    if adjusted.rig_movements is not None:
+        write_csv(folder / "rig_movements.csv", movement_columns(adjusted.rig_movements, adjusted.block.images.names))
     _write_residuals(folder / "residuals.parquet", adjusted)
     if adjusted.components is not None:
         write_json(folder / "variance_components.json", adjusted.components.as_dict())
@@ -90,7 +104,23 @@ def adjustment_json(adjusted: AdjustedBlock) -> dict[str, Any]:
         "model_part": (adjusted.model_part or ModelPart(reason=NOT_LOOKED_FOR)).as_dict(),
         "gnss_errors": None if adjusted.position_errors is None else adjusted.position_errors.as_dict(),
         **({"rigs": rigs_json(adjusted.rigs)} if adjusted.rigs else {}),
+        **({} if adjusted.rig_movements is None else {"rig_movements": movements_json(adjusted.rig_movements)}),
+        **({} if adjusted.rigidity is None else {"rigidity": rigidity_json(adjusted.rigidity)}),
+        **_rolling_shutters(adjusted),
     }
+
+
+def _rolling_shutters(adjusted: AdjustedBlock) -> dict[str, Any]:
+    shutters = adjusted.rolling_shutters
+    return {} if shutters is None else {"rolling_shutters": shutters.as_dict()}
+
+
+def motion_columns(block: Block, motions: Motions) -> dict[str, np.ndarray]:
+    """Columns of motion.csv: how photographs of rolling shutters moved while they were read."""
+    columns = {"image": block.images.names[motions.image]}
+    columns |= _split(("vX", "vY", "vZ"), motions.velocity)
+    columns |= _split(("wx", "wy", "wz"), np.degrees(motions.spin))
+    return columns | {"source": motions.source.astype(str)}
 
 
 def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:

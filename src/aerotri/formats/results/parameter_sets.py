@@ -11,23 +11,25 @@ from aerotri.diagnosis.parameter_sets import verdict
 from aerotri.formats.results.json_text import number_or_none
 from aerotri.image_errors import Change
 from aerotri.results.parameter_comparison import ParameterComparison, SetOutcome
-from aerotri.strategies.parameter_choice import Gain, gains, standings
+from aerotri.strategies.parameter_choice import Behind, Gain, distances, gains, standings
 
 
 def comparison_json(comparison: ParameterComparison) -> dict[str, Any]:
     """Content of compare_parameters.json; what is not known is null."""
-    found, behind = gains(comparison), standings(comparison)
+    found, behind, distance = gains(comparison), standings(comparison), distances(comparison)
     return {
         "block": comparison.block,
         "folds": comparison.folds,
         "robust": comparison.robust,
         "check_points": list(comparison.check_points),
         "control_points": list(comparison.control_points),
-        "sets": [_set_json(o, found.get(o.name), behind.get(o.name)) for o in comparison.outcomes],
+        "sets": [
+            _set_json(o, found.get(o.name), behind.get(o.name), distance.get(o.name)) for o in comparison.outcomes
+        ],
     }
 
 
-def _set_json(o: SetOutcome, gain: Gain | None, behind: Gain | None) -> dict[str, Any]:
+def _set_json(o: SetOutcome, gain: Gain | None, behind: Gain | None, distance: Behind | None) -> dict[str, Any]:
     content: dict[str, Any] = {"set": o.name, "status": o.status, "count": o.count, "significant": o.significant}
     for key in ("effective", "sigma0", "sigma0_um", "aic", "bic"):
         content[key] = number_or_none(getattr(o, key))
@@ -40,6 +42,14 @@ def _set_json(o: SetOutcome, gain: Gain | None, behind: Gain | None) -> dict[str
             "differences": [[number_or_none(v) for v in row] for row in accuracy.difference],
         }
     content["collocation"] = {"sigma_um": number_or_none(o.sigma_um), "length_mm": number_or_none(o.length_mm)}
+    content |= {"groups": o.groups, "kind": o.kind, "p": number_or_none(o.p)}
+    content["prediction"] = {
+        **{key: [number_or_none(v) for v in getattr(o.evidence, key)] for key in ("areas", "strips", "control")},
+        "sigma_height": number_or_none(o.evidence.sigma_height),
+        "best": None if distance is None else distance.best,
+        "value": None if distance is None else number_or_none(distance.value),
+        "standard_error": None if distance is None else number_or_none(distance.error),
+    }
     content |= {"gain": _gain_json(gain), "behind": _gain_json(behind), "verdict": verdict(o, gain, behind)}
     return content
 
@@ -65,6 +75,9 @@ def comparison_columns(comparison: ParameterComparison) -> dict[str, np.ndarray]
                 columns[f"{where}_{kind}_{axis}"] = np.array([getattr(getattr(o, where), kind)[k] for o in out])
     columns["gain"] = np.array([g.value if (g := found.get(o.name)) else np.nan for o in out])
     columns["gain_against"] = np.array([g.against if (g := found.get(o.name)) else "" for o in out], dtype=object)
+    distance = distances(comparison)
+    columns["prediction"] = np.array([d.value if (d := distance.get(o.name)) else np.nan for o in out])
+    columns["prediction_error"] = np.array([d.error if (d := distance.get(o.name)) else np.nan for o in out])
     columns["verdict"] = np.array([verdict(o, found.get(o.name), behind.get(o.name)) for o in out], dtype=object)
     return columns
 

@@ -19,6 +19,7 @@ from aerotri.functional_model.additional_parameters import (
     fourier,
     grid,
     gruen,
+    interior_change,
     legendre,
     lens,
     ultracam_d,
@@ -32,6 +33,7 @@ FAMILIES: dict[str, Family] = {
     module.FAMILY.name: module.FAMILY
     for module in (
         bluh, ultracam_d, dmc, ebner, gruen, fourier, legendre, chebyshev, grid, collocation, brown, lens,
+        interior_change,
     )
 }  # fmt: skip
 LINEAR_FAMILIES = {name: family for name, family in FAMILIES.items() if family.is_linear}

@@ -31,6 +31,7 @@ from aerotri.report.plots.rendering import RenderedPlot, render_plots
 from aerotri.report.tables import adjustment as tables
 from aerotri.report.tables import parameters as parameter_tables
 from aerotri.report.tables import precision as precision_tables
+from aerotri.report.tables import rigs as rig_tables
 from aerotri.report.tables import work as work_tables
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.parameter_comparison import ParameterComparison
@@ -75,6 +76,9 @@ CAPTIONS = {
     "reliability": (
         "What the tests may overlook: the height error that the largest undetected error of a ray can cause at its "
         "point, and how well the rays of every photograph control each other."
+    ),
+    "rig": (
+        "What the cameras of a rig see of the ground at one exposure. The dot marks the upper edge of the photograph."
     ),
     "crosscheck": "How far other programs' results lie from this one, in standard deviations.",
     "rays_per_point": "In how many photographs the points were measured.",
@@ -159,6 +163,7 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         "tables": _tables(adjusted)
         | {"work": work_tables.work_table(work), "effects": _effects(adjusted, beside)}
         | _parameter_tables(adjusted, beside),
+        "rig_verdicts": rig_tables.verdicts(adjusted),
         "effects_missing": _why_no_effects(adjusted),
         "selection": adjusted.block.settings.adjustment.parameter_selection == "on",
         "changes": [_change(change) for change in beside.changes],
@@ -228,6 +233,10 @@ def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
         "control_rays": work_tables.control_rays_table(adjusted),
         "cameras": tables.cameras(adjusted),
         "film": tables.film(adjusted),
+        "rigs": rig_tables.rigs_table(adjusted),
+        "rig_movements": rig_tables.movements_table(adjusted),
+        "rigidity": rig_tables.rigidity_table(adjusted),
+        "rig_photographs": rig_tables.photographs_table(adjusted),
         "parameters": tables.parameters(adjusted),
         "correlations": precision_tables.correlations(adjusted),
         "precision": precision_tables.precision(adjusted),

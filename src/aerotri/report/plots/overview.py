@@ -13,6 +13,7 @@ from aerotri.report.plots.panels import Panel, plot_panels
 from aerotri.report.plots.reliability import plot_reliability
 from aerotri.report.plots.rendering import save_plots
 from aerotri.report.plots.residuals import correlated_parameters, plot_correlations, plot_residual_histogram
+from aerotri.report.plots.rigs import plot_rig
 from aerotri.results.adjusted_block import AdjustedBlock
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "plot_rays_per_point",
     "plot_reliability",
     "plot_residual_histogram",
+    "plot_rig",
     "plot_systematic_errors",
     "save_plots",
 ]
@@ -57,6 +59,8 @@ def all_plots(adjusted: AdjustedBlock, changes: Sequence[Change] = ()) -> dict[s
             figures[f"averaged_residuals{suffix}"] = plot_averaged_residuals(averaged, name)
     for number, change in enumerate(changes, start=1):
         figures["change" if number == 1 else f"change_{number}"] = plot_change(adjusted, change)
+    for number, rig in enumerate(dict.fromkeys(one.rig for one in adjusted.rigs), start=1):
+        figures["rig" if number == 1 else f"rig_{number}"] = plot_rig(adjusted, rig)
     if len(correlated_parameters(adjusted)) >= 2:
         figures["correlations"] = plot_correlations(adjusted)
     figures["residual_histogram"] = plot_residual_histogram(adjusted)

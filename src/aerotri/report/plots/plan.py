@@ -90,7 +90,7 @@ def footprints(adjusted: AdjustedBlock) -> np.ndarray:
     block = adjusted.block
     ground = np.nanmedian(adjusted.points.xyz[:, 2]) if np.isfinite(adjusted.points.xyz[:, 2]).any() else np.nan
     rotation = rotation_from_angles(np.nan_to_num(adjusted.images.angles), block.rotation)
-    corners = np.array([_corner_directions(camera) for camera in block.cameras])[block.images.camera]
+    corners = np.array([corner_directions(camera) for camera in block.cameras])[block.images.camera]
     direction = np.einsum("nij,nkj->nki", rotation, corners)
     centre = adjusted.images.centre
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -102,7 +102,7 @@ def footprints(adjusted: AdjustedBlock) -> np.ndarray:
     return np.where(hidden.any(axis=1)[:, None, None], np.nan, corners_xy)
 
 
-def _corner_directions(camera: Camera) -> np.ndarray:
+def corner_directions(camera: Camera) -> np.ndarray:
     """(4, 3) directions of the corners in the camera frame."""
     (half_x, half_y), (x0, y0) = camera.half_format_mm, camera.principal_point_mm
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])

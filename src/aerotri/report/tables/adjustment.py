@@ -114,7 +114,7 @@ def unit_of_group(name: str) -> tuple[str, float]:
     """Unit in which a group of observations is shown, and the factor from the unit of its record."""
     if name.startswith("image points"):
         return "µm", 1.0
-    if name == "attitudes" or name.startswith("INS"):
+    if name == "attitudes" or name.startswith(("INS", "rotations on the rig")):
         return "mgon", MGON_PER_RADIAN
     # weighted parameters of many units are recorded in units of their own σ
     together = ("weighted parameters", "collocation field", "deviations of groups", "position errors in time")

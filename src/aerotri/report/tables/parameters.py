@@ -12,19 +12,20 @@ from aerotri.image_errors import Change
 from aerotri.report.tables.adjustment import Column, Table
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.parameter_comparison import Accuracy, ParameterComparison, SetOutcome
-from aerotri.strategies.parameter_choice import Gain, gains, standings
+from aerotri.strategies.parameter_choice import Behind, Gain, distances, gains, standings
 
 NOTE = (
     "check: RMS at check points with 95 % bounds; control: RMS at control points predicted without themselves; "
     "parameters: estimated (effective number of a random field), of them significant (t > 1.96); gain: on the best of "
-    "the sets it contains, at check points and predicted control together, ± its standard error; ΔAIC, ΔBIC: above the "
-    "least"
+    "the sets it contains, at check points and predicted control together, ± its standard error; prediction: how much "
+    "worse than by the best set areas, strips and control points are predicted by everything else (−2 ln of the "
+    "density), ± its standard error; ΔAIC, ΔBIC: above the least"
 )
 
 
 def comparison_table(comparison: ParameterComparison) -> Table:
     """A row for each set; where there are no check points their columns are left out."""
-    found, behind = gains(comparison), standings(comparison)
+    found, behind, distance = gains(comparison), standings(comparison), distances(comparison)
     there = [o for o in comparison.outcomes if o.converged]
     least_aic, least_bic = (min((getattr(o, k) for o in there), default=0.0) for k in ("aic", "bic"))
     digits = _digits(there)
@@ -32,7 +33,13 @@ def comparison_table(comparison: ParameterComparison) -> Table:
     for where, points in (("check", comparison.check_points), ("control", comparison.control_points)):
         if points:
             columns += [Column(f"{where} {axis}", "m") for axis in "XYZ"]
-    columns += [Column("ΔAIC", "", ".0f"), Column("ΔBIC", "", ".0f"), Column("gain"), Column("verdict")]
+    columns += [
+        Column("ΔAIC", "", ".0f"),
+        Column("ΔBIC", "", ".0f"),
+        Column("prediction"),
+        Column("gain"),
+        Column("verdict"),
+    ]
     rows = []
     for o in comparison.outcomes:
         cells: list[Any] = [o.name, _count_text(o), str(o.significant) if o.converged else "–", o.sigma0_um]
@@ -41,7 +48,8 @@ def comparison_table(comparison: ParameterComparison) -> Table:
         if comparison.control_points:
             cells += [_rms_text(o.control, k, digits) for k in range(3)]
         gain = found.get(o.name)
-        cells += [o.aic - least_aic, o.bic - least_bic, _gain_text(gain), verdict(o, gain, behind.get(o.name))]
+        cells += [o.aic - least_aic, o.bic - least_bic, _distance_text(distance.get(o.name)), _gain_text(gain)]
+        cells.append(verdict(o, gain, behind.get(o.name)))
         rows.append(tuple(cells))
     return Table("Sets of additional parameters compared", tuple(columns), tuple(rows))
 
@@ -114,6 +122,12 @@ def _bounds_text(accuracy: Accuracy, axis: int, digits: int) -> str:
     if not np.isfinite(accuracy.rms[axis]):
         return "–"
     return f"{accuracy.rms[axis]:.{digits}f} ({accuracy.low[axis]:.{digits}f}–{accuracy.high[axis]:.{digits}f})"
+
+
+def _distance_text(distance: Behind | None) -> str:
+    if distance is None or not np.isfinite(distance.value):
+        return "–"
+    return "best" if distance.value == 0.0 else f"{distance.value:.0f} ± {distance.error:.0f}"
 
 
 def _gain_text(gain: Gain | None) -> str:

@@ -16,9 +16,9 @@ from aerotri.observations import Camera
 from aerotri.observations.block import BROWN_NAMES
 from aerotri.simulation.camera_errors import dmc, frame, ultracam_d
 from aerotri.simulation.camera_errors.lens import format_grid
+from aerotri.simulation.camera_spec import ErrorSpec, PhysicalErrorSpec
 from aerotri.simulation.projection import Field, TrueCamera
 from aerotri.simulation.random_streams import stream
-from aerotri.simulation.spec import ErrorSpec, PhysicalErrorSpec
 
 MACHINES: Mapping[str, tuple[Callable[[Camera, dict[str, float], np.random.Generator], Field], Mapping[str, float]]] = {
     "ultracam_d": (ultracam_d.ultracam_d_error, ultracam_d.WEIGHTS),

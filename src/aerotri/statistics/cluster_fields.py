@@ -1,0 +1,252 @@
+"""Errors that few clusters of photographs have: a random field a cluster, its size from the residuals.
+
+A variance of four strips has three degrees of freedom and says little. But the residuals of a strip show its errors
+over the whole format. [D] Cluster c has the image errors s_c = B·p_c, p_c its nodes over the format with the covariance
+σ_s²·R, R = exp(−ρ/ℓ) or exp(−ρ²/2ℓ²), dx and dy apart, and each camera of a rig its own. The scores h = BᵀPv have the
+covariance
+
+    σ0²·K + σ_s²·K·R·K,   K = BᵀPB − BᵀPA·Q·AᵀPB,
+
+from which σ_s, ℓ and the form follow by restricted maximum likelihood. What a camera has in common in all clusters is
+eliminated beforehand: it does not move. The unknowns get from the fields the covariance F·Fᵀ, F = Q·AᵀPB·(σ_s²·R)^½.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aerotri.adjustment.kernel_records import Problem
+from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.solve import Solution
+from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.results.model_part import ClusterTest, ModelRoot
+from aerotri.statistics import _field_kernels as _kernels
+from aerotri.statistics.cluster_test import NUMBERS_AT_ONCE, SAME
+from aerotri.statistics.clusters import Clusters, divided_at_random
+from aerotri.statistics.covariance import InnerDatum
+
+NODES = (7, 5)
+"""Nodes along the longer and the shorter side of the format [C]: what orientation cannot take up is finer than a third
+of the format; finer than a sixth it does not bend a block."""
+LENGTHS = (0.2, 0.4, 0.8, 1.6, 3.2)
+"""Correlation lengths looked at, in half diagonals of the format."""
+SIZES = np.geomspace(1e-2, 1e2, 161)
+"""σ_s looked at, in σ of an image coordinate."""
+KEPT = 1e-3
+"""Share of the largest eigenvalue of R below which a pattern is left out: together a hundredth of the variance."""
+DIVISIONS = 3
+"""Random divisions that a scheme is compared with."""
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """The field of every cluster.
+
+    Parameters
+    ----------
+    sigma : mm. length : mm. smooth : whether R is exp(−ρ²/2ℓ²). gain : twice the logarithm of the likelihood with the
+        field over that without. ratio : RMS of the scores along the patterns of the field, over that of white noise.
+    freedom : rank of K. root : (nodes, k) of σ_s²·R.
+    """
+
+    sigma: float
+    length: float
+    smooth: bool
+    gain: float
+    ratio: float
+    freedom: int
+    root: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class FieldEquations:
+    """What the rays say of the nodes of all clusters: sides (6n + s, k), normals K (k, k) and scores h (k,).
+
+    camera : (m,) of the parts, the photographs of one cluster and one camera, whose nodes they are.
+    """
+
+    nodes: _kernels.Nodes
+    camera: np.ndarray
+    sides: np.ndarray
+    normals: np.ndarray
+    scores: np.ndarray
+
+
+def compare_field(
+    system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters, sigma0: float, level: float
+) -> tuple[ClusterTest, Field]:
+    """The test of one scheme by its fields, against white noise and against random divisions.
+
+    Parameters
+    ----------
+    factor : undamped, at the solution. level : below which both probabilities have to be.
+    """
+    field = _fitted(system, solution, factor, clusters, sigma0)
+    # two unknowns, σ_s and ℓ: of white noise the gain is below χ² with two degrees of freedom
+    p_noise, ratio_random, p_random = float(np.exp(-0.5 * field.gain)), float("nan"), float("nan")
+    if p_noise < level and len(clusters) > 1:
+        rng = np.random.default_rng(len(clusters.label))
+        others: list[Field] = []
+        for _ in range(DIVISIONS):
+            label = divided_at_random(solution.state.centre, clusters.label, rng)
+            others.append(_fitted(system, solution, factor, replace(clusters, label=label), sigma0))
+        best = max(others, key=lambda other: other.gain)
+        ratio_random = best.ratio
+        p_random = float(np.exp(-0.5 * max(field.gain - best.gain, 0.0)))
+    counts = p_noise < level and not p_random >= level
+    test = ClusterTest(
+        clusters.scheme, len(clusters), field.freedom, field.ratio, ratio_random, p_noise, p_random, counts,
+        field_um=1e3 * field.sigma, field_mm=field.length,
+    )  # fmt: skip
+    return test, field
+
+
+def root_of_field(
+    system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters, field: Field,
+    inner: InnerDatum | None = None,
+) -> ModelRoot:  # fmt: skip
+    """The columns F of the fields, see above; in the inner datum where there is one."""
+    u = system.unknowns
+    n, s, count = len(u.images), len(u.shared), len(u.points)
+    equations = field_equations(system, solution, factor, clusters)
+    size, k, m = equations.nodes.count, field.root.shape[1], len(equations.camera)
+    apart = equations.sides.reshape(6 * n + s, 2 * m, size) @ field.root
+    x = factor.solve(np.ascontiguousarray(apart.reshape(6 * n + s, 2 * m * k)))
+    images = x[: 6 * n].reshape(n, 6, -1) * u.eo_free[:, :, None]
+    shared, points = x[6 * n :], np.empty((count, 3, 2 * m * k), np.float32)
+    problem = system.problem(solution.state, solution.estimator)
+    at_once = max(int(NUMBERS_AT_ONCE / (6 * max(count, 1) * k)), 1)
+    for first in range(0, m, at_once):
+        parts = slice(first, min(first + at_once, m))
+        own = slice(2 * k * parts.start, 2 * k * parts.stop)
+        columns = _point_sides(system, problem, equations.nodes, field.root, parts)
+        points[:, :, own] = system.expand_sides(
+            solution.state, np.ascontiguousarray(images[:, :, own]), np.ascontiguousarray(shared[:, own]), columns,
+            solution.estimator,
+        )  # fmt: skip
+    if inner is not None:
+        images, shared, points = inner.moved(images, shared, points)
+    return ModelRoot(images, shared, points.astype(np.float32, copy=False), 0.0)
+
+
+def _point_sides(
+    system: NormalSystem, problem: Problem, nodes: _kernels.Nodes, root: np.ndarray, parts: slice
+) -> np.ndarray:
+    """A_pᵀP·B·R (P, 3, ·) of some parts; rays of others have no weight."""
+    u = system.unknowns
+    inside = (nodes.label >= parts.start) & (nodes.label < parts.stop)
+    share = np.where(inside[u.rays.image][:, None], nodes.weight, 0.0)
+    here = nodes._replace(weight=share, label=np.where(inside, nodes.label - parts.start, 0))
+    sides = np.zeros((len(u.points), 3, 2 * root.shape[1] * (parts.stop - parts.start)))
+
+    def chunk(c: int) -> None:
+        _kernels.field_point_sides(*system.chunks[c], problem, here, root, sides, system.work())
+
+    system.over_chunks(chunk)
+    return sides
+
+
+def field_equations(system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters) -> FieldEquations:
+    """The rays over the nodes of all clusters, photographs, shared parameters and points eliminated."""
+    u = system.unknowns
+    label, camera = _by_camera(system, clusters)
+    nodes = _nodes(system, label)
+    n, s, k = len(u.images), len(u.shared), 2 * len(camera) * nodes.count
+    parts = [
+        _kernels.FieldSums(
+            np.zeros((n, 6, k)), np.zeros((s, k)), np.zeros((k, k)), np.zeros(k), np.full(k, -1, np.int64)
+        )
+        for _ in system.chunks
+    ]
+    problem = system.problem(solution.state, solution.estimator)
+    system.over_chunks(lambda c: _kernels.field_sides(*system.chunks[c], problem, nodes, parts[c], system.work()))
+    images, shared, own, scores = (np.sum([part[axis] for part in parts], axis=0) for axis in range(4))
+    sides = np.concatenate([images.reshape(6 * n, k), shared])
+    half = factor.half_solve(sides)
+    normals = own - half.T @ half
+    return FieldEquations(nodes, camera, sides, 0.5 * (normals + normals.T), scores)
+
+
+def _by_camera(system: NormalSystem, clusters: Clusters) -> tuple[np.ndarray, np.ndarray]:
+    """Clusters divided by camera: (n,) number of every photograph's part, (m,) camera of every part."""
+    camera = system.unknowns.block.images.camera[system.unknowns.images]
+    pairs, label = np.unique(np.column_stack([clusters.label, camera]), axis=0, return_inverse=True)
+    return label.ravel().astype(np.int64), pairs[:, 1]
+
+
+def _nodes(system: NormalSystem, label: np.ndarray) -> _kernels.Nodes:
+    """The rays among the nodes of their photograph's format, photographs with labels (n,)."""
+    u, block = system.unknowns, system.unknowns.block
+    half = np.array([camera.half_format_mm for camera in block.cameras])[block.images.camera[u.images]][u.rays.image]
+    number = np.array(_counts(system))
+    at = np.clip(0.5 * (u.rays.xy / half + 1.0), 0.0, 1.0) * (number - 1)
+    low = np.minimum(at.astype(np.int64), number - 2)
+    x, y = (at - low).T
+    node = low[:, :1] * number[1] + low[:, 1:] + np.array([0, 1, number[1], number[1] + 1])
+    weight = np.column_stack([(1.0 - x) * (1.0 - y), (1.0 - x) * y, x * (1.0 - y), x * y])
+    return _kernels.Nodes(node, weight, label, int(number.prod()))
+
+
+def _counts(system: NormalSystem) -> tuple[int, int]:
+    """Nodes along x and y."""
+    half = _half_format(system)
+    return NODES if half[0] >= half[1] else (NODES[1], NODES[0])
+
+
+def _half_format(system: NormalSystem) -> np.ndarray:
+    """(2,) mm, of the largest camera."""
+    return np.max([camera.half_format_mm for camera in system.unknowns.block.cameras], axis=0)
+
+
+def _correlations(system: NormalSystem, length: float, smooth: bool) -> np.ndarray:
+    """(nodes, nodes) R for a length in mm."""
+    axes = [half * np.linspace(-1.0, 1.0, k) for half, k in zip(_half_format(system), _counts(system), strict=True)]
+    xy = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    squares = np.sum((xy[:, None] - xy) ** 2, axis=2) / length**2
+    return np.exp(-0.5 * squares) if smooth else np.exp(-np.sqrt(squares))
+
+
+def _fitted(system: NormalSystem, solution: Solution, factor: Factor, clusters: Clusters, sigma0: float) -> Field:
+    """The field with the greatest restricted likelihood."""
+    found = field_equations(system, solution, factor, clusters)
+    normals, scores = found.normals, found.scores
+    if len(clusters) > 1:
+        normals, scores = _without_common(normals, scores, found.camera)
+    values, vectors = np.linalg.eigh(normals)
+    there = values > SAME * values[-1]
+    root, freedom = vectors[:, there] * np.sqrt(values[there]), int(there.sum())
+    z = (vectors[:, there].T @ scores) / np.sqrt(values[there]) / sigma0
+    unit, half = float(np.median(1.0 / system.unknowns.rays.inv_sigma)), float(np.hypot(*_half_format(system)))
+    best, sizes = None, (unit * SIZES) ** 2
+    for smooth in (False, True):
+        for length in LENGTHS:
+            r = _correlations(system, half * length, smooth)
+            spread = root.reshape(2 * len(found.camera), found.nodes.count, -1)
+            power, patterns = np.linalg.eigh(np.einsum("cip,ij,cjq->pq", spread, r, spread, optimize=True) / sigma0**2)
+            power, squares = np.maximum(power, 0.0), (patterns.T @ z) ** 2
+            grown = sizes[:, None] * power
+            gains = np.sum(squares * grown / (1.0 + grown) - np.log1p(grown), axis=1)
+            k = int(np.argmax(gains))
+            if best is None or gains[k] > best[0]:
+                ratio = float(np.sqrt(np.sum(power * squares) / np.sum(power)))
+                best = float(gains[k]), sizes[k], length, smooth, ratio, r
+    assert best is not None
+    gain, variance, length, smooth, ratio, r = best
+    power, patterns = np.linalg.eigh(variance * r)
+    kept = power > KEPT * power[-1]
+    return Field(
+        float(np.sqrt(variance)), half * length, smooth, max(gain, 0.0), ratio, freedom,
+        patterns[:, kept] * np.sqrt(power[kept]),
+    )  # fmt: skip
+
+
+def _without_common(normals: np.ndarray, scores: np.ndarray, camera: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """K and h with a field that every camera has in all clusters eliminated."""
+    size = len(scores) // len(camera)
+    same = np.kron(camera[:, None] == np.unique(camera), np.eye(size))
+    mixed = normals @ same
+    gain = np.linalg.pinv(same.T @ mixed, rcond=1e-9, hermitian=True)
+    rest = normals - mixed @ gain @ mixed.T
+    return 0.5 * (rest + rest.T), scores - mixed @ (gain @ (same.T @ scores))
