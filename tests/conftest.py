@@ -10,10 +10,17 @@ from hypothesis import settings
 settings.register_profile("aerotri", deadline=None)
 settings.load_profile("aerotri")
 
-if "PYTEST_XDIST_WORKER" in os.environ:
-    # the processors are taken by the processes of the tests: threads of each would only wait for one another
-    for setting in ("AEROTRI_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(setting, "1")
+
+def pytest_configure(config):
+    """One thread in each process of the tests: the processors are taken, and threads would only wait for one another.
+
+    Set in the process that starts the others: OpenBLAS reads it when numpy is loaded, and there pytest loads numba, and
+    with it numpy, for `filterwarnings` before any conftest.
+    """
+    if config.getoption("numprocesses", None):
+        for setting in ("AEROTRI_THREADS", "OPENBLAS_NUM_THREADS"):
+            os.environ.setdefault(setting, "1")
+
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
