@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import chdtrc, chndtrinc, fdtrc, gammaincinv, ndtri
+from scipy.special import chdtrc, chndtrinc, fdtrc, gammaincinv, ndtri, stdtr
 
 
 def normal_quantile(probability: float) -> float:
@@ -25,6 +25,11 @@ def chi_square_exceedance(value: float, freedom: float) -> float:
 def f_exceedance(value: float, freedom: float, freedom_below: float) -> float:
     """P(F ≥ value) for F of `freedom` over `freedom_below` degrees of freedom."""
     return float(fdtrc(freedom, freedom_below, value))
+
+
+def student_exceedance(value: float, freedom: float) -> float:
+    """P(t ≥ value) for Student's t of `freedom` degrees of freedom."""
+    return float(stdtr(freedom, -value))
 
 
 def noncentrality(freedom: float, alpha: float, power: float) -> float:

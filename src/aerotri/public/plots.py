@@ -77,6 +77,22 @@ class AdjustmentPlots:
 
         return plot_residual_histogram(self.adjusted)
 
+    def neighbouring_rays(self) -> Figure:
+        """Correlation of the residuals of two image points of a photograph, by their distance.
+
+        Raises
+        ------
+        InputError
+            When no image points are near enough to one another.
+        """
+        from aerotri.conventions import InputError
+        from aerotri.report.plots.overview import plot_ray_correlation
+
+        found = self.adjusted.ray_correlation
+        if found is None or found.nearest < 0:
+            raise InputError("no image points of a photograph are near one another", "there is nothing to draw")
+        return plot_ray_correlation(found, self.adjusted.block.name)
+
     def correlations(self) -> Figure:
         """Correlations of the shared parameters.
 

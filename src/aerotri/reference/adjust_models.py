@@ -84,6 +84,27 @@ def gnss_errors() -> tuple[Item, ...]:
     return (Item("gnss_errors", "object?", text), *items)
 
 
+def ray_correlation() -> tuple[Item, ...]:
+    what: tuple[tuple[str, Kind, str, str], ...] = (
+        ("from_px", "number", "Least distance of the two image points.", "px"),
+        ("to_px", "number", "Largest distance.", "px"),
+        ("pairs", "whole", "Pairs of image points.", ""),
+        ("x", "number?", "Correlation of their residuals in x; null where there are few pairs.", ""),
+        ("y", "number?", "The same in y.", ""),
+        ("s_x", "number?", "Standard deviation of x, from the scatter of the photographs.", ""),
+        ("s_y", "number?", "Standard deviation of y.", ""),
+    )
+    text = "How much image points of one photograph that are near one another err alike."
+    return (
+        Item("ray_correlation", "object", text),
+        Item("ray_correlation.classes[]", "object", "One entry a class of distances in the image."),
+        *(Item(f"ray_correlation.classes[].{name}", kind, said, unit) for name, kind, said, unit in what),
+        Item("ray_correlation.p", "number?", "Probability of such residuals if every image point errs by itself."),
+        Item("ray_correlation.near_px", "number?", "Distance of the pairs that took part in this test.", "px"),
+        Item("ray_correlation.reason", "text", "Why nothing was tested; else empty."),
+    )
+
+
 def rolling_shutters() -> tuple[Item, ...]:
     camera = "rolling_shutters.cameras[]"
     test, variant = "rolling_shutters.test", "rolling_shutters.test.variants[]"

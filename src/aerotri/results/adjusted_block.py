@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from aerotri.results.deviations import Deviations
     from aerotri.results.model_part import ModelPart
     from aerotri.results.position_errors import PositionErrors
+    from aerotri.results.ray_correlation import RayCorrelation
     from aerotri.results.removal import Removal
     from aerotri.results.rigidity import Rigidity
     from aerotri.results.rigs import MountedCamera, RigMovements
@@ -326,7 +327,8 @@ class AdjustedBlock:
     says where the model part of σ comes from, or why there is none; None before it is looked for. `rigs` are the
     cameras of rigs beside their reference cameras, `rigidity` the tests whether they keep their places, `rig_movements`
     how they move on weighted rigs.
-    `deviations` says how much parameters differ between groups of photographs that are tied to one another.
+    `deviations` says how much parameters differ between groups of photographs that are tied to one another,
+    `ray_correlation` how much neighbouring rays of a photograph err alike.
     """
 
     block: Block
@@ -350,3 +352,4 @@ class AdjustedBlock:
     rigidity: Rigidity | None = None
     rolling_shutters: RollingShutters | None = None
     rig_movements: RigMovements | None = None
+    ray_correlation: RayCorrelation | None = None

@@ -31,6 +31,7 @@ from aerotri.results.normalised import normalised_residuals
 from aerotri.statistics.covariance import Cofactors, cofactors, correlations, orientation_cofactors, total_correlations
 from aerotri.statistics.external_reliability import ray_effects, row_effects
 from aerotri.statistics.held_control import HeldTests, held_tests
+from aerotri.statistics.ray_correlation import ray_correlation
 from aerotri.statistics.reliability import detectable_share, suspected_blunders
 from aerotri.statistics.rig_movements import movement_groups, rig_movements
 from aerotri.statistics.rig_results import mounted_cameras
@@ -115,6 +116,7 @@ def summarise(
         rigs=mounted_cameras(system, solution, q, sigma0),
         rolling_shutters=rolling_shutters(system, solution, q, sigma0),
         rig_movements=rig_movements(system, solution, q.inverse, sigma0),
+        ray_correlation=ray_correlation(block, rays),
     )
 
 

@@ -36,6 +36,7 @@ from aerotri.observations import Block
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Outcome
 from aerotri.results.model_part import ModelPart
+from aerotri.results.ray_correlation import RayCorrelation
 from aerotri.results.rolling_shutter import Motions
 from aerotri.statistics.set_aside import photograph_reasons, point_reasons, status_columns
 
@@ -103,6 +104,7 @@ def adjustment_json(adjusted: AdjustedBlock) -> dict[str, Any]:
         "deviations": None if adjusted.deviations is None else adjusted.deviations.as_dict(),
         "model_part": (adjusted.model_part or ModelPart(reason=NOT_LOOKED_FOR)).as_dict(),
         "gnss_errors": None if adjusted.position_errors is None else adjusted.position_errors.as_dict(),
+        "ray_correlation": (adjusted.ray_correlation or RayCorrelation(reason=NOT_LOOKED_FOR)).as_dict(),
         **({"rigs": rigs_json(adjusted.rigs)} if adjusted.rigs else {}),
         **({} if adjusted.rig_movements is None else {"rig_movements": movements_json(adjusted.rig_movements)}),
         **({} if adjusted.rigidity is None else {"rigidity": rigidity_json(adjusted.rigidity)}),
@@ -152,6 +154,7 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
         "deviations": None,
         "model_part": ModelPart(reason=NOT_LOOKED_FOR).as_dict(),
         "gnss_errors": None,
+        "ray_correlation": RayCorrelation(reason=NOT_LOOKED_FOR).as_dict(),
         "warnings": list(o.warnings),
         "timings_s": {key: float(o.timings_s.get(key, 0.0)) for key in TIMINGS},
     }

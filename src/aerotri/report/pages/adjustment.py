@@ -73,6 +73,10 @@ CAPTIONS = {
     ),
     "correlations": "Correlations of the shared parameters; darkness is size, a dash marks negative ones.",
     "residual_histogram": "Residuals of the image coordinates against the normal curve they should follow.",
+    "ray_correlation": (
+        "Whether image points near one another err alike. Above 0 they have errors in common: of matching, or of the "
+        "camera where the parameters do not contain them."
+    ),
     "reliability": (
         "What the tests may overlook: the height error that the largest undetected error of a ray can cause at its "
         "point, and how well the rays of every photograph control each other."

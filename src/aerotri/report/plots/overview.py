@@ -12,7 +12,12 @@ from aerotri.report.plots.camera import plot_averaged_residuals, plot_systematic
 from aerotri.report.plots.panels import Panel, plot_panels
 from aerotri.report.plots.reliability import plot_reliability
 from aerotri.report.plots.rendering import save_plots
-from aerotri.report.plots.residuals import correlated_parameters, plot_correlations, plot_residual_histogram
+from aerotri.report.plots.residuals import (
+    correlated_parameters,
+    plot_correlations,
+    plot_ray_correlation,
+    plot_residual_histogram,
+)
 from aerotri.report.plots.rigs import plot_rig
 from aerotri.results.adjusted_block import AdjustedBlock
 
@@ -23,6 +28,7 @@ __all__ = [
     "plot_change",
     "plot_correlations",
     "plot_ground_points",
+    "plot_ray_correlation",
     "plot_rays_per_point",
     "plot_reliability",
     "plot_residual_histogram",
@@ -64,6 +70,8 @@ def all_plots(adjusted: AdjustedBlock, changes: Sequence[Change] = ()) -> dict[s
     if len(correlated_parameters(adjusted)) >= 2:
         figures["correlations"] = plot_correlations(adjusted)
     figures["residual_histogram"] = plot_residual_histogram(adjusted)
+    if adjusted.ray_correlation is not None and adjusted.ray_correlation.nearest >= 0:
+        figures["ray_correlation"] = plot_ray_correlation(adjusted.ray_correlation, name)
     figures["rays_per_point"] = plot_rays_per_point(adjusted)
     if adjusted.effects is not None:
         figures["reliability"] = plot_reliability(adjusted)

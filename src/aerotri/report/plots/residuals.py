@@ -12,11 +12,14 @@ from matplotlib.ticker import MaxNLocator
 from aerotri.adjustment.ray_status import RayStatus
 from aerotri.report.plots.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, plain, styled
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.ray_correlation import RayCorrelation
 
 BINS = 60
 """Bars of the histogram; chosen [C]: fewer hide the shape of the tails, more show chance."""
 MOST_PARAMETERS = 90
 """Parameters drawn, beyond which GNSS shifts are left out first; chosen [C]: a cell is then still wider than a line."""
+LEAST_P = 1e-6
+"""Probabilities below are not told apart [C]."""
 MOST_LABELS = 60
 """Names along a side; chosen [C]: with more they overlap, and every second stands."""
 
@@ -86,6 +89,39 @@ def _histogram_legend(figure: Figure, sigma: float) -> None:
     width, height = figure.get_size_inches()
     figure.legend(handles=handles, loc="center left", bbox_to_anchor=(0.85 / width, 0.25 / height), ncols=4,
                   borderaxespad=0.0, handletextpad=0.6, columnspacing=1.8)  # fmt: skip
+
+
+@styled
+def plot_ray_correlation(found: RayCorrelation, block_name: str) -> Figure:
+    """How much residuals of two image points of one photograph are alike, by their distance.
+
+    Raises
+    ------
+    ValueError
+        When there is no class of distances with enough pairs.
+    """
+    known = np.flatnonzero(np.isfinite(found.correlation).any(axis=1))
+    if not len(known):
+        raise ValueError("no two image points of a photograph are near enough to one another")
+    chance = f"p = {found.p:.2g}" if found.p >= LEAST_P else f"p < {LEAST_P:g}"
+    subtitle = f"{int(found.pairs[known].sum())} pairs; by chance up to {found.near_px:.3g} px: {chance}; bars 2 σ"
+    figure = new_figure(3.75, f"Residuals of neighbouring image points – {plain(block_name)}", subtitle)
+    axes = axes_at(figure, 0.95, 0.9, WIDTH - 1.25, 1.95)
+    place = np.arange(len(known))
+    for axis, (letter, marker, face) in enumerate((("x", "o", "white"), ("y", "s", INK))):
+        axes.errorbar(place + 0.12 * (2 * axis - 1), found.correlation[known, axis], 2.0 * found.sigma[known, axis],
+                      fmt=marker, color=INK, mfc=face, ms=5, lw=1.0, capsize=2.5,
+                      label=f"residuals in {letter}")  # fmt: skip
+    axes.axhline(0.0, color=GREY, lw=0.9, ls=":")
+    limits = [f"{found.limits_px[k]:.0f} to {found.limits_px[k + 1]:.0f}" for k in known]
+    axes.set_xticks(place, limits)
+    axes.set_xlim(-0.5, len(known) - 0.5)
+    axes.set_xlabel("distance of two image points of a photograph [px]")
+    axes.set_ylabel("correlation")
+    axes.spines[["top", "right"]].set_visible(False)
+    width, height = figure.get_size_inches()
+    figure.legend(loc="center left", bbox_to_anchor=(0.85 / width, 0.25 / height), ncols=2, borderaxespad=0.0)
+    return figure
 
 
 def correlated_parameters(adjusted: AdjustedBlock) -> np.ndarray:
