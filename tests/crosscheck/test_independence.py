@@ -83,10 +83,13 @@ def test_brown_and_lens_are_the_same():
     x, y = rng.uniform(-20, 20, (2, 50))
     values = rng.normal(size=7) * [1e-5, 1e-8, 1e-11, 1e-5, 1e-5, 1e-4, 1e-4]
     np.testing.assert_allclose(np.stack(paper_patterns.brown(x, y, *values), 1), brown.image_error(x, y, values))
-    values = rng.normal(size=5) * 0.1
+    values = np.abs(rng.normal(size=13)) * 0.1
     np.testing.assert_allclose(
-        np.stack(paper_patterns.forward_lens(x / 30, y / 30, *values), 1), lens.distort(x / 30, y / 30, values)
+        np.stack(paper_patterns.forward_lens(x / 30, y / 30, *values), 1),
+        lens.bend(x / 30, y / 30, values),
     )
+    ideal = np.stack(paper_patterns.equidistant(x / 30, y / 30, np.full(50, -1.0)), 1)
+    np.testing.assert_allclose(ideal, lens.distort(x / 30, y / 30, lens.vector({}, True)))
 
 
 @pytest.mark.parametrize("order", ["omega-phi-kappa", "phi-omega-kappa"])
@@ -103,10 +106,11 @@ def test_complex_step_against_differences(order):
     pose = np.column_stack([rng.normal(size=(5, 2)), np.full(5, 100.0), 0.2 * rng.normal(size=(5, 3))])
     mount = rotation_from_angles(rng.normal(size=(5, 3)) * 0.1)
     point, xy = np.column_stack([30 * rng.normal(size=(5, 2)), np.zeros(5)]), 10 * rng.normal(size=(5, 2))
-    elements = np.zeros((5, 15))
+    elements = np.zeros((5, 24))
     elements[:, :3] = 35.0, 0.1, -0.2
-    elements[:, 3:] = 1e-6 * rng.normal(size=12)
-    active = np.arange(15)
+    elements[:, 3:-1] = 1e-6 * rng.normal(size=20)
+    elements[:2, -1] = 1.0  # the first two are fisheyes
+    active = np.arange(23)
     _, by_pose, by_elements = paper_rays.linearise(pose, mount, point, elements, xy, order, active)
     for column in range(6):
         step = np.zeros(6)
@@ -115,8 +119,8 @@ def test_complex_step_against_differences(order):
             np.stack(paper_rays.predict(pose + s * step, mount, point, elements, xy, order), 1) for s in (1, -1)
         )
         np.testing.assert_allclose(by_pose[:, :, column], (ahead - behind) / 2e-5, rtol=1e-6, atol=1e-7)
-    for column in range(15):
-        step = np.zeros(15)
+    for column in range(23):
+        step = np.zeros(24)
         step[column] = 1e-6
         ahead, behind = (
             np.stack(paper_rays.predict(pose, mount, point, elements + s * step, xy, order), 1) for s in (1, -1)

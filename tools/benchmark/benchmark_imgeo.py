@@ -77,7 +77,7 @@ def _errors(scale: int):
         chosen = parameter_set(family, [str(i) for i in items], camera)
         largest = np.abs(chosen.basis(x, y)).max(axis=(0, 1))
         linear.append((chosen, rng.normal(size=len(largest)) * 0.3 * camera.pixel_mm / largest))
-    return ErrorFunction(camera, "ucd", np.array([101.4, 0.0, 0.0]), tuple(linear), np.zeros(7), np.zeros(5))
+    return ErrorFunction(camera, "ucd", np.array([101.4, 0.0, 0.0]), tuple(linear), np.zeros(7), np.zeros(14))
 
 
 def _make_photograph(path: Path, scale: int) -> None:

@@ -11,7 +11,7 @@ from aerotri.adjustment._intersection_kernels import smallest_eigenvalue
 from aerotri.adjustment._robust_kernels import robust_factor
 from aerotri.adjustment.kernel_records import Work
 from aerotri.compiled import inlined, kernel, leaf_kernel
-from aerotri.functional_model._kernels import linearise_ray
+from aerotri.functional_model._kernels import INTERIOR, linearise_ray
 from aerotri.functional_model._scan_kernels import place_in_scan, scan_partials
 
 E = 6
@@ -35,7 +35,7 @@ def scratch(max_rays, max_columns, n_shared):
         np.full(n_shared, -1, np.int64),
         np.empty((max_rays, 3, E)),
         np.empty((3, n_shared)),
-        np.empty((2, 15)),
+        np.empty((2, INTERIOR)),
         np.empty(2),
         np.empty(3),
         np.empty((3, 3)),
@@ -83,7 +83,7 @@ def linearise_point(p, rays, table, values, points, weighting, work):
             n = scan_partials(
                 per_ms, tau, rotation[i], velocity[i], spin[i], by_eo[q], scan_columns[i], by_sh[q], columns[q], 0,
             )  # fmt: skip
-        for t in range(15):
+        for t in range(INTERIOR):
             if lens_columns[lens, t] >= 0:
                 columns[q, n] = lens_columns[lens, t]
                 by_sh[q, 0, n], by_sh[q, 1, n] = by_interior[0, t], by_interior[1, t]

@@ -146,10 +146,8 @@ def size_mm(camera: Camera, name: str) -> float:
         d = brown.basis(x - camera.principal_point_mm[0], y - camera.principal_point_mm[1])
         d = d[:, :, brown.ITEMS.index(parameter.item)]
     else:
-        c, unit = camera.focal_length_mm, np.zeros(len(lens.ITEMS))
-        unit[lens.ITEMS.index(parameter.item)] = 1.0
-        direction = np.column_stack([x, y]) / c
-        d = c * (lens.distort(direction[:, 0], direction[:, 1], unit) - direction)
+        c = camera.focal_length_mm
+        d = c * lens.patterns(x / c, y / c, lens.vector({}))[:, :, lens.ITEMS.index(parameter.item)]
     return float(np.sqrt(np.mean(np.sum(d**2, axis=1))))
 
 

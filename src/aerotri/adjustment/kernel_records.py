@@ -49,7 +49,7 @@ class Table(NamedTuple):
 
     Parameters
     ----------
-    lens_columns : (L, 15) shared parameter of every interior element, −1 where it is none.
+    lens_columns : (L, 24) shared parameter of every interior element, −1 where it is none.
     eo_free : (n, 6) 1 or 0.
     turn : (n, 3, 3) basis of the small rotations.
     kept : (P,) first shared parameter of a point that is not eliminated, −1 otherwise.
@@ -79,7 +79,7 @@ class Scans(NamedTuple):
 
 
 class Values(NamedTuple):
-    """Where the unknowns but the points stand: rotation (n, 3, 3), centre (n, 3), interior (L, 15), shared (s,).
+    """Where the unknowns but the points stand: rotation (n, 3, 3), centre (n, 3), interior (L, 24), shared (s,).
 
     scans : what photographs of rolling shutters do while they are read.
     """
@@ -146,7 +146,7 @@ class Work(NamedTuple):
     columns, n_columns : (q, ·) shared parameters of every ray, and how many; places in `union`.
     union, place : (s,) the shared parameters of the point, and where each stands among them.
     couple, couple_shared : (q, 3, 6) and (3, s), L⁻¹·N_pe and L⁻¹·N_ps.
-    by_interior, prediction : (2, 15) and (2,) of one ray.
+    by_interior, prediction : (2, 24) and (2,) of one ray.
     moved, turned : (3,) and (3, 3), projection centre and rotation of one ray of a rolling shutter.
     """
 

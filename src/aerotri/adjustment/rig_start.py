@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerotri.adjustment.directions import directions_of
 from aerotri.adjustment.rigging import relative_rotations, robust_mean
 from aerotri.adjustment.start_values import (
     RESECTION_TOLERANCES,
-    directions_of,
     intersect_into,
     resect_into,
     start_values,

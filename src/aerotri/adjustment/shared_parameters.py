@@ -90,8 +90,8 @@ class LensTable:
 
     Parameters
     ----------
-    base : (L, 15) start values, columns of `INTERIOR_COLUMNS`.
-    columns : (L, 15) shared parameter of each element, −1 where it is held.
+    base : (L, 24) start values, columns of `INTERIOR_COLUMNS`.
+    columns : (L, 24) shared parameter of each element, −1 where it is held.
     of_image : (n,) row of every photograph.
     """
 

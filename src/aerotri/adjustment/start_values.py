@@ -6,18 +6,17 @@ and further photographs resected from them, until nothing is added.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from aerotri.adjustment import _intersection_kernels
+from aerotri.adjustment.directions import Directions, directions_of
 from aerotri.adjustment.ray_status import RayStatus, ray_status
 from aerotri.adjustment.solve import SolveOptions, minimise
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.track import AXIS_ANGLE, headings, order_of_exposure, strips_of_track, vertical_rotations
 from aerotri.adjustment.unknowns import StartValues
-from aerotri.functional_model.additional_parameters import brown, lens
-from aerotri.functional_model.collinearity import interior_row
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block, Control, GnssIns, GnssSettings, Prior
 
@@ -39,14 +38,6 @@ TRACK_TOLERANCE = 20.0
 """Median miss of the rays, in tolerances, beyond which the track was no track."""
 OPENCV_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
 """From axes with z up, against the viewing direction, to those of OpenCV with y down and z in viewing direction."""
-
-
-@dataclass(frozen=True, eq=False)
-class Directions:
-    """Rays as directions: tangents (m, 2) in the camera, freed of known lens errors, and their tolerance (m,)."""
-
-    tangent: np.ndarray
-    tolerance: np.ndarray
 
 
 def local_origin(block: Block) -> np.ndarray:
@@ -266,24 +257,6 @@ def _full_control(block: Block, origin: np.ndarray) -> np.ndarray:
     if block.settings.adjustment.datum in ("control", "inner", "minimal"):
         points[control.point[usable]] = control.xyz[usable] - origin
     return points
-
-
-def directions_of(block: Block) -> Directions:
-    rays = block.image_points
-    tangent, tolerance = np.empty((len(rays), 2)), np.empty(len(rays))
-    camera_of_ray = block.images.camera[rays.image]
-    for index, camera in enumerate(block.cameras):
-        of_camera = camera_of_ray == index
-        row = interior_row(camera)
-        bar = rays.xy[of_camera] - row[1:3]
-        ideal = (bar - brown.image_error(bar[:, 0], bar[:, 1], row[3:10])) / row[0]
-        distorted = ideal.copy()
-        if row[10:].any():
-            for _ in range(20):
-                ideal = ideal - (lens.distort(ideal[:, 0], ideal[:, 1], row[10:]) - distorted)
-        tangent[of_camera] = ideal
-        tolerance[of_camera] = np.maximum(rays.sigma[of_camera].max(axis=1), camera.pixel_mm) / row[0]
-    return Directions(tangent, tolerance)
 
 
 def intersect_into(

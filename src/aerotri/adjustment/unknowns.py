@@ -161,7 +161,7 @@ class Unknowns:
         return self.rigging.chain(state.rotation, state.shared, self.turn(state), self.eo_free)
 
     def interior(self, state: State) -> np.ndarray:
-        """(L, 15) interior elements and lens parameters at `state`."""
+        """(L, 24) interior elements and lens parameters at `state`."""
         table = self.lens.base.copy()
         free = self.lens.columns >= 0
         table[free] = state.shared[self.lens.columns[free]]

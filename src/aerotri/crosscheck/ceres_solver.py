@@ -85,7 +85,7 @@ class _LocalEntries:
 
     Parameters
     ----------
-    owners : the blocks. size : of all together. elements : (k, 15). linear : (k, q), `size` where there is none.
+    owners : the blocks. size : of all together. elements : (k, 24). linear : (k, q), `size` where there is none.
     """
 
     owners: tuple[Owner, ...]

@@ -29,6 +29,7 @@ from aerotri.crosscheck.comparison import (
 from aerotri.crosscheck.freed import FreedBlock, freed_block
 from aerotri.crosscheck.start import displacement, intersect, typical_distance
 from aerotri.formats.assembly.oriented import OrientedBlock, oriented_from_adjusted
+from aerotri.formats.assembly.reprojection import ideal_tangents
 from aerotri.formats.foreign.colmap import COLMAP_FROM_CAMERA, point_numbers, write_colmap
 from aerotri.functional_model.rotation import angles_from_rotation, exponential, small_rotation_per_angle
 from aerotri.observations import Block
@@ -143,9 +144,7 @@ def _displace(problem: _Problem, local: OrientedBlock) -> None:
         turn = COLMAP_FROM_CAMERA @ rotation[row].T
         block[:4] = pycolmap.Rotation3d(turn).quat
         block[4:] = -turn @ centre[row]
-    interior = np.array([(c.focal_length_mm, *c.principal_point_mm) for c in local.block.cameras])
-    interior = interior[local.block.images.camera[rays.image]]
-    tangent = (rays.xy - interior[:, 1:]) / interior[:, :1]
+    tangent = ideal_tangents(local.block)
     found = intersect(centre, rotation, (rays.image, rays.point, tangent), local.points, 1e-3 * distance)
     for row, point in enumerate(problem.points.tolist()):
         problem.point_block(row)[:] = found[point]

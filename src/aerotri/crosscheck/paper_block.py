@@ -73,7 +73,7 @@ class PaperRays:
     Parameters
     ----------
     image, point, setup : (m,) rows; xy, inv_sigma : (m, 2). at : (m, 2) mm, where parameters are evaluated.
-    elements : (S, 15) shared entry of every element of `paper_rays.ELEMENTS`, for each setup (camera and group).
+    elements : (S, 24) shared entry of every element of `paper_rays.ELEMENTS`, for each setup (camera and group).
     linear : (S, q) shared entries of the linear patterns, −1 where a setup has fewer; patterns : (m, 2, q) mm, 0 there.
     """
 
@@ -244,6 +244,9 @@ def _element_entries(block: Block, camera_row: int, group: str, entries: _Entrie
     for element in ELEMENTS:
         if element in INTERIOR:
             numbers.append(entries.add(element, ("camera", camera.name), camera.interior[element]))
+            continue
+        if element == "lens.fisheye":
+            numbers.append(entries.add(element, ("camera", camera.name), Prior(float(camera.is_fisheye), fixed=True)))
             continue
         family, item = element.split(".")
         known = (camera.brown if family == "brown" else camera.lens).get(item)

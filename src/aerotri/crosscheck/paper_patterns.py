@@ -103,13 +103,27 @@ def brown(
     return -dx, -dy
 
 
-def forward_lens(
-    a: np.ndarray, b: np.ndarray, k1: np.ndarray, k2: np.ndarray, p1: np.ndarray, p2: np.ndarray, k3: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Distorted direction (a', b') of an ideal one, as OpenCV and COLMAP have it [L]; arguments as in `brown`."""
+def equidistant(u1: np.ndarray, u2: np.ndarray, u3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Position in an ideal fisheye for c = 1 of a direction (u1, u2, u3): the angle θ to −u3 away from the axis.
+
+    θ = 2·arctan(r/(R − u3)) with r² = u1² + u2², R² = r² + u3²; all arguments broadcast, and may be complex.
+    """
+    r = np.sqrt(u1**2 + u2**2 + np.finfo(float).tiny)
+    theta = 2.0 * np.arctan(r / (np.sqrt(r**2 + u3**2) - u3))
+    return theta * u1 / r, theta * u2 / r
+
+
+def forward_lens(a: np.ndarray, b: np.ndarray, *lens: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distorted position (a', b') of an ideal one, as OpenCV, COLMAP and Metashape have it [L].
+
+    Parameters
+    ----------
+    a, b : for c = 1; all arguments broadcast, and may be complex.
+    lens : k1, k2, p1, p2, k3, k4, then q1, q2, q3 of the denominator, sx, sy, b1, b2.
+    """
+    k1, k2, p1, p2, k3, k4, q1, q2, q3, sx, sy, b1, b2 = lens
     r2 = a**2 + b**2
-    radial = 1.0 + k1 * r2 + k2 * r2**2 + k3 * r2**3
-    return (
-        a * radial + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a**2),
-        b * radial + 2.0 * p2 * a * b + p1 * (r2 + 2.0 * b**2),
-    )
+    radial = (1.0 + k1 * r2 + k2 * r2**2 + k3 * r2**3 + k4 * r2**4) / (1.0 + q1 * r2 + q2 * r2**2 + q3 * r2**3)
+    a_bent = a * radial + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a**2) + sx * r2
+    b_bent = b * radial + 2.0 * p2 * a * b + p1 * (r2 + 2.0 * b**2) + sy * r2
+    return a_bent + b1 * a_bent + b2 * b_bent, b_bent

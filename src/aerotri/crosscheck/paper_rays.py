@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerotri.crosscheck.paper_patterns import brown, forward_lens
+from aerotri.crosscheck.paper_patterns import brown, equidistant, forward_lens
 
 STEP = 1e-30
 """Imaginary step of the partials: they need no difference, so it may be so small that its square vanishes [L: Squire
 and Trapp 1998]."""
 INTERIOR = ("focal_length_mm", "x0_mm", "y0_mm")
 BROWN = ("K1", "K2", "K3", "P1", "P2", "b1", "b2")
-LENS = ("k1", "k2", "p1", "p2", "k3")
-ELEMENTS = (*INTERIOR, *(f"brown.{name}" for name in BROWN), *(f"lens.{name}" for name in LENS))
-"""What a ray depends on besides pose, point and the linear patterns, in the order of the arrays here."""
+LENS = ("k1", "k2", "p1", "p2", "k3", "k4", "q1", "q2", "q3", "sx", "sy", "b1", "b2")
+ELEMENTS = (*INTERIOR, *(f"brown.{name}" for name in BROWN), *(f"lens.{name}" for name in LENS), "lens.fisheye")
+"""What a ray depends on besides pose, point and the linear patterns, in the order of the arrays here; the last is 1 for
+a fisheye, else 0."""
 
 SEQUENCE = {"omega-phi-kappa": (0, 1, 2), "phi-omega-kappa": (1, 0, 2)}
 """Axes in the order in which Rᵀ turns a vector, by the order of the angles: x is 0, y 1, z 2."""
@@ -67,13 +68,15 @@ def predict(
     Parameters
     ----------
     pose : (..., k, 6) X0, Y0, Z0 (m), ω, φ, κ (rad). mount : (k, 3, 3) or None, a constant rotation after the angles.
-    point : (k, 3) m. elements : (..., k, 15) by `ELEMENTS`. xy : (k, 2) mm, the measured position.
+    point : (k, 3) m. elements : (..., k, 24) by `ELEMENTS`. xy : (k, 2) mm, the measured position.
     """
     u = into_camera([point[:, axis] - pose[..., axis] for axis in range(3)], pose[..., 3:], order)
     if mount is not None:
         u = [u[0] * mount[:, 0, axis] + u[1] * mount[:, 1, axis] + u[2] * mount[:, 2, axis] for axis in range(3)]
     c, x0, y0 = (elements[..., i] for i in range(3))
-    a, b = forward_lens(-u[0] / u[2], -u[1] / u[2], *(elements[..., i] for i in range(10, 15)))
+    round_lens, fisheye = equidistant(*u), elements[..., -1] != 0.0
+    a, b = (np.where(fisheye, e, -t / u[2]) for e, t in zip(round_lens, u[:2], strict=True))
+    a, b = forward_lens(a, b, *(elements[..., i] for i in range(10, 23)))
     dx, dy = brown(xy[:, 0] - x0, xy[:, 1] - y0, *(elements[..., i] for i in range(3, 10)))
     return c * a + x0 + dx, c * b + y0 + dy
 

@@ -71,7 +71,7 @@ class PhotoErrors:
         for k, item in enumerate(lens.ITEMS):
             name = f"{lens.FAMILY.name}.{item}"
             if name in self.column:
-                step = LENS_STEP * np.eye(len(lens.ITEMS))[k]
+                step = LENS_STEP * np.eye(len(lens.COLUMNS))[k]
                 ends = [replace(f, lens=f.lens + sign * step).of_measured(measured) for sign in (1.0, -1.0)]
                 self._put(out, (name,), ((ends[0] - ends[1]) / (2.0 * LENS_STEP))[:, :, None])
         return out

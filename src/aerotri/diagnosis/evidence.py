@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from aerotri.adjustment.start_values import directions_of
+from aerotri.adjustment.directions import directions_of
 from aerotri.diagnosis.free_model import FreeModel
 from aerotri.diagnosis.placement import Placed, lay_on
 from aerotri.functional_model.rotation import exponential, logarithm, rotation_from_angles

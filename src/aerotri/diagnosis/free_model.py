@@ -14,10 +14,10 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from aerotri.adjustment.directions import directions_of
 from aerotri.adjustment.start_values import (
     OPENCV_FROM_CAMERA,
     RESECTION_TOLERANCES,
-    directions_of,
     intersect_into,
     refine,
     start_values,

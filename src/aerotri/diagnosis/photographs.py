@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.adjustment.start_values import directions_of, resect
+from aerotri.adjustment.directions import directions_of
+from aerotri.adjustment.start_values import resect
 from aerotri.diagnosis import changes
 from aerotri.diagnosis.free_model import FreeModel, sub_block
 from aerotri.diagnosis.hypothesis import Hypothesis

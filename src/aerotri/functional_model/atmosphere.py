@@ -156,7 +156,7 @@ def corrected_image_points(
     Raises
     ------
     InputError
-        When the ground is not below a photograph, or a ray is flatter than 80° off the nadir.
+        When the ground is not below a photograph, or a ray is flatter than 80° off the nadir; for a fisheye.
     """
     rays = block.image_points
     xy = rays.xy.copy()
@@ -172,6 +172,12 @@ def corrected_image_points(
     camera = block.images.camera[rays.image]
     for index, cam in enumerate(block.cameras):
         own = np.flatnonzero((camera == index) & oriented[rays.image])
+        if cam.is_fisheye and effects:
+            raise InputError(
+                f"camera '{cam.name}' is a fisheye: refraction and earth curvature are for perspective cameras",
+                'set refraction and earth_curvature to "off"',
+                file="block.toml",
+            )
         image, principal_point = rays.image[own], np.array(cam.principal_point_mm)
         for effect in effects:
             bar = xy[own] - principal_point

@@ -1,7 +1,8 @@
 """The collinearity equations over many rays: x + vx = −c·u1/u3 + x0 + d(x, y), u = Rᵀ(X − X0) [L].
 
-`interior` rows hold c, x0, y0, K1, K2, K3, P1, P2, b1, b2, k1, k2, p1, p2, k3 (see `INTERIOR_COLUMNS`); the linear
-additional parameters are added by the caller, since their columns do not change between iterations.
+`interior` rows hold c, x0, y0, Brown's parameters, those of the forward lens and whether the camera is a fisheye (see
+`INTERIOR_COLUMNS`); the linear additional parameters are added by the caller, since their columns do not change between
+iterations.
 """
 
 from __future__ import annotations
@@ -10,18 +11,22 @@ import numpy as np
 
 from aerotri.functional_model import _kernels
 from aerotri.functional_model._kernels import RayList, RayPartials
+from aerotri.functional_model.additional_parameters import lens
 from aerotri.observations import Camera
-from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
+from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS
 
-INTERIOR_COLUMNS = INTERIOR_ELEMENTS + tuple(f"brown.{n}" for n in BROWN_NAMES) + tuple(f"lens.{n}" for n in LENS_NAMES)
+INTERIOR_COLUMNS = (
+    *INTERIOR_ELEMENTS, *(f"brown.{name}" for name in BROWN_NAMES), *(f"lens.{name}" for name in lens.COLUMNS),
+)  # fmt: skip
+FIRST_LENS = len(INTERIOR_ELEMENTS) + len(BROWN_NAMES)
+"""Where the forward lens begins."""
 
 
 def interior_row(camera: Camera) -> np.ndarray:
-    """(15,) start values of a camera's interior elements and lens parameters."""
+    """(24,) start values of a camera's interior elements and lens parameters."""
     row = [camera.interior[name].value for name in INTERIOR_ELEMENTS]
     row += [camera.brown[name].value if name in camera.brown else 0.0 for name in BROWN_NAMES]
-    row += [camera.lens[name].value if name in camera.lens else 0.0 for name in LENS_NAMES]
-    return np.array(row)
+    return np.array([*row, *lens.vector_of(camera)])
 
 
 def predict(
@@ -38,7 +43,7 @@ def predict(
 
     Parameters
     ----------
-    rotation : (n, 3, 3); centre : (n, 3) m; points : (N, 3) m; interior : (L, 15).
+    rotation : (n, 3, 3); centre : (n, 3) m; points : (N, 3) m; interior : (L, 24).
     image, point, lens_row : (m,) rows of these tables for every ray.
     xy : (m, 2) mm, measured positions.
 
@@ -63,6 +68,8 @@ def linearise(
 ) -> RayPartials:
     """Prediction and analytic partials; arguments as in `predict`."""
     m = len(image)
-    out = RayPartials(np.empty((m, 2)), np.empty((m, 2, 6)), np.empty((m, 2, 3)), np.empty((m, 2, 15)))
+    out = RayPartials(
+        np.empty((m, 2)), np.empty((m, 2, 6)), np.empty((m, 2, 3)), np.empty((m, 2, len(INTERIOR_COLUMNS)))
+    )
     _kernels.linearise_rays(rotation, centre, points, interior, RayList(image, point, lens_row, xy), out)
     return out

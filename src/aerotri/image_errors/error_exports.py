@@ -127,7 +127,7 @@ def nearest_opencv(errors: ErrorFunction) -> NearestLens:
     measured, direction = _directions(errors)
 
     def residuals(p: np.ndarray) -> np.ndarray:
-        bent = lens.distort(direction[:, 0], direction[:, 1], np.array([*p[4:], 0.0]))
+        bent = lens.distort(direction[:, 0], direction[:, 1], lens.vector(dict(zip(OPENCV_ITEMS, p[4:], strict=True))))
         return (bent * p[:2] + p[2:4] - measured).ravel()
 
     c, x0, y0 = errors.interior

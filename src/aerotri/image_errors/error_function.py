@@ -6,9 +6,7 @@ the ideal direction; both directions are exact here, m = lens(ideal) + d(m) and 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 
@@ -40,7 +38,7 @@ class ErrorFunction:
     camera, group : of the photographs.
     interior : (3,) mm, c, x0, y0 as adjusted.
     linear : sets with the values of their parameters.
-    brown, lens : (7,) and (5,) values in the order of the families' items.
+    brown : (7,) values in the order of the items. lens : (14,) in the order of `lens.COLUMNS`.
     """
 
     camera: Camera
@@ -116,16 +114,11 @@ class ErrorFunction:
         return c * lens.distort(direction[:, 0], direction[:, 1], self.lens) + principal_point
 
     def _without_lens(self, distorted: np.ndarray) -> np.ndarray:
-        """The inverse of `_with_lens`, by fixed point."""
-        ideal = distorted
-        for _ in range(ITERATIONS):
-            step = distorted - self._with_lens(ideal)
-            ideal = ideal + step
-            largest = np.abs(step).max(initial=0.0)
-            if largest <= TOLERANCE_MM:
-                return ideal
-            if not largest < FARTHEST_MM:
-                break
+        """The inverse of `_with_lens`."""
+        c, principal_point = self.interior[0], self.interior[1:]
+        direction = lens.undistort((distorted - principal_point) / c, self.lens)
+        if not np.isnan(direction).any():
+            return c * direction + principal_point
         raise InputError(
             f"the lens distortion of group '{self.group}' is so large that neighbouring image points change places",
             "adjust with fewer additional parameters",
@@ -134,6 +127,7 @@ class ErrorFunction:
 
 def error_function(adjusted: AdjustedBlock, group: ImageGroup) -> ErrorFunction:
     """All additional parameters in force in a group, estimated or given; what the selection removed is not."""
+    _refuse_fisheye(group.camera)
     values = _values_in_force(adjusted, group)
     sets = tuple(
         (chosen, np.array([values[name] for name in chosen.names]))
@@ -144,13 +138,20 @@ def error_function(adjusted: AdjustedBlock, group: ImageGroup) -> ErrorFunction:
         group=group.name,
         interior=interior_elements(adjusted, group.camera)[0],
         linear=sets,
-        brown=_of_family(values, brown),
-        lens=_of_family(values, lens),
+        brown=np.array([values.get(f"brown.{item}", 0.0) for item in brown.ITEMS]),
+        lens=lens.vector({item: values.get(f"lens.{item}", 0.0) for item in lens.ITEMS}),
     )
 
 
-def _of_family(values: Mapping[str, float], module: ModuleType) -> np.ndarray:
-    return np.array([values.get(f"{module.FAMILY.name}.{item}", 0.0) for item in module.ITEMS])
+def _refuse_fisheye(camera: Camera) -> None:
+    """Ideal photographs, models and ground points are computed in perspective photographs."""
+    if camera.is_fisheye:
+        raise InputError(
+            f"camera '{camera.name}' is a fisheye: ideal photographs, model deformation and ground points are computed "
+            "in perspective photographs only",
+            "write the result with `aerotri convert RESULT MODEL --to colmap`, have the photographs made perspective "
+            "there (`colmap image_undistorter`), and read that model as a block",
+        )
 
 
 def _values_in_force(adjusted: AdjustedBlock, group: ImageGroup) -> dict[str, float]:

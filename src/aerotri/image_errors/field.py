@@ -24,9 +24,6 @@ from aerotri.results.adjusted_block import AdjustedBlock
 
 CHI2_LIMIT = -2.0 * np.log(1.0 - 0.95)
 """95 % quantile of χ² with two degrees of freedom; the distribution function is 1 − exp(−χ²/2)."""
-LENS_ITERATIONS = 20
-"""Steps of a fixed point: each shrinks by the slope of the lens error; even a slope of 0.3 leaves 3·10⁻¹¹ of it
-[D]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +67,8 @@ def systematic_errors(
     """Systematic image errors of a group at image positions, and their covariance.
 
     Linear families count exactly. Brown's family is evaluated about the adjusted principal point. The forward lens is a
-    function of the ideal direction, which is found from the measured one by fixed point; its covariance leaves out how
-    the ideal direction itself depends on the parameters (a relative effect of |∂d/∂x|). Lens values that were given and
-    not adjusted belong to d and carry no variance.
+    function of the ideal direction, which is found from the measured one; of a fisheye the ideal position is that of
+    its own ideal projection. Lens values that were given and not adjusted belong to d and carry no variance.
 
     Parameters
     ----------
@@ -160,7 +156,7 @@ def lens_errors(
 
     Parameters
     ----------
-    c : mm, principal distance. principal_point : x0, y0 in mm. lens_parameters : (5,) in the order of `LENS_NAMES`.
+    c : mm, principal distance. principal_point : x0, y0 in mm. lens_parameters : (14,) in the order of `lens.COLUMNS`.
     """
     x0, y0 = principal_point
     return _lens((x - x0) / c, (y - y0) / c, c, lens_parameters)[0]
@@ -287,8 +283,9 @@ def _families(adjusted: AdjustedBlock, group: ImageGroup, rows: np.ndarray, x: n
     for module in (brown, lens):
         names = tuple(f"{module.FAMILY.name}.{item}" for item in module.ITEMS)
         if any(name in values for name in names):
-            p = np.array([values.get(name, 0.0) for name in names])
-            yield names, *(_brown(x - x0, y - y0, p) if module is brown else _lens((x - x0) / c, (y - y0) / c, c, p))
+            p = np.array([*(values.get(name, 0.0) for name in names), float(camera.is_fisheye)])
+            bar = x - x0, y - y0
+            yield names, *(_brown(*bar, p[:-1]) if module is brown else _lens(bar[0] / c, bar[1] / c, c, p))
 
 
 def _values_in_force(adjusted: AdjustedBlock, group: ImageGroup, rows: np.ndarray) -> dict[str, float]:
@@ -306,10 +303,12 @@ def _brown(x_bar: np.ndarray, y_bar: np.ndarray, p: np.ndarray) -> tuple[np.ndar
 
 
 def _lens(a: np.ndarray, b: np.ndarray, c: float, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Image error and patterns of the forward lens at measured directions a, b."""
+    """Image error and its partials by the forward lens at measured positions a, b for c = 1."""
     measured = np.stack([a, b], axis=-1)
-    ideal = measured
-    for _ in range(LENS_ITERATIONS):
-        ideal = measured - (lens.distort(ideal[:, 0], ideal[:, 1], p) - ideal)
-    patterns = [lens.distort(ideal[:, 0], ideal[:, 1], unit) - ideal for unit in np.eye(len(lens.ITEMS))]
-    return c * (measured - ideal), c * np.stack(patterns, axis=-1)
+    ideal = lens.unbend(measured, p)
+    x, y = ideal.T
+    by_ideal, by_parameter = lens.slopes(x, y, p), lens.patterns(x, y, p)
+    there = np.isfinite(by_ideal).all(axis=(1, 2))
+    # the measured position stays: what a parameter adds, the ideal position gives way
+    by_parameter[there] = np.linalg.solve(by_ideal[there], by_parameter[there])
+    return c * (measured - ideal), c * by_parameter

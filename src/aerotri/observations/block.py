@@ -19,7 +19,8 @@ from aerotri.observations.rolling_shutter import RollingShutter
 
 INTERIOR_ELEMENTS = ("focal_length_mm", "x0_mm", "y0_mm")
 BROWN_NAMES = ("K1", "K2", "K3", "P1", "P2", "b1", "b2")
-LENS_NAMES = ("k1", "k2", "p1", "p2", "k3")
+LENS_NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "q1", "q2", "q3", "sx", "sy", "b1", "b2")
+PROJECTIONS = ("perspective", "fisheye")
 INTERIOR_ORIENTATIONS = ("similarity", "affine", "projective")
 EDIT_ACTIONS = ("off", "check", "control")
 CONSTRAINT_KINDS = ("vertical", "horizontal", "height_difference", "distance", "plane", "line")
@@ -37,7 +38,9 @@ class Camera:
     interior : a `Prior` for each of focal_length_mm, x0_mm, y0_mm (principal distance and principal point, mm).
     brown : `Prior` of Brown's parameters by name (`BROWN_NAMES`, units mm^-k); a function of the measured position.
     lens : `Prior` of the forward lens parameters by name (`LENS_NAMES`, dimensionless); a function of the ideal
-        direction, as OpenCV, COLMAP and Bundler have it.
+        direction, as OpenCV, COLMAP, Bundler and Metashape have it.
+    projection : one of `PROJECTIONS`: an ideal ray at the angle θ to the axis lies c·tan θ (perspective) or c·θ
+        (fisheye, equidistant) from the principal point.
     flight_axis : image axis along the flight ('+x', '-x', '+y', '-y') or None when not stated.
     fiducials : calibrated positions (x, y) in mm of the fiducial marks of a film camera, by name.
     interior_orientation : one of `INTERIOR_ORIENTATIONS`, how scans of a film camera are brought to the marks.
@@ -51,6 +54,7 @@ class Camera:
     interior: Mapping[str, Prior]
     brown: Mapping[str, Prior] = field(default_factory=dict)
     lens: Mapping[str, Prior] = field(default_factory=dict)
+    projection: str = "perspective"
     flight_axis: str | None = None
     fiducials: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     interior_orientation: str | None = None
@@ -67,6 +71,10 @@ class Camera:
     @property
     def principal_point_mm(self) -> tuple[float, float]:
         return self.interior["x0_mm"].value, self.interior["y0_mm"].value
+
+    @property
+    def is_fisheye(self) -> bool:
+        return self.projection == "fisheye"
 
     @property
     def half_format_mm(self) -> tuple[float, float]:

@@ -89,6 +89,7 @@ class CameraSpec(Table):
     pixel_um: Positive = key(..., "Size of a pixel.", "µm")
     focal_length_mm: Positive = key(..., "Principal distance.", "mm")
     principal_point_mm: tuple[Number, Number] = key((0.0, 0.0), "Principal point x0, y0.", "mm")
+    projection: Literal["perspective", "fisheye"] = key("perspective", "Kind of lens, as in block.toml.")
     flight_axis: Literal["+x", "-x", "+y", "-y"] = key("+y", "Image axis along the flight.")
     interior: dict[InteriorName, PriorSpec] = key(
         {}, "What the block states of the interior orientation, as in block.toml.", "mm"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerotri.functional_model.additional_parameters import lens as forward_lens
 from aerotri.observations import Camera, Prior, RollingShutter
-from aerotri.observations.block import LENS_NAMES
 from aerotri.observations.rolling_shutter import READING
 from aerotri.simulation.camera_spec import CameraSpec, PriorSpec, RollingShutterSpec
 from aerotri.simulation.projection import TrueCamera
@@ -28,6 +28,7 @@ def block_camera(name: str, spec: CameraSpec) -> Camera:
         interior={str(key): _prior(spec.interior.get(key, held), value) for key, value in values.items()},
         brown={str(key): _prior(prior, 0.0) for key, prior in spec.brown.items()},
         lens={str(key): _prior(prior, 0.0) for key, prior in spec.lens.items()},
+        projection=spec.projection,
         flight_axis=spec.flight_axis,
         rolling_shutter=None if spec.rolling_shutter is None else _stated_shutter(spec.rolling_shutter),
     )
@@ -47,7 +48,7 @@ def true_camera(name: str, spec: CameraSpec) -> TrueCamera:
         focal_length=spec.focal_length_mm + wrong.get("focal_length_mm", 0.0),
         x0=spec.principal_point_mm[0] + wrong.get("x0_mm", 0.0),
         y0=spec.principal_point_mm[1] + wrong.get("y0_mm", 0.0),
-        lens=np.array([lens.get(key, 0.0) for key in LENS_NAMES]),
+        lens=forward_lens.vector(lens, spec.projection == "fisheye"),
         scan=_true_scan(spec),
     )
 

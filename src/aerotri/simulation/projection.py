@@ -28,7 +28,7 @@ class TrueCamera:
     ----------
     nominal : the camera as the block states it.
     focal_length, x0, y0 : mm.
-    lens : (5,) forward lens parameters.
+    lens : (14,) forward lens, in the order of `lens.COLUMNS`.
     scan : (2,) s per mm: a ray at (x, y) is exposed scan·(x, y) after the middle of the readout; 0 for all rows at
         once.
     """
@@ -172,6 +172,8 @@ def _largest_tangent(photographs: Photographs, limit: np.ndarray) -> np.ndarray:
     """(c,) tangent of the steepest ray a camera records; a lens that pulls inwards sees further than c says."""
     tangent = (np.hypot(*limit.T) + 0.1) / np.array([c.focal_length for c in photographs.cameras])
     for k, camera in enumerate(photographs.cameras):
+        if camera.nominal.is_fisheye:
+            tangent[k] = np.tan(min(tangent[k], STEEPEST))
         if camera.lens.any():
             tangent[k] *= 1.3
     return tangent

@@ -17,7 +17,7 @@ from scipy.special import ndtr
 
 from aerotri.adjustment.parallel import thread_count
 from aerotri.conventions import InputError, mm_from_px, px_from_mm
-from aerotri.functional_model.additional_parameters.lens import distort
+from aerotri.functional_model.additional_parameters.lens import undistort
 from aerotri.image_errors.tile_grid import Tile, TileGrid, sample, seams_px, tiles_of
 from aerotri.observations import Block
 from aerotri.simulation import _rendering_kernels as kernels
@@ -274,22 +274,15 @@ def _ground_function(scene: Scene, image: int, tile: Tile) -> Callable[[np.ndarr
     def ground(column_row: np.ndarray) -> np.ndarray:
         measured = mm_from_px(column_row, camera.size_px, camera.pixel_mm)
         ideal = measured - field(*np.clip(measured, low, high).T)
-        direction = _undistorted((ideal - (true.x0, true.y0)) / true.focal_length, true.lens)
+        direction = undistort((ideal - (true.x0, true.y0)) / true.focal_length, true.lens)
+        if np.isnan(direction).any():
+            name = scene.names[image]
+            raise InputError(f"photograph '{name}' has pixels without a direction", "take a longer focal length")
         centre, rotation = photographs.during_readout(np.full(len(measured), image), measured)
         ray = np.einsum("nij,nj->ni", rotation, np.column_stack([direction, -np.ones(len(direction))]))
         return _on_terrain(scene, image, centre, ray)
 
     return ground
-
-
-def _undistorted(bent: np.ndarray, lens: np.ndarray) -> np.ndarray:
-    ideal = bent
-    for _ in range(RAY_ITERATIONS if lens.any() else 0):
-        step = bent - distort(ideal[:, 0], ideal[:, 1], lens)
-        ideal = ideal + step
-        if np.abs(step).max(initial=0.0) < 1e-12:
-            break
-    return ideal
 
 
 def _on_terrain(scene: Scene, image: int, centre: np.ndarray, ray: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ Number0 = Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)]
 Name = Annotated[str, StringConstraints(min_length=1)]
 InteriorName = Literal["focal_length_mm", "x0_mm", "y0_mm"]
 BrownName = Literal["K1", "K2", "K3", "P1", "P2", "b1", "b2"]
-LensName = Literal["k1", "k2", "p1", "p2", "k3"]
+LensName = Literal["k1", "k2", "p1", "p2", "k3", "k4", "q1", "q2", "q3", "sx", "sy", "b1", "b2"]
 Triple = tuple[NotNegative, NotNegative, NotNegative]
 Vector = tuple[Number, Number, Number]
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from aerotri.conventions import InputError, px_from_mm
 from aerotri.formats.assembly.reprojection import ideal_tangents
-from aerotri.formats.foreign.colmap import COLMAP_FROM_CAMERA, SIGN
+from aerotri.formats.foreign.colmap import COLMAP_FROM_CAMERA
+from aerotri.formats.foreign.colmap_cameras import SIGN
 from aerotri.observations import Block, Camera, Prior
 
 LENS_IN_MAPPING = ("k1", "k2")
@@ -51,8 +52,20 @@ def is_held(camera: Camera) -> bool:
 
 
 def pinhole(camera: Camera) -> Any:
-    """pycolmap's camera with the principal distance and principal point as they are stated, no lens."""
+    """pycolmap's camera with the principal distance and principal point as they are stated, no lens.
+
+    Raises
+    ------
+    InputError
+        For a fisheye.
+    """
     import pycolmap
+
+    if camera.is_fisheye:
+        raise InputError(
+            f"camera '{camera.name}' is a fisheye: tie points are matched and oriented in perspective photographs only",
+            "measure the tie points with COLMAP, camera model OPENCV_FISHEYE, and read its model as a block",
+        )
 
     return pycolmap.Camera(
         model="SIMPLE_PINHOLE",

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aerotri.compiled import kernel
-from aerotri.functional_model._kernels import linearise_ray, predict_ray
+from aerotri.functional_model._kernels import INTERIOR, linearise_ray, predict_ray
 
 
 class PhotoArrays(NamedTuple):
@@ -49,7 +49,7 @@ class PicketArrays(NamedTuple):
 
 
 class ResponseSums(NamedTuple):
-    """Sums of the response, out: by_eo (n, 6), by_interior (L, 15), nodes (·, 2), noise (1,)."""
+    """Sums of the response, out: by_eo (n, 6), by_interior (L, 24), nodes (·, 2), noise (1,)."""
 
     by_eo: np.ndarray
     by_interior: np.ndarray
@@ -98,7 +98,7 @@ def respond(first, last, pickets, photos, tiles, out):
     most = 1
     for p in range(first, last):
         most = max(most, start[p + 1] - start[p])
-    by_eo, by_pt, by_in = np.empty((most, 2, 6)), np.empty((most, 2, 3)), np.empty((most, 2, 15))
+    by_eo, by_pt, by_in = np.empty((most, 2, 6)), np.empty((most, 2, 3)), np.empty((most, 2, INTERIOR))
     at, normal, q = np.empty((most, 2)), np.empty((3, 3)), np.empty(3)
     for p in range(first, last):
         normal[:] = 0.0
@@ -140,7 +140,7 @@ def respond(first, last, pickets, photos, tiles, out):
             f1 = weight * (by_pt[r, 1, 0] * q[0] + by_pt[r, 1, 1] * q[1] + by_pt[r, 1, 2] * q[2])
             for t in range(6):
                 by_eo_sum[i, t] -= by_eo[r, 0, t] * f0 + by_eo[r, 1, t] * f1
-            for t in range(15):
+            for t in range(INTERIOR):
                 by_interior_sum[lens_row[i], t] -= by_in[r, 0, t] * f0 + by_in[r, 1, t] * f1
             deposit(photos.source[i], at[r, 0], at[r, 1], (f0, f1), tiles, nodes)
     return -1

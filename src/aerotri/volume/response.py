@@ -47,7 +47,7 @@ class Response:
     unknowns : (6n + s,) c = ∂V/∂θ in the unknowns of the reduced system, zero where held. solved : Q·c.
     variance : σ̂0²·cᵀQc, the part of the adjustment. model : its model part. noise : Σ gᵀN⁻¹g, the part of matching.
     by_orientation : (n, 6) ∂V by projection centre and small rotation of the photographs of the system, held or not.
-    by_interior : (L, 15) ∂V by the interior elements of the system's rows.
+    by_interior : (L, 24) ∂V by the interior elements of the system's rows.
     by_parameters : (p,) change of V by an additional parameter that is left uncorrected, as `additional_rows`.
     error : change of V by the image errors in force, left uncorrected.
     """
@@ -193,7 +193,7 @@ def _summed(
     arrays = _kernels.PicketArrays(pickets.start, image, 1.0 / pickets.sigma_mm, points, along, pickets.noise_share)
     outs = [
         _kernels.ResponseSums(
-            np.zeros((len(u.images), 6)), np.zeros((len(u.lens.base), 15)), np.zeros((len(nodes.xy), 2)), np.zeros(1)
+            np.zeros((len(u.images), 6)), np.zeros(u.lens.base.shape), np.zeros((len(nodes.xy), 2)), np.zeros(1)
         )
         for _ in bounds
     ]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.functional_model.collinearity import linearise, predict
+from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise, predict
 from aerotri.functional_model.rotation import rotation_from_angles, small_rotation_per_angle
 
 ORDER = "omega-phi-kappa"
@@ -47,7 +47,7 @@ class Pair:
 
     def rays(self, points: np.ndarray):
         n = len(points)
-        interior = np.zeros((2, 15))
+        interior = np.zeros((2, len(INTERIOR_COLUMNS)))
         interior[:, 0] = self.focal_length
         image, point = np.repeat(np.arange(2), n), np.tile(np.arange(n), 2)
         return self.rotation, np.ascontiguousarray(self.centre), points, interior, image, point, image

@@ -69,7 +69,8 @@ def test_conventions(folder):
     np.testing.assert_allclose(rotation_from_angles(block.images.angles), np.tile(np.eye(3), (2, 1, 1)), atol=1e-12)
     one, two = block.cameras
     assert one.focal_length_mm == pytest.approx(0.5 * 200 * 0.005)
-    assert one.lens == {"k1": Prior(0.1), "k2": Prior(0.0)}
+    held = {name: Prior(0.0, fixed=True) for name in ("p1", "p2", "k3")}
+    assert one.lens == {"k1": Prior(0.1), "k2": Prior(0.0)} | held
     np.testing.assert_allclose(two.principal_point_mm, [0.01 * 200 * 0.005, 0.02 * 200 * 0.005])
     assert two.brown["b1"].value == pytest.approx(0.51 / 0.5 - 1)
     assert (two.lens["p1"].value, two.lens["p2"].value) == (-1e-3, 2e-3)
@@ -156,7 +157,7 @@ WRONG = {
     "empty": ("[]", "holds no reconstruction"),
     "no table": ("[1]", "reconstruction 0: is no table"),
     "no shots": (changed("shots", to={}), "reconstruction 1.cameras: is empty"),
-    "fisheye": (changed("cameras", "one", "projection_type", to="fisheye"), "fisheye cannot be expressed"),
+    "spherical": (changed("cameras", "one", "projection_type", to="spherical"), "spherical cannot be expressed"),
     "type": (changed("cameras", "one", "projection_type", to=3), "projection_type: is no text"),
     "width": (changed("cameras", "one", "width", to=0.5), "width and height are no format"),
     "focal": (changed("cameras", "one", "focal", to=-1), "a focal length is not greater than 0"),

@@ -144,7 +144,7 @@ def true_image_points(calibration, truth, rotation: np.ndarray, pickets: Pickets
     function = error_function(calibration.local, image_groups(calibration.result.block)[0])
     values = dict(zip(truth.parameter_names, truth.parameter_values, strict=True))
     sets = tuple((chosen, np.array([values.get(name, 0.0) for name in chosen.names])) for chosen, _ in function.linear)
-    erring = ErrorFunction(function.camera, function.group, truth.interior[0], sets, np.zeros(7), np.zeros(5))
+    erring = ErrorFunction(function.camera, function.group, truth.interior[0], sets, np.zeros(7), np.zeros(14))
     point = np.repeat(np.arange(len(pickets)), np.diff(pickets.start))
     zero = np.zeros(len(point), np.int64)
     ideal = predict(rotation, truth.centre, pickets.xyz, _interior(truth.interior[0]), pickets.image, point, zero,

@@ -10,7 +10,7 @@ from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import brown, lens
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block, Camera
-from aerotri.observations.block import BROWN_NAMES, LENS_NAMES
+from aerotri.observations.block import BROWN_NAMES
 
 WEAKEST = 1e-6
 """Smallest eigenvalue of the intersection's normal matrix per ray: rays that meet under 0.1° say nothing of a point."""
@@ -18,9 +18,6 @@ CLEAR = 0.5
 """The right reading has a median residual less than this part of any other's."""
 FEWEST = 4
 """Rays to intersected points without which nothing is settled."""
-LENS_ITERATIONS = 20
-"""Steps that take lens distortion off an image point; chosen [C]: a step multiplies the error by the slope of the
-distortion; where that is 0.3, a strong lens, 20 leave 1e-10 of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,14 +59,8 @@ def _tangents(camera: Camera, xy: np.ndarray) -> np.ndarray:
     bar = xy - np.array(camera.principal_point_mm)
     values = np.array([camera.brown[name].value if name in camera.brown else 0.0 for name in BROWN_NAMES])
     distorted = (bar - brown.image_error(bar[:, 0], bar[:, 1], values)) / camera.focal_length_mm
-    forward = np.array([camera.lens[name].value if name in camera.lens else 0.0 for name in LENS_NAMES])
-    ideal = distorted.copy()
-    if forward.any():
-        # a lens of impossible values has no ideal direction: the residual is then not known
-        with np.errstate(over="ignore", invalid="ignore"):
-            for _ in range(LENS_ITERATIONS):
-                ideal = ideal - (lens.distort(ideal[:, 0], ideal[:, 1], forward) - distorted)
-    return ideal
+    # a lens of impossible values has no ideal direction: the residual is then not known
+    return lens.undistort(distorted, lens.vector_of(camera))
 
 
 def reproject(block: Block, centre: np.ndarray, rotation: np.ndarray) -> Reprojection:

@@ -52,13 +52,22 @@ class BrownModel(Section):
 
 
 class LensModel(Section):
-    """Start values and σ of the lens model of OpenCV and COLMAP; see `additional_parameters`, family lens."""
+    """Values and σ of the lens model of OpenCV, COLMAP and Metashape, family lens. What `additional_parameters` does
+    not name is held at its value."""
 
     k1: PriorModel | None = key(None, "Radial distortion as in OpenCV, term of the third power.")
     k2: PriorModel | None = key(None, "Radial distortion as in OpenCV, term of the fifth power.")
     p1: PriorModel | None = key(None, "Decentring distortion as in OpenCV, mainly along y.")
     p2: PriorModel | None = key(None, "Decentring distortion as in OpenCV, mainly along x.")
     k3: PriorModel | None = key(None, "Radial distortion as in OpenCV, term of the seventh power.")
+    k4: PriorModel | None = key(None, "Radial distortion, term of the ninth power; Metashape's and a fisheye's k4.")
+    q1: PriorModel | None = key(None, "Denominator of the radial distortion, second power; OpenCV's k4.")
+    q2: PriorModel | None = key(None, "Denominator of the radial distortion, fourth power; OpenCV's k5.")
+    q3: PriorModel | None = key(None, "Denominator of the radial distortion, sixth power; OpenCV's k6.")
+    sx: PriorModel | None = key(None, "Thin prism distortion along x, term of the second power.")
+    sy: PriorModel | None = key(None, "Thin prism distortion along y, term of the second power.")
+    b1: PriorModel | None = key(None, "Affinity after the distortion: scale of x against y; Metashape's B1 over f.")
+    b2: PriorModel | None = key(None, "Affinity after the distortion: shear of x; minus Metashape's B2 over f.")
 
 
 class CameraModel(Section):
@@ -76,6 +85,10 @@ class CameraModel(Section):
     principal_point_mm: Two = key(
         [0.0, 0.0], "Principal point x0, y0 from the image centre; x to the right, y up.", "mm"
     )
+    projection: Literal["perspective", "fisheye"] = key(
+        "perspective", "Kind of lens. A ray at the angle θ to the axis is recorded at c·tan θ (perspective) or c·θ "
+        "(fisheye) from the principal point, before the distortion of the lens."
+    )  # fmt: skip
     flight_axis: Literal["+x", "-x", "+y", "-y"] | None = key(
         None, "Image axis that points along the flight. The parameters of ultracam_d and dmc need it to place the "
         "sensors (+y where it is not given); model deformation takes the base along it (+x where it is not given)."
@@ -102,6 +115,12 @@ class CameraModel(Section):
     )  # fmt: skip
 
     @model_validator(mode="after")
+    def _fisheye_of_one_sensor(self) -> CameraModel:
+        if self.projection == "fisheye" and self.model != "frame":
+            raise ValueError(f'projection = "fisheye" does not go with model = "{self.model}", it needs "frame"')
+        return self
+
+    @model_validator(mode="after")
     def _focal_length_positive(self) -> CameraModel:
         given = self.interior.focal_length_mm
         if given is not None and given.value is not None and given.value <= 0:
@@ -123,6 +142,7 @@ class CameraModel(Section):
             interior=interior,
             brown=_priors(self.brown, BROWN_NAMES),
             lens=_priors(self.lens, LENS_NAMES),
+            projection=self.projection,
             flight_axis=self.flight_axis,
             fiducials={name: (float(x), float(y)) for name, (x, y) in self.fiducials.items()},
             interior_orientation=self.interior_orientation,

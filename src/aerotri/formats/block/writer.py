@@ -233,6 +233,8 @@ def _camera(camera: Camera) -> dict[str, Any]:
         "focal_length_mm": camera.focal_length_mm,
         "principal_point_mm": list(camera.principal_point_mm),
     }
+    if camera.is_fisheye:
+        content["projection"] = camera.projection
     if camera.flight_axis is not None:
         content["flight_axis"] = camera.flight_axis
     unknown = {name: prior for name, prior in camera.interior.items() if name in INTERIOR_ELEMENTS and not prior.fixed}

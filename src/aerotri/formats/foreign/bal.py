@@ -213,9 +213,12 @@ def write_bal(oriented: OrientedBlock, path: FilePath) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        When a lens has p1, p2 or k3, or nothing is oriented.
+        When a camera is a fisheye or its lens has more than k1 and k2, or nothing is oriented.
     """
     for camera in oriented.block.cameras:
+        if camera.is_fisheye:
+            message = f"camera '{camera.name}' is a fisheye, which BAL has no words for"
+            raise InputError(message, "write COLMAP or OpenSfM")
         more = [name for name, prior in camera.lens.items() if prior.value and name not in WRITTEN_LENS]
         if more:
             raise InputError(f"camera '{camera.name}' has lens parameter {more[0]}, BAL has k1 and k2", "write COLMAP")

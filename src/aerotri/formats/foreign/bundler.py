@@ -239,10 +239,13 @@ def write_bundler(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        When a lens has p1, p2 or k3, a name a blank, or nothing is oriented.
+        When a camera is a fisheye or its lens has more than k1 and k2, a name a blank, or nothing is oriented.
     """
     block, rays = oriented.block, oriented.block.image_points
     for camera in block.cameras:
+        if camera.is_fisheye:
+            message = f"camera '{camera.name}' is a fisheye, which Bundler has no words for"
+            raise InputError(message, "write COLMAP or OpenSfM")
         more = [name for name, prior in camera.lens.items() if prior.value and name not in WRITTEN_LENS]
         if more:
             message = f"camera '{camera.name}' has lens parameter {more[0]}, Bundler has k1 and k2"

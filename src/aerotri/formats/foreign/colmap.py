@@ -1,9 +1,7 @@
 """COLMAP models, text and binary, by way of pycolmap, which is known to this module only.
 
 COLMAP's camera frame is x right, y down, z forwards: this program's turned by diag(1, −1, −1). Its pixels begin at the
-corner of the upper left one, as here. Its lens is the forward lens of `additional_parameters.lens` in a frame whose y
-points down, so p1 changes sign. Two focal lengths are c = fy with the affinity b1 = fy/fx − 1 of Brown's family, which
-is exact, since b1 acts on the measured x alone.
+corner of the upper left one, as here. Its cameras are those of `colmap_cameras`.
 
 COLMAP knows no pixel size. It is 1 µm unless stated, so that a principal distance of 3000 pixels reads 3 mm; choose the
 camera's own where it is known.
@@ -13,7 +11,6 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +21,7 @@ from aerotri.conventions import FilePath, InputError, counted, mm_from_px, px_fr
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.foreign.colmap_binary import check_binary_model
+from aerotri.formats.foreign.colmap_cameras import MOST_PIXELS, colmap_camera, expressible, read_camera, value
 from aerotri.formats.foreign.colmap_rigs import (
     COLMAP_FROM_CAMERA,
     add_frames,
@@ -37,21 +35,6 @@ from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints,
 from aerotri.observations.block import LENS_NAMES
 from aerotri.observations.rigs import STATION
 
-LENS_OF_MODEL: Mapping[str, tuple[str, ...]] = {
-    "SIMPLE_PINHOLE": (),
-    "PINHOLE": (),
-    "SIMPLE_RADIAL": ("k1",),
-    "RADIAL": ("k1", "k2"),
-    "OPENCV": ("k1", "k2", "p1", "p2"),
-    "FULL_OPENCV": ("k1", "k2", "p1", "p2", "k3"),
-}
-"""Models that can be expressed, and their lens parameters in COLMAP's order."""
-TWO_FOCAL_LENGTHS = ("PINHOLE", "OPENCV", "FULL_OPENCV")
-SIGN = {"p1": -1.0}
-"""Parameters that change their sign with y: p1 is the tangential distortion along it."""
-SMALLEST_FOCAL_PX, MOST_PIXELS, LARGEST_RATIO = 1e-3, 10_000_000, 100.0
-"""Least focal length, largest format, both pixels, and largest ratio of two focal lengths; chosen [C]: beyond any
-camera, so that only damaged files are refused."""
 FILES = ("cameras", "images", "points3D")
 OWN_ENTRIES = tuple(f"{name}.{end}" for name in (*FILES, "rigs", "frames") for end in ("txt", "bin"))
 
@@ -86,7 +69,8 @@ def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndar
     Warns
     -----
     UserWarning
-        When an object point is measured more than once in one image; the first measurement is kept.
+        When an object point is measured more than once in one image; the first measurement is kept. When a lens is
+        held, or fitted to a model of other formulas.
     """
     folder = Path(folder)
     model = _read_model(folder)
@@ -156,7 +140,10 @@ def _read_model(folder: Path) -> Any:
 def _cameras_of(model: Any, pixel_um: float, folder: Path) -> tuple[tuple[Camera, ...], dict[int, int]]:
     """The cameras, and their places by COLMAP's numbers."""
     ids = sorted(model.cameras)
-    found = [_camera_of(model.cameras[number], pixel_um, folder) for number in ids]
+    read = [read_camera(model.cameras[number], pixel_um, folder) for number in ids]
+    for sentence in dict.fromkeys(sentence for _, said in read for sentence in said):
+        warnings.warn(sentence, stacklevel=3)
+    found = [camera for camera, _ in read]
     used = [name for name in LENS_NAMES if any(name in camera.lens for camera in found)]
     complete = []
     for camera in found:
@@ -166,46 +153,15 @@ def _cameras_of(model: Any, pixel_um: float, folder: Path) -> tuple[tuple[Camera
     return tuple(complete), {number: place for place, number in enumerate(ids)}
 
 
-def _camera_of(camera: Any, pixel_um: float, folder: Path) -> Camera:
-    name, values = camera.model.name, list(camera.params)
-    if name not in LENS_OF_MODEL:
-        known = ", ".join(LENS_OF_MODEL)
-        raise InputError(f"camera {camera.camera_id} is of model {name}", f"known are {known}", folder)
-    focal = values[:2] if name in TWO_FOCAL_LENGTHS else [values[0], values[0]]
-    after = 2 if name in TWO_FOCAL_LENGTHS else 1
-    cx, cy, *rest = values[after:]
-    names = LENS_OF_MODEL[name]
-    if any(rest[len(names) :]):
-        raise InputError(
-            f"camera {camera.camera_id} has lens parameters k4 to k6",
-            "estimate it as OPENCV or with k4 to k6 held at 0",
-            folder,
-        )
-    possible = bool((np.abs(values) <= LARGEST_NUMBER).all())
-    possible = possible and min(focal) >= SMALLEST_FOCAL_PX and max(focal) < LARGEST_RATIO * min(focal)
-    if not possible or not 0 < min(camera.width, camera.height) <= max(camera.width, camera.height) <= MOST_PIXELS:
-        raise InputError(f"camera {camera.camera_id} has no valid parameters", "calibrate it first", folder)
-    size = (int(camera.width), int(camera.height))
-    x0, y0 = mm_from_px(np.array([[cx, cy]]), size, pixel_um * 1e-3)[0]
-    return Camera(
-        name=str(camera.camera_id),
-        model="frame",
-        size_px=size,
-        pixel_um=pixel_um,
-        interior={
-            "focal_length_mm": Prior(float(focal[1] * pixel_um * 1e-3)),
-            "x0_mm": Prior(float(x0), fixed=True),
-            "y0_mm": Prior(float(y0), fixed=True),
-        },
-        brown={} if focal[0] == focal[1] else {"b1": Prior(float(focal[1] / focal[0] - 1.0))},
-        lens={key: Prior(SIGN.get(key, 1.0) * float(value)) for key, value in zip(names, rest, strict=False)},
-    )
-
-
 def _free_parameters(cameras: tuple[Camera, ...]) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    lens = tuple(name for name in LENS_NAMES if any(name in camera.lens for camera in cameras))
+    lens = tuple(name for name in LENS_NAMES if any(is_free(camera.lens.get(name)) for camera in cameras))
     affinity = ("b1",) if any(camera.brown for camera in cameras) else ()
     return tuple((family, items) for family, items in (("lens", lens), ("brown", affinity)) if items)
+
+
+def is_free(prior: Prior | None) -> bool:
+    """Whether there is a parameter to be estimated."""
+    return prior is not None and not prior.fixed
 
 
 def _name(image: Any, folder: Path) -> str:
@@ -299,10 +255,12 @@ def write_colmap(oriented: OrientedBlock, folder: FilePath, binary: bool = True)
     if not len(keep):
         raise InputError(f"block '{block.name}' has no oriented image points", "adjust it first")
     freed, cameras = _freed(oriented)
+    written = [expressible(camera) for camera in cameras]
+    cameras = [camera for camera, _ in written]
     model, lost_rigs = _model(oriented, cameras, freed, keep)
     with atomic_folder(folder, own=OWN_ENTRIES) as place:
         (model.write_binary if binary else model.write_text)(place)
-    lost = [*oriented.losses(), *lost_rigs]
+    lost = [*oriented.losses(), *lost_rigs, *(sentence for _, said in written for sentence in said)]
     single = int(np.sum(rays == 1))
     if single:
         lost.append(f"could not be carried over: {counted(single, 'point')} with one ray")
@@ -315,9 +273,22 @@ def _freed(oriented: OrientedBlock) -> tuple[np.ndarray, list[Camera]]:
     """(m, 2) mm, and the cameras that belong to it: as measured, when lens and affinity are all there is."""
     cameras = list(oriented.block.cameras)
     other = [camera.brown[name].value for camera in cameras for name in camera.brown if name != "b1"]
-    if oriented.errors is None and not any(other):
+    if oriented.errors is None and not any(other) and not any(value(camera, "b2") for camera in cameras):
         return oriented.block.image_points.xy, cameras
-    return oriented.corrected_xy(), [replace(camera, brown={}) for camera in cameras]
+    return without_shear(oriented), [replace(camera, brown={}, lens=_lens_without_shear(camera)) for camera in cameras]
+
+
+def without_shear(oriented: OrientedBlock) -> np.ndarray:
+    """(m, 2) mm, the rays free of Brown's and the linear errors, and of the lens' shear b2: x − b2·(y − y0)."""
+    block, rays = oriented.block, oriented.block.image_points
+    xy = oriented.corrected_xy()
+    b2, y0 = np.array([(value(camera, "b2"), camera.principal_point_mm[1]) for camera in block.cameras]).T
+    of_ray = block.images.camera[rays.image]
+    return xy - np.column_stack([b2[of_ray] * (xy[:, 1] - y0[of_ray]), np.zeros(len(xy))]) if b2.any() else xy
+
+
+def _lens_without_shear(camera: Camera) -> dict[str, Prior]:
+    return {name: prior for name, prior in camera.lens.items() if name != "b2"}
 
 
 def _model(
@@ -359,27 +330,6 @@ def _model(
     for number in written.from_world:
         model.register_frame(number)
     return model, written.lost
-
-
-def colmap_camera(camera: Camera) -> tuple[str, list[float]]:
-    """COLMAP's model and parameters (pixels) of a camera; of Brown's family only b1 counts.
-
-    Returns
-    -------
-    model : the smallest that has all lens parameters the camera names.
-    values : in COLMAP's order.
-    """
-    fy = camera.focal_length_mm / camera.pixel_mm
-    fx = fy / (1.0 + (camera.brown["b1"].value if "b1" in camera.brown else 0.0))
-    cx, cy = px_from_mm(np.array([camera.principal_point_mm]), camera.size_px, camera.pixel_mm)[0].tolist()
-    wanted = [model for model, names in LENS_OF_MODEL.items() if set(camera.lens) <= set(names)]
-    model = next(model for model in wanted if model in TWO_FOCAL_LENGTHS or fx == fy)
-    lens = [
-        SIGN.get(name, 1.0) * camera.lens[name].value if name in camera.lens else 0.0 for name in LENS_OF_MODEL[model]
-    ]
-    if model == "FULL_OPENCV":
-        lens += [0.0, 0.0, 0.0]
-    return model, [*([fx, fy] if model in TWO_FOCAL_LENGTHS else [fy]), cx, cy, *lens]
 
 
 def point_numbers(names: np.ndarray) -> np.ndarray:

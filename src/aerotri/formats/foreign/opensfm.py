@@ -3,13 +3,15 @@
 Lengths in an image are parts of its longer side, from its centre, x right, y down. Rotations (angle-axis) and
 translations are world → camera, with x right, y down, z forward: this program's camera frame turned by diag(1, −1, −1).
 Lens parameters are those of `additional_parameters.lens`, p1 with the other sign, since y points down; two focal
-lengths are c and the affinity b1, as for COLMAP. Coordinates are local, east, north, up around reference_lla.
+lengths are c and the affinity b1, as for COLMAP. fisheye and fisheye_opencv are fisheyes with k1, k2 and k1 to k4;
+fisheye62 is read where its k5, k6, p1 and p2 are 0. Coordinates are local, east, north, up around reference_lla.
 """
 
 from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,9 @@ from aerotri.conventions import FilePath, InputError, counted, mm_from_px, px_fr
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import Reading, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_folder
-from aerotri.formats.foreign.colmap import COLMAP_FROM_CAMERA, SIGN, colmap_camera
+from aerotri.formats.foreign.colmap import is_free, without_shear
+from aerotri.formats.foreign.colmap_cameras import SIGN, value, with_nearest
+from aerotri.formats.foreign.colmap_rigs import COLMAP_FROM_CAMERA
 from aerotri.formats.results.json_text import json_text
 from aerotri.formats.text.csv_text import UTF8_REMEDY, read_bytes
 from aerotri.formats.text.tables import LARGEST_FORMAT_PX, SMALLEST_POSITIVE
@@ -44,8 +48,14 @@ LENS_OF_TYPE: dict[str, tuple[str, ...]] = {
     "simple_radial": ("k1",),
     "radial": ("k1", "k2"),
     "brown": ("k1", "k2", "p1", "p2", "k3"),
+    "fisheye": ("k1", "k2"),
+    "fisheye_opencv": ("k1", "k2", "k3", "k4"),
+    "fisheye62": ("k1", "k2", "k3", "k4"),
 }
 """Projections that can be expressed, and their lens parameters."""
+NOT_EXPRESSED = {"fisheye62": ("k5", "k6", "p1", "p2")}
+"""Lens parameters of other formulas."""
+TWO_FOCAL_LENGTHS = ("radial", "simple_radial", "brown", "fisheye_opencv", "fisheye62")
 LARGEST = 1e9
 """Largest number of a reconstruction; chosen [C]: beyond every coordinate in metres and every pixel; squares of it keep
 their digits."""
@@ -116,7 +126,7 @@ def read_opensfm(path: FilePath, pixel_um: float = 1.0) -> Reading:
     Raises
     ------
     InputError
-        When the files are damaged, or a camera is of a projection that cannot be expressed, such as fisheye.
+        When the files are damaged, or a camera is of a projection that cannot be expressed, such as spherical.
     """
     path = Path(path) / RECONSTRUCTION if Path(path).is_dir() else Path(path)
     chosen, messages = _largest(path)
@@ -149,7 +159,7 @@ def read_opensfm(path: FilePath, pixel_um: float = 1.0) -> Reading:
     if chosen.has("reference_lla"):
         lla = [chosen.get("reference_lla").get(key).number() for key in ("latitude", "longitude", "altitude")]
         messages.append("coordinates are local, around latitude {:.9g}, longitude {:.9g}, height {:.6g} m".format(*lla))
-    free = tuple(name for name in LENS_NAMES if any(name in camera.lens for camera in cameras))
+    free = tuple(name for name in LENS_NAMES if any(is_free(camera.lens.get(name)) for camera in cameras))
     affinity = ("b1",) if any(camera.brown for camera in cameras) else ()
     parameters = tuple((family, items) for family, items in (("lens", free), ("brown", affinity)) if items)
     datum = "minimal" if observed is None else "control"
@@ -193,7 +203,10 @@ def _cameras(section: _Node, pixel_um: float) -> tuple[Camera, ...]:
     found = [_camera(name, node, pixel_um) for name, node in section.items().items()]
     if not found:
         raise section.error("is empty")
-    return tuple(found)
+    used = [name for name in LENS_NAMES if any(name in camera.lens for camera in found)]
+    # a parameter that other cameras estimate is held at zero where this one does not have it
+    held = Prior(0.0, fixed=True)
+    return tuple(replace(camera, lens={name: camera.lens.get(name, held) for name in used}) for camera in found)
 
 
 def _camera(name: str, node: _Node, pixel_um: float) -> Camera:
@@ -204,7 +217,10 @@ def _camera(name: str, node: _Node, pixel_um: float) -> Camera:
     if min(width, height) < 1.0 or max(width, height) > LARGEST_FORMAT_PX or width % 1.0 or height % 1.0:
         raise node.error("width and height are no format")
     size, longer = (int(width), int(height)), max(width, height)
-    two = node.has("focal_x") or kind in ("radial", "simple_radial", "brown")
+    for key in NOT_EXPRESSED.get(kind, ()):
+        if node.has(key) and node.get(key).number():
+            raise node.error(f"projection {kind} with {key} cannot be expressed", "estimate it as fisheye_opencv")
+    two = node.has("focal_x") or kind in TWO_FOCAL_LENGTHS
     fx, fy = (node.get(key).number() * longer for key in (("focal_x", "focal_y") if two else ("focal", "focal")))
     if min(fx, fy) < SMALLEST_POSITIVE:
         raise node.error("a focal length is not greater than 0")
@@ -223,6 +239,7 @@ def _camera(name: str, node: _Node, pixel_um: float) -> Camera:
         },
         brown={} if fx == fy else {"b1": Prior(fy / fx - 1.0)},
         lens={key: Prior(value) for key, value in lens.items()},
+        projection="fisheye" if kind.startswith("fisheye") else "perspective",
     )
 
 
@@ -301,9 +318,10 @@ def write_opensfm(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:
     block, rays = oriented.block, oriented.block.image_points
     rows = oriented.rows_with_orientation("a reconstruction")
     other = any(prior.value for camera in block.cameras for name, prior in camera.brown.items() if name != "b1")
-    freed = other or oriented.errors is not None
-    xy = oriented.corrected_xy() if freed else rays.xy
-    cameras = {camera.name: _camera_json(camera, not freed) for camera in block.cameras}
+    freed = other or oriented.errors is not None or any(value(camera, "b2") for camera in block.cameras)
+    xy = without_shear(oriented) if freed else rays.xy
+    written = [_expressible(camera, not freed) for camera in block.cameras]
+    cameras = {camera.name: _camera_json(camera) for camera, _ in written}
     shots = {str(block.images.names[row]): _shot_json(oriented, row) for row in rows.tolist()}
     known = np.flatnonzero(np.isfinite(oriented.points).all(axis=1))
     points = {
@@ -322,23 +340,33 @@ def write_opensfm(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:
         (place / RECONSTRUCTION).write_text(text, encoding="utf-8", newline="\n")
         (place / TRACKS).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
     said = ("image points are written free of the additional parameters, which OpenSfM has no words for",)
-    return (*oriented.losses(), *(said if freed else ()))
+    return (*oriented.losses(), *(said if freed else ()), *(sentence for _, fitted in written for sentence in fitted))
 
 
-def _camera_json(camera: Camera, with_affinity: bool) -> dict[str, Any]:
+def _expressible(camera: Camera, with_affinity: bool) -> tuple[Camera, tuple[str, ...]]:
+    """The camera with a lens that OpenSfM has words for, and in words what was fitted."""
     if not with_affinity:
-        camera = Camera(camera.name, camera.model, camera.size_px, camera.pixel_um, camera.interior, lens=camera.lens)
-    model, values = colmap_camera(camera)
+        camera = replace(camera, brown={})
+    names = LENS_OF_TYPE["fisheye_opencv" if camera.is_fisheye else "brown"]
+    if all(name in (*names, "b1", "b2") for name, prior in camera.lens.items() if prior.value):
+        return camera, ()
+    return with_nearest(camera, names, "OpenSfM")
+
+
+def _camera_json(camera: Camera) -> dict[str, Any]:
     longer = max(camera.size_px)
-    fx, fy = (values[0], values[0]) if "SIMPLE" in model or model == "RADIAL" else values[:2]
-    lens = {key: SIGN.get(key, 1.0) * camera.lens[key].value if key in camera.lens else 0.0 for key in LENS_NAMES}
+    fy = camera.focal_length_mm / camera.pixel_mm
+    fx = fy * (1.0 + value(camera, "b1")) / (1.0 + (camera.brown["b1"].value if "b1" in camera.brown else 0.0))
+    small, large = ("fisheye", "fisheye_opencv") if camera.is_fisheye else ("perspective", "brown")
+    lens = {key: SIGN.get(key, 1.0) * value(camera, key) for key in LENS_OF_TYPE[large]}
     size: dict[str, Any] = {"width": camera.size_px[0], "height": camera.size_px[1]}
     x0, y0 = camera.principal_point_mm
-    if fx == fy and not (x0 or y0 or lens["p1"] or lens["p2"] or lens["k3"]):
-        focal = {"focal": fx / longer, "k1": lens["k1"], "k2": lens["k2"]}
-        return {"projection_type": "perspective", **size, **focal}
+    if fx == fy and not (x0 or y0 or any(number for key, number in lens.items() if key not in LENS_OF_TYPE[small])):
+        return {
+            "projection_type": small, **size, "focal": fx / longer, "k1": lens["k1"], "k2": lens["k2"],
+        }  # fmt: skip
     centre = {"c_x": x0 / camera.pixel_mm / longer, "c_y": -y0 / camera.pixel_mm / longer}
-    return {"projection_type": "brown", **size, "focal_x": fx / longer, "focal_y": fy / longer, **centre, **lens}
+    return {"projection_type": large, **size, "focal_x": fx / longer, "focal_y": fy / longer, **centre, **lens}
 
 
 def _shot_json(oriented: OrientedBlock, row: int) -> dict[str, Any]:

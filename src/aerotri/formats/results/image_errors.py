@@ -202,7 +202,7 @@ def _write_correction_raster(errors: ErrorFunction, path: Path) -> None:
 
 def _colmap_text(cameras: Mapping[int, tuple[str, Camera, str]]) -> str:
     """cameras.txt of COLMAP, of cameras with their names and a remark."""
-    from aerotri.formats.foreign.colmap import colmap_camera
+    from aerotri.formats.foreign.colmap_cameras import colmap_camera
 
     lines = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"]
     for number, (name, camera, remark) in enumerate(cameras.values(), start=1):

@@ -63,7 +63,4 @@ def _patterns(camera: Camera, family: str, items: Sequence[str], x: np.ndarray, 
     if family == brown.FAMILY.name:
         return brown.basis(x - x0, y - y0)[:, :, [brown.ITEMS.index(item) for item in items]]
     c = camera.focal_length_mm
-    unit = np.eye(len(lens.ITEMS))[[lens.ITEMS.index(item) for item in items]]
-    direction = (x - x0) / c, (y - y0) / c
-    ideal = np.stack(direction, axis=1)
-    return np.stack([lens.distort(*direction, one) - ideal for one in unit], axis=2)
+    return lens.patterns((x - x0) / c, (y - y0) / c, lens.vector({}))[:, :, [lens.ITEMS.index(item) for item in items]]

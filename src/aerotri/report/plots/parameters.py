@@ -142,9 +142,7 @@ def _patterns(family: str, items: Sequence[str], camera: Camera, x: np.ndarray, 
     if family == brown.FAMILY.name:
         return brown.basis(x_bar, y_bar)[:, :, [brown.ITEMS.index(item) for item in items]]
     c = camera.focal_length_mm
-    a, b, ideal = x_bar / c, y_bar / c, np.column_stack([x_bar, y_bar])
-    units = np.eye(len(lens.ITEMS))[[lens.ITEMS.index(item) for item in items]]
-    return np.stack([c * lens.distort(a, b, unit) - ideal for unit in units], axis=-1)
+    return c * lens.patterns(x_bar / c, y_bar / c, lens.vector({}))[:, :, [lens.ITEMS.index(item) for item in items]]
 
 
 def _pattern_apart(family: str, item: str, camera: Camera, x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from aerotri.functional_model.additional_parameters import lens
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Camera
 from aerotri.report.plots.canvas import GREY, INK, LIGHT, axes_at, coordinate_axes, plain
@@ -107,7 +108,8 @@ def corner_directions(camera: Camera) -> np.ndarray:
     (half_x, half_y), (x0, y0) = camera.half_format_mm, camera.principal_point_mm
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     corners = signs * np.array([half_x, half_y]) - np.array([x0, y0])
-    return np.column_stack([corners, np.full(4, -camera.focal_length_mm)])
+    tangent = lens.undistort(corners / camera.focal_length_mm, lens.vector({}, camera.is_fisheye))
+    return np.column_stack([tangent, np.full(4, -1.0)])
 
 
 def draw_footprints(axes: Axes, corners: np.ndarray) -> None:
