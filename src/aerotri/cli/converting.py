@@ -59,8 +59,8 @@ def convert(
     to: Annotated[
         str,
         typer.Option(
-            help="block, bal, colmap, colmap-text, bundler, opensfm, metashape (opk), pix4d-eo, ign, patb, bingo, "
-            "pix4d-gcp, pix4d-geo, pix4d-offset, odm-gcp, odm-geo, ign-mes, ign-app.",
+            help="block, bal, colmap, colmap-text, bundler, opensfm, metashape (opk), metashape-camera, pix4d-eo, ign, "
+            "patb, bingo, pix4d-gcp, pix4d-geo, pix4d-offset, odm-gcp, odm-geo, ign-mes, ign-app.",
             rich_help_panel=OUTPUT,
         ),
     ] = "block",

@@ -94,7 +94,7 @@ PhotographPositions = Annotated[
 CameraFile = Annotated[
     Path | None,
     typer.Option(
-        help="File with the camera: tables camera.NAME as in block.toml, IGN, or orthority.",
+        help="File with the camera: tables camera.NAME as in block.toml, Metashape (XML), IGN, or orthority.",
         rich_help_panel=CAMERA,
     ),
 ]  # fmt: skip

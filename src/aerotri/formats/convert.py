@@ -26,6 +26,7 @@ from aerotri.formats.foreign.dbat_script import is_dbat
 from aerotri.formats.foreign.ign import write_ign_opk
 from aerotri.formats.foreign.measured_lists import write_ign_app, write_ign_mes, write_odm_geo, write_pix4d_offset
 from aerotri.formats.foreign.metashape import write_metashape
+from aerotri.formats.foreign.metashape_camera import write_metashape_camera
 from aerotri.formats.foreign.odm import write_odm_gcp
 from aerotri.formats.foreign.opensfm import is_opensfm, read_opensfm, write_opensfm
 from aerotri.formats.foreign.patb import write_patb
@@ -70,6 +71,7 @@ WRITERS: Mapping[str, OrientedWriter] = {
 """Formats of orientations and points, in coordinates in which rays are straight."""
 ORIENTATION_WRITERS: Mapping[str, OrientedWriter] = {
     "metashape": write_metashape,
+    "metashape-camera": write_metashape_camera,
     "opk": write_metashape,
     "pix4d-eo": write_pix4d_eo,
     "ign": write_ign_opk,

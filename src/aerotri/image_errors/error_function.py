@@ -149,8 +149,8 @@ def _refuse_fisheye(camera: Camera) -> None:
         raise InputError(
             f"camera '{camera.name}' is a fisheye: ideal photographs, model deformation and ground points are computed "
             "in perspective photographs only",
-            "write the result with `aerotri convert RESULT MODEL --to colmap`, have the photographs made perspective "
-            "there (`colmap image_undistorter`), and read that model as a block",
+            "write the result with `aerotri convert RESULT --to colmap --out MODEL`, have the photographs made "
+            "perspective there (`colmap image_undistorter`), and read that model as a block",
         )
 
 

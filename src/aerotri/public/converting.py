@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 Tables = Literal["csv", "parquet"]
 Target = Literal[
-    "block", "bal", "colmap", "colmap-text", "bundler", "opensfm", "metashape", "opk", "pix4d-eo", "ign", "patb",
-    "bingo", "pix4d-gcp", "pix4d-geo", "pix4d-offset", "odm-gcp", "odm-geo", "ign-mes", "ign-app",
+    "block", "bal", "colmap", "colmap-text", "bundler", "opensfm", "metashape", "metashape-camera", "opk", "pix4d-eo",
+    "ign", "patb", "bingo", "pix4d-gcp", "pix4d-geo", "pix4d-offset", "odm-gcp", "odm-geo", "ign-mes", "ign-app",
 ]  # fmt: skip
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.foreign.bingo import format_in_name
 from aerotri.formats.foreign.ign import is_ign_camera, read_ign_camera
+from aerotri.formats.foreign.metashape_camera import is_metashape_camera, read_metashape_camera
 from aerotri.formats.foreign.orientation_list import is_ortho_camera, read_ortho_camera
 from aerotri.observations import Camera, Prior
 
@@ -24,7 +25,8 @@ class CameraSpec:
 
     Parameters
     ----------
-    file : tables [camera.NAME] as in block.toml, a camera of IGN, or one of simple-ortho or orthority.
+    file : tables [camera.NAME] as in block.toml, a camera of IGN, a calibration of Metashape, or
+        a camera of simple-ortho or orthority.
     name : '' where the files of image points name it.
     size_px : columns and rows; pixel_um; focal_length_mm : None where not stated.
     flight_axis : image axis along the flight.
@@ -89,10 +91,11 @@ def _from_file(path: Path, spec: CameraSpec) -> tuple[Camera, ...]:
         return read_cameras_toml(path)
     if is_ortho_camera(path):
         return (read_ortho_camera(path),)
-    if is_ign_camera(path):
-        if spec.pixel_um is None:
-            raise InputError("does not tell the size of a pixel", "state it: --pixel-um 4.0", path)
-        return (read_ign_camera(path, spec.pixel_um),)
+    for recognises, read in ((is_ign_camera, read_ign_camera), (is_metashape_camera, read_metashape_camera)):
+        if recognises(path):
+            if spec.pixel_um is None:
+                raise InputError("does not tell the size of a pixel", "state it: --pixel-um 4.0", path)
+            return (read(path, spec.pixel_um),)
     if not path.exists():
         raise InputError("there is no such file", "check the path", path)
     raise InputError("does not describe a camera", "give tables [camera.NAME] as in block.toml, in a .toml file", path)
