@@ -155,7 +155,7 @@ def test_parameters_chosen_by_the_program(monkeypatch):
     block = with_adjustment(small_block(3, **ERRING)[0], additional_parameters=AUTO)
     few_sets(monkeypatch)
     before = numbers_of(adjust(block), same(block))
-    (chosen,) = (said for said in before.words["warnings"] if "additional parameters chosen" in said)
+    (chosen,) = (said for said in before.words["notes"] if "additional parameters chosen" in said)
     assert "chosen: none" not in chosen
     for name, change in {"rows and names": ROWS, "shift": SHIFT}.items():
         few_sets(monkeypatch, -1)

@@ -124,7 +124,8 @@ def test_parameters_chosen_for_split_files(measured, tmp_path, monkeypatch):
     after = adjust(split)
     assert_same(before, after, changed, ALL, "split")
     assert sorted(after.outcome.warnings) == before.words["warnings"]
-    assert any("additional parameters chosen" in said for said in after.outcome.warnings)
+    assert list(after.outcome.notes) == before.words["notes"]
+    assert any("additional parameters chosen" in said for said in after.outcome.notes)
 
 
 @pytest.mark.parametrize("tables", ["csv", "parquet"])

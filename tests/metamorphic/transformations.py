@@ -327,6 +327,7 @@ def numbers_of(result: AdjustedBlock, changed: Changed) -> Numbers:
         "blunders": sorted((old.get(b.image, b.image), old.get(b.point, b.point), b.action) for b in result.blunders),
         "groups": sorted((_old_words(g.name, old), g.count) for g in result.groups),
         "warnings": sorted(_old_words(w, old) for w in o.warnings),
+        "notes": [_old_words(note, old) for note in o.notes],
     }  # fmt: skip
     return Numbers(values, sigmas, words)
 

@@ -221,7 +221,7 @@ def test_auto_adjusts_with_what_it_chooses(block):
     assert len(found.compared.outcomes) == len(candidate_sets(block))
     chosen = choose(found.compared)
     assert set_name(found.result.block.settings.adjustment.additional_parameters) == chosen.name
-    assert found.result.outcome.warnings[0] == chosen.reason
+    assert found.result.outcome.notes[0] == chosen.reason
     plain = adjust(with_adjustment(block, additional_parameters=chosen.choice))
     assert found.result.outcome.sigma0 == pytest.approx(plain.outcome.sigma0, rel=1e-9)
     assert np.sqrt(np.mean(found.result.check.difference[:, 2] ** 2)) < 0.6 * np.sqrt(

@@ -115,7 +115,7 @@ def _prepared_without(block: Block, geoid: FilePath | None) -> Prepared:
 
 
 def with_reason(found: Adjustment, choice: ParameterChoice) -> Adjustment:
-    """The adjustment with the comparison, and why its parameters were chosen among the warnings."""
+    """The adjustment with the comparison, and why its parameters were chosen among the notes."""
     outcome = found.result.outcome
-    found = with_outcome(found, replace(outcome, warnings=(choice.chosen.reason, *outcome.warnings)))
+    found = with_outcome(found, replace(outcome, notes=(choice.chosen.reason, *outcome.notes)))
     return replace(found, compared=choice.compared)

@@ -60,6 +60,7 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
         result, parameters=with_removed(result.parameters, removals), removals=removals, deviations=deviations
     )
     rigidity = rigidity_of(system, solution, factor, result.outcome)
+    result = replace(result, outcome=replace(result.outcome, notes=saved.notes))
     result = replace(result, position_errors=saved.position_record(), rigidity=rigidity)
     components = saved.component_record()
     if components is not None:

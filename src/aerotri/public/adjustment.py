@@ -320,7 +320,7 @@ class Adjustment:
     def html(self) -> str:
         """The outcome as a notebook shows it: the verdict first."""
         o = self.adjusted.outcome
-        reasons = "".join(f"<li>{escape(reason)}</li>" for reason in (*o.reasons, *o.warnings))
+        reasons = "".join(f"<li>{escape(reason)}</li>" for reason in (*o.reasons, *o.warnings, *o.notes))
         return (
             f"<div><b>{escape(str(self.block.name))}: {escape(o.verdict)}</b> ({escape(o.status)}), "
             f"σ<sub>0</sub> {o.sigma0:.4g} ({o.sigma0_um:.3g} µm), redundancy {o.redundancy}"

@@ -168,6 +168,7 @@ ADJUSTMENT = (
     *within("rig_movements[]", *movements()),
     *rigidity(),
     *rolling_shutters(),
+    Item("notes[]", "text", "Sentences about what the program chose by itself, and why."),
     Item("warnings[]", "text", "Sentences to read: what was left out, assumed or is weak."),
     Item("timings_s", "object", "Time by stage.", "s"),
     *(

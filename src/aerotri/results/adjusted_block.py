@@ -34,7 +34,7 @@ class Outcome:
     sigma0 : σ̂0, dimensionless; sigma0_um : the same times the a-priori σ of an image coordinate, µm.
     vtpv : vᵀPv with the final weights.
     observations, unknowns, conditions, redundancy : redundancy = observations − unknowns + conditions.
-    warnings : sentences the user should read.
+    warnings : sentences the user should read. notes : sentences about what the program chose by itself.
     verdict : 'accepted', 'doubtful' or 'rejected'; '' before it is judged. reasons : sentences, the gravest first.
     timings_s : seconds by stage.
     """
@@ -53,6 +53,7 @@ class Outcome:
     timings_s: Mapping[str, float] = field(default_factory=dict)
     verdict: str = ""
     reasons: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -155,6 +155,7 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
         "model_part": ModelPart(reason=NOT_LOOKED_FOR).as_dict(),
         "gnss_errors": None,
         "ray_correlation": RayCorrelation(reason=NOT_LOOKED_FOR).as_dict(),
+        "notes": list(o.notes),
         "warnings": list(o.warnings),
         "timings_s": {key: float(o.timings_s.get(key, 0.0)) for key in TIMINGS},
     }

@@ -43,7 +43,7 @@ class SavedSolution:
     ray_status, weight : (m,).
     components : the variance components as JSON, '' where there are none; the block has the σ they led to.
     removals : the parameters that the selection took out, as JSON, '' where there are none.
-    verdict, reasons : of the outcome; '' in results of versions that did not judge.
+    verdict, reasons, notes : of the outcome; empty in results of versions that did not have them.
     position_errors : what was said of the errors of positions as JSON, '' where there is nothing.
     """
 
@@ -72,6 +72,7 @@ class SavedSolution:
     verdict: str = ""
     reasons: tuple[str, ...] = ()
     position_errors: str = ""
+    notes: tuple[str, ...] = ()
 
     def removal_records(self) -> tuple[Removal, ...]:
         """The parameters that the selection took out."""
@@ -129,6 +130,7 @@ def write_solution(
         warnings=np.array(result.outcome.warnings, dtype=str),
         verdict=np.array(result.outcome.verdict),
         reasons=np.array(result.outcome.reasons, dtype=str),
+        notes=np.array(result.outcome.notes, dtype=str),
         removals=np.array(json.dumps([removal.as_dict() for removal in result.removals])),
         position_errors=np.array("" if result.position_errors is None else json_text(result.position_errors.as_dict())),
         components=np.array("" if result.components is None else json_text(result.components.as_dict())),

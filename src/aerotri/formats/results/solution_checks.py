@@ -50,7 +50,7 @@ def checked_values(archive: Archive, block: Block | None) -> dict[str, Any]:
     values = {name: archive.scalar(name, kind) for name, kind in SCALARS.items()}
     values |= {name: archive.scalar(name, kind) if name in archive.members else "" for name, kind in LATER.items()}
     values |= _arrays(archive, block)
-    for name in ("warnings", "reasons"):
+    for name in ("warnings", "reasons", "notes"):
         texts = archive.array(name, "Uf", (None,)) if name in archive.members else np.zeros(0, "U1")
         values[name] = tuple(str(text) for text in texts)
     _check_scalars(archive, values)

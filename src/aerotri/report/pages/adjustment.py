@@ -159,6 +159,7 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         "version": _version(),
         "cards": _cards(adjusted),
         "findings": diagnosis.findings(adjusted) if beside.lights is None else beside.lights,
+        "notes": [quality.printable(text, 1000) for text in adjusted.outcome.notes],
         "warnings": [quality.printable(text, 1000) for text in adjusted.outcome.warnings],
         "asprs": quality.asprs_warning(adjusted),
         "plots": {name: _embedded(name, plot) for name, plot in plots.items()},

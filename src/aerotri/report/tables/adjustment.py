@@ -384,4 +384,5 @@ def summary_lines(adjusted: AdjustedBlock) -> list[str]:
             counted(int(additional.sum()), "additional parameter") + (f", {removed} removed" if removed else "")
         )
     warnings = [*o.warnings, *([asprs_warning(adjusted)] if asprs_warning(adjusted) else [])]
+    lines += [f"note: {printable(text, 500)}" for text in o.notes]
     return lines + [f"warning: {printable(text, 500)}" for text in warnings] + what_to_do(o)
