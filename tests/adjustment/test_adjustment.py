@@ -66,7 +66,7 @@ def test_resection_single_photograph():
 
 def test_no_start_values_is_refused():
     with pytest.raises(InputError, match="no photograph has start values"):
-        adjust(without_start(small_block(12)[0]))
+        adjust(with_adjustment(without_start(small_block(12)[0]), start="strips"))
 
 
 def test_no_control_names_the_datum():

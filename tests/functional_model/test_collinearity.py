@@ -114,6 +114,19 @@ def test_brown_identity_corrected_equals_measured_plus_correction():
 
 
 @pytest.mark.parametrize("order", ["omega-phi-kappa", "phi-omega-kappa"])
+@pytest.mark.parametrize("off", [0.0, 1e-16, 1e-12, 1e-8, -1e-8, 1e-4])
+def test_angles_of_horizontal_axes_give_the_rotation_back(order, off):
+    """At and beside ±90° of the middle angle first and last cannot be told apart; together they are right."""
+    middle = 1 if order == "omega-phi-kappa" else 0
+    angles = np.random.default_rng(2).uniform(-3.0, 3.0, (20, 3))
+    angles[:, middle] = np.repeat([np.pi / 2 - off, -np.pi / 2 + off], 10)
+    exact = rotation_from_angles(angles, order)
+    exact[np.abs(exact) < 1e-15] = 0.0
+    again = rotation_from_angles(angles_from_rotation(exact, order), order)
+    np.testing.assert_allclose(again, exact, atol=2e-15)
+
+
+@pytest.mark.parametrize("order", ["omega-phi-kappa", "phi-omega-kappa"])
 def test_angles_round_trip_and_partials(order):
     rng = np.random.default_rng(1)
     angles = rng.uniform(-1.4, 1.4, (50, 3))

@@ -115,6 +115,10 @@ def _no_control(block):
     return replace(block, control=replace(block.control, is_check=np.ones(len(block.control), bool)), gnss_ins=None)
 
 
+def _by_strips(block):
+    return aerotri.with_settings(block, start="strips")
+
+
 def _free(block):
     adjustment = replace(block.settings.adjustment, datum="minimal")
     return replace(_no_control(block), settings=replace(block.settings, adjustment=adjustment))
@@ -127,10 +131,11 @@ def _free(block):
         (_free, ""),
         (_no_control, "no control: the datum is free in X, Y, Z, ω, φ, κ, scale"),
         (_two_control_points, "too little control: the datum is free in"),
-        (lambda block: without_start_values(_free(block)), "no photograph has start values"),
+        (lambda block: _by_strips(without_start_values(_free(block))), "no photograph has start values"),
+        (lambda block: without_start_values(_free(block)), ""),
         (without_start_values, ""),
     ],
-    ids=["faultless", "free", "no control", "two points", "no start values, free", "no start values"],
+    ids=["faultless", "free", "no control", "two points", "no start values, free", "tie points", "no start values"],
 )
 def test_what_is_missing_is_what_adjust_lacks(ten, change, reason):
     """`can_be_adjusted` and the adjustment agree; the reason is the same."""

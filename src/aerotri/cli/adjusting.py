@@ -50,6 +50,14 @@ def adjust(
             rich_help_panel=METHOD,
         ),
     ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            help="Start values of photographs without orientation: strips (control, and strips along the track), "
+            "points (tie points alone, whatever the geometry) or auto. Default: as block.toml says.",
+            rich_help_panel=METHOD,
+        ),
+    ] = None,
     check: CheckPoints = None,
     control_prefix: ControlPrefix = "",
     geoid: GeoidGrid = None,
@@ -69,7 +77,9 @@ def adjust(
 
     names = tuple(check or ())
     raise typer.Exit(
-        run_adjust(block, out, parameters, robust, geoid, plots, json_, check_free, control_prefix, names, model_part)
+        run_adjust(
+            block, out, parameters, robust, geoid, plots, json_, check_free, control_prefix, names, model_part, start
+        )
     )
 
 

@@ -28,6 +28,7 @@ def run_adjust(
     control_prefix: str = "",
     check: tuple[str, ...] = (),
     model_part: Any = None,
+    start: Any = None,
 ) -> int:
     """Exit code of the command: 0 when converged and not rejected, 1 otherwise; arguments as on the command line."""
     console = Console(quiet=as_json)
@@ -55,8 +56,8 @@ def run_adjust(
 
     console.progress(compilation_notice())
     try:
-        found = adjust(block, parameters=parameters, robust=robust, model_part=model_part, geoid=geoid,
-                       progress=console.stage)  # fmt: skip
+        found = adjust(block, parameters=parameters, robust=robust, model_part=model_part, start=start,
+                       geoid=geoid, progress=console.stage)  # fmt: skip
     except AdjustmentFailedError as failure:
         from aerotri.formats.results.adjustment import outcome_json
 

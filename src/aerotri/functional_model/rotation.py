@@ -45,6 +45,9 @@ def rotation_from_angles(angles: np.ndarray, order: str = OMEGA_PHI_KAPPA) -> np
 def angles_from_rotation(rotation: np.ndarray, order: str = OMEGA_PHI_KAPPA) -> np.ndarray:
     """(ω, φ, κ) of rotation matrices; the middle angle lies in [−π/2, π/2].
 
+    κ is taken once the first angle is undone: where the middle one is ±90° the first may be any, and together they are
+    right all the same.
+
     Parameters
     ----------
     rotation : (..., 3, 3).
@@ -57,11 +60,13 @@ def angles_from_rotation(rotation: np.ndarray, order: str = OMEGA_PHI_KAPPA) -> 
     if order == OMEGA_PHI_KAPPA:
         omega = np.arctan2(-r[..., 1, 2], r[..., 2, 2])
         phi = np.arctan2(r[..., 0, 2], np.hypot(r[..., 1, 2], r[..., 2, 2]))
-        kappa = np.arctan2(-r[..., 0, 1], r[..., 0, 0])
+        cos, sin = np.cos(omega), np.sin(omega)
+        kappa = np.arctan2(cos * r[..., 1, 0] + sin * r[..., 2, 0], cos * r[..., 1, 1] + sin * r[..., 2, 1])
     else:
         omega = np.arctan2(-r[..., 1, 2], np.hypot(r[..., 0, 2], r[..., 2, 2]))
         phi = np.arctan2(r[..., 0, 2], r[..., 2, 2])
-        kappa = np.arctan2(r[..., 1, 0], r[..., 1, 1])
+        cos, sin = np.cos(phi), np.sin(phi)
+        kappa = np.arctan2(sin * r[..., 2, 1] - cos * r[..., 0, 1], cos * r[..., 0, 0] - sin * r[..., 2, 0])
     return np.stack([omega, phi, kappa], axis=-1)
 
 

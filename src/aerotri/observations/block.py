@@ -276,6 +276,7 @@ class AdjustmentSettings:
     datum_fixed: tuple[tuple[str, str], ...] = ()
     variance_components: str = "off"
     model_part: str = "on"
+    start: str = "auto"
     alpha: float = 0.001
     power: float = 0.80
     max_iterations: int = 30

@@ -18,6 +18,7 @@ from aerotri.pipeline.in_frame import adjust_in_frame
 from aerotri.pipeline.local import Report
 from aerotri.pipeline.model_part import with_model_part
 from aerotri.pipeline.shutter_test import with_shutter_test
+from aerotri.pipeline.starting import with_start
 from aerotri.pipeline.verdict import causes, judged, with_outcome
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.adjustment import Adjustment
@@ -64,7 +65,8 @@ def adjust_keeping_system(
     tested : whether a rolling shutter is held against the block without it.
     sets : called before each set of additional parameters that is tried, where they are to be chosen.
     """
-    choice, block = None, with_named_strips(block)
+    started = with_start(with_named_strips(block), geoid)
+    choice, block = None, started.block
     if block.settings.adjustment.additional_parameters == AUTO:
         choice = choose_parameters(block, geoid, sets)
         block = choice.block
@@ -74,7 +76,7 @@ def adjust_keeping_system(
     found = judged(with_model_part(found))
     if tested and asks_for_test(block):
         found = with_shutter_test(found, report)
-    return found if choice is None else with_reason(found, choice)
+    return started.told(found if choice is None else with_reason(found, choice))
 
 
 def adjust_and_explain(
@@ -88,7 +90,8 @@ def adjust_and_explain(
 
     Parameters
     ----------
-    say : told when the search for it begins. sets : as of `adjust_keeping_system`.
+    say : told when start values are sought from tie points, and when the search for an explanation begins.
+    sets : as of `adjust_keeping_system`.
     """
 
     def explained(found: Adjustment | None) -> tuple[str, ...]:
@@ -100,7 +103,9 @@ def adjust_and_explain(
         return causes(_as_chosen(block, found), found, again, geoid)
 
     try:
-        found = adjust_keeping_system(block, report, geoid=geoid, sets=sets)
+        started = with_start(with_named_strips(block), geoid, say)
+        block = started.block
+        found = started.told(adjust_keeping_system(block, report, geoid=geoid, sets=sets))
     except AdjustmentFailedError as error:
         o = error.outcome
         raise AdjustmentFailedError(replace(o, reasons=(*explained(None), *o.reasons))) from error

@@ -13,6 +13,7 @@ from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.diagnosis.doubts import failure
 from aerotri.observations import Block
 from aerotri.pipeline.local import Report
+from aerotri.pipeline.starting import with_start
 from aerotri.pipeline.verdict import with_outcome
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.parameter_comparison import Choice, ParameterComparison
@@ -62,7 +63,7 @@ def compare_parameters(
     choices : as `parse_parameters` returns them. folds : parts in which control points are left out, one by one where
         there are no more points than that. progress : called before each set. report : after every iteration.
     """
-    prepared = _prepared_without(block, geoid)
+    prepared = _prepared_without(with_start(block, geoid).block, geoid)
     settings = prepared.system.unknowns.block.settings.adjustment
     options = SolveOptions(settings.max_iterations, settings.robust, report)
     return compare_sets(prepared, choices, folds, options, progress)

@@ -13,6 +13,7 @@ from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.diagnosis.doubts import defects_in_words
 from aerotri.functional_model.additional_parameters import AUTO
 from aerotri.observations import Block
+from aerotri.pipeline.starting import with_start
 from aerotri.statistics.summarise import count_observations
 
 
@@ -40,6 +41,7 @@ def rehearse(block: Block, geoid: FilePath | None = None) -> Rehearsal:
     if not len(block.image_points):
         return Rehearsal(_nothing_there(block))
     try:
+        block = with_start(block, geoid).block
         local = block if block.crs == "local" else transform_block(block, frame_of_block(block, geoid))
         prepared = prepare(local)
     except InputError as error:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 Robust = Literal["off", "huber", "danish", "cauchy", "adaptive", "data-snooping"]
 Datum = Literal["control", "minimal", "inner", "fixed"]
 Switch = Literal["off", "on"]
+Start = Literal["auto", "strips", "points"]
 
 
 def adjust(
@@ -30,6 +31,7 @@ def adjust(
     datum: Datum | None = None,
     variance_components: Switch | None = None,
     model_part: Switch | None = None,
+    start: Start | None = None,
     max_iterations: int | None = None,
     check: Sequence[str] = (),
     points: np.ndarray | None = None,
@@ -52,6 +54,8 @@ def adjust(
     variance_components : 'on' estimates σ of every group of observations.
     model_part : 'on' tests whether strips or other groups of photographs share errors, and adds a model part to σ where
         they do.
+    start : where start values of photographs without orientation come from: 'strips' (control, and strips along the
+        track), 'points' (tie points alone, whatever the geometry; given orientations are not used), or 'auto'.
     max_iterations : at most, in each stage of a robust estimator.
     check : names of control points that become check points: they are compared, not used.
     points : (N, 3) m, start values of the object points, where known from elsewhere.
@@ -92,7 +96,7 @@ def adjust(
     chosen = with_settings(
         block_with_check_points(as_block(block), check), parameters=parameters, parameter_selection=parameter_selection,
         robust=robust, datum=datum, variance_components=variance_components, model_part=model_part,
-        max_iterations=max_iterations,
+        start=start, max_iterations=max_iterations,
     )  # fmt: skip
     unread = () if isinstance(block, Block) else unread_in_words(Path(block))
     with stage_report(progress) as report:

@@ -217,6 +217,11 @@ class AdjustmentModel(Section):
         "on", "on: strips, days and other groups of photographs are tested for errors that they share; where they do, "
         "σ gets a model part (mX, mY, mZ) beside that of the noise. off: σ of the noise alone."
     )  # fmt: skip
+    start: Literal["auto", "strips", "points"] = key(
+        "auto", "Where start values of photographs without orientation come from. strips: control points and strips "
+        "along the track, quick. points: the tie points alone, brought onto GNSS and control, for every geometry; "
+        "orientations that are given are not used. auto: strips, and points where these do not hold."
+    )  # fmt: skip
     alpha: Fraction = key(
         0.001, "Significance level of the tests of residuals: 0.001 means one false alarm in a thousand tests."
     )

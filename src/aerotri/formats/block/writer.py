@@ -187,6 +187,7 @@ def _settings(block: Block) -> dict[str, Any]:
             "datum_fixed": [f"{image}:{element}" for image, element in adjustment.datum_fixed],
             "variance_components": adjustment.variance_components,
             "model_part": adjustment.model_part,
+            "start": adjustment.start,
             "alpha": adjustment.alpha,
             "power": adjustment.power,
             "max_iterations": adjustment.max_iterations,
