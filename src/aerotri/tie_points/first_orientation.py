@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -24,28 +24,18 @@ FEWEST_INITIAL, FEWEST_POSE = 50, 15
 points are spread evenly and fewer than those of other photographs."""
 SMALLEST_ANGLE_DEG = (16.0, 8.0, 4.0, 2.0)
 """Angles between the rays of the first pair, tried one after the other: narrow cameras have small ones."""
-
-
-class Ties(NamedTuple):
-    """Points in common that are enough for a pair, for the first pair, and to orient a further photograph."""
-
-    pair: int
-    initial: int
-    pose: int
-
-
-USUAL, WEAK = Ties(FEWEST_POSE, FEWEST_INITIAL, FEWEST_POSE), Ties(6, 20, 8)
 PAIR_TRIALS = 500
 """Random samples of a pair at most: points have names, so that half of them right is little; 200 samples of five then
 hold a right one with a probability of 99.8 %. COLMAP's 10 000 are spent on planes that are none."""
 MOST_PARTS = 10
+"""Parts of a block that are looked for [C]."""
 FIRST_PAIRS = 30
 """First pairs that are tried for a part [C]: where so many fail, the others do."""
 SMALLEST_PART = 3
 """Photographs of a part that is worth a frame of its own."""
 GROWTH = 1.3
-"""Growth of a part after which it is adjusted as a whole [C]: COLMAP's 1.1 takes three times as long, and a start does
-not need it."""
+"""Growth of a part after which it is adjusted as a whole [C]: above COLMAP's 1.1, for speed; a start needs no
+better."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,20 +138,16 @@ def map_incrementally(
     InputError
         When no two photographs make a beginning.
     """
-    return _mapped_parts(
-        block, lambda angle: _mapping_options(block, seed, angle, tolerance_px), (FEWEST_POSE, None), report
-    )[0]
+    return _mapped_parts(block, lambda angle: _mapping_options(block, seed, angle, tolerance_px), None, report)[0]
 
 
-def map_parts(
-    block: Block, seed: int, partners: int, ties: Ties = USUAL, tolerance_px: float = 4.0
-) -> tuple[Mapped, ...]:
+def map_parts(block: Block, seed: int, partners: int, tolerance_px: float = 4.0) -> tuple[Mapped, ...]:
     """As `map_incrementally`, every part of a block that falls apart in a frame of its own, the largest first.
 
     Parameters
     ----------
     partners : photographs that each is matched with, those with most points in common. What ties the block together
-        stays. ties : points in common that are enough.
+        stays.
 
     Raises
     ------
@@ -171,30 +157,28 @@ def map_parts(
 
     def options(angle: float) -> Any:
         found = _mapping_options(block, seed, angle, tolerance_px)
-        # of weak ties, many first pairs would be tried in vain
-        found.multiple_models = ties is not WEAK
+        found.multiple_models = True
         found.max_num_models = MOST_PARTS
         found.min_model_size = SMALLEST_PART
-        found.min_num_matches, found.init_num_trials = ties.pair, FIRST_PAIRS
-        found.mapper.init_min_num_inliers, found.mapper.abs_pose_min_num_inliers = ties.initial, ties.pose
+        found.init_num_trials = FIRST_PAIRS
         found.ba_global_frames_ratio = found.ba_global_points_ratio = GROWTH
         return found
 
-    return _mapped_parts(block, options, (ties.pair, partners), lambda done: None)
+    return _mapped_parts(block, options, partners, lambda done: None)
 
 
 def _mapped_parts(
-    block: Block, options_at: Callable[[float], Any], pairs: tuple[int, int | None], report: Callable[[int], None]
+    block: Block, options_at: Callable[[float], Any], partners: int | None, report: Callable[[int], None]
 ) -> tuple[Mapped, ...]:
     """The models of the first angle that gives any, the largest first; `options_at` takes the angle in degrees.
 
-    `pairs` are the points that a pair needs, and the partners of a photograph.
+    `partners` are those that a photograph is matched with at most.
     """
     import pycolmap
 
     with tempfile.TemporaryDirectory() as folder, _quiet():
         database = Path(folder) / "database.db"
-        _write_database(block, database, pairs)
+        _write_database(block, database, partners)
         for angle in SMALLEST_ANGLE_DEG:
             options = options_at(angle)
             done = [1]
@@ -266,7 +250,7 @@ def _keypoints(block: Block) -> np.ndarray:
     return px
 
 
-def _write_database(block: Block, path: Path, pairs: tuple[int, int | None]) -> None:
+def _write_database(block: Block, path: Path, partners: int | None) -> None:
     """Cameras, photographs, image points and, as matches, what every two photographs have in common."""
     import pycolmap
 
@@ -295,23 +279,22 @@ def _write_database(block: Block, path: Path, pairs: tuple[int, int | None]) -> 
             frame.add_data_id(image.data_id)
             database.write_frame(frame, use_frame_id=True)
             database.write_keypoints(ids[row], px[order[bounds[row] : bounds[row + 1]]].astype(np.float32))
-        for i, j, matches in _common_points(rays.point[order], bounds, pairs):
-            _write_pair(database, (i, j), matches, px[order], bounds, block, pairs[0])
+        for i, j, matches in _common_points(rays.point[order], bounds, partners):
+            _write_pair(database, (i, j), matches, px[order], bounds, block)
 
 
 def _common_points(
-    point: np.ndarray, bounds: np.ndarray, pairs: tuple[int, int | None]
+    point: np.ndarray, bounds: np.ndarray, partners: int | None
 ) -> Iterator[tuple[int, int, np.ndarray]]:
     """Pairs of photographs with enough points in common, and where these stand in the lists of the two.
 
     With partners only so many for each photograph, and the pairs that tie all of them together most strongly.
     """
-    fewest, partners = pairs
     from scipy.sparse import csr_array
 
     seen = csr_array((np.ones(len(point), np.int32), point, bounds))
     both = (seen @ seen.T).tocoo()
-    enough = (both.row < both.col) & (both.data >= fewest)
+    enough = (both.row < both.col) & (both.data >= FEWEST_POSE)
     first, second, count = both.row[enough], both.col[enough], both.data[enough]
     if partners is not None:
         kept = _strongest(first, second, count, len(bounds) - 1, partners)
@@ -341,19 +324,13 @@ def _strongest(first: np.ndarray, second: np.ndarray, count: np.ndarray, images:
 
 
 def _write_pair(
-    database: Any,
-    pair: tuple[int, int],
-    matches: np.ndarray,
-    px: np.ndarray,
-    bounds: np.ndarray,
-    block: Block,
-    fewest: int,
+    database: Any, pair: tuple[int, int], matches: np.ndarray, px: np.ndarray, bounds: np.ndarray, block: Block
 ) -> None:
     import pycolmap
 
     cameras = [pinhole(block.cameras[block.images.camera[k]]) for k in pair]
     own = [px[bounds[k] : bounds[k + 1]] for k in pair]
-    options = _two_view_options(fewest, seed=1)
+    options = _two_view_options(FEWEST_POSE, seed=1)
     options.ransac.max_num_trials = PAIR_TRIALS
     geometry = pycolmap.estimate_two_view_geometry(cameras[0], own[0], cameras[1], own[1], matches, options)
     database.write_matches(pair[0] + 1, pair[1] + 1, matches)

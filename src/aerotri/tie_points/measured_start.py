@@ -19,13 +19,13 @@ from aerotri.conventions import InputError, counted, px_from_mm
 from aerotri.formats.assembly.reprojection import ideal_tangents
 from aerotri.functional_model.rotation import exponential
 from aerotri.observations import Block, Camera, ImagePoints, Prior
-from aerotri.tie_points.first_orientation import LENS_IN_MAPPING, SMALLEST_PART, USUAL, WEAK, Mapped, Ties, map_parts
+from aerotri.tie_points.first_orientation import LENS_IN_MAPPING, SMALLEST_PART, Mapped, map_parts
 from aerotri.tie_points.georeferencing import is_line, place
 from aerotri.tie_points.tracks import Tracks, thin
 
 SEED = 1
 PARTNERS = 12
-"""Photographs that each is matched with [C]: with 12, 581 photographs take a minute; more hardly change the start."""
+"""Photographs that each is matched with [C]; the pairs that hold the block together come on top."""
 POINTS = 500
 """Image points of a photograph that are used, evenly spread."""
 WELL_KNOWN = 0.05
@@ -85,9 +85,9 @@ def start_from_points(block: Block, seed: int = SEED) -> MeasuredStart:
     bare = _bare(block)
     tied = np.bincount(bare.image_points.image, minlength=len(block.images)) > 0
     best, refused = None, None
-    for cameras, ties in _assumptions(bare.cameras):
+    for cameras in _assumptions(bare.cameras):
         try:
-            found = _placed(block, replace(bare, cameras=cameras), ties, seed)
+            found = _placed(block, replace(bare, cameras=cameras), seed)
         except InputError as error:
             refused = refused or error
             continue
@@ -123,10 +123,9 @@ def _bare(block: Block) -> Block:
     return replace(block, image_points=points, cameras=cameras)
 
 
-def _assumptions(cameras: tuple[Camera, ...]) -> Iterator[tuple[tuple[Camera, ...], Ties]]:
-    """The cameras with their principal distances held; free, where these are not well known; held, with weak ties."""
+def _assumptions(cameras: tuple[Camera, ...]) -> Iterator[tuple[Camera, ...]]:
+    """The cameras with their principal distances held, then, where these are not well known, free."""
     lens = {name: Prior() for name in LENS_IN_MAPPING}
-    held = cameras
     for free in (False, True):
         made = []
         for camera in cameras:
@@ -134,12 +133,9 @@ def _assumptions(cameras: tuple[Camera, ...]) -> Iterator[tuple[tuple[Camera, ..
             unknown = free and not _is_well_known(stated)
             prior = Prior(stated.value) if unknown else Prior(stated.value, fixed=True)
             made.append(replace(camera, lens=lens, interior={**camera.interior, "focal_length_mm": prior}))
-        if not free:
-            held = tuple(made)
-            yield held, USUAL
-        elif not all(_is_well_known(camera.interior["focal_length_mm"]) for camera in cameras):
-            yield tuple(made), USUAL
-    yield held, WEAK
+        yield tuple(made)
+        if all(_is_well_known(camera.interior["focal_length_mm"]) for camera in cameras):
+            return
 
 
 def _is_well_known(prior: Prior) -> bool:
@@ -163,9 +159,9 @@ def _thinned(bare: Block) -> Block:
     return replace(bare, image_points=points)
 
 
-def _placed(block: Block, bare: Block, ties: Ties, seed: int) -> MeasuredStart:
+def _placed(block: Block, bare: Block, seed: int) -> MeasuredStart:
     """The parts that the image points give, each brought to where its positions and control points are."""
-    parts = map_parts(_thinned(bare), seed, PARTNERS, ties)
+    parts = map_parts(_thinned(bare), seed, PARTNERS)
     count = len(block.images)
     cameras = _with_found_cameras(bare.cameras, parts)
     found = replace(bare, cameras=cameras)
