@@ -60,7 +60,7 @@ def linearise_point(p, rays, table, values, points, weighting, work):
     rate, readout, velocity, spin, scan_columns = (
         scans.rate, scans.readout, scans.velocity, scans.spin, scans.columns,
     )  # fmt: skip
-    n_scans = rate.shape[0]
+    n_scans, used = rate.shape[0], lens_columns.shape[1]
     rotation, centre, interior, shared = values.rotation, values.centre, values.interior, values.shared
     lens_row = rays.lens_row
     cost, n_union = 0.0, 0
@@ -76,14 +76,14 @@ def linearise_point(p, rays, table, values, points, weighting, work):
                 of_rotation, of_centre = rolled, moved
         linearise_ray(
             of_rotation, of_centre, xyz[p], interior[lens], at[ray, 0], at[ray, 1],
-            prediction, by_eo[q], by_pt[q], by_interior,
+            prediction, by_eo[q], by_pt[q], by_interior, used,
         )  # fmt: skip
         n = 0
         if n_scans and per_ms != 0.0:
             n = scan_partials(
                 per_ms, tau, rotation[i], velocity[i], spin[i], by_eo[q], scan_columns[i], by_sh[q], columns[q], 0,
             )  # fmt: skip
-        for t in range(INTERIOR):
+        for t in range(used):
             if lens_columns[lens, t] >= 0:
                 columns[q, n] = lens_columns[lens, t]
                 by_sh[q, 0, n], by_sh[q, 1, n] = by_interior[0, t], by_interior[1, t]

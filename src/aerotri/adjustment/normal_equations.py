@@ -135,7 +135,7 @@ class NormalSystem:
         return Problem(
             rays=u.rays.arrays(),
             pairs=Pairs(u.pair_start, u.pair_block),
-            table=Table(u.lens.columns, u.eo_free.astype(float), u.turn(state), u.kept),
+            table=Table(u.lens.used_columns, u.eo_free.astype(float), u.turn(state), u.kept),
             values=Values(
                 np.ascontiguousarray(state.rotation), state.centre, u.interior(state), state.shared, u.scans(state)
             ),

@@ -11,6 +11,7 @@ import numpy as np
 
 from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.conventions import InputError
+from aerotri.functional_model._kernels import USUAL
 from aerotri.functional_model.additional_parameters import (
     FAMILIES,
     Parameter,
@@ -98,6 +99,12 @@ class LensTable:
     base: np.ndarray
     columns: np.ndarray
     of_image: np.ndarray
+
+    @property
+    def used_columns(self) -> np.ndarray:
+        """(L, 15) or (L, 24), `columns` without those that no camera of the block needs."""
+        needed = self.base[:, USUAL:-1].any() or (self.columns[:, USUAL:] >= 0).any()
+        return self.columns if needed else np.ascontiguousarray(self.columns[:, :USUAL])
 
 
 def group_of_images(block: Block) -> np.ndarray:

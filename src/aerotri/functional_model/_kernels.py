@@ -14,6 +14,8 @@ from aerotri.compiled import kernel, leaf_kernel
 
 INTERIOR = 24
 """Columns of a table of interior elements."""
+USUAL = 15
+"""The first of them, which most cameras need alone."""
 
 
 class RayPartials(NamedTuple):
@@ -96,8 +98,10 @@ def predict_ray(rotation, centre, point, interior, x, y, prediction):
 
 
 @leaf_kernel
-def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orientation, by_point, by_interior):
+def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orientation, by_point, by_interior, used):
     """As `predict_ray`, with the partials; they share their intermediates.
+
+    used : USUAL where the further elements are 0 and no partial by them is asked for, else INTERIOR.
 
     The outputs are those of `RayPartials`, one by one: a record made for every ray costs a tenth of the linearisation.
     """
@@ -118,10 +122,7 @@ def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orient
     radial = 1.0 + rho2 * (k1 + rho2 * (k2 + rho2 * k3))
     slope = 2.0 * (k1 + rho2 * (2.0 * k2 + 3.0 * rho2 * k3))
     below, sx, sy, stretch, shear = 1.0, 0.0, 0.0, 1.0, 0.0
-    plain = True
-    for t in range(15, 23):
-        plain &= interior[t] == 0.0
-    if not plain:
+    if used > USUAL:
         q1, q2, q3 = interior[16], interior[17], interior[18]
         sx, sy, stretch, shear = interior[19], interior[20], 1.0 + interior[21], interior[22]
         below = 1.0 / (1.0 + rho2 * (q1 + rho2 * (q2 + rho2 * q3)))
@@ -135,7 +136,7 @@ def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orient
     lens_bb = c * (radial + b * b * slope + 6.0 * p1 * b + 2.0 * p2 * a)
     lens_ab = lens_ba = c * cross
     a_bent = a_lens
-    if not plain:
+    if used > USUAL:
         a_bent, b_lens = a_lens + sx * rho2, b_lens + sy * rho2
         a_lens = stretch * a_bent + shear * b_lens
         lens_ba, lens_bb = lens_ba + 2.0 * c * sy * a, lens_bb + 2.0 * c * sy * b
@@ -191,12 +192,13 @@ def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orient
     by_interior[0, 13], by_interior[1, 13] = c * (rho2 + 2.0 * a * a), 2.0 * c * a * b
     power *= rho2
     by_interior[0, 14], by_interior[1, 14] = a * power, b * power
+    if used == USUAL:
+        return
     by_interior[0, 15], by_interior[1, 15] = a * power * rho2, b * power * rho2
     by_interior[0, 19], by_interior[1, 19] = c * rho2, 0.0
     by_interior[0, 20], by_interior[1, 20] = 0.0, c * rho2
-    if not plain:
-        for t in range(10, 21):
-            by_interior[0, t] = stretch * by_interior[0, t] + shear * by_interior[1, t]
+    for t in range(10, 21):
+        by_interior[0, t] = stretch * by_interior[0, t] + shear * by_interior[1, t]
     for t, of in ((16, 10), (17, 11), (18, 14)):
         by_interior[0, t], by_interior[1, t] = -radial * by_interior[0, of], -radial * by_interior[1, of]
     by_interior[0, 21], by_interior[1, 21] = c * a_bent, 0.0
@@ -229,5 +231,5 @@ def linearise_rays(rotation, centre, points, interior, rays, partials):
         i = image[k]
         linearise_ray(
             rotation[i], centre[i], points[point[k]], interior[lens_row[k]], xy[k, 0], xy[k, 1], prediction[k],
-            by_orientation[k], by_point[k], by_interior[k],
+            by_orientation[k], by_point[k], by_interior[k], INTERIOR,
         )  # fmt: skip

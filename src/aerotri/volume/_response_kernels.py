@@ -114,7 +114,7 @@ def respond(first, last, pickets, photos, tiles, out):
                 for _ in range(3):
                     predict_ray(rotation[i], centre[i], points[p], row, x, y, at[r])
                     x, y = at[r, 0], at[r, 1]
-            linearise_ray(rotation[i], centre[i], points[p], row, x, y, at[r], by_eo[r], by_pt[r], by_in[r])
+            linearise_ray(rotation[i], centre[i], points[p], row, x, y, at[r], by_eo[r], by_pt[r], by_in[r], INTERIOR)
             weight = inv_sigma[start[p] + r] ** 2
             for a in range(3):
                 for b in range(3):
