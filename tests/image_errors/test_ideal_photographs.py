@@ -63,7 +63,7 @@ def errors_of(camera, linear=(), brown=(), lens=()):
         sets.append((chosen, np.array([values[item] for item in chosen.items])))
     return ErrorFunction(
         camera, "cam", np.array([101.4, 0.05, -0.03]), tuple(sets),
-        np.array([*brown, *np.zeros(7 - len(brown))]), np.array([*lens, *np.zeros(5 - len(lens))]),
+        np.array([*brown, *np.zeros(7 - len(brown))]), np.array([*lens, *np.zeros(14 - len(lens))]),
     )  # fmt: skip
 
 

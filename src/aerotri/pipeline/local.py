@@ -234,9 +234,10 @@ def _determined(found: tuple[Prepared, Solution]) -> tuple[Prepared, Solution]:
     AdjustmentFailedError
     """
     prepared, solution = found
+    # where the principal distance ran away everything is undetermined, and names nothing of use
+    refuse_runaway(prepared.system, solution)
     if solution.defects:
         raise failure(prepared.system, "rank deficient", defects_in_words(prepared.system, solution.defects))
-    refuse_runaway(prepared.system, solution)
     return found
 
 
