@@ -28,6 +28,7 @@ INSIDE = {
     "prove/moving/cases.py": "the strips of a track, as an adjustment finds them",
     "prove/moving/flights.py": "the strips of a track, as an adjustment finds them",
     "prove/metamorphic_photographs.py": "the first orientation in orders that no file gives",
+    "prove/starts.py": "times the start without the adjustment that follows",
     "prove/volume_epochs.py": "the adjustment's part of σ alone, of pickets at stated places",
     "prove/volume_proof/simulated.py": "every part of σ alone, of pickets at stated places",
     "reproduce/paper_003_deformation/even_odd.py": "deformation at single points, by another orientation",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aerotri.deformation.restitution import restitution_of
-from aerotri.functional_model.collinearity import linearise
+from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.simulation import parse_spec, simulate
 from aerotri.terrain.adjustment_part import adjustment_variances
@@ -55,7 +55,7 @@ def test_point_after_the_adjustment_is_as_sure_as_in_it(name):
     adjustment = adjustment_variances(found, restitution, np.arange(len(block.images)), pickets)
     picket, column = np.nonzero(photographs >= 0)
     image = photographs[picket, column]
-    interior = np.zeros((len(restitution.true), 15))
+    interior = np.zeros((len(restitution.true), len(INTERIOR_COLUMNS)))
     interior[:, :3] = restitution.true.interior
     by_point = linearise(
         restitution.true.rotation,

@@ -11,7 +11,7 @@ from aerotri.adjustment.unknowns import Step
 from aerotri.deformation.absorbed import shared_columns
 from aerotri.deformation.restitution import restitution_of
 from aerotri.deformation.stereo_model import covariance_of, deform_points, pair_model
-from aerotri.functional_model._kernels import linearise_ray, predict_ray
+from aerotri.functional_model._kernels import INTERIOR, linearise_ray, predict_ray
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.volume.functionals import tin_heights, tin_volume
 from aerotri.volume.pickets import Pickets, pickets_where_seen
@@ -44,7 +44,7 @@ def intersect(calibration, pickets, state, xy, basis):
     row_of = {int(image): row for row, image in enumerate(u.images)}
     interior = u.interior(state)
     points = pickets.xyz - u.origin
-    prediction, by_eo, by_in = np.empty(2), np.empty((2, 6)), np.empty((2, 15))
+    prediction, by_eo, by_in = np.empty(2), np.empty((2, 6)), np.empty((2, INTERIOR))
     for k in range(len(points)):
         rays = range(pickets.start[k], pickets.start[k + 1])
         for _ in range(6):
@@ -53,7 +53,7 @@ def intersect(calibration, pickets, state, xy, basis):
                 i = row_of[int(pickets.image[r])]
                 by_pt = np.empty((2, 3))
                 linearise_ray(state.rotation[i], state.centre[i], points[k], interior[u.lens.of_image[i]], 0.0, 0.0,
-                              prediction, by_eo, by_pt, by_in)  # fmt: skip
+                              prediction, by_eo, by_pt, by_in, INTERIOR)  # fmt: skip
                 a.append(by_pt / pickets.sigma_mm[r])
                 gap.append((xy[r] - basis[r] @ state.shared - prediction) / pickets.sigma_mm[r])
             points[k] += np.linalg.lstsq(np.concatenate(a), np.concatenate(gap), rcond=None)[0]
@@ -118,11 +118,11 @@ def point_cofactor(calibration, pickets, k):
     """(3, 3) m² of a picket intersected with orientation that is known."""
     u, state = calibration.system.unknowns, calibration.solution.state
     rows, interior = [], u.interior(state)
-    prediction, by_eo, by_in = np.empty(2), np.empty((2, 6)), np.empty((2, 15))
+    prediction, by_eo, by_in = np.empty(2), np.empty((2, 6)), np.empty((2, INTERIOR))
     for r in range(pickets.start[k], pickets.start[k + 1]):
         i, by_pt = int(np.flatnonzero(u.images == pickets.image[r])[0]), np.empty((2, 3))
         linearise_ray(state.rotation[i], state.centre[i], pickets.xyz[k] - u.origin, interior[u.lens.of_image[i]],
-                      0.0, 0.0, prediction, by_eo, by_pt, by_in)  # fmt: skip
+                      0.0, 0.0, prediction, by_eo, by_pt, by_in, INTERIOR)  # fmt: skip
         rows.append(by_pt / pickets.sigma_mm[r])
     a = np.concatenate(rows)
     return np.linalg.inv(a.T @ a)

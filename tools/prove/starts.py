@@ -7,6 +7,8 @@ that begins there beside the one that begins as usual: with strips (cu_sbr_p1), 
 nominal angles of the mounting (ca502), with the orientations that the file states (dbat_roma). Seconds are those of the
 processor: other programs may run beside. Prints Markdown.
 
+Measures the start without the adjustment that follows: looks within the package on purpose.
+
 Example: python tools/prove/starts.py ../shared/data > tools/results/starts.md
 """
 

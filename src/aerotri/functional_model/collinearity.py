@@ -51,6 +51,7 @@ def predict(
     -------
     (m, 2) mm.
     """
+    _refuse_other_columns(interior)
     prediction = np.empty((len(image), 2))
     _kernels.predict_rays(rotation, centre, points, interior, RayList(image, point, lens_row, xy), prediction)
     return prediction
@@ -67,9 +68,21 @@ def linearise(
     xy: np.ndarray,
 ) -> RayPartials:
     """Prediction and analytic partials; arguments as in `predict`."""
+    _refuse_other_columns(interior)
     m = len(image)
     out = RayPartials(
         np.empty((m, 2)), np.empty((m, 2, 6)), np.empty((m, 2, 3)), np.empty((m, 2, len(INTERIOR_COLUMNS)))
     )
     _kernels.linearise_rays(rotation, centre, points, interior, RayList(image, point, lens_row, xy), out)
     return out
+
+
+def _refuse_other_columns(interior: np.ndarray) -> None:
+    """Kernels do not see where an array ends.
+
+    Raises
+    ------
+    ValueError
+    """
+    if interior.shape[1:] != (len(INTERIOR_COLUMNS),):
+        raise ValueError(f"interior has the shape {interior.shape}, not (L, {len(INTERIOR_COLUMNS)})")

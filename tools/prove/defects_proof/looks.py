@@ -118,7 +118,7 @@ def dense_design(system: NormalSystem, state: State) -> np.ndarray:
         design[ray, axis, eliminated] = by.by_point[:, axis] * u.point_free[point]
         kept = np.flatnonzero(u.kept[point] >= 0)
         design[kept[:, None], axis, 6 * n + u.kept[point[kept]][:, None] + np.arange(3)] = by.by_point[kept, axis]
-        for t in range(15):
+        for t in range(u.lens.columns.shape[1]):
             column = u.lens.columns[rays.lens_row, t]
             there = np.flatnonzero(column >= 0)
             design[there, axis, 6 * n + column[there]] += by.by_interior[there, axis, t]

@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 import aerotri
-from aerotri.functional_model.collinearity import linearise, predict
+from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise, predict
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.image_errors import image_groups
 from aerotri.image_errors.error_function import ErrorFunction, error_function
@@ -167,7 +167,7 @@ def intersected(rotation, centre, interior, xy: np.ndarray, pickets: Pickets) ->
 
 
 def _interior(values: np.ndarray) -> np.ndarray:
-    table = np.zeros((1, 15))
+    table = np.zeros((1, len(INTERIOR_COLUMNS)))
     table[0, :3] = values[:3]
     return table
 
