@@ -129,6 +129,13 @@ def convert(
             help="Height of the ground, m, where heights of .OPK are corrected for scale.", rich_help_panel=INPUT
         ),
     ] = None,
+    in_place: Annotated[
+        bool,
+        typer.Option(
+            help="--out is the project that the block was read from (colmap, opensfm): it takes over the orientation.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = False,
     overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:
@@ -163,7 +170,7 @@ def convert(
         image_sigma_px=image_sigma_px,
         gnss_shift=gnss_shift,
     )
-    run_convert(request, form.needed(), to, json_, overwrite)
+    run_convert(request, form.needed(), to, json_, overwrite, in_place)
     form.tell()
 
 

@@ -80,7 +80,9 @@ def camera_spec(
     return CameraSpec(file, name, size_px, pixel_um, focal_length_mm, flight_axis, free)
 
 
-def run_convert(request: Request, target: Path, to: Any, as_json: bool, overwrite: bool = False) -> None:
+def run_convert(
+    request: Request, target: Path, to: Any, as_json: bool, overwrite: bool = False, in_place: bool = False
+) -> None:
     """Convert; arguments as on the command line.
 
     Raises
@@ -88,12 +90,16 @@ def run_convert(request: Request, target: Path, to: Any, as_json: bool, overwrit
     InputError
     """
     from aerotri.public.blocks import read_request
-    from aerotri.public.converting import convert, name_of_target, refuse_target
+    from aerotri.public.converting import convert, name_of_target, refuse_no_project, refuse_target
 
-    refuse_target(request.source, target, to, overwrite)
+    if in_place:
+        refuse_no_project(request.source, target, to)
+    else:
+        refuse_target(request.source, target, to, overwrite)
     found = read_request(replace(request, name=request.name or name_of_target(target, to)))
     geoid, tell = request.stated.geoid, Console().stage
-    messages = [*found.messages, *convert(found, target, to, geoid=geoid, overwrite=overwrite, progress=tell)]
+    said = convert(found, target, to, geoid=geoid, in_place=in_place, overwrite=overwrite, progress=tell)
+    messages = [*found.messages, *said]
     if as_json:
         print(json_text({"target": str(target), "format": to, "messages": messages}, None))
         return

@@ -21,6 +21,7 @@ from aerotri.formats.foreign.bal import is_bal, read_bal, write_bal
 from aerotri.formats.foreign.bingo import write_bingo
 from aerotri.formats.foreign.bundler import is_bundler, read_bundler, write_bundler
 from aerotri.formats.foreign.colmap import is_colmap, read_colmap, write_colmap
+from aerotri.formats.foreign.colmap_in_place import update_colmap
 from aerotri.formats.foreign.dbat import read_dbat
 from aerotri.formats.foreign.dbat_script import is_dbat
 from aerotri.formats.foreign.ign import write_ign_opk
@@ -98,6 +99,8 @@ FOLDER_TARGETS: Mapping[str, tuple[str, ...]] = {
     "patb": patb.FILES,
 }
 """Formats that are folders, with the files written there."""
+UPDATERS: Mapping[str, OrientedWriter] = {"colmap": update_colmap}
+"""Projects that are brought to an orientation in place, and then go on in their own program."""
 TARGETS = ("block", *WRITERS, *ORIENTATION_WRITERS, *BLOCK_WRITERS)
 
 
@@ -199,6 +202,31 @@ def write_oriented(
         return WRITERS[format](oriented, Path(path))
     local, said = in_local_frame(oriented, geoid)
     return (*WRITERS[format](local, Path(path)), said)
+
+
+def update_project(
+    oriented: OrientedBlock, project: FilePath, format: str, geoid: FilePath | None = None
+) -> tuple[str, ...]:
+    """Bring the project that a block was read from to the block's orientation; it keeps everything else.
+
+    Parameters
+    ----------
+    project : its folder. format : one of `UPDATERS`. geoid : see `write_oriented`.
+
+    Returns
+    -------
+    What moved along unadjusted or could not be carried over, in words.
+
+    Raises
+    ------
+    InputError
+    """
+    if format not in UPDATERS:
+        raise InputError(f"a '{format}' is not brought up to date in place", f"possible are {', '.join(UPDATERS)}")
+    if oriented.block.crs == "local":
+        return UPDATERS[format](oriented, Path(project))
+    local, said = in_local_frame(oriented, geoid)
+    return (*UPDATERS[format](local, Path(project)), said)
 
 
 def _unknown(format: str) -> InputError:

@@ -32,6 +32,7 @@ def convert(
     points: np.ndarray | None = None,
     tables: Tables = "csv",
     geoid: FilePath | None = None,
+    in_place: bool = False,
     overwrite: bool = False,
     progress: ProgressLike = None,
 ) -> tuple[str, ...]:
@@ -46,6 +47,8 @@ def convert(
     points : (N, 3) m, object points of a block, for formats that hold them.
     tables : of our own format; 'parquet' is read faster where there are millions of image points.
     geoid : grid of geoid undulations for heights of the coordinate system.
+    in_place : `out` is the project that the block was read from (COLMAP, OpenSfM): cameras, orientations and object
+        points become those of `source`, everything else stays, older files go into its folder before_aerotri.
     overwrite : replace files that aerotri has not written, or that were changed since.
     progress : see `aerotri.adjust`.
 
@@ -69,7 +72,10 @@ def convert(
     12
     """
     target, said = Path(out), ()
-    refuse_target(_place(source), target, to, overwrite)
+    if in_place:
+        refuse_no_project(_place(source), target, to)
+    else:
+        refuse_target(_place(source), target, to, overwrite)
     if not isinstance(source, (Block, Adjustment, ReadBlock)):
         source = read(source, name=name_of_target(target, to))
         said = source.messages
@@ -78,6 +84,8 @@ def convert(
     if to == "block" and tables != "csv":
         return (*said, *_write_tables(source.block, target, tables))
     with stage_report(progress) as report:
+        if in_place:
+            return (*said, *_update(source, target, to, geoid))
         if isinstance(source, Adjustment) or source.is_result:
             return (*said, *_write_result(source, target, to, geoid))
         return (*said, *_write_block(source, target, to, geoid, report))
@@ -115,6 +123,40 @@ def refuse_target(source: str, target: Path, to: str, overwrite: bool) -> None:
         refuse_foreign_entries(target, FOLDER_TARGETS[to], overwrite)
     else:
         refuse_existing_file(target, overwrite)
+
+
+def refuse_no_project(source: str, target: Path, to: str) -> None:
+    """Refuse, before anything is read, what cannot be brought to an orientation in place.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.formats.convert import RECOGNISERS, UPDATERS
+
+    if to not in UPDATERS:
+        raise InputError(f"--in-place is not possible for '{to}'", f"it is for {', '.join(UPDATERS)}")
+    if not RECOGNISERS[to](target):
+        raise InputError(f"is no {to} project to bring up to date", "give its folder, or leave --in-place out", target)
+    if source and target.resolve() == Path(source).resolve():
+        raise InputError("source and target are the same", "give the result of the adjustment as source", target)
+
+
+def _update(source: Adjustment | ReadBlock, target: Path, to: Target, geoid: FilePath | None) -> tuple[str, ...]:
+    """The project of another program at an orientation of ours."""
+    from aerotri.formats.assembly.oriented import oriented_block, oriented_from_adjusted
+    from aerotri.formats.convert import update_project
+    from aerotri.opening import open_result
+
+    if isinstance(source, Adjustment):
+        oriented = oriented_from_adjusted(source.adjusted)
+    elif source.is_result:
+        oriented = oriented_from_adjusted(open_result(source.source).result)
+    elif source.points is None:
+        raise InputError("has no object points", "give the result of its adjustment", source.source or None)
+    else:
+        oriented = oriented_block(source.block, source.points)
+    return update_project(oriented, target, to, geoid)
 
 
 def _place(source: Block | Adjustment | ReadBlock | FilePath) -> str:

@@ -32,6 +32,7 @@ class OrientedBlock:
     used : (m,) bool, the rays to be handed on.
     errors : (m, 2) mm, image errors of the rays by linear additional parameters, measured = ideal + error; None where
         there are none.
+    format_errors : of every camera the same at `lens_fit.format_grid_mm`, (g, 2) mm; () where there are none.
     """
 
     block: Block
@@ -40,6 +41,7 @@ class OrientedBlock:
     points: np.ndarray
     used: np.ndarray
     errors: np.ndarray | None = None
+    format_errors: tuple[np.ndarray, ...] = ()
 
     @property
     def oriented(self) -> np.ndarray:
@@ -135,12 +137,14 @@ def oriented_block(block: Block, points: np.ndarray) -> OrientedBlock:
 def oriented_from_adjusted(adjusted: AdjustedBlock) -> OrientedBlock:
     """A block after its adjustment, with a camera for every group of images that has parameters of its own."""
     # imported here: who converts blocks without results need not wait for it
+    from aerotri.formats.foreign.lens_fit import format_grid_mm
     from aerotri.image_errors import image_groups
 
     block, rays = adjusted.block, adjusted.block.image_points
     groups = image_groups(block)
     names = [group.camera.name for group in groups]
-    cameras, of_image, errors = [], np.zeros(len(block.images), np.int64), np.zeros_like(rays.xy)
+    cameras, of_format = [], []
+    of_image, errors = np.zeros(len(block.images), np.int64), np.zeros_like(rays.xy)
     for number, group in enumerate(groups):
         values = _values_in_force(adjusted, group)
         camera = _adjusted_camera(adjusted, group, values)
@@ -149,6 +153,7 @@ def oriented_from_adjusted(adjusted: AdjustedBlock) -> OrientedBlock:
         of_image[group.images] = number
         own = np.flatnonzero(group.images[rays.image])
         errors[own] = _linear_errors(group.camera, values, rays.xy[own])
+        of_format.append(_linear_errors(group.camera, values, format_grid_mm(group.camera)))
     return OrientedBlock(
         replace(block, cameras=tuple(cameras), images=replace(block.images, camera=of_image)),
         adjusted.images.centre,
@@ -156,6 +161,7 @@ def oriented_from_adjusted(adjusted: AdjustedBlock) -> OrientedBlock:
         adjusted.points.xyz,
         adjusted.rays.status == RayStatus.USED,
         errors if errors.any() else None,
+        tuple(of_format) if errors.any() else (),
     )
 
 

@@ -73,7 +73,7 @@ def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndar
         held, or fitted to a model of other formulas.
     """
     folder = Path(folder)
-    model = _read_model(folder)
+    model = open_model(folder)
     cameras, camera_place = _cameras_of(model, pixel_um, folder)
     ids = sorted(model.images)
     images = _images_of(model, ids, camera_place, folder)
@@ -124,7 +124,14 @@ def _points_of(model: Any, numbers: np.ndarray, folder: Path) -> np.ndarray:
     return xyz
 
 
-def _read_model(folder: Path) -> Any:
+def open_model(folder: Path) -> Any:
+    """pycolmap's reconstruction of a folder.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read.
+    """
     import pycolmap
 
     if not is_colmap(folder):

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import InputError, mm_from_px, px_from_mm
-from aerotri.formats.foreign.lens_fit import FittedLens, fitted_lens, format_grid_px, nearest_lens
+from aerotri.formats.foreign.lens_fit import FittedLens, fitted_camera, fitted_lens, format_grid_px, nearest_lens
 from aerotri.formats.text.tables import LARGEST_NUMBER
 from aerotri.functional_model.additional_parameters import lens
 from aerotri.observations import Camera, Prior
@@ -155,12 +155,16 @@ def _fit(tangent: np.ndarray, bent: np.ndarray, fisheye: bool, focal_px: float) 
     return fitted_lens(ideal, bent, FITTED_LENS[fisheye], fisheye, focal_px)
 
 
-def colmap_camera(camera: Camera) -> tuple[str, list[float]]:
+def colmap_camera(camera: Camera, first: str = "") -> tuple[str, list[float]]:
     """COLMAP's model and parameters (pixels) of a camera; of Brown's family only b1 counts.
+
+    Parameters
+    ----------
+    first : model to be taken where it can hold the camera.
 
     Returns
     -------
-    model : the smallest that has all lens parameters the camera names.
+    model : else the smallest that has all lens parameters the camera names.
     values : in COLMAP's order.
 
     Raises
@@ -174,6 +178,7 @@ def colmap_camera(camera: Camera) -> tuple[str, list[float]]:
     wanted = _holding(camera)
     if not wanted or value(camera, "b2"):
         raise InputError(f"COLMAP has no model for the lens of camera '{camera.name}'", "write it with the fitted lens")
+    wanted = sorted(wanted, key=lambda name: name != first)
     name = next(name for name in wanted if MODELS[name].focal_lengths == 2 or fx == fy)
     lens_values = [SIGN.get(key, 1.0) * value(camera, key) for key in MODELS[name].lens]
     return name, [*([fx, fy] if MODELS[name].focal_lengths == 2 else [fy]), cx, cy, *lens_values]
@@ -184,6 +189,20 @@ def expressible(camera: Camera) -> tuple[Camera, tuple[str, ...]]:
     if _holding(camera):
         return camera, ()
     return with_nearest(camera, THIN_PRISM if camera.is_fisheye else RATIONAL[:6], "COLMAP")
+
+
+def whole_camera(camera: Camera, errors: np.ndarray | None) -> tuple[Camera, tuple[str, ...]]:
+    """The camera for image points as measured: where COLMAP has no words for it, all that it does is fitted.
+
+    Parameters
+    ----------
+    errors : of additional parameters beside the lens, see `lens_fit.nearest_of_all`.
+    """
+    other = any(prior.value for name, prior in camera.brown.items() if name != "b1")
+    if errors is None and not other and not value(camera, "b2") and _holding(camera):
+        return camera, ()
+    items = THIN_PRISM if camera.is_fisheye else RATIONAL[:6]
+    return fitted_camera(camera, (*items, "b1"), errors, "COLMAP")
 
 
 def with_nearest(camera: Camera, names: tuple[str, ...], program: str) -> tuple[Camera, tuple[str, ...]]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.functional_model.additional_parameters import lens
-from aerotri.observations import Camera
+from aerotri.conventions import mm_from_px
+from aerotri.functional_model.additional_parameters import brown, lens
+from aerotri.observations import Camera, Prior
 
 GRID = 41, 31
 """Places over the format at which two lenses are compared, along the longer and the shorter side [C]."""
@@ -50,6 +51,11 @@ def format_grid_px(size_px: tuple[int, int]) -> np.ndarray:
     return np.stack(np.meshgrid(column, row), axis=-1).reshape(-1, 2)
 
 
+def format_grid_mm(camera: Camera) -> np.ndarray:
+    """(g, 2) mm, the same places in a camera's image coordinates."""
+    return mm_from_px(format_grid_px(camera.size_px), camera.size_px, camera.pixel_mm)
+
+
 def fitted_lens(
     ideal: np.ndarray, bent: np.ndarray, names: Sequence[str], fisheye: bool, focal_px: float
 ) -> FittedLens:
@@ -82,9 +88,47 @@ def nearest_lens(camera: Camera, names: Sequence[str]) -> FittedLens:
     """
     own = lens.vector_of(camera)
     own[[lens.ITEMS.index("b1"), lens.ITEMS.index("b2")]] = 0.0
-    xy = (format_grid_px(camera.size_px) - np.array(camera.size_px) / 2.0) * [1.0, -1.0] * camera.pixel_mm
-    bent = (xy - np.array(camera.principal_point_mm)) / camera.focal_length_mm
-    ideal = lens.unbend(bent, own)
+    bent = (format_grid_mm(camera) - np.array(camera.principal_point_mm)) / camera.focal_length_mm
+    return _nearest(camera, lens.unbend(bent, own), bent, names)
+
+
+def nearest_of_all(camera: Camera, names: Sequence[str], errors: np.ndarray | None = None) -> FittedLens:
+    """The lens with these items only that is nearest to everything a camera does: lens, affinity, Brown's parameters.
+
+    Parameters
+    ----------
+    names : items that may differ from zero.
+    errors : (g, 2) mm, further image errors at `format_grid_mm`, measured = ideal + error.
+    """
+    c, bar = camera.focal_length_mm, format_grid_mm(camera) - np.array(camera.principal_point_mm)
+    values = np.array([camera.brown[name].value if name in camera.brown else 0.0 for name in brown.ITEMS])
+    free = bar - brown.image_error(bar[:, 0], bar[:, 1], values)
+    ideal = lens.unbend((free if errors is None else free - errors) / c, lens.vector_of(camera))
+    return _nearest(camera, ideal, bar / c, names)
+
+
+def fitted_camera(
+    camera: Camera, names: Sequence[str], errors: np.ndarray | None, program: str
+) -> tuple[Camera, tuple[str, ...]]:
+    """The camera with the nearest of a program's lenses in place of lens and additional parameters.
+
+    Parameters
+    ----------
+    names, errors : see `nearest_of_all`. program : its name.
+
+    Returns
+    -------
+    camera : without Brown's parameters, its lens held.
+    said : what was fitted and what that leaves, in words.
+    """
+    best = nearest_of_all(camera, names, errors)
+    fitted = {name: Prior(value, fixed=True) for name, value in best.values(names).items()}
+    what = "its lens" if errors is None or not errors.any() else "its additional parameters"
+    said = f"camera '{camera.name}': {program} has no words for {what}; the nearest lens is written, {best.text}"
+    return replace(camera, lens=fitted, brown={}), (said,)
+
+
+def _nearest(camera: Camera, ideal: np.ndarray, bent: np.ndarray, names: Sequence[str]) -> FittedLens:
     there = np.isfinite(ideal).all(axis=1)
     focal_px = camera.focal_length_mm / camera.pixel_mm
     return fitted_lens(ideal[there], bent[there], names, camera.is_fisheye, focal_px)

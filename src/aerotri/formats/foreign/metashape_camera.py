@@ -8,20 +8,18 @@ is 0 may be left out. It is the forward lens of `additional_parameters.lens` wit
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, mm_from_px
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.files.atomic import atomic_file
-from aerotri.formats.foreign.lens_fit import fitted_lens, format_grid_px
+from aerotri.formats.foreign.lens_fit import fitted_camera
 from aerotri.formats.text.tables import LARGEST_FORMAT_PX, SMALLEST_POSITIVE
 from aerotri.formats.text.text_lines import first_lines
 from aerotri.formats.text.xml_text import child_text, numbers, read_xml
-from aerotri.functional_model.additional_parameters import brown, lens
 from aerotri.observations import Camera, Prior
 
 ROOT = "calibration"
@@ -92,7 +90,7 @@ def _number(root: ElementTree.Element, tag: str, path: Path, default: str | None
 def write_metashape_camera(oriented: OrientedBlock, path: FilePath) -> tuple[str, ...]:
     """Write the calibration of a block's camera.
 
-    What Metashape has no words for (Brown's parameters, denominators, thin prism) is fitted over the format.
+    What Metashape has no words for (additional parameters, denominators, thin prism) is fitted over the format.
 
     Returns
     -------
@@ -110,29 +108,24 @@ def write_metashape_camera(oriented: OrientedBlock, path: FilePath) -> tuple[str
             "write a block of one camera",
         )
     (one,) = cameras
-    camera, said = expressible(one)
-    if oriented.errors is not None:
-        said = (*said, "the additional parameters beside the lens are not in it: see `aerotri imgeo`")
+    camera, said = expressible(one, *oriented.format_errors)
     with atomic_file(path) as place:
         place.write_text(_text(camera), encoding="utf-8", newline="\n")
     return said
 
 
-def expressible(camera: Camera) -> tuple[Camera, tuple[str, ...]]:
-    """The camera with Metashape's lens, and in words what was fitted."""
+def expressible(camera: Camera, errors: np.ndarray | None = None) -> tuple[Camera, tuple[str, ...]]:
+    """The camera with Metashape's lens, and in words what was fitted.
+
+    Parameters
+    ----------
+    errors : of further additional parameters, see `lens_fit.nearest_of_all`.
+    """
     named = {name for name, prior in camera.lens.items() if prior.value}
-    if named <= set(OUR_LENS) and not any(prior.value for prior in camera.brown.values()):
+    bent = any(prior.value for prior in camera.brown.values()) or (errors is not None and bool(errors.any()))
+    if named <= set(OUR_LENS) and not bent:
         return camera, ()
-    c, own = camera.focal_length_mm, lens.vector_of(camera)
-    values = np.array([camera.brown[name].value if name in camera.brown else 0.0 for name in brown.ITEMS])
-    measured = mm_from_px(format_grid_px(camera.size_px), camera.size_px, camera.pixel_mm)
-    bar = measured - np.array(camera.principal_point_mm)
-    ideal = lens.unbend((bar - brown.image_error(bar[:, 0], bar[:, 1], values)) / c, own)
-    there = np.isfinite(ideal).all(axis=1)
-    best = fitted_lens(ideal[there], bar[there] / c, OUR_LENS, camera.is_fisheye, c / camera.pixel_mm)
-    fitted = {name: Prior(value, fixed=True) for name, value in best.values(OUR_LENS).items()}
-    said = f"camera '{camera.name}': Metashape has no words for its lens; the nearest lens is written, {best.text}"
-    return replace(camera, lens=fitted, brown={}), (said,)
+    return fitted_camera(camera, OUR_LENS, errors, "Metashape")
 
 
 def _text(camera: Camera) -> str:
