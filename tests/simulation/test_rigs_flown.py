@@ -62,6 +62,18 @@ def test_positions_are_observed_once_a_station():
     assert len(block.gnss_ins) == 13
 
 
+def test_navigation_is_that_of_a_tilted_reference_camera():
+    """Lever arm and attitude in the frame of the camera, however it is tilted on the frame."""
+    spec = rig_spec(gnss={"sigma_m": [1e-6] * 3, "lever_arm_m": [0.2, -0.3, 1.1]}, ins={"sigma_deg": [1e-7] * 3})
+    del spec["camera"]
+    block, truth = simulate(parse_spec(spec | {"rig": {"frame": {"preset": "two_head"}}}), 1)
+    observed = block.gnss_ins
+    rotation = rotation_from_angles(truth.angles[observed.image])
+    np.testing.assert_allclose(observed.xyz, truth.centre[observed.image] + rotation @ [0.2, -0.3, 1.1], atol=1e-4)
+    gap = logarithm(rotation_from_angles(observed.angles) @ np.swapaxes(rotation, 1, 2))
+    np.testing.assert_allclose(gap, 0.0, atol=1e-7)
+
+
 def test_what_is_stated_errs_by_its_sigma():
     errors = []
     for seed in range(40):

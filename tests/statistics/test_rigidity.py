@@ -14,7 +14,7 @@ from aerotri.pipeline import adjust
 from aerotri.report.plots.rigs import plot_rig, rig_footprints
 from aerotri.report.tables.rigs import photographs_table, rigidity_table, rigs_table, verdicts
 from aerotri.results.rigidity import POSITION, ROTATION
-from aerotri.statistics.rigidity import holm
+from aerotri.statistics.rigidity_tests import holm
 from rig_blocks import EXACT, rig_block
 
 TWO = ("left", "fore")
@@ -87,6 +87,15 @@ def test_a_camera_that_moves_is_found_and_measured(moving):
     assert "camera left does not keep its place on the rig frame: it turns by σ" in said["left"].says
     assert min(tests.heads, key=lambda one: one.movement_p) is left
     assert said["left"].says in moving.outcome.warnings
+
+
+def test_a_camera_that_shifts_is_found_and_measured(quiet):
+    """Of the size stated as detectable and a half more: what turns explain of it does not pass for noise."""
+    size = 1.5 * quiet.rigidity.head("frame", "left", POSITION).movement_detectable
+    found = adjust(_flown(3, {"left": EXACT | {"play_position_m": size}, "fore": EXACT})[0]).rigidity
+    left = found.head("frame", "left", POSITION)
+    assert left.movement_found
+    assert left.movement == pytest.approx(size, abs=3.5 * left.movement_sigma)
 
 
 def test_a_drift_is_found_and_measured():
@@ -163,17 +172,20 @@ def test_written_and_in_the_report(moving):
 @pytest.mark.slow
 def test_false_alarms_and_power_over_seeds():
     """p of faultless rigs is uniform; movements of the size said to be detectable are found as often as said."""
-    p, found, sizes = [], [], []
+    p, sizes = [], {ROTATION: [], POSITION: []}
     for seed in range(2000, 2060):
         tests = adjust(_flown(seed, {"left": EXACT, "fore": EXACT})[0]).rigidity
         p.append([one.movement_p for one in tests.heads] + [one.drift_p for one in tests.heads])
-        sizes.append(tests.head("frame", "left").movement_detectable)
+        for what, of in sizes.items():
+            of.append(tests.head("frame", "left", what).movement_detectable)
     p = np.array(p)
     # 60 uniform numbers: their mean has σ 0.037
     assert (np.abs(p.mean(axis=0) - 0.5) < 3.5 * 0.0373).all()
-    size = float(np.degrees(np.median(sizes)))
-    for seed in range(3000, 3060):
-        block, _ = _flown(seed, {"left": EXACT | {"play_rotation_deg": size}, "fore": EXACT})
-        found.append(adjust(block).rigidity.head("frame", "left").movement_p < 0.001 / 12)
-    # 60 times 0.8: σ of the share 5.2 %
-    assert abs(np.mean(found) - 0.8) < 3.5 * 0.052
+    keys = {ROTATION: ("play_rotation_deg", np.degrees(1.0)), POSITION: ("play_position_m", 1.0)}
+    for what, (key, unit) in keys.items():
+        plays, found = EXACT | {key: float(unit * np.median(sizes[what]))}, []
+        for seed in range(3000, 3060):
+            block, _ = _flown(seed, {"left": plays, "fore": EXACT})
+            found.append(adjust(block).rigidity.head("frame", "left", what).movement_p < 0.001 / 12)
+        # 60 times 0.8: σ of the share 5.2 %
+        assert abs(np.mean(found) - 0.8) < 3.5 * 0.052, what

@@ -44,6 +44,17 @@ def true_mountings(rigs: Mapping[str, RigSpec]) -> dict[str, np.ndarray]:
     }
 
 
+def tilted(flown: FlownImages, spec: SimulationSpec) -> FlownImages:
+    """The flight with the reference cameras tilted as their rigs say."""
+    names, angles = list(spec.camera), flown.angles.copy()
+    for rig in spec.rig.values():
+        if any(rig.tilt_deg):
+            own = flown.camera == names.index(rig.reference)
+            tilt = rotation_from_angles(np.radians(rig.tilt_deg), spec.rotation)
+            angles[own] = angles_from_rotation(rotation_from_angles(angles[own], spec.rotation) @ tilt, spec.rotation)
+    return replace(flown, angles=angles)
+
+
 def with_rigs(flown: FlownImages, spec: SimulationSpec, rng: np.random.Generator) -> tuple[FlownImages, np.ndarray]:
     """The photographs of all cameras, those of a station one after the other, the reference camera first.
 
@@ -58,10 +69,6 @@ def with_rigs(flown: FlownImages, spec: SimulationSpec, rng: np.random.Generator
     number = {name: k for k, name in enumerate(spec.camera)}
     rigs = {number[rig.reference]: rig for rig in spec.rig.values()}
     rotation = rotation_from_angles(flown.angles, spec.rotation)
-    for reference, rig in rigs.items():
-        tilt = rotation_from_angles(np.radians(rig.tilt_deg), spec.rotation)
-        own = flown.camera == reference
-        rotation[own] = rotation[own] @ tilt
     lead, name, camera, centre, turned = [], [], [], [], []
     for k in range(len(flown)):
         rig = rigs.get(int(flown.camera[k]))

@@ -29,7 +29,7 @@ from aerotri.simulation.motion import true_motion, true_readouts
 from aerotri.simulation.navigation import observe_navigation
 from aerotri.simulation.projection import Motion, Photographs, Rays, TrueCamera
 from aerotri.simulation.random_streams import stream
-from aerotri.simulation.rigs import reference_cameras, stated_rigs, true_mountings, with_rigs
+from aerotri.simulation.rigs import reference_cameras, stated_rigs, tilted, true_mountings, with_rigs
 from aerotri.simulation.spec import ControlSpec, SimulationSpec
 from aerotri.simulation.terrain import Terrain, make_terrain
 from aerotri.simulation.towers import build_towers, plumb_lines
@@ -79,6 +79,7 @@ def simulate(spec: SimulationSpec, seed: int) -> tuple[Block, Truth]:
     nominal = tuple(camera.nominal for camera in cameras)
     plan = stream(seed, "flight")
     planned, frame = plan_flight(spec.flight, nominal, spec.terrain.height_m, plan, reference_cameras(spec))
+    planned = tilted(planned, spec)
     flown, lead = with_rigs(planned, spec, stream(seed, "rigs"))
     motion = true_motion(spec, planned, lead, seed)
     imaging = _imaging(spec, cameras, flown, motion, seed)

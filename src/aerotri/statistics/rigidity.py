@@ -9,18 +9,13 @@ at the rigid solution, without another adjustment. One photograph: uᵀS⁻u/σ�
 camera, moving anew at every exposure: the sum of squares of u, locally most powerful for a small variance of the
 movements [L: Rao 1948; Verbyla 1993]; it is a sum of χ² weighted with the eigenvalues λ of S, and of λ(1 + ρλ) where
 the movements have the variance ρ·σ0². A drift: Σ τ·u over the exposures, τ from −½ to ½.
-
-σ̂0² comes from the same residuals: vᵀPv = uᵀS⁻u + what is independent of u, so P(T > c·vᵀPv) is that of
-Σ(λ − c)·χ²₁ − c·χ²_rest > 0.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import cast
+from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.sparse import bsr_matrix
 
 from aerotri.adjustment.exposures import exposures_of
@@ -28,41 +23,18 @@ from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor
 from aerotri.observations.rigs import STATION
-from aerotri.quantiles import f_exceedance, noncentrality
+from aerotri.quantiles import noncentrality
 from aerotri.results.adjusted_block import Outcome
-from aerotri.results.rigidity import POSITION, ROTATION, HeadTest, Rigidity, StationTests
-from aerotri.statistics.weighted_chi_square import weighted_chi_square_exceedance
+from aerotri.results.rigidity import HeadTest, Rigidity, StationTests
+from aerotri.statistics.rigidity_tests import POS, ROT, Head, Photographs, Scores, Tests, holm
 
 MOST = 400
 """Photographs of a camera whose S is held at once [C]; of longer flights section by section, their correlations with
 one another left out."""
 AT_ONCE = 2e7
 """Numbers of right sides that are solved at once [C]."""
-NOTHING = 1e-8
-"""Share of its normal equations below which nothing of an element is left to test."""
 FEWEST = 3
 """Stations from which movements of a camera are tested."""
-ROT, POS = slice(3, 6), slice(0, 3)
-
-
-@dataclass(frozen=True, eq=False)
-class _Head:
-    """Photographs of one camera of a rig in order of time, their axes (m, 3, 3) and τ (m,)."""
-
-    rig: str
-    camera: str
-    rows: np.ndarray
-    axes: np.ndarray
-    tau: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class _Scores:
-    """u (6·m,) and S (6·m, 6·m) of photographs of one camera, and the diagonal of MᵀNM (6·m,)."""
-
-    u: np.ndarray
-    s: np.ndarray
-    size: np.ndarray
 
 
 def rigidity_of(system: NormalSystem, solution: Solution, factor: Factor, outcome: Outcome) -> Rigidity | None:
@@ -76,7 +48,7 @@ def rigidity_of(system: NormalSystem, solution: Solution, factor: Factor, outcom
     if rigging is None or not outcome.vtpv > 0.0 or freedom < 1.0:
         return None
     settings = system.unknowns.block.settings.adjustment
-    tests = _Tests(outcome.vtpv, freedom, settings.alpha, settings.power)
+    tests = Tests(outcome.vtpv, freedom, settings.alpha, settings.power)
     heads, photographs = [], []
     for head in _heads(system, solution):
         scores = [_scores(system, solution, factor, head, part) for part in _sections(len(head.rows))]
@@ -86,7 +58,7 @@ def rigidity_of(system: NormalSystem, solution: Solution, factor: Factor, outcom
             heads.append((head, scores, drift))
     if not photographs:
         return None
-    tests = _Tests(outcome.vtpv, freedom, settings.alpha, settings.power, 4 * max(len(heads), 1))
+    tests = Tests(outcome.vtpv, freedom, settings.alpha, settings.power, 4 * max(len(heads), 1))
     found = tuple(_with_holm([test for one in heads for test in tests.of_head(*one)], settings.alpha))
     block = system.unknowns.block
     return Rigidity(
@@ -99,7 +71,7 @@ def rigidity_of(system: NormalSystem, solution: Solution, factor: Factor, outcom
     )
 
 
-def _heads(system: NormalSystem, solution: Solution) -> list[_Head]:
+def _heads(system: NormalSystem, solution: Solution) -> list[Head]:
     """The mounted cameras, and the reference camera where there are two others to tell it from them."""
     u, rigging = system.unknowns, system.unknowns.rigging
     if rigging is None:
@@ -117,7 +89,7 @@ def _heads(system: NormalSystem, solution: Solution) -> list[_Head]:
             led = np.unique(rigging.lead[np.isin(rigging.mounting, own)])
             out.append((rig.name, rig.reference, led[usable[led]]))
     return [
-        _Head(rig, camera, rows[order], solution.state.rotation[rigging.lead[rows[order]]], tau[rows[order]])
+        Head(rig, camera, rows[order], solution.state.rotation[rigging.lead[rows[order]]], tau[rows[order]])
         for rig, camera, rows in out
         if len(rows) and len(order := np.argsort(tau[rows], kind="stable"))
     ]
@@ -150,7 +122,7 @@ def _sections(count: int) -> list[np.ndarray]:
 class _Normals:
     """N·M of chosen photographs from the matrix of all."""
 
-    def __init__(self, system: NormalSystem, matrix: BorderedMatrix, head: _Head, part: np.ndarray):
+    def __init__(self, system: NormalSystem, matrix: BorderedMatrix, head: Head, part: np.ndarray):
         u, rows = system.unknowns, head.rows[part]
         n, m = len(u.images), len(rows)
         own = np.full(n, -1)
@@ -181,7 +153,7 @@ class _Normals:
         return (np.swapaxes(self.move, 1, 2) @ chosen).reshape(6 * len(self.rows), -1)
 
 
-def _scores(system: NormalSystem, solution: Solution, factor: Factor, head: _Head, part: np.ndarray) -> _Scores:
+def _scores(system: NormalSystem, solution: Solution, factor: Factor, head: Head, part: np.ndarray) -> Scores:
     """u and S of a section of the photographs of a camera."""
     equations = solution.equations
     normals = _Normals(system, equations.matrix, head, part)
@@ -199,10 +171,10 @@ def _scores(system: NormalSystem, solution: Solution, factor: Factor, head: _Hea
         s[:, columns] = direct - transposed @ x[:n] - normals.shared.T @ x[n:]
         size[columns] = direct[np.arange(first, columns.stop), np.arange(columns.stop - first)]
     u = normals.of_rows(equations.of_photographs[:, None])[:, 0]
-    return _Scores(u, 0.5 * (s + s.T), size)
+    return Scores(u, 0.5 * (s + s.T), size)
 
 
-def _drift(system: NormalSystem, solution: Solution, factor: Factor, head: _Head) -> _Scores:
+def _drift(system: NormalSystem, solution: Solution, factor: Factor, head: Head) -> Scores:
     """Score and S of a drift of the camera, six elements."""
     equations = solution.equations
     normals = _Normals(system, equations.matrix, head, np.arange(len(head.rows)))
@@ -211,171 +183,7 @@ def _drift(system: NormalSystem, solution: Solution, factor: Factor, head: _Head
     direct = tau.T @ normals.of_rows(a)
     s = direct - a.T @ factor.solve(a)
     u = tau.T @ normals.of_rows(equations.of_photographs[:, None])[:, 0]
-    return _Scores(u, 0.5 * (s + s.T), np.diagonal(direct).copy())
-
-
-@dataclass(frozen=True, eq=False)
-class _Photographs:
-    """The tests of the photographs of one camera, as `StationTests`; s_rot (m, 3) diagonal of S over σ0² scale."""
-
-    head: _Head
-    turned: np.ndarray
-    sigma: np.ndarray
-    freedom: np.ndarray
-    f: np.ndarray
-    p: np.ndarray
-    information: np.ndarray
-
-
-@dataclass(frozen=True)
-class _Tests:
-    """The tests themselves, with vᵀPv and redundancy of the adjustment; `count` of them share α."""
-
-    vtpv: float
-    freedom: float
-    alpha: float
-    power: float
-    count: int = 1
-
-    @property
-    def variance(self) -> float:
-        """σ̂0²."""
-        return self.vtpv / self.freedom
-
-    def of_photographs(self, head: _Head, scores: list[_Scores]) -> _Photographs:
-        """Every photograph of a camera by itself."""
-        m = len(head.rows)
-        turned, sigma, information = np.full((m, 3), np.nan), np.full((m, 3), np.nan), np.zeros((m, 3))
-        freedom, f, p = np.zeros(m, dtype=np.int64), np.full(m, np.nan), np.ones(m)
-        k = 0
-        for part in scores:
-            for at in range(0, len(part.u), 6):
-                own = slice(at, at + 6)
-                u, s, size = part.u[own], part.s[own, own], part.size[own]
-                inverse, freedom[k] = _inverse(s, size)
-                if freedom[k] and self.freedom > freedom[k]:
-                    f[k], p[k] = self._f_test(float(u @ inverse @ u), int(freedom[k]))
-                information[k] = np.diagonal(s)[ROT]
-                inverse, rank = _inverse(s[ROT, ROT], size[ROT])
-                if rank == 3:
-                    turned[k] = inverse @ u[ROT]
-                    sigma[k] = np.sqrt(self.variance * np.diagonal(inverse))
-                k += 1
-        return _Photographs(head, turned, sigma, freedom, f, p, information)
-
-    def of_head(self, head: _Head, scores: list[_Scores], drift: _Scores) -> list[HeadTest]:
-        """Movements and drift of a camera, first in rotation, then in position beyond that."""
-        out = []
-        beyond = {ROTATION: (scores, drift), POSITION: ([_beyond_rotations(one) for one in scores],
-                                                        _beyond_rotations(drift))}  # fmt: skip
-        for what, (every, trend) in beyond.items():
-            at = ROT if what == ROTATION else POS
-            movement, movement_sigma, p, detectable = self._movement(*self._movement_parts(every, np.arange(6)[at]))
-            inverse, rank = _inverse(trend.s[at, at], trend.size[at])
-            change, change_sigma, drift_p, drift_detectable = np.full(3, np.nan), np.full(3, np.nan), 1.0, np.nan
-            if rank == 3:
-                change, variances = inverse @ trend.u[at], self.variance * np.diagonal(inverse)
-                change_sigma = np.sqrt(variances)
-                drift_p = self._f_test(float(trend.u[at] @ change), 3)[1]
-                needed = noncentrality(3.0, self.alpha / self.count, self.power)
-                worst = 1.0 / np.linalg.eigvalsh(trend.s[at, at])[0]
-                drift_detectable = float(np.sqrt(needed * self.variance * worst))
-            out.append(
-                HeadTest(
-                    head.rig, head.camera, what, len(head.rows), movement, movement_sigma, p, False, detectable,
-                    change, change_sigma, drift_p, False, drift_detectable,
-                )
-            )  # fmt: skip
-        return out
-
-    def _f_test(self, squared: float, rank: int) -> tuple[float, float]:
-        """F of a quadratic form that is part of vᵀPv, and P of a larger one."""
-        rest = max((self.vtpv - squared) / (self.freedom - rank), 1e-300)
-        f = squared / rank / rest
-        return f, f_exceedance(f, rank, self.freedom - rank)
-
-    def _movement_parts(self, scores: list[_Scores], own: np.ndarray) -> tuple[np.ndarray, float, float]:
-        """Eigenvalues of S, Σu², and Σu² less what is expected, over all sections."""
-        values, total = [], 0.0
-        for part in scores:
-            at = (np.arange(0, len(part.u), 6)[:, None] + own).ravel()
-            # elements that nothing is known of count nothing
-            eigen = np.linalg.eigvalsh(part.s[np.ix_(at, at)])
-            values.append(eigen[eigen > NOTHING * max(float(part.size[at].max(initial=0.0)), 1e-300)])
-            total += float(part.u[at] @ part.u[at])
-        eigenvalues = np.concatenate(values)
-        return eigenvalues, total, total - self.variance * float(eigenvalues.sum())
-
-    def _movement(self, eigenvalues: np.ndarray, total: float, excess: float) -> tuple[float, float, float, float]:
-        """σ of movements with its own σ, P of such a sum of squares by chance, and the σ that would be found."""
-        squares = float(np.sum(eigenvalues**2))
-        if not squares > 0.0:
-            return 0.0, np.nan, 1.0, np.nan
-        variance = max(excess / squares, 0.0)
-        rho = variance / self.variance
-        spread = self.variance * np.sqrt(2.0 * np.sum((eigenvalues * (1.0 + rho * eigenvalues)) ** 2)) / squares
-        movement = float(np.sqrt(variance))
-        own_sigma = float(spread / (2.0 * movement)) if movement > 0.0 else float(np.sqrt(spread))
-        p = self._exceedance(eigenvalues, total / self.vtpv, 0.0)
-        return movement, own_sigma, p, self._detectable(eigenvalues)
-
-    def _exceedance(self, eigenvalues: np.ndarray, ratio: float, rho: float) -> float:
-        """P(Σu² > ratio·vᵀPv) where the movements have the variance ρ·σ0²."""
-        rest = max(self.freedom - len(eigenvalues), 0.0)
-        weights = np.append((1.0 + rho * eigenvalues) * (eigenvalues - ratio), -ratio)
-        return weighted_chi_square_exceedance(weights, np.append(np.ones(len(eigenvalues)), rest), 0.0)
-
-    def _detectable(self, eigenvalues: np.ndarray) -> float:
-        """σ of movements that the first of `count` tests finds with the power asked for."""
-        level, largest = self.alpha / self.count, float(eigenvalues.max())
-        mean = float(eigenvalues.sum()) / self.freedom
-        top = largest
-        if self._exceedance(eigenvalues, 0.999999 * top, 0.0) > level:
-            return np.nan
-
-        def too_likely(ratio: float) -> float:
-            return self._exceedance(eigenvalues, ratio, 0.0) - level
-
-        ratio = cast(float, brentq(too_likely, mean, 0.999999 * top))
-
-        def missing(log_rho: float) -> float:
-            return self._exceedance(eigenvalues, ratio, float(np.exp(log_rho))) - self.power
-
-        low, high = np.log(1e-6 / largest), np.log(1e12 / largest)
-        if missing(high) < 0.0:
-            return np.nan
-        return float(np.sqrt(self.variance * np.exp(cast(float, brentq(missing, low, high)))))
-
-
-def _inverse(s: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, int]:
-    """S⁻ where `size` says what is not rounding, and its rank."""
-    unit = 1.0 / np.sqrt(np.maximum(size, 1e-300))
-    values, vectors = np.linalg.eigh(s * np.outer(unit, unit))
-    keep = values > NOTHING
-    vectors = vectors[:, keep] * unit[:, None]
-    return (vectors / values[keep]) @ vectors.T, int(keep.sum())
-
-
-def _beyond_rotations(one: _Scores) -> _Scores:
-    """Scores of positions where rotations of the same photographs are free, in the places of positions."""
-    rot = (np.arange(0, len(one.u), 6)[:, None] + np.arange(3, 6)).ravel()
-    pos = rot - 3
-    inverse, _ = _inverse(one.s[np.ix_(rot, rot)], one.size[rot])
-    gain = one.s[np.ix_(pos, rot)] @ inverse
-    u, s = np.zeros_like(one.u), np.zeros_like(one.s)
-    u[pos] = one.u[pos] - gain @ one.u[rot]
-    left = one.s[np.ix_(pos, pos)] - gain @ one.s[np.ix_(rot, pos)]
-    s[np.ix_(pos, pos)] = 0.5 * (left + left.T)
-    return _Scores(u, s, one.size)
-
-
-def holm(p: np.ndarray, alpha: float) -> np.ndarray:
-    """(n,) bool, which of n tests reject, with the probability α of one or more false alarms [L: Holm 1979]."""
-    order = np.argsort(p, kind="stable")
-    small = p[order] <= alpha / np.arange(len(p), 0, -1)
-    found = np.zeros(len(p), dtype=bool)
-    found[order[: len(p) if small.all() else int(np.argmin(small))]] = True
-    return found
+    return Scores(u, 0.5 * (s + s.T), np.diagonal(direct).copy())
 
 
 def _with_holm(tests: list[HeadTest], alpha: float) -> list[HeadTest]:
@@ -387,7 +195,7 @@ def _with_holm(tests: list[HeadTest], alpha: float) -> list[HeadTest]:
     ]
 
 
-def _stations(system: NormalSystem, every: list[_Photographs], alpha: float) -> StationTests:
+def _stations(system: NormalSystem, every: list[Photographs], alpha: float) -> StationTests:
     """The tests of all photographs, in the order of the block."""
     block = system.unknowns.block
     image = system.unknowns.images[np.concatenate([one.head.rows for one in every])]
@@ -414,7 +222,7 @@ def _stations(system: NormalSystem, every: list[_Photographs], alpha: float) -> 
     )
 
 
-def _station_detectable(every: list[_Photographs], tests: _Tests, count: int) -> dict[tuple[str, str], float]:
+def _station_detectable(every: list[Photographs], tests: Tests, count: int) -> dict[tuple[str, str], float]:
     """Rotation of a single photograph about its worst axis that would be found, median of a camera's."""
     needed = noncentrality(6.0, tests.alpha / count, tests.power)
     out = {}
