@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from aerotri.adjustment import _covariance_kernels, _kernels, _point_kernels
+from aerotri.adjustment import _covariance_kernels, _kernels, _point_kernels, position_errors, rigging
 from aerotri.adjustment.chunk_sums import ChunkSums, add_gaps, add_own_squares, add_squares
 from aerotri.adjustment.datum import ExtraObservations, free_motions, observes_centres, without_motion
 from aerotri.adjustment.kernel_records import (
@@ -24,7 +24,6 @@ from aerotri.adjustment.kernel_records import (
     Work,
 )
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
-from aerotri.adjustment.position_errors import KIND
 from aerotri.adjustment.rig_reduction import RigFactor, RigReduction
 from aerotri.adjustment.rig_ties import TieRows
 from aerotri.adjustment.rigging import Chain
@@ -100,8 +99,9 @@ class NormalSystem:
         else:
             leads, pattern = self._reduction.leads, (self._reduction.block_row, self._reduction.block_col)
             self.symbolic = Symbolic(len(leads), *pattern, position[leads], s)
-        # errors of positions stand last in the list and act on no ray
-        of_rays = 1 + max((k for k, kind in enumerate(unknowns.shared.kinds) if kind != KIND), default=-1)
+        # mountings and errors of positions act on no ray; behind the others they need no sums
+        apart = position_errors.KIND, rigging.KIND
+        of_rays = 1 + max((k for k, kind in enumerate(unknowns.shared.kinds) if kind not in apart), default=-1)
         self._sums = [ChunkSums(unknowns, first, last, of_rays) for first, last in self._bounds]
         self.priors = SharedPriors.of(unknowns)
         # the kernels see no prior of a point that is not eliminated: it stands with the shared parameters
@@ -177,7 +177,7 @@ class NormalSystem:
         chain = u.chain(state)
         if chain is not None and u.rigging is not None:
             u.rigging.add_squares(chain, squares, squares_shared)
-        side = self._summed(state, rows, outcomes, problem)
+        side = self._summed(state, rows, ties, chain, outcomes, problem)
         whole = np.concatenate([squares.ravel(), squares_shared]) * (1.0 + damping)
         matrix = BorderedMatrix(blocks, border, corner)
         return NormalEquations(**side.__dict__, matrix=matrix, diagonal=whole, chain=chain)
@@ -193,10 +193,17 @@ class NormalSystem:
             )
 
         outcomes = self.over_chunks(chunk)
-        return self._summed(state, self.whitened_rows(state), outcomes, problem)
+        rows, ties, chain = self.whitened_rows(state), self.tie_rows(state), self.unknowns.chain(state)
+        return self._summed(state, rows, ties, chain, outcomes, problem)
 
     def _summed(
-        self, state: State, rows: list[Rows], outcomes: list[tuple[float, float, int]], problem: Problem
+        self,
+        state: State,
+        rows: list[Rows],
+        ties: TieRows | None,
+        chain: Chain | None,
+        outcomes: list[tuple[float, float, int]],
+        problem: Problem,
     ) -> RightSide:
         """Chunks, observations beside the image points and observed shared parameters together."""
         right, right_shared = np.zeros((len(self.unknowns.images), 6)), np.zeros(len(self.unknowns.shared))
@@ -206,11 +213,10 @@ class NormalSystem:
             add_gaps(observed, right, right_shared)
         cost = sum(o[0] for o in outcomes) + sum(float(np.sum(observed.gap**2)) for observed in rows)
         together, alone = self.priors.add_gaps_to(right_shared, state.shared)
-        ties = self.tie_rows(state)
         if ties is not None and self.unknowns.ties is not None:
             self.unknowns.ties.add_gaps(ties, right, right_shared)
             cost += float(np.sum(ties.deviation**2))
-        whole, chain = np.concatenate([right.ravel(), right_shared]), self.unknowns.chain(state)
+        whole = np.concatenate([right.ravel(), right_shared])
         return RightSide(
             right=whole if self._reduction is None or chain is None else self._reduction.on_leads(whole, chain),
             cost=float(cost + together + alone),
