@@ -173,6 +173,28 @@ def local_frame(
     return _frame(reference, np.asarray(origin, dtype=float))
 
 
+def topocentric_frame(crs: str, origin: np.ndarray, geoid: FilePath | None = None) -> LocalFrame:
+    """The frame that others have around a place: east, true north and the ellipsoidal normal there.
+
+    Parameters
+    ----------
+    crs, geoid : see `local_frame`.
+    origin : (3,) longitude, latitude in degrees, ellipsoidal height in metres.
+
+    Raises
+    ------
+    InputError
+        When the CRS is of no use there, or a grid is missing.
+    """
+    origin = np.asarray(origin, dtype=float)
+    plain = georeference(crs.partition("+")[0], np.zeros((0, 3)))
+    place = plain.from_geographic(origin[None])
+    if not np.isfinite(place).all():
+        raise InputError(f"longitude {origin[0]:.9g}, latitude {origin[1]:.9g} lies outside {crs}", CRS_REMEDY)
+    reference = georeference(crs, place, geoid)
+    return LocalFrame(reference, origin, reference.to_geocentric(origin[None])[0], _east_north_up(origin[None])[0].T)
+
+
 def _middle(lon: np.ndarray, lat: np.ndarray) -> np.ndarray:
     """(3,) rounded longitude and latitude of the mean direction (mean longitudes fail at the date line), height 0."""
     x, y, z = np.array([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)]).mean(axis=1)

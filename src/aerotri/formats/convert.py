@@ -13,7 +13,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.assembly.oriented import OrientedBlock, oriented_block
 from aerotri.formats.assembly.parts import Reading
-from aerotri.formats.assembly.placing import in_local_frame
+from aerotri.formats.assembly.placing import in_axes_at, in_local_frame
 from aerotri.formats.block import writer as block_writer
 from aerotri.formats.block.folder import read_block, write_block
 from aerotri.formats.foreign import bundler, colmap, opensfm, patb
@@ -30,6 +30,7 @@ from aerotri.formats.foreign.metashape import write_metashape
 from aerotri.formats.foreign.metashape_camera import write_metashape_camera
 from aerotri.formats.foreign.odm import write_odm_gcp
 from aerotri.formats.foreign.opensfm import is_opensfm, read_opensfm, write_opensfm
+from aerotri.formats.foreign.opensfm_in_place import origin_of, update_opensfm
 from aerotri.formats.foreign.patb import write_patb
 from aerotri.formats.foreign.pix4d import write_pix4d_eo, write_pix4d_gcp, write_pix4d_geo
 from aerotri.observations import Block
@@ -99,7 +100,7 @@ FOLDER_TARGETS: Mapping[str, tuple[str, ...]] = {
     "patb": patb.FILES,
 }
 """Formats that are folders, with the files written there."""
-UPDATERS: Mapping[str, OrientedWriter] = {"colmap": update_colmap}
+UPDATERS: Mapping[str, OrientedWriter] = {"colmap": update_colmap, "opensfm": update_opensfm}
 """Projects that are brought to an orientation in place, and then go on in their own program."""
 TARGETS = ("block", *WRITERS, *ORIENTATION_WRITERS, *BLOCK_WRITERS)
 
@@ -225,6 +226,9 @@ def update_project(
         raise InputError(f"a '{format}' is not brought up to date in place", f"possible are {', '.join(UPDATERS)}")
     if oriented.block.crs == "local":
         return UPDATERS[format](oriented, Path(project))
+    origin = origin_of(project) if format == "opensfm" else None
+    if origin is not None:
+        return UPDATERS[format](in_axes_at(oriented, origin, geoid), Path(project))
     local, said = in_local_frame(oriented, geoid)
     return (*UPDATERS[format](local, Path(project)), said)
 

@@ -53,8 +53,10 @@ class Statements:
     patb_rotation: str | None = None
 
 
-def with_crs(reading: Reading, crs: str) -> Reading:
+def with_crs(reading: Reading, crs: str, geoid: FilePath | None = None) -> Reading:
     """The block in the CRS that was stated or that a file names; a block that has one already keeps it.
+
+    A local block with a known origin is brought there.
 
     Raises
     ------
@@ -66,6 +68,8 @@ def with_crs(reading: Reading, crs: str) -> Reading:
         return reading
     if block.crs != "local":
         raise InputError(f"the block is in {block.crs}, not in {crs}", "leave out --crs")
+    if reading.origin is not None:
+        return placing.in_crs(reading, crs, geoid)
     return replace(reading, block=replace(block, crs=crs))
 
 

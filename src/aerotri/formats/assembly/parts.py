@@ -126,11 +126,14 @@ class Reading:
     block : the block.
     points : (N, 3) m, start values of object points, None where there are none.
     messages : what the user should know.
+    origin : longitude, latitude (degrees) and ellipsoidal height (m) on WGS 84 of a local block whose axes point east,
+        north and up there; None where nothing is known.
     """
 
     block: Block
     points: np.ndarray | None = None
     messages: tuple[str, ...] = ()
+    origin: tuple[float, float, float] | None = None
 
 
 def no_sigma(count: int) -> np.ndarray:

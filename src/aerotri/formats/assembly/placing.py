@@ -11,8 +11,11 @@ from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates import local_frame
 from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.coordinates.georeference import CRS_PATTERN, CRS_REMEDY, Georeference, georeference
+from aerotri.coordinates.local_frame import LocalFrame, topocentric_frame
 from aerotri.formats.assembly.oriented import OrientedBlock
+from aerotri.formats.assembly.parts import Reading
 from aerotri.formats.foreign.ign import without_linear_alteration
+from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 
 NORTH_STEP_DEG = 1e-5
 """Half the length of the piece of meridian that gives the direction of north in a grid: 1 m."""
@@ -166,19 +169,60 @@ def in_local_frame(oriented: OrientedBlock, geoid: FilePath | None = None) -> tu
         When a grid for its heights is missing.
     """
     frame = frame_of_block(oriented.block, geoid)
+    local = _in_frame(oriented, frame)
+    lon, lat, _ = frame.origin.tolist()
+    words = f"coordinates are local: east, north of the grid and up around longitude {lon:.9g}, latitude {lat:.9g}"
+    return local, f"{words} on the ellipsoid of {oriented.block.crs}"
+
+
+def _in_frame(oriented: OrientedBlock, frame: LocalFrame) -> OrientedBlock:
     there = oriented.oriented
     rotation = oriented.rotation.copy()
     rotation[there] = frame.axes_at(oriented.centre[there]) @ oriented.rotation[there]
-    local = replace(
+    return replace(
         oriented,
         block=transform_block(oriented.block, frame),
         centre=frame.to_local(oriented.centre),
         rotation=rotation,
         points=frame.to_local(oriented.points),
     )
-    lon, lat, _ = frame.origin.tolist()
-    words = f"coordinates are local: east, north of the grid and up around longitude {lon:.9g}, latitude {lat:.9g}"
-    return local, f"{words} on the ellipsoid of {oriented.block.crs}"
+
+
+def in_crs(reading: Reading, crs: str, geoid: FilePath | None = None) -> Reading:
+    """What was read in the axes at an origin, in a CRS; standard deviations stay as they are.
+
+    Raises
+    ------
+    InputError
+        When the origin lies outside of the CRS, or a grid for its heights is missing.
+    """
+    assert reading.origin is not None
+    block, frame = reading.block, topocentric_frame(crs, np.array(reading.origin), geoid)
+    there = np.isfinite(block.images.centre).all(axis=1) & np.isfinite(block.images.angles).all(axis=1)
+    centre, angles = frame.from_local(block.images.centre), block.images.angles.copy()
+    turned = np.swapaxes(frame.axes_at(centre[there]), 1, 2) @ rotation_from_angles(angles[there], block.rotation)
+    angles[there] = angles_from_rotation(turned, block.rotation)
+    observed = block.gnss_ins
+    if observed is not None:
+        observed = replace(observed, xyz=frame.from_local(observed.xyz))
+    images = replace(block.images, centre=centre, angles=angles)
+    points = None if reading.points is None else frame.from_local(reading.points)
+    return replace(reading, block=replace(block, crs=crs, images=images, gnss_ins=observed), points=points, origin=None)
+
+
+def in_axes_at(oriented: OrientedBlock, origin: np.ndarray, geoid: FilePath | None = None) -> OrientedBlock:
+    """A block with a CRS in the axes east, north and up at a place; the way back of `in_crs`.
+
+    Parameters
+    ----------
+    origin : (3,) longitude, latitude in degrees, ellipsoidal height in metres.
+
+    Raises
+    ------
+    InputError
+        When the place lies outside of the CRS, or a grid for its heights is missing.
+    """
+    return _in_frame(oriented, topocentric_frame(oriented.block.crs, origin, geoid))
 
 
 def refuse_exchanged_axes(points: np.ndarray, photographs: np.ndarray, file: os.PathLike[str]) -> None:

@@ -93,7 +93,8 @@ def read_project(request: Request) -> Reading:
     control = [*parts.control, *([kinds.read_control(request.control, options)] if request.control else [])]
     positions = kinds.read_position_list(request.positions, options) if request.positions else None
     told = [part.crs for part in (*control, *([positions] if positions else [])) if part.crs]
-    reading = with_crs(reading, request.stated.crs or (told[0] if told and reading.block.crs == "local" else ""))
+    crs = request.stated.crs or (told[0] if told and reading.block.crs == "local" else "")
+    reading = with_crs(reading, crs, request.stated.geoid)
     extra = [kinds.read_rays(text, options) for text in request.image_points]
     of_control = [part.rays for part in control if part.rays is not None and part.rays.path not in parts.files]
     sigma_px = 1.0 if request.image_sigma_px is None else request.image_sigma_px
@@ -262,8 +263,11 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
         sigma = rays.sigma if sigma_um is None else np.full_like(rays.sigma, sigma_um * 1e-3)
     if sigma_um is not None:
         settings = replace(settings, image_sigma_um=sigma_um)
-    if is_new and not len(block.control) and block.gnss_ins is None:
+    placed = len(block.control) > 0 or block.gnss_ins is not None
+    if is_new and not placed:
         settings = replace(settings, adjustment=AdjustmentSettings(datum="minimal"))
+    if placed and settings.adjustment.datum == "minimal" and (request.control or request.positions):
+        settings = replace(settings, adjustment=replace(settings.adjustment, datum="control"))
     if request.gnss_shift is not None:
         if request.gnss_shift not in SHIFTS:
             raise InputError(f"--gnss-shift '{request.gnss_shift}' is not possible", f"give {' or '.join(SHIFTS)}")
