@@ -129,6 +129,17 @@ def convert(
             help="Height of the ground, m, where heights of .OPK are corrected for scale.", rich_help_panel=INPUT
         ),
     ] = None,
+    station_pattern: Annotated[
+        str,
+        typer.Option(
+            help="Where exposure and camera of a rig stand in names of photographs: IMG_{station}_{camera}.tif.",
+            rich_help_panel=INPUT,
+        ),
+    ] = "",
+    rig_reference: Annotated[
+        str,
+        typer.Option(help="Reference camera of that rig; default: that with most photographs.", rich_help_panel=INPUT),
+    ] = "",
     in_place: Annotated[
         bool,
         typer.Option(
@@ -169,6 +180,8 @@ def convert(
         image_sigma_um=image_sigma_um,
         image_sigma_px=image_sigma_px,
         gnss_shift=gnss_shift,
+        station_pattern=station_pattern,
+        rig_reference=rig_reference,
     )
     run_convert(request, form.needed(), to, json_, overwrite, in_place)
     form.tell()

@@ -129,6 +129,8 @@ def read(
     offset: FilePath | None = None,
     patb_rotation: PatbRotation | None = None,
     linear_alteration_m: float | None = None,
+    station_pattern: str = "",
+    rig_reference: str = "",
 ) -> ReadBlock:
     """A block from files of other programs; several files make one block.
 
@@ -165,6 +167,9 @@ def read(
     patb_rotation : meaning of the matrices of an .ori file; told by the image points where None.
     linear_alteration_m : m, mean height of the ground, where heights of orientations are corrected for the scale of the
         projection.
+    station_pattern : where exposure and camera of a rig stand in the names of the photographs, such as
+        'IMG_{station}_{camera}.tif'; the block gets a rigid rig.
+    rig_reference : its reference camera, as in the names; that with most photographs where ''.
 
     Returns
     -------
@@ -206,6 +211,8 @@ def read(
         image_sigma_um=image_sigma_um,
         image_sigma_px=image_sigma_px,
         gnss_shift=gnss_shift,
+        station_pattern=station_pattern,
+        rig_reference=rig_reference,
     )
     return read_request(request)
 

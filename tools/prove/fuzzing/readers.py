@@ -105,6 +105,10 @@ def _projects(written: dict[str, dict[str, bytes]]) -> list[Target]:
     if ign:
         request = lambda folder: Request(str(folder / "x"), "x", camera=camera, stated=stated)  # noqa: E731
         targets.append(Target("ign folder", ign, tuple(ign), lambda folder: read_project(request(folder))))
+    opk = {"opk.txt": written["metashape"]["x"], "camera.toml": CAMERA}
+    targets.append(Target("rig by names", opk, tuple(opk), lambda folder: read_project(Request(
+        str(folder / "opk.txt"), "x", camera=CameraSpec(folder / "camera.toml"),
+        station_pattern="{station}{camera}"))))  # fmt: skip
     patb = {f"x/{name.removeprefix('x/')}": raw for name, raw in written["patb"].items()} | {"camera.toml": CAMERA}
     targets.append(Target("patb folder", patb, tuple(patb), lambda folder: read_project(Request(
         str(folder / "x"), "x", camera=CameraSpec(folder / "camera.toml"), stated=stated))))  # fmt: skip

@@ -46,6 +46,10 @@ THINGS: dict[str, tuple[Count, str]] = {
     "edits": (lambda block: 0 if block.edits is None else len(block.edits), "{decision} on rays and points"),
     "constraints": (lambda block: 0 if block.constraints is None else len(block.constraints), "{constraint}"),
     "fiducials": (lambda block: 0 if block.fiducials is None else len(block.fiducials), "{measured fiducial}"),
+    "rigs": (
+        lambda block: sum(rig.constraint != "off" for rig in block.rigs),
+        "{rig}; photographs are written one by one",
+    ),
     "crs": (lambda block: int(block.crs != "local"), "the name of the coordinate system"),
 }
 """Things by name: how many of them a block has, and words for them; a noun in braces is written with its number."""

@@ -88,8 +88,13 @@ class OrientedBlock:
                 xy[own] -= brown.image_error(bar[:, 0], bar[:, 1], values)
         return xy
 
-    def losses(self) -> tuple[str, ...]:
-        """What a format of orientations, points and rays alone cannot hold, in words."""
+    def losses(self, with_rigs: bool = False) -> tuple[str, ...]:
+        """What a format of orientations, points and rays alone cannot hold, in words.
+
+        Parameters
+        ----------
+        with_rigs : whether it holds rigs.
+        """
         block = self.block
         lost = []
         if len(block.control):
@@ -107,6 +112,9 @@ class OrientedBlock:
             lost.append(
                 counted(rays, "image point") + " not used in the adjustment, or of a photograph or point not adjusted"
             )
+        rigs = sum(rig.constraint != "off" for rig in block.rigs)
+        if rigs and not with_rigs:
+            lost.append(f"{counted(rigs, 'rig')}; photographs are written one by one")
         if block.crs != "local":
             lost.append(f"the coordinate system {block.crs}")
         return tuple(f"could not be carried over: {what}" for what in lost)

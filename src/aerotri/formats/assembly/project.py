@@ -21,6 +21,7 @@ from aerotri.formats.assembly.camera_spec import CameraSpec, camera_of_each, cam
 from aerotri.formats.assembly.kinds import ReadingOptions
 from aerotri.formats.assembly.parts import OrientationList, PointList, RayList, Reading, no_sigma
 from aerotri.formats.assembly.reprojection import FEWEST, control_at_start, residuals_at_start
+from aerotri.formats.assembly.rigs_by_name import names_told, with_rig
 from aerotri.formats.block.folder import read_block
 from aerotri.formats.foreign.bundler import read_bundler
 from aerotri.formats.foreign.colmap import read_colmap
@@ -48,6 +49,7 @@ class Request:
     axes, offset, patb_rotation : see `kinds.ReadingOptions`; offset is a file.
     image_sigma_um, image_sigma_px : standard deviation of the image points; None: that of the source, or a pixel.
     gnss_shift : 'off', 'block' or 'strip'; None: as the settings are.
+    station_pattern, rig_reference : see `rigs_by_name.with_rig`; '' for no rig.
     """
 
     source: str
@@ -64,6 +66,8 @@ class Request:
     image_sigma_um: float | None = None
     image_sigma_px: float | None = None
     gnss_shift: str | None = None
+    station_pattern: str = ""
+    rig_reference: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +114,22 @@ def read_project(request: Request) -> Reading:
     for points in control:
         reading = with_control(reading, points, request.stated)
     reading = with_check_points(reading, request.check, request.stated.control_prefix)
+    if request.station_pattern:
+        reading = _on_rig(reading, request)
     return _finished(reading, request, whole is None)
+
+
+def _on_rig(reading: Reading, request: Request) -> Reading:
+    try:
+        return with_rig(reading, request.station_pattern, request.rig_reference)
+    except InputError as error:
+        raise InputError(error.message, error.remedy, error.file or Path(request.source)) from error
 
 
 def _options(request: Request) -> ReadingOptions:
     offset = None if request.offset is None else read_pix4d_offset(request.offset)
+    if request.rig_reference and not request.station_pattern:
+        raise InputError("--rig-reference is given, but no rig", "say how names tell it: --station-pattern PATTERN")
     if not request.control and request.stated.control_prefix:
         raise InputError("--control-prefix is given, but no control points", "give them: --control FILE")
     axes = kinds.axes_of(request.stated.crs) if request.axes is None else request.axes
@@ -225,6 +240,9 @@ def _begin(request: Request, parts: _Parts) -> Reading:
     c_mm = np.concatenate([rays.focal_length_mm for rays in parts.rays]) if parts.rays else np.zeros(0)
     try:
         cameras = cameras_of(request.camera, parts.cameras, named, c_mm)
+        if request.station_pattern and len(cameras) > 1:
+            _, told = names_told(np.array(list(camera_of), dtype=str), request.station_pattern)
+            camera_of = {image: name or of for (image, name), of in zip(camera_of.items(), told, strict=True)}
         cameras, camera, said = camera_of_each(cameras, list(camera_of.values()))
     except InputError as error:
         raise InputError(error.message, error.remedy, error.file or Path(request.source), error.line) from error

@@ -267,7 +267,7 @@ def write_colmap(oriented: OrientedBlock, folder: FilePath, binary: bool = True)
     model, lost_rigs = _model(oriented, cameras, freed, keep)
     with atomic_folder(folder, own=OWN_ENTRIES) as place:
         (model.write_binary if binary else model.write_text)(place)
-    lost = [*oriented.losses(), *lost_rigs, *(sentence for _, said in written for sentence in said)]
+    lost = [*oriented.losses(with_rigs=True), *lost_rigs, *(sentence for _, said in written for sentence in said)]
     single = int(np.sum(rays == 1))
     if single:
         lost.append(f"could not be carried over: {counted(single, 'point')} with one ray")
