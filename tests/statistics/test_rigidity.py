@@ -87,6 +87,24 @@ def test_a_camera_that_moves_is_found_and_measured(moving):
     assert "camera left does not keep its place on the rig frame: it turns by σ" in said["left"].says
     assert min(tests.heads, key=lambda one: one.movement_p) is left
     assert said["left"].says in moving.outcome.warnings
+    assert "fore seems to move on the rig frame as well" in said["fore"].says
+    assert "This may come from camera left, whose movement is clearer" in said["fore"].says
+
+
+@pytest.mark.parametrize(("factor", "alike"), [(1.0, True), (1.4, True), (3.0, False)])
+def test_movements_of_all_cameras_alike(quiet, factor, alike):
+    """In the image: errors that are not modelled look so. One much larger: the others follow from it."""
+    focal = quiet.rigidity.focal_mm
+    heads = tuple(
+        replace(one, movement=1e-3 / focal[one.camera] * (factor if one.camera == "left" else 1.0),
+                movement_p=1e-20 if one.camera == "left" else 1e-9, movement_found=one.what == ROTATION)
+        for one in quiet.rigidity.heads
+    )  # fmt: skip
+    said = {one.camera: one.says for one in camera_verdicts(replace(quiet.rigidity, heads=heads))}
+    for text in said.values():
+        assert ("image errors that are not modelled look the same" in text) == alike
+    assert ("seems to move on the rig frame as well" in said["nadir"]) != alike
+    assert "camera left does not keep its place" in said["left"]
 
 
 def test_a_camera_that_shifts_is_found_and_measured(quiet):
@@ -158,6 +176,9 @@ def test_written_and_in_the_report(moving):
     assert set(columns["camera"]) == {"nadir", *TWO}
     assert len(rigidity_table(moving)) == 6
     assert len(rigs_table(moving)) == 2
+    strongest = rigs_table(moving).rows[0][-2]
+    first, second = (("x", "y", "z", "ω", "φ", "κ").index(word) for word in strongest.split(":")[0].split(", "))
+    assert float(strongest.split(":")[1]) == pytest.approx(moving.rigs[0].correlations[first, second], abs=0.006)
     assert len(photographs_table(moving)) == 15
     assert [one["level"] for one in verdicts(moving)].count("attention") >= 1
     prints = rig_footprints(moving, "frame")

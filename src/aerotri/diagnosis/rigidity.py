@@ -13,6 +13,8 @@ from aerotri.results.rigidity import POSITION, ROTATION, HeadTest, Rigidity
 from aerotri.results.rigs import RigMovements
 
 ARC_SECONDS = 3600.0 * 180.0 / np.pi
+APART = 1.5
+"""Movement of a camera over the next largest from which the others are taken to follow from it [C]."""
 SETTING = 'constraint = "weighted"'
 
 
@@ -100,23 +102,29 @@ def _verdict(tests: Rigidity, rig: str, camera: str) -> CameraVerdict:
         if not np.isfinite(found):
             rest = "the block is too small to find movements"
         return CameraVerdict(rig, camera, True, f"camera {camera} keeps its place on the rig {rig}: {rest}")
-    said = "; ".join([*moves, *drifts, *_single_photographs(tests, rig, camera)])
-    clearest, all_move = _clearest(tests, rig), all(
-        one.movement_found for one in tests.heads if one.rig == rig and one.what == ROTATION
-    )  # fmt: skip
-    other = ""
-    if moves and all_move:
-        other = "; all cameras of the rig seem to move: image errors that are not modelled look the same"
-    elif moves and clearest != camera:
-        other = f"; this may come from camera {clearest}, whose movement is clearer"
+    clearest, alike = _clearest(tests, rig), _all_move_alike(tests, rig)
     advice = f". {SETTING} tells which cameras move" if moves else ""
-    text = f"camera {camera} does not keep its place on the rig {rig}: {said}{other}{advice}"
+    if moves and clearest != camera and not alike:
+        text = (
+            f"camera {camera} seems to move on the rig {rig} as well: {moves[0]}. This may come from camera {clearest}"
+        )
+        return CameraVerdict(rig, camera, False, f"{text}, whose movement is clearer{advice}")
+    said = "; ".join([*moves, *drifts, *_single_photographs(tests, rig, camera)])
+    other = "; all cameras of the rig seem to move: image errors that are not modelled look the same"
+    text = f"camera {camera} does not keep its place on the rig {rig}: {said}{other if moves and alike else ''}{advice}"
     return CameraVerdict(rig, camera, False, text)
 
 
 def _clearest(tests: Rigidity, rig: str) -> str:
     """The camera whose movement is least likely by chance: where one moves, others seem to."""
     return min((one for one in tests.heads if one.rig == rig), key=lambda one: one.movement_p).camera
+
+
+def _all_move_alike(tests: Rigidity, rig: str) -> bool:
+    """Whether all cameras turn, none of them much more in the image than the next."""
+    heads = [one for one in tests.heads if one.rig == rig and one.what == ROTATION]
+    sizes = sorted(one.movement * tests.focal_mm.get(one.camera, np.nan) for one in heads)
+    return all(one.movement_found for one in heads) and (len(sizes) < 2 or sizes[-1] < APART * sizes[-2])
 
 
 def _movement(one: HeadTest, tests: Rigidity) -> str:

@@ -10,8 +10,11 @@ from aerotri.report.tables.adjustment import Column, Table
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.rigidity import ROTATION
 
+ELEMENTS = ("x", "y", "z", "ω", "φ", "κ")
 TOP_PHOTOGRAPHS = 15
 """Photographs that are listed [C]: all are in rig_stations.csv."""
+LEAST_P = 1e-5
+"""Probability that is given as 0 below [C]: no model of errors is true to that."""
 
 
 def rigs_table(adjusted: AdjustedBlock) -> Table:
@@ -21,13 +24,22 @@ def rigs_table(adjusted: AdjustedBlock) -> Table:
         degrees, sigma = np.degrees(one.angles), one.sigma
         cells = [value for k in range(3) for value in (one.position[k], 1e3 * sigma[k])]
         cells += [value for k in range(3) for value in (degrees[k], ARC_SECONDS * sigma[3 + k])]
-        rows.append((printable(one.rig), printable(one.camera), *(float(v) for v in cells), one.stations))
+        strongest = _strongest(one.correlations)
+        rows.append((printable(one.rig), printable(one.camera), *(float(v) for v in cells), strongest, one.stations))
     columns = [Column("rig"), Column("camera")]
     for name in "xyz":
         columns += [Column(name, "m", ".4f"), Column("σ", "mm", ".1f")]
     for name in ("ω", "φ", "κ"):
         columns += [Column(name, "°", ".4f"), Column("σ", "″", ".1f")]
-    return Table("Cameras on rigs", (*columns, Column("photographs", "", "d")), tuple(rows))
+    columns += [Column("strongest correlation"), Column("photographs", "", "d")]
+    return Table("Cameras on rigs", tuple(columns), tuple(rows))
+
+
+def _strongest(correlations: np.ndarray) -> str:
+    """The two elements that are correlated most, and how."""
+    off = np.nan_to_num(np.triu(correlations, 1))
+    i, j = np.unravel_index(int(np.argmax(np.abs(off))), off.shape)
+    return f"{ELEMENTS[i]}, {ELEMENTS[j]}: {off[i, j]:+.2f}" if off.any() else "–"
 
 
 def movements_table(adjusted: AdjustedBlock) -> Table:
@@ -58,13 +70,14 @@ def rigidity_table(adjusted: AdjustedBlock) -> Table:
         worst = int(np.argmax(np.abs(one.drift / one.drift_sigma))) if known else 0
         rows.append((
             printable(one.camera), one.what, "″" if one.what == ROTATION else "mm", one.stations,
-            one.movement * unit, one.movement_sigma * unit, one.movement_detectable * unit, 100.0 * one.movement_p,
+            one.movement * unit, one.movement_sigma * unit, one.movement_detectable * unit, _percent(one.movement_p),
             "yes" if one.movement_found else "no", f"{'xyz'[worst]}", float(one.drift[worst] * unit),
-            float(one.drift_sigma[worst] * unit), 100.0 * one.drift_p, "yes" if one.drift_found else "no",
+            float(one.drift_sigma[worst] * unit), _percent(one.drift_p), "yes" if one.drift_found else "no",
         ))  # fmt: skip
     columns = (
         Column("camera"), Column("what"), Column("unit"), Column("photographs", "", "d"),
-        Column("movement σ", "", ".2f"), Column("±", "", ".2f"), Column("σ found", "", ".2f"), Column("p", "%", ".2g"),
+        Column("movement σ", "", ".2f"), Column("±", "", ".2f"), Column("detectable σ", "", ".2f"),
+        Column("p", "%", ".2g"),
         Column("moves"), Column("axis"), Column("drift", "", "+.2f"), Column("±", "", ".2f"), Column("p", "%", ".2g"),
         Column("drifts"),
     )  # fmt: skip
@@ -81,7 +94,7 @@ def photographs_table(adjusted: AdjustedBlock) -> Table:
             rows.append((
                 printable(adjusted.block.images.names[s.image[k]]), printable(s.camera[k]),
                 *(float(ARC_SECONDS * value) for value in turned), float(s.f[k]), int(s.freedom[k]),
-                float(100.0 * s.p[k]), "yes" if s.found[k] else "no",
+                _percent(float(s.p[k])), "yes" if s.found[k] else "no",
             ))  # fmt: skip
     columns = [Column("photograph"), Column("camera")]
     for name in "xyz":
@@ -97,6 +110,11 @@ def verdicts(adjusted: AdjustedBlock) -> list[dict[str, str]]:
         {"level": "good" if one.keeps else "attention", "sentence": printable(_capital(one.says), 1000)}
         for one in (() if tests is None else camera_verdicts(tests))
     ]
+
+
+def _percent(p: float) -> float:
+    """In percent."""
+    return 100.0 * p if p >= LEAST_P else 0.0
 
 
 def _capital(text: str) -> str:
