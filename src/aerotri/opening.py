@@ -41,6 +41,8 @@ def open_result(folder: FilePath) -> Adjustment:
         raise InputError(error.message, error.remedy or REMEDY, error.file or path, error.line) from error
     sigma0 = found.result.outcome.sigma0
     if not np.isclose(sigma0, saved.sigma0, rtol=SAME_SIGMA0, atol=0.0, equal_nan=True):
+        if saved.status != "converged":
+            raise InputError(f"the adjustment ended '{saved.status}'", "give the result of a converged one", folder)
         differs = f"σ0 {saved.sigma0:.6g} in the file, {sigma0:.6g} with the block"
         raise InputError(f"does not belong to the block beside it: {differs}", REMEDY, path)
     return found

@@ -283,3 +283,21 @@ def test_opened_again(tmp_path):
     assert other.readouts[0].sigma_ms == pytest.approx(one.readouts[0].sigma_ms, rel=1e-4)
     np.testing.assert_allclose(other.motions.velocity, one.motions.velocity, atol=1e-3)
     np.testing.assert_allclose(again.adjusted.rays.v, result.adjusted.rays.v, atol=1e-7)
+
+
+def test_opened_again_with_parameters_that_noise_alone_determines(tmp_path):
+    """Free nodes of a grid stay at the measured points; the velocities are those of the adjusted centres."""
+    import aerotri
+    from aerotri.pipeline.local import DETERMINED_BY_NOISE
+
+    held = RollingShutter(Prior(30.0, fixed=True))
+    block = with_shutter(rolling_block(7)[0], held)
+    interior = {name: replace(prior, fixed=True, sigma=None) for name, prior in block.cameras[0].interior.items()}
+    block = replace(block, cameras=(replace(block.cameras[0], interior=interior),))
+    block = aerotri.with_settings(block, parameters="grid:5x4", model_part="off", max_iterations=100)
+    result = aerotri.adjust(block, explain=False)
+    assert result.status == "converged"
+    assert DETERMINED_BY_NOISE in result.warnings
+    result.save(tmp_path / "result", plots=False)
+    again = aerotri.open_result(tmp_path / "result")
+    np.testing.assert_allclose(again.adjusted.rays.v, result.adjusted.rays.v, atol=1e-7)

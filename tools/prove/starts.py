@@ -1,11 +1,12 @@
 """Real blocks started from their measured points alone: no orientation, no angles, no nominal mounting.
 
 cu_sbr_p1 (581 vertical photographs with RTK), ca502 (five heads, oblique and weakly tied, GNSS of metres; the heads as
-independent cameras) and dbat_roma (60 photographs from the ground and above, neither GNSS nor control: inner datum).
-Printed are the time of the start by itself, the photographs that it orients, what its rays miss, and the adjustment
-that begins there beside the one that begins as usual: with strips (cu_sbr_p1), with the nadir head turned by the
-nominal angles of the mounting (ca502), with the orientations that the file states (dbat_roma). Seconds are those of the
-processor: other programs may run beside. Prints Markdown.
+independent cameras), ca502 as a rig of which nothing but the stations is known, and dbat_roma (60 photographs from the
+ground and above, neither GNSS nor control: inner datum). Printed are the time of the start by itself, the photographs
+that it orients, what its rays miss, and the adjustment that begins there beside the one that begins as usual: with
+strips (cu_sbr_p1), with the nadir head turned by the nominal angles of the mounting (ca502), with the nominal mounting
+(ca502 as a rig), with the orientations that the file states (dbat_roma). Seconds are those of the processor: other
+programs may run beside. Prints Markdown.
 
 Measures the start without the adjustment that follows: looks within the package on purpose.
 
@@ -24,12 +25,16 @@ from pathlib import Path
 import numpy as np
 
 import aerotri
+from aerotri import observations
 from aerotri.pipeline.starting import with_start
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import ca502
+import rigs
 
+ARM_SIGMA_M = 0.1
+"""σ of the position of a head on the frame, of which nothing is known but that the frame is small."""
 BROWN = "brown:K1+K2+K3+P1+P2"
 
 
@@ -49,6 +54,13 @@ def ca502_(data: Path) -> tuple[aerotri.Block, aerotri.Block]:
     return block, ca502.oriented(block)
 
 
+def ca502_rig(data: Path) -> tuple[aerotri.Block, aerotri.Block]:
+    usual = rigs.whole_stations(rigs.with_rig(ca502.unoriented(data / "ca502")))
+    arm = observations.Prior(0.0, ARM_SIGMA_M)
+    cameras = dict.fromkeys(usual.rigs[0].cameras, observations.Mounting((arm, arm, arm), known=False))
+    return replace(usual, rigs=(replace(usual.rigs[0], cameras=cameras),)), usual
+
+
 def dbat_roma(data: Path) -> tuple[aerotri.Block, aerotri.Block]:
     block = aerotri.with_settings(aerotri.read(data / "dbat_roma").block, datum="inner")
     nothing = np.full((len(block.images), 3), np.nan)
@@ -56,7 +68,7 @@ def dbat_roma(data: Path) -> tuple[aerotri.Block, aerotri.Block]:
 
 
 CASES: dict[str, Callable[[Path], tuple[aerotri.Block, aerotri.Block]]] = {
-    "cu_sbr_p1": cu_sbr_p1, "ca502": ca502_, "dbat_roma": dbat_roma,
+    "cu_sbr_p1": cu_sbr_p1, "ca502": ca502_, "ca502 as a rig": ca502_rig, "dbat_roma": dbat_roma,
 }  # fmt: skip
 
 

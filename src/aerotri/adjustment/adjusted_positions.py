@@ -98,9 +98,25 @@ def minimise_at_adjusted(
         if again.status != "converged" and again.status != INTERRUPTED:
             if not acts_by_position(system):
                 return there, again
-            return _at_measured_positions(system), replace(first, iterations=again.iterations)
+            return _without_positions(_at_measured_positions(system), first, again.iterations, redundancy, options)
         system, solution = there, again
     return system, solution
+
+
+def _without_positions(
+    measured: NormalSystem, first: Solution, iterations: int, redundancy: int, options: SolveOptions
+) -> tuple[NormalSystem, Solution]:
+    """The solution with parameters at measured points; velocities of rolling shutters are still those of the solution.
+
+    Parameters
+    ----------
+    first : the solution before anything followed. iterations : made so far; those of the attempt do not count here.
+    """
+    first = replace(first, iterations=iterations)
+    if not follows_solution(measured):
+        return measured, first
+    system, again = minimise_at_adjusted(measured, first.state, redundancy, options)
+    return system, replace(again, iterations=iterations + again.iterations)
 
 
 def _at_measured_positions(system: NormalSystem) -> NormalSystem:

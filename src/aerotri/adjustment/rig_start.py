@@ -1,7 +1,8 @@
 """Start values of blocks with rigs: stations from the reference camera, the other cameras by their mountings.
 
 Stated angles of a mounting may be 10° off. Photographs of the other cameras that see enough points of the reference
-camera are resected; the robust mean of what they say of the mounting takes the place of the stated angles.
+camera are resected; the robust mean of what they say of the mounting takes the place of the stated angles. Where
+neither is there the tie points of a camera tell how it is turned (`mounting_search`).
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerotri.adjustment.directions import directions_of
+from aerotri.adjustment.directions import Directions, directions_of
+from aerotri.adjustment.mounting_search import Stations, ground_of, search_mounting
 from aerotri.adjustment.rigging import relative_rotations, robust_mean
 from aerotri.adjustment.start_values import (
     RESECTION_TOLERANCES,
@@ -33,9 +35,10 @@ FEWEST = 3
 def rig_start_values(block: Block, given_points: np.ndarray | None = None) -> StartValues:
     """As `start_values`, with the photographs of rigs placed at their stations.
 
-    Orientations that are given stay; of a station the reference camera is oriented first, or a camera that is given.
+    Orientations that are given stay. Rigs that are off tell the start all the same. Of a station the reference camera
+    is oriented first, or a camera that is given.
     """
-    places = station_places(block)
+    places = station_places(block, off_too=True)
     if not places:
         return start_values(block, given_points)
     own = _given(block)
@@ -65,14 +68,14 @@ def _with_stations(block: Block, places: StationPlaces, given_points: np.ndarray
     block = replace(block, images=replace(block.images, centre=centre, angles=angles))
     if _given(block)[places.lead].any():
         return block
-    alone = start_values(_without_followers(block, places), given_points)
+    alone = start_values(without_followers(block, places), given_points)
     centre, rotation = alone.centre + alone.origin, alone.rotation
     angles = angles_from_rotation(rotation, block.rotation)
     return replace(block, images=replace(block.images, centre=centre, angles=angles))
 
 
-def _without_followers(block: Block, places: StationPlaces) -> Block:
-    """The block without image points, positions and angles of the photographs that follow others."""
+def without_followers(block: Block, places: StationPlaces) -> Block:
+    """The block without image points, positions and start values of the photographs that follow others."""
     rays, gnss, leads = block.image_points, block.gnss_ins, places.mounting < 0
     kept = leads[rays.image]
     rays = replace(rays, image=rays.image[kept], point=rays.point[kept], xy=rays.xy[kept], sigma=rays.sigma[kept])
@@ -123,6 +126,8 @@ def _turn(
     if not len(relative):
         relative = _resected(block, places, k, given, rotation)
     mean = _agreed(relative)
+    if mean is None and not mounting.known:
+        mean = _searched(block, places, k, given, rotation)
     if mean is None:
         return (position, turn) if mounting.known else None
     return position, mean
@@ -138,14 +143,34 @@ def _agreed(relative: np.ndarray) -> np.ndarray | None:
     return robust_mean(relative[alike]) if enough else None
 
 
-def _resected(block: Block, places: StationPlaces, k: int, given: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """(·, 3, 3) what resection of some photographs from the points of the oriented ones says of a mounting."""
+def _searched(
+    block: Block, places: StationPlaces, k: int, given: np.ndarray, rotation: np.ndarray
+) -> np.ndarray | None:
+    """(3, 3) the rotation of a mounting that its tie points tell where nothing else does."""
+    centre, turned, points, directions = _intersected(block, given, rotation)
+    ground = ground_of(points, centre)
+    if ground is None:
+        return None
+    follows = (places.mounting == k) & given[places.lead]
+    return search_mounting(block, directions, Stations(np.where(follows, places.lead, -1), centre, turned), ground)
+
+
+def _intersected(
+    block: Block, given: np.ndarray, rotation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, Directions]:
+    """Of the oriented photographs, about their middle: centres (n, 3), rotations (n, 3, 3), points (N, 3), rays."""
     directions = directions_of(block)
     origin = np.nanmean(block.images.centre[given], axis=0)
     centre = np.where(given[:, None], block.images.centre - origin, np.nan)
     turned = np.where(given[:, None, None], rotation, np.nan)
     points = np.full((len(block.points), 3), np.nan)
     intersect_into(points, block, directions, turned, centre)
+    return centre, turned, points, directions
+
+
+def _resected(block: Block, places: StationPlaces, k: int, given: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """(·, 3, 3) what resection of some photographs from the points of the oriented ones says of a mounting."""
+    centre, turned, points, _ = _intersected(block, given, rotation)
     seen = np.isfinite(points[block.image_points.point, 0])
     count = np.bincount(block.image_points.image[seen], minlength=len(given))
     rows = np.flatnonzero((places.mounting == k) & ~given & given[places.lead])

@@ -83,11 +83,11 @@ class StationPlaces:
         return bool((self.mounting >= 0).any())
 
 
-def station_places(block: Block) -> StationPlaces:
-    """Where the photographs of rigid and weighted rigs belong."""
+def station_places(block: Block, off_too: bool = False) -> StationPlaces:
+    """Where the photographs of rigid and weighted rigs belong; with `off_too` of rigs that are off as well."""
     n = len(block.images)
     lead, mounting, found = np.arange(n), np.full(n, -1), []
-    rigs = [rig for rig in block.rigs if rig.constraint != "off"]
+    rigs = [rig for rig in block.rigs if off_too or rig.constraint != "off"]
     if rigs and STATION in block.images.columns:
         station = np.asarray(block.images.columns[STATION], dtype=object)
         names = [camera.name for camera in block.cameras]

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment.prepare import NoStartValuesError
-from aerotri.adjustment.rig_start import rig_start_values
-from aerotri.conventions import FilePath, InputError
+from aerotri.adjustment.rig_start import rig_start_values, without_followers
+from aerotri.conventions import FilePath, InputError, counted
 from aerotri.coordinates import LocalFrame
 from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.functional_model.rotation import angles_from_rotation
 from aerotri.observations import Block
+from aerotri.observations.rigs import station_places
 from aerotri.pipeline.verdict import with_outcome
 from aerotri.results.adjustment import Adjustment
 from aerotri.tie_points.measured_start import MeasuredStart, misses, start_from_points
@@ -96,7 +97,7 @@ def _median_miss(local: Block, start: _Orientations) -> float:
 
 def _from_points(block: Block, local: Block, frame: LocalFrame | None) -> Started:
     try:
-        found: MeasuredStart = start_from_points(local)
+        found = _of_reference_photographs(local) or start_from_points(local)
     except InputError as error:
         raise NoStartValuesError(
             f"no photograph has start values, and the tie points alone give none: {error.message}",
@@ -107,6 +108,25 @@ def _from_points(block: Block, local: Block, frame: LocalFrame | None) -> Starte
     adjustment = replace(started.settings.adjustment, start="auto")
     settings = replace(started.settings, adjustment=adjustment)
     return Started(replace(started, cameras=found.cameras, settings=settings), found.messages)
+
+
+def _of_reference_photographs(local: Block) -> MeasuredStart | None:
+    """The start of the reference photographs of rigs, which the others follow; None where there is no rig, or where
+    they alone do not hold together."""
+    places = station_places(local, off_too=True)
+    if not places:
+        return None
+    follow = int((places.mounting >= 0).sum())
+    leads = without_followers(local, places)
+    try:
+        found = start_from_points(leads)
+    except InputError:
+        return None
+    tied = np.bincount(leads.image_points.image, minlength=len(places.lead)) > 0
+    if found.oriented.sum() < MOST * tied.sum():
+        return None
+    told = f"{counted(follow, 'photograph')} of other cameras follow them on their rigs"
+    return replace(found, messages=(*found.messages, told))
 
 
 def _oriented(block: Block, start: _Orientations, frame: LocalFrame | None) -> Block:
