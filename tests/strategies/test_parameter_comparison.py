@@ -11,7 +11,10 @@ import pytest
 from aerotri.diagnosis.parameter_sets import verdict
 from aerotri.formats.results.parameter_sets import comparison_columns, comparison_json
 from aerotri.functional_model.additional_parameters import AUTO, parse_parameters
-from aerotri.pipeline import adjust, adjust_keeping_system, compare_parameters
+from aerotri.pipeline import adjust, adjust_keeping_system, chain, compare_parameters
+from aerotri.pipeline.choosing import choose_parameters
+from aerotri.pipeline.in_frame import adjust_in_frame
+from aerotri.pipeline.verdict import with_outcome
 from aerotri.report.tables.parameters import comparison_table
 from aerotri.report.tables.terminal import table_lines
 from aerotri.results.parameter_comparison import Accuracy, Evidence, ParameterComparison, SetOutcome
@@ -227,3 +230,29 @@ def test_auto_adjusts_with_what_it_chooses(block):
     assert np.sqrt(np.mean(found.result.check.difference[:, 2] ** 2)) < 0.6 * np.sqrt(
         np.mean(adjust(block).check.difference[:, 2] ** 2)
     )
+
+
+def test_auto_takes_the_next_set_where_the_first_does_not_converge(block, monkeypatch):
+    """And the first where none does: what was tried last is no better."""
+    tried, failing = [], 1
+
+    def adjusted(own, *rest):
+        tried.append(own.settings.adjustment.additional_parameters)
+        found = adjust_in_frame(own, *rest)
+        status = "not converged" if len(tried) <= failing else found.result.outcome.status
+        return with_outcome(found, replace(found.result.outcome, status=status))
+
+    automatic = with_adjustment(block, additional_parameters=AUTO, model_part="off")
+    choice = choose_parameters(automatic)
+    monkeypatch.setattr(chain, "adjust_in_frame", adjusted)
+    monkeypatch.setattr(chain, "choose_parameters", lambda *rest: choice)
+    found = adjust_keeping_system(automatic)
+    assert len(tried) == 2
+    assert tried[0] != tried[1] == found.result.block.settings.adjustment.additional_parameters
+    assert found.result.outcome.status == "converged"
+    assert "chosen first, did not converge" in found.result.outcome.notes[0]
+    first, tried, failing = tried[0], [], 100
+    found = adjust_keeping_system(automatic)
+    assert len(tried) == chain.MOST_CHOICES
+    assert found.result.block.settings.adjustment.additional_parameters == first
+    assert found.result.outcome.status == "not converged"

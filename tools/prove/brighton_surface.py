@@ -23,7 +23,6 @@ import rasterio
 
 import aerotri
 from aerotri import observations
-from aerotri.observations import RollingShutter
 
 Parameters = str | tuple[tuple[str, tuple[str, ...]], ...]
 GSD_M, FOCAL_MM = 0.0231, 3.61
@@ -39,15 +38,17 @@ HEAD = (
 )
 
 
-def held(readout_ms: float, direction: str = "down", motion: str = "track", rotation: str = "off") -> RollingShutter:
+def held(
+    readout_ms: float, direction: str = "down", motion: str = "track", rotation: str = "off"
+) -> observations.RollingShutter:
     """A rolling shutter with a known readout time."""
     known = observations.Prior(readout_ms, fixed=True)
-    return RollingShutter(known, direction, motion, MOTION_SIGMA_M_S, rotation)
+    return observations.RollingShutter(known, direction, motion, MOTION_SIGMA_M_S, rotation)
 
 
-FREE = RollingShutter(observations.Prior(0.0))
+FREE = observations.RollingShutter(observations.Prior(0.0))
 FREE_FOCAL = observations.Prior(FOCAL_MM)
-MODELS: dict[str, tuple[Parameters, RollingShutter | None, Mapping[str, Any]]] = {
+MODELS: dict[str, tuple[Parameters, observations.RollingShutter | None, Mapping[str, Any]]] = {
     "lens": (LENS, None, {}),
     "none": ("none", None, {}),
     "brown": ("brown:K1+K2+K3+P1+P2", None, {}),

@@ -12,7 +12,7 @@ from aerotri.adjustment.track import with_named_strips
 from aerotri.conventions import FilePath
 from aerotri.functional_model.additional_parameters import AUTO
 from aerotri.observations import Block
-from aerotri.pipeline.choosing import choose_parameters, with_reason
+from aerotri.pipeline.choosing import ParameterChoice, choose_again, choose_parameters, with_reason
 from aerotri.pipeline.components import with_variance_components
 from aerotri.pipeline.in_frame import adjust_in_frame
 from aerotri.pipeline.local import Report
@@ -25,6 +25,10 @@ from aerotri.results.adjustment import Adjustment
 from aerotri.results.failure import AdjustmentFailedError
 from aerotri.strategies.parameter_comparison import Progress
 from aerotri.strategies.shutter_test import asks_for_test
+
+NOT_CONVERGED = "not converged"
+MOST_CHOICES = 4
+"""Sets of additional parameters that are tried where the adjustment with the one chosen does not converge [C]."""
 
 
 def adjust(block: Block, report: Report | None = None, given_points: np.ndarray | None = None) -> AdjustedBlock:
@@ -69,14 +73,31 @@ def adjust_keeping_system(
     choice, block = None, started.block
     if block.settings.adjustment.additional_parameters == AUTO:
         choice = choose_parameters(block, geoid, sets)
+        found, choice = _adjusted_as_chosen(choice, report, given_points, geoid)
         block = choice.block
-    found = adjust_in_frame(block, report, given_points, geoid)
+    else:
+        found = adjust_in_frame(block, report, given_points, geoid)
     if block.settings.adjustment.variance_components == "on":
         found = with_variance_components(block, found, report, geoid)
     found = judged(with_model_part(found))
     if tested and asks_for_test(block):
         found = with_shutter_test(found, report)
     return started.told(found if choice is None else with_reason(found, choice))
+
+
+def _adjusted_as_chosen(
+    choice: ParameterChoice, report: Report | None, given_points: np.ndarray | None, geoid: FilePath | None
+) -> tuple[Adjustment, ParameterChoice]:
+    """The adjustment with the parameters chosen, or with the next choice where it does not converge."""
+    first = (adjust_in_frame(choice.block, report, given_points, geoid), choice)
+    found, tried = first[0], 1
+    while found.result.outcome.status == NOT_CONVERGED:
+        other = choose_again(choice, NOT_CONVERGED) if tried < MOST_CHOICES else None
+        if other is None:
+            return first
+        choice, tried = other, tried + 1
+        found = adjust_in_frame(choice.block, report, given_points, geoid)
+    return found, choice
 
 
 def adjust_and_explain(

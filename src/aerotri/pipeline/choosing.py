@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from aerotri.adjustment.datum import FREEDOMS, nothing_holds
 from aerotri.adjustment.prepare import Prepared, prepare
 from aerotri.adjustment.solve import SolveOptions
@@ -39,11 +41,22 @@ sets apart."""
 
 @dataclass(frozen=True, eq=False)
 class ParameterChoice:
-    """The sets that were compared, the one that was chosen, and the block that takes it."""
+    """The sets that were compared, the one that was chosen, and the block that takes it.
+
+    Parameters
+    ----------
+    bare : the block as it was given. strips : (n,) names of its strips, None where some photograph has none.
+    """
 
     compared: ParameterComparison
     chosen: Chosen
-    block: Block
+    bare: Block
+    strips: np.ndarray | None
+
+    @property
+    def block(self) -> Block:
+        chosen = self.chosen
+        return with_candidate(self.bare, Candidate(chosen.choice, chosen.groups, chosen.kind), self.strips)
 
 
 def compare_parameters(
@@ -96,9 +109,19 @@ def choose_parameters(
         chosen = choose(compared)
     else:
         chosen = Chosen("none", (), "no set of additional parameters could be adjusted: adjusted without")
-    return ParameterChoice(
-        compared, chosen, with_candidate(block, Candidate(chosen.choice, chosen.groups, chosen.kind), strips)
-    )
+    return ParameterChoice(compared, chosen, block, strips)
+
+
+def choose_again(made: ParameterChoice, status: str) -> ParameterChoice | None:
+    """The choice among the other sets, where the adjustment with the one chosen ended with `status`; None of none."""
+    failed = made.chosen.name
+    outcomes = tuple(replace(o, status=status) if o.name == failed else o for o in made.compared.outcomes)
+    if not any(outcome.converged for outcome in outcomes):
+        return None
+    compared = replace(made.compared, outcomes=outcomes)
+    chosen = choose(compared)
+    chosen = replace(chosen, reason=f"{chosen.reason}. The adjustment with {failed}, chosen first, did not converge")
+    return replace(made, compared=compared, chosen=chosen)
 
 
 def _prepared_without(block: Block, geoid: FilePath | None) -> Prepared:
