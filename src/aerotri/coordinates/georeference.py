@@ -146,6 +146,8 @@ def utm_on_datum(crs: str, lon: float, lat: float) -> str:
     name = "WGS 84" if geographic is None else geographic.name
     area = AreaOfInterest(lon, lat, lon, lat)
     found = query_utm_crs_info(datum_name=name, area_of_interest=area) if name != "WGS 84" else []
+    # others count north before east or belong to one realisation, which their longer names say
+    found.sort(key=lambda one: len(one.name))
     return f"EPSG:{found[0].code}" if found else utm_crs(np.array([lon]), np.array([lat]))
 
 

@@ -28,6 +28,9 @@ from aerotri.formats.foreign.ign import write_ign_opk
 from aerotri.formats.foreign.measured_lists import write_ign_app, write_ign_mes, write_odm_geo, write_pix4d_offset
 from aerotri.formats.foreign.metashape import write_metashape
 from aerotri.formats.foreign.metashape_camera import write_metashape_camera
+from aerotri.formats.foreign.metashape_cameras import write_metashape_cameras
+from aerotri.formats.foreign.metashape_files import is_metashape_project
+from aerotri.formats.foreign.metashape_project import read_metashape_project
 from aerotri.formats.foreign.odm import write_odm_gcp
 from aerotri.formats.foreign.opensfm import is_opensfm, read_opensfm, write_opensfm
 from aerotri.formats.foreign.opensfm_in_place import origin_of, update_opensfm
@@ -47,6 +50,7 @@ RECOGNISERS: Mapping[str, Callable[[Path], bool]] = {
     "bal": is_bal,
     "bundler": is_bundler,
     "opensfm": is_opensfm,
+    "metashape-project": is_metashape_project,
 }
 
 
@@ -61,6 +65,7 @@ READERS: Mapping[str, Callable[[Path], tuple[Block, np.ndarray | None]]] = {
     "bal": read_bal,
     "bundler": lambda path: _block_and_points(read_bundler(path)),
     "opensfm": lambda path: _block_and_points(read_opensfm(path)),
+    "metashape-project": lambda path: _block_and_points(read_metashape_project(path)),
 }
 OrientedWriter = Callable[[OrientedBlock, Path], tuple[str, ...]]
 WRITERS: Mapping[str, OrientedWriter] = {
@@ -74,6 +79,7 @@ WRITERS: Mapping[str, OrientedWriter] = {
 ORIENTATION_WRITERS: Mapping[str, OrientedWriter] = {
     "metashape": write_metashape,
     "metashape-camera": write_metashape_camera,
+    "metashape-xml": write_metashape_cameras,
     "opk": write_metashape,
     "pix4d-eo": write_pix4d_eo,
     "ign": write_ign_opk,

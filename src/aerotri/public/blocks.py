@@ -136,8 +136,9 @@ def read(
 
     Parameters
     ----------
-    source : block, result, DBAT, BAL, COLMAP, Bundler, OpenSfM, a folder of IGN or PAT-B files, image points (BINGO,
-        .im, .mes, gcp_list.txt) or a list of orientations; PATH, or kind:PATH where the kind cannot be told.
+    source : block, result, DBAT, BAL, COLMAP, Bundler, OpenSfM, Metashape (.psx, .psz, cameras XML), a folder of IGN or
+        PAT-B files, image points (BINGO, .im, .mes, gcp_list.txt) or a list of orientations; PATH, or kind:PATH where
+        the kind cannot be told.
     name : of the block; that of the source where ''.
     image_points : more files of image points.
     positions : observed positions of the photographs.

@@ -90,6 +90,14 @@ def _projects(written: dict[str, dict[str, bytes]]) -> list[Target]:
             return read_project(Request(f"{source}{folder / 'x'}", "x"))
 
         targets.append(Target(kind, files, tuple(files), read))
+    for ending in (".psx", ".psz", ".xml"):
+        files = seeds.metashape_project(ending)
+        source = f"site{ending}"
+
+        def read_site(folder: Path, source: str = source) -> object:
+            return read_project(Request(f"metashape-project:{folder / source}", "x"))
+
+        targets.append(Target(f"metashape project {ending}", files, tuple(files), read_site))
     dbat = seeds.of_tests("test_dbat").FILES
     files = {f"x/{name}": text.encode() for name, text in dbat.items()}
     read_dbat = lambda folder: read_project(Request(f"dbat:{folder / 'x'}", "x"))  # noqa: E731

@@ -53,6 +53,13 @@ def written(formats: tuple[str, ...]) -> dict[str, dict[str, bytes]]:
     return found
 
 
+def metashape_project(ending: str) -> dict[str, bytes]:
+    """The project of the tests: content by path within a folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        of_tests("metashape_sample").Sample().write(Path(folder), ending)
+        return contents(Path(folder))
+
+
 def contents(folder: Path) -> dict[str, bytes]:
     """The files below a folder by their paths in it."""
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}

@@ -26,6 +26,7 @@ from aerotri.formats.block.folder import read_block
 from aerotri.formats.foreign.bundler import read_bundler
 from aerotri.formats.foreign.colmap import read_colmap
 from aerotri.formats.foreign.ign import files_of, is_ign, is_ign_camera, read_ign_app, read_ign_camera, read_ign_mes
+from aerotri.formats.foreign.metashape_project import read_metashape_project
 from aerotri.formats.foreign.opensfm import read_opensfm
 from aerotri.formats.foreign.pix4d import read_pix4d_offset
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images
@@ -151,6 +152,8 @@ def _whole(request: Request) -> Reading | None:
         raise InputError("has cameras of its own", "leave the options of the camera out; --pixel-um may stay", path)
     if size_px is not None and kind != "bundler":
         raise InputError("has cameras of its own", "leave --camera-size out", path)
+    if kind == "metashape-project":
+        return read_metashape_project(path, pixel_um)
     said = () if pixel_um is not None else (f"a pixel counts as {UNKNOWN_PIXEL_UM:g} µm: state it with --pixel-um",)
     if kind in ("bundler", "opensfm", "colmap"):
         pixel_um = UNKNOWN_PIXEL_UM if pixel_um is None else pixel_um

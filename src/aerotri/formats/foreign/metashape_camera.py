@@ -128,15 +128,20 @@ def expressible(camera: Camera, errors: np.ndarray | None = None) -> tuple[Camer
     return fitted_camera(camera, OUR_LENS, errors, "Metashape")
 
 
-def _text(camera: Camera) -> str:
+def calibration_of(camera: Camera) -> dict[str, float]:
+    """Metashape's parameters of a camera whose lens it has words for, in pixels."""
     f = camera.focal_length_mm / camera.pixel_mm
     x0, y0 = camera.principal_point_mm
     own = {name: prior.value for name, prior in camera.lens.items()}
-    kind = next(name for name, projection in PROJECTIONS.items() if projection == camera.projection)
-    content = {"projection": kind, "width": camera.size_px[0], "height": camera.size_px[1], "f": f}
-    content |= {"cx": x0 / camera.pixel_mm, "cy": -y0 / camera.pixel_mm}
+    content = {"f": f, "cx": x0 / camera.pixel_mm, "cy": -y0 / camera.pixel_mm}
     content |= {"b1": own.get("b1", 0.0) * f, "b2": -own.get("b2", 0.0) * f}
     content |= {name: own.get(name, 0.0) for name in RADIAL}
     content |= {"p1": own.get("p2", 0.0), "p2": -own.get("p1", 0.0)}
+    return {name: float(value) for name, value in content.items()}
+
+
+def _text(camera: Camera) -> str:
+    kind = next(name for name, projection in PROJECTIONS.items() if projection == camera.projection)
+    content = {"projection": kind, "width": camera.size_px[0], "height": camera.size_px[1], **calibration_of(camera)}
     lines = [f"  <{tag}>{value}</{tag}>" for tag, value in content.items()]
     return "\n".join(['<?xml version="1.0" encoding="UTF-8"?>', f"<{ROOT}>", *lines, f"</{ROOT}>"]) + "\n"

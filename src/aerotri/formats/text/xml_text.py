@@ -26,7 +26,17 @@ def read_xml(path: Path) -> ElementTree.Element:
         When the file cannot be read, is not XML, or declares a document type: these can define entities that grow
         without bound or refer to other files, and no format read here has one.
     """
-    text = _decoded(read_bytes(path), path)
+    return xml_of(read_bytes(path), path)
+
+
+def xml_of(raw: bytes, path: Path) -> ElementTree.Element:
+    """The root element of what an XML file, or a file in an archive, holds; see `read_xml`.
+
+    Raises
+    ------
+    InputError
+    """
+    text = _decoded(raw, path)
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InputError("declares a document type or entities", "remove the declaration", path)
     try:
@@ -36,7 +46,7 @@ def read_xml(path: Path) -> ElementTree.Element:
         raise InputError(
             f"is not XML: {str(error).split(':')[0]}", "export the file again; is it cut off?", path, line
         ) from error
-    except (ValueError, LookupError) as error:
+    except (ValueError, LookupError, RecursionError) as error:
         raise InputError(f"is not XML: {error}", "save the file as UTF-8", path) from error
 
 
