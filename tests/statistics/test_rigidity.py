@@ -12,8 +12,9 @@ from aerotri.diagnosis.rigidity import camera_verdicts, rigidity_in_words
 from aerotri.formats.results.rigs import rigidity_json, station_columns
 from aerotri.pipeline import adjust
 from aerotri.report.plots.rigs import plot_rig, rig_footprints
-from aerotri.report.tables.rigs import photographs_table, rigidity_table, rigs_table, verdicts
+from aerotri.report.tables.rigs import photographs_table, rigidity_table, rigs_table, stations_table, verdicts
 from aerotri.results.rigidity import POSITION, ROTATION
+from aerotri.statistics import rigidity
 from aerotri.statistics.rigidity_tests import holm
 from rig_blocks import EXACT, rig_block
 
@@ -58,6 +59,29 @@ def test_a_photograph_as_where_it_is_free(rigid, quiet):
     assert s.freedom[k] == 6
     assert quiet.outcome.redundancy - free.outcome.redundancy == 6
     assert s.f[k] == pytest.approx(gain / 6 / rest, rel=1e-3)
+
+
+def test_a_station_as_where_its_photographs_are_free(rigid, quiet):
+    """The test of an exposure is what vᵀPv loses when its photographs leave the rig, all of them."""
+    whole = quiet.rigidity.whole
+    k = whole.station.tolist().index("1_003")
+    station = np.asarray(rigid.images.columns["station"], dtype=object).copy()
+    station[station == "1_003"] = ""
+    free = adjust(replace(rigid, images=replace(rigid.images, columns={"station": station})))
+    gain = quiet.outcome.vtpv - free.outcome.vtpv
+    rest = free.outcome.vtpv / free.outcome.redundancy
+    assert (whole.photographs[k], whole.freedom[k]) == (3, 12)
+    assert quiet.outcome.redundancy - free.outcome.redundancy == 12
+    assert whole.f[k] == pytest.approx(gain / 12 / rest, rel=1e-3)
+    assert not whole.found.any()
+    assert len(set(whole.station.tolist())) == len(whole) > 8
+
+
+def test_stations_in_batches_are_tested_as_together(rigid, quiet, monkeypatch):
+    monkeypatch.setattr(rigidity, "AT_A_TIME", 5)
+    again, whole = adjust(rigid).rigidity.whole, quiet.rigidity.whole
+    assert again.station.tolist() == whole.station.tolist()
+    np.testing.assert_allclose(again.f, whole.f, rtol=1e-6)
 
 
 def test_movements_beside_a_sum_over_the_photographs(quiet):
@@ -171,7 +195,7 @@ def test_written_and_in_the_report(moving):
     left = next(one for one in content["cameras"] if one["camera"] == "left")
     assert left["keeps_place"] is False
     assert left["tests"][0]["movement"] == pytest.approx(np.degrees(tests.head("frame", "left").movement))
-    columns = station_columns(tests.stations, block.images.names)
+    columns = station_columns(tests, block.images.names)
     assert {len(values) for values in columns.values()} == {len(tests.stations)}
     assert set(columns["camera"]) == {"nadir", *TWO}
     assert len(rigidity_table(moving)) == 6
@@ -180,6 +204,10 @@ def test_written_and_in_the_report(moving):
     first, second = (("x", "y", "z", "ω", "φ", "κ").index(word) for word in strongest.split(":")[0].split(", "))
     assert float(strongest.split(":")[1]) == pytest.approx(moving.rigs[0].correlations[first, second], abs=0.006)
     assert len(photographs_table(moving)) == 15
+    assert len(stations_table(moving)) == len(tests.whole) == 13
+    assert content["stations_found"] == tests.whole.found.sum() > 0
+    own = columns["station"] == tests.whole.station[0]
+    np.testing.assert_array_equal(columns["station_p"][own], np.full(own.sum(), tests.whole.p[0]))
     assert [one["level"] for one in verdicts(moving)].count("attention") >= 1
     prints = rig_footprints(moving, "frame")
     assert list(prints) == ["nadir", *TWO]

@@ -45,7 +45,18 @@ def rigidity_in_words(tests: Rigidity | None) -> tuple[str, ...]:
             said.append(one.says)
         elif single:
             said.append(f"camera {one.camera} of the rig {one.rig}: {single[0]} (rig_stations.csv)")
-    return tuple(said)
+    return tuple(said) or _whole_stations(tests)
+
+
+def _whole_stations(tests: Rigidity) -> tuple[str, ...]:
+    """A sentence on exposures that do not fit their rig, where neither a camera nor a photograph is to blame alone."""
+    rows = np.flatnonzero(tests.whole.found).tolist()
+    if not rows:
+        return ()
+    worst = min(rows, key=lambda k: float(tests.whole.p[k]))
+    many = f"{len(rows)} exposures do" if len(rows) > 1 else "1 exposure does"
+    name = f"{tests.whole.station[worst]} of the rig {tests.whole.rig[worst]}"
+    return (f"{many} not fit the rig, least of all {name}; no single photograph stands out (rig_stations.csv)",)
 
 
 def movements_in_words(movements: RigMovements) -> tuple[str, ...]:

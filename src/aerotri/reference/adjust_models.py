@@ -44,6 +44,9 @@ def rigidity() -> tuple[Item, ...]:
              optional=True),
         Item("rigidity.alpha", "number", "Probability of a false alarm in all these tests together."),
         Item("rigidity.power", "number", "Probability with which what is called detectable is found."),
+        Item("rigidity.stations", "whole", "Exposures that were tested, those with two photographs or more."),
+        Item("rigidity.stations_found", "whole", "Exposures whose photographs do not stand to one another as the rig "
+             "says."),
         Item("rigidity.cameras[]", "object", "One entry a camera."),
         Item("rigidity.cameras[].rig", "text", "Name of the rig."),
         Item("rigidity.cameras[].camera", "text", "Camera; the reference camera as well where there are two others."),

@@ -282,7 +282,12 @@ RIG_STATIONS = (
     Item("f", "number?", "Value of the F test; about 1 where the photograph is in its place."),
     Item("p", "number", "Probability of such a value by chance."),
     Item("found", "yes/no", "Whether it is out of its place, all photographs of rigs taken together (Holm)."),
-)
+    Item("station_freedom", "whole", "Degrees of freedom of the test whether the photographs of its exposure stand to "
+         "one another as the rig says."),
+    Item("station_f", "number?", "Value of this F test."),
+    Item("station_p", "number", "Probability of such a value by chance."),
+    Item("station_found", "yes/no", "Whether the exposure does not fit the rig, all exposures taken together (Holm)."),
+)  # fmt: skip
 MOTIONS = (
     Item("image", "text", "Name of the photograph."),
     *of_axes("v{}", "number", "Velocity in {} while the photograph was read; with an EPSG code in east, north and up.",

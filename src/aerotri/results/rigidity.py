@@ -69,13 +69,34 @@ class StationTests:
 
 
 @dataclass(frozen=True, eq=False)
+class WholeStations:
+    """Every exposure of a rig: whether its photographs stand to one another as the rig says, n of them.
+
+    Parameters
+    ----------
+    rig, station : (n,) names. photographs : (n,) how many it has. freedom, f, p, found : as in `StationTests`.
+    """
+
+    rig: np.ndarray
+    station: np.ndarray
+    photographs: np.ndarray
+    freedom: np.ndarray
+    f: np.ndarray
+    p: np.ndarray
+    found: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.station)
+
+
+@dataclass(frozen=True, eq=False)
 class Rigidity:
     """The tests of all rigid rigs.
 
     Parameters
     ----------
-    heads : two a camera, rotation and position. stations : photographs.
-    alpha : probability of a false alarm in all tests of cameras together, and in all of photographs together.
+    heads : two a camera, rotation and position. stations : photographs. whole : exposures.
+    alpha : probability of a false alarm in all tests of cameras together; the same of photographs, and of exposures.
     power : with which a movement of the size `…_detectable` is found.
     station_detectable : (rig, camera) → rad, rotation of a single photograph that would be found, median.
     focal_mm : by camera: a rotation times it is the shift in the image.
@@ -83,6 +104,7 @@ class Rigidity:
 
     heads: tuple[HeadTest, ...]
     stations: StationTests
+    whole: WholeStations
     alpha: float
     power: float
     station_detectable: dict[tuple[str, str], float]

@@ -14,6 +14,7 @@ the movements have the variance ρ·σ0². A drift: Σ τ·u over the exposures,
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import bsr_matrix
@@ -25,7 +26,7 @@ from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor
 from aerotri.observations.rigs import STATION
 from aerotri.quantiles import noncentrality
 from aerotri.results.adjusted_block import Outcome
-from aerotri.results.rigidity import HeadTest, Rigidity, StationTests
+from aerotri.results.rigidity import HeadTest, Rigidity, StationTests, WholeStations
 from aerotri.statistics.rigidity_tests import POS, ROT, Head, Photographs, Scores, Tests, holm
 
 MOST = 400
@@ -33,6 +34,8 @@ MOST = 400
 one another left out."""
 AT_ONCE = 2e7
 """Numbers of right sides that are solved at once [C]."""
+AT_A_TIME = 100
+"""Photographs of stations that are tested together [C]: each is solved for with all of them."""
 FEWEST = 3
 """Stations from which movements of a camera are tested."""
 
@@ -49,8 +52,8 @@ def rigidity_of(system: NormalSystem, solution: Solution, factor: Factor, outcom
         return None
     settings = system.unknowns.block.settings.adjustment
     tests = Tests(outcome.vtpv, freedom, settings.alpha, settings.power)
-    heads, photographs = [], []
-    for head in _heads(system, solution):
+    heads, photographs, every = [], [], _heads(system, solution)
+    for head in every:
         scores = [_scores(system, solution, factor, head, part) for part in _sections(len(head.rows))]
         photographs.append(tests.of_photographs(head, scores))
         if len(head.rows) >= FEWEST:
@@ -64,6 +67,7 @@ def rigidity_of(system: NormalSystem, solution: Solution, factor: Factor, outcom
     return Rigidity(
         heads=found,
         stations=_stations(system, photographs, settings.alpha),
+        whole=_whole_stations(system, solution, factor, every, tests),
         alpha=settings.alpha,
         power=settings.power,
         station_detectable=_station_detectable(photographs, tests, sum(len(one.p) for one in photographs)),
@@ -222,12 +226,53 @@ def _stations(system: NormalSystem, every: list[Photographs], alpha: float) -> S
     )
 
 
+def _whole_stations(
+    system: NormalSystem, solution: Solution, factor: Factor, heads: list[Head], tests: Tests
+) -> WholeStations:
+    """The tests of all exposures with two photographs or more, in the order of the block."""
+    u = system.unknowns
+    assert u.rigging is not None
+    rig_of = {int(row): head.rig for head in heads for row in head.rows}
+    for row in list(rig_of):
+        # of two cameras the reference camera is no head of its own, but belongs to its stations
+        rig_of.setdefault(int(u.rigging.lead[row]), rig_of[row])
+    usable = (np.bincount(u.rays.image, minlength=len(u.images)) > 0) & u.eo_free.all(axis=1) & ~u.by_angles
+    rows = np.array(sorted((int(u.rigging.lead[row]), row) for row in rig_of if usable[row]), np.int64).reshape(-1, 2)
+    lead, first, count = np.unique(rows[:, 0], return_index=True, return_counts=True)
+    lead, first, count = lead[count > 1], first[count > 1], count[count > 1]
+    freedom, f, p = [], [], []
+    for part in _batches(count):
+        own = np.concatenate([rows[a : a + k, 1] for a, k in zip(first[part], count[part], strict=True)])
+        axes = solution.state.rotation[u.rigging.lead[own]]
+        together = Head("", "", own, axes, np.zeros(len(own)))
+        found = tests.of_stations(_scores(system, solution, factor, together, np.arange(len(own))), count[part])
+        for kept, new in zip((freedom, f, p), found, strict=True):
+            kept.extend(new)
+    names = np.asarray(u.block.images.columns[STATION], dtype=object)
+    return WholeStations(
+        rig=np.array([rig_of[int(row)] for row in lead], dtype=object),
+        station=names[u.images[lead]],
+        photographs=count,
+        freedom=np.array(freedom, dtype=np.int64),
+        f=np.array(f, dtype=float),
+        p=np.array(p, dtype=float),
+        found=holm(np.array(p, dtype=float), tests.alpha),
+    )
+
+
+def _batches(count: np.ndarray) -> list[slice]:
+    """Runs of stations with about `AT_A_TIME` photographs together."""
+    number = (np.cumsum(count) - count) // AT_A_TIME
+    edges = [*np.flatnonzero(np.diff(number, prepend=-1)).tolist(), len(count)]
+    return [slice(a, b) for a, b in pairwise(edges)]
+
+
 def _station_detectable(every: list[Photographs], tests: Tests, count: int) -> dict[tuple[str, str], float]:
     """Rotation of a single photograph about its worst axis that would be found, median of a camera's."""
     needed = noncentrality(6.0, tests.alpha / count, tests.power)
     out = {}
     for one in every:
-        least = np.maximum(one.information.min(axis=1), 0.0)
+        least = np.maximum(one.information, 0.0)
         with np.errstate(divide="ignore"):
             out[one.head.rig, one.head.camera] = float(np.median(np.sqrt(needed * tests.variance / least)))
     return out

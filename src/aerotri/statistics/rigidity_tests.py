@@ -44,7 +44,7 @@ class Scores:
 
 @dataclass(frozen=True, eq=False)
 class Photographs:
-    """The tests of the photographs of one camera, as `StationTests`; s_rot (m, 3) diagonal of S over σ0² scale."""
+    """The tests of the photographs of one camera, as `StationTests`; information (m,) of S about the worst axis."""
 
     head: Head
     turned: np.ndarray
@@ -73,7 +73,7 @@ class Tests:
     def of_photographs(self, head: Head, scores: list[Scores]) -> Photographs:
         """Every photograph of a camera by itself."""
         m = len(head.rows)
-        turned, sigma, information = np.full((m, 3), np.nan), np.full((m, 3), np.nan), np.zeros((m, 3))
+        turned, sigma, information = np.full((m, 3), np.nan), np.full((m, 3), np.nan), np.zeros(m)
         freedom, f, p = np.zeros(m, dtype=np.int64), np.full(m, np.nan), np.ones(m)
         k = 0
         for part in scores:
@@ -83,13 +83,27 @@ class Tests:
                 inverse, freedom[k] = _inverse(s, size)
                 if freedom[k] and self.freedom > freedom[k]:
                     f[k], p[k] = self._f_test(float(u @ inverse @ u), int(freedom[k]))
-                information[k] = np.diagonal(s)[ROT]
+                information[k] = np.linalg.eigvalsh(s[ROT, ROT])[0]
                 inverse, rank = _inverse(s[ROT, ROT], size[ROT])
                 if rank == 3:
                     turned[k] = inverse @ u[ROT]
                     sigma[k] = np.sqrt(self.variance * np.diagonal(inverse))
                 k += 1
         return Photographs(head, turned, sigma, freedom, f, p, information)
+
+    def of_stations(self, scores: Scores, photographs: np.ndarray) -> tuple[list[int], list[float], list[float]]:
+        """Degrees of freedom, F and P of whole stations, one behind the other with (k,) `photographs` each."""
+        freedom, f, p = [], [], []
+        for first, count in zip(6 * (np.cumsum(photographs) - photographs), 6 * photographs, strict=True):
+            own = slice(int(first), int(first + count))
+            inverse, rank = _inverse(scores.s[own, own], scores.size[own])
+            value = np.nan, 1.0
+            if rank and self.freedom > rank:
+                value = self._f_test(float(scores.u[own] @ inverse @ scores.u[own]), rank)
+            freedom.append(rank)
+            f.append(value[0])
+            p.append(value[1])
+        return freedom, f, p
 
     def of_head(self, head: Head, scores: list[Scores], drift: Scores) -> list[HeadTest]:
         """Movements and drift of a camera, first in rotation, then in position beyond that."""

@@ -79,7 +79,7 @@ def write_result(adjusted: AdjustedBlock, folder: str | Path) -> None:
     if adjusted.rigs:
         write_csv(folder / "rigs.csv", rig_columns(adjusted.rigs))
     if adjusted.rigidity is not None:
-        write_csv(folder / "rig_stations.csv", station_columns(adjusted.rigidity.stations, adjusted.block.images.names))
+        write_csv(folder / "rig_stations.csv", station_columns(adjusted.rigidity, adjusted.block.images.names))
     if adjusted.rolling_shutters is not None:
         write_csv(folder / "motion.csv", motion_columns(adjusted.block, adjusted.rolling_shutters.motions))
     if adjusted.rig_movements is not None:

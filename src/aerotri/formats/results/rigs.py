@@ -8,7 +8,7 @@ import numpy as np
 
 from aerotri.diagnosis.rigidity import camera_verdicts
 from aerotri.formats.results.json_text import number_or_none
-from aerotri.results.rigidity import ROTATION, HeadTest, Rigidity, StationTests
+from aerotri.results.rigidity import ROTATION, HeadTest, Rigidity
 from aerotri.results.rigs import MountedCamera, RigMovements
 
 ELEMENTS = ("x", "y", "z", "omega", "phi", "kappa")
@@ -49,13 +49,20 @@ def rigs_json(cameras: tuple[MountedCamera, ...]) -> list[dict[str, Any]]:
     ]
 
 
-def station_columns(tests: StationTests, names: np.ndarray) -> dict[str, np.ndarray]:
+def station_columns(rigidity: Rigidity, names: np.ndarray) -> dict[str, np.ndarray]:
     """Columns of rig_stations.csv, a row a photograph.
 
     Parameters
     ----------
     names : of all photographs of the block.
     """
+    tests, whole = rigidity.stations, rigidity.whole
+    place = {key: k for k, key in enumerate(zip(whole.rig.tolist(), whole.station.tolist(), strict=True))}
+    at = np.array([place.get(key, -1) for key in zip(tests.rig.tolist(), tests.station.tolist(), strict=True)], int)
+
+    def of_station(values: np.ndarray, alone: float) -> np.ndarray:
+        return np.append(values, alone)[at]
+
     turned, sigma = np.degrees(tests.turned), np.degrees(tests.sigma)
     return {
         "image": names[tests.image],
@@ -68,6 +75,10 @@ def station_columns(tests: StationTests, names: np.ndarray) -> dict[str, np.ndar
         "f": tests.f,
         "p": tests.p,
         "found": tests.found,
+        "station_freedom": of_station(whole.freedom, 0),
+        "station_f": of_station(whole.f, np.nan),
+        "station_p": of_station(whole.p, 1.0),
+        "station_found": of_station(whole.found, False),
     }
 
 
@@ -116,6 +127,8 @@ def rigidity_json(tests: Rigidity) -> dict[str, Any]:
     return {
         "alpha": tests.alpha,
         "power": tests.power,
+        "stations": len(tests.whole),
+        "stations_found": int(np.sum(tests.whole.found)),
         "cameras": [
             {
                 "rig": one.rig,

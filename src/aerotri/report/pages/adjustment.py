@@ -242,6 +242,7 @@ def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
         "rig_movements": rig_tables.movements_table(adjusted),
         "rigidity": rig_tables.rigidity_table(adjusted),
         "rig_photographs": rig_tables.photographs_table(adjusted),
+        "rig_stations": rig_tables.stations_table(adjusted),
         "parameters": tables.parameters(adjusted),
         "correlations": precision_tables.correlations(adjusted),
         "precision": precision_tables.precision(adjusted),

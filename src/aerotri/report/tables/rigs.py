@@ -103,6 +103,23 @@ def photographs_table(adjusted: AdjustedBlock) -> Table:
     return Table("Photographs that fit their place on the rig least", tuple(columns), tuple(rows))
 
 
+def stations_table(adjusted: AdjustedBlock) -> Table:
+    """The exposures whose photographs fit one another on the rig least."""
+    rows, tests = [], adjusted.rigidity
+    if tests is not None:
+        s = tests.whole
+        for k in np.argsort(s.p, kind="stable")[:TOP_PHOTOGRAPHS].tolist():
+            rows.append((
+                printable(s.rig[k]), printable(s.station[k]), int(s.photographs[k]), float(s.f[k]), int(s.freedom[k]),
+                _percent(float(s.p[k])), "yes" if s.found[k] else "no",
+            ))  # fmt: skip
+    columns = (
+        Column("rig"), Column("station"), Column("photographs", "", "d"), Column("F", "", ".2f"),
+        Column("freedom", "", "d"), Column("p", "%", ".2g"), Column("found"),
+    )  # fmt: skip
+    return Table("Exposures that fit the rig least", columns, tuple(rows))
+
+
 def verdicts(adjusted: AdjustedBlock) -> list[dict[str, str]]:
     """A light and a sentence a camera."""
     tests = adjusted.rigidity
