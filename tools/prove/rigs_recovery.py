@@ -143,7 +143,7 @@ def rigid(seeds: Iterable[int]) -> dict[str, list[Any]]:
 def false_alarms(tests: dict[str, list[Any]]) -> None:
     """How often cameras and photographs that are in their places are said to move."""
     print(f"\n## False alarms\n\nAlarms of a block at {LEVEL:.0%} (all tests together), and single tests with "
-          f"p below {LEVEL:.0%}.\n\n| rig | blocks with an alarm: cameras | photographs | 99.9 % up to | "
+          f"p below {LEVEL:.0%}.\n\n| rig | blocks with an alarm: cameras | photographs | exposures | 99.9 % up to | "
           "single tests of cameras | share of each, smallest … largest | 99.9 % band | mean p of each |\n"
           + "|---" * 9 + "|")  # fmt: skip
     for name, every in tests.items():
