@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from oriented_sample import CAMERA, oriented_sample, prediction
 
+import aerotri
 from aerotri.conventions import InputError
 from aerotri.formats.foreign.opensfm import is_opensfm, read_opensfm, write_opensfm
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -88,6 +89,21 @@ def test_conventions(folder):
         "coordinates are local, around latitude 14.5, longitude 101, height 0 m",
     )
     assert is_opensfm(folder())
+
+
+def test_cameras_that_opensfm_held_are_unknowns(folder):
+    """And with --free-interior the principal point, too."""
+    place = folder()
+    (place / "config.yaml").write_text("processes: 4\noptimize_camera_parameters: no\n")
+    reading = aerotri.read(place)
+    assert "OpenSfM held focal lengths and lens (optimize_camera_parameters: no); here they are unknowns" in (
+        reading.messages
+    )
+    assert [camera.interior["x0_mm"].fixed for camera in reading.block.cameras] == [True, True]
+    free = aerotri.read(place, free_interior=True).block
+    assert not any(prior.fixed for camera in free.cameras for prior in camera.interior.values())
+    with pytest.raises(InputError, match="has cameras of its own"):
+        aerotri.read(place, focal_length_mm=3.0)
 
 
 def test_tracks_of_other_versions_and_none(folder):

@@ -17,7 +17,7 @@ from aerotri.formats import convert
 from aerotri.formats.assembly import kinds
 from aerotri.formats.assembly.assemble import Statements, with_crs, with_orientations, with_positions, with_rays
 from aerotri.formats.assembly.assemble_control import with_check_points, with_control
-from aerotri.formats.assembly.camera_spec import CameraSpec, camera_of_each, cameras_of
+from aerotri.formats.assembly.camera_spec import CameraSpec, camera_of_each, cameras_of, freed
 from aerotri.formats.assembly.kinds import ReadingOptions
 from aerotri.formats.assembly.parts import OrientationList, PointList, RayList, Reading, no_sigma
 from aerotri.formats.assembly.reprojection import FEWEST, control_at_start, residuals_at_start
@@ -35,6 +35,8 @@ FOLDERS = {"ign": "IGN", "patb": "PAT-B"}
 """Kinds of folders whose files are parts."""
 UNKNOWN_PIXEL_UM = 1.0
 """Size of a pixel where nothing tells it; a principal distance of 3000 pixels then reads 3 mm."""
+MAY_FREE = ("bundler", "colmap", "metashape-project", "opensfm")
+"""Whole blocks whose interior elements --free-interior makes unknowns."""
 SHIFTS = ("off", "block", "strip")
 
 
@@ -139,6 +141,14 @@ def _options(request: Request) -> ReadingOptions:
 
 def _whole(request: Request) -> Reading | None:
     """The source as a whole block; None where it is made of parts."""
+    reading = _as_it_is(request)
+    if reading is None or not request.camera.free:
+        return reading
+    cameras = tuple(freed(camera) for camera in reading.block.cameras)
+    return replace(reading, block=replace(reading.block, cameras=cameras))
+
+
+def _as_it_is(request: Request) -> Reading | None:
     stated, path = kinds.split_kind(request.source, convert.READERS, FOLDERS, kinds.RAYS, kinds.ORIENTATIONS)
     if not path.exists():
         raise InputError("there is no such file or folder", "check the path", path)
@@ -148,8 +158,10 @@ def _whole(request: Request) -> Reading | None:
     if kind not in convert.READERS:
         return None
     pixel_um, size_px = request.camera.pixel_um, request.camera.size_px
-    if request.camera != CameraSpec(pixel_um=pixel_um, size_px=size_px):
-        raise InputError("has cameras of its own", "leave the options of the camera out; --pixel-um may stay", path)
+    may_free = kind in MAY_FREE and request.camera.free
+    if request.camera != CameraSpec(pixel_um=pixel_um, size_px=size_px, free=may_free):
+        remedy = f"leave the options of the camera out; --pixel-um may stay, of {', '.join(MAY_FREE)} --free-interior"
+        raise InputError("has cameras of its own", remedy, path)
     if size_px is not None and kind != "bundler":
         raise InputError("has cameras of its own", "leave --camera-size out", path)
     if kind == "metashape-project":
