@@ -29,9 +29,10 @@ class CameraVerdict:
 
 
 def camera_verdicts(tests: Rigidity) -> tuple[CameraVerdict, ...]:
-    """One a camera that was tested."""
+    """One a camera that was tested; where cameras of a rig move, the one that moves most clearly first."""
     names = dict.fromkeys((one.rig, one.camera) for one in tests.heads)
-    return tuple(_verdict(tests, rig, camera) for rig, camera in names)
+    said = [_verdict(tests, rig, camera) for rig, camera in names]
+    return tuple(sorted(said, key=lambda one: (one.rig, one.keeps or one.camera != _clearest(tests, one.rig))))
 
 
 def rigidity_in_words(tests: Rigidity | None) -> tuple[str, ...]:

@@ -31,7 +31,7 @@ def rigs_table(adjusted: AdjustedBlock) -> Table:
         columns += [Column(name, "m", ".4f"), Column("σ", "mm", ".1f")]
     for name in ("ω", "φ", "κ"):
         columns += [Column(name, "°", ".4f"), Column("σ", "″", ".1f")]
-    columns += [Column("strongest correlation"), Column("photographs", "", "d")]
+    columns += [Column("largest ρ"), Column("photographs", "", "d")]
     return Table("Cameras on rigs", tuple(columns), tuple(rows))
 
 
