@@ -129,6 +129,8 @@ def spread_points(result: aerotri.Adjustment, low: np.ndarray, high: np.ndarray)
 def row(block: aerotri.Block, folder: Path, data: Path, name: str) -> str:
     """One line of the table."""
     result = aerotri.adjust(modelled(block, name), explain=False)
+    if result.status != "converged":
+        return f"| {name} | {result.sigma0:.3f} | {result.status}" + " |" * (HEAD.count("|") - 3)
     result.save(folder / "result", plots=False)
     aerotri.terrain(folder / "result", data / "images").save(folder / "dtm", plots=False)
     compared = aerotri.compare(folder / "dtm" / "dsm.tif", data / "model.laz", align="rigid")
