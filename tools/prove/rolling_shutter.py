@@ -1,7 +1,6 @@
-"""Rolling shutter on simulated drone flights whose truth is known, and on real photographs.
+"""Rolling shutter on simulated drone flights whose truth is known (on real ones: brighton_surface.py).
 
     python tools/prove/rolling_shutter.py [--seeds 20]
-    python tools/prove/rolling_shutter.py --brighton DIR --data brighton
 
 Flights: 24 photographs of 4000 × 3000 pixels of 2 cm at 8 m/s, 80/60 %, three strips and one across, relief of 2 m
 (RMS); tie points with 0.33 px, GNSS with 2 and 3 cm, control with 1 and 1.5 cm. Rows are read in 30 ms or all at once.
@@ -12,11 +11,9 @@ from __future__ import annotations
 
 import argparse
 import copy
-import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -116,57 +113,10 @@ def simulated(seeds: int) -> None:
     print(case("30 ms, strips in one direction over a plane, no tilts", few, TRUE_MS, flat=True), flush=True)
 
 
-def surface(block: aerotri.Block, folder: Path, data: Path) -> tuple[aerotri.Adjustment, str]:
-    """Adjusted, its surface, and that against the reference."""
-    result = aerotri.adjust(block)
-    result.save(folder / "result", plots=False)
-    terrain = aerotri.terrain(folder / "result", data / "images")
-    terrain.save(folder / "dtm")
-    d = aerotri.compare(folder / "dtm" / "dsm.tif", data / "model.laz", align="rigid").summary
-    difference = d["difference_m"]
-    return result, f"{difference['nmad']:.4f} | {difference['rmse']:.4f} | {d['coverage']:.1%}"
-
-
-def brighton(folder: Path, data: Path) -> None:
-    """The photographs of Brighton with each model of the effect; the surface against `model.laz`."""
-    begun = time.perf_counter()
-    tied = folder / "block"
-    block = aerotri.read_block(tied) if tied.exists() else aerotri.tie_points(data / "images").save(tied)
-    block = block if isinstance(block, aerotri.Block) else aerotri.read_block(tied)
-    free = observations.RollingShutter(observations.Prior(0.0))
-    models = {
-        "none": (None, ()),
-        "affinity": (None, (("brown", ("b1", "b2")),)),
-        "rolling shutter": (free, ()),
-        "both": (free, (("brown", ("b1", "b2")),)),
-        "rolling shutter, 33 ms held": (observations.RollingShutter(observations.Prior(33.0, fixed=True)), ()),
-        "rolling shutter, 33 ± 3 ms": (observations.RollingShutter(observations.Prior(33.0, 3.0)), ()),
-    }
-    print("| model | σ0 | readout ms | σ | NMAD m | RMSE m | covered |\n|" + "---|" * 7)
-    said = []
-    for name, (shutter, more) in models.items():
-        chosen = (*block.settings.adjustment.additional_parameters, *more)
-        settings = replace(block.settings.adjustment, additional_parameters=chosen)
-        own = replace(with_shutter(block, shutter), settings=replace(block.settings, adjustment=settings))
-        result, row = surface(own, folder / name.replace(" ", "_").replace(",", ""), data)
-        value, sigma = readout(result) if shutter is not None else (float("nan"), float("nan"))
-        print(f"| {name} | {result.sigma0:.3f} | {value:.2f} | {sigma:.2f} | {row} |", flush=True)
-        if shutter is not None:
-            said += [text for text in result.adjusted.outcome.warnings if "readout" in text or "rolling" in text]
-    print("\n" + "\n".join(f"- {text}" for text in said))
-    print(f"\n{time.perf_counter() - begun:.0f} s")
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--brighton", type=Path, help="folder for the results of the real photographs")
-    parser.add_argument("--data", type=Path, default=Path("../shared/data/brighton"))
-    arguments = parser.parse_args()
-    if arguments.brighton is None:
-        simulated(arguments.seeds)
-    else:
-        brighton(arguments.brighton, arguments.data)
+    simulated(parser.parse_args().seeds)
 
 
 if __name__ == "__main__":

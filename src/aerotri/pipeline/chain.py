@@ -27,7 +27,7 @@ from aerotri.strategies.parameter_comparison import Progress
 from aerotri.strategies.shutter_test import asks_for_test
 
 NOT_CONVERGED = "not converged"
-MOST_CHOICES = 4
+MOST_CHOICES = 6
 """Sets of additional parameters that are tried where the adjustment with the one chosen does not converge [C]."""
 
 
