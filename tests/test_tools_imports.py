@@ -18,6 +18,7 @@ INSIDE = {
     "benchmark/adjusting/peers.py": "gives other solvers the equations of the independent model",
     "benchmark/benchmark_imgeo.py": "times the resampling kernel beside cv2.remap",
     "benchmark/benchmark_pickets.py": "times the search kernel beside matchTemplate",
+    "benchmark/benchmark_reading_others.py": "times the readers of COLMAP and OpenSfM without what is added to them",
     "benchmark/benchmark_rigs.py": "times parts of an iteration of the same flight with and without a rig",
     "benchmark/benchmark_volume.py": "times the response of a functional and a solution with the factor",
     "prove/defects_proof/looks.py": "looks at pivots, free directions and eigenvalues of the factor",

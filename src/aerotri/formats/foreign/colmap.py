@@ -20,6 +20,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError, counted, mm_from_px, px_from_mm
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.files.atomic import atomic_folder
+from aerotri.formats.foreign.colmap_arrays import ModelArrays, read_arrays
 from aerotri.formats.foreign.colmap_binary import check_binary_model
 from aerotri.formats.foreign.colmap_cameras import MOST_PIXELS, colmap_camera, expressible, read_camera, value
 from aerotri.formats.foreign.colmap_rigs import (
@@ -82,7 +83,8 @@ def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndar
     if rigs:
         images = replace(images, columns={STATION: stations_of_model(model, ids, names, rigs)})
     _check_images(images, folder)
-    image, point_id, px = _observations(model, ids)
+    arrays = read_arrays(folder)
+    image, point_id, px = _observations(model, ids) if arrays is None else _rays_of(arrays, ids)
     image, point_id, px = _once_each(image, point_id, px)
     if not len(image):
         raise InputError("the model has no points that were measured", "export it with its points", folder)
@@ -109,19 +111,33 @@ def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndar
         ),
         rigs=rigs,
     )
-    return block, _points_of(model, numbers, folder)
+    return block, _points_of(model, arrays, numbers, folder)
 
 
-def _points_of(model: Any, numbers: np.ndarray, folder: Path) -> np.ndarray:
+def _points_of(model: Any, arrays: ModelArrays | None, numbers: np.ndarray, folder: Path) -> np.ndarray:
     """(N, 3) the object points of these numbers."""
-    missing = [number for number in numbers.tolist() if number not in model.points3D]
-    if missing:
-        message = f"image points belong to object point {missing[0]}, which there is not"
+    if arrays is None:
+        ids = np.array(sorted(model.point3D_ids()), np.uint64)
+        known = np.array([model.points3D[number].xyz for number in ids.tolist()]).reshape(-1, 3)
+    else:
+        order = np.argsort(arrays.ids, kind="stable")
+        ids, known = arrays.ids[order], arrays.xyz[order]
+    place = np.minimum(np.searchsorted(ids, numbers), max(len(ids) - 1, 0))
+    missing = np.flatnonzero(ids[place] != numbers) if len(ids) else np.arange(len(numbers))
+    if len(missing):
+        message = f"image points belong to object point {numbers[missing[0]]}, which there is not"
         raise InputError(message, "export the model with its points", folder)
-    xyz = np.array([model.points3D[number].xyz for number in numbers.tolist()])
+    xyz = known[place]
     if not (np.abs(xyz) <= LARGEST_NUMBER).all():
         raise InputError("an object point lies at no possible place", "export the model anew", folder)
     return xyz
+
+
+def _rays_of(arrays: ModelArrays, ids: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """As `_observations`, from arrays."""
+    row = np.searchsorted(np.array(ids, np.int64), arrays.image)
+    order = np.argsort(row, kind="stable")
+    return row[order], arrays.point[order], arrays.px[order]
 
 
 def open_model(folder: Path) -> Any:
@@ -223,8 +239,9 @@ def _observations(model: Any, ids: list[int]) -> tuple[np.ndarray, np.ndarray, n
 
 def _once_each(image: np.ndarray, point: np.ndarray, px: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """COLMAP's tracks may hold two image points of one image; a block's may not."""
-    pairs = np.stack([image.astype(np.uint64), point], axis=1)
-    _, first = np.unique(pairs, axis=0, return_index=True)
+    order = np.lexsort((point, image))
+    again = (np.diff(image[order]) == 0) & (point[order][1:] == point[order][:-1])
+    first = order[np.append(True, ~again)] if len(order) else order
     if len(first) < len(image):
         count = len(image) - len(first)
         warnings.warn(f"left out: {counted(count, 'repeated measurement')} of a point in the same image", stacklevel=3)

@@ -67,6 +67,10 @@ def check_binary_model(folder: Path) -> None:
     InputError
         Naming the file.
     """
+    from aerotri.formats.foreign.colmap_arrays import read_points
+
+    if (folder / "points3D.bin").is_file():
+        read_points(folder / "points3D.bin")
     for name, record in RECORDS.items():
         path = folder / f"{name}.bin"
         if path.is_file():
@@ -91,12 +95,6 @@ def _image(cursor: _Cursor) -> None:
     cursor.skip(24 * points)
 
 
-def _point(cursor: _Cursor) -> None:
-    cursor.skip(8 + 24 + 3 + 8)
-    (length,) = cursor.take("Q")
-    cursor.skip(8 * length)
-
-
 def _rig(cursor: _Cursor) -> None:
     _, sensors = cursor.take("II")
     if not sensors:
@@ -114,5 +112,5 @@ def _frame(cursor: _Cursor) -> None:
 
 
 RECORDS: dict[str, Callable[[_Cursor], None]] = {
-    "cameras": _camera, "images": _image, "points3D": _point, "rigs": _rig, "frames": _frame,
+    "cameras": _camera, "images": _image, "rigs": _rig, "frames": _frame,
 }  # fmt: skip
