@@ -22,6 +22,9 @@ from ca502 import MOUNTING_DEG, NADIR, exposures, left_out_in_turn, print_table,
 POSITION_M = {"A": (0, -0.05, 0.02), "D": (0, 0.05, 0.02), "W": (-0.05, 0, 0.02), "X": (0.05, 0, 0.02)}
 """Nominal projection centres of the heads in the frame of the nadir head."""
 NAMES = {"rigid": "Rigid", "weighted": "Weighted", "off": "Independent cameras"}
+COMPARED = 40
+"""Exposures whose relative orientations are compared."""
+STEP_M, STEP_RAD = 1e-3, 1e-6
 SIGMA_M = 0.02
 """σ of a nominal position; the nominal angles are start values only."""
 
@@ -52,26 +55,46 @@ def whole_stations(block: aerotri.Block) -> aerotri.Block:
 
 
 def relative(found: aerotri.Adjustment, block: aerotri.Block) -> dict[str, tuple[np.ndarray, np.ndarray, int]]:
-    """Median relative orientation of every head over the exposures (m and degrees), σ by its scatter, and count."""
-    images, order = found.adjusted.images, block.rotation
-    station = np.array([name[1:] for name in block.images.names.tolist()])
-    head = np.array([name[0] for name in block.images.names.tolist()])
-    there = np.isfinite(images.centre[:, 0])
-    lead = {s: k for k, s in enumerate(station) if head[k] == NADIR and there[k]}
+    """Mean relative orientation of every head over some exposures (m and degrees), its σ, and how many exposures.
+
+    σ follows from the joint covariance of the photographs: what they share, such as the principal points, does not
+    become smaller with their number.
+    """
+    images, names = found.adjusted.images, block.images.names.tolist()
+    row = {name: k for k, name in enumerate(names) if np.isfinite(images.centre[k, 0])}
     out = {}
-    for name in POSITION_M:
-        rows = [k for k in np.flatnonzero((head == name) & there) if station[k] in lead]
-        at = np.array([lead[station[k]] for k in rows])
-        r_s = geometry.rotation_from_angles(images.angles[at], order)
-        arm = np.einsum("nji,nj->ni", r_s, images.centre[rows] - images.centre[at])
-        turn = np.swapaxes(r_s, 1, 2) @ geometry.rotation_from_angles(images.angles[rows], order)
-        angles = np.degrees(geometry.angles_from_rotation(turn, order))
-        angles = angles[0] + (angles - angles[0] + 180.0) % 360.0 - 180.0
-        six = np.concatenate([arm, angles], axis=1)
-        middle = np.median(six, axis=0)
-        spread = 1.4826 * np.median(np.abs(six - middle), axis=0)
-        out[name] = middle, spread * np.sqrt(np.pi / 2.0 / len(rows)), len(rows)
+    for head in POSITION_M:
+        both = [name for name in names if name[0] == head and name in row and NADIR + name[1:] in row]
+        both = both[:: max(1, len(both) // COMPARED)]
+        pairs = [photograph for name in both for photograph in (NADIR + name[1:], name)]
+        covariance = found.covariance(pairs).matrix
+        start = np.array([[*images.centre[row[name]], *images.angles[row[name]]] for name in pairs]).reshape(-1, 12)
+        six, partials = zip(*(_with_partials(twelve, block.rotation) for twelve in start), strict=True)
+        value, wide = np.array(six), np.zeros((len(both), 6, len(covariance)))
+        for k, own in enumerate(partials):
+            wide[k, :, 12 * k : 12 * k + 12] = own
+        value[:, 3:] = value[0, 3:] + (value[:, 3:] - value[0, 3:] + 180.0) % 360.0 - 180.0
+        weight = 1.0 / np.einsum("kij,jl,kil->ki", wide, covariance, wide)
+        weight /= weight.sum(axis=0)
+        mean = np.einsum("ki,kij->ij", weight, wide)
+        out[head] = (weight * value).sum(axis=0), np.sqrt(np.diagonal(mean @ covariance @ mean.T)), len(both)
     return out
+
+
+def _with_partials(twelve: np.ndarray, order: str) -> tuple[np.ndarray, np.ndarray]:
+    """Position (m) and angles (degrees) of one photograph in the frame of another (6,), and partials (6, 12)."""
+
+    def relation(both: np.ndarray) -> np.ndarray:
+        lead = geometry.rotation_from_angles(both[3:6], order)
+        turn = lead.T @ geometry.rotation_from_angles(both[9:], order)
+        return np.concatenate([lead.T @ (both[6:9] - both[:3]), np.degrees(geometry.angles_from_rotation(turn, order))])
+
+    steps = np.tile([STEP_M, STEP_M, STEP_M, STEP_RAD, STEP_RAD, STEP_RAD], 2)
+    columns = [
+        (relation(twelve + step * one) - relation(twelve - step * one)) / (2.0 * step)
+        for step, one in zip(steps, np.eye(12), strict=True)
+    ]
+    return relation(twelve), np.column_stack(columns)
 
 
 def mountings(found: aerotri.Adjustment) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -96,7 +119,7 @@ def print_rig(rigid: aerotri.Adjustment) -> None:
 
 def print_mountings(rigid: aerotri.Adjustment, off: aerotri.Adjustment, block: aerotri.Block) -> None:
     """Rigid and independent side by side."""
-    print("| head | element | rigid | σ | independent (median) | σ of it | difference over σ | exposures |")
+    print("| head | element | rigid | σ | independent (mean) | σ of it | difference over σ | exposures |")
     print("|---|---|---|---|---|---|---|---|")
     free = relative(off, block)
     for name, (value, sigma) in mountings(rigid).items():
