@@ -128,8 +128,11 @@ def _pairs(block: Block, directions: Directions, stations: Stations, ground_m: f
     rays = block.image_points
     mine = (stations.lead >= 0)[rays.image]
     oriented = np.isfinite(stations.centre[:, 0])[rays.image] & ~mine
-    first, second = _neighbours(rays.point, rays.image, mine, mine)
-    third, fourth = _neighbours(rays.point, rays.image, mine, oriented)
+    first, second = _neighbours(rays.point, rays.image, mine)
+    third, fourth = _neighbours(rays.point, rays.image, mine | oriented)
+    third, fourth = np.where(mine[third], third, fourth), np.where(mine[third], fourth, third)
+    mixed = mine[third] & oriented[fourth]
+    third, fourth = third[mixed], fourth[mixed]
     unit = np.column_stack([directions.tangent, -np.ones(len(rays))])
     unit /= np.linalg.norm(unit, axis=1)[:, None]
     place = np.where(stations.lead >= 0, stations.lead, np.arange(len(stations.lead)))
@@ -151,20 +154,16 @@ def _pairs(block: Block, directions: Directions, stations: Stations, ground_m: f
     return made(first, second, True), made(third, fourth, False)
 
 
-def _neighbours(
-    point: np.ndarray, image: np.ndarray, mine: np.ndarray, other: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of two rays of one point, one of `mine` with one of the next of `other`, in the order of photographs."""
+def _neighbours(point: np.ndarray, image: np.ndarray, among: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of two rays of one point, each with the next three of those `among` (m,), in the order of photographs."""
     order = np.lexsort((image, point))
-    order = order[(mine | other)[order]]
+    order = order[among[order]]
     first, second = [], []
     for step in (1, 2, 3):
         a, b = order[:-step], order[step:]
-        same = point[a] == point[b]
-        for one, two in ((a, b),) if mine is other else ((a, b), (b, a)):
-            use = same & mine[one] & other[two] & (image[one] != image[two])
-            first.append(one[use])
-            second.append(two[use])
+        use = (point[a] == point[b]) & (image[a] != image[b])
+        first.append(a[use])
+        second.append(b[use])
     return np.concatenate(first), np.concatenate(second)
 
 

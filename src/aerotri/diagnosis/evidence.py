@@ -13,8 +13,9 @@ from functools import lru_cache
 import numpy as np
 
 from aerotri.adjustment.directions import directions_of
+from aerotri.coordinates.similarity import Similarity
 from aerotri.diagnosis.free_model import FreeModel
-from aerotri.diagnosis.placement import Placed, lay_on
+from aerotri.diagnosis.placement import lay_on
 from aerotri.functional_model.rotation import exponential, logarithm, rotation_from_angles
 from aerotri.observations import Block
 
@@ -86,7 +87,7 @@ class Fit:
     """
 
     cost: float
-    placed: Placed | None
+    placed: Similarity | None
     residual: dict[str, np.ndarray]
     turned: dict[str, np.ndarray]
     tolerance: dict[str, float]
@@ -190,13 +191,13 @@ def fit(evidence: Evidence, trusted: tuple[str, ...] = ("control", "check", "gns
     return best if best is not None else Fit(0.0, None, {}, {}, {})
 
 
-def _laid(model: np.ndarray, given: np.ndarray, looking: np.ndarray) -> Placed | None:
+def _laid(model: np.ndarray, given: np.ndarray, looking: np.ndarray) -> Similarity | None:
     """`lay_on`, remembered: most hypotheses leave most sets as they are."""
     return _laid_once(model.tobytes(), given.tobytes(), looking.tobytes())
 
 
 @lru_cache(maxsize=512)
-def _laid_once(model: bytes, given: bytes, looking: bytes) -> Placed | None:
+def _laid_once(model: bytes, given: bytes, looking: bytes) -> Similarity | None:
     source, target = (np.frombuffer(values).reshape(-1, 3) for values in (model, given))
     return lay_on(source, target, np.frombuffer(looking))
 
@@ -235,7 +236,7 @@ def places_by_others(evidence: Evidence) -> dict[str, tuple[np.ndarray, np.ndarr
     return found
 
 
-def left_over(evidence: Evidence, placed: Placed) -> Fit:
+def left_over(evidence: Evidence, placed: Similarity) -> Fit:
     """Residuals and cost of a placing."""
     residual, turned, tolerances, cost = {}, {}, {}, 0.0
     for own in evidence.positions:
@@ -262,7 +263,7 @@ def _doublings(size: np.ndarray, tolerance: float) -> float:
     return float(np.mean(np.clip(np.log2(np.maximum(size, 1e-300) / tolerance), 0.0, MOST_DOUBLINGS)))
 
 
-def _turned(own: Attitudes, placed: Placed) -> np.ndarray:
+def _turned(own: Attitudes, placed: Similarity) -> np.ndarray:
     """(k,) rad between given attitudes and those of the placed model, a constant boresight taken off."""
     apart = np.swapaxes(placed.rotation @ own.model, 1, 2) @ own.given
     if own.with_boresight:

@@ -6,10 +6,11 @@ re-weighted until nothing changes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+
+from aerotri.coordinates.similarity import Similarity, nearest_similarities, nearest_similarity
 
 TRIPLES = 150
 """Sets of three positions tried where there are more than ten [C]: with half of the positions wrong one in eight has
@@ -24,19 +25,7 @@ VIRTUAL_WEIGHT = 1e-3
 """Weight of the point below the block that holds the roll of a single strip."""
 
 
-@dataclass(frozen=True, eq=False)
-class Placed:
-    """target ≈ scale·R·source + translation."""
-
-    scale: float
-    rotation: np.ndarray
-    translation: np.ndarray
-
-    def __call__(self, xyz: np.ndarray) -> np.ndarray:
-        return self.scale * xyz @ self.rotation.T + self.translation
-
-
-def lay_on(source: np.ndarray, target: np.ndarray, looking: np.ndarray) -> Placed | None:
+def lay_on(source: np.ndarray, target: np.ndarray, looking: np.ndarray) -> Similarity | None:
     """The robust similarity of two sets of positions; None where they do not determine one.
 
     Parameters
@@ -49,7 +38,7 @@ def lay_on(source: np.ndarray, target: np.ndarray, looking: np.ndarray) -> Place
     if len(source) == 2 or _is_line(target) or _is_line(source):
         return _along_line(source, target, looking)
     triples = _triples(len(source))
-    scale, rotation, translation = _similarities(source[triples], target[triples], np.ones(triples.shape))
+    scale, rotation, translation = nearest_similarities(source[triples], target[triples], np.ones(triples.shape))
     misfit = np.linalg.norm(
         scale[:, None, None] * (source @ np.swapaxes(rotation, 1, 2)) + translation[:, None] - target, axis=2
     )
@@ -57,28 +46,26 @@ def lay_on(source: np.ndarray, target: np.ndarray, looking: np.ndarray) -> Place
     score = np.median(misfit, axis=1) if len(source) > 4 else np.sort(misfit, axis=1)[:, :3].sum(axis=1)
     score = np.where(np.isfinite(score), score, np.inf)
     best = int(np.argmin(score))
-    placed = Placed(float(scale[best]), rotation[best], translation[best])
+    placed = Similarity(float(scale[best]), rotation[best], translation[best])
     return _reweighted(placed, source, target, np.ones(len(source)))
 
 
-def _reweighted(placed: Placed, source: np.ndarray, target: np.ndarray, base: np.ndarray) -> Placed:
+def _reweighted(placed: Similarity, source: np.ndarray, target: np.ndarray, base: np.ndarray) -> Similarity:
     for _ in range(REWEIGHTINGS):
         misfit = np.linalg.norm(placed(source) - target, axis=1)
         spread = max(float(np.median(misfit)), 1e-12 * float(np.abs(target).max() + 1.0))
         weight = base / (1.0 + (misfit / (3.0 * spread)) ** 2)
-        scale, rotation, translation = _similarities(source[None], target[None], weight[None])
-        placed = Placed(float(scale[0]), rotation[0], translation[0])
+        placed = nearest_similarity(source, target, weight)
     return placed
 
 
-def _along_line(source: np.ndarray, target: np.ndarray, looking: np.ndarray) -> Placed:
+def _along_line(source: np.ndarray, target: np.ndarray, looking: np.ndarray) -> Similarity:
     """Positions on a line, with a point far below them on either side."""
     below = target.mean(axis=0) - [0.0, 0.0, np.linalg.norm(np.ptp(target, axis=0))]
     beyond = source.mean(axis=0) + looking / np.linalg.norm(looking) * np.linalg.norm(np.ptp(source, axis=0))
     source, target = np.vstack([source, beyond]), np.vstack([target, below])
     base = np.append(np.ones(len(source) - 1), VIRTUAL_WEIGHT)
-    scale, rotation, translation = _similarities(source[None], target[None], base[None])
-    return _reweighted(Placed(float(scale[0]), rotation[0], translation[0]), source, target, base)
+    return _reweighted(nearest_similarity(source, target, base), source, target, base)
 
 
 def _is_line(xyz: np.ndarray) -> bool:
@@ -94,20 +81,3 @@ def _triples(count: int) -> np.ndarray:
         return rows[(rows[:, 0] < rows[:, 1]) & (rows[:, 1] < rows[:, 2])]
     rng = np.random.default_rng(1)
     return np.array([rng.choice(count, 3, replace=False) for _ in range(TRIPLES)])
-
-
-def _similarities(
-    source: np.ndarray, target: np.ndarray, weight: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Scales (t,), rotations (t, 3, 3), translations (t, 3) of t weighted sets (t, k, 3) (Umeyama 1991)."""
-    share = weight / weight.sum(axis=1, keepdims=True)
-    middle, aim = (np.einsum("tk,tki->ti", share, xyz) for xyz in (source, target))
-    p, q = source - middle[:, None], target - aim[:, None]
-    u, size, vt = np.linalg.svd(np.einsum("tk,tki,tkj->tij", share, q, p))
-    sign = np.ones_like(size)
-    sign[:, 2] = np.sign(np.linalg.det(u @ vt))
-    rotation = (u * sign[:, None, :]) @ vt
-    spread = np.einsum("tk,tki,tki->t", share, p, p)
-    scale = (size * sign).sum(axis=1) / np.maximum(spread, 1e-300)
-    translation = aim - scale[:, None] * np.einsum("tij,tj->ti", rotation, middle)
-    return scale, rotation, translation

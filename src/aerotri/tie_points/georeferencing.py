@@ -12,6 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from aerotri.conventions import SIGMA_PER_MAD, InputError, counted
+from aerotri.coordinates.similarity import nearest_similarity
 
 COLLINEAR = 0.03
 """Width over length of a set of points below which it is a line."""
@@ -96,16 +97,9 @@ def is_line(xyz: np.ndarray) -> bool:
 
 
 def _similarity(source: np.ndarray, target: np.ndarray, weight: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """Scale, rotation and translation by weighted least squares (Umeyama 1991)."""
-    share = weight / weight.sum()
-    middle, aim = share @ source, share @ target
-    p, q = source - middle, target - aim
-    u, size, vt = np.linalg.svd((q * share[:, None]).T @ p)
-    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    rotation = (u * sign) @ vt
-    spread = float(share @ (p**2).sum(axis=1))
-    scale = float(size @ sign) / max(spread, 1e-300)
-    return scale, rotation, aim - scale * rotation @ middle
+    """Scale, rotation and translation by weighted least squares."""
+    found = nearest_similarity(source, target, weight)
+    return found.scale, found.rotation, found.translation
 
 
 def _best_triple(source: np.ndarray, target: np.ndarray, sigma: np.ndarray, seed: int):

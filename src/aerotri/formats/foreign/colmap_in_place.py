@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.adjustment.rigging import robust_mean
-from aerotri.conventions import FilePath, InputError, counted
+from aerotri.conventions import FilePath, InputError
+from aerotri.coordinates.similarity import Similarity
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.foreign.colmap import OWN_ENTRIES, open_model
 from aerotri.formats.foreign.colmap_cameras import colmap_camera, whole_camera
-from aerotri.formats.foreign.colmap_rigs import SAME_M, SAME_RAD, colmap_pose
-from aerotri.formats.foreign.in_place import Move, move_between, replaced_files
-from aerotri.functional_model.rotation import logarithm
+from aerotri.formats.foreign.colmap_rigs import colmap_pose
+from aerotri.formats.foreign.in_place import about_others, mean_pose, move_between, poses_differ, replaced_files
 
 
 def update_colmap(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:
@@ -63,7 +62,9 @@ def update_colmap(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]:
     model.update_point_3d_errors()
     with replaced_files(folder, OWN_ENTRIES) as new:
         (model.write_binary if (folder / "cameras.bin").is_file() else model.write_text)(new)
-    return (*said, *_unadjusted(model, rows, points), *_strangers(oriented, rows))
+    images = sum(number not in rows for number in model.reg_image_ids())
+    missing = int(oriented.oriented.sum()) - len(rows)
+    return (*said, *about_others(images, len(model.points3D) - len(points), missing, "model"))
 
 
 def _points(oriented: OrientedBlock, model: Any) -> dict[int, int]:
@@ -82,7 +83,7 @@ def _is_number(name: str) -> bool:
 
 def _move(
     oriented: OrientedBlock, model: Any, rows: Mapping[int, int], points: Mapping[int, int], folder: Path
-) -> Move:
+) -> Similarity:
     """From photographs with an old pose, and from points."""
     posed = [number for number in rows if model.images[number].has_pose]
     old = [model.images[number].projection_center() for number in posed]
@@ -91,7 +92,7 @@ def _move(
     return move_between(np.array(old, dtype=float).reshape(-1, 3), np.vstack(new), folder)
 
 
-def _transform(model: Any, move: Move) -> None:
+def _transform(model: Any, move: Similarity) -> None:
     import pycolmap
 
     model.transform(pycolmap.Sim3d(move.scale, pycolmap.Rotation3d(move.rotation), move.translation))
@@ -165,36 +166,14 @@ def _sensors(model: Any, rig: Any, wanted: Mapping[int, np.ndarray]) -> dict[Any
             if camera in sensors:
                 turn = pose[:, :3] @ lead[:, :3].T
                 found.setdefault(camera, []).append(np.column_stack([turn, pose[:, 3] - turn @ lead[:, 3]]))
-    out = {}
-    for camera, poses in found.items():
-        several = np.array(poses)
-        out[sensors[camera]] = np.column_stack([robust_mean(several[:, :, :3]), np.median(several[:, :, 3], axis=0)])
-    return out
+    return {sensors[camera]: mean_pose(poses) for camera, poses in found.items()}
 
 
 def _check_poses(model: Any, wanted: Mapping[int, np.ndarray], folder: Path) -> None:
     for number, pose in wanted.items():
-        matrix = model.images[number].cam_from_world().matrix()
-        turn = np.abs(logarithm(matrix[:, :3] @ pose[:, :3].T)).max()
-        shift = np.abs(matrix[:, :3].T @ matrix[:, 3] - pose[:, :3].T @ pose[:, 3]).max()
-        if turn > SAME_RAD or shift > SAME_M:
+        if poses_differ(model.images[number].cam_from_world().matrix(), pose):
             raise InputError(
                 f"photograph '{model.images[number].name}' moves on its rig, which is rigid in the model",
                 'adjust with constraint = "rigid", or write a new model without --in-place',
                 folder,
             )
-
-
-def _unadjusted(model: Any, rows: Mapping[int, int], points: Mapping[int, int]) -> tuple[str, ...]:
-    """A sentence on what moved along."""
-    images = sum(number not in rows for number in model.reg_image_ids())
-    others = len(model.points3D) - len(points)
-    said = [counted(images, "photograph")] * (images > 0) + [counted(others, "object point")] * (others > 0)
-    return (f"not adjusted, moved along with the others: {' and '.join(said)}",) if said else ()
-
-
-def _strangers(oriented: OrientedBlock, rows: Mapping[int, int]) -> tuple[str, ...]:
-    missing = int(oriented.oriented.sum()) - len(rows)
-    return (f"could not be carried over: {counted(missing, 'photograph')} that the model does not have",) * (
-        missing > 0
-    )

@@ -10,14 +10,17 @@ import os
 import shutil
 from collections.abc import Collection, Generator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.adjustment.rigging import robust_mean
+from aerotri.conventions import FilePath, InputError, counted
+from aerotri.coordinates.similarity import Similarity, nearest_similarity
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.files.ownership import foreign_files
+from aerotri.formats.foreign.colmap_rigs import SAME_M, SAME_RAD
+from aerotri.functional_model.rotation import logarithm
 
 OLDER = "before_aerotri"
 """Folder for the files that were there before."""
@@ -29,26 +32,8 @@ COLLINEAR = 1e-6
 """Second extent of points, of the first, below which they are a line [C]: rotation about it stays open."""
 
 
-@dataclass(frozen=True, eq=False)
-class Move:
-    """How a project moves: X_new = scale·R·X_old + translation.
-
-    Parameters
-    ----------
-    scale : > 0. rotation : (3, 3). translation : (3,) m.
-    """
-
-    scale: float
-    rotation: np.ndarray
-    translation: np.ndarray
-
-    def points(self, xyz: np.ndarray) -> np.ndarray:
-        """(n, 3) points of the project where they are now."""
-        return self.scale * xyz @ self.rotation.T + self.translation
-
-
-def move_between(old: np.ndarray, new: np.ndarray, project: FilePath) -> Move:
-    """The similarity nearest to what was adjusted, by least squares [L: Umeyama 1991]; points far off do not count.
+def move_between(old: np.ndarray, new: np.ndarray, project: FilePath) -> Similarity:
+    """The similarity nearest to what was adjusted, by least squares; points far off do not count.
 
     Parameters
     ----------
@@ -64,13 +49,13 @@ def move_between(old: np.ndarray, new: np.ndarray, project: FilePath) -> Move:
     if use.sum() < 3 or _is_line(old[use]) or _is_line(new[use]):
         message = "fewer than three places that are not on a line are common to the project and the result"
         raise InputError(message, "give the project that the block was read from", project)
-    move = _similarity(old[use], new[use])
+    move = nearest_similarity(old[use], new[use])
     for _ in range(ROUNDS - 1):
-        misfit = np.linalg.norm(move.points(old) - new, axis=1)
+        misfit = np.linalg.norm(move(old) - new, axis=1)
         near = use & (misfit <= FAR * np.median(misfit[use]))
         if near.sum() < 3 or _is_line(old[near]):
             break
-        move = _similarity(old[near], new[near])
+        move = nearest_similarity(old[near], new[near])
     return move
 
 
@@ -79,13 +64,30 @@ def _is_line(xyz: np.ndarray) -> bool:
     return bool(size[1] <= COLLINEAR * size[0])
 
 
-def _similarity(old: np.ndarray, new: np.ndarray) -> Move:
-    p, q = old - old.mean(axis=0), new - new.mean(axis=0)
-    u, size, vt = np.linalg.svd(q.T @ p)
-    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    rotation = (u * sign) @ vt
-    scale = float(size @ sign / (p**2).sum())
-    return Move(scale, rotation, new.mean(axis=0) - scale * rotation @ old.mean(axis=0))
+def mean_pose(poses: list[np.ndarray]) -> np.ndarray:
+    """(3, 4) the pose in the middle of several, robustly."""
+    several = np.array(poses)
+    return np.column_stack([robust_mean(several[:, :, :3]), np.median(several[:, :, 3], axis=0)])
+
+
+def centre_of(pose: np.ndarray) -> np.ndarray:
+    """(3,) projection centre of a pose (3, 4), world → camera."""
+    return -pose[:, :3].T @ pose[:, 3]
+
+
+def poses_differ(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two poses (3, 4) differ by more than rounding."""
+    turn = np.abs(logarithm(one[:, :3] @ other[:, :3].T)).max()
+    return bool(turn > SAME_RAD or np.abs(centre_of(one) - centre_of(other)).max() > SAME_M)
+
+
+def about_others(images: int, points: int, missing: int, project: str) -> list[str]:
+    """Sentences on photographs and object points that were not adjusted, and photographs that the project lacks."""
+    along = [counted(images, "photograph")] * (images > 0) + [counted(points, "object point")] * (points > 0)
+    said = [f"not adjusted, moved along with the others: {' and '.join(along)}"] if along else []
+    if missing:
+        said.append(f"could not be carried over: {counted(missing, 'photograph')} that the {project} does not have")
+    return said
 
 
 @contextmanager

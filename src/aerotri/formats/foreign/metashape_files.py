@@ -173,7 +173,7 @@ class Archive:
             raise InputError("there is no such file", "give the project together with its folder .files", path)
         try:
             self.archive = zipfile.ZipFile(io.BytesIO(read_bytes(path)))
-        except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError) as error:
+        except DAMAGED as error:
             raise InputError(f"is no archive: {error}", REMEDY, path) from error
 
     def read(self, name: str) -> bytes:
@@ -194,15 +194,7 @@ class Archive:
             with self.archive.open(info) as file:
                 # the stated size may be wrong
                 content = file.read(size + 1)
-        except (
-            zipfile.BadZipFile,
-            zlib.error,
-            RuntimeError,
-            ValueError,
-            OSError,
-            EOFError,
-            NotImplementedError,
-        ) as error:
+        except DAMAGED as error:
             raise InputError(f"{name[:60]} is damaged: {error}", REMEDY, self.path) from error
         if len(content) != size:
             raise InputError(f"{name[:60]} is damaged", REMEDY, self.path)

@@ -14,11 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.adjustment.rigging import robust_mean
 from aerotri.conventions import FilePath, InputError, counted
+from aerotri.coordinates.similarity import Similarity
 from aerotri.formats.assembly.oriented import OrientedBlock
-from aerotri.formats.foreign.colmap_rigs import SAME_M, SAME_RAD, colmap_pose
-from aerotri.formats.foreign.in_place import Move, move_between, replaced_files
+from aerotri.formats.foreign.colmap_rigs import colmap_pose
+from aerotri.formats.foreign.in_place import (
+    about_others,
+    centre_of,
+    mean_pose,
+    move_between,
+    poses_differ,
+    replaced_files,
+)
 from aerotri.formats.foreign.opensfm import RECONSTRUCTION, TOPOCENTRIC, file_of
 from aerotri.formats.foreign.opensfm_cameras import camera_json, whole_camera
 from aerotri.formats.foreign.opensfm_json import Node, points_of, read_reconstructions
@@ -97,23 +104,19 @@ def update_opensfm(oriented: OrientedBlock, folder: FilePath) -> tuple[str, ...]
 
 def _points(
     oriented: OrientedBlock, chosen: Node, rows: dict[str, int], names: list[str], old: np.ndarray, path: Path
-) -> tuple[Move, np.ndarray, int]:
+) -> tuple[Similarity, np.ndarray, int]:
     """How the project moves, (N, 3) its points as they are to be, and how many of them were adjusted."""
     place = {name: k for k, name in enumerate(oriented.block.points.tolist())}
     where = np.array([place.get(name, -1) for name in names], dtype=np.int64)
     known = where >= 0
     known[known] = np.isfinite(oriented.points[where[known]]).all(axis=1)
     shots = chosen.get("shots").items()
-    centres = np.array([_centre(pose_of(shots[name])) for name in rows])
+    centres = np.array([centre_of(pose_of(shots[name])) for name in rows])
     common = np.vstack([centres, old[known]])
     move = move_between(common, np.vstack([oriented.centre[list(rows.values())], oriented.points[where[known]]]), path)
-    new = move.points(old)
+    new = move(old)
     new[known] = oriented.points[where[known]]
     return move, new, int(known.sum())
-
-
-def _centre(pose: np.ndarray) -> np.ndarray:
-    return -pose[:, :3].T @ pose[:, 3]
 
 
 def _set_cameras(oriented: OrientedBlock, chosen: Node, rows: dict[str, int]) -> list[str]:
@@ -143,7 +146,7 @@ def _free_key(cameras: dict[str, Any], name: str) -> str:
     return key
 
 
-def _set_poses(oriented: OrientedBlock, chosen: Node, rows: dict[str, int], move: Move) -> list[str]:
+def _set_poses(oriented: OrientedBlock, chosen: Node, rows: dict[str, int], move: Similarity) -> list[str]:
     """Shots, rig cameras and rig instances, and what to say of them."""
     wanted = {name: colmap_pose(oriented, row) for name, row in rows.items()}
     shots = chosen.get("shots").items()
@@ -164,7 +167,7 @@ def _set_poses(oriented: OrientedBlock, chosen: Node, rows: dict[str, int], move
                 again = compose(mounted[members[shot]], instance)
                 if shot not in wanted:
                     poses[shot] = again
-                elif _differ(again, wanted[shot]):
+                elif poses_differ(again, wanted[shot]):
                     alone[shot] = members[shot]
                     del node.value["rig_camera_ids"][shot]
         for shot, name in alone.items():
@@ -179,7 +182,7 @@ def _set_poses(oriented: OrientedBlock, chosen: Node, rows: dict[str, int], move
     return [f"{what} a rig instance of its own now, since it moves on the rig"] if alone else []
 
 
-def _mounted(chosen: Node, on_rigs: RigShots, wanted: dict[str, np.ndarray], move: Move) -> dict[str, np.ndarray]:
+def _mounted(chosen: Node, on_rigs: RigShots, wanted: dict[str, np.ndarray], move: Similarity) -> dict[str, np.ndarray]:
     """(3, 4) camera from rig of every rig camera; the reference of a rig stays where it is in its rig."""
     if not chosen.has("rig_cameras"):
         return {}
@@ -197,21 +200,14 @@ def _mounted(chosen: Node, on_rigs: RigShots, wanted: dict[str, np.ndarray], mov
                 if (key, name) in shot_of
             ]
             if turns:
-                several = np.array(turns)
-                middle = np.column_stack([robust_mean(several[:, :, :3]), np.median(several[:, :, 3], axis=0)])
-                out[name] = compose(middle, out[lead])
+                out[name] = compose(mean_pose(turns), out[lead])
     return out
 
 
-def _moved(pose: np.ndarray, move: Move) -> np.ndarray:
+def _moved(pose: np.ndarray, move: Similarity) -> np.ndarray:
     """A pose in the coordinates of the adjustment."""
     rotation = pose[:, :3] @ move.rotation.T
-    return np.column_stack([rotation, -rotation @ move.points(_centre(pose)[None])[0]])
-
-
-def _differ(one: np.ndarray, other: np.ndarray) -> bool:
-    turn = np.abs(logarithm(one[:, :3] @ other[:, :3].T)).max()
-    return bool(turn > SAME_RAD or np.abs(_centre(one) - _centre(other)).max() > SAME_M)
+    return np.column_stack([rotation, -rotation @ move(centre_of(pose)[None])[0]])
 
 
 def _write(value: dict[str, Any], pose: np.ndarray) -> None:
@@ -255,7 +251,7 @@ def _set_projected(node: Node, chosen: Node, linear: np.ndarray, shift: np.ndarr
             if source is not None:
                 pose = pose_of(Node(source, name, chosen.path))
                 rotation = pose[:, :3] @ turn
-                _write(value, np.column_stack([rotation, -rotation @ (linear @ _centre(pose) + shift)]))
+                _write(value, np.column_stack([rotation, -rotation @ (linear @ centre_of(pose) + shift)]))
                 if "camera" in source:
                     value["camera"] = source["camera"]
     for section in ("cameras", "rig_cameras"):
@@ -264,17 +260,11 @@ def _set_projected(node: Node, chosen: Node, linear: np.ndarray, shift: np.ndarr
 
 
 def _about(
-    oriented: OrientedBlock, chosen: Node, rows: dict[str, int], others: int, move: Move, folder: Path
+    oriented: OrientedBlock, chosen: Node, rows: dict[str, int], others: int, move: Similarity, folder: Path
 ) -> list[str]:
     """What is to be said."""
-    said = []
-    images = len(chosen.value["shots"]) - len(rows)
-    along = [counted(images, "photograph")] * (images > 0) + [counted(others, "object point")] * (others > 0)
-    if along:
-        said.append(f"not adjusted, moved along with the others: {' and '.join(along)}")
     missing = int(oriented.oriented.sum()) - len(rows)
-    if missing:
-        said.append(f"could not be carried over: {counted(missing, 'photograph')} that the project does not have")
+    said = about_others(len(chosen.value["shots"]) - len(rows), others, missing, "project")
     turned = float(np.abs(logarithm(move.rotation)).max())
     if chosen.has("reference_lla") and (abs(move.scale - 1.0) > MOVED or turned > MOVED):
         said.append("the project turned or grew: its coordinates are no longer east, north and up at reference_lla")
