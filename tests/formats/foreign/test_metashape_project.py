@@ -16,6 +16,7 @@ from aerotri.conventions import InputError, px_from_mm
 from aerotri.coordinates.local_frame import topocentric_frame
 from aerotri.formats.assembly.oriented import oriented_block
 from aerotri.formats.convert import detect_format, write_oriented
+from aerotri.formats.foreign.metashape_files import open_project
 from aerotri.formats.foreign.metashape_project import read_metashape_project
 from aerotri.functional_model.additional_parameters import lens
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -279,3 +280,17 @@ def test_additional_parameters_are_fitted(tmp_path):
     oriented = oriented_block(replace(reading.block, cameras=cameras), reading.points)
     said = write_oriented(oriented, tmp_path / "cameras.xml", "metashape-xml")
     assert any("Metashape has no words for" in text for text in said)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_damaged_members_of_every_compression(tmp_path, method):
+    path = tmp_path / "site.psz"
+    with zipfile.ZipFile(path, "w", method) as file:
+        file.writestr("doc.xml", "<document>" + "<a b='1'/>" * 500 + "</document>")
+    whole = path.read_bytes()
+    begin = whole.index(b"doc.xml") + len("doc.xml")
+    end = whole.index(b"PK\x01\x02")
+    for at in range(begin, end, 3):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
+        with pytest.raises(InputError):
+            open_project(path)
