@@ -150,6 +150,17 @@ def print_rigidity(found: aerotri.Adjustment) -> None:
     print(f"\nPhotographs out of place: {int(out.found.sum())} of {len(out)}\n", flush=True)
 
 
+def print_movements(found: aerotri.Adjustment) -> None:
+    """σ of the movements of every head of a weighted rig."""
+    moves = found.adjusted.rig_movements
+    if moves is None:
+        return
+    print("| head | σ of position mm | σ of rotation ″ |\n|---|---|---|")
+    for name, (position, rotation) in zip(moves.camera, moves.sigma, strict=True):
+        print(f"| {name} | {1000.0 * position:.1f} | {3600.0 * np.degrees(rotation):.1f} |")
+    print(flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="folder of the data")
@@ -179,6 +190,7 @@ def main() -> None:
         if found[name].adjusted.rigs:
             print_rig(found[name])
             print_rigidity(found[name])
+            print_movements(found[name])
         if options.leave_out:
             print("| left out | | dX m | dY m | dZ m | d/σ X | d/σ Y | d/σ Z |\n|---|---|---|---|---|---|---|---|")
             for point, left in left_out_in_turn(own, found[name]):

@@ -85,7 +85,7 @@ def unnoticed_motions(system: NormalSystem, state: State, diagonal: np.ndarray) 
     diagonal : (size,) of the normal matrix before the points are eliminated.
     """
     motions = _motions(system.unknowns, state)
-    directions = _directions(motions, len(diagonal))
+    directions, diagonal = _directions(motions, len(diagonal)), _without_ties(system, state, diagonal)
     size = _size(motions, directions, diagonal)
     unit = 1.0 / np.sqrt(np.maximum(np.diagonal(size), 1e-300))
     size, rows = size * np.outer(unit, unit), _rows(system, state, motions, diagonal) * unit[None, :]
@@ -95,6 +95,17 @@ def unnoticed_motions(system: NormalSystem, state: State, diagonal: np.ndarray) 
     value, turn = eigh(effect.T @ effect, weak.T @ size @ weak) if weak.shape[1] else (np.zeros(0), np.zeros((0, 0)))
     names, free = _named(weak @ turn[:, value < NOT_DETERMINED])
     return FreeOfObservations(names, directions @ (free * unit[:, None]))
+
+
+def _without_ties(system: NormalSystem, state: State, diagonal: np.ndarray) -> np.ndarray:
+    """(size,) the diagonal without the ties of weighted rigs: tight ones outweigh all rays and notice no motion."""
+    rows, ties = system.tie_rows(state), system.unknowns.ties
+    if rows is None or ties is None:
+        return diagonal
+    n = len(state.centre)
+    squares, squares_shared = np.zeros((n, 6)), np.zeros(len(state.shared))
+    ties.add_squares(rows, squares, squares_shared)
+    return np.maximum(diagonal - np.concatenate([squares.ravel(), squares_shared]), 0.0)
 
 
 def _weak(effect: np.ndarray, size: np.ndarray) -> np.ndarray:
