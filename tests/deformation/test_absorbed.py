@@ -7,7 +7,8 @@ import pytest
 from scipy.stats import chi2
 
 from aerotri.adjustment.ray_status import RayStatus
-from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials, additional_rows
+from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials
+from aerotri.deformation.error_parameters import error_rows
 from aerotri.deformation.model_geometry import normal_model
 from aerotri.deformation.model_grid import mean_ground, pair_of
 from aerotri.deformation.orientation import calibrated_orientation
@@ -22,7 +23,7 @@ DRAWS = {"free": 200, "absorbed": 30}
 
 def with_values(calibration, value):
     """State and result with other values of the additional parameters, everything else as adjusted."""
-    rows = additional_rows(calibration)
+    rows = error_rows(calibration)
     p = calibration.local.parameters
     changed = p.value.copy()
     changed[rows] = value
@@ -67,7 +68,7 @@ def test_without_image_errors_nothing_moves(datum):
     navigated = {"gnss": gnss, "ins": ins} if datum == "control" else {}
     block, _ = small_block(5, "bluh:1-12", **navigated)
     a = adjust_keeping_system(with_adjustment(block, datum=datum))
-    rows = additional_rows(a)
+    rows = error_rows(a)
     assert len(rows) == 12
     _, state = with_values(a, np.zeros(12))
     found, true = absorbed_orientation(a, state).orientation, calibrated_orientation(a)
@@ -85,7 +86,7 @@ def test_partials_are_those_of_the_adjustment(calibration, datum):
         free = replace(camera, interior={**camera.interior, "focal_length_mm": focal})
         block = replace(block, cameras=(free,))
     a = adjust_keeping_system(block)
-    rows, partials = additional_rows(a), absorbed_partials(a)
+    rows, partials = error_rows(a), absorbed_partials(a)
     value, sigma = a.local.parameters.value[rows], a.local.parameters.sigma[rows]
     rng = np.random.default_rng(2)
     for _ in range(2):
@@ -116,7 +117,7 @@ def test_sigma_against_monte_carlo(calibration, pair, variant):
     points = points[seen]
     assert len(points) >= 4
     predicted = np.diagonal(covariance_of(model, points), axis1=1, axis2=2)
-    rows = additional_rows(calibration)
+    rows = error_rows(calibration)
     p = calibration.local.parameters
     scale = p.sigma[rows]
     root = scale[:, None] * np.linalg.cholesky(p.covariance[np.ix_(rows, rows)] / np.outer(scale, scale))
@@ -140,7 +141,7 @@ def test_sigma_against_monte_carlo(calibration, pair, variant):
 
 def test_sigma_of_the_normal_case_follows_its_parameters(calibration):
     """The mean change of orientation and its partials belong together: a finite change of the parameters."""
-    rows = additional_rows(calibration)
+    rows = error_rows(calibration)
     value, sigma = calibration.local.parameters.value[rows], calibration.local.parameters.sigma[rows]
     restitution = restitution_of(calibration, "absorbed")
     model, _ = normal_model(calibration, restitution, 0.6)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aerotri.adjustment.unknowns import Step
-from aerotri.deformation.absorbed import shared_columns
+from aerotri.deformation.error_parameters import shared_columns
 from aerotri.deformation.restitution import restitution_of
 from aerotri.deformation.stereo_model import covariance_of, deform_points, pair_model
 from aerotri.functional_model._kernels import INTERIOR, linearise_ray, predict_ray

@@ -92,5 +92,7 @@ def _summary(found: IdealPhotographs) -> list[str]:
         )
     for photograph in found.summary["photographs"]:
         lost = f", without {', '.join(photograph['left_out'])}" if photograph["left_out"] else ""
-        lines.append(f"{one_line(photograph['written'])}: {photograph['seconds']:.1f} s{lost}")
+        left = photograph.get("relief_rms_px")
+        relief = "" if left is None else f", relief leaves {left:.2f} px RMS of the rolling shutter"
+        lines.append(f"{one_line(photograph['written'])}: {photograph['seconds']:.1f} s{relief}{lost}")
     return lines

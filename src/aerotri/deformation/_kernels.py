@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aerotri.compiled import kernel
-from aerotri.functional_model._photo_kernels import ErrorTable, image_error, partials, project
+from aerotri.functional_model._photo_kernels import ErrorTable, delay, image_error, partials, project, project_at
 
 SMALLEST_PATCH, NODES, CHECKS, MODELS_IN_PATCH = 4, 9, 6, 3
 """Cells along a patch that is not halved, nodes of a fit (3 × 3), places it is checked at, models of a patch [C]. A fit
@@ -29,7 +29,8 @@ LAST_STEP_M = 5e-3
 class Models(NamedTuple):
     """M stereo models.
 
-    photos : (M, 4, 23) used left, used right, true left, true right, as in `_photo_kernels`.
+    photos : (M, 4, 23) used left, used right, true left, true right, as in `_photo_kernels`; a true one may have a
+        rolling shutter.
     source : (M, 2) image errors of left and right. errors : of all groups of photographs.
     """
 
@@ -113,6 +114,7 @@ def deformation(models, m, x, y, z):
     on_right = depth2 < 0.0 and abs(x2) <= half[right, 0] and abs(y2) <= half[right, 1]
     if not (on_left and on_right):
         return np.nan, np.nan, np.nan
+    tau1, tau2 = delay(photos, m, 2, x1, y1), delay(photos, m, 3, x2, y2)
     dx, dy = image_error(left, x1, y1, models.errors)
     x1, y1 = x1 - dx, y1 - dy
     dx, dy = image_error(right, x2, y2, models.errors)
@@ -130,9 +132,9 @@ def deformation(models, m, x, y, z):
     scale = 1.0 / (n00 * q00 + n10 * q10 + n20 * q20)
     px, py, pz = x, y, z
     for _ in range(STEPS):
-        u, v, _ = project(photos, m, 2, px, py, pz)
+        u, v = project_at(photos, m, 2, tau1, px, py, pz)
         g0, g1 = x1 - u, y1 - v
-        u, v, _ = project(photos, m, 3, px, py, pz)
+        u, v = project_at(photos, m, 3, tau2, px, py, pz)
         g2, g3 = x2 - u, y2 - v
         r0 = a0 * g0 + b0 * g1 + c0 * g2 + d0 * g3
         r1 = a1 * g0 + b1 * g1 + c1 * g2 + d1 * g3

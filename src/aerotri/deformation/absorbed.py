@@ -3,7 +3,7 @@
 [D] The noise-free observations l + v of the self-calibrated solution are adjusted without additional parameters, with
 the same weights and in the same datum. Every observation takes part as it was adjusted: image points, control, GNSS,
 INS, conditions. So what moves is moved by the image errors alone. Interior elements that were unknowns stay unknowns
-[C]; Brown's and lens parameters count as image errors, also where they were given.
+[C]; Brown's and lens parameters count as image errors, also where they were given, and so does a rolling shutter.
 
 To first order x_abs = x + N_xx⁻¹·N_xp·p, x all unknowns but the additional parameters p. From Q·N = I follows
 N_xx⁻¹·N_xp = −Q_xp·Q_pp⁻¹: the covariances of the self-calibrated adjustment know how the orientation would follow.
@@ -20,6 +20,7 @@ from aerotri.adjustment.normal_equations import ExtraObservations, NormalSystem
 from aerotri.adjustment.solve import Solution, SolveOptions, minimise
 from aerotri.adjustment.unknowns import State, Unknowns
 from aerotri.conventions import InputError
+from aerotri.deformation.error_parameters import KINDS, shared_columns
 from aerotri.deformation.orientation import Orientation
 from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.results.adjustment import Adjustment
@@ -102,7 +103,7 @@ def absorbed_partials(calibration: Adjustment) -> np.ndarray:
     Returns
     -------
     (n, 9, p) partials of X0, Y0, Z0 (m), the small rotation about the object axes (rad) and c, x0, y0 (mm) of all
-    photographs of the block by the additional parameters, in the order of `additional_rows`.
+    photographs of the block by the additional parameters, in the order of `error_rows`.
     """
     system, solution = calibration.system, calibration.solution
     u = system.unknowns
@@ -127,26 +128,13 @@ def absorbed_partials(calibration: Adjustment) -> np.ndarray:
     return out
 
 
-def additional_rows(calibration: Adjustment) -> np.ndarray:
-    """Rows of the additional parameters that were adjusted, in the record of the shared parameters."""
-    p = calibration.local.parameters
-    return np.flatnonzero((p.kinds == "additional") & np.isin(p.status, ("estimated", "weighted")))
-
-
-def shared_columns(calibration: Adjustment) -> np.ndarray:
-    """The shared unknowns of the system that `additional_rows` are."""
-    shared, p = calibration.system.unknowns.shared, calibration.local.parameters
-    place = {key: column for column, key in enumerate(zip(shared.names, shared.groups, strict=True))}
-    rows = additional_rows(calibration)
-    return np.array([place[str(p.names[row]), str(p.groups[row])] for row in rows], dtype=np.int64)
-
-
 def _has_image_errors(unknowns: Unknowns) -> bool:
-    return "additional" in unknowns.shared.kinds or bool(unknowns.lens.base[:, N_INTERIOR:].any())
+    moved = unknowns.scanning is not None
+    return moved or "additional" in unknowns.shared.kinds or bool(unknowns.lens.base[:, N_INTERIOR:].any())
 
 
 def _without_parameters(system: NormalSystem, solution: Solution, state: State) -> tuple[NormalSystem, State]:
-    """The same block without additional parameters, its observations as the unknowns `state` foretell them."""
+    """The same block without additional parameters and rolling shutters, its observations as `state` foretells them."""
     u = system.unknowns
     predicted = u.rays.xy - system.assemble(state, 0.0, solution.estimator).residual
     weight = np.sqrt(solution.equations.weight)[:, None]
@@ -157,14 +145,15 @@ def _without_parameters(system: NormalSystem, solution: Solution, state: State) 
     )  # fmt: skip
     base, columns = u.lens.base.copy(), u.lens.columns.copy()
     base[:, N_INTERIOR:], columns[:, N_INTERIOR:] = 0.0, -1
-    gone = np.array(u.shared.kinds) == "additional"
+    gone = np.isin(np.array(u.shared.kinds, dtype=object), KINDS)
     # no ray touches these columns any more: observed as zero they stay out of everything
     sigma = np.where(gone, 1.0, np.array(u.shared.sigma, dtype=float))
     values = np.where(gone, 0.0, state.shared)
     shared = replace(u.shared, sigma=sigma.tolist(), observed=values.tolist(), fields=[])
     unknowns = replace(
-        u, rays=rays, lens=replace(u.lens, base=base, columns=columns), shared=shared, prior_xyz=state.points.copy()
-    )
+        u, rays=rays, lens=replace(u.lens, base=base, columns=columns), shared=shared, prior_xyz=state.points.copy(),
+        scanning=None,
+    )  # fmt: skip
     start = replace(state, shared=values)
     extras = [_NoiseFree(e, e.rows(state.centre, state.rotation, state.shared).gap) for e in system.extras]
     return NormalSystem(unknowns, extras, state.centre[:, :2]), start

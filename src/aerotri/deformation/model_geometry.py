@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.adjustment.kernel_records import Scans
 from aerotri.conventions import InputError
 from aerotri.deformation.orientation import Orientation
 from aerotri.deformation.restitution import Restitution
@@ -117,7 +118,7 @@ def normal_model(
     scale = height / float(
         np.median(restitution.true.centre[members, 2]) - np.nanmedian(calibration.local.points.xyz[:, 2])
     )
-    true = _normal_orientation(errors.camera, interior, geometry)
+    true = _normal_orientation(errors.camera, interior, geometry, _normal_motion(errors.camera, restitution, members))
     used, follows = _with_mean_change(true, restitution, members, scale)
     names = ("first", "second")
     return StereoModel(names, (errors, errors), true, used, follows, restitution.covariance), geometry
@@ -141,13 +142,28 @@ def _members(calibration: Adjustment, restitution: Restitution, group: str | Non
     return members, number
 
 
-def _normal_orientation(camera: Camera, interior: np.ndarray, geometry: ModelGeometry) -> Orientation:
+def _normal_motion(camera: Camera, restitution: Restitution, members: np.ndarray) -> Scans | None:
+    """Of two photographs of a rolling shutter: along the flight with the usual speed of the group, without turning."""
+    s = restitution.true.scans
+    if s is None or not s.rate[members].any():
+        return None
+    x, y = AXES[camera.flight_axis or DEFAULT_AXIS]
+    velocity = float(np.median(np.linalg.norm(s.velocity[members], axis=1))) * np.array([x, y, 0.0])
+    first = members[0]
+    columns = np.array([s.columns[first, 0], -1, -1])
+    one = Scans(s.rate[first], s.readout[first], velocity, np.zeros(3), columns)
+    return Scans(*(np.stack([part, part]) for part in one))
+
+
+def _normal_orientation(
+    camera: Camera, interior: np.ndarray, geometry: ModelGeometry, motion: Scans | None
+) -> Orientation:
     """Two vertical photographs whose flight axis points along X."""
     x, y = AXES[camera.flight_axis or DEFAULT_AXIS]
     rotation = np.array([[x, y, 0.0], [-y, x, 0.0], [0.0, 0.0, 1.0]])
     half, height = geometry.base_m / 2.0, geometry.height_m
     centre = np.array([[-half, 0.0, height], [half, 0.0, height]])
-    return Orientation(centre, np.stack([rotation, rotation]), np.stack([interior, interior]))
+    return Orientation(centre, np.stack([rotation, rotation]), np.stack([interior, interior]), motion)
 
 
 def _with_mean_change(

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerotri.adjustment.kernel_records import Scans
+from aerotri.deformation.error_parameters import shared_columns
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.image_errors import interior_elements
 from aerotri.observations import Block
@@ -22,13 +24,13 @@ class Orientation:
     centre : (n, 3) m, in the local frame of the block.
     rotation : (n, 3, 3) camera → object.
     interior : (n, 3) mm, c, x0, y0.
-    scan : (n, 8) of rolling shutters, as the last of `_photo_kernels`; None without.
+    scans : what rolling shutters do while photographs are read, columns counted in `error_rows`; None without.
     """
 
     centre: np.ndarray
     rotation: np.ndarray
     interior: np.ndarray
-    scan: np.ndarray | None = None
+    scans: Scans | None = None
 
     def __len__(self) -> int:
         return len(self.centre)
@@ -40,25 +42,34 @@ class Orientation:
 
     def take(self, rows: np.ndarray | list[int]) -> Orientation:
         """The orientation of some photographs."""
-        scan = None if self.scan is None else self.scan[rows]
-        return Orientation(self.centre[rows], self.rotation[rows], self.interior[rows], scan)
+        scans = None if self.scans is None else Scans(*(part[rows] for part in self.scans))
+        return Orientation(self.centre[rows], self.rotation[rows], self.interior[rows], scans)
+
+    @property
+    def standing_still(self) -> Orientation:
+        """The orientation in the middle of the readout for all rows: what programs use that know no rolling shutter."""
+        return replace(self, scans=None)
 
 
 def calibrated_orientation(calibration: Adjustment) -> Orientation:
     """The orientation of all photographs of the block after its adjustment."""
     adjusted = calibration.local
     rotation = rotation_from_angles(adjusted.images.angles, adjusted.block.rotation)
-    return Orientation(adjusted.images.centre, rotation, interior_of_images(adjusted))
+    return Orientation(adjusted.images.centre, rotation, interior_of_images(adjusted), _scans_of_images(calibration))
 
 
-def scan_of_images(calibration: Adjustment) -> np.ndarray | None:
-    """(n, 8) what rolling shutters do, of every photograph of the block after its adjustment; None without."""
-    u, shared = calibration.system.unknowns, calibration.solution.state.shared
+def _scans_of_images(calibration: Adjustment) -> Scans | None:
+    """What rolling shutters do, of every photograph of the block after its adjustment; None without."""
+    u = calibration.system.unknowns
     if u.scanning is None:
         return None
-    found = np.zeros((len(calibration.local.block.images), 8))
-    velocity, spin = u.scanning.motion(shared)
-    found[u.images] = np.concatenate([velocity, spin, u.scanning.rate * u.scanning.readout(shared)[:, None]], axis=1)
+    own, n = u.scans(calibration.solution.state), len(calibration.local.block.images)
+    place = np.full(len(u.shared) + 1, -1, dtype=np.int64)
+    columns = shared_columns(calibration)
+    place[columns] = np.arange(len(columns))
+    found = Scans(np.zeros((n, 2)), np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.full((n, 3), -1))
+    for part, values in zip(found, own._replace(columns=place[own.columns]), strict=True):
+        part[u.images] = values
     return found
 
 
@@ -107,7 +118,9 @@ def photo_rows(orientation: Orientation, local: np.ndarray, axes: np.ndarray) ->
     """(n, 23) photographs as kernels take them, for coordinates Δ of which local + axes·Δ is the place in the frame."""
     to_camera = np.swapaxes(orientation.rotation, 1, 2)
     u = np.concatenate([to_camera @ axes, to_camera @ (local - orientation.centre)[:, :, None]], axis=2)
-    scan = np.zeros((len(u), 8)) if orientation.scan is None else orientation.scan
+    scan, s = np.zeros((len(u), 8)), orientation.scans
+    if s is not None:
+        scan = np.concatenate([s.velocity, s.spin, s.rate * s.readout[:, None]], axis=1)
     return np.concatenate([u.reshape(-1, 12), orientation.interior, scan], axis=1)
 
 

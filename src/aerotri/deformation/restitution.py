@@ -2,6 +2,7 @@
 
 Two variants, always labelled. `free`: the orientation of the self-calibrated block, the photographs used uncorrected.
 `absorbed`: the orientation of an adjustment without additional parameters, which swallows part of the image errors.
+What a rolling shutter does is an image error too: in use, all rows of a photograph count as exposed at once.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials, additional_rows
+from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials
+from aerotri.deformation.error_parameters import error_rows
 from aerotri.deformation.orientation import Orientation, calibrated_orientation
 from aerotri.deformation.photo_errors import PhotoErrors, errors_by_image
 from aerotri.results.adjustment import Adjustment
@@ -44,7 +46,8 @@ class Restitution:
     Parameters
     ----------
     variant : 'free', 'absorbed', or 'given' for an orientation from elsewhere.
-    true, used : the orientation after the self-calibration, and the one the models are restituted with.
+    true, used : the orientation after the self-calibration, with the motion of rolling shutters, and the one the models
+        are restituted with, which knows none.
     errors : image errors of the groups of photographs. group : (n,) which of them each photograph has.
     follows : (n, 9, p) partials of the used orientation by the additional parameters, as `absorbed_partials`.
     covariance : (p, p) of the additional parameters, σ̂0² and the model part included.
@@ -81,7 +84,7 @@ def restitution_of(calibration: Adjustment, variant: str = FREE, used: Orientati
     ------
     AbsorptionFailedError
     """
-    rows = additional_rows(calibration)
+    rows = error_rows(calibration)
     errors, group = errors_by_image(calibration, rows)
     true = calibrated_orientation(calibration)
     follows = np.zeros((len(true), 9, len(rows)))
@@ -90,7 +93,7 @@ def restitution_of(calibration: Adjustment, variant: str = FREE, used: Orientati
     elif variant == ABSORBED:
         used, follows = absorbed_orientation(calibration).orientation, absorbed_partials(calibration)
     else:
-        used = true
+        used = true.standing_still
     covariance = calibration.local.parameters.total_covariance[np.ix_(rows, rows)]
     part = calibration.local.model_part
     return Restitution(variant, true, used, errors, group, follows, covariance, "" if part is None else part.change)

@@ -1,7 +1,8 @@
 """The deformation of a stereo model: what a point becomes when its photographs are used uncorrected.
 
 [D] The true point P is projected into both photographs, measured where the image errors put it, m = ideal + d(m) inside
-the tile of the ideal position, and intersected rigorously with the orientation in use. dX, dY, dZ = wrong − true.
+the tile of the ideal position, and intersected rigorously with the orientation in use. dX, dY, dZ = wrong − true. With
+a rolling shutter the projection is that at the exposure of the row of m; the intersection knows nothing of it.
 
 σ comes from the covariance Q of the additional parameters: with G = (AᵀA)⁻¹Aᵀ of the intersection, A the partials of
 its four image coordinates by the point, ∂P/∂p = G·(B − A_o·∂o/∂p), B = ∂d/∂p and o the orientation in use.
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.deformation.moving_rays import by_motion, exposed
 from aerotri.deformation.orientation import Orientation
 from aerotri.deformation.photo_errors import PhotoErrors, seams_mm
 from aerotri.deformation.restitution import Restitution
@@ -23,6 +25,10 @@ ITERATIONS = 20
 """Steps of an intersection at most [C]: a few reach the tolerance; the others are for rays that hardly meet."""
 STEP_TOLERANCE_M = 1e-8
 """Last step of an intersection [C]: 0.01 µm, above the rounding of local coordinates and far below any deformation."""
+ROW_STEPS = 3
+"""Steps to the row that shows a point in a photograph of a rolling shutter [C]: each leaves about a hundredth."""
+FARTHEST_ROW = 1.5
+"""Half formats from the middle beyond which a row is taken for that at this distance."""
 PIECE = 2048
 """Nodes whose partials by all parameters are held at a time."""
 
@@ -82,16 +88,39 @@ def seen_by_both(model: StereoModel, points: np.ndarray) -> np.ndarray:
     for k, errors in enumerate(model.errors):
         depth = (points - model.true.centre[k]) @ model.true.rotation[k, :, 2]
         with np.errstate(divide="ignore", invalid="ignore"):
-            seen &= (depth < 0.0) & errors.inside(project(model.true, k, points))
+            seen &= (depth < 0.0) & errors.inside(ideal(model, k, points))
     return seen
 
 
-def project(orientation: Orientation, k: int, points: np.ndarray) -> np.ndarray:
-    """(n, 2) mm, ideal position of points (n, 3) m in photograph k."""
-    n = len(points)
+def ideal(model: StereoModel, k: int, points: np.ndarray) -> np.ndarray:
+    """(n, 2) mm, ideal position of points (n, 3) m in photograph k; of a rolling shutter in the row that it shows."""
+    orientation, xy = model.true, np.zeros((len(points), 2))
+    if orientation.scans is None:
+        return project(orientation, k, points, xy)
+    # rows far beyond the format say no time
+    most = FARTHEST_ROW * np.array(model.errors[k].camera.half_format_mm)
+    for _ in range(ROW_STEPS):
+        xy = project(orientation, k, points, np.clip(np.nan_to_num(xy), -most, most))
+    return xy
+
+
+def project(orientation: Orientation, k: int, points: np.ndarray, at: np.ndarray | None = None) -> np.ndarray:
+    """(n, 2) mm, ideal position of points (n, 3) m in photograph k, when rays measured `at` (n, 2) mm are exposed.
+
+    Without `at` all are exposed in the middle of the readout.
+    """
+    rotation, centre, interior, image = _moved(orientation, k, np.zeros((len(points), 2)) if at is None else at)
+    point, row = np.arange(len(points)), np.full(len(points), k, dtype=np.int64)
+    return predict(rotation, centre, points, interior, image, point, row, np.zeros((len(points), 2)))
+
+
+def _moved(orientation: Orientation, k: int, at: np.ndarray):
+    """Tables of photograph k as rays measured at (n, 2) mm take them: rotation, centre, interior, row of each ray."""
     rotation, centre, interior = _tables(orientation)
-    one = np.full(n, k, dtype=np.int64)
-    return predict(rotation, centre, points, interior, one, np.arange(n), one, np.zeros((n, 2)))
+    if orientation.scans is None:
+        return rotation, centre, interior, np.full(len(at), k, dtype=np.int64)
+    rotation, centre = (np.ascontiguousarray(part) for part in exposed(orientation, k, at))
+    return rotation, centre, interior, np.arange(len(at))
 
 
 def regions(model: StereoModel, points: np.ndarray) -> np.ndarray:
@@ -102,7 +131,7 @@ def regions(model: StereoModel, points: np.ndarray) -> np.ndarray:
     seen = seen_by_both(model, points)
     number = np.zeros(len(points), dtype=np.int64)
     for k, errors in enumerate(model.errors):
-        xy = project(model.true, k, points[seen])
+        xy = ideal(model, k, points[seen])
         for axis, seams in enumerate(seams_mm(errors.camera)):
             number[seen] = (len(seams) + 1) * number[seen] + np.searchsorted(seams, xy[:, axis], side="right")
     return np.where(seen, number, -1)
@@ -127,7 +156,16 @@ def deform_points(model: StereoModel, points: np.ndarray) -> PointDeformation:
 
 def measured(model: StereoModel, points: np.ndarray) -> np.ndarray:
     """(2, n, 2) mm, where the erring camera shows true points (n, 3) m."""
-    return np.stack([errors.measured(project(model.true, k, points)) for k, errors in enumerate(model.errors)])
+    return np.stack([_measured(model, k, points) for k in range(len(model.errors))])
+
+
+def _measured(model: StereoModel, k: int, points: np.ndarray) -> np.ndarray:
+    """(n, 2) mm in photograph k; the row that is measured says when it is exposed."""
+    errors = model.errors[k]
+    xy = errors.measured(ideal(model, k, points))
+    for _ in range(0 if model.true.scans is None else ROW_STEPS):
+        xy = errors.measured(project(model.true, k, points, xy))
+    return xy
 
 
 def intersect(orientation: Orientation, xy: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -174,11 +212,21 @@ def partials_by_parameters(model: StereoModel, points: np.ndarray) -> Iterator[t
         at = measured(model, true)
         linear = _linearised(model.used, true)
         by_photo = [errors.partials(at[k]) for k, errors in enumerate(model.errors)]
+        if model.true.scans is not None:
+            by_photo = [b + _by_motion(model, k, true, at[k]) for k, b in enumerate(by_photo)]
         if moved:
             by_used = np.concatenate([linear.by_orientation, linear.by_interior[:, :, :3]], axis=2)
             by_used = by_used.reshape(2, len(true), 2, 9)
             by_photo = [b - by_used[k] @ model.follows[k] for k, b in enumerate(by_photo)]
         yield rows, _gain(linear) @ np.concatenate(by_photo, axis=1)
+
+
+def _by_motion(model: StereoModel, k: int, points: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """(n, 2, p) partials of rays of photograph k measured at (n, 2) mm by the unknowns of its rolling shutter."""
+    rotation, centre, interior, image = _moved(model.true, k, at)
+    point, row = np.arange(len(points)), np.full(len(points), k, dtype=np.int64)
+    rays = linearise(rotation, centre, points, interior, image, point, row, np.zeros((len(points), 2)))
+    return by_motion(model.true, k, at, rays, len(model.covariance))
 
 
 def _tables(orientation: Orientation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -61,17 +61,34 @@ def image_error(s, x, y, table):
 
 
 @kernel
+def scans(photos, m, k):
+    """Whether photograph k of model m has a rolling shutter."""
+    return photos[m, k, 21] != 0.0 or photos[m, k, 22] != 0.0
+
+
+@kernel
+def delay(photos, m, k, x, y):
+    """s after the middle of the readout, at which a ray measured at (x, y) mm is exposed."""
+    return photos[m, k, 21] * x + photos[m, k, 22] * y
+
+
+@kernel
+def when_exposed(photos, m, k, tau, u1, u2, u3):
+    """u of a point, tau s after the middle of the readout."""
+    p1, p2, p3 = u1 - photos[m, k, 15] * tau, u2 - photos[m, k, 16] * tau, u3 - photos[m, k, 17] * tau
+    t1, t2, t3 = photos[m, k, 18] * tau, photos[m, k, 19] * tau, photos[m, k, 20] * tau
+    return p1 - t2 * p3 + t3 * p2, p2 - t3 * p1 + t1 * p3, p3 - t1 * p2 + t2 * p1
+
+
+@kernel
 def in_scan(photos, m, k, u1, u2, u3):
     """u of a point when its row is exposed; the row is that of the ideal position, found in two steps [C]: they leave
     less than a thousandth of a pixel of some ten."""
     v1, v2, v3 = u1, u2, u3
     for _ in range(2):
         scale = -photos[m, k, 12] / v3
-        x, y = photos[m, k, 13] + scale * v1, photos[m, k, 14] + scale * v2
-        tau = photos[m, k, 21] * x + photos[m, k, 22] * y
-        p1, p2, p3 = u1 - photos[m, k, 15] * tau, u2 - photos[m, k, 16] * tau, u3 - photos[m, k, 17] * tau
-        t1, t2, t3 = photos[m, k, 18] * tau, photos[m, k, 19] * tau, photos[m, k, 20] * tau
-        v1, v2, v3 = p1 - t2 * p3 + t3 * p2, p2 - t3 * p1 + t1 * p3, p3 - t1 * p2 + t2 * p1
+        tau = delay(photos, m, k, photos[m, k, 13] + scale * v1, photos[m, k, 14] + scale * v2)
+        v1, v2, v3 = when_exposed(photos, m, k, tau, u1, u2, u3)
     return v1, v2, v3
 
 
@@ -81,10 +98,22 @@ def project(photos, m, k, x, y, z):
     u1 = photos[m, k, 0] * x + photos[m, k, 1] * y + photos[m, k, 2] * z + photos[m, k, 3]
     u2 = photos[m, k, 4] * x + photos[m, k, 5] * y + photos[m, k, 6] * z + photos[m, k, 7]
     u3 = photos[m, k, 8] * x + photos[m, k, 9] * y + photos[m, k, 10] * z + photos[m, k, 11]
-    if photos[m, k, 21] != 0.0 or photos[m, k, 22] != 0.0:
+    if scans(photos, m, k):
         u1, u2, u3 = in_scan(photos, m, k, u1, u2, u3)
     scale = -photos[m, k, 12] / u3
     return photos[m, k, 13] + scale * u1, photos[m, k, 14] + scale * u2, u3
+
+
+@kernel
+def project_at(photos, m, k, tau, x, y, z):
+    """(x, y) mm of a point in photograph k of model m, tau s after the middle of the readout."""
+    u1 = photos[m, k, 0] * x + photos[m, k, 1] * y + photos[m, k, 2] * z + photos[m, k, 3]
+    u2 = photos[m, k, 4] * x + photos[m, k, 5] * y + photos[m, k, 6] * z + photos[m, k, 7]
+    u3 = photos[m, k, 8] * x + photos[m, k, 9] * y + photos[m, k, 10] * z + photos[m, k, 11]
+    if tau != 0.0:
+        u1, u2, u3 = when_exposed(photos, m, k, tau, u1, u2, u3)
+    scale = -photos[m, k, 12] / u3
+    return photos[m, k, 13] + scale * u1, photos[m, k, 14] + scale * u2
 
 
 @kernel
@@ -93,7 +122,7 @@ def partials(photos, m, k, x, y, z):
     u1 = photos[m, k, 0] * x + photos[m, k, 1] * y + photos[m, k, 2] * z + photos[m, k, 3]
     u2 = photos[m, k, 4] * x + photos[m, k, 5] * y + photos[m, k, 6] * z + photos[m, k, 7]
     u3 = photos[m, k, 8] * x + photos[m, k, 9] * y + photos[m, k, 10] * z + photos[m, k, 11]
-    if photos[m, k, 21] != 0.0 or photos[m, k, 22] != 0.0:
+    if scans(photos, m, k):
         u1, u2, u3 = in_scan(photos, m, k, u1, u2, u3)
     inverse = -1.0 / u3
     a, b, f = u1 * inverse, u2 * inverse, photos[m, k, 12] * inverse

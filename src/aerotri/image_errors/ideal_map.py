@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 
 from aerotri.conventions import mm_from_px, px_from_mm
 from aerotri.image_errors import _kernels
-from aerotri.image_errors.error_function import ErrorFunction
+from aerotri.image_errors.error_function import Bounds
 from aerotri.image_errors.tile_grid import TileGrid, sample, seams_px, tiles_of
 from aerotri.observations import Camera
 
@@ -65,8 +66,18 @@ class IdealMap:
         return low - _kernels.PAD + 1, max(high, low) + _kernels.PAD + 1
 
 
-def ideal_map(errors: ErrorFunction) -> IdealMap:
-    """The map of a group of photographs.
+class Errors(Protocol):
+    """Image errors of a group of photographs, or of one."""
+
+    @property
+    def camera(self) -> Camera: ...
+    @property
+    def is_zero(self) -> bool: ...
+    def measured(self, ideal: np.ndarray, within: Bounds | None = None) -> np.ndarray: ...
+
+
+def ideal_map(errors: Errors) -> IdealMap:
+    """The map of a group of photographs, or of one photograph of a rolling shutter.
 
     Raises
     ------
@@ -96,7 +107,7 @@ def ideal_map(errors: ErrorFunction) -> IdealMap:
     )
 
 
-def _margin(errors: ErrorFunction) -> int:
+def _margin(errors: Errors) -> int:
     """Pixels by which a tile may record what ideally lies beyond its seams."""
     camera, farthest = errors.camera, 0.0
     half = np.array(camera.half_format_mm)
@@ -116,7 +127,7 @@ def _ranges(seams: np.ndarray, count: int, margin: int) -> list[tuple[int, int]]
     return [(int(max(low - margin, 0)), int(min(high + margin, count - 1))) for low, high in pairwise(edges)]
 
 
-def _displacement(errors: ErrorFunction, within: tuple[np.ndarray, np.ndarray]):
+def _displacement(errors: Errors, within: tuple[np.ndarray, np.ndarray]):
     size, pixel = errors.camera.size_px, errors.camera.pixel_mm
 
     def of_pixels(column_row: np.ndarray) -> np.ndarray:

@@ -10,6 +10,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import paths_of, refuse_existing_file, refuse_foreign_folder
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
     from aerotri.image_errors.error_function import ErrorFunction
     from aerotri.image_errors.ideal_map import IdealMap
     from aerotri.observations import Block, Camera
+    from aerotri.results.adjusted_block import AdjustedBlock
+    from aerotri.results.adjustment import Adjustment as Record
 
 ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff")
 UNITS = {"focal_length_mm": "mm", "x0_mm": "mm", "y0_mm": "mm", "d_rms_um": "µm", "d_max_um": "µm", "seconds": "s"}
@@ -80,6 +84,7 @@ class _Job:
     source: Path
     group: int
     name: str
+    row: int
 
 
 def ideal_photographs(
@@ -134,15 +139,19 @@ def ideal_photographs(
     folder = Path(out)
     _check(resampling, compression)
     refuse_foreign_folder(folder, RECORD)
-    adjusted = StatedAdjustment(result).record.result
+    calibration = StatedAdjustment(result).record
+    adjusted = calibration.result
     groups = image_groups(adjusted.block)
     jobs = _jobs(adjusted.block, groups, paths_of(photographs), folder, group)
+    _refuse_unknown_motion(adjusted, groups, jobs)
     used = sorted({job.group for job in jobs}) if jobs else range(len(groups))
     errors = {k: error_function(adjusted, groups[k]) for k in used}
     with held(folder), stage_report(progress) as report:
         exports = exports_of(adjusted, errors, resampling)
         record = _write_exports(exports, folder, [job.name for job in jobs], overwrite)
-        record["photographs"] = _resample_all(jobs, errors, folder, (resampling, compression), report)
+        record["photographs"] = _resample_all(
+            calibration, jobs, errors, folder, (resampling, compression), report
+        )  # fmt: skip
         _write_record(record, folder)
     names = [entry["ideal_camera"] for entry in record["groups"]]
     return IdealPhotographs(
@@ -182,7 +191,7 @@ def _jobs(
         if (out / name).exists() and (out / name).samefile(path):
             raise InputError("would be overwritten by its own correction", "choose another --out", path)
         taken[name] = path
-        jobs.append(_Job(path, number, name))
+        jobs.append(_Job(path, number, name, row))
     return jobs
 
 
@@ -227,11 +236,27 @@ def _write_record(record: dict[str, Any], out: Path) -> None:
         write_json(place, record)
 
 
+def _refuse_unknown_motion(adjusted: AdjustedBlock, groups: tuple[ImageGroup, ...], jobs: list[_Job]) -> None:
+    """Photographs of a rolling shutter that were not adjusted: how they moved is not known."""
+    if adjusted.rolling_shutters is None:
+        return
+    rolling = {one.camera for one in adjusted.rolling_shutters.readouts}
+    oriented: np.ndarray = np.isfinite(adjusted.images.centre).all(axis=1)
+    for job in jobs:
+        if groups[job.group].camera.name in rolling and (job.row < 0 or not bool(oriented[job.row])):
+            raise InputError(
+                "its camera has a rolling shutter, and how it moved is not known: it was not adjusted",
+                "leave it out, or adjust it with the others", job.source,
+            )  # fmt: skip
+
+
 def _resample_all(
-    jobs: list[_Job], errors: dict[int, ErrorFunction], out: Path, how: tuple[Resampling, Compression],
-    report: StageReport,
+    calibration: Record, jobs: list[_Job], errors: dict[int, ErrorFunction], out: Path,
+    how: tuple[Resampling, Compression], report: StageReport,
 ) -> list[dict[str, Any]]:  # fmt: skip
     from aerotri.compiled import compilation_notice
+    from aerotri.deformation.moving_photographs import moving_errors, relief_left
+    from aerotri.deformation.orientation import calibrated_orientation
     from aerotri.formats.files.atomic import atomic_file
     from aerotri.image_errors.ideal_map import ideal_map
     from aerotri.image_errors.ideal_photographs import ideal_photograph
@@ -240,8 +265,10 @@ def _resample_all(
         report.stage(notice, None)
     maps: dict[int, IdealMap] = {}
     done = []
+    orientation = calibrated_orientation(calibration)
     for number, job in enumerate(jobs):
-        if job.group not in maps:
+        own = moving_errors(calibration, orientation, job.row, errors[job.group]) if job.row >= 0 else None
+        if own is None and job.group not in maps:
             maps[job.group] = ideal_map(errors[job.group])
 
         def told(share: float, number: int = number) -> None:
@@ -250,11 +277,14 @@ def _resample_all(
         started = time.perf_counter()
         (out / job.name).parent.mkdir(parents=True, exist_ok=True)
         with atomic_file(out / job.name) as place:
-            lost = ideal_photograph(job.source, place, maps[job.group], *how, told)
+            mapped = maps[job.group] if own is None else ideal_map(own)
+            lost = ideal_photograph(job.source, place, mapped, *how, told)
         done.append({
             "file": str(job.source), "written": job.name, "group": errors[job.group].group,
             "left_out": list(lost), "seconds": round(time.perf_counter() - started, 3),
         })  # fmt: skip
+        if own is not None:
+            done[-1]["relief_rms_px"] = relief_left(calibration, orientation, job.row, own)
     return done
 
 

@@ -156,6 +156,13 @@ IMGEO_JSON = (
     Item("photographs[].group", "text", "Its group."),
     Item("photographs[].left_out[]", "text", "What of the file could not be kept."),
     Item("photographs[].seconds", "number", "Time it took.", "s"),
+    Item(
+        "photographs[].relief_rms_px",
+        "number?",
+        "Of a rolling shutter: what the relief of the ground over a plane leaves, RMS over the tie points.",
+        "px",
+        optional=True,
+    ),
     Item("files[]", "text", "All files written."),
 )
 CORRECTION = (

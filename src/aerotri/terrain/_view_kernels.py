@@ -11,7 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from aerotri.compiled import kernel
-from aerotri.functional_model._photo_kernels import ErrorTable, error_in_tile, project, tile_of
+from aerotri.functional_model._photo_kernels import (
+    ErrorTable,
+    delay,
+    error_in_tile,
+    project,
+    project_at,
+    scans,
+    tile_of,
+)
 
 SMALLEST_ANGLE = 0.02
 """Base over height below which two photographs give no height."""
@@ -52,6 +60,8 @@ def photo_place(view, k, i, j, x, y, z):
         dx, dy = error_in_tile(view.source[k], i, j, mx, my, view.errors)
         change = abs(ideal_x + dx - mx) + abs(ideal_y + dy - my)
         mx, my = ideal_x + dx, ideal_y + dy
+        if scans(view.photos, 0, k):
+            ideal_x, ideal_y = project_at(view.photos, 0, k, delay(view.photos, 0, k, mx, my), x, y, z)
         if not change > FIXED_POINT_MM:
             break
     return sensor[k, 0] + mx * sensor[k, 2], sensor[k, 1] - my * sensor[k, 2]

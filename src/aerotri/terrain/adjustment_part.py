@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-from aerotri.deformation.absorbed import additional_rows, shared_columns
+from aerotri.deformation.error_parameters import error_rows, shared_columns
 from aerotri.deformation.model_grid import places_of
 from aerotri.deformation.restitution import Restitution
 from aerotri.functional_model.collinearity import RayPartials, linearise
@@ -125,7 +125,7 @@ def _by_unknowns(
         e = -np.einsum("rik,rk->ri", gain[there], effect[there])
         np.add.at(j, (picket[there][:, None], np.arange(3), first_shared + columns[there][:, None]), e)
     columns = shared_columns(calibration)
-    if len(additional_rows(calibration)):
+    if len(error_rows(calibration)):
         for g, errors in enumerate(restitution.errors):
             has = np.flatnonzero(restitution.group[image] == g)
             if len(has):

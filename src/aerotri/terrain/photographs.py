@@ -17,7 +17,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.deformation.error_tables import ErrorTables, error_tables
 from aerotri.deformation.model_grid import Places, mean_ground, places_of
-from aerotri.deformation.orientation import Orientation, photo_rows, scan_of_images
+from aerotri.deformation.orientation import Orientation, photo_rows
 from aerotri.deformation.photo_errors import PhotoErrors
 from aerotri.deformation.restitution import FREE, Restitution, restitution_of
 from aerotri.rasters.images import open_photograph
@@ -179,6 +179,16 @@ class Site:
         errors = p.tables.for_kernels
         return View(self.photos, p.source, errors, p.sensor, self.centres, crops, pixels, scale, edge)
 
+    def _while_read(self, k: int, u: np.ndarray) -> np.ndarray:
+        """Places (n, 3) in camera k as they are when the first and the last rows are read; (n, 3) or (2n, 3)."""
+        velocity, spin, rate = np.split(self.photos[0, k, 15:], [3, 6])
+        half_c, half_r, per_mm = self.photographs.sensor[k]
+        tau = float(np.abs(rate) @ np.array([half_c, half_r])) / per_mm
+        if tau == 0.0:
+            return u
+        moved = [(u - velocity * t, t) for t in (-tau, tau)]
+        return np.concatenate([w - t * np.cross(spin, w) for w, t in moved])
+
     def _window(
         self, k: int, low: np.ndarray, high: np.ndarray, reach: float, scale: float
     ) -> tuple[int, int, int, int] | None:
@@ -186,6 +196,7 @@ class Site:
         x, y = (np.array([low[a] - reach, high[a] + reach]) for a in range(2))
         corners = np.stack(np.meshgrid(x, y, [low[2], high[2]]), axis=-1).reshape(-1, 3)
         u = corners @ self.photos[0, k, :12].reshape(3, 4)[:, :3].T + self.photos[0, k, :12].reshape(3, 4)[:, 3]
+        u = self._while_read(k, u)
         c, x0, y0 = self.photos[0, k, 12:15]
         if not (u[:, 2] < 0.0).all():
             return None
@@ -221,7 +232,7 @@ def photographs_of(
         if not restitution.true.known[row]:
             raise InputError("is not oriented", "leave it out, or adjust it", path)
     places = places_of(calibration)
-    orientation = replace(restitution.true, scan=scan_of_images(calibration)).take(rows)
+    orientation = restitution.true.take(rows)
     cameras = [block.cameras[c] for c in block.images.camera[rows]]
     pixel = min(camera.pixel_mm for camera in cameras)
     if ideal:

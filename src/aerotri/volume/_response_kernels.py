@@ -8,16 +8,31 @@ import numpy as np
 
 from aerotri.compiled import kernel
 from aerotri.functional_model._kernels import INTERIOR, linearise_ray, predict_ray
+from aerotri.functional_model._scan_kernels import place_in_scan, scan_partials
+
+MOST_OF_SCAN = 7
+"""Shared parameters of a ray by its rolling shutter: readout time, velocity, rates of rotation."""
+STEPS = 3
+"""Steps of the fixed point of a measured position [C]: each leaves a hundredth."""
 
 
 class PhotoArrays(NamedTuple):
-    """n photographs; `lens_row` and `source` say which interior elements and which group of image errors are theirs."""
+    """n photographs; `lens_row` and `source` say which interior elements and which group of image errors are theirs.
+
+    scan_rate (n, 2), readout (n), velocity and spin (n, 3), scan_columns (n, 3) are those of `Scans`, 0 and −1 without
+    rolling shutter.
+    """
 
     rotation: np.ndarray
     centre: np.ndarray
     interior: np.ndarray
     lens_row: np.ndarray
     source: np.ndarray
+    scan_rate: np.ndarray
+    readout: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    scan_columns: np.ndarray
 
 
 class Tiles(NamedTuple):
@@ -49,12 +64,17 @@ class PicketArrays(NamedTuple):
 
 
 class ResponseSums(NamedTuple):
-    """Sums of the response, out: by_eo (n, 6), by_interior (L, 24), nodes (·, 2), noise (1,)."""
+    """Sums of the response, out: by_eo (n, 6), by_interior (L, 24), nodes (·, 2), noise (1,).
+
+    by_shared : (s,) by the unknowns of rolling shutters. moved : (1,) by the motion of photographs, left uncorrected.
+    """
 
     by_eo: np.ndarray
     by_interior: np.ndarray
     nodes: np.ndarray
     noise: np.ndarray
+    by_shared: np.ndarray
+    moved: np.ndarray
 
 
 class Views(NamedTuple):
@@ -86,6 +106,37 @@ def deposit(s, x, y, force, tiles, nodes):
 
 
 @kernel
+def settle_ray(photos, i, point, place, centre, rotation, at, xy):
+    """The ray of a point in photograph i: measured position, and how much later than the middle it is exposed, s.
+
+    Parameters
+    ----------
+    place : the measured position is needed for it. centre : (3,), rotation : (3, 3), at its exposure, out.
+    at : (2,) measured position, xy : (2,) what it were if the camera stood still, out.
+    """
+    row = photos.interior[photos.lens_row[i]]
+    rate, tau = photos.scan_rate[i], 0.0
+    scans = rate[0] != 0.0 or rate[1] != 0.0
+    centre[:], rotation[:] = photos.centre[i], photos.rotation[i]
+    x, y = row[1], row[2]
+    at[0], at[1] = x, y
+    if place or scans:
+        for _ in range(STEPS):
+            predict_ray(rotation, centre, point, row, x, y, at)
+            x, y = at[0], at[1]
+    xy[0], xy[1] = at[0], at[1]
+    if scans:
+        for _ in range(STEPS):
+            tau = (rate[0] * x + rate[1] * y) * photos.readout[i]
+            place_in_scan(
+                tau, photos.rotation[i], photos.centre[i], photos.velocity[i], photos.spin[i], centre, rotation
+            )
+            predict_ray(rotation, centre, point, row, x, y, at)
+            x, y = at[0], at[1]
+    return tau
+
+
+@kernel
 def respond(first, last, pickets, photos, tiles, out):
     """Add pickets first..last: f = W·A·N⁻¹·g of every ray; by_eo −= Bᵀf, nodes += f, noise += share·gᵀN⁻¹g.
 
@@ -93,28 +144,41 @@ def respond(first, last, pickets, photos, tiles, out):
     """
     start, image, inv_sigma, points = pickets.start, pickets.image, pickets.inv_sigma, pickets.points
     gradient, noise_share = pickets.gradient, pickets.noise_share
-    rotation, centre, interior, lens_row = photos.rotation, photos.centre, photos.interior, photos.lens_row
+    interior, lens_row = photos.interior, photos.lens_row
+    moved_centre, turned, unmoved = np.empty(3), np.empty((3, 3)), np.empty((2,))
     by_eo_sum, by_interior_sum, nodes, noise = out.by_eo, out.by_interior, out.nodes, out.noise
     most = 1
     for p in range(first, last):
         most = max(most, start[p + 1] - start[p])
     by_eo, by_pt, by_in = np.empty((most, 2, 6)), np.empty((most, 2, 3)), np.empty((most, 2, INTERIOR))
     at, normal, q = np.empty((most, 2)), np.empty((3, 3)), np.empty(3)
+    by_scan, place, count_of = (
+        np.empty((most, 2, MOST_OF_SCAN)),
+        np.empty((most, MOST_OF_SCAN), np.int64),
+        np.empty(most, np.int64),
+    )
+    way = np.zeros((most, 2))
     for p in range(first, last):
         normal[:] = 0.0
         count = start[p + 1] - start[p]
         for r in range(count):
             i = image[start[p] + r]
             row = interior[lens_row[i]]
-            x, y = row[1], row[2]
             brown = False
             for t in range(3, 10):
                 brown |= row[t] != 0.0
-            if brown:
-                for _ in range(3):
-                    predict_ray(rotation[i], centre[i], points[p], row, x, y, at[r])
-                    x, y = at[r, 0], at[r, 1]
-            linearise_ray(rotation[i], centre[i], points[p], row, x, y, at[r], by_eo[r], by_pt[r], by_in[r], INTERIOR)
+            tau = settle_ray(photos, i, points[p], brown, moved_centre, turned, at[r], unmoved)
+            x, y = at[r, 0], at[r, 1]
+            linearise_ray(turned, moved_centre, points[p], row, x, y, at[r], by_eo[r], by_pt[r], by_in[r], INTERIOR)
+            rate, count_of[r] = photos.scan_rate[i], 0
+            if rate[0] != 0.0 or rate[1] != 0.0:
+                way[r, 0], way[r, 1] = at[r, 0] - unmoved[0], at[r, 1] - unmoved[1]
+                count_of[r] = scan_partials(
+                    rate[0] * x + rate[1] * y, tau, photos.rotation[i], photos.velocity[i], photos.spin[i], by_eo[r],
+                    photos.scan_columns[i], by_scan[r], place[r], 0,
+                )  # fmt: skip
+            else:
+                way[r, 0], way[r, 1] = 0.0, 0.0
             weight = inv_sigma[start[p] + r] ** 2
             for a in range(3):
                 for b in range(3):
@@ -142,6 +206,9 @@ def respond(first, last, pickets, photos, tiles, out):
                 by_eo_sum[i, t] -= by_eo[r, 0, t] * f0 + by_eo[r, 1, t] * f1
             for t in range(INTERIOR):
                 by_interior_sum[lens_row[i], t] -= by_in[r, 0, t] * f0 + by_in[r, 1, t] * f1
+            for t in range(count_of[r]):
+                out.by_shared[place[r, t]] -= by_scan[r, 0, t] * f0 + by_scan[r, 1, t] * f1
+            out.moved[0] += way[r, 0] * f0 + way[r, 1] * f1
             deposit(photos.source[i], at[r, 0], at[r, 1], (f0, f1), tiles, nodes)
     return -1
 

@@ -7,8 +7,9 @@ N_k = A_kᵀW_kA_k, a change of θ moves P_k by −N_k⁻¹A_kᵀW_kB_k, so that
     Var V = σ̂0²·cᵀQc + Σ g_kᵀN_k⁻¹g_k,   Qc by one solution with the reduced factor of the final normal equations.
 
 The first part holds every correlation between pickets. Where groups of photographs share errors, it has a model part,
-see `statistics.model_of_functions`. An image error d that is not corrected moves V by
-Σ g_kᵀN_k⁻¹A_kᵀW_k·d, and where the orientation was adjusted without parameters by c times its change besides.
+see `statistics.model_of_functions`. An image error d that is not corrected moves V by Σ g_kᵀN_k⁻¹A_kᵀW_k·d, as does the
+way of the camera during the readout of a rolling shutter, and where the orientation was adjusted without parameters by
+c times its change besides.
 """
 
 from __future__ import annotations
@@ -17,10 +18,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.adjustment import scanning
+from aerotri.adjustment.kernel_records import Scans
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.conventions import InputError
-from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials, additional_rows, shared_columns
+from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials
+from aerotri.deformation.error_parameters import KINDS, error_rows, shared_columns
 from aerotri.deformation.orientation import calibrated_orientation
 from aerotri.deformation.photo_errors import PhotoErrors, errors_by_image, seams_mm
 from aerotri.functional_model.additional_parameters import Parameter
@@ -48,7 +52,7 @@ class Response:
     variance : σ̂0²·cᵀQc, the part of the adjustment. model : its model part. noise : Σ gᵀN⁻¹g, the part of matching.
     by_orientation : (n, 6) ∂V by projection centre and small rotation of the photographs of the system, held or not.
     by_interior : (L, 24) ∂V by the interior elements of the system's rows.
-    by_parameters : (p,) change of V by an additional parameter that is left uncorrected, as `additional_rows`.
+    by_parameters : (p,) change of V by a parameter that is left uncorrected, as `error_rows`.
     error : change of V by the image errors in force, left uncorrected.
     """
 
@@ -104,14 +108,15 @@ def respond(calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, cor
     """
     system, state = calibration.system, calibration.solution.state
     u = system.unknowns
-    rows = additional_rows(calibration)
+    rows = error_rows(calibration)
     errors, number = errors_by_image(calibration, rows)
     nodes = _nodes_of(errors)
     photos = _kernels.PhotoArrays(
         np.ascontiguousarray(state.rotation), state.centre, u.interior(state), u.lens.of_image, number[u.images],
+        *_scans(calibration),
     )  # fmt: skip
-    by_eo, by_interior, deposits, noise = _summed(calibration, pickets, gradient, photos, nodes)
-    by_parameters, error = np.zeros(len(rows)), 0.0
+    by_eo, by_interior, deposits, noise, by_shared, error = _summed(calibration, pickets, gradient, photos, nodes)
+    by_parameters = -by_shared[shared_columns(calibration)]
     for group, own in zip(errors, nodes.of_group, strict=True):
         used = np.flatnonzero(deposits[own].any(axis=1))
         xy, f = nodes.xy[own][used], deposits[own][used]
@@ -169,7 +174,7 @@ def systematic(calibration: Adjustment, response: Response, variant: str = "free
         value += float(np.sum(response.by_orientation * moved) + np.sum(response.by_interior[:, :3] * interior))
         by_parameters += np.einsum("na,nap->p", response.by_orientation, follows[:, :6])
         by_parameters += np.einsum("na,nap->p", response.by_interior[:, :3], follows[first, 6:])
-    rows = additional_rows(calibration)
+    rows = error_rows(calibration)
     q = calibration.local.parameters.total_covariance[np.ix_(rows, rows)]
     return Systematic(variant, value, float(np.sqrt(max(by_parameters @ q @ by_parameters, 0.0))))
 
@@ -177,7 +182,8 @@ def systematic(calibration: Adjustment, response: Response, variant: str = "free
 def _summed(
     calibration: Adjustment, pickets: Pickets, gradient: np.ndarray, photos: _kernels.PhotoArrays, nodes: _Nodes
 ):
-    """Sums over the pickets, in threads: by orientation, by interior elements, at the nodes, and the noise."""
+    """Sums over the pickets, in threads: by orientation, by interior elements, at the nodes, the noise, by shared
+    unknowns of rolling shutters, and what these do where they are left uncorrected."""
     u = calibration.system.unknowns
     row_of = np.full(len(u.block.images), -1, np.int64)
     row_of[u.images] = np.arange(len(u.images))
@@ -191,12 +197,8 @@ def _summed(
     points, along = _in_frame(calibration, pickets.xyz, np.asarray(gradient, dtype=float))
     bounds = chunk_bounds(np.diff(pickets.start).astype(float))
     arrays = _kernels.PicketArrays(pickets.start, image, 1.0 / pickets.sigma_mm, points, along, pickets.noise_share)
-    outs = [
-        _kernels.ResponseSums(
-            np.zeros((len(u.images), 6)), np.zeros(u.lens.base.shape), np.zeros((len(nodes.xy), 2)), np.zeros(1)
-        )
-        for _ in bounds
-    ]
+    shapes = (len(u.images), 6), u.lens.base.shape, (len(nodes.xy), 2), 1, len(u.shared), 1
+    outs = [_kernels.ResponseSums(*(np.zeros(shape) for shape in shapes)) for _ in bounds]
 
     def chunk(k: int) -> int:
         return _kernels.respond(*bounds[k], arrays, photos, nodes.tiles, outs[k])
@@ -206,8 +208,20 @@ def _summed(
         raise InputError(
             f"the rays of ground point (picket) {worst + 1} do not determine it", "remove its row from pickets.parquet"
         )
-    by_eo, by_interior, deposits = (np.sum([out[part] for out in outs], axis=0) for part in range(3))
-    return by_eo, by_interior, deposits, float(sum(out[3][0] for out in outs))
+    total = _kernels.ResponseSums(*(np.sum([out[part] for out in outs], axis=0) for part in range(6)))
+    return (
+        total.by_eo, total.by_interior, total.nodes, float(total.noise[0]), total.by_shared, float(total.moved[0])
+    )  # fmt: skip
+
+
+def _scans(calibration: Adjustment) -> Scans:
+    """What rolling shutters do, of every photograph of the system; zeros without."""
+    u = calibration.system.unknowns
+    n = len(u.images)
+    if u.scanning is not None:
+        return u.scans(calibration.solution.state)
+    nothing = np.zeros((n, 3))
+    return Scans(np.zeros((n, 2)), np.zeros(n), nothing, nothing, np.full((n, 3), -1, dtype=np.int64))
 
 
 def _in_frame(calibration: Adjustment, xyz: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -231,14 +245,18 @@ def _in_unknowns(
     turned = by_eo.copy()
     turned[:, 3:] = np.einsum("nij,ni->nj", u.turn(state), by_eo[:, 3:])
     shared = np.zeros(len(u.shared))
-    kinds = np.array(u.shared.kinds)
+    kinds = np.array(u.shared.kinds, dtype=object)
     rows, columns = np.nonzero(u.lens.columns >= 0)
     np.add.at(shared, u.lens.columns[rows, columns], by_interior[rows, columns])
-    names = calibration.local.parameters.names[additional_rows(calibration)]
-    linear = np.array([Parameter.of(name).family not in INTERIOR_FAMILIES for name in names], dtype=bool)
+    names = calibration.local.parameters.names[error_rows(calibration)]
+    own = kinds[shared_columns(calibration)]
+    linear = np.array(
+        [kind == scanning.KIND or Parameter.of(name).family not in INTERIOR_FAMILIES
+         for kind, name in zip(own, names, strict=True)], dtype=bool,
+    )  # fmt: skip
     shared[shared_columns(calibration)[linear]] = -by_parameters[linear]
     if not corrected:
-        shared[kinds == "additional"] = 0.0
+        shared[np.isin(kinds, KINDS)] = 0.0
     return np.concatenate([(turned * u.eo_free).ravel(), shared])
 
 
