@@ -35,6 +35,7 @@ GROUPS = {
     "folder of imgeo": ("imgeo", "Folder of `aerotri imgeo`"),
     "folder of crosscheck": ("crosscheck", "Folder of `aerotri crosscheck`"),
     "folder of dtm": ("dtm", "Folder of `aerotri dtm`"),
+    "folder of ortho": ("ortho", "Folder of `aerotri ortho`"),
     "folder of compare": ("compare", "Folder of `aerotri compare`"),
     "folder of volume": ("volume", "Folder of `aerotri volume`"),
     "folder of run": ("run", "Folder of `aerotri run`"),

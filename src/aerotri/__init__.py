@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from aerotri.public.ideal import ideal_photographs as ideal_photographs
     from aerotri.public.image_errors import ImageErrors as ImageErrors
     from aerotri.public.models import deform as deform
+    from aerotri.public.ortho import orthophoto as orthophoto
     from aerotri.public.results import adjust as adjust
     from aerotri.public.results import open_result as open_result
     from aerotri.public.running import run as run
@@ -80,6 +81,7 @@ _PLACES = {
     "ideal_photographs": "aerotri.public.ideal",
     "observations": "aerotri.observations",
     "open_result": "aerotri.public.results",
+    "orthophoto": "aerotri.public.ortho",
     "parameters": "aerotri.public.parameters",
     "predict": "aerotri.public.predict",
     "read": "aerotri.public.blocks",
@@ -122,6 +124,7 @@ __all__ = [
     "ideal_photographs",
     "observations",
     "open_result",
+    "orthophoto",
     "parameters",
     "predict",
     "read",

@@ -7,7 +7,7 @@ from inspect import Parameter, signature
 import pytest
 
 import aerotri
-from aerotri.cli import adjusting, blocks, converting, run, terrain, volumes
+from aerotri.cli import adjusting, blocks, converting, ortho, run, terrain, volumes
 from aerotri.public.simulating import SimulatedBlock
 
 NOTHING = (None, "", (), [], "auto")
@@ -18,6 +18,7 @@ PAIRS = {
     "tiepoints": (converting.tiepoints, aerotri.tie_points),
     "compare-parameters": (adjusting.compare_parameters, aerotri.compare_parameters),
     "dtm": (terrain.dtm, aerotri.terrain),
+    "ortho": (ortho.ortho, aerotri.orthophoto),
     "volume": (volumes.volume, aerotri.volume),
     "predict volume": (volumes.predict_volume, aerotri.predict.volume),
     "predict attitude": (volumes.predict_attitude, aerotri.predict.attitude),
@@ -31,7 +32,11 @@ PAIRS = {
 @pytest.mark.parametrize("name", PAIRS)
 def test_defaults_are_those_of_the_function(name):
     command, function = (signature(one).parameters for one in PAIRS[name])
-    common = [key for key in command if key in function and command[key].default is not Parameter.empty]
+    common = [
+        key
+        for key in command
+        if key in function and Parameter.empty not in (command[key].default, function[key].default)
+    ]
     assert common
     for key in common:
         stated = [one[key].default for one in (command, function)]

@@ -167,6 +167,7 @@ def _written(folder: Path) -> Written:
     photographs = tiny / "photographs"
     pairs = run("dtm", result, photographs, "--interval", "20", "--pairs", out="dtm")
     run("demcor", result, pairs / "dsm.tif", "--models", pairs / "model.tif", out="corrected/NAME.tif")
+    ortho = run("ortho", result, photographs, pairs, out="ortho")
     model = run("deform", result, "--end-lap", "0.6", out="model")
     whole = run("deform", result, out="whole")
     imgeo = run("imgeo", result, next(photographs.glob("*.tif")), out="ideal")
@@ -190,7 +191,7 @@ def _written(folder: Path) -> Written:
         "folder of compare-parameters": (sets,), "folder of halves": (halves,), "folder of deform": (model, whole),
         "folder of demcor": (folder / "corrected",), "folder of imgeo": (imgeo,), "folder of crosscheck": (checked,),
         "folder of dtm": (pairs, project / "dtm"), "folder of compare": (compared,),
-        "folder of volume": (project / "volume",),
+        "folder of volume": (project / "volume",), "folder of ortho": (ortho,),
         "truth of simulate": (tiny / "truth", rigged / "truth", rolling / "truth"),
         "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),
         "control_marks of tiepoints": (project / "block" / "control_marks",), "folder of run": (project,),

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import rasterio
 from rasterio._err import CPLE_BaseError
-from rasterio.enums import ColorInterp, MaskFlags
+from rasterio.enums import ColorInterp, MaskFlags, Resampling
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 from rasterio.transform import Affine
 
@@ -105,6 +105,26 @@ class Photograph:
         """
         with _told(self.path), rasterio.Env(**SETTINGS):
             return self.dataset.read(window=window_of(0, first, self.columns, last - first))
+
+    def window(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
+        """(bands, rows, columns) from a pixel on.
+
+        Raises
+        ------
+        InputError
+        """
+        with _told(self.path), rasterio.Env(**SETTINGS):
+            return self.dataset.read(window=window_of(column, row, columns, rows))
+
+    def reduced(self, rows: int, columns: int) -> np.ndarray:
+        """(bands, rows, columns) of the whole photograph, each the mean of the pixels it stands for.
+
+        Raises
+        ------
+        InputError
+        """
+        with _told(self.path), rasterio.Env(**SETTINGS):
+            return self.dataset.read(out_shape=(self.bands, rows, columns), resampling=Resampling.average)
 
 
 @contextmanager

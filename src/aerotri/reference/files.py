@@ -10,6 +10,7 @@ from aerotri.reference.block_files import block_files
 from aerotri.reference.block_tables import block_table_files
 from aerotri.reference.halves_files import halves_files
 from aerotri.reference.image_error_files import image_error_files
+from aerotri.reference.ortho_files import ortho_files
 from aerotri.reference.printed import printed_contents
 from aerotri.reference.records import DescribedFile
 from aerotri.reference.terrain_files import terrain_files
@@ -25,6 +26,7 @@ def described_files() -> tuple[DescribedFile, ...]:
         *halves_files(),
         *image_error_files(),
         *terrain_files(),
+        *ortho_files(),
         *block_files(),
         *printed_contents(),
     )

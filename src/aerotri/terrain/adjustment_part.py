@@ -40,14 +40,41 @@ def adjustment_variances(
     out = np.full(pickets.xyz.shape, np.nan)
     if len(measured) < 4:
         return out
-    places, frame = measured[:: max(len(measured) // MOST_PLACES, 1)], places_of(calibration)
-    local = frame.to_local(pickets.xyz[places])
+    places = measured[:: max(len(measured) // MOST_PLACES, 1)]
+    local = places_of(calibration).to_local(pickets.xyz[places])
     photographs = pickets.photographs[places]
+    variances = _variances(calibration, restitution, rows, local, photographs, plan=False)
+    at = pickets.xyz[places, :2]
+    values = NearestNDInterpolator(at, variances)(pickets.xyz[measured, :2])
+    linear = LinearNDInterpolator(at, variances)(pickets.xyz[measured, :2])
+    out[measured] = np.where(np.isfinite(linear), linear, values)
+    return out
+
+
+def plan_variances(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photograph: np.ndarray
+) -> np.ndarray:
+    """(n, 2) m², of X and Y in the CRS, of places whose height is known and which one photograph each shows.
+
+    Parameters
+    ----------
+    rows : photographs of the block. xyz : (n, 3) m in the CRS. photograph : (n,) place in `rows`.
+    """
+    local = places_of(calibration).to_local(xyz)
+    return _variances(calibration, restitution, rows, local, photograph[:, None], plan=True)[:, :2]
+
+
+def _variances(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, local: np.ndarray, photographs: np.ndarray,
+    plan: bool,
+) -> np.ndarray:  # fmt: skip
+    """(n, 3) m² in the CRS. plan : whether heights are known, and one ray gives X and Y."""
+    frame = places_of(calibration)
     factor = calibration.system.factorise(calibration.solution.equations)
-    variances = np.empty((len(places), 3))
-    for first in range(0, len(places), AT_A_TIME):
+    variances = np.empty((len(local), 3))
+    for first in range(0, len(local), AT_A_TIME):
         part = slice(first, first + AT_A_TIME)
-        j = _by_unknowns(calibration, restitution, rows, local[part], photographs[part])
+        j = _by_unknowns(calibration, restitution, rows, local[part], photographs[part], plan)
         q = factor.solve(j.reshape(-1, j.shape[2]).T)
         both = np.einsum("nau,unb->nab", j, q.reshape(j.shape[2], len(j), 3))
         covariance = calibration.local.outcome.sigma0**2 * both
@@ -57,11 +84,7 @@ def adjustment_variances(
                 calibration.system, calibration.solution, calibration.model, by_columns, q, 3
             )
         variances[part] = frame.variances(local[part], covariance)
-    at = pickets.xyz[places, :2]
-    values = NearestNDInterpolator(at, variances)(pickets.xyz[measured, :2])
-    linear = LinearNDInterpolator(at, variances)(pickets.xyz[measured, :2])
-    out[measured] = np.where(np.isfinite(linear), linear, values)
-    return out
+    return variances
 
 
 def _by_scans(calibration: Adjustment, rays: RayPartials, own: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -85,10 +108,28 @@ def _by_scans(calibration: Adjustment, rays: RayPartials, own: np.ndarray) -> It
             yield np.where(first >= 0, first + axis, -1), tau[:, :, 0] * by[:, :, axis]
 
 
+def _gain(by_point: np.ndarray, picket: np.ndarray, count: int) -> np.ndarray:
+    """(r, 3, 2) of rays, by which the points that they intersect in move."""
+    normal = np.zeros((count, 3, 3))
+    np.add.at(normal, picket, np.einsum("rki,rkj->rij", by_point, by_point))
+    return np.linalg.solve(normal[picket], np.swapaxes(by_point, 1, 2))
+
+
+def _gain_in_plan(by_point: np.ndarray) -> np.ndarray:
+    """(r, 3, 2) of rays that meet a known height."""
+    gain = np.zeros((len(by_point), 3, 2))
+    gain[:, :2] = np.linalg.inv(by_point[:, :, :2])
+    return gain
+
+
 def _by_unknowns(
-    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, local: np.ndarray, photographs: np.ndarray
-) -> np.ndarray:
-    """(n, 3, u) partials of intersected points by the unknowns of the reduced system."""
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, local: np.ndarray, photographs: np.ndarray,
+    plan: bool,
+) -> np.ndarray:  # fmt: skip
+    """(n, 3, u) partials of intersected points by the unknowns of the reduced system.
+
+    plan : whether the height is known, so that one ray gives X and Y; the partials of Z are 0.
+    """
     u, state = calibration.system.unknowns, calibration.solution.state
     in_system = np.full(len(restitution.group), -1)
     in_system[u.images] = np.arange(len(u.images))
@@ -101,9 +142,7 @@ def _by_unknowns(
         np.ascontiguousarray(np.nan_to_num(orientation.rotation)), np.ascontiguousarray(orientation.centre), local,
         interior, image, picket, image, np.zeros((len(image), 2)),
     )  # fmt: skip
-    normal = np.zeros((len(local), 3, 3))
-    np.add.at(normal, picket, np.einsum("rki,rkj->rij", rays.by_point, rays.by_point))
-    gain = np.linalg.solve(normal[picket], np.swapaxes(rays.by_point, 1, 2))
+    gain = _gain_in_plan(rays.by_point) if plan else _gain(rays.by_point, picket, len(local))
     own = in_system[image]
     by_image = rays.by_orientation.copy()
     by_image[:, :, 3:] = rays.by_orientation[:, :, 3:] @ u.turn(state)[own]

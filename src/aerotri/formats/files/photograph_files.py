@@ -11,7 +11,16 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.formats.assembly.names_match import match_photographs
 
-RECORDS = ("block.toml", "adjustment.json", "tiepoints.json", "dtm.json", "volume.json", "imgeo.json", "run.json")
+RECORDS = (
+    "block.toml",
+    "adjustment.json",
+    "tiepoints.json",
+    "dtm.json",
+    "volume.json",
+    "imgeo.json",
+    "ortho.json",
+    "run.json",
+)
 """Files of a folder that this program has written: pictures in it are no photographs of a flight."""
 
 

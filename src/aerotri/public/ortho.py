@@ -1,0 +1,277 @@
+"""True orthophotos: every cell from the photograph that sees it best, with seams, colours and accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aerotri.conventions import FilePath, InputError
+from aerotri.public.adjustment import Adjustment
+from aerotri.public.folders import paths_of, refuse_foreign_folder
+from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.public.results import open_result
+from aerotri.public.surfaces import as_surface
+from aerotri.public.terrain import ENDINGS
+from aerotri.terrain.ortho.settings import DEFAULTS, OrthoSettings, Sampling
+from aerotri.volume.settings import LAYERS, Layer
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from aerotri.public.surfaces import SurfaceLike
+    from aerotri.results.adjustment import Adjustment as Record
+    from aerotri.terrain.ortho.make import OrthoOutcome
+
+RECORD, SEAMS = "ortho.json", "seams.gpkg"
+OWN_NAMES = (RECORD, SEAMS, "ortho.tif", "photographs.tif", "sigma.tif", "plots")
+LAYER: Layer = "dsm"
+"""Of a folder of `aerotri dtm`: with roofs and trees, so that they stand where they are."""
+
+
+@dataclass(frozen=True, eq=False)
+class OrthoPlots:
+    """Plots of an orthophoto, each a matplotlib Figure.
+
+    Parameters
+    ----------
+    record : the numbers as arrays. folder : with the rasters. points : control and check points. block : its name.
+    """
+
+    record: OrthoOutcome
+    folder: Path
+    points: tuple[Any, ...]
+    block: str
+
+    def orthophoto(self) -> Figure:
+        """The orthophoto with its seams, and σ of its positions."""
+        from aerotri.report.plots.ortho import plot_orthophoto
+
+        return plot_orthophoto(self.record, self.folder, self.block)
+
+    def points_in_it(self) -> Figure:
+        """The ground around control and check points, with a cross where their coordinates are.
+
+        Raises
+        ------
+        InputError
+            When none lies in the orthophoto.
+        """
+        from aerotri.report.plots.ortho import plot_points
+
+        if not self.points:
+            raise InputError("no control or check point lies in the orthophoto", "leave this plot out")
+        return plot_points(self.record, self.folder, self.points, self.block)
+
+    def all(self) -> dict[str, Figure]:
+        """Every plot by the name of its file."""
+        return {"orthophoto": self.orthophoto()} | ({"points": self.points_in_it()} if self.points else {})
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Orthophoto:
+    """What `aerotri.orthophoto` wrote.
+
+    Parameters
+    ----------
+    folder : with ortho.tif and what belongs to it. summary : the content of ortho.json.
+    record : the numbers as arrays. points : control and check points in it. notes : on the input, in sentences.
+    """
+
+    folder: Path
+    summary: dict[str, Any]
+    record: OrthoOutcome
+    points: tuple[Any, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> Path:
+        """ortho.tif, a cloud-optimised GeoTIFF; its last band is the mask."""
+        return self.folder / "ortho.tif"
+
+    @property
+    def plot(self) -> OrthoPlots:
+        """Plots of the orthophoto, each a matplotlib Figure."""
+        return OrthoPlots(self.record, self.folder, self.points, str(self.summary["block"]))
+
+    def __repr__(self) -> str:
+        s = self.summary
+        return f"<aerotri orthophoto of {s['block']!r}: {s['columns']} × {s['rows']} cells of {s['cell_m']:g} m>"
+
+    def _repr_html_(self) -> str:
+        s = self.summary
+        return (
+            f"<div><b>{escape(str(s['block']))}</b>: {s['columns']} × {s['rows']} cells of {s['cell_m']:g} m, σ of a "
+            f"position {s['sigma_m']['total']['median']:.3f} m (median)</div>"
+        )
+
+
+def orthophoto(
+    result: Adjustment | FilePath,
+    photographs: FilePath | Sequence[FilePath],
+    surface: SurfaceLike,
+    out: FilePath,
+    *,
+    cell: float | None = DEFAULTS.cell,
+    area: tuple[float, float, float, float] | None = DEFAULTS.area,
+    edge: float = DEFAULTS.edge,
+    resampling: Sampling = DEFAULTS.resampling,
+    balance: bool = DEFAULTS.balance,
+    seams: bool = DEFAULTS.seams,
+    ideal: bool = DEFAULTS.ideal,
+    layer: Layer = LAYER,
+    plots: bool = True,
+    progress: ProgressLike = None,
+) -> Orthophoto:
+    """Make a true orthophoto: every cell of the ground from the photograph that sees it best.
+
+    Parameters
+    ----------
+    result : an adjustment, or the folder of one.
+    photographs : folder or files of the photographs, TIFF or JPEG.
+    surface : heights of the ground with what stands on it, a GeoTIFF in metres, or what `aerotri.terrain` gave.
+    out : folder to write; an older result there is replaced in one step.
+    cell : m; the size of a pixel on the ground where None.
+    area : m, X and Y of the lower left, then of the upper right corner; as far as surface and photographs where None.
+    edge : share of the format at its edge that is not used.
+    resampling : 'bicubic', 'bilinear' or 'nearest'.
+    balance : bring the colours of the photographs to one another.
+    seams : lay seams where photographs look alike; without, every cell is from its best photograph.
+    ideal : the photographs are those of `aerotri.ideal_photographs`, free of image errors.
+    layer : surface of a terrain model: with objects (dsm) or without (dtm).
+    plots : draw the orthophoto and the points in it.
+    progress : as of `aerotri.adjust`.
+
+    Returns
+    -------
+    Orthophoto
+        Its `path` is the image, its `summary` the content of ortho.json.
+
+    Raises
+    ------
+    InputError
+        For a setting that makes no sense, photographs or a surface that do not fit the block, or a folder with other
+        files.
+
+    Examples
+    --------
+    >>> import aerotri
+    >>> found = aerotri.orthophoto("saar_result", "photographs", "saar_dtm", "saar_ortho")  # doctest: +SKIP
+    >>> found.summary["sigma_m"]["total"]["median"]  # doctest: +SKIP
+    0.041
+    """
+    settings = OrthoSettings(cell, area, edge, resampling, balance, seams, ideal)
+    if layer not in LAYERS:
+        raise InputError(f"there is no layer '{layer}'", f"choose one of {', '.join(LAYERS)}")
+    return make_ortho(result, paths_of(photographs), as_surface(surface, layer), Path(out), settings, plots, progress)
+
+
+def make_ortho(
+    result: Adjustment | FilePath, photographs: Sequence[Path], surface: SurfaceLike, out: Path,
+    settings: OrthoSettings, plots: bool = True, progress: ProgressLike = None,
+) -> Orthophoto:  # fmt: skip
+    """As `orthophoto`, with the settings in one record.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.rasters.grids import horizontal_crs
+
+    settings.check()
+    refuse_foreign_folder(out, RECORD)
+    record = (result if isinstance(result, Adjustment) else open_result(result)).record
+    chosen = _photographs(record, photographs)
+    ground = as_surface(surface, LAYER)
+    with ExitStack() as stack, stage_report(progress) as report:
+        heights, sigma, notes = _opened(ground, horizontal_crs(record.result.block.crs), stack)
+        folder = stack.enter_context(atomic_folder(out, own=OWN_NAMES))
+        outcome, summary, points = _made(record, chosen, (heights, sigma), ground.label, settings, folder, report)
+        if plots:
+            from aerotri.report.plots.rendering import save_plots
+
+            report.stage("drawing", None)
+            drawn = OrthoPlots(outcome, folder, points, str(record.result.block.name))
+            save_plots(drawn.all(), folder / "plots")
+    return Orthophoto(out, summary, outcome, points, notes)
+
+
+def _made(
+    record: Record, chosen: tuple[np.ndarray, tuple[Path, ...]], surface: tuple[Any, Any], name: str,
+    settings: OrthoSettings, folder: Path, report: StageReport,
+) -> tuple[OrthoOutcome, dict[str, Any], tuple[Any, ...]]:  # fmt: skip
+    from aerotri.formats.results.json_text import write_json
+    from aerotri.formats.results.ortho import marked_points, ortho_json, write_seams
+    from aerotri.rasters.grids import horizontal_crs
+    from aerotri.terrain.ortho.make import make_orthophoto
+
+    block = record.result.block
+    outcome = make_orthophoto(record, chosen, surface, settings, folder, report.stage)
+    write_seams(folder / SEAMS, outcome, horizontal_crs(block.crs))
+    summary = ortho_json(outcome, block, name, settings.resampling)
+    write_json(folder / RECORD, summary)
+    return outcome, summary, tuple(marked_points(outcome, block))
+
+
+def _photographs(record: Record, given: Sequence[Path]) -> tuple[np.ndarray, tuple[Path, ...]]:
+    """Oriented photographs of the block, and their files.
+
+    Raises
+    ------
+    InputError
+        When none is found.
+    """
+    from aerotri.formats.files.photograph_files import match_files, photographs_in
+    from aerotri.terrain.dtm import chosen_rows
+
+    missing = [path for path in given if not path.exists()]
+    if missing:
+        raise InputError("is not there", "give the folder of the photographs, or their files", missing[0])
+    files = [f for f in photographs_in(given, ENDINGS) if f.suffix.lower() in ENDINGS]
+    found = match_files(files, record.result.block.images.names)
+    path_of = {int(row): file for row, file in zip(found, files, strict=True) if row >= 0}
+    rows = np.array([r for r in chosen_rows(record, "all") if r in path_of], dtype=np.int64)
+    if not len(rows):
+        where = ", ".join(str(path) for path in given) or "nothing"
+        raise InputError(f"no photograph of the block is in {where}", "give the folder that holds them")
+    return rows, tuple(path_of[int(r)] for r in rows)
+
+
+def _opened(surface: Any, crs: str | None, stack: ExitStack) -> tuple[Any, Any, tuple[str, ...]]:
+    """Heights, their σ where there are any, and what is to be said about them.
+
+    Raises
+    ------
+    InputError
+        When they are not in metres in the CRS of the block.
+    """
+    from aerotri.rasters.grids import RasterReader
+    from aerotri.rasters.held import HeldRaster
+    from aerotri.rasters.metric import refuse_other_units
+
+    if surface.path is None:
+        heights = surface.heights
+        sigma = HeldRaster(heights.sigma, heights.grid, surface.crs, surface.label)
+        found: Any = surface.reader()
+        known = bool(np.isfinite(heights.sigma).any())
+    else:
+        found = stack.enter_context(RasterReader(surface.path))
+        refuse_other_units(found)
+        known = found.bands > 1
+        sigma = stack.enter_context(RasterReader(surface.path, band=2)) if known else None
+    own = None if found.epsg is None else f"EPSG:{found.epsg}"
+    if own is not None and own != crs:
+        remedy = "give a surface of the same system" if crs is None else f"bring it there: gdalwarp -t_srs {crs} IN OUT"
+        raise InputError(f"is in {own}, the block in {crs or 'local coordinates'}", remedy, found.path)
+    notes = []
+    if own is None and crs is not None:
+        notes.append(f"{surface.label} does not say its coordinate system; taken for {crs}")
+    if not known:
+        notes.append(f"{surface.label} has no σ: the accuracy of the orthophoto is stated without that of the heights")
+    return found, sigma if known else None, tuple(notes)

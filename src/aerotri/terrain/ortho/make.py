@@ -1,0 +1,197 @@
+"""From an adjusted block, its photographs and a surface to a true orthophoto: the stages of `aerotri ortho`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.memory import refuse_beyond_memory
+from aerotri.rasters.grids import Grid, RasterReader, RasterWriter, cache_limited, horizontal_crs
+from aerotri.rasters.mosaics import write_mosaic
+from aerotri.results.adjustment import Adjustment
+from aerotri.terrain.dtm import rounded
+from aerotri.terrain.ortho.accuracy import PlanAccuracy, plan_accuracy
+from aerotri.terrain.ortho.balance import Balance, balance_of, balanced, no_balance
+from aerotri.terrain.ortho.candidates import (
+    Candidates,
+    candidates_of,
+    coarse_step,
+    coloured,
+    covered,
+    results_in_threads,
+)
+from aerotri.terrain.ortho.ground import TILE, GroundSurface, ground_surface, tiles_of
+from aerotri.terrain.ortho.pixels import PixelStore
+from aerotri.terrain.ortho.seams import Choice, choose
+from aerotri.terrain.ortho.settings import OrthoSettings
+from aerotri.terrain.ortho.tiles import Sources, Tile, make_tile
+from aerotri.terrain.photographs import Photographs, photographs_of
+from aerotri.terrain.pickets import footprint
+
+IMAGE, NUMBERS, SIGMAS = "ortho.tif", "photographs.tif", "sigma.tif"
+"""Names of the rasters."""
+COMPRESSED = {"compress": "deflate", "predictor": 3}
+BYTES_OF_COARSE_CELL = 900
+"""All that a coarse cell has, at the stage that takes most; 3 bands."""
+Report = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class OrthoOutcome:
+    """An orthophoto, its cells being in a file.
+
+    Parameters
+    ----------
+    grid : its cells. photographs : all that were given. gsd : m, their median.
+    bands, dtype : of the colours.
+    candidates, choice, balance, accuracy : of the coarse cells.
+    cells : (n,) cells of every photograph. heights : cells with a height. hidden : those among them that the
+        photograph chosen for their place does not see.
+    """
+
+    grid: Grid
+    photographs: Photographs
+    gsd: float
+    bands: int
+    dtype: str
+    candidates: Candidates
+    choice: Choice
+    balance: Balance
+    accuracy: PlanAccuracy
+    cells: np.ndarray
+    heights: int
+    hidden: int
+
+
+def make_orthophoto(
+    calibration: Adjustment,
+    chosen: tuple[np.ndarray, tuple[Path, ...]],
+    surface: tuple[RasterReader, RasterReader | None],
+    settings: OrthoSettings,
+    folder: Path,
+    report: Report,
+) -> OrthoOutcome:
+    """Make an orthophoto and write its rasters.
+
+    Parameters
+    ----------
+    chosen : photographs of the block, and their files. surface : its heights, and their σ where it has them; in
+        metres and in the CRS of the block. folder : to write to.
+
+    Raises
+    ------
+    InputError
+    """
+    photographs = photographs_of(calibration, *chosen, settings.ideal)
+    cameras = calibration.local.block.cameras
+    sizes = [cameras[c].size_px for c in calibration.local.block.images.camera[chosen[0]]]
+    pixels = PixelStore(chosen[1], sizes)
+    with cache_limited():
+        ground = ground_surface(surface[0])
+        if not np.isfinite(ground.low).any():
+            raise InputError("has no heights", "give another surface", surface[0].path)
+        gsd = float(np.median(photographs.gsd))
+        grid = _grid(photographs, ground, settings, rounded(gsd))
+        candidates, grid = _candidates(photographs, ground, grid, settings, report)
+        candidates = coloured(candidates, photographs, pixels, lambda share: report("colours", share))
+        report("seams", 0.0)
+        balance = (balance_of if settings.balance else no_balance)(len(photographs), candidates)
+        choice = choose(candidates, balanced(candidates, balance), settings.seams)
+        report("accuracy", 0.0)
+        accuracy = plan_accuracy(calibration, photographs, candidates, choice, surface[1])
+        sources = Sources(
+            photographs, pixels, ground, candidates, choice, balance, settings.edge, settings.resampling
+        )  # fmt: skip
+        crs = horizontal_crs(calibration.result.block.crs)
+        cells, heights, hidden = _written(sources, grid, folder, crs, report)
+    with RasterWriter(folder / SIGMAS, candidates.grid, crs=crs, options=COMPRESSED) as writer:
+        writer.describe("σ of X and Y, m")
+        writer.write(0, 0, accuracy.total.astype(np.float32))
+    return OrthoOutcome(
+        grid, photographs, gsd, pixels.bands, pixels.dtype.name, candidates, choice, balance, accuracy, cells, heights,
+        hidden,
+    )  # fmt: skip
+
+
+def _grid(photographs: Photographs, surface: GroundSurface, settings: OrthoSettings, cell: float) -> Grid:
+    """Cells at whole multiples of their size where surface, photographs and area overlap.
+
+    Raises
+    ------
+    InputError
+        When they do not.
+    """
+    cell = cell if settings.cell is None else settings.cell
+    seen, bounds = footprint(photographs), surface.grid.bounds
+    low, high = np.maximum(seen.low, bounds[:2]), np.minimum(seen.high, bounds[2:])
+    if not (low < high).all():
+        raise InputError(
+            f"covers X {bounds[0]:.0f} … {bounds[2]:.0f}, Y {bounds[1]:.0f} … {bounds[3]:.0f}; the photographs show X "
+            f"{seen.low[0]:.0f} … {seen.high[0]:.0f}, Y {seen.low[1]:.0f} … {seen.high[1]:.0f}",
+            "give a surface of the same ground in the coordinate system of the block", surface.reader.path,
+        )  # fmt: skip
+    if settings.area is not None:
+        low, high = np.maximum(low, settings.area[:2]), np.minimum(high, settings.area[2:])
+        if not (low < high).all():
+            raise InputError("the area has no surface or no photographs", "give an area that both cover")
+    first, last = np.floor(low / cell + 1e-6), np.ceil(high / cell - 1e-6)
+    columns, rows = (int(v) for v in np.maximum(last - first, 1.0))
+    return Grid(rows, columns, float(first[0] * cell), float(last[1] * cell), cell, cell)
+
+
+def _candidates(
+    photographs: Photographs, surface: GroundSurface, grid: Grid, settings: OrthoSettings, report: Report
+) -> tuple[Candidates, Grid]:
+    """The candidates of the coarse cells that are seen, and the cells of these.
+
+    Raises
+    ------
+    InputError
+    """
+    coarse = grid.coarser(coarse_step(grid))
+    refuse_beyond_memory(
+        float(BYTES_OF_COARSE_CELL) * coarse.rows * coarse.columns, f"{grid.rows} × {grid.columns} cells",
+        "give a larger --cell, or an --area",
+    )  # fmt: skip
+    gsd = float(np.median(photographs.gsd))
+    found = candidates_of(
+        photographs, surface, grid, gsd, settings.edge, lambda share: report("visibility", share)
+    )  # fmt: skip
+    if not (found.found[0] >= 0).any():
+        raise InputError(
+            f"no photograph shows the surface, whose heights are {float(np.min(surface.low)):.1f} … "
+            f"{float(np.max(surface.high)):.1f} m; the ground of the block is at {photographs.ground:.1f} m",
+            "give a surface in the height system of the block", surface.reader.path,
+        )  # fmt: skip
+    found, (row, column) = covered(found)
+    step, g = found.step, found.grid
+    return found, grid.window(row * step, column * step, g.rows * step, g.columns * step)
+
+
+def _written(
+    sources: Sources, grid: Grid, folder: Path, crs: str | None, report: Report
+) -> tuple[np.ndarray, int, int]:
+    """Write all tiles; cells of every photograph, cells with heights and hidden ones among them."""
+    cells, heights, hidden = np.zeros(len(sources.photographs), np.int64), 0, 0
+    bands = (*(f"band {b + 1}" for b in range(sources.pixels.bands)), "mask")
+
+    def one(place: tuple[int, int, Grid]) -> Tile | None:
+        return make_tile(sources, *place)
+
+    with (
+        write_mosaic(folder / IMAGE, grid, bands, sources.pixels.dtype.name, crs, True) as image,
+        write_mosaic(folder / NUMBERS, grid, ("number of the photograph",), "int32", crs, False) as numbers,
+    ):
+        for tile in results_in_threads(one, list(tiles_of(grid, TILE)), lambda done: report("cells", 0.95 * done)):
+            if tile is None:
+                continue
+            image.write(tile.row, tile.column, tile.colours)
+            numbers.write(tile.row, tile.column, tile.number[None])
+            cells += np.bincount(tile.number[tile.number >= 0], minlength=len(cells))
+            heights, hidden = heights + tile.heights, hidden + tile.hidden
+        report("overviews", 0.95)
+    return cells, heights, hidden

@@ -1,0 +1,165 @@
+"""Orthophotos by the command and from Python: files, words, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from matplotlib.figure import Figure
+from photographed import PLAN
+from typer.testing import CliRunner
+
+import aerotri
+from aerotri import InputError
+from aerotri.cli import app
+from aerotri.rasters.grids import Grid, write_raster, write_surface
+from aerotri.vectors.geopackage import read_geopackage
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Photographs, result, and a flat surface at the height of the ground."""
+    here = tmp_path_factory.mktemp("ortho")
+    flight = aerotri.simulate(PLAN, seed=3)
+    flight.save(here / "block", photographs=True)
+    result = aerotri.adjust(flight.block)
+    grid = Grid(100, 100, -150.0, 150.0, 3.0, 3.0)
+    write_surface(here / "surface.tif", np.full((100, 100), 100.0), np.full((100, 100), 0.2), grid, None, "Z, m")
+    found = aerotri.orthophoto(result, here / "block" / "photographs", here / "surface.tif", here / "out", cell=2.0)
+    return here, result, found
+
+
+def test_files(made):
+    here, _, found = made
+    assert json.loads((here / "out" / "ortho.json").read_text(encoding="utf-8")) == found.summary
+    with rasterio.open(found.path) as image, rasterio.open(here / "out" / "photographs.tif") as numbers:
+        assert image.count == 2
+        assert image.colorinterp[-1].name == "alpha"
+        assert image.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG"
+        mask, number = image.read(2), numbers.read(1)
+        np.testing.assert_array_equal(mask > 0, number >= 0)
+        assert image.transform == numbers.transform
+    cells = np.bincount(number[number >= 0], minlength=3) * 4.0
+    np.testing.assert_allclose([one["area_m2"] for one in found.summary["photographs"]], cells)
+    layers = {name: list(rows) for name, _, rows in read_geopackage(here / "out" / "seams.gpkg")}
+    # coarse cells of 16 m: those at the edge are whole or missing
+    whole = sum(one.properties["area_m2"] for one in layers["photographs"])
+    assert whole == pytest.approx(cells.sum(), rel=0.07)
+    names = {one["photograph"] for one in found.summary["photographs"]}
+    for one in layers["seams"]:
+        assert one.kind == "MultiLineString"
+        assert {one.properties["photograph_1"], one.properties["photograph_2"]} <= names
+    assert all(isinstance(figure, Figure) for figure in found.plot.all().values())
+    assert (here / "out" / "plots" / "points.png").stat().st_size > 10_000
+    assert "cells of 2 m" in repr(found)
+
+
+def test_accuracy_has_its_parts(made):
+    _, _, found = made
+    sigma = found.summary["sigma_m"]
+    parts = [sigma[name]["median"] for name in ("surface", "orientation", "image")]
+    assert all(part > 0.0 for part in parts)
+    assert max(parts) < sigma["total"]["median"] < 1.5 * np.hypot.reduce(parts)
+    # the angle of a ray and σ of the heights, 0.2 m, in two coordinates
+    accuracy = found.record.accuracy
+    assert accuracy.surface is not None
+    there = np.isfinite(accuracy.total)
+    np.testing.assert_allclose(accuracy.surface[there], 0.2 * accuracy.tangent[there] / np.sqrt(2.0), rtol=1e-6)
+    for point in found.summary["points"]:
+        assert 0.0 <= point["column"] < found.summary["columns"]
+        assert point["sigma"] is None or point["sigma"] > 0.0
+
+
+def test_a_surface_in_memory_gives_the_same(made):
+    here, result, found = made
+    with rasterio.open(here / "surface.tif") as file:
+        z = file.read(1).astype(float)
+    surface = aerotri.Surface.of_array(z, left=-150.0, top=150.0, cell=3.0)
+    other = aerotri.orthophoto(result, here / "block" / "photographs", surface, here / "same", cell=2.0, plots=False)
+    assert other.path.read_bytes() == found.path.read_bytes()
+    assert other.summary["sigma_m"]["surface"] is None
+    assert "has no σ" in other.notes[0]
+
+
+def test_command(made, tmp_path):
+    here, result, _ = made
+    result.save(tmp_path / "result", plots=False)
+    words = ["ortho", tmp_path / "result", here / "block" / "photographs", here / "surface.tif", "--cell", 4,
+             "--out", tmp_path / "out", "--no-plots", "--no-balance", "--no-seams"]  # fmt: skip
+    done = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
+    assert done.exit_code == 0
+    assert "cells of 4 m" in done.output
+    assert "σ of X and Y" in done.output
+    assert json.loads((tmp_path / "out" / "ortho.json").read_text(encoding="utf-8"))["cell_m"] == 4.0
+    assert not (tmp_path / "out" / "plots").exists()
+
+
+def surface_at(path: Path, left: float, height: float, crs: str | None = None, cell: float = 3.0) -> Path:
+    write_raster(path, np.full((100, 100), height), Grid(100, 100, left, 150.0, cell, cell), crs)
+    return path
+
+
+def test_surfaces_that_do_not_fit_are_refused(made, tmp_path):
+    here, result, _ = made
+    photographs = here / "block" / "photographs"
+    for match, surface in (
+        ("the photographs show X", surface_at(tmp_path / "elsewhere.tif", 5e5, 100.0)),
+        ("the ground of the block is at", surface_at(tmp_path / "high.tif", -150.0, 9000.0)),
+        ("counts in degree", surface_at(tmp_path / "degrees.tif", 9.0, 100.0, "EPSG:4326", 1e-3)),
+        ("the block in local", surface_at(tmp_path / "utm.tif", -150.0, 100.0, "EPSG:32632")),
+        ("US survey foot", surface_at(tmp_path / "feet.tif", -150.0, 300.0, "EPSG:2264")),
+        ("is no raster", photographs.parent / "block.toml"),
+        ("is no raster", tmp_path / "missing.tif"),
+    ):
+        with pytest.raises(InputError, match=match):
+            aerotri.orthophoto(result, photographs, surface, tmp_path / "out")
+    empty = write_nothing(tmp_path / "empty.tif")
+    with pytest.raises(InputError, match="no heights"):
+        aerotri.orthophoto(result, photographs, empty, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def write_nothing(path: Path) -> Path:
+    write_raster(path, np.full((100, 100), np.nan), Grid(100, 100, -150.0, 150.0, 3.0, 3.0))
+    return path
+
+
+def test_photographs_that_do_not_fit_are_refused(made, tmp_path):
+    here, result, _ = made
+    photographs, surface = here / "block" / "photographs", here / "surface.tif"
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="no photograph of the block"):
+        aerotri.orthophoto(result, tmp_path / "empty", surface, tmp_path / "out")
+    with pytest.raises(InputError, match="is not there"):
+        aerotri.orthophoto(result, tmp_path / "nowhere", surface, tmp_path / "out")
+    first, second = sorted(photographs.glob("*.tif"))[:2]
+    for match, changes in (
+        ("pixels large", {"width": 100}), ("has 2 bands", {"count": 2}), ("type float32", {"dtype": "float32"}),
+    ):  # fmt: skip
+        folder = tmp_path / match.split()[-1]
+        folder.mkdir()
+        with rasterio.open(first) as file:
+            profile = file.profile | {"tiled": False, "blockxsize": None, "blockysize": None}
+        (folder / first.name).write_bytes(first.read_bytes())
+        with rasterio.open(folder / second.name, "w", **(profile | changes)):
+            pass
+        with pytest.raises(InputError, match=match):
+            aerotri.orthophoto(result, folder, surface, tmp_path / "out")
+    (tmp_path / "cut").mkdir()
+    (tmp_path / "cut" / first.name).write_bytes(first.read_bytes()[:20_000])
+    with pytest.raises(InputError, match=first.name):
+        aerotri.orthophoto(result, tmp_path / "cut", surface, tmp_path / "out")
+
+
+def test_settings_are_refused(made, tmp_path):
+    here, result, _ = made
+    for match, options in (
+        ("no resampling", {"resampling": "best"}), ("the area is empty", {"area": (1, 1, 0, 0)}),
+        ("edge 0.5", {"edge": 0.5}), ("cell -1", {"cell": -1.0}), ("no layer", {"layer": "top"}),
+        ("the area has no surface", {"area": (1e6, 1e6, 2e6, 2e6)}), ("of memory", {"cell": 1e-6}),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=match):
+            aerotri.orthophoto(result, here / "block" / "photographs", here / "surface.tif", tmp_path / "o", **options)
