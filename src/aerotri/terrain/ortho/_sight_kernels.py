@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerotri.compiled import kernel
+from aerotri.compiled import kernel, leaf_kernel
 from aerotri.functional_model._photo_kernels import project, tile_of
 from aerotri.terrain._view_kernels import photo_place
 
@@ -65,7 +65,7 @@ def highest_of_blocks(z, out):
             out[i, j] = top
 
 
-@kernel
+@leaf_kernel
 def surface_heights(obstacles, cells):
     """Heights of the cells, bilinear between the four centres around; NaN where one of these is not known."""
     z, out = obstacles.z, cells.z
@@ -83,7 +83,7 @@ def surface_heights(obstacles, cells):
                 out[i, j] = top + t * (low - top)
 
 
-@kernel
+@leaf_kernel
 def is_hidden(obstacles, x, y, z, cx, cy, cz):
     """Whether the surface stands between a place and a projection centre."""
     surface = obstacles.z
@@ -115,7 +115,7 @@ def is_hidden(obstacles, x, y, z, cx, cy, cz):
     return False
 
 
-@kernel
+@leaf_kernel
 def place_of(view, k, x, y, z):
     """(column, row) px of a place in photograph k, image errors and all; NaN where it is not in its usable part."""
     half, edge, source = view.errors.half, view.edge, view.source[k]
@@ -131,7 +131,7 @@ def place_of(view, k, x, y, z):
     return np.nan, np.nan
 
 
-@kernel
+@leaf_kernel
 def look(view, k, cells, obstacles, wanted, column, row):
     """Places in photograph k of the cells wanted, out; NaN of those that it does not see, and of all others.
 
@@ -150,7 +150,7 @@ def look(view, k, cells, obstacles, wanted, column, row):
                     column[i, j], row[i, j] = a, b
 
 
-@kernel
+@leaf_kernel
 def offer(view, k, number, cells, obstacles, gsd, found, cost, column, row):
     """Enter photograph k, the number-th of the block, where it is among the best that see a cell.
 
