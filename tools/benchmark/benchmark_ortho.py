@@ -3,7 +3,7 @@
 A strip of drone photographs over hilly ground, 4000 × 3000 pixels in colour, JPEG. The plain way reads every photograph
 once, takes every tile of the orthophoto from one photograph by one `cv2.remap` (bicubic) with a map that is ready made,
 and writes the same cloud-optimised GeoTIFF. It knows no surface, no hidden ground, no seams and no colours. A small
-orthophoto is made before, so that nothing is compiled in the time that counts. Peak memory is that of the whole process.
+orthophoto is made before, so that nothing is compiled in the time that counts. Peak memory is that of all.
 
 Example
 -------
@@ -124,7 +124,8 @@ def _tiles(folder: Path, files: list[Path]) -> list[tuple[Path, list[tuple[Windo
             owner = int(np.bincount(part[part >= 0]).argmax())
             i, j = np.indices(part.shape, np.float32)
             x, y = 900.0 + j * 0.99 + i * 0.03, 900.0 + i * 0.99 - j * 0.03
-            found[owner][1].append((Window(column, row, part.shape[1], part.shape[0]), x, y))
+            place = Window.from_slices((row, row + part.shape[0]), (column, column + part.shape[1]))
+            found[owner][1].append((place, x, y))
     return found
 
 
