@@ -20,7 +20,7 @@ from aerotri.formats.assembly.assemble_control import with_check_points, with_co
 from aerotri.formats.assembly.camera_spec import CameraSpec, camera_of_each, cameras_of, freed
 from aerotri.formats.assembly.kinds import ReadingOptions
 from aerotri.formats.assembly.parts import OrientationList, PointList, RayList, Reading, no_sigma
-from aerotri.formats.assembly.reprojection import FEWEST, control_at_start, residuals_at_start
+from aerotri.formats.assembly.reprojection import FEWEST, control_at_start, residuals_at_start, sample_of_points
 from aerotri.formats.assembly.rigs_by_name import names_told, with_rig
 from aerotri.formats.block.folder import read_block
 from aerotri.formats.foreign.bundler import read_bundler
@@ -319,19 +319,23 @@ def fit_of_start_values(block: Block, geoid: FilePath | None = None) -> list[str
     """How well image points fit the orientations that were given, in words; nothing where there are none."""
     start = np.column_stack([block.images.centre, block.images.angles])
     known = np.asarray(np.isfinite(start).all(axis=1))
-    if not known.any() or not known[block.image_points.image].any():
+    rays = block.image_points
+    if not known.any() or not known[rays.image].any():
         return []
     try:
         local = block if block.crs == "local" else transform_block(block, frame_of_block(block, geoid))
     except InputError as error:
         return [f"how image points fit the orientations was not computed: {error}"]
-    found = residuals_at_start(local)
-    control = control_at_start(local)
+    sample = sample_of_points(local)
+    found = residuals_at_start(_with_rays(local, sample))
+    control = control_at_start(_with_rays(local, np.flatnonzero(np.isin(rays.point, block.control.point))))
     said = []
     if found.count >= FEWEST:
+        chosen = len(np.unique(rays.point[sample]))
+        part = "" if len(sample) == len(rays) else f" of {chosen} points, a sample of {len(block.points)}"
         said.append(
             f"image points fit the given orientations to {found.median_px:.3g} px "
-            f"(median of {counted(found.count, 'ray')})"
+            f"(median of {counted(found.count, 'ray')}{part})"
         )
     if len(control):
         said.append(
@@ -339,3 +343,10 @@ def fit_of_start_values(block: Block, geoid: FilePath | None = None) -> list[str
             f"(median of {counted(len(control), 'ray')})"
         )
     return said
+
+
+def _with_rays(block: Block, rows: np.ndarray) -> Block:
+    """The block with these rays alone."""
+    rays = block.image_points
+    own = replace(rays, image=rays.image[rows], point=rays.point[rows], xy=rays.xy[rows], sigma=rays.sigma[rows])
+    return replace(block, image_points=own)

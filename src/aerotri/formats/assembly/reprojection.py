@@ -18,6 +18,9 @@ CLEAR = 0.5
 """The right reading has a median residual less than this part of any other's."""
 FEWEST = 4
 """Rays to intersected points without which nothing is settled."""
+SAMPLE = 20000
+"""Object points of which the fit of start values is stated where there are more [C]: the median of their rays is known
+to a per cent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +153,22 @@ def settle(block: Block, centre: np.ndarray, choices: dict[str, np.ndarray], rem
             f"the rotations may be read in several ways, and none fits the image points clearly better ({told})", remedy
         )
     return best, f"rotations are {best}, by the median residual of the image points: {told}"
+
+
+def sample_of_points(block: Block, most: int = SAMPLE) -> np.ndarray:
+    """Rays (indices) of a sample of the object points, spread evenly over the rays; every photograph takes part.
+
+    All rays where there are no more than `most` points; up to one point more for every photograph.
+    """
+    rays = block.image_points
+    if len(block.points) <= most:
+        return np.arange(len(rays))
+    chosen = np.zeros(len(block.points), bool)
+    chosen[rays.point[np.linspace(0, len(rays) - 1, most).astype(np.int64)]] = True
+    first = np.full(len(block.images), -1)
+    first[rays.image[::-1]] = np.arange(len(rays))[::-1]
+    chosen[rays.point[first[first >= 0]]] = True
+    return np.flatnonzero(chosen[rays.point])
 
 
 def residuals_at_start(block: Block) -> Reprojection:

@@ -1,4 +1,4 @@
-"""Where the object points of a COLMAP file begin: records of variable length, one behind the other."""
+"""Loops over the millions of records of a COLMAP model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ FIXED = 51
 
 @kernel
 def find_points(raw, offsets):
-    """Fill in the place of every record; whether all of them lie in the file.
+    """Fill in where every object point begins, in records of variable length; whether all of them lie in the file.
 
     raw : (b,) uint8. offsets : (N,) int64, out.
     """
@@ -26,3 +26,33 @@ def find_points(raw, offsets):
             length = length * 256 + raw[at + FIXED - 8 + byte]
         at += FIXED + 8 * length
     return at <= len(raw)
+
+
+@kernel
+def number_by_appearance(point, place, index):
+    """Number object points 0, 1, 2 … in the order in which they appear; how many there are.
+
+    point : (m,) int64, 0 ≤ point < len(place). place : (n,) int64 of −1, in and out: the number of every point.
+    index : (m,) int64, out: the number of the point of every ray.
+    """
+    count = 0
+    for k in range(len(point)):
+        if place[point[k]] < 0:
+            place[point[k]] = count
+            count += 1
+        index[k] = place[point[k]]
+    return count
+
+
+@kernel
+def mark_repeated(image, point, last, again):
+    """Mark the rays whose point the same image measured before; how many they are. Rays come image by image.
+
+    image, point : (m,) int64. last : (N,) int64 of −1, for the points. again : (m,) bool, out.
+    """
+    count = 0
+    for k in range(len(image)):
+        again[k] = last[point[k]] == image[k]
+        last[point[k]] = image[k]
+        count += again[k]
+    return count

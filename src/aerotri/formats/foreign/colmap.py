@@ -10,6 +10,7 @@ camera's own where it is known.
 from __future__ import annotations
 
 import re
+import tempfile
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,8 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError, counted, mm_from_px, px_from_mm
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.files.atomic import atomic_folder
-from aerotri.formats.foreign.colmap_arrays import ModelArrays, read_arrays
+from aerotri.formats.foreign._colmap_kernels import mark_repeated, number_by_appearance
+from aerotri.formats.foreign.colmap_arrays import FILES, ModelArrays, read_arrays, write_bare
 from aerotri.formats.foreign.colmap_binary import check_binary_model
 from aerotri.formats.foreign.colmap_cameras import MOST_PIXELS, colmap_camera, expressible, read_camera, value
 from aerotri.formats.foreign.colmap_rigs import (
@@ -36,8 +38,9 @@ from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints,
 from aerotri.observations.block import LENS_NAMES
 from aerotri.observations.rigs import STATION
 
-FILES = ("cameras", "images", "points3D")
 OWN_ENTRIES = tuple(f"{name}.{end}" for name in (*FILES, "rigs", "frames") for end in ("txt", "bin"))
+SPARSE = 8
+"""Largest number of an object point, per ray, up to which a table of all numbers is made [C]."""
 
 
 def is_colmap(path: Path) -> bool:
@@ -74,7 +77,7 @@ def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndar
         held, or fitted to a model of other formulas.
     """
     folder = Path(folder)
-    model = open_model(folder)
+    model, arrays = _opened(folder)
     cameras, camera_place = _cameras_of(model, pixel_um, folder)
     ids = sorted(model.images)
     images = _images_of(model, ids, camera_place, folder)
@@ -83,45 +86,28 @@ def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndar
     if rigs:
         images = replace(images, columns={STATION: stations_of_model(model, ids, names, rigs)})
     _check_images(images, folder)
-    arrays = read_arrays(folder)
-    image, point_id, px = _observations(model, ids) if arrays is None else _rays_of(arrays, ids)
-    image, point_id, px = _once_each(image, point_id, px)
-    if not len(image):
-        raise InputError("the model has no points that were measured", "export it with its points", folder)
-    if not (np.abs(px) <= MOST_PIXELS).all():
-        raise InputError("an image point lies outside of any image", "export the model anew", folder)
-    numbers, first, point = np.unique(point_id, return_index=True, return_inverse=True)
-    appearance = np.argsort(first)
-    place = np.empty_like(appearance)
-    place[appearance] = np.arange(len(appearance))
-    numbers, point = numbers[appearance], place[point]
-    xy = np.empty_like(px)
-    for number, camera in enumerate(cameras):
-        own = images.camera[image] == number
-        xy[own] = mm_from_px(px[own], camera.size_px, camera.pixel_mm)
+    image, point_id, xy = _rays_of(arrays, ids, images, cameras, folder)
+    numbers, point = _by_appearance(point_id)
+    keep = _once_each(image, point, len(numbers))
     block = Block(
         name=folder.resolve().name,
         cameras=cameras,
         images=images,
         points=numbers.astype(str),
-        image_points=ImagePoints(image, point, xy, np.full_like(xy, pixel_um * 1e-3)),
+        image_points=ImagePoints(image[keep], point[keep], xy[keep], np.full_like(xy[keep], pixel_um * 1e-3)),
         settings=Settings(
             adjustment=AdjustmentSettings(additional_parameters=_free_parameters(cameras), datum="minimal"),
             image_sigma_um=pixel_um,
         ),
         rigs=rigs,
     )
-    return block, _points_of(model, arrays, numbers, folder)
+    return block, _points_of(arrays, numbers, folder)
 
 
-def _points_of(model: Any, arrays: ModelArrays | None, numbers: np.ndarray, folder: Path) -> np.ndarray:
+def _points_of(arrays: ModelArrays, numbers: np.ndarray, folder: Path) -> np.ndarray:
     """(N, 3) the object points of these numbers."""
-    if arrays is None:
-        ids = np.array(sorted(model.point3D_ids()), np.uint64)
-        known = np.array([model.points3D[number].xyz for number in ids.tolist()]).reshape(-1, 3)
-    else:
-        order = np.argsort(arrays.ids, kind="stable")
-        ids, known = arrays.ids[order], arrays.xyz[order]
+    order = np.argsort(arrays.ids, kind="stable")
+    ids, known = arrays.ids[order], arrays.xyz[order]
     place = np.minimum(np.searchsorted(ids, numbers), max(len(ids) - 1, 0))
     missing = np.flatnonzero(ids[place] != numbers) if len(ids) else np.arange(len(numbers))
     if len(missing):
@@ -133,11 +119,58 @@ def _points_of(model: Any, arrays: ModelArrays | None, numbers: np.ndarray, fold
     return xyz
 
 
-def _rays_of(arrays: ModelArrays, ids: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As `_observations`, from arrays."""
-    row = np.searchsorted(np.array(ids, np.int64), arrays.image)
-    order = np.argsort(row, kind="stable")
-    return row[order], arrays.point[order], arrays.px[order]
+def _rays_of(
+    arrays: ModelArrays, ids: list[int], images: Images, cameras: tuple[Camera, ...], folder: Path
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Image (m,), number of the object point (m,) and position (m, 2) mm of every ray, image by image."""
+    parts = [arrays.images[number] for number in ids]
+    ends = np.cumsum([0, *(len(point) for _, point in parts)])
+    if not ends[-1]:
+        raise InputError("the model has no points that were measured", "export it with its points", folder)
+    point, xy = np.empty(ends[-1], np.uint64), np.empty((ends[-1], 2))
+    for row, (px, numbers) in enumerate(parts):
+        camera = cameras[images.camera[row]]
+        if not (np.abs(px) <= MOST_PIXELS).all():
+            raise InputError("an image point lies outside of any image", "export the model anew", folder)
+        point[ends[row] : ends[row + 1]] = numbers
+        xy[ends[row] : ends[row + 1]] = mm_from_px(px, camera.size_px, camera.pixel_mm)
+    return np.repeat(np.arange(len(ids)), np.diff(ends)), point, xy
+
+
+def _by_appearance(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers (N,) of the object points in the order in which they appear, and the place (m,) of each ray's there."""
+    known = None
+    if point.max() > SPARSE * len(point):
+        known, point = np.unique(point, return_inverse=True)
+    place, index = np.full(int(point.max()) + 1, -1), np.empty(len(point), np.int64)
+    numbers = np.zeros(number_by_appearance(point.astype(np.int64), place, index), np.uint64)
+    seen = np.flatnonzero(place >= 0)
+    numbers[place[seen]] = seen if known is None else known[seen]
+    return numbers, index
+
+
+def _opened(folder: Path) -> tuple[Any, ModelArrays]:
+    """pycolmap's reconstruction of a folder, without its image points and object points, and these in arrays."""
+    _check(folder)
+    arrays = read_arrays(folder)
+    if arrays is None:
+        model = _reconstruction(folder, folder)
+        return model, _arrays_of(model)
+    with tempfile.TemporaryDirectory(prefix="aerotri_colmap_") as place:
+        write_bare(arrays, folder, Path(place))
+        return _reconstruction(Path(place), folder), arrays
+
+
+def _arrays_of(model: Any) -> ModelArrays:
+    """The records of a model that pycolmap has read."""
+    images = {}
+    for number, image in model.images.items():
+        used = [measured for measured in image.points2D if measured.has_point3D()]
+        px = np.array([measured.xy for measured in used], float).reshape(-1, 2)
+        images[number] = px, np.array([measured.point3D_id for measured in used], np.uint64)
+    ids = list(model.point3D_ids())
+    xyz = np.array([model.points3D[number].xyz for number in ids], float).reshape(-1, 3)
+    return ModelArrays(images, b"", np.array(ids, np.uint64), xyz)
 
 
 def open_model(folder: Path) -> Any:
@@ -148,15 +181,25 @@ def open_model(folder: Path) -> Any:
     InputError
         When it cannot be read.
     """
-    import pycolmap
+    _check(folder)
+    return _reconstruction(folder, folder)
 
+
+def _check(folder: Path) -> None:
     if not is_colmap(folder):
         raise InputError("holds no COLMAP model", "give a folder with cameras, images and points3D", folder)
     check_binary_model(folder)
+
+
+def _reconstruction(place: Path, folder: Path) -> Any:
+    """What pycolmap reads at a place; errors name the folder of the model."""
+    import pycolmap
+
     try:
-        return pycolmap.Reconstruction(folder)
+        return pycolmap.Reconstruction(place)
     except (RuntimeError, ValueError, IndexError, MemoryError, OSError) as error:
         short = str(error).strip().splitlines()[-1] if str(error).strip() else type(error).__name__
+        short = short.replace(str(place), str(folder))
         raise InputError(f"is no readable COLMAP model: {short}", "export the model anew", folder) from error
 
 
@@ -225,29 +268,14 @@ def _check_images(images: Images, folder: Path) -> None:
         raise InputError("an image lies at no possible place", "export the model anew", folder)
 
 
-def _observations(model: Any, ids: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image (m,), number of the object point (m,) and pixel position (m, 2) of every ray, image by image."""
-    image, point, px = [], [], []
-    for row, number in enumerate(ids):
-        for measured in model.images[number].points2D:
-            if measured.has_point3D():
-                image.append(row)
-                point.append(measured.point3D_id)
-                px.append(measured.xy)
-    return np.array(image, np.int64), np.array(point, np.uint64), np.array(px, float).reshape(-1, 2)
-
-
-def _once_each(image: np.ndarray, point: np.ndarray, px: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """COLMAP's tracks may hold two image points of one image; a block's may not."""
-    order = np.lexsort((point, image))
-    again = (np.diff(image[order]) == 0) & (point[order][1:] == point[order][:-1])
-    first = order[np.append(True, ~again)] if len(order) else order
-    if len(first) < len(image):
-        count = len(image) - len(first)
-        warnings.warn(f"left out: {counted(count, 'repeated measurement')} of a point in the same image", stacklevel=3)
-        keep = np.sort(first)
-        return image[keep], point[keep], px[keep]
-    return image, point, px
+def _once_each(image: np.ndarray, point: np.ndarray, count: int) -> np.ndarray | slice:
+    """Rays to keep: COLMAP's tracks may hold two image points of one image; a block's may not."""
+    again = np.zeros(len(image), bool)
+    repeated = int(mark_repeated(image, point, np.full(count, -1), again))
+    if not repeated:
+        return slice(None)
+    warnings.warn(f"left out: {counted(repeated, 'repeated measurement')} of a point in the same image", stacklevel=3)
+    return ~again
 
 
 def write_colmap(oriented: OrientedBlock, folder: FilePath, binary: bool = True) -> tuple[str, ...]:
