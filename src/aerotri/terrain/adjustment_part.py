@@ -41,14 +41,25 @@ def adjustment_variances(
     if len(measured) < 4:
         return out
     places = measured[:: max(len(measured) // MOST_PLACES, 1)]
-    local = places_of(calibration).to_local(pickets.xyz[places])
-    photographs = pickets.photographs[places]
-    variances = _variances(calibration, restitution, rows, local, photographs, plan=False)
+    variances = variances_at(calibration, restitution, rows, pickets.xyz[places], pickets.photographs[places])
     at = pickets.xyz[places, :2]
     values = NearestNDInterpolator(at, variances)(pickets.xyz[measured, :2])
     linear = LinearNDInterpolator(at, variances)(pickets.xyz[measured, :2])
     out[measured] = np.where(np.isfinite(linear), linear, values)
     return out
+
+
+def variances_at(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photographs: np.ndarray
+) -> np.ndarray:
+    """(n, 3) m² in the CRS, what the adjustment adds to points xyz (n, 3) intersected from photographs (n, m).
+
+    Parameters
+    ----------
+    rows : photographs of the block that `photographs` counts, −1 where a point has fewer.
+    """
+    local = places_of(calibration).to_local(xyz)
+    return _variances(calibration, restitution, rows, local, photographs, plan=False)
 
 
 def plan_variances(

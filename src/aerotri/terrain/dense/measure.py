@@ -1,0 +1,223 @@
+"""From an adjusted block and its photographs to a surface with a σ for every cell: coarse levels, then the finest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.adjustment.parallel import thread_count
+from aerotri.conventions import InputError
+from aerotri.memory import refuse_beyond_memory
+from aerotri.rasters.grids import Grid
+from aerotri.results.adjustment import Adjustment
+from aerotri.terrain.dense.grey_store import GreyStore
+from aerotri.terrain.dense.height_range import HeightRange, range_of_prior, range_of_surface
+from aerotri.terrain.dense.shared_part import SharedPart, shared_part
+from aerotri.terrain.dense.tile import TileOptions, measure_tile
+from aerotri.terrain.dense.tile_files import TileFiles, TileWindow, tile_windows
+from aerotri.terrain.photographs import Photographs, photographs_of
+from aerotri.terrain.pickets import Area, footprint
+from aerotri.terrain.prior import first_prior
+
+CELLS_PER_GSD = 2.0
+"""Cell over GSD where none is stated; the windows of least squares are seven pixels: smaller cells only repeat them."""
+TILE_PX = 1000
+"""Side of a tile, pixels of its level; chosen [C]: the paths of matching need a margin, which smaller tiles pay more
+often; larger ones take more memory and are less alike in their parallaxes."""
+MOST_LEVEL = 3
+"""Coarsest level; chosen [C]: an eighth of the resolution costs a sixty-fourth of the time and shows every house."""
+FEWEST_PIXELS = 250
+"""On the shorter side of a photograph in its coarsest level."""
+COARSE_PAIRS = 3
+BYTES_OF_CELL = 60
+"""Of a coarse level, held as a whole with what bounds its heights."""
+MOST_PLACES = 400
+"""Where the share of the adjustment is computed, linear between them: it changes slowly over a block."""
+Report = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class DensePlan:
+    """What is to be measured.
+
+    Parameters
+    ----------
+    rows : photographs of the block; paths : their files. resolution : m, cell; None: two GSD.
+    area : None: as far as photographs reach. pairs : most of a tile. edge : share of the format not used.
+    ideal : the photographs have been freed of image errors. folder : for the tiles.
+    """
+
+    rows: np.ndarray
+    paths: tuple[Path, ...]
+    folder: Path
+    resolution: float | None = None
+    area: Area | None = None
+    pairs: int = 4
+    edge: float = 0.02
+    ideal: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class DenseOutcome:
+    """A surface in tiles.
+
+    Parameters
+    ----------
+    grid : all cells. windows, files : its tiles. shared : what the adjustment adds to σ.
+    photographs : what was matched. level : of resolution they were matched at. cells : that have a height.
+    shared_cells : cells a side of the square that has one noise. across_px : median shift across the base of a pair.
+    factors : of the tiles. pairs : matched in all tiles. resumed : tiles that an earlier run had made.
+    """
+
+    grid: Grid
+    windows: tuple[TileWindow, ...]
+    files: TileFiles
+    shared: SharedPart
+    photographs: Photographs
+    level: int
+    cells: int
+    shared_cells: float
+    across_px: np.ndarray
+    factors: np.ndarray
+    pairs: np.ndarray
+    resumed: int
+
+
+def measure_surface(calibration: Adjustment, plan: DensePlan, report: Report | None = None) -> DenseOutcome:
+    """Match all tiles, from coarse to fine.
+
+    Raises
+    ------
+    InputError
+        When a photograph cannot be read, or nothing could be matched.
+    """
+
+    def tell(stage: str, share: float) -> None:
+        if report is not None:
+            report(stage, share)
+
+    photographs = photographs_of(calibration, plan.rows, plan.paths, plan.ideal)
+    block = calibration.local.block
+    sizes = [block.cameras[c].size_px for c in block.images.camera[plan.rows].tolist()]
+    store = GreyStore(plan.paths, sizes)
+    gsd = float(np.median(photographs.gsd))
+    area = footprint(photographs) if plan.area is None else plan.area
+    cell = plan.resolution or CELLS_PER_GSD * gsd
+    finest = max(int(np.floor(np.log2(cell / (CELLS_PER_GSD * gsd)) + 1e-9)), 0)
+    coarsest = max(min(MOST_LEVEL, int(np.log2(max(min(min(s) for s in sizes) / FEWEST_PIXELS, 1.0)))), finest)
+    heights = range_of_prior(first_prior(calibration.result.points.xyz, area, gsd, coarsest + 1))
+    if coarsest > finest:
+        heights = _coarse(photographs, store, area, heights, plan, coarsest, gsd, partial(tell, "coarse surface"))
+    grid = grid_of_area(area, cell)
+    files = TileFiles(plan.folder, finest)
+    windows = tile_windows(grid, tile_side(grid, gsd, finest))
+    options = TileOptions(finest, plan.pairs, plan.edge, True)
+    resumed = do_windows(photographs, store, grid, windows, heights, options, files, partial(tell, "surface"))
+    return _outcome(calibration, plan, photographs, grid, windows, files, finest, resumed)
+
+
+def grid_of_area(area: Area, cell: float) -> Grid:
+    """The grid whose edges are multiples of the cell, over an area."""
+    low, high = np.floor(area.low / cell), np.ceil(area.high / cell)
+    columns, rows = (int(n) for n in np.maximum(high - low, 1.0))
+    return Grid(rows, columns, float(low[0]) * cell, float(high[1]) * cell, cell, cell)
+
+
+def tile_side(grid: Grid, gsd: float, level: int) -> int:
+    """Cells of a side of a tile."""
+    return max(int(TILE_PX * gsd * 2**level / grid.cell_x), 16)
+
+
+def _coarse(
+    photographs: Photographs, store: GreyStore, area: Area, heights: HeightRange, plan: DensePlan, level: int,
+    gsd: float, report: Callable[[float], None],
+) -> HeightRange:  # fmt: skip
+    grid = grid_of_area(area, CELLS_PER_GSD * gsd * 2**level)
+    refuse_beyond_memory(
+        BYTES_OF_CELL * grid.rows * grid.columns, f"a coarse surface of {grid.rows} × {grid.columns} cells",
+        "give an --area, one part of the block after the other",
+    )  # fmt: skip
+    files = TileFiles(plan.folder, level)
+    windows = tile_windows(grid, tile_side(grid, gsd, level))
+    options = TileOptions(level, COARSE_PAIRS, plan.edge, False)
+    do_windows(photographs, store, grid, windows, heights, options, files, report)
+    z = np.full((grid.rows, grid.columns), np.nan)
+    for window, tile in files.read_all(windows):
+        z[window.row : window.row + window.rows, window.column : window.column + window.columns] = tile.z
+    if not np.isfinite(z).any():
+        raise InputError(
+            "no two photographs could be matched", "check that they overlap, are sharp and belong to this orientation"
+        )
+    height = float(np.median(photographs.centres[:, 2])) - float(np.nanmedian(z))
+    angle = np.radians(10.0)
+    per_pixel = gsd * 2**level / angle if height > 0.0 else gsd
+    return range_of_surface(grid, z, per_pixel)
+
+
+def do_windows(
+    photographs: Photographs, store: GreyStore, grid: Grid, windows: Sequence[TileWindow], heights: HeightRange,
+    options: TileOptions, files: TileFiles, report: Callable[[float], None],
+) -> int:  # fmt: skip
+    """Measure the tiles that are not there yet; how many were.
+
+    Raises
+    ------
+    InputError
+    """
+
+    def one(window: TileWindow) -> int:
+        if files.read(window) is not None:
+            return 1
+        part = grid.window(window.row, window.column, window.rows, window.columns)
+        files.write(window, measure_tile(photographs, store, part, heights, options))
+        return 0
+
+    resumed = 0
+    with ThreadPoolExecutor(thread_count()) as pool:
+        for n, was_there in enumerate(pool.map(one, windows)):
+            resumed += was_there
+            report((n + 1) / len(windows))
+    return resumed
+
+
+def _outcome(
+    calibration: Adjustment, plan: DensePlan, photographs: Photographs, grid: Grid, windows: list[TileWindow],
+    files: TileFiles, level: int, resumed: int,
+) -> DenseOutcome:  # fmt: skip
+    cells, shared_cells, across, factors, pairs = 0, [], [], [], []
+    places, shown = [], []
+    for window, tile in files.read_all(windows):
+        known = int(np.isfinite(tile.z).sum())
+        cells += known
+        if known == 0:
+            continue
+        shared_cells.append(tile.shared_cells)
+        across.append(tile.across)
+        factors.append(tile.factor)
+        pairs.append(tile.pairs)
+        for place in _some_places(grid, window, tile.z, max(int(MOST_PLACES / len(windows)), 4)):
+            places.append(place)
+            shown.append(np.unique(tile.pairs))
+    if not cells:
+        raise InputError(
+            "no two photographs could be matched", "check that they overlap, are sharp and belong to this orientation"
+        )
+    told = np.array(shared_cells)[np.isfinite(shared_cells)]
+    return DenseOutcome(
+        grid, tuple(windows), files, shared_part(calibration, photographs, plan.rows, np.array(places), shown),
+        photographs, level, cells, float(np.median(told)) if len(told) else np.nan, np.concatenate(across),
+        np.array(factors), np.concatenate(pairs), resumed,
+    )  # fmt: skip
+
+
+def _some_places(grid: Grid, window: TileWindow, z: np.ndarray, most: int) -> Iterator[np.ndarray]:
+    """(3,) m, cells of a tile that have a height, spread over it."""
+    rows, columns = np.nonzero(np.isfinite(z))
+    for n in np.unique(np.linspace(0, len(rows) - 1, most).astype(int)):
+        row, column = int(rows[n]), int(columns[n])
+        yield np.array([grid.x(window.column + column), grid.y(window.row + row), z[row, column]])

@@ -1,0 +1,176 @@
+"""Parallaxes of an epipolar pair: semi-global matching, then the shift of windows by least squares.
+
+The matching of OpenCV (Hirschmüller 2008) finds them to a part of a pixel with a bias towards whole ones. The right
+image is therefore resampled by the parallaxes found, smoothed where they are continuous, and what is left in a window
+between the two is solved for with gain, offset and the shift across the base. That one is zero but for noise: it tells
+how much larger the noise is than its formal σ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from aerotri.conventions import SIGMA_PER_MAD
+from aerotri.terrain.dense._refinement_kernels import solve_shifts
+from aerotri.terrain.dense.epipolar import EpipolarImages
+
+BLOCK_PX = 5
+"""Side of a block of the semi-global matching; chosen [C] on rendered scenes: 3 is noisier, 7 rounds off edges."""
+SMALL_STEP, LARGE_STEP = 8 * BLOCK_PX**2, 32 * BLOCK_PX**2
+"""Penalty of a change of parallax by one pixel, and by more: those that OpenCV's manual recommends."""
+CLIPPED_GRADIENT = 63
+"""Largest gradient that counts in a match."""
+UNIQUE_PERCENT = 5
+"""By which the best match must be better than the second: the least OpenCV's manual recommends."""
+BOTH_WAYS_PX = 1
+"""Largest difference of left-to-right and right-to-left."""
+SPECKLE_PX, SPECKLE_STEP = 100, 2
+"""Pixels of a patch of its own parallax below which it is taken out, and the step that bounds it; the manual's."""
+WINDOW_PX = 7
+"""Side of the windows of least squares; chosen [C] on rendered scenes."""
+ROUNDS = 2
+"""Of least squares; the third changes nothing that counts."""
+LARGEST_SHIFT_PX = 1.0
+"""By which least squares may move a parallax of the semi-global matching; chosen [C]: that is within a pixel of it."""
+LARGEST_ACROSS_PX = 1.0
+"""Shift across the base at which it is no match of this pair; chosen [C]: five times what orientations leave."""
+LEAST_CORRELATION = 0.5
+"""Correlation of a window below which it counts as not matched; chosen [C]: below, half of the grey values' variance is
+something else."""
+LEAST_SIGMA_PX = 0.02
+"""σ of a parallax is never stated smaller; chosen [C]: interpolation between pixels leaves that even without noise."""
+LARGEST_SIGMA_PX = 1.0
+"""σ of a parallax at which nothing is known."""
+FEWEST_TELL = 200
+"""Shifts across the base of which a factor is taken."""
+INVALID = -1e4
+
+
+@dataclass(frozen=True, eq=False)
+class Parallaxes:
+    """Of the pixels of a left epipolar image, beyond those known before; NaN where nothing is known.
+
+    Parameters
+    ----------
+    value, sigma : (rows, columns) px. bend : (rows, columns) px, RMS by which they leave their mean over a window.
+    across : px, median shift across the base. factor : of the formal σ, as the shifts across the base have it.
+    """
+
+    value: np.ndarray
+    sigma: np.ndarray
+    bend: np.ndarray
+    across: float
+    factor: float
+
+
+def parallaxes_of(images: EpipolarImages, refine: bool = True) -> Parallaxes:
+    """Match a pair.
+
+    Parameters
+    ----------
+    refine : by least squares; without, σ is that of rounding.
+    """
+    found = semi_global(images)
+    value = np.where(np.isfinite(found), found, INVALID).astype(np.float32)
+    value = cv2.medianBlur(value, 3)
+    value[~np.isfinite(found)] = INVALID
+    if not refine:
+        known = value > INVALID / 2
+        nothing = np.full(value.shape, np.nan, np.float32)
+        return Parallaxes(
+            np.where(known, value, nothing), np.where(known, np.float32(0.3), nothing), np.zeros_like(value), 0.0, 1.0
+        )
+    return _refined(images, value)
+
+
+def semi_global(images: EpipolarImages) -> np.ndarray:
+    """(rows, columns) float32 px, NaN where nothing matches: what OpenCV gives."""
+    g = images.geometry
+    matcher = cv2.StereoSGBM_create(
+        minDisparity=g.lowest, numDisparities=g.count, blockSize=BLOCK_PX, P1=SMALL_STEP, P2=LARGE_STEP,
+        disp12MaxDiff=BOTH_WAYS_PX, preFilterCap=CLIPPED_GRADIENT, uniquenessRatio=UNIQUE_PERCENT,
+        speckleWindowSize=SPECKLE_PX, speckleRange=SPECKLE_STEP, mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
+    )  # fmt: skip
+    found = matcher.compute(images.left, images.right).astype(np.float32) / 16.0
+    known = (found >= g.lowest) & images.left_known
+    rows, columns = np.nonzero(known)
+    at = np.rint(columns - found[rows, columns]).astype(np.int64)
+    inside = (at >= 0) & (at < found.shape[1])
+    known[rows, columns] = inside & images.right_known[rows, np.clip(at, 0, found.shape[1] - 1)]
+    return np.where(known, found, np.nan).astype(np.float32)
+
+
+def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
+    known = value > INVALID / 2
+    left, right = images.left.astype(np.float32), images.right.astype(np.float32)
+    start = value.copy()
+    shape = value.shape
+    shift, across, variance, of_across, correlation = (np.full(shape, np.nan, np.float32) for _ in range(5))
+    row, column = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
+    middle, factor = 0.0, 1.0
+    for _ in range(ROUNDS):
+        value = _smoothed(value, known)
+        aligned = cv2.remap(right, column - np.where(known, value, 0.0), row + np.float32(middle), cv2.INTER_CUBIC)
+        aligned = np.where(known, aligned, left)
+        means, products = _sums(left, aligned)
+        solve_shifts(known, means, products, float(WINDOW_PX**2), shift, across, variance, of_across, correlation)
+        known = known & (np.abs(shift) < LARGEST_SHIFT_PX)
+        value = np.where(known, value + shift, INVALID).astype(np.float32)
+        left_across, factor = _noise(across, of_across, known)
+        middle += left_across
+    known &= (
+        (np.abs(value - start) < LARGEST_SHIFT_PX) & (np.abs(across) < LARGEST_ACROSS_PX)
+        & (correlation > LEAST_CORRELATION)
+    )  # fmt: skip
+    sigma = np.sqrt(factor**2 * variance + LEAST_SIGMA_PX**2)
+    known &= sigma < LARGEST_SIGMA_PX
+    nothing = np.float32(np.nan)
+    bend = _bend(value, known)
+    return Parallaxes(
+        np.where(known, value, nothing), np.where(known, sigma, nothing).astype(np.float32), bend, middle, factor
+    )
+
+
+def _smoothed(value: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Smooth where it is continuous: neighbours further off than a pixel do not count."""
+    out = cv2.bilateralFilter(value, 5, 0.7, 1.5)
+    return np.where(known, out, INVALID).astype(np.float32)
+
+
+def _sums(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Means over windows, as `solve_shifts` takes them; gradients are those of both images."""
+    both = 0.5 * (left + right)
+    x = cv2.Scharr(both, cv2.CV_32F, 1, 0, scale=1.0 / 32.0)
+    y = cv2.Scharr(both, cv2.CV_32F, 0, 1, scale=1.0 / 32.0)
+    d = left - right
+    r = right - np.float32(right.mean())
+    size = WINDOW_PX, WINDOW_PX
+    means = np.stack([cv2.boxFilter(a, -1, size) for a in (d, x, y, r)], axis=-1)
+    pairs = ((d, d), (d, x), (d, y), (d, r), (x, x), (x, y), (x, r), (y, y), (y, r), (r, r))
+    products = np.stack([cv2.boxFilter(a * b, -1, size) for a, b in pairs], axis=-1)
+    return means, products
+
+
+def _noise(across: np.ndarray, variance: np.ndarray, known: np.ndarray) -> tuple[float, float]:
+    """Median of the shifts across the base, px, and how much larger they scatter than their formal σ."""
+    chosen = known & (variance > 0.0)
+    if chosen.sum() < FEWEST_TELL:
+        return 0.0, 2.0
+    v = across[chosen]
+    middle = float(np.median(v))
+    scaled = np.abs(v - middle) / np.sqrt(variance[chosen])
+    return middle, max(float(np.median(scaled)) * SIGMA_PER_MAD, 1.0)
+
+
+def _bend(value: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """(rows, columns) px, RMS by which the parallaxes of a window leave the mean about them."""
+    size = WINDOW_PX, WINDOW_PX
+    weight = cv2.boxFilter(known.astype(np.float32), -1, size)
+    filled = np.where(known, value, 0.0).astype(np.float32)
+    mean = cv2.boxFilter(filled, -1, size) / np.maximum(weight, 1e-6)
+    off = np.where(known, value - mean, 0.0).astype(np.float32)
+    square = cv2.boxFilter(off * off, -1, size) / np.maximum(weight, 1e-6)
+    return np.sqrt(np.maximum(square, 0.0)).astype(np.float32)

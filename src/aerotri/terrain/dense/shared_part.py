@@ -1,0 +1,63 @@
+"""What the adjustment adds to the variance of a surface, which its cells share, at some places and linear between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+from aerotri.rasters.grids import Grid
+from aerotri.results.adjustment import Adjustment
+from aerotri.terrain.adjustment_part import variances_at
+from aerotri.terrain.photographs import Photographs
+
+MOST_RAYS = 8
+"""Photographs a place is taken to be measured in; more change its σ little."""
+NODES = 60
+"""Along a side of the grid that is interpolated once."""
+
+
+@dataclass(frozen=True, eq=False)
+class SharedPart:
+    """Variances on a coarse grid: (rows, columns) m² of Z, on x rising and y falling."""
+
+    x: np.ndarray
+    y: np.ndarray
+    variance: np.ndarray
+
+    def over(self, grid: Grid) -> np.ndarray:
+        """(rows, columns) m, σ of the cells of a grid, bilinear."""
+        column = np.interp(grid.x(np.arange(grid.columns)), self.x, np.arange(len(self.x)))
+        row = np.interp(-grid.y(np.arange(grid.rows)), -self.y, np.arange(len(self.y)))
+        i, j = np.minimum(row.astype(int), len(self.y) - 2), np.minimum(column.astype(int), len(self.x) - 2)
+        s, t = (row - i)[:, None], (column - j)[None]
+        v = self.variance
+        a, b, c, d = v[np.ix_(i, j)], v[np.ix_(i, j + 1)], v[np.ix_(i + 1, j)], v[np.ix_(i + 1, j + 1)]
+        return np.sqrt((1 - s) * ((1 - t) * a + t * b) + s * ((1 - t) * c + t * d))
+
+
+def shared_part(
+    calibration: Adjustment, photographs: Photographs, rows: np.ndarray, places: np.ndarray, shown: list[np.ndarray]
+) -> SharedPart:
+    """Of the surface through places (n, 3) m in the CRS.
+
+    Parameters
+    ----------
+    rows : photographs of the block. shown : into them, of every place, those that may have measured it.
+    """
+    chosen = np.full((len(places), MOST_RAYS), -1)
+    for n, (place, candidates) in enumerate(zip(places, shown, strict=True)):
+        away = np.hypot(*(photographs.centres[candidates, :2] - place[:2]).T)
+        nearest = candidates[np.argsort(away, kind="stable")][:MOST_RAYS]
+        chosen[n, : len(nearest)] = nearest
+    variance = variances_at(calibration, photographs.restitution, rows, places, chosen)[:, 2]
+    low, high = places[:, :2].min(axis=0), places[:, :2].max(axis=0)
+    high = np.maximum(high, low + 1e-3)
+    x, y = np.linspace(low[0], high[0], NODES), np.linspace(high[1], low[1], NODES)
+    nodes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    near = NearestNDInterpolator(places[:, :2], variance)(nodes)
+    if len(places) < 4 or np.linalg.matrix_rank(places[:, :2] - places[:, :2].mean(axis=0)) < 2:
+        return SharedPart(x, y, near.reshape(NODES, NODES))
+    linear = LinearNDInterpolator(places[:, :2], variance)(nodes)
+    return SharedPart(x, y, np.where(np.isfinite(linear), linear, near).reshape(NODES, NODES))

@@ -1,0 +1,216 @@
+"""One tile of the surface: its pairs matched one after the other, their heights fused cell by cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from aerotri.conventions import SIGMA_PER_MAD
+from aerotri.rasters.grids import Grid
+from aerotri.terrain.dense import _mesh_kernels as kernels
+from aerotri.terrain.dense.epipolar import EpipolarGeometry, epipolar_geometry, epipolar_images
+from aerotri.terrain.dense.grey_store import GreyStore
+from aerotri.terrain.dense.height_range import HeightRange
+from aerotri.terrain.dense.pairs import Pair, chosen_pairs, noise_correlation
+from aerotri.terrain.dense.parallaxes import Parallaxes, parallaxes_of
+from aerotri.terrain.dense.place import Place, place_at
+from aerotri.terrain.photographs import Photographs
+
+LARGEST_JUMP_PX = 1.5
+"""Difference of parallax between neighbouring pixels of one surface; chosen [C]: more is the edge of an object, and a
+triangle across it would be a wall that was not measured."""
+AGREEING_SIGMAS = 4.0
+"""σ of a difference within which heights of two pairs agree."""
+AGREEING_PX = 1.0
+"""Besides, in pixels of parallax: what two pairs see of rough ground differs by that much."""
+BEND_SHARE = 0.35
+"""Share of the bend of the ground within a window that stays in the heights as an error; calibrated [C] on rendered
+scenes (tools/prove/dense_surface.py)."""
+SMALLEST_PATCH, PATCH_STEP_PX = 50, 2.0
+"""Cells of a patch of surface below which it is taken for chance, and the step, in pixels of parallax, that bounds it;
+chosen [C]: five by ten cells, the size of a window of the matching and its neighbours."""
+MOST_LAGS = 12
+"""Cells up to which the noise of neighbouring cells is looked at for what they share."""
+FEWEST_MISFITS = 500
+"""Cells measured twice of which the noise of a tile is taken."""
+LARGEST_FACTOR = 3.0
+STEP_UNITS, NO_HEIGHT = 8, -32000
+"""Of the whole numbers in which heights are looked through for patches."""
+
+
+@dataclass(frozen=True, eq=False)
+class TileSurface:
+    """Heights of a tile, (rows, columns) m, NaN where there is none.
+
+    Parameters
+    ----------
+    z : of the CRS. sigma : of matching. count : photographs. factor : by which agreement of pairs changed the σ.
+    pairs : photographs, (n, 2). across : (n,) px, median shift across the base of each.
+    shared_cells : cells along a side of the square whose noise is one, as neighbours share it; NaN where not known.
+    """
+
+    z: np.ndarray
+    sigma: np.ndarray
+    count: np.ndarray
+    factor: float
+    pairs: np.ndarray
+    across: np.ndarray
+    shared_cells: float
+
+
+@dataclass(frozen=True)
+class TileOptions:
+    """level : of resolution. pairs : most of a tile. edge : share of the format not used. refine : least squares."""
+
+    level: int
+    pairs: int
+    edge: float
+    refine: bool
+
+
+def measure_tile(
+    photographs: Photographs, store: GreyStore, grid: Grid, heights: HeightRange, options: TileOptions
+) -> TileSurface:
+    """The heights of the cells of a grid.
+
+    Raises
+    ------
+    InputError
+        When a photograph cannot be read.
+    """
+    nodes, low_z, high_z = heights.within(grid)
+    z = 0.5 * (low_z + high_z)
+    middle = np.array([*nodes.mean(axis=0), float(np.median(z))])
+    reach = 0.5 * float(np.hypot(grid.columns * grid.cell_x, grid.rows * grid.cell_y)) + float(np.ptp([low_z, high_z]))
+    place = place_at(photographs, middle, reach, options.edge)
+    ground, low, high = (place.from_crs(np.column_stack([nodes, h])) for h in (z, low_z, high_z))
+    pairs = chosen_pairs(place, ground, options.pairs)
+    shape = grid.rows, grid.columns
+    layers: list[tuple[np.ndarray, ...]] = []
+    kept: list[int] = []
+    across: list[float] = []
+    for n, pair in enumerate(pairs):
+        geometry = epipolar_geometry(place, pair.left, pair.right, options.level, ground, low, high)
+        if geometry is None:
+            continue
+        images = epipolar_images(place, geometry, store)
+        if not (images.left_known.any() and images.right_known.any()):
+            continue
+        found = parallaxes_of(images, options.refine)
+        layers.append(_heights(place, geometry, found, grid))
+        kept.append(n)
+        across.append(found.across)
+    used = [pairs[n] for n in kept]
+    if not used:
+        empty = np.full(shape, np.nan)
+        return TileSurface(
+            empty, empty.copy(), np.zeros(shape, np.int16), 1.0, np.zeros((0, 2), int), np.zeros(0),
+            np.nan,
+        )
+    numbers = np.array([[p.left, p.right] for p in used])
+    tolerance = AGREEING_PX * metres_per_pixel(place, used, options.level)
+    fused = _fused(place, used, layers, middle[2], tolerance)
+    return TileSurface(*fused, numbers, np.array(across), _shared_cells(layers))
+
+
+def _heights(
+    place: Place, g: EpipolarGeometry, found: Parallaxes, grid: Grid
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Heights above the place, σ and bend, (rows, columns) m, of the cells as one pair sees them."""
+    rays = kernels.Rays(
+        g.f, g.base, g.first, g.known, np.ascontiguousarray(g.centre), np.ascontiguousarray(g.rotation),
+        np.ascontiguousarray(place.to_crs), place.reach,
+    )  # fmt: skip
+    xyz = np.empty((*found.value.shape, 3))
+    per_pixel = np.empty(found.value.shape)
+    kernels.place_of_pixels(rays, found.value, xyz, per_pixel)
+    z, sigma, bend = (np.full((grid.rows, grid.columns), np.nan) for _ in range(3))
+    about = grid.left - place.origin[0], grid.top - place.origin[1], grid.cell_x
+    kernels.lay_mesh(xyz, found.sigma, found.bend, per_pixel, found.value, LARGEST_JUMP_PX, about, z, sigma, bend)
+    return z, sigma, bend
+
+
+def metres_per_pixel(place: Place, pairs: list[Pair], level: int) -> float:
+    """m of height that a pixel of parallax is, of the median pair."""
+    p, found = place.photographs, []
+    for pair in pairs:
+        far = float(np.linalg.norm(place.centres[pair.left]))
+        gsd = far / (p.orientation.interior[pair.left, 0] * p.sensor[pair.left, 2]) * 2**level
+        found.append(gsd / (2.0 * np.tan(np.radians(pair.angle) / 2.0)))
+    return float(np.median(found))
+
+
+def _fused(
+    place: Place, pairs: list[Pair], layers: list[tuple[np.ndarray, ...]], height: float, tolerance: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    heights, sigmas, bends = (np.stack(part) for part in zip(*layers, strict=True))
+    correlation = noise_correlation(place, pairs)
+    bit = {k: 1 << n for n, k in enumerate(sorted({k for p in pairs for k in (p.left, p.right)}))}
+    used = np.array([bit[p.left] | bit[p.right] for p in pairs], np.int64)
+    shape = heights.shape[1:]
+    z, sigma, misfit = (np.full(shape, np.nan) for _ in range(3))
+    count = np.zeros(shape, np.int16)
+    kernels.fuse(heights, sigmas, correlation, used, AGREEING_SIGMAS, tolerance, z, sigma, count, misfit)
+    factor = _factor(misfit)
+    patched = _without_patches(z, PATCH_STEP_PX * tolerance)
+    z[~patched], sigma[~patched], count[~patched] = np.nan, np.nan, 0
+    known = np.isfinite(heights)
+    bend = BEND_SHARE * np.where(known, bends, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    return z + height, np.hypot(sigma * factor, bend), count, factor
+
+
+def _without_patches(z: np.ndarray, step: float) -> np.ndarray:
+    """(rows, columns) whether a height belongs to a patch that is large enough; step : m that bounds a patch."""
+    known = np.isfinite(z)
+    if not known.any():
+        return known
+    unit = step / STEP_UNITS
+    whole = np.where(known, np.rint((z - np.nanmedian(z)) / unit), NO_HEIGHT)
+    held = np.clip(whole, NO_HEIGHT, -NO_HEIGHT).astype(np.int16)
+    cv2.filterSpeckles(held, NO_HEIGHT, SMALLEST_PATCH, STEP_UNITS)
+    return held != NO_HEIGHT
+
+
+def _factor(misfit: np.ndarray) -> float:
+    """By which heights of pairs scatter more than their σ say; 1 where too few cells were measured twice."""
+    told = misfit[np.isfinite(misfit)]
+    if len(told) < FEWEST_MISFITS:
+        return 1.0
+    # the median of chi-square of one degree of freedom is 1 / SIGMA_PER_MAD²; more pairs lie nearer to 1
+    return float(np.clip(np.sqrt(np.median(told)) * SIGMA_PER_MAD, 1.0, LARGEST_FACTOR))
+
+
+def _shared_cells(layers: list[tuple[np.ndarray, ...]]) -> float:
+    """Side of the square of cells that have one noise: from how differences of two pairs are alike at neighbours.
+
+    The noise of a sum over many cells is that of cells for themselves times the sum of the correlations over all lags,
+    the side of the square being its root.
+    """
+    if len(layers) < 2:
+        return np.nan
+    both = {(n, m): int(np.isfinite(layers[n][0] + layers[m][0]).sum()) for m in range(len(layers)) for n in range(m)}
+    n, m = max(both, key=lambda pair: both[pair])
+    (one, s1, _), (other, s2, _) = layers[n], layers[m]
+    difference = (one - other) / np.hypot(s1, s2)
+    known = np.isfinite(difference) & (np.abs(difference) < AGREEING_SIGMAS)
+    if known.sum() < FEWEST_MISFITS:
+        return np.nan
+    d = np.where(known, difference - np.median(difference[known]), 0.0)
+    # the slow part is the orientation of the pairs, which cells share as a part of the adjustment
+    size = 4 * MOST_LAGS + 1, 4 * MOST_LAGS + 1
+    weight = cv2.boxFilter(known.astype(np.float64), -1, size)
+    d = np.where(known, d - cv2.boxFilter(d, -1, size) / np.maximum(weight, 1e-9), 0.0)
+    variance = float((d**2).sum() / known.sum())
+    total = []
+    for a, b in ((d, known), (d.T, known.T)):
+        sums = 1.0
+        for lag in range(1, min(MOST_LAGS, len(a) - 1)):
+            pairs = float((b[lag:] & b[:-lag]).sum())
+            rho = float((a[lag:] * a[:-lag]).sum()) / max(pairs, 1.0) / max(variance, 1e-12)
+            if rho < 0.05:
+                break
+            sums += 2.0 * rho
+        total.append(sums)
+    return float(np.sqrt(total[0] * total[1]))

@@ -1,0 +1,83 @@
+"""Tiles of a surface as files, so that memory does not grow with the block and a run that was ended goes on."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+
+from aerotri.rasters.grids import Grid
+from aerotri.terrain.dense.tile import TileSurface
+
+FIELDS = ("z", "sigma", "count", "factor", "pairs", "across", "shared_cells")
+
+
+@dataclass(frozen=True)
+class TileWindow:
+    """Cells of a grid: first row and column, size."""
+
+    row: int
+    column: int
+    rows: int
+    columns: int
+
+
+def tile_windows(grid: Grid, side: int) -> list[TileWindow]:
+    """Tiles of a grid, rows to and fro, so that neighbours in the list are neighbours on the ground."""
+    found = []
+    for n, row in enumerate(range(0, grid.rows, side)):
+        columns = range(0, grid.columns, side)
+        for column in columns if n % 2 == 0 else reversed(columns):
+            found.append(TileWindow(row, column, min(side, grid.rows - row), min(side, grid.columns - column)))
+    return found
+
+
+@dataclass(frozen=True)
+class TileFiles:
+    """The tiles of one level in a folder."""
+
+    folder: Path
+    level: int
+
+    def path(self, window: TileWindow) -> Path:
+        """Where a tile is, or will be."""
+        return self.folder / f"level{self.level}_{window.row}_{window.column}.npz"
+
+    def write(self, window: TileWindow, tile: TileSurface) -> None:
+        """Write a tile whole or not at all."""
+        path = self.path(window)
+        part = path.with_suffix(".part")
+        with part.open("wb") as file:
+            np.savez(
+                file, z=tile.z, sigma=tile.sigma.astype(np.float32), count=tile.count.astype(np.uint8),
+                factor=np.array(tile.factor), pairs=tile.pairs.astype(np.int64), across=tile.across.astype(np.float64),
+                shared_cells=np.array(tile.shared_cells),
+            )  # fmt: skip
+        os.replace(part, path)
+
+    def read(self, window: TileWindow) -> TileSurface | None:
+        """A tile that is there and whole; None otherwise."""
+        path = self.path(window)
+        try:
+            with np.load(path, allow_pickle=False) as held:
+                parts = {name: held[name] for name in FIELDS}
+        except (OSError, ValueError, KeyError, BadZipFile, EOFError):
+            return None
+        if parts["z"].shape != (window.rows, window.columns):
+            return None
+        return TileSurface(
+            parts["z"], parts["sigma"], parts["count"], float(parts["factor"]), parts["pairs"], parts["across"],
+            float(parts["shared_cells"]),
+        )  # fmt: skip
+
+    def read_all(self, windows: list[TileWindow]) -> Iterator[tuple[TileWindow, TileSurface]]:
+        """Tiles one after the other; all must be there."""
+        for window in windows:
+            tile = self.read(window)
+            if tile is None:
+                raise FileNotFoundError(self.path(window))
+            yield window, tile
