@@ -36,6 +36,7 @@ GROUPS = {
     "folder of crosscheck": ("crosscheck", "Folder of `aerotri crosscheck`"),
     "folder of dtm": ("dtm", "Folder of `aerotri dtm`"),
     "folder of ortho": ("ortho", "Folder of `aerotri ortho`"),
+    "folder of dsm": ("dsm", "Folder of `aerotri dsm`"),
     "folder of compare": ("compare", "Folder of `aerotri compare`"),
     "folder of volume": ("volume", "Folder of `aerotri volume`"),
     "folder of run": ("run", "Folder of `aerotri run`"),
@@ -58,7 +59,8 @@ PYTHON = {
         "compare_parameters", "halves", "crosscheck", "parameters", "InputError", "AdjustmentFailedError",
     ),
     "Image errors, terrain, volume": (
-        "ImageErrors", "deform", "correct_dem", "ideal_photographs", "terrain", "Surface", "compare", "volume", "run",
+        "ImageErrors", "deform", "correct_dem", "ideal_photographs", "terrain", "dense_surface", "Surface", "compare",
+        "volume", "run",
     ),
     "Before the flight": ("predict",),
     "Figures and geometry of one's own": ("drawing", "geometry"),

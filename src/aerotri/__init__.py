@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from aerotri.public.converting import convert as convert
     from aerotri.public.covariance import Covariance as Covariance
     from aerotri.public.dem import correct_dem as correct_dem
+    from aerotri.public.dense import dense_surface as dense_surface
     from aerotri.public.editing import edit as edit
     from aerotri.public.halves import halves as halves
     from aerotri.public.ideal import ideal_photographs as ideal_photographs
@@ -71,6 +72,7 @@ _PLACES = {
     "correct_dem": "aerotri.public.dem",
     "crosscheck": "aerotri.public.comparing",
     "deform": "aerotri.public.models",
+    "dense_surface": "aerotri.public.dense",
     "drawing": "aerotri.public.drawing",
     "edit": "aerotri.public.editing",
     "adjust": "aerotri.public.results",
@@ -116,6 +118,7 @@ __all__ = [
     "correct_dem",
     "crosscheck",
     "deform",
+    "dense_surface",
     "drawing",
     "edit",
     "example_flight",

@@ -19,6 +19,7 @@ PAIRS = {
     "compare-parameters": (adjusting.compare_parameters, aerotri.compare_parameters),
     "dtm": (terrain.dtm, aerotri.terrain),
     "ortho": (ortho.ortho, aerotri.orthophoto),
+    "dsm": (terrain.dsm, aerotri.dense_surface),
     "volume": (volumes.volume, aerotri.volume),
     "predict volume": (volumes.predict_volume, aerotri.predict.volume),
     "predict attitude": (volumes.predict_attitude, aerotri.predict.attitude),

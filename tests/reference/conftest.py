@@ -166,6 +166,7 @@ def _written(folder: Path) -> Written:
     of_weighted = run("adjust", rigged, "--no-plots", out="weighted_result")
     photographs = tiny / "photographs"
     pairs = run("dtm", result, photographs, "--interval", "20", "--pairs", out="dtm")
+    dense = run("dsm", result, photographs, out="dsm")
     run("demcor", result, pairs / "dsm.tif", "--models", pairs / "model.tif", out="corrected/NAME.tif")
     ortho = run("ortho", result, photographs, pairs, out="ortho")
     model = run("deform", result, "--end-lap", "0.6", out="model")
@@ -190,7 +191,7 @@ def _written(folder: Path) -> Written:
         "result of adjust": (first, second, result, of_rig, of_weighted, of_shutter),
         "folder of compare-parameters": (sets,), "folder of halves": (halves,), "folder of deform": (model, whole),
         "folder of demcor": (folder / "corrected",), "folder of imgeo": (imgeo,), "folder of crosscheck": (checked,),
-        "folder of dtm": (pairs, project / "dtm"), "folder of compare": (compared,),
+        "folder of dtm": (pairs, project / "dtm"), "folder of dsm": (dense,), "folder of compare": (compared,),
         "folder of volume": (project / "volume",), "folder of ortho": (ortho,),
         "truth of simulate": (tiny / "truth", rigged / "truth", rolling / "truth"),
         "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),

@@ -11,7 +11,7 @@ import textwrap
 import pytest
 
 from aerotri.cli.app import app, invoke
-from aerotri.commands import compare, deform, dtm, volume
+from aerotri.commands import compare, deform, dsm, dtm, volume
 from aerotri.conventions import InputError
 from aerotri.formats.block.settings import read_block_toml
 from aerotri.reference.block_keys import block_keys, plan_keys
@@ -34,7 +34,7 @@ EVERYDAY = {
 """Words of the printed lines that need no explanation: small words, units, parts of terms explained together."""
 PRINTING = (
     adjustment.summary_lines, work.free_check_lines, volume.outcome_lines, compare._summary, deform._summary,
-    dtm._summary,
+    dtm._summary, dsm._summary,
 )  # fmt: skip
 
 

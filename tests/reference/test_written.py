@@ -20,6 +20,7 @@ PRINTED_CONTENT = {
     "adjust": "adjustment.json (result of adjust)", "deform": "deform.json (folder of deform)",
     "demcor": "NAME_demcor.json (folder of demcor)", "imgeo": "imgeo.json (folder of imgeo)",
     "crosscheck": "crosscheck.json (folder of crosscheck)", "dtm": "dtm.json (folder of dtm)",
+    "dsm": "dsm.json (folder of dsm)",
     "halves": "halves.json (folder of halves)", "ortho": "ortho.json (folder of ortho)",
     "compare": "compare.json (folder of compare)", "volume": "volume.json (folder of volume)",
     "tiepoints": "tiepoints.json (block of tiepoints)", "run": "run.json (folder of run)",

@@ -8,7 +8,8 @@ import pytest
 from aerotri.commands.compare import run_compare
 from aerotri.conventions import InputError
 from aerotri.formats.results.point_cloud import read_point_cloud, write_point_cloud
-from aerotri.rasters.grids import Grid, RasterReader, write_raster, write_surface
+from aerotri.rasters.grids import Grid, RasterReader, write_raster
+from aerotri.rasters.surface_files import write_surface
 from aerotri.terrain.compare import PointHeights, RasterHeights, compare, statistics_of
 
 GRID = Grid(120, 150, 0.0, 240.0, 2.0, 2.0)

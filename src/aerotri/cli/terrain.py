@@ -12,10 +12,13 @@ from aerotri.cli.options import ARGUMENTS, INPUT, METHOD, OUTPUT, TERRAIN, Json,
 from aerotri.terrain.settings import (
     ALIGNMENT,
     DEFAULTS,
+    DENSE_DEFAULTS,
     FEWEST_PHOTOGRAPHS,
     INTERPOLATION,
     LARGEST_EDGE,
+    MOST_PAIRS,
     MOST_PHOTOGRAPHS,
+    DenseSettings,
     TerrainSettings,
 )
 
@@ -136,6 +139,65 @@ def dtm(
         most_photographs, breaklines, ground_within, ideal,
     )  # fmt: skip
     raise typer.Exit(run_dtm(result, photographs, out, settings, plots, json_))
+
+
+@app.command(
+    rich_help_panel=TERRAIN,
+    epilog="Example: aerotri dsm drone_project/result blocks/drone_site/photographs --out drone_dsm",
+)
+def dsm(
+    result: ResultFolder,
+    photographs: Annotated[
+        list[Path],
+        typer.Argument(help="Folders or files of the photographs, TIFF or JPEG.", rich_help_panel=ARGUMENTS),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder to write; default NAME_dsm here. Tiles lie beside it, in a folder .tiles, until all is done.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    resolution: Annotated[
+        float | None,
+        typer.Option(min=1e-6, help="Cell of the surface, m. Default: two pixels.", rich_help_panel=GRID),
+    ] = DENSE_DEFAULTS.resolution,
+    area: Annotated[
+        tuple[float, float, float, float] | None,
+        typer.Option(help="X Y of the lower left, X Y of the upper right corner, m.", rich_help_panel=GRID),
+    ] = DENSE_DEFAULTS.area,
+    pairs: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            max=MOST_PAIRS,
+            help="Number of pairs of photographs that measure a piece of ground, at most.",
+            rich_help_panel=MATCHING,
+        ),
+    ] = DENSE_DEFAULTS.pairs,
+    edge: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            max=LARGEST_EDGE,
+            help="Share of the photograph at its edge that is not used.",
+            rich_help_panel=MATCHING,
+        ),
+    ] = DENSE_DEFAULTS.edge,
+    ideal: Annotated[
+        bool,
+        typer.Option(
+            "--ideal", help="The photographs are those of imgeo, without image errors.", rich_help_panel=INPUT
+        ),
+    ] = DENSE_DEFAULTS.ideal,
+    plots: Annotated[bool, typer.Option(help="Draw the surface.", rich_help_panel=OUTPUT)] = True,
+    json_: Json = False,
+) -> None:
+    """The whole surface by dense matching: a height and its standard deviation for every cell."""
+    from aerotri.commands.dsm import run_dsm
+
+    settings = DenseSettings(resolution, area, pairs, edge, ideal)
+    raise typer.Exit(run_dsm(result, photographs, out, settings, plots, json_))
 
 
 @app.command(

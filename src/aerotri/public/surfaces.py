@@ -196,7 +196,8 @@ class Surface:
             When the file is there already, or cannot be written.
         """
         from aerotri.formats.files.atomic import atomic_file
-        from aerotri.rasters.grids import write_raster, write_surface
+        from aerotri.rasters.grids import write_raster
+        from aerotri.rasters.surface_files import write_surface
 
         target, h = Path(path), self.heights
         refuse_existing_file(target, overwrite)

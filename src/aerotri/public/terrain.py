@@ -302,30 +302,43 @@ def terrain_plan(
     InputError
         When fewer than two photographs of the block are found.
     """
-    from aerotri.formats.files.photograph_files import match_files, photographs_in
     from aerotri.formats.foreign.breaklines import breaklines_and_note
     from aerotri.rasters.grids import horizontal_crs
     from aerotri.terrain.dtm import TerrainPlan, chosen_rows
     from aerotri.terrain.pickets import Area
 
-    files = [f for f in photographs_in(given, ENDINGS) if f.suffix.lower() in ENDINGS]
-    found = match_files(files, record.result.block.images.names)
-    path_of = {int(row): file for row, file in zip(found, files, strict=True) if row >= 0}
-    rows = np.array([r for r in chosen_rows(record, settings.subset) if r in path_of], dtype=np.int64)
-    if len(rows) < 2:
-        where = ", ".join(str(path) for path in given) or "nothing"
-        raise InputError(f"{len(rows)} photographs of the block are in {where}", "give the folder that holds them")
+    rows, paths = rows_and_files(record, given, chosen_rows(record, settings.subset))
     s, area, lines, note = settings, None, (), ""
     if s.area is not None:
         area = Area(np.array(s.area[:2]), np.array(s.area[2:]))
     if s.breaklines is not None:
         lines, note = breaklines_and_note(s.breaklines, horizontal_crs(record.result.block.crs))
     plan = TerrainPlan(
-        rows=rows, paths=tuple(path_of[int(r)] for r in rows), interval=s.interval, cell=s.cell, pairs=s.in_pairs,
+        rows=rows, paths=paths, interval=s.interval, cell=s.cell, pairs=s.in_pairs,
         step=s.step, area=area, window_px=s.window, threshold=s.threshold, agreeing=s.agreeing, edge=s.unused_edge,
         most_photographs=s.most_photographs, breaklines=lines, ideal=s.ideal,
     )  # fmt: skip
     return plan, (note,) if note else ()
+
+
+def rows_and_files(record: Record, given: Sequence[Path], wanted: np.ndarray) -> tuple[np.ndarray, tuple[Path, ...]]:
+    """Photographs of a block that are found in folders and files, of those wanted, and their files.
+
+    Raises
+    ------
+    InputError
+        When fewer than two are found.
+    """
+    from aerotri.formats.files.photograph_files import match_files, photographs_in
+
+    files = [f for f in photographs_in(given, ENDINGS) if f.suffix.lower() in ENDINGS]
+    found = match_files(files, record.result.block.images.names)
+    path_of = {int(row): file for row, file in zip(found, files, strict=True) if row >= 0}
+    rows = np.array([r for r in wanted.tolist() if r in path_of], dtype=np.int64)
+    if len(rows) < 2:
+        where = ", ".join(str(path) for path in given) or "nothing"
+        raise InputError(f"{len(rows)} photographs of the block are in {where}", "give the folder that holds them")
+    return rows, tuple(path_of[int(r)] for r in rows)
 
 
 def outline_of(stated: BaseGeometry | FilePath, crs: str) -> Boundary:
@@ -354,7 +367,8 @@ def _write(target: Path, model: TerrainModel, plots: bool) -> None:
     from aerotri.formats.results.pickets import write_pickets
     from aerotri.formats.results.point_cloud import write_point_cloud
     from aerotri.public.tables import write_rows
-    from aerotri.rasters.grids import horizontal_crs, write_raster, write_surface
+    from aerotri.rasters.grids import horizontal_crs, write_raster
+    from aerotri.rasters.surface_files import write_surface
 
     outcome, p, crs = model.record, model.record.pickets, horizontal_crs(model.crs)
     with atomic_folder(target, own=OWN_NAMES) as folder:

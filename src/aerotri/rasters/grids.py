@@ -6,8 +6,6 @@ NaN inside the program and the no-data value in a file.
 
 from __future__ import annotations
 
-import errno
-import shutil
 import warnings
 from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
@@ -19,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from aerotri.conventions import LEAST_ROOM, FilePath, InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.vectors.geojson import LARGEST_M
 
 if TYPE_CHECKING:
@@ -143,7 +141,7 @@ class RasterReader:
         import rasterio
 
         self.path, self.band = Path(path), band
-        with _told(self.path, "is no raster", "give a GeoTIFF"), _quietly():
+        with _told(self.path, "is no raster", "give a GeoTIFF"), quietly():
             self._file = rasterio.open(self.path)
         try:
             with _told(self.path, "cannot be read", DAMAGED):
@@ -269,10 +267,10 @@ class RasterWriter:
         if "compress" in made and threads > 1:
             made["num_threads"] = threads
         self.no_data = no_data
-        with _quietly():
+        with quietly():
             self._file = rasterio.open(
                 path, "w", driver="GTiff", height=grid.rows, width=grid.columns, count=1, dtype=np.dtype(dtype),
-                crs=crs, transform=_transform(grid), nodata=no_data, **made,
+                crs=crs, transform=transform_of(grid), nodata=no_data, **made,
             )  # fmt: skip
 
     def write(self, row: int, column: int, values: np.ndarray) -> None:
@@ -300,32 +298,6 @@ def write_raster(path: FilePath, values: np.ndarray, grid: Grid, crs: Any = None
         if text:
             writer.describe(text)
         writer.write(0, 0, values if whole else values.astype(np.float32))
-
-
-def write_surface(path: FilePath, z: np.ndarray, sigma: np.ndarray, grid: Grid, crs: Any, text: str) -> None:
-    """Write heights and their σ (rows, columns) as the two bands of a cloud-optimised GeoTIFF; NaN is no-data."""
-    import rasterio.shutil
-
-    plain = Path(path).with_name(f"{Path(path).name}.plain")
-    made: dict[str, Any] = {"tiled": True, "blockxsize": TILE, "blockysize": TILE, "bigtiff": "IF_SAFER"}
-    try:
-        with _quietly():
-            with rasterio.open(
-                plain, "w", driver="GTiff", height=grid.rows, width=grid.columns, count=2, dtype=np.float32, crs=crs,
-                transform=_transform(grid), nodata=NO_DATA, **made,
-            ) as file:  # fmt: skip
-                for band, (values, what) in enumerate(((z, text), (sigma, f"{SIGMA} of {text}")), start=1):
-                    known = np.isfinite(z) & np.isfinite(values)
-                    file.write(np.where(known, values, NO_DATA).astype(np.float32), band)
-                    file.set_band_description(band, what)
-            rasterio.shutil.copy(plain, path, driver="COG", compress="DEFLATE", predictor="YES")
-    except Exception as error:
-        # GDAL closes a file that found no room without a word and fails when it reads it again
-        if shutil.disk_usage(plain.parent).free < LEAST_ROOM:
-            raise OSError(errno.ENOSPC, "No space left on device", str(plain)) from error
-        raise
-    finally:
-        plain.unlink(missing_ok=True)
 
 
 def horizontal_crs(crs: str) -> str | None:
@@ -357,11 +329,11 @@ def rasterise(
         return np.full((grid.rows, grid.columns), background, np.int32)
     shape = grid.rows, grid.columns
     return rasterize(
-        shapes, out_shape=shape, fill=background, dtype=np.int32, transform=_transform(grid), all_touched=touched
+        shapes, out_shape=shape, fill=background, dtype=np.int32, transform=transform_of(grid), all_touched=touched
     )
 
 
-def _transform(grid: Grid) -> Any:
+def transform_of(grid: Grid) -> Any:
     from rasterio import Affine
 
     return Affine(grid.cell_x, 0.0, grid.left, 0.0, -grid.cell_y, grid.top)
@@ -389,7 +361,7 @@ def _told(path: Path, what: str, remedy: str) -> Generator[None]:
 
 
 @contextmanager
-def _quietly() -> Generator[None]:
+def quietly() -> Generator[None]:
     """Without a warning for rasters of local blocks, which have no CRS, and for those that are refused anyway."""
     from rasterio.errors import NotGeoreferencedWarning
 

@@ -80,5 +80,6 @@ PRINTED_WORDS = (
     Word("raster", DTM, "The regular cells of the heights that are written, interpolated between the pickets."),
     Word("hole", DTM, "A place of the grid where no height could be measured."),
     Word("parallax", DTM, "Difference of where a point is measured and where the other photographs place it, px."),
+    Word("y-parallax", "aerotri dsm", "Shift of one photograph of a pair against the other across their base, px."),
 )  # fmt: skip
 """With the command that prints the word; columns and JSON keys of the same name are entries of their own."""

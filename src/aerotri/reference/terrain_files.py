@@ -1,4 +1,4 @@
-"""What dtm, compare and volume write."""
+"""What dtm, dsm, compare and volume write."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from aerotri.terrain.picket_status import TEXTS, PicketStatus
 from aerotri.volume.accuracy import MODEL, PARTS
 from aerotri.volume.settings import METHODS
 
-DTM, COMPARE, VOLUME = (f"folder of {name}" for name in ("dtm", "compare", "volume"))
+DTM, DSM, COMPARE, VOLUME = (f"folder of {name}" for name in ("dtm", "dsm", "compare", "volume"))
 PICKET_STATUS = {
     PicketStatus.ACCEPTED: "a ground point",
     PicketStatus.NOT_SEEN: "fewer than two photographs see the place",
@@ -63,6 +63,36 @@ DTM_JSON = (
     Item("sigma0_rays", "number", "How well the rays of a point meet, against their stated σ; 1 is as stated."),
     Item("ground_share", "number", "Share of the points that are ground, not objects."),
     Item("ground_within", "text", "Outline within which all is ground; empty where none was given."),
+    Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
+)
+DSM_JSON = (
+    VERSION,
+    BLOCK,
+    Item("crs", "text", "Coordinate system."),
+    Item("photographs", "whole", "Photographs matched."),
+    Item("gsd_m", "number", "Size of a pixel on the ground.", "m"),
+    Item("cell_m", "number", "Cell of the rasters.", "m"),
+    Item("cells", "object", "Number of cells."),
+    Item("cells.all", "whole", "Of the whole raster."),
+    Item("cells.measured", "whole", "That have a height."),
+    Item("area_m2", "number", "Area of the cells that have a height.", "m²"),
+    Item("pairs", "whole", "Pairs of photographs that were matched."),
+    Item("tiles", "whole", "Pieces the surface was measured in."),
+    Item("tiles_resumed", "whole", "Pieces that an earlier run, which was ended, had measured."),
+    Item("photographs_mean", "number", "Mean number of photographs of a cell."),
+    Item("sigma_Z_m", "object", "Standard deviation of heights, median over the cells.", "m"),
+    Item("sigma_Z_m.median", "number", "Of a cell, all together.", "m"),
+    Item("sigma_Z_m.matching", "number", "From matching alone.", "m"),
+    Item("sigma_Z_m.adjustment", "number", "From the adjustment alone, which neighbouring cells share.", "m"),
+    Item(
+        "noise_length_m",
+        "number?",
+        "Side of the square whose cells have one noise, as neighbours share it; null where no two pairs overlap.",
+        "m",
+    ),
+    Item("y_parallax_px", "object", "Shift across the base of a pair, its median over a tile, without sign.", "px"),
+    Item("y_parallax_px.median", "number", "Median of the pairs.", "px"),
+    Item("y_parallax_px.largest", "number", "Largest of the pairs.", "px"),
     Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
 )
 DIFFERENCE = (
@@ -202,7 +232,7 @@ SECTIONS = (
 
 
 def terrain_files() -> tuple[DescribedFile, ...]:
-    """The files of dtm, compare and volume."""
+    """The files of dtm, dsm, compare and volume."""
     pairs, plots = "with --pairs", "unless --no-plots"
     return (
         DescribedFile("dtm.json", DTM, "json", "Number and accuracy of the ground points.", DTM_JSON),
@@ -223,6 +253,12 @@ def terrain_files() -> tuple[DescribedFile, ...]:
         DescribedFile("model.tif", DTM, "raster", "Number of the pair of photographs of every cell.", when=pairs),
         DescribedFile("models.csv", DTM, "table", "The pairs by their numbers.", MODELS, pairs),
         DescribedFile("plots", DTM, "folder", "Surface and points, PNG and SVG.", when=plots),
+        DescribedFile("dsm.json", DSM, "json", "Cells of the surface and how sure they are.", DSM_JSON),
+        DescribedFile("dsm.tif", DSM, "raster", "The whole surface: band 1 height, band 2 its standard deviation, m."),
+        DescribedFile("matching.tif", DSM, "raster", "Standard deviation of the heights from matching alone, m."),
+        DescribedFile("photographs.tif", DSM, "raster", "Number of photographs that measured a cell; 0: none."),
+        DescribedFile("dsm.laz", DSM, "other", "The cells as LAZ 1.4 with sigma_z, sigma_z_matching and photographs."),
+        DescribedFile("plots", DSM, "folder", "The surface and its standard deviation, PNG and SVG.", when=plots),
         DescribedFile("compare.json", COMPARE, "json", "Statistics of the differences of two surfaces.", COMPARE_JSON),
         DescribedFile("difference.tif", COMPARE, "raster", "Differences test − control, m."),
         DescribedFile("plots", COMPARE, "folder", "Map and histogram, PNG and SVG.", when=plots),

@@ -23,6 +23,8 @@ EDGE, EDGE_OF_PAIRS = 0.02, 0.10
 """Share of the format at its edge not used: of pairs as Tran (2007) has it; where more vouch for a picket, less."""
 LARGEST_EDGE = 0.4
 """Share of the format that `edge` may take on every side; at a half nothing would be left."""
+MOST_PAIRS = 12
+"""Pairs of a piece of ground, the bound of the setting; more take time and tell nothing new."""
 FEWEST_PHOTOGRAPHS, MOST_PHOTOGRAPHS = 2, 20
 """Photographs of a picket, the bounds of the setting: a ray alone gives no height; more than 20 take time and add
 hardly any base."""
@@ -104,4 +106,41 @@ class TerrainSettings:
                 raise InputError(f"{name} {value:g} is not possible", f"give a number from {low:g} to {high:g}")
 
 
+@dataclass(frozen=True)
+class DenseSettings:
+    """How the whole surface is matched.
+
+    Parameters
+    ----------
+    resolution : m, cell of the surface; None: two pixels on the ground.
+    area : m, X and Y of the lower left, X and Y of the upper right corner; None: as far as photographs reach.
+    pairs : pairs of photographs that measure a piece of ground, at most.
+    edge : share of the format at its edge that is not used.
+    ideal : the photographs have been freed of image errors.
+    """
+
+    resolution: float | None = None
+    area: tuple[float, float, float, float] | None = None
+    pairs: int = 4
+    edge: float = EDGE
+    ideal: bool = False
+
+    def check(self) -> None:
+        """Refuse what makes no sense.
+
+        Raises
+        ------
+        InputError
+        """
+        if self.area is not None and not (self.area[0] < self.area[2] and self.area[1] < self.area[3]):
+            raise InputError("the area is empty", "give X and Y of its lower left, then of its upper right corner")
+        for name, value, low, high in (
+            ("resolution", self.resolution, 1e-6, LARGEST), ("pairs", self.pairs, 1, MOST_PAIRS),
+            ("edge", self.edge, 0.0, LARGEST_EDGE),
+        ):  # fmt: skip
+            if value is not None and not low <= value <= high:
+                raise InputError(f"{name} {value:g} is not possible", f"give a number from {low:g} to {high:g}")
+
+
 DEFAULTS = TerrainSettings()
+DENSE_DEFAULTS = DenseSettings()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,16 @@ UNCLASSIFIED, GROUND = 1, 2
 SCALE_M = 0.001
 """Step of the coordinates, m, which LAS keeps as whole numbers; chosen [C]: 1 mm is below σ of every picket, and 32
 bits then reach over 4000 km."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePoints:
+    """Cells of a surface: xyz (n, 3) m, σ of Z and that of matching (n,) m, number of photographs (n,)."""
+
+    xyz: np.ndarray
+    sigma: np.ndarray
+    matching: np.ndarray
+    photographs: np.ndarray
 
 
 def write_point_cloud(path: Path, xyz: np.ndarray, sigma: np.ndarray, ground: np.ndarray, crs: str | None) -> None:
@@ -33,6 +45,40 @@ def write_point_cloud(path: Path, xyz: np.ndarray, sigma: np.ndarray, ground: np
     cloud["sigma_z"] = sigma.astype(np.float32)
     with path.open("wb") as file:
         cloud.write(file, do_compress=True)
+
+
+def write_surface_cloud(path: Path, parts: Iterable[SurfacePoints], low: np.ndarray, crs: str | None) -> int:
+    """Write the cells of a surface as LAZ 1.4 with `sigma_z`, `sigma_z_matching` and `photographs`; how many.
+
+    Parameters
+    ----------
+    parts : points, part by part. low : (3,) m, near the lowest coordinates.
+    """
+    import laspy
+    from pyproj import CRS
+
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.offsets, header.scales = np.floor(low), np.full(3, SCALE_M)
+    header.add_extra_dims(
+        [
+            laspy.ExtraBytesParams("sigma_z", "f4", "sigma of Z [m]"),
+            laspy.ExtraBytesParams("sigma_z_matching", "f4", "of matching alone [m]"),
+            laspy.ExtraBytesParams("photographs", "u1", "that measured it"),
+        ]
+    )
+    if crs is not None:
+        header.add_crs(CRS.from_user_input(crs))
+    count = 0
+    with path.open("wb") as file, laspy.open(file, mode="w", header=header, do_compress=True, closefd=False) as cloud:
+        for part in parts:
+            points = laspy.ScaleAwarePointRecord.zeros(len(part.xyz), header=header)
+            points.x, points.y, points.z = part.xyz.T
+            points["classification"] = np.full(len(part.xyz), UNCLASSIFIED, np.uint8)
+            points["sigma_z"], points["sigma_z_matching"] = part.sigma, part.matching
+            points["photographs"] = part.photographs
+            cloud.write_points(points)
+            count += len(part.xyz)
+    return count
 
 
 def read_point_cloud(path: Path, parallel: bool = True) -> tuple[np.ndarray, np.ndarray]:

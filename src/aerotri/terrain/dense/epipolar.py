@@ -15,6 +15,7 @@ import numpy as np
 from scipy.interpolate import NearestNDInterpolator
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from aerotri.terrain.dense._resampling_kernels import resample
 from aerotri.terrain.dense.grey_store import GreyStore
 from aerotri.terrain.dense.place import Place
 
@@ -68,7 +69,7 @@ class EpipolarGeometry:
 
 @dataclass(frozen=True, eq=False)
 class EpipolarImages:
-    """Pixels of a pair, (rows, columns) uint8, and where each is known."""
+    """Pixels of a pair, (rows, columns) float32, and where each is known."""
 
     geometry: EpipolarGeometry
     left: np.ndarray
@@ -159,8 +160,8 @@ class _Field:
         """(rows, columns) float32 px over a window."""
         column = np.clip((first[0] + np.arange(shape[1]) - self.first[0]) / self.step, 0, self.nodes.shape[1] - 1)
         row = np.clip((first[1] + np.arange(shape[0]) - self.first[1]) / self.step, 0, self.nodes.shape[0] - 1)
-        at = np.stack(np.broadcast_arrays(column[None], row[:, None]), axis=-1).astype(np.float32)
-        return cv2.remap(self.nodes.astype(np.float32), at, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        x, y = (np.ascontiguousarray(a, np.float32) for a in np.broadcast_arrays(column[None], row[:, None]))
+        return cv2.remap(self.nodes.astype(np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 def _smooth_field(column: np.ndarray, row: np.ndarray, parallax: np.ndarray) -> _Field:
@@ -196,7 +197,7 @@ def epipolar_images(place: Place, geometry: EpipolarGeometry, store: GreyStore) 
 def _resampled(
     place: Place, g: EpipolarGeometry, store: GreyStore, k: int, centre: np.ndarray, bent: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, columns) uint8 of photograph k in the window, and where it is known."""
+    """(rows, columns) float32 of photograph k in the window, and where it is known."""
     rows, columns = g.shape
     s = LATTICE_PX
     # nodes in the middle of squares of s × s pixels, one square more around
@@ -213,27 +214,16 @@ def _resampled(
     pixels = store.level(k, g.level)
     nodes = np.nan_to_num(pixel, nan=-1e6).astype(np.float32).reshape(len(r), len(c), 2)
     whole = cv2.resize(nodes, (s * len(c), s * len(r)), interpolation=cv2.INTER_LINEAR)
-    place_of = np.ascontiguousarray(whole[s : s + rows, s : s + columns])
+    place_of = whole[s : s + rows, s : s + columns]
     edge = place.view.edge * np.array([pixels.shape[1], pixels.shape[0]])
     x, y = place_of[:, :, 0], place_of[:, :, 1]
     known = (
         (x >= edge[0] + 1.0) & (x <= pixels.shape[1] - 2.0 - edge[0])
         & (y >= edge[1] + 1.0) & (y <= pixels.shape[0] - 2.0 - edge[1])
     )  # fmt: skip
-    return _remapped(pixels, place_of, known), known
-
-
-def _remapped(pixels: np.ndarray, place_of: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Cubic between the pixels; OpenCV takes no image of more than 32767 columns, so a crop is handed to it."""
-    if not known.any():
-        return np.zeros(known.shape, np.uint8)
-    inside = place_of[known]
-    low = np.maximum(np.floor(inside.min(axis=0)).astype(int) - 3, 0)
-    high = np.ceil(inside.max(axis=0)).astype(int) + 4
-    crop = pixels[low[1] : high[1], low[0] : high[0]]
-    return cv2.remap(
-        crop, place_of - low.astype(np.float32), None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
-    )  # fmt: skip
+    out = np.empty((rows, columns), np.float32)
+    resample(pixels, x, y, known, out)
+    return out, known
 
 
 def _mean_depth(g: EpipolarGeometry) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 
 from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.terrain.dense._refinement_kernels import solve_shifts
+from aerotri.terrain.dense._resampling_kernels import align
 from aerotri.terrain.dense.epipolar import EpipolarImages
 
 BLOCK_PX = 5
@@ -89,12 +90,12 @@ def parallaxes_of(images: EpipolarImages, refine: bool = True) -> Parallaxes:
 def semi_global(images: EpipolarImages) -> np.ndarray:
     """(rows, columns) float32 px, NaN where nothing matches: what OpenCV gives."""
     g = images.geometry
-    matcher = cv2.StereoSGBM_create(
+    matcher = cv2.StereoSGBM.create(
         minDisparity=g.lowest, numDisparities=g.count, blockSize=BLOCK_PX, P1=SMALL_STEP, P2=LARGE_STEP,
         disp12MaxDiff=BOTH_WAYS_PX, preFilterCap=CLIPPED_GRADIENT, uniquenessRatio=UNIQUE_PERCENT,
         speckleWindowSize=SPECKLE_PX, speckleRange=SPECKLE_STEP, mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
     )  # fmt: skip
-    found = matcher.compute(images.left, images.right).astype(np.float32) / 16.0
+    found = matcher.compute(_bytes(images.left), _bytes(images.right)).astype(np.float32) / 16.0
     known = (found >= g.lowest) & images.left_known
     rows, columns = np.nonzero(known)
     at = np.rint(columns - found[rows, columns]).astype(np.int64)
@@ -103,18 +104,21 @@ def semi_global(images: EpipolarImages) -> np.ndarray:
     return np.where(known, found, np.nan).astype(np.float32)
 
 
+def _bytes(grey: np.ndarray) -> np.ndarray:
+    return np.clip(np.rint(grey), 0.0, 255.0).astype(np.uint8)
+
+
 def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
     known = value > INVALID / 2
-    left, right = images.left.astype(np.float32), images.right.astype(np.float32)
+    left, right = images.left, images.right
+    aligned = np.empty(value.shape, np.float32)
     start = value.copy()
     shape = value.shape
     shift, across, variance, of_across, correlation = (np.full(shape, np.nan, np.float32) for _ in range(5))
-    row, column = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
     middle, factor = 0.0, 1.0
     for _ in range(ROUNDS):
         value = _smoothed(value, known)
-        aligned = cv2.remap(right, column - np.where(known, value, 0.0), row + np.float32(middle), cv2.INTER_CUBIC)
-        aligned = np.where(known, aligned, left)
+        align(right, value, middle, known, left, aligned)
         means, products = _sums(left, aligned)
         solve_shifts(known, means, products, float(WINDOW_PX**2), shift, across, variance, of_across, correlation)
         known = known & (np.abs(shift) < LARGEST_SHIFT_PX)
@@ -136,7 +140,7 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
 
 def _smoothed(value: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Smooth where it is continuous: neighbours further off than a pixel do not count."""
-    out = cv2.bilateralFilter(value, 5, 0.7, 1.5)
+    out = cv2.bilateralFilter(value, 7, 0.7, 2.5)
     return np.where(known, out, INVALID).astype(np.float32)
 
 

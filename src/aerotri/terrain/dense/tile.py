@@ -106,7 +106,12 @@ def measure_tile(
     if not used:
         empty = np.full(shape, np.nan)
         return TileSurface(
-            empty, empty.copy(), np.zeros(shape, np.int16), 1.0, np.zeros((0, 2), int), np.zeros(0),
+            empty,
+            empty.copy(),
+            np.zeros(shape, np.int16),
+            1.0,
+            np.zeros((0, 2), int),
+            np.zeros(0),
             np.nan,
         )
     numbers = np.array([[p.left, p.right] for p in used])

@@ -1,0 +1,63 @@
+"""`aerotri dsm`: the whole surface by dense matching."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerotri.commands.console import Console
+from aerotri.commands.results import reopened
+from aerotri.formats.results.json_text import json_text
+from aerotri.public.folders import refuse_foreign_folder
+from aerotri.terrain.settings import DenseSettings
+
+if TYPE_CHECKING:
+    from aerotri.public.dense import DenseSurface
+
+
+def run_dsm(
+    source: Path, photographs: list[Path], out: Path | None, settings: DenseSettings, plots: bool, as_json: bool
+) -> int:
+    """Exit code of the command; arguments as on the command line."""
+    from aerotri.public.adjustment import Adjustment
+    from aerotri.public.dense import RECORD, measure_dense
+
+    console = Console(quiet=as_json)
+    settings.check()
+    target = out or Path(f"{source.resolve().name.removesuffix('_result')}_dsm")
+    refuse_foreign_folder(target, RECORD)
+    tiles = target.with_name(f"{target.name}.tiles")
+    found = measure_dense(Adjustment(reopened(source, console)), photographs, settings, tiles, console.stage)
+    console.progress("writing")
+    found.save(target, plots)
+    shutil.rmtree(tiles, ignore_errors=True)
+    if as_json:
+        print(json_text(found.summary))
+    else:
+        console.lines(outcome_lines(found, target))
+    return 0
+
+
+def outcome_lines(found: DenseSurface, target: Path) -> list[str]:
+    """What the user reads of the surface."""
+    return [*_summary(found.summary), f"Written to {target}"]
+
+
+def _summary(content: dict[str, Any]) -> list[str]:
+    c = content
+    lines = [
+        f"{c['photographs']} photographs in {c['pairs']} pairs, GSD {c['gsd_m']:.3f} m; cells of {c['cell_m']:.3g} m",
+        f"{c['cells']['measured']} cells with a height, {c['area_m2']:.0f} m²; photographs of a cell: "
+        f"{c['photographs_mean']:.1f}",
+    ]
+    if c["tiles_resumed"]:
+        lines.append(f"tiles measured before: {c['tiles_resumed']} of {c['tiles']}")
+    s, noise = c["sigma_Z_m"], c["noise_length_m"]
+    length = "" if noise is None else f"; noise length {noise:.2g} m"
+    lines.append(
+        f"σ of Z: median {s['median']:.3f} m (matching {s['matching']:.3f}, adjustment {s['adjustment']:.3f}){length}"
+    )
+    y = c["y_parallax_px"]
+    lines.append(f"y-parallax of the pairs: median {y['median']:.2f} px, largest {y['largest']:.2f} px")
+    return lines

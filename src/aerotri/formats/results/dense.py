@@ -1,0 +1,51 @@
+"""A dense surface for machines: dsm.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from aerotri.terrain.dense.measure import DenseOutcome
+from aerotri.version import __version__
+
+
+def dense_json(outcome: DenseOutcome, block: str, crs: str) -> dict[str, Any]:
+    """The content of dsm.json."""
+    o = outcome
+    sigma, matching, shared, count = (np.concatenate(part) for part in zip(*_samples(o), strict=True))
+    noise = o.shared_cells * o.grid.cell_x if np.isfinite(o.shared_cells) else None
+    return {
+        "aerotri": __version__, "block": block, "crs": crs, "photographs": len(o.photographs),
+        "gsd_m": float(np.median(o.photographs.gsd)), "cell_m": o.grid.cell_x,
+        "cells": {"all": o.grid.rows * o.grid.columns, "measured": o.cells},
+        "area_m2": o.cells * o.grid.cell_x * o.grid.cell_y,
+        "pairs": len(np.unique(np.sort(o.pairs, axis=1), axis=0)), "tiles": len(o.windows), "tiles_resumed": o.resumed,
+        "photographs_mean": float(count.mean()),
+        "sigma_Z_m": {
+            "median": float(np.median(sigma)), "matching": float(np.median(matching)),
+            "adjustment": float(np.median(shared)),
+        },
+        "noise_length_m": noise,
+        "y_parallax_px": {
+            "median": float(np.median(np.abs(o.across_px))), "largest": float(np.abs(o.across_px).max(initial=0.0)),
+        },
+    }  # fmt: skip
+
+
+def _samples(o: DenseOutcome) -> list[tuple[np.ndarray, ...]]:
+    """σ, that of matching, that of the adjustment, and photographs, of cells that have a height."""
+    found = []
+    for window, tile in o.files.read_all(list(o.windows)):
+        known = np.isfinite(tile.z)
+        if known.any():
+            shared = o.shared.over(o.grid.window(window.row, window.column, window.rows, window.columns))[known]
+            matching = tile.sigma[known].astype(float)
+            every = max(int(known.sum() * len(o.windows) / MOST_SAMPLES), 1)
+            parts = np.hypot(matching, shared), matching, shared, tile.count[known]
+            found.append(tuple(part[::every] for part in parts))
+    return found
+
+
+MOST_SAMPLES = 2_000_000
+"""Cells that medians are taken of, spread over all tiles."""

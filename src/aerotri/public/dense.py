@@ -1,0 +1,315 @@
+"""The whole surface by dense matching, with a σ for every cell."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aerotri.conventions import FilePath, InputError
+from aerotri.public.adjustment import Adjustment
+from aerotri.public.folders import paths_of, refuse_foreign_folder
+from aerotri.public.progress import ProgressLike, stage_report
+from aerotri.public.results import open_result
+from aerotri.public.surfaces import Surface
+from aerotri.public.terrain import rows_and_files
+from aerotri.terrain.settings import DENSE_DEFAULTS, DenseSettings
+from aerotri.version import __version__
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from aerotri.formats.files.spool import Spool
+    from aerotri.formats.results.point_cloud import SurfacePoints
+    from aerotri.terrain.dense.measure import DenseOutcome
+
+RECORD, SURFACE, MATCHING, COUNT, CLOUD = "dsm.json", "dsm.tif", "matching.tif", "photographs.tif", "dsm.laz"
+OWN_NAMES = (RECORD, SURFACE, MATCHING, COUNT, CLOUD, "plots")
+STATED = "tiles.json"
+DRAWN = 1200
+"""Cells drawn along a side, the others skipped."""
+
+
+@dataclass(frozen=True, eq=False)
+class DensePlots:
+    """Plots of a dense surface, each a matplotlib Figure.
+
+    Parameters
+    ----------
+    record : what was measured. block : name of the block.
+    """
+
+    record: DenseOutcome
+    block: str
+
+    def surface(self) -> Figure:
+        """The surface, lit from the north-west, and the σ of its cells."""
+        from aerotri.rasters.grids import Grid
+        from aerotri.report.plots.terrain import plot_heights
+
+        o = self.record
+        step = max(-(-max(o.grid.rows, o.grid.columns) // DRAWN), 1)
+        rows, columns = -(-o.grid.rows // step), -(-o.grid.columns // step)
+        z, sigma = np.full((rows, columns), np.nan), np.full((rows, columns), np.nan)
+        for row, column, heights, total in _surface_parts(o):
+            first = -row % step, -column % step
+            taken, s = heights[first[0] :: step, first[1] :: step], total[first[0] :: step, first[1] :: step]
+            i, j = (row + first[0]) // step, (column + first[1]) // step
+            z[i : i + taken.shape[0], j : j + taken.shape[1]] = taken
+            sigma[i : i + taken.shape[0], j : j + taken.shape[1]] = s
+        whole = o.grid
+        drawn = Grid(rows, columns, whole.left, whole.top, whole.cell_x * step, whole.cell_y * step)
+        return plot_heights(drawn, z, sigma, self.block, o.photographs.places.frame is None)
+
+    def all(self) -> dict[str, Figure]:
+        """Every plot by the name of its file."""
+        return {"surface": self.surface()}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DenseSurface:
+    """What `aerotri.dense_surface` measured: a height and its σ for every cell that could be matched.
+
+    Parameters
+    ----------
+    record : the numbers, in tiles. block : name of the block. crs : its coordinate system.
+    adjustment : key of the adjustment it was measured with.
+    keeper : what removes the tiles when nobody uses them any more; None where they stay.
+    """
+
+    record: DenseOutcome
+    block: str
+    crs: str
+    adjustment: str
+    keeper: Spool | None = None
+
+    @cached_property
+    def surface(self) -> Surface:
+        """The heights and their σ, as `aerotri.compare` and `aerotri.volume` take them, held in memory."""
+        from aerotri.rasters.grids import horizontal_crs
+        from aerotri.terrain.surface import Surface as Heights
+
+        grid = self.record.grid
+        z, sigma = np.full((grid.rows, grid.columns), np.nan), np.full((grid.rows, grid.columns), np.nan)
+        for row, column, heights, total in _surface_parts(self.record):
+            place = np.s_[row : row + heights.shape[0], column : column + heights.shape[1]]
+            z[place], sigma[place] = heights, total
+        return Surface(Heights(grid, z, sigma), horizontal_crs(self.crs), SURFACE)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The content of dsm.json: cells, σ and its parts."""
+        from aerotri.formats.results.dense import dense_json
+
+        return dense_json(self.record, self.block, self.crs) | {"adjustment": self.adjustment}
+
+    @property
+    def plot(self) -> DensePlots:
+        """Plots of the surface, each a matplotlib Figure."""
+        return DensePlots(self.record, self.block)
+
+    def save(self, out: FilePath, plots: bool = True) -> Path:
+        """Write dsm.tif, matching.tif, photographs.tif, dsm.laz, dsm.json and the plots into a folder.
+
+        Parameters
+        ----------
+        out : folder; an older result there is replaced in one step. plots : draw the surface.
+
+        Returns
+        -------
+        Path of the folder.
+
+        Raises
+        ------
+        InputError
+            When the folder holds other files, or cannot be written to.
+        """
+        target = Path(out)
+        refuse_foreign_folder(target, RECORD)
+        _write(target, self, plots)
+        return target
+
+    def __repr__(self) -> str:
+        s = self.summary
+        return f"<aerotri dense surface of {self.block!r}: {s['cells']['measured']} cells of {s['cell_m']:g} m>"
+
+    def _repr_html_(self) -> str:
+        return self.html()
+
+    def html(self) -> str:
+        """Cells and σ, as a notebook shows them."""
+        s = self.summary
+        sigma = s["sigma_Z_m"]
+        return (
+            f"<div><b>{escape(self.block)}</b>: {s['cells']['measured']} cells of {s['cell_m']:g} m, σ of Z "
+            f"{sigma['median']:.3f} m (median; matching {sigma['matching']:.3f}, adjustment "
+            f"{sigma['adjustment']:.3f})</div>"
+        )
+
+
+def dense_surface(
+    result: Adjustment | FilePath,
+    photographs: FilePath | Sequence[FilePath],
+    *,
+    resolution: float | None = DENSE_DEFAULTS.resolution,
+    area: tuple[float, float, float, float] | None = DENSE_DEFAULTS.area,
+    pairs: int = DENSE_DEFAULTS.pairs,
+    edge: float = DENSE_DEFAULTS.edge,
+    ideal: bool = DENSE_DEFAULTS.ideal,
+    tiles: FilePath | None = None,
+    progress: ProgressLike = None,
+) -> DenseSurface:
+    """Match the photographs densely: a height with its σ for every cell of a raster.
+
+    Parameters
+    ----------
+    result : an adjustment, or the folder of one.
+    photographs : folder or files of the photographs, TIFF or JPEG.
+    resolution : m, cell of the surface; two pixels on the ground where None.
+    area : m, X and Y of the lower left, then of the upper right corner; as far as photographs reach where None.
+    pairs : pairs of photographs that measure a piece of ground, at most.
+    edge : share of the format at its edge that is not used.
+    ideal : the photographs are those of `aerotri.ideal_photographs`, free of image errors.
+    tiles : folder for the tiles of the surface; a run that was ended goes on with those it finds there. None: a
+        temporary one.
+    progress : as of `aerotri.adjust`.
+
+    Returns
+    -------
+    DenseSurface
+        Its `surface` has heights and σ.
+
+    Raises
+    ------
+    InputError
+        For a setting that makes no sense, photographs that are not found, or where nothing could be matched.
+
+    Examples
+    --------
+    >>> import aerotri
+    >>> dense = aerotri.dense_surface("saar_result", "photographs")  # doctest: +SKIP
+    >>> dense.save("saar_dsm")  # doctest: +SKIP
+    """
+    return measure_dense(result, paths_of(photographs), DenseSettings(resolution, area, pairs, edge, ideal),
+                         None if tiles is None else Path(tiles), progress)  # fmt: skip
+
+
+def measure_dense(
+    result: Adjustment | FilePath, photographs: Sequence[Path], settings: DenseSettings, tiles: Path | None,
+    progress: ProgressLike = None,
+) -> DenseSurface:  # fmt: skip
+    """As `dense_surface`, with the settings in one record.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.formats.files.spool import Spool
+    from aerotri.terrain.dense.measure import DensePlan, measure_surface
+    from aerotri.terrain.dtm import chosen_rows
+    from aerotri.terrain.pickets import Area
+    from aerotri.volume.shared import adjustment_key
+
+    settings.check()
+    record = (result if isinstance(result, Adjustment) else open_result(result)).record
+    rows, paths = rows_and_files(record, photographs, chosen_rows(record, "all"))
+    key = adjustment_key(record)
+    keeper = None
+    if tiles is None:
+        keeper = Spool()
+        tiles = keeper.folder
+    else:
+        _open_tiles(tiles, settings, key, paths)
+    area = None if settings.area is None else Area(np.array(settings.area[:2]), np.array(settings.area[2:]))
+    plan = DensePlan(rows, paths, tiles, settings.resolution, area, settings.pairs, settings.edge, settings.ideal)
+    with stage_report(progress) as report:
+        outcome = measure_surface(record, plan, report.stage)
+    block = record.result.block
+    return DenseSurface(outcome, str(block.name), block.crs, key, keeper)
+
+
+def _open_tiles(folder: Path, settings: DenseSettings, key: str, paths: tuple[Path, ...]) -> None:
+    """Make the folder of the tiles; tiles of other settings, photographs or adjustments are removed.
+
+    Raises
+    ------
+    InputError
+        When it holds other files, or cannot be written to.
+    """
+    files = [[path.name, path.stat().st_size, path.stat().st_mtime_ns] for path in paths]
+    stated = json.dumps(
+        {"settings": asdict(settings), "adjustment": key, "photographs": files, "aerotri": __version__}, sort_keys=True
+    )
+    mark = hashlib.sha256(stated.encode()).hexdigest()
+    there = folder / STATED
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        held = [path for path in folder.iterdir() if path.name != STATED]
+        if any(path.suffix not in (".npz", ".part") for path in held):
+            raise InputError("holds other files than tiles", "give another folder for the tiles", folder)
+        if there.is_file() and there.read_text(encoding="utf-8") == mark:
+            return
+        for path in held:
+            path.unlink()
+        there.write_text(mark, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot be written to: {error}", "give another place for the tiles", folder) from error
+
+
+def _surface_parts(o: DenseOutcome) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
+    """First row and column, heights and their σ, of every tile."""
+    for window, tile in o.files.read_all(list(o.windows)):
+        grid = o.grid.window(window.row, window.column, window.rows, window.columns)
+        yield window.row, window.column, tile.z, np.hypot(tile.sigma, o.shared.over(grid))
+
+
+def _points(o: DenseOutcome) -> Iterator[SurfacePoints]:
+    """The cells of every tile as points."""
+    from aerotri.formats.results.point_cloud import SurfacePoints
+
+    for window, tile in o.files.read_all(list(o.windows)):
+        grid = o.grid.window(window.row, window.column, window.rows, window.columns)
+        row, column = np.nonzero(np.isfinite(tile.z))
+        if len(row):
+            z, matching = tile.z[row, column], tile.sigma[row, column]
+            sigma = np.hypot(matching, o.shared.over(grid)[row, column])
+            yield SurfacePoints(
+                np.column_stack([grid.x(column), grid.y(row), z]), sigma, matching, tile.count[row, column]
+            )
+
+
+def _write(target: Path, dense: DenseSurface, plots: bool) -> None:
+    """Write all files whole or not at all."""
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.formats.results.json_text import write_json
+    from aerotri.formats.results.point_cloud import write_surface_cloud
+    from aerotri.rasters.grids import horizontal_crs
+    from aerotri.rasters.surface_files import write_raster_parts, write_surface_parts
+
+    o, crs = dense.record, horizontal_crs(dense.crs)
+    noise = dense.summary["noise_length_m"]
+    tags = {} if noise is None else {"NOISE_LENGTH_M": f"{noise:.4g}"}
+    windows = list(o.windows)
+    with atomic_folder(target, own=OWN_NAMES) as folder:
+        write_surface_parts(folder / SURFACE, _surface_parts(o), o.grid, crs, "DSM Z, m", tags)
+        matching = ((w.row, w.column, tile.sigma) for w, tile in o.files.read_all(windows))
+        what = "σ of Z of matching alone, m"
+        write_raster_parts(folder / MATCHING, matching, o.grid, crs, what, np.dtype(np.float32), -9999.0)
+        count = ((w.row, w.column, tile.count) for w, tile in o.files.read_all(windows))
+        what = "photographs that measured a cell"
+        write_raster_parts(folder / COUNT, count, o.grid, crs, what, np.dtype(np.uint8), 0.0)
+        lowest = min(float(np.nanmin(t.z)) for _, t in o.files.read_all(windows) if np.isfinite(t.z).any())
+        low = np.array([o.grid.left, o.grid.bounds[1], lowest])
+        write_surface_cloud(folder / CLOUD, _points(o), low, crs)
+        if plots:
+            from aerotri.report.plots.rendering import save_plots
+
+            save_plots(dense.plot.all(), folder / "plots")
+        write_json(folder / RECORD, dense.summary)

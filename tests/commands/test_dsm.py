@@ -1,0 +1,115 @@
+"""`aerotri dsm`: from a result folder and photographs to files that later commands read."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import aerotri
+from aerotri.cli import app
+from aerotri.conventions import InputError
+from aerotri.formats.results.point_cloud import read_point_cloud
+from aerotri.rasters.grids import RasterReader
+
+PLAN = """
+name = "tiny"
+camera.cam = { preset = "ultracam_d", size_px = [575, 375], pixel_um = 180.0 }
+flight = { gsd_m = 1.0, strips = 1, images_per_strip = 3, end_lap = 0.6, heading_deg = 30.0 }
+terrain = { kind = "undulating", height_m = 100.0, relief_rms_m = 10.0, wavelength_m = 400.0 }
+tie_points = { per_image = 60, probability = 0.9, sigma_um = 9.0 }
+control = { distance_bases = 1.0, sigma_m = [0.05, 0.05, 0.05] }
+"""
+
+
+def run(*arguments: object) -> str:
+    found = CliRunner().invoke(app, [str(a) for a in arguments])
+    if isinstance(found.exception, InputError):
+        raise found.exception
+    assert found.exit_code == 0, found.output + repr(found.exception)
+    return found.output
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The folder with block, result and surface, made by commands, and what the last printed."""
+    here = tmp_path_factory.mktemp("dsm")
+    (here / "plan.toml").write_text(PLAN, encoding="utf-8")
+    run("simulate", here / "plan.toml", "--out", here / "block", "--seed", 3, "--render")
+    run("adjust", here / "block", "--out", here / "result", "--no-plots")
+    printed = run("dsm", here / "result", here / "block" / "photographs", "--out", here / "dsm", "--json")
+    return here, json.loads(printed)
+
+
+def test_files_hold_the_same_surface(made):
+    here, content = made
+    assert content == json.loads((here / "dsm" / "dsm.json").read_text(encoding="utf-8"))
+    files = "dsm.tif", "matching.tif", "photographs.tif"
+    with RasterReader(here / "dsm" / files[0]) as reader:
+        grid = reader.grid
+        z = reader.read(0, 0, grid.rows, grid.columns)
+    with RasterReader(here / "dsm" / files[0], band=2) as reader:
+        sigma = reader.read(0, 0, grid.rows, grid.columns)
+    matching, count = (_whole(here / "dsm" / name) for name in files[1:])
+    known = np.isfinite(z)
+    assert content["cells"] == {"all": z.size, "measured": int(known.sum())}
+    np.testing.assert_array_equal(known, np.isfinite(matching))
+    np.testing.assert_array_equal(known, count >= 2)
+    assert (sigma[known] >= matching[known]).all()
+    assert np.median(sigma[known]) == pytest.approx(content["sigma_Z_m"]["median"], rel=1e-3)
+    xyz, _ = read_point_cloud(here / "dsm" / "dsm.laz")
+    np.testing.assert_allclose(np.sort(xyz[:, 2]), np.sort(z[known]), atol=6e-4)
+    assert (here / "dsm" / "plots" / "surface.png").is_file()
+    assert not (here / "dsm.tiles").exists()
+
+
+def _whole(path) -> np.ndarray:
+    with RasterReader(path) as reader:
+        return reader.read(0, 0, reader.grid.rows, reader.grid.columns)
+
+
+def test_the_surface_is_the_ground_that_was_simulated(made):
+    here, content = made
+    found = aerotri.compare(here / "dsm" / "dsm.tif", here / "block" / "truth" / "surface.tif")
+    assert abs(found.record.statistics.median) < 3.0 * content["sigma_Z_m"]["adjustment"] + 0.05
+    assert found.record.statistics.nmad < 2.0 * content["sigma_Z_m"]["matching"]
+    assert content["y_parallax_px"]["median"] < 0.1
+
+
+def test_the_function_gives_what_the_command_writes_and_goes_on_with_its_tiles(made, tmp_path):
+    here, content = made
+    photographs = here / "block" / "photographs"
+    area = (-100.0, -100.0, 100.0, 100.0)
+    first = aerotri.dense_surface(here / "result", photographs, area=area, tiles=tmp_path / "tiles")
+    again = aerotri.dense_surface(here / "result", photographs, area=area, tiles=tmp_path / "tiles")
+    other = aerotri.dense_surface(here / "result", photographs, area=area, pairs=1, tiles=tmp_path / "tiles")
+    assert first.summary["tiles_resumed"] == other.summary["tiles_resumed"] == 0
+    assert again.summary["tiles_resumed"] == again.summary["tiles"]
+    np.testing.assert_array_equal(first.surface.z, again.surface.z)
+    with RasterReader(here / "dsm" / "dsm.tif") as reader:
+        row, column = (
+            round(float(reader.grid.row(first.surface.grid.y(0)))),
+            reader.grid.column(first.surface.grid.x(0)),
+        )
+        part = reader.read(row, round(float(column)), 50, 50)
+    both = np.isfinite(part) & np.isfinite(first.surface.z[:50, :50])
+    assert both.mean() > 0.9
+    assert np.median(np.abs(part - first.surface.z[:50, :50])[both]) < content["sigma_Z_m"]["matching"]
+    assert "cells of 2" in repr(first)
+
+
+def test_wrong_settings_and_places_are_refused(made, tmp_path):
+    here, _ = made
+    photographs = here / "block" / "photographs"
+    for given, message in (
+        ({"resolution": -1.0}, "resolution -1 is not possible"), ({"area": (1.0, 0.0, 0.0, 1.0)}, "the area is empty"),
+        ({"pairs": 0}, "pairs 0 is not possible"), ({"area": (1e5, 1e5, 1.001e5, 1.001e5)}, "no two photographs"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=message):
+            aerotri.dense_surface(here / "result", photographs, **given)
+    with pytest.raises(InputError, match="0 photographs of the block"):
+        aerotri.dense_surface(here / "result", tmp_path)
+    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match="holds other files than tiles"):
+        aerotri.dense_surface(here / "result", photographs, tiles=tmp_path)
+    assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"

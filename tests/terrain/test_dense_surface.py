@@ -1,0 +1,241 @@
+"""The whole surface by dense matching: geometry of epipolar images, parallaxes with σ, fusion, tiles."""
+
+import cv2
+import numpy as np
+import pytest
+from rendered_blocks import rendered_block, write_photograph
+
+from aerotri.conventions import InputError
+from aerotri.rasters.grids import Grid
+from aerotri.terrain.dense import _mesh_kernels as kernels
+from aerotri.terrain.dense._resampling_kernels import resample
+from aerotri.terrain.dense.epipolar import EpipolarGeometry, EpipolarImages, epipolar_geometry
+from aerotri.terrain.dense.grey_store import GreyStore
+from aerotri.terrain.dense.height_range import range_of_surface
+from aerotri.terrain.dense.measure import DensePlan, measure_surface
+from aerotri.terrain.dense.pairs import Pair, chosen_pairs, noise_correlation
+from aerotri.terrain.dense.parallaxes import parallaxes_of
+from aerotri.terrain.dense.place import place_at
+from aerotri.terrain.pickets import Area
+
+
+@pytest.fixture(scope="module")
+def hill(tmp_path_factory):
+    """A hill, and houses with flat roofs beside it."""
+    houses = [[-150.0, -60.0, 60.0, 40.0, 20.0], [120.0, 40.0, 50.0, 50.0, 15.0]]
+    ground = {"hill_height_m": 60.0, "hill_radius_m": 150.0, "kind": "hill", "houses": houses}
+    return rendered_block(tmp_path_factory.mktemp("dense"), **ground)
+
+
+@pytest.fixture(scope="module")
+def surface(hill, tmp_path_factory):
+    """The surface of its middle."""
+    area = Area(np.array([-220.0, -220.0]), np.array([220.0, 220.0]))
+    plan = DensePlan(np.arange(4), hill.paths, tmp_path_factory.mktemp("tiles"), area=area)
+    return measure_surface(hill.calibration, plan), plan
+
+
+def cells(outcome, rendered):
+    """Errors and σ of the cells that have a height, and whether each lies off the walls of houses."""
+    errors, sigmas, off_walls = [], [], []
+    for window, part in outcome.files.read_all(list(outcome.windows)):
+        grid = outcome.grid.window(window.row, window.column, window.rows, window.columns)
+        x, y = np.meshgrid(grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows)))
+        truth = rendered.truth(np.column_stack([x.ravel(), y.ravel(), 0.0 * x.ravel()])).reshape(x.shape)
+        wall = np.maximum(*(np.abs(slope) for slope in np.gradient(truth))) > 3.0
+        near = cv2.dilate(wall.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
+        known = np.isfinite(part.z)
+        errors.append((part.z - truth)[known])
+        sigmas.append(part.sigma[known])
+        off_walls.append(~near[known])
+    return np.concatenate(errors), np.concatenate(sigmas), np.concatenate(off_walls)
+
+
+def test_heights_are_those_of_the_ground_within_their_sigma(surface, hill):
+    outcome, _ = surface
+    error, sigma, off = cells(outcome, hill)
+    z = error[off] / sigma[off]
+    assert outcome.cells > 0.5 * outcome.grid.rows * outcome.grid.columns
+    assert abs(np.median(error[off])) < 0.1  # of a pixel of 1 m
+    assert 0.75 < z.std() < 1.25
+    assert (np.abs(z) > 4.0).mean() < 0.005
+    assert np.median(sigma) < 0.4
+
+
+def test_nothing_hangs_between_roof_and_ground(surface, hill):
+    error, _, off = cells(surface[0], hill)
+    assert (np.abs(error[off]) > 3.0).mean() < 1e-3
+    assert (np.abs(error) > 8.0).mean() < 5e-3
+
+
+def test_tiles_of_an_earlier_run_are_used_and_damaged_ones_measured_again(surface, hill):
+    first, plan = surface
+    again = measure_surface(hill.calibration, plan)
+    assert again.resumed == len(again.windows) > 0
+    path = first.files.path(first.windows[0])
+    whole = path.read_bytes()
+    held = first.files.read(first.windows[0])
+    path.write_bytes(whole[: len(whole) // 2])
+    assert first.files.read(first.windows[0]) is None
+    last = measure_surface(hill.calibration, plan)
+    assert last.resumed == len(last.windows) - 1
+    np.testing.assert_array_equal(last.files.read(first.windows[0]).z, held.z)
+
+
+def test_a_place_has_one_row_in_both_epipolar_images(hill):
+    place = place_at(hill.photographs(), np.array([0.0, 0.0, 100.0]), 300.0, 0.02)
+    rng = np.random.default_rng(1)
+    q = np.column_stack([rng.uniform(-60.0, 60.0, (200, 2)), rng.uniform(-20.0, 40.0, 200)])
+    pair = chosen_pairs(place, q, 1)[0]
+    spare = np.array([0.0, 0.0, 10.0])
+    g = epipolar_geometry(place, pair.left, pair.right, 0, q, q - spare, q + spare)
+    left, right = ((q - place.centres[k]) @ g.rotation for k in (pair.left, pair.right))
+    in_left, in_right = (-g.f * u[:, :2] / u[:, 2:] for u in (left, right))
+    np.testing.assert_allclose(in_left[:, 1], in_right[:, 1], atol=1e-9)
+    np.testing.assert_allclose(in_left[:, 0] - in_right[:, 0], -g.f * g.base / left[:, 2], rtol=1e-12)
+    assert (in_left[:, 0] - in_right[:, 0] > 0.0).all()
+
+
+def test_pixels_with_their_parallax_lie_where_they_were_projected_from(hill):
+    """The identity of `place_of_pixels`: projected, then back by the parallax, bent image included."""
+    place = place_at(hill.photographs(), np.array([0.0, 0.0, 100.0]), 300.0, 0.02)
+    rng = np.random.default_rng(2)
+    ground = np.column_stack([rng.uniform(-60.0, 60.0, (400, 2)), rng.uniform(-20.0, 40.0, 400)])
+    pair = chosen_pairs(place, ground, 1)[0]
+    spare = np.array([0.0, 0.0, 10.0])
+    g = epipolar_geometry(place, pair.left, pair.right, 0, ground, ground - spare, ground + spare)
+    rows, columns = g.shape
+    i, j = rows // 2, columns // 2
+    depth = np.linspace(0.97, 1.03, 5) * np.median(-((ground - g.centre) @ g.rotation)[:, 2])
+    u = np.column_stack([(g.first[0] + j) * depth / g.f, -(g.first[1] + i) * depth / g.f, -depth])
+    q = g.centre + u @ g.rotation.T
+    parallax = g.f * g.base / depth
+    value = np.full((5, rows, columns), np.nan, np.float32)
+    for k in range(5):
+        delta = parallax[k] - g.known[i, j]
+        for _ in range(50):
+            delta = parallax[k] - np.interp(j - delta, np.arange(columns), g.known[i])
+        value[k, i, j] = delta
+        xyz, per_pixel = np.empty((rows, columns, 3)), np.empty((rows, columns))
+        rays = kernels.Rays(
+            g.f, g.base, g.first, g.known, g.centre, np.ascontiguousarray(g.rotation), place.to_crs, place.reach
+        )
+        kernels.place_of_pixels(rays, value[k], xyz, per_pixel)
+        np.testing.assert_allclose(xyz[i, j], q[k], atol=2e-2)
+        assert np.isnan(xyz[0, 0]).all()
+
+
+def textured_pair(shift: float, across: float, noise: float, seed: int) -> EpipolarImages:
+    """Two images of one texture, the right one moved by so many pixels along and across the base."""
+    rng = np.random.default_rng(seed)
+    row, column = np.mgrid[:240, :320].astype(float)
+    waves = rng.normal(scale=0.45, size=(300, 2)), rng.uniform(0.0, 2.0 * np.pi, 300)
+    images = []
+    for du, dv in ((0.0, 0.0), (shift, -across)):
+        grey = np.zeros((240, 320))
+        for (fx, fy), phase in zip(*waves, strict=True):
+            grey += np.cos(fx * (column + du) + fy * (row + dv) + phase)
+        images.append((128.0 + 2.5 * grey + rng.normal(scale=noise, size=grey.shape)).astype(np.float32))
+    whole = np.ones((240, 320), np.bool_)
+    g = EpipolarGeometry(
+        0, 1, 0, 1000.0, 100.0, np.eye(3), np.zeros(3), (0, 0), (240, 320), np.zeros((240, 320), np.float32), -8, 16
+    )
+    return EpipolarImages(g, images[0], images[1], whole, whole)
+
+
+@pytest.mark.parametrize("across", [0.0, 0.3])
+@pytest.mark.parametrize("shift", [0.0, 0.25, 0.5, -1.37])
+def test_parallaxes_are_recovered_whatever_the_shift_across_the_base(shift, across):
+    found = parallaxes_of(textured_pair(shift, across, 3.0, 3))
+    known = np.isfinite(found.value)
+    error, sigma = found.value[known] - shift, found.sigma[known]
+    assert known.mean() > 0.85
+    assert abs(np.median(error)) < 0.02
+    assert abs(found.across - across) < 0.02
+    assert 0.7 < (error / sigma).std() < 1.3
+
+
+def test_resampling_keeps_straight_lines_and_parabolas():
+    row, column = np.mgrid[:40, :50].astype(float)
+    x, y = np.random.default_rng(6).uniform(3.0, 36.0, (2, 30, 30))
+    out = np.empty((30, 30), np.float32)
+    for grey in (3.0 * column - 2.0 * row, 0.1 * column**2 - 0.3 * row**2 + row * column):
+        resample(grey, x, y, np.ones((30, 30), np.bool_), out)
+        true = 3.0 * x - 2.0 * y if grey[0, 1] == 3.0 else 0.1 * x**2 - 0.3 * y**2 + x * y
+        np.testing.assert_allclose(out, true, rtol=1e-6, atol=1e-4)
+
+
+def test_sigma_follows_the_noise():
+    quiet, loud = (parallaxes_of(textured_pair(0.4, 0.0, noise, 4)) for noise in (1.5, 12.0))
+    assert np.nanmedian(loud.sigma) > 3.0 * np.nanmedian(quiet.sigma)
+
+
+def fused(heights: np.ndarray, sigmas: np.ndarray, correlation: np.ndarray):
+    shape = heights.shape[1:]
+    z, sigma, misfit = (np.empty(shape) for _ in range(3))
+    count = np.zeros(shape, np.int16)
+    used = np.array([0b00011, 0b00110, 0b11000][: len(heights)], np.int64)
+    kernels.fuse(heights, sigmas, correlation, used, 4.0, 0.1, z, sigma, count, misfit)
+    return z[0, 0], sigma[0, 0], count[0, 0]
+
+
+def test_the_pairs_that_agree_make_the_height():
+    heights = np.array([10.0, 10.2, 30.0]).reshape(3, 1, 1)
+    z, sigma, count = fused(heights, np.full((3, 1, 1), 0.2), np.eye(3))
+    assert z == pytest.approx(10.1)
+    assert sigma == pytest.approx(0.2 / np.sqrt(2.0))
+    assert count == 3
+    z, _, count = fused(np.array([np.nan, np.nan, 30.0]).reshape(3, 1, 1), np.full((3, 1, 1), 0.2), np.eye(3))
+    assert (z, count) == (30.0, 2)
+    z, sigma, count = fused(np.full((3, 1, 1), np.nan), np.full((3, 1, 1), 0.2), np.eye(3))
+    assert np.isnan(z)
+    assert np.isnan(sigma)
+    assert count == 0
+
+
+def test_pairs_that_share_a_photograph_share_its_noise(hill):
+    place = place_at(hill.photographs(), np.array([0.0, 0.0, 100.0]), 300.0, 0.02)
+    same_side, other_side = [Pair(0, 1, 9.0), Pair(0, 2, 18.0)], [Pair(0, 1, 9.0), Pair(1, 2, 9.0)]
+    assert noise_correlation(place, same_side)[0, 1] == pytest.approx(0.5, abs=0.02)
+    assert noise_correlation(place, other_side)[0, 1] == pytest.approx(-0.5, abs=0.02)
+    apart = [Pair(0, 1, 9.0), Pair(2, 3, 9.0)]
+    np.testing.assert_array_equal(noise_correlation(place, apart), np.eye(2))
+
+
+def test_photographs_beyond_the_memory_allowed_are_read_again(tmp_path):
+    rng = np.random.default_rng(5)
+    pixels = [rng.integers(0, 255, (64, 96)).astype(np.uint8) for _ in range(3)]
+    paths = [write_photograph(tmp_path / f"{k}.tif", p) for k, p in enumerate(pixels)]
+    store = GreyStore(paths, [(96, 64)] * 3, most_bytes=2 * 64 * 96)
+    for k in (0, 1, 0, 2, 1):
+        np.testing.assert_array_equal(store.level(k, 0), pixels[k])
+    assert store.reads == 4
+    quarter = store.level(0, 1)
+    np.testing.assert_allclose(quarter, pixels[0].reshape(32, 2, 48, 2).mean(axis=(1, 3)), atol=1.0)
+
+
+def test_sixteen_bits_are_stretched_and_other_sizes_refused(tmp_path):
+    grey = np.linspace(3000.0, 5000.0, 64 * 96).reshape(64, 96).astype(np.uint16)
+    path = write_photograph(tmp_path / "a.tif", grey)
+    found = GreyStore([path], [(96, 64)]).level(0, 0)
+    assert found.min() == 0
+    assert found.max() == 255
+    with pytest.raises(InputError, match="its camera has 95"):
+        GreyStore([path], [(95, 64)]).level(0, 0)
+
+
+def test_holes_are_looked_for_between_the_heights_around_them():
+    z = np.full((40, 40), 100.0)
+    z[:, 20:] = 120.0
+    z[15:25, 15:25] = np.nan
+    grid = Grid(40, 40, 0.0, 40.0, 1.0, 1.0)
+    found = range_of_surface(grid, z, 1.0)
+    assert found.low[20, 20] <= 98.0
+    assert found.high[20, 20] >= 122.0
+    assert (found.low[5, 5], found.high[5, 5]) == (98.0, 102.0)
+
+
+def test_photographs_that_show_nothing_alike_are_refused(hill, tmp_path):
+    blank = [write_photograph(tmp_path / path.name, np.full((375, 575), 9000, np.uint16)) for path in hill.paths]
+    with pytest.raises(InputError, match="no two photographs could be matched"):
+        measure_surface(hill.calibration, DensePlan(np.arange(4), tuple(blank), tmp_path))
