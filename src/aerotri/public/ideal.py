@@ -241,7 +241,7 @@ def _refuse_unknown_motion(adjusted: AdjustedBlock, groups: tuple[ImageGroup, ..
     if adjusted.rolling_shutters is None:
         return
     rolling = {one.camera for one in adjusted.rolling_shutters.readouts}
-    oriented: np.ndarray = np.isfinite(adjusted.images.centre).all(axis=1)
+    oriented = np.asarray(np.isfinite(adjusted.images.centre).all(axis=1))
     for job in jobs:
         if groups[job.group].camera.name in rolling and (job.row < 0 or not bool(oriented[job.row])):
             raise InputError(
