@@ -82,7 +82,7 @@ def test_the_function_gives_what_the_command_writes_and_goes_on_with_its_tiles(m
     area = (-100.0, -100.0, 100.0, 100.0)
     first = aerotri.dense_surface(here / "result", photographs, area=area, tiles=tmp_path / "tiles")
     again = aerotri.dense_surface(here / "result", photographs, area=area, tiles=tmp_path / "tiles")
-    other = aerotri.dense_surface(here / "result", photographs, area=area, pairs=1, tiles=tmp_path / "tiles")
+    other = aerotri.dense_surface(here / "result", photographs, area=area, most_pairs=1, tiles=tmp_path / "tiles")
     assert first.summary["tiles_resumed"] == other.summary["tiles_resumed"] == 0
     assert again.summary["tiles_resumed"] == again.summary["tiles"]
     np.testing.assert_array_equal(first.surface.z, again.surface.z)
@@ -103,7 +103,8 @@ def test_wrong_settings_and_places_are_refused(made, tmp_path):
     photographs = here / "block" / "photographs"
     for given, message in (
         ({"resolution": -1.0}, "resolution -1 is not possible"), ({"area": (1.0, 0.0, 0.0, 1.0)}, "the area is empty"),
-        ({"pairs": 0}, "pairs 0 is not possible"), ({"area": (1e5, 1e5, 1.001e5, 1.001e5)}, "no two photographs"),
+        ({"most_pairs": 0}, "most_pairs 0 is not possible"),
+        ({"area": (1e5, 1e5, 1.001e5, 1.001e5)}, "no two photographs"),
     ):  # fmt: skip
         with pytest.raises(InputError, match=message):
             aerotri.dense_surface(here / "result", photographs, **given)

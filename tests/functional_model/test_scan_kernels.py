@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerotri.adjustment.kernel_records import Scans
 from aerotri.deformation.orientation import Orientation, photo_rows
 from aerotri.functional_model._photo_kernels import partials, project
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -30,8 +31,9 @@ def photograph(direction):
     )  # fmt: skip
     rotation = rotation_from_angles(angles)
     rate = 0.030 * np.array(READING[direction]) / (np.array([4000, 3000]) * 0.0024)
-    scan = np.concatenate([np.einsum("nji,nj->ni", rotation, velocity), spin, rate[None]], axis=1)
-    return shown, Orientation(shown.centre, rotation, np.array([[8.8, 0.0, 0.0]]), scan)
+    moved = np.einsum("nji,nj->ni", rotation, velocity)
+    scans = Scans(rate[None] / 30.0, np.full(1, 30.0), moved, spin, np.full((1, 3), -1))
+    return shown, Orientation(shown.centre, rotation, np.array([[8.8, 0.0, 0.0]]), scans)
 
 
 def test_projection_and_partials():

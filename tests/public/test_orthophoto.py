@@ -15,7 +15,8 @@ from typer.testing import CliRunner
 import aerotri
 from aerotri import InputError
 from aerotri.cli import app
-from aerotri.rasters.grids import Grid, write_raster, write_surface
+from aerotri.rasters.grids import Grid, write_raster
+from aerotri.rasters.surface_files import write_surface
 from aerotri.vectors.geopackage import read_geopackage
 
 

@@ -11,8 +11,9 @@ from aerotri.conventions import px_from_mm
 from aerotri.deformation.restitution import FREE, restitution_of
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.pipeline import adjust_keeping_system
-from aerotri.rasters.grids import Grid, RasterReader, write_surface
+from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.rasters.mosaics import read_mosaic
+from aerotri.rasters.surface_files import write_surface
 from aerotri.simulation import _rendering_kernels as rendering
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.projection import Rays, measured_rays, project

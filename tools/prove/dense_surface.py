@@ -1,5 +1,6 @@
 """Dense surfaces of rendered photographs against the ground: coverage, bias, spread and normalised errors by scene.
 
+Measures σ of matching alone and what semi-global matching alone gives, so it looks inside the package on purpose.
 Every scene is a block of two strips with 70 % end and 40 % side lap, rendered with noise, its tie points as good as
 free of error, so that what is judged is the matching. Cells that two photographs see count as coverable (from the true
 ground; what a house hides is not taken off). σ is that of matching alone. z is error over σ; NMAD is in pixels on the

@@ -166,7 +166,7 @@ def dsm(
         tuple[float, float, float, float] | None,
         typer.Option(help="X Y of the lower left, X Y of the upper right corner, m.", rich_help_panel=GRID),
     ] = DENSE_DEFAULTS.area,
-    pairs: Annotated[
+    most_pairs: Annotated[
         int,
         typer.Option(
             min=1,
@@ -174,7 +174,7 @@ def dsm(
             help="Number of pairs of photographs that measure a piece of ground, at most.",
             rich_help_panel=MATCHING,
         ),
-    ] = DENSE_DEFAULTS.pairs,
+    ] = DENSE_DEFAULTS.most_pairs,
     edge: Annotated[
         float,
         typer.Option(
@@ -196,7 +196,7 @@ def dsm(
     """The whole surface by dense matching: a height and its standard deviation for every cell."""
     from aerotri.commands.dsm import run_dsm
 
-    settings = DenseSettings(resolution, area, pairs, edge, ideal)
+    settings = DenseSettings(resolution, area, most_pairs, edge, ideal)
     raise typer.Exit(run_dsm(result, photographs, out, settings, plots, json_))
 
 

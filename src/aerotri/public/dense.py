@@ -160,7 +160,7 @@ def dense_surface(
     *,
     resolution: float | None = DENSE_DEFAULTS.resolution,
     area: tuple[float, float, float, float] | None = DENSE_DEFAULTS.area,
-    pairs: int = DENSE_DEFAULTS.pairs,
+    most_pairs: int = DENSE_DEFAULTS.most_pairs,
     edge: float = DENSE_DEFAULTS.edge,
     ideal: bool = DENSE_DEFAULTS.ideal,
     tiles: FilePath | None = None,
@@ -174,7 +174,7 @@ def dense_surface(
     photographs : folder or files of the photographs, TIFF or JPEG.
     resolution : m, cell of the surface; two pixels on the ground where None.
     area : m, X and Y of the lower left, then of the upper right corner; as far as photographs reach where None.
-    pairs : pairs of photographs that measure a piece of ground, at most.
+    most_pairs : pairs of photographs that measure a piece of ground, at most.
     edge : share of the format at its edge that is not used.
     ideal : the photographs are those of `aerotri.ideal_photographs`, free of image errors.
     tiles : folder for the tiles of the surface; a run that was ended goes on with those it finds there. None: a
@@ -197,7 +197,7 @@ def dense_surface(
     >>> dense = aerotri.dense_surface("saar_result", "photographs")  # doctest: +SKIP
     >>> dense.save("saar_dsm")  # doctest: +SKIP
     """
-    return measure_dense(result, paths_of(photographs), DenseSettings(resolution, area, pairs, edge, ideal),
+    return measure_dense(result, paths_of(photographs), DenseSettings(resolution, area, most_pairs, edge, ideal),
                          None if tiles is None else Path(tiles), progress)  # fmt: skip
 
 
@@ -228,7 +228,7 @@ def measure_dense(
     else:
         _open_tiles(tiles, settings, key, paths)
     area = None if settings.area is None else Area(np.array(settings.area[:2]), np.array(settings.area[2:]))
-    plan = DensePlan(rows, paths, tiles, settings.resolution, area, settings.pairs, settings.edge, settings.ideal)
+    plan = DensePlan(rows, paths, tiles, settings.resolution, area, settings.most_pairs, settings.edge, settings.ideal)
     with stage_report(progress) as report:
         outcome = measure_surface(record, plan, report.stage)
     block = record.result.block

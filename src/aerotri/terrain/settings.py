@@ -114,14 +114,14 @@ class DenseSettings:
     ----------
     resolution : m, cell of the surface; None: two pixels on the ground.
     area : m, X and Y of the lower left, X and Y of the upper right corner; None: as far as photographs reach.
-    pairs : pairs of photographs that measure a piece of ground, at most.
+    most_pairs : pairs of photographs that measure a piece of ground, at most.
     edge : share of the format at its edge that is not used.
     ideal : the photographs have been freed of image errors.
     """
 
     resolution: float | None = None
     area: tuple[float, float, float, float] | None = None
-    pairs: int = 4
+    most_pairs: int = 4
     edge: float = EDGE
     ideal: bool = False
 
@@ -135,7 +135,7 @@ class DenseSettings:
         if self.area is not None and not (self.area[0] < self.area[2] and self.area[1] < self.area[3]):
             raise InputError("the area is empty", "give X and Y of its lower left, then of its upper right corner")
         for name, value, low, high in (
-            ("resolution", self.resolution, 1e-6, LARGEST), ("pairs", self.pairs, 1, MOST_PAIRS),
+            ("resolution", self.resolution, 1e-6, LARGEST), ("most_pairs", self.most_pairs, 1, MOST_PAIRS),
             ("edge", self.edge, 0.0, LARGEST_EDGE),
         ):  # fmt: skip
             if value is not None and not low <= value <= high:
