@@ -10,8 +10,8 @@ from aerotri.terrain.dense.place import Place
 
 LEAST_ANGLE, BEST_ANGLE, LARGEST_ANGLE = 3.0, 15.0, 40.0
 """Degrees between the rays of a pair; chosen [C]: below the least a pixel of parallax is 20 GSD of height, beyond the
-largest the photographs differ too much to be matched densely, and the best is near where σ of rendered scenes is
-least."""
+largest the photographs differ too much to be matched densely, and the best lies between; other bounds were
+not compared."""
 LARGEST_OFF_NADIR = 45.0
 """Degrees of a ray from the vertical; beyond, a photograph sees walls rather than ground."""
 GAIN = (1.0, 0.6, 0.4, 0.25, 0.15, 0.1)
