@@ -9,10 +9,11 @@ from aerotri.adjustment.datum import motions_of_points
 from aerotri.pipeline.chain import adjust_keeping_system
 from aerotri.statistics.cluster_influence import influences, known_part
 from aerotri.statistics.cluster_test import compare_clusters, sum_of_squares, weakest_modes
-from aerotri.statistics.clusters import PHOTOGRAPH, Clusters, cluster_schemes
+from aerotri.statistics.clusters import PHOTOGRAPH, Clusters, cluster_schemes, to_test
 from aerotri.statistics.covariance import cofactors
 from aerotri.statistics.model_part import compare_schemes, excess_of_clusters, positive_part
 from dense_algebra import dense_design
+from rig_blocks import rig_block
 from small_blocks import small_block, with_adjustment
 from statistics_blocks import drone_block
 
@@ -243,3 +244,30 @@ def test_free_network_in_both_datums(strips):
     assert np.abs(np.linalg.pinv(g) @ found).max() < 1e-3 * np.abs(np.linalg.pinv(g) @ columns).max()
     assert (inner.result.points.total_sigma >= inner.result.points.sigma * (1.0 - 1e-9)).all()
     assert np.isfinite(inner.result.images.total_sigma).all()
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_heads_of_a_rig_fly_the_strips_of_the_rig(named):
+    """Strips and directions are those of the exposures, whatever cameras there are, and the order of their rows."""
+    block = rig_block(2)[0]
+    if not named:
+        block = replace(block, images=replace(block.images, strip=np.full(len(block.images), "", dtype=object)))
+    found = adjust_keeping_system(block)
+    u = found.system.unknowns
+    station = np.asarray(block.images.columns["station"], dtype=object)[u.images]
+    schemes = {one.scheme: one for one in cluster_schemes(u, found.solution.state)}
+    assert len(schemes["strip"]) == 3
+    for scheme in ("strip", "direction of flight"):
+        if scheme in schemes:
+            for one in set(station.tolist()):
+                assert len(set(schemes[scheme].label[station == one].tolist())) == 1
+
+
+def test_photographs_are_tested_in_more_clusters_than_their_variance_is_taken_from():
+    centre = np.random.default_rng(1).uniform(size=(200, 3))
+    few = Clusters(PHOTOGRAPH, np.arange(200) % 15, tuple(str(k) for k in range(15)), 200)
+    tested = to_test(few, centre)
+    assert len(tested) == 60
+    assert np.bincount(tested.label).min() >= 3
+    strips = replace(few, scheme="strip")
+    assert to_test(strips, centre) is strips

@@ -14,6 +14,7 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block
+from aerotri.observations.rigs import station_places
 
 TURN = np.radians(45.0)
 """Change of direction between two legs that ends a strip."""
@@ -47,6 +48,28 @@ def exposure_times(block: Block) -> np.ndarray:
             np.isfinite(block.gnss_ins.time), block.gnss_ins.time, time[block.gnss_ins.image]
         )
     return time
+
+
+def one_an_exposure(block: Block, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """One photograph of every exposure, since the cameras of a rig fly one track together.
+
+    Parameters
+    ----------
+    rows : (n,) photographs, rows of the block.
+
+    Returns
+    -------
+    (e,) which of the n stand for the exposures, in their order: of a rig the reference camera where it is among them;
+    (n,) which of the e exposures every photograph belongs to.
+    """
+    lead = station_places(block, off_too=True).lead[rows]
+    _, first, exposure = np.unique(lead, return_index=True, return_inverse=True)
+    at_lead = np.flatnonzero(lead == rows)
+    first[exposure[at_lead]] = at_lead
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return first[order], rank[exposure.ravel()]
 
 
 def order_of_exposure(centre: np.ndarray, strips: np.ndarray, names: np.ndarray, time: np.ndarray) -> np.ndarray:
@@ -117,9 +140,12 @@ def with_named_strips(block: Block) -> Block:
             "add a column strip to images.csv, or positions",
             file="images.csv",
         )
-    order = order_of_exposure(centre, np.full(len(images), ""), images.names, exposure_times(block))
-    strip = np.empty(len(images), dtype=object)
-    strip[order] = [f"strip {k + 1}" for k in strips_of_track(centre[order], np.full(len(images), ""))]
+    alone, exposure = one_an_exposure(block, np.arange(len(images)))
+    nameless = np.full(len(alone), "")
+    order = order_of_exposure(centre[alone], nameless, images.names[alone], exposure_times(block)[alone])
+    number = np.empty(len(alone), dtype=np.int64)
+    number[order] = strips_of_track(centre[alone][order], nameless)
+    strip = np.array([f"strip {k + 1}" for k in number[exposure]], dtype=object)
     return replace(block, images=replace(images, strip=strip))
 
 

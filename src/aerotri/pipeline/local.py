@@ -16,6 +16,7 @@ from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.weak_geometry import go_on_without, minimise_tied
 from aerotri.diagnosis.common_height import common_height
+from aerotri.diagnosis.common_shift import common_shift
 from aerotri.diagnosis.doubts import defects_in_words, doubts, failure, refuse_runaway
 from aerotri.diagnosis.position_errors import position_errors_in_words
 from aerotri.diagnosis.rigidity import movements_in_words, rigidity_in_words
@@ -204,6 +205,8 @@ def _with_words(delivered: _Delivered, timings: dict[str, float]) -> Adjustment:
     if shared_height is not None:
         sentence = shared_height.sentence(float(np.nanmedian(result.points.sigma[:, 2])))
         said += (sentence,) if sentence else ()
+    shifted = common_shift(system, solution, delivered.factor, sigma0)
+    said += (shifted.sentence,) if shifted is not None and shifted.sentence else ()
     of_positions = position_errors_in_words(errors)
     said += (of_positions,) if of_positions else ()
     said += rigidity_in_words(rigidity)

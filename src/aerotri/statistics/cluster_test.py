@@ -32,7 +32,7 @@ from aerotri.functional_model.observed_unknowns import Rows
 from aerotri.quantiles import chi_square_exceedance, f_exceedance
 from aerotri.results.model_part import ClusterTest
 from aerotri.statistics import _cluster_kernels as _kernels
-from aerotri.statistics.clusters import ALONE, FEWEST, PHOTOGRAPH, Clusters, divided_at_random
+from aerotri.statistics.clusters import ALONE, FEWEST, PHOTOGRAPH, Clusters, divided_at_random, to_test
 
 LEVEL = 0.001
 """Probability with which white noise is taken for errors of clusters [C]: Baarda's level of a single test."""
@@ -190,10 +190,11 @@ def compare_clusters(
     ----------
     factor : undamped, at the solution. level : below which both probabilities have to be for the scheme to count.
     """
-    m = len(clusters)
     reason = untestable(clusters)
     if reason:
-        return ClusterTest(clusters.scheme, m, reason=reason)
+        return ClusterTest(clusters.scheme, len(clusters), reason=reason)
+    clusters = to_test(clusters, solution.state.centre)
+    m = len(clusters)
     found, freedom = sum_of_squares(system, solution, factor, modes, clusters)
     if freedom == 0:
         return ClusterTest(clusters.scheme, m, reason="nothing checks the clusters against one another")
