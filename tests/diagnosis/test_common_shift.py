@@ -52,7 +52,9 @@ def test_white_noise_is_no_shift():
 def test_where_there_is_nothing_to_hold_it_against(case):
     block = small_block(3, gnss=WHITE)[0]
     if case == "no control":
-        block = replace(block, control=replace(block.control, is_check=np.ones(len(block.control.is_check), dtype=bool)))
+        block = replace(
+            block, control=replace(block.control, is_check=np.ones(len(block.control.is_check), dtype=bool))
+        )
     elif case == "no positions":
         block = replace(block, gnss_ins=None)
     else:

@@ -9,7 +9,7 @@ from aerotri.adjustment.datum import motions_of_points
 from aerotri.pipeline.chain import adjust_keeping_system
 from aerotri.statistics.cluster_influence import influences, known_part
 from aerotri.statistics.cluster_test import compare_clusters, sum_of_squares, weakest_modes
-from aerotri.statistics.clusters import PHOTOGRAPH, Clusters, cluster_schemes, to_test
+from aerotri.statistics.clusters import CAMERA, PHOTOGRAPH, Clusters, cluster_schemes, to_test
 from aerotri.statistics.covariance import cofactors
 from aerotri.statistics.model_part import compare_schemes, excess_of_clusters, positive_part
 from dense_algebra import dense_design
@@ -271,3 +271,30 @@ def test_photographs_are_tested_in_more_clusters_than_their_variance_is_taken_fr
     assert np.bincount(tested.label).min() >= 3
     strips = replace(few, scheme="strip")
     assert to_test(strips, centre) is strips
+
+
+def test_errors_of_the_cameras_of_a_rig_are_found_and_their_size_is_right():
+    """Every camera bends its photographs by some 6 µm of its own: heights err as much as the total σ say, not σ."""
+    before, after = [], []
+    for seed in (1, 2, 3):
+        block, truth = rig_block(seed)
+        rays, camera = block.image_points, block.images.camera[block.image_points.image]
+        x, y = (rays.xy / np.array([one.half_format_mm for one in block.cameras])[camera]).T
+        size = np.random.default_rng(seed).normal(scale=0.006, size=(len(block.cameras), 2))[camera]
+        bent = rays.xy + size * np.stack([x * y, x**2 - 1.0 / 3.0], axis=1)
+        found = adjust_keeping_system(replace(block, image_points=replace(rays, xy=bent)))
+        assert found.local.model_part.scheme == CAMERA
+        used = found.system.unknowns.points
+        error = (found.local.points.xyz - truth.points)[used, 2]
+        before.append(error / found.local.points.sigma[used, 2])
+        after.append(error / found.local.points.total_sigma[used, 2])
+    assert np.sqrt(np.mean(np.concatenate(before) ** 2)) > 1.2
+    assert 0.6 < np.sqrt(np.mean(np.concatenate(after) ** 2)) < 1.2
+
+
+def test_good_cameras_of_a_rig_have_no_errors_of_their_own():
+    found = adjust_keeping_system(rig_block(2)[0])
+    tests = {test.scheme: test for test in found.local.model_part.tests}
+    assert tests[CAMERA].clusters == 5
+    assert not tests[CAMERA].reason
+    assert not found.local.model_part.counts

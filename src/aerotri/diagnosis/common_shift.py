@@ -4,8 +4,8 @@ Receivers without corrections, another datum or a wrong antenna offset shift all
 independent errors, a hundred positions seem to know their mean ten times better than one does. They then pull the block
 away from its control points: it tilts, since the positions lie a flying height above the points.
 
-[L: a score test; Rao 1948] With a shift s as an unknown beside the others, S its columns and E the rows of the positions,
-both whitened, and b the whitened residuals without it,
+[L: a score test; Rao 1948] With a shift s as an unknown beside the others, S its columns and E the rows of the
+positions, both whitened, and b the whitened residuals without it,
 
     N_s = SᵀS − SᵀE·Q·EᵀS,   s = N_s⁻¹·Sᵀb,   sᵀN_s·s/σ0² = χ² with three degrees of freedom where there is none.
 

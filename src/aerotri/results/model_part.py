@@ -24,7 +24,7 @@ class ClusterTest:
         weakest deformations of the block). ratio_random : the same of random divisions into as many clusters.
     p_noise : probability of such a ratio by the noise of the rays alone. p_random : by what random divisions show. NaN
         where there was no test; those of random divisions as well where noise explains the ratio.
-    counts : whether both are below the level of the test.
+    counts : whether p_noise is below the level of the test, and p_random says that a group errs, not photographs.
     field_um, field_mm : σ and correlation length of the random field of every cluster; NaN where there was none.
     reason : why there was no test, '' otherwise.
     """

@@ -36,6 +36,10 @@ from aerotri.statistics.clusters import ALONE, FEWEST, PHOTOGRAPH, Clusters, div
 
 LEVEL = 0.001
 """Probability with which white noise is taken for errors of clusters [C]: Baarda's level of a single test."""
+ATTRIBUTED = 0.05
+"""Probability with which errors of single photographs are taken for those of a group [C]. That white noise does not
+explain them is known by then. The covariance from groups is right for both: taken for those of a group, errors of
+photographs only make it less sure."""
 DIVISIONS = 3
 """Random divisions of the photographs [C]: their degrees of freedom are three times those of the scheme."""
 MODES = 6
@@ -188,7 +192,8 @@ def compare_clusters(
 
     Parameters
     ----------
-    factor : undamped, at the solution. level : below which both probabilities have to be for the scheme to count.
+    factor : undamped, at the solution. level : below which the probability by white noise has to be for the scheme to
+        count; ATTRIBUTED that by random divisions.
     """
     reason = untestable(clusters)
     if reason:
@@ -207,9 +212,8 @@ def compare_clusters(
     of_random = _by_random_divisions(system, solution, factor, modes, clusters)
     ratio_random = float(np.sqrt(of_random[0] / of_random[1])) / sigma0
     p_random = f_exceedance((ratio / max(ratio_random, 1.0)) ** 2, freedom, of_random[1])
-    return ClusterTest(
-        clusters.scheme, m, freedom, ratio, ratio_random, p_noise, p_random, max(p_noise, p_random) < level
-    )
+    counts = p_noise < level and p_random < ATTRIBUTED
+    return ClusterTest(clusters.scheme, m, freedom, ratio, ratio_random, p_noise, p_random, counts)
 
 
 def _by_random_divisions(

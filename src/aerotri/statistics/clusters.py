@@ -26,8 +26,10 @@ PHOTOGRAPH, PER_CLUSTER, MOST_AT_RANDOM = "photograph", 3, 15
 """The scheme of errors of single photographs: photographs at random into clusters of PER_CLUSTER at least, so many at
 most. What belongs to photographs adds up in such clusters as it does alone."""
 MOST_TESTED = 60
-"""Clusters of the scheme PHOTOGRAPH in its test [C]: more of them see smaller errors, and cost no factorisation. With six
-deformations looked at they have 360 degrees of freedom, enough for errors 1.15 times as large as noise explains."""
+"""Clusters of the scheme PHOTOGRAPH in its test [C]: more of them see smaller errors, and cost no factorisation. With
+six deformations looked at they have 360 degrees of freedom, enough for errors 1.2 times as large as noise explains."""
+CAMERA = "camera"
+"""The scheme of errors that all photographs of one camera share, of a rig of FEWEST cameras or more."""
 OF_ONE_EXPOSURE = ("time", "station")
 """Columns of images.csv that have a value of their own for every exposure and make no groups."""
 SAME_WAY = np.radians(30.0)
@@ -40,7 +42,7 @@ class Clusters:
 
     Parameters
     ----------
-    scheme : 'strip', 'direction of flight', a column of images.csv or PHOTOGRAPH.
+    scheme : 'strip', 'direction of flight', a column of images.csv, CAMERA or PHOTOGRAPH.
     label : (n,) number of every photograph's cluster, photographs as in `Unknowns`. names : (m,) of the clusters.
     joined : how many groups of the scheme there are where neighbours were joined to fewer clusters; len(names) if not.
     """
@@ -55,7 +57,7 @@ class Clusters:
 
 
 def cluster_schemes(unknowns: Unknowns, state: State) -> tuple[Clusters, ...]:
-    """Strips, directions of flight, every grouping column of images.csv and single photographs.
+    """Strips, directions of flight, every grouping column of images.csv, cameras and single photographs.
 
     A scheme of one cluster is left out unless the block is one strip, and one that divides the photographs as another
     before it.
@@ -74,6 +76,10 @@ def cluster_schemes(unknowns: Unknowns, state: State) -> tuple[Clusters, ...]:
             continue
         names, label = np.unique(values[rows].astype(str), return_inverse=True)
         found.append(_limited(name, label, tuple(str(n) for n in names)))
+    of_camera = np.array([camera.name for camera in unknowns.block.cameras])[images.camera[rows]]
+    cameras, label = np.unique(of_camera, return_inverse=True)
+    if len(cameras) >= FEWEST:
+        found.append(_limited(CAMERA, label, tuple(cameras.tolist())))
     kept: list[Clusters] = []
     for clusters in found:
         several = 2 <= len(clusters) <= len(rows) // 2 or (clusters.scheme == "strip" and len(clusters) == 1)

@@ -19,7 +19,7 @@ from aerotri.results.model_part import ClusterTest, ModelPart, ModelRoot
 from aerotri.statistics.cluster_fields import Field, compare_field
 from aerotri.statistics.cluster_influence import influences, known_part
 from aerotri.statistics.cluster_test import LEVEL, compare_clusters, untestable, weakest_modes
-from aerotri.statistics.clusters import LARGE, PHOTOGRAPH, Clusters, cluster_schemes
+from aerotri.statistics.clusters import CAMERA, LARGE, PHOTOGRAPH, Clusters, cluster_schemes
 from aerotri.statistics.covariance import InnerDatum, orientation_cofactors
 
 FEWEST_PHOTOGRAPHS = 10
@@ -85,7 +85,7 @@ def compare_few(
     -------
     the tests, and the fields by the number of their scheme.
     """
-    several = [k for k, one in enumerate(schemes) if one.scheme != PHOTOGRAPH]
+    several = [k for k, one in enumerate(schemes) if one.scheme not in (CAMERA, PHOTOGRAPH)]
     if any(not tests[k].reason for k in several) or len(system.unknowns.images) > LARGE:
         return tests, {}
     found = {
