@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aerotri.diagnosis.common_shift import CommonShift, common_shift
+from aerotri.diagnosis.common_shift import common_shift_in_words
 from aerotri.pipeline import adjust_keeping_system
+from aerotri.results.common_shift import CommonShift
+from aerotri.statistics.common_shift import common_shift
 from small_blocks import small_block
 
 WHITE = {"sigma_m": [0.5, 0.5, 0.8]}
@@ -37,8 +39,11 @@ def test_it_is_what_the_adjustment_with_a_shift_finds():
     ratio = shift.sigma / parameters.sigma[rows]
     np.testing.assert_allclose(ratio, ratio[0], rtol=0.01)
     assert shift.p < 1e-6
-    assert shift.sentence in found.local.outcome.warnings
-    assert 'shift = "block"' in shift.sentence
+    said, outcome = common_shift_in_words(shift), found.local.outcome
+    assert said in outcome.warnings
+    assert 'shift = "block"' in said
+    assert outcome.verdict == "doubtful"
+    assert said in outcome.reasons
 
 
 def test_white_noise_is_no_shift():
@@ -64,5 +69,5 @@ def test_where_there_is_nothing_to_hold_it_against(case):
 
 def test_chance_is_told_from_a_shift():
     size = np.array([0.1, 0.0, 0.0]), np.full(3, 0.05)
-    assert not CommonShift(*size, 0.2).sentence
-    assert "less than 0.001 %" in CommonShift(*size, 1e-9).sentence
+    assert not common_shift_in_words(CommonShift(*size, 0.2))
+    assert "less than 0.001 %" in common_shift_in_words(CommonShift(*size, 1e-9))

@@ -2,7 +2,8 @@
 
 The cameras of the frame are adjusted as independent ones. The nadir head is oriented along its track and adjusted by
 itself; the orientation of every exposure, turned by the nominal angles of the mounting, is the start of the other
-heads. Only the BINGO file, the GNSS positions, the control points and the nominal angles go in.
+heads. Only the BINGO file, the GNSS positions, the control points and the nominal angles go in. The positions are those
+of a receiver without corrections: a shift that they have in common is an unknown.
 
 Example: python tools/prove/ca502.py ../shared/data/ca502 --leave-out
 """
@@ -52,7 +53,7 @@ def unoriented(folder: Path) -> aerotri.Block:
         block = aerotri.read(
             bingo, name="ca502", positions=folder / "gnss_positions.csv", control=folder / "control_points.csv",
             camera=cameras, crs="EPSG:32647", control_prefix="GCP_", control_sigma_m=(0.02, 0.02, 0.03),
-            image_sigma_px=SIGMA_PX, gnss_shift="off",
+            image_sigma_px=SIGMA_PX, gnss_shift="block",
         ).block  # fmt: skip
     return aerotri.with_settings(block, parameters=PARAMETERS, robust=ROBUST)
 

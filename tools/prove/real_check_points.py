@@ -1,9 +1,9 @@
 """Do check points confirm σ on real blocks? Control left out, for several sets of additional parameters.
 
-cu_sbr_p1 with and without RTK: every control point left out in turn, without RTK every pair as well. ca502: every
-control point in turn. dbat_sxb: four control points, the rest are check points. Printed are the RMS of the height
-errors, of them over the σ of the noise and over the total σ, and the same in plan; 1 is right, and over six points a
-right σ gives 0.22 to 2.0 in 99.9 % of the cases. Prints Markdown.
+cu_sbr_p1 with and without RTK: every control point left out in turn, without RTK every pair as well. ca502, as
+independent cameras and as one rig: every control point in turn. dbat_sxb: four control points, the rest are check
+points. Printed are the RMS of the height errors, of them over the σ of the noise and over the total σ, and the same in
+plan; 1 is right, and over six points a right σ gives 0.22 to 2.0 in 99.9 % of the cases. Prints Markdown.
 
 Example: python tools/prove/real_check_points.py ../shared/data --blocks cu_sbr_p1 > tools/results/real_check_points.md
 """
@@ -25,6 +25,7 @@ import aerotri
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import ca502
+import rigs
 
 ITERATIONS = 150
 """At most; a block that four points hold takes more than the usual 30."""
@@ -36,6 +37,7 @@ SETS = {
     "brown": ("brown:K1+K2+K3+P1+P2", {}),
     "lens": ("lens:k1+k2+k3+p1+p2", {}),
     "legendre:4x4": ("legendre:4x4", {}),
+    "legendre:5x5": ("legendre:5x5", {}),
     "brown, strips differ": ("brown:K1+K2+K3+P1+P2", STRIPS),
     "brown, collocation": ("brown:K1+K2+K3+P1+P2,collocation", {}),
     "auto": ("auto", {}),
@@ -65,9 +67,14 @@ def cu_sbr_p1(data: Path) -> Iterator[Case]:
     yield Case("cu_sbr_p1, RTK and control", block, left_out[: len(names)])
 
 
-def ca502_(data: Path) -> Iterator[Case]:
+def ca502_independent(data: Path) -> Iterator[Case]:
     block = started(ca502.oriented(ca502.unoriented(data / "ca502")))
-    yield Case("ca502", block, tuple((name,) for name in control_names(block)))
+    yield Case("ca502, independent cameras", block, tuple((name,) for name in control_names(block)))
+
+
+def ca502_rig(data: Path) -> Iterator[Case]:
+    block = started(rigs.with_rig(ca502.unoriented(data / "ca502")))
+    yield Case("ca502, one rig", block, tuple((name,) for name in control_names(block)))
 
 
 def dbat_sxb(data: Path) -> Iterator[Case]:
@@ -80,7 +87,12 @@ def dbat_sxb(data: Path) -> Iterator[Case]:
     yield Case("dbat_sxb, four control points", block, (tuple(np.delete(names, held).tolist()),))
 
 
-CASES: dict[str, Callable[[Path], Iterator[Case]]] = {"cu_sbr_p1": cu_sbr_p1, "ca502": ca502_, "dbat_sxb": dbat_sxb}
+CASES: dict[str, Callable[[Path], Iterator[Case]]] = {
+    "cu_sbr_p1": cu_sbr_p1,
+    "ca502_independent": ca502_independent,
+    "ca502_rig": ca502_rig,
+    "dbat_sxb": dbat_sxb,
+}
 
 
 def control_names(block: aerotri.Block) -> list[str]:

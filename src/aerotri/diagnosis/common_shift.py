@@ -1,110 +1,43 @@
-"""A shift that all observed positions have in common against the control points, where none is an unknown.
-
-Receivers without corrections, another datum or a wrong antenna offset shift all positions of a flight alike. Taken for
-independent errors, a hundred positions seem to know their mean ten times better than one does. They then pull the block
-away from its control points: it tilts, since the positions lie a flying height above the points.
-
-[L: a score test; Rao 1948] With a shift s as an unknown beside the others, S its columns and E the rows of the
-positions, both whitened, and b the whitened residuals without it,
-
-    N_s = SᵀS − SᵀE·Q·EᵀS,   s = N_s⁻¹·Sᵀb,   sᵀN_s·s/σ0² = χ² with three degrees of freedom where there is none.
-
-So the adjustment need not be made anew. N_s vanishes where nothing but the positions holds the block.
-"""
+"""A shift of all observed positions against the control points, in words."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from aerotri.diagnosis.finding import Finding, doubt
+from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.common_shift import CommonShift
 
-import numpy as np
-
-from aerotri.adjustment.normal_equations import NormalSystem
-from aerotri.adjustment.solve import Solution
-from aerotri.adjustment.sparse_cholesky import Factor
-from aerotri.functional_model.observed_unknowns import CentreObservations, Rows
-from aerotri.quantiles import chi_square_exceedance
-from aerotri.results.position_errors import CHECK_LEVEL
-
-DETERMINED = 1e-6
-"""Share of a shift's weight that has to be left when all else is eliminated; less is rounding."""
+DOUBTFUL = 1e-5
+"""[C] Probability below which a result with such a shift is doubtful; more is worth a warning alone."""
 SETTING = 'shift = "block" in [gnss] of block.toml'
 
 
-@dataclass(frozen=True, eq=False)
-class CommonShift:
-    """What the positions have in common against the rest of the block.
-
-    Parameters
-    ----------
-    shift, sigma : (3,) m, X, Y, Z: observed − adjusted, and its σ. p : probability of as much without a shift.
-    """
-
-    shift: np.ndarray
-    sigma: np.ndarray
-    p: float
-
-    @property
-    def sentence(self) -> str:
-        """What to tell the user; '' where chance explains it."""
-        if self.p >= CHECK_LEVEL:
-            return ""
-        size = ", ".join(
-            f"{axis} {value:+.3f} m (σ {sigma:.3f})"
-            for axis, value, sigma in zip("XYZ", self.shift, self.sigma, strict=True)
-        )
-        chance = f"{100.0 * self.p:.2g} %" if self.p >= 1e-5 else "less than 0.001 %"
-        return (
-            f"all GNSS positions are shifted against the control points: {size}; by chance with a probability of "
-            f"{chance}. The adjustment takes their errors for independent, so the shift pulls at the block, "
-            f"and σ may be too small. Set {SETTING}"
-        )
+def common_shift_in_words(found: CommonShift | None) -> str:
+    """What to tell the user; '' where there is none or chance explains it."""
+    if found is None or not found.counts:
+        return ""
+    chance = f"{100.0 * found.p:.2g} %" if found.p >= 1e-5 else "less than 0.001 %"
+    return (
+        f"all GNSS positions are shifted against the control points: {_size(found)}; by chance with a probability of "
+        f"{chance}. The adjustment takes their errors for independent, so the shift pulls at the block, "
+        f"and σ may be too small. Set {SETTING}"
+    )
 
 
-def common_shift(system: NormalSystem, solution: Solution, factor: Factor, sigma0: float) -> CommonShift | None:
-    """The shift of the positions; None where it is an unknown already, or where nothing else holds the block.
-
-    Parameters
-    ----------
-    factor : of the undamped equations.
-    """
-    for extra, rows in zip(system.extras, system.whitened_rows(solution.state), strict=True):
-        if isinstance(extra, CentreObservations) and (extra.shift < 0).all():
-            return _of_rows(rows, factor, (len(system.unknowns.images), len(system.unknowns.shared)), sigma0)
-    return None
-
-
-def _of_rows(rows: Rows, factor: Factor, counts: tuple[int, int], sigma0: float) -> CommonShift | None:
-    whitened = rows.inv_sigma[:, :, None] * np.eye(3)
-    left = whitened - _explained(rows, whitened, factor, counts)
-    weight, normals = np.einsum("gak,gak->k", whitened, whitened), np.einsum("gak,gaj->kj", whitened, left)
-    scale = np.sqrt(weight)
-    if not weight.all() or np.linalg.eigvalsh(normals / scale[:, None] / scale)[0] < DETERMINED:
-        return None
-    cofactors = np.linalg.inv(0.5 * (normals + normals.T))
-    shift = cofactors @ np.einsum("gak,ga->k", whitened, rows.gap)
-    # noise larger than stated is not to be taken for a shift
-    rest, observed = rows.gap - left @ shift, rows.inv_sigma > 0.0
-    noise = max(sigma0, float(np.sqrt(np.mean(rest[observed] ** 2))))
-    p = chi_square_exceedance(float(shift @ normals @ shift) / noise**2, 3.0)
-    return CommonShift(shift, noise * np.sqrt(np.diagonal(cofactors)), p)
+def of_common_shift(adjusted: AdjustedBlock) -> list[Finding]:
+    """Positions that contradict the control points as a whole make σ too small."""
+    found = adjusted.common_shift
+    if found is None:
+        return []
+    name, expected, said = "shift of GNSS against control", "0 within its σ", common_shift_in_words(found)
+    if not found.counts:
+        return [Finding(name, _size(found), expected, "positions and control points agree", "good")]
+    if found.p >= DOUBTFUL:
+        return [Finding(name, _size(found), expected, said, "attention")]
+    return doubt(name, _size(found), expected, "doubtful", said)
 
 
-def _explained(rows: Rows, whitened: np.ndarray, factor: Factor, counts: tuple[int, int]) -> np.ndarray:
-    """(g, 3, k) E·Q·Eᵀ of k columns (g, 3, k).
-
-    Parameters
-    ----------
-    counts : of the photographs and the shared parameters.
-    """
-    n, s = counts
-    k = whitened.shape[2]
-    images, shared = np.zeros((n, 6, k)), np.zeros((s, k))
-    there = rows.columns >= 0
-    np.add.at(images, rows.image, np.einsum("gat,gak->gtk", rows.by_image, whitened))
-    pulls = np.einsum("gac,gak->gck", rows.by_shared, whitened)
-    np.add.at(shared, rows.columns[there], pulls[there])
-    x = factor.solve(np.concatenate([images.reshape(6 * n, k), shared]))
-    found = np.einsum("gat,gtk->gak", rows.by_image, x[: 6 * n].reshape(n, 6, k)[rows.image])
-    at_shared = np.zeros((*rows.columns.shape, k))
-    at_shared[there] = x[6 * n :][rows.columns[there]]
-    return found + np.einsum("gac,gck->gak", rows.by_shared, at_shared)
+def _size(found: CommonShift) -> str:
+    return ", ".join(
+        f"{axis} {value:+.3f} m (σ {sigma:.3f})"
+        for axis, value, sigma in zip("XYZ", found.shift, found.sigma, strict=True)
+    )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from aerotri.diagnosis import (
     check_points,
+    common_shift,
     fit,
     geometry,
     left_out,
@@ -28,6 +29,7 @@ RULES: tuple[Rule, ...] = (
     check_points.of_check_points,
     check_points.of_means,
     moving_errors.of_model_part,
+    common_shift.of_common_shift,
     position_errors.of_positions,
     neighbouring_rays.of_neighbouring_rays,
     rigidity.of_rigs,

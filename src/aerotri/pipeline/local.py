@@ -16,7 +16,7 @@ from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.weak_geometry import go_on_without, minimise_tied
 from aerotri.diagnosis.common_height import common_height
-from aerotri.diagnosis.common_shift import common_shift
+from aerotri.diagnosis.common_shift import common_shift_in_words
 from aerotri.diagnosis.doubts import defects_in_words, doubts, failure, refuse_runaway
 from aerotri.diagnosis.position_errors import position_errors_in_words
 from aerotri.diagnosis.rigidity import movements_in_words, rigidity_in_words
@@ -26,6 +26,7 @@ from aerotri.results.adjustment import Adjustment
 from aerotri.results.deviations import Deviations
 from aerotri.results.position_errors import PositionErrors
 from aerotri.results.removal import Removal
+from aerotri.statistics.common_shift import common_shift
 from aerotri.statistics.loose_points import loose_by_rays, loose_in_words, loose_points, to_set_aside
 from aerotri.statistics.rigidity import rigidity_of
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
@@ -197,7 +198,8 @@ def _with_words(delivered: _Delivered, timings: dict[str, float]) -> Adjustment:
     )  # fmt: skip
     errors = position_errors_of(system, solution, delivered.factor, sigma0, stand.position_errors)
     rigidity = rigidity_of(system, solution, delivered.factor, result.outcome)
-    result = replace(result, position_errors=errors, rigidity=rigidity)
+    shift = common_shift(system, solution, delivered.factor, sigma0)
+    result = replace(result, position_errors=errors, rigidity=rigidity, common_shift=shift)
     timings = timings | {"statistics": time.perf_counter() - delivered.solved}
     tied = () if stand.deviations is None else (stand.deviations.sentence,)
     said = (*result.outcome.warnings, *tied, *loose_in_words(result, kept), *inseparable(result.parameters))
@@ -205,10 +207,7 @@ def _with_words(delivered: _Delivered, timings: dict[str, float]) -> Adjustment:
     if shared_height is not None:
         sentence = shared_height.sentence(float(np.nanmedian(result.points.sigma[:, 2])))
         said += (sentence,) if sentence else ()
-    shifted = common_shift(system, solution, delivered.factor, sigma0)
-    said += (shifted.sentence,) if shifted is not None and shifted.sentence else ()
-    of_positions = position_errors_in_words(errors)
-    said += (of_positions,) if of_positions else ()
+    said += tuple(words for words in (common_shift_in_words(shift), position_errors_in_words(errors)) if words)
     said += rigidity_in_words(rigidity)
     if result.rig_movements is not None and stand.movements is not None:
         movements = replace(result.rig_movements, estimated=stand.movements[_cameras_that_move(system)])

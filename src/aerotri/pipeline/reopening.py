@@ -19,6 +19,7 @@ from aerotri.pipeline.model_part import with_model_part
 from aerotri.pipeline.verdict import judged
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.in_crs import transform_result
+from aerotri.statistics.common_shift import common_shift
 from aerotri.statistics.rigidity import rigidity_of
 from aerotri.statistics.summarise import summarise
 from aerotri.strategies.deviation_estimation import ReducedToGroups, found_deviations
@@ -61,7 +62,8 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     )
     rigidity = rigidity_of(system, solution, factor, result.outcome)
     result = replace(result, outcome=replace(result.outcome, notes=saved.notes))
-    result = replace(result, position_errors=saved.position_record(), rigidity=rigidity)
+    shift = common_shift(system, solution, factor, result.outcome.sigma0)
+    result = replace(result, position_errors=saved.position_record(), rigidity=rigidity, common_shift=shift)
     components = saved.component_record()
     if components is not None:
         result = with_components(result, components)

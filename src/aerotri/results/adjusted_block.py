@@ -12,6 +12,7 @@ from aerotri.functional_model.additional_parameters import Parameter, is_grid
 from aerotri.observations import Block
 
 if TYPE_CHECKING:
+    from aerotri.results.common_shift import CommonShift
     from aerotri.results.deviations import Deviations
     from aerotri.results.model_part import ModelPart
     from aerotri.results.position_errors import PositionErrors
@@ -329,7 +330,8 @@ class AdjustedBlock:
     cameras of rigs beside their reference cameras, `rigidity` the tests whether they keep their places, `rig_movements`
     how they move on weighted rigs.
     `deviations` says how much parameters differ between groups of photographs that are tied to one another,
-    `ray_correlation` how much neighbouring rays of a photograph err alike.
+    `ray_correlation` how much neighbouring rays of a photograph err alike, `common_shift` what all observed positions
+    are shifted against the control points.
     """
 
     block: Block
@@ -354,3 +356,4 @@ class AdjustedBlock:
     rolling_shutters: RollingShutters | None = None
     rig_movements: RigMovements | None = None
     ray_correlation: RayCorrelation | None = None
+    common_shift: CommonShift | None = None
