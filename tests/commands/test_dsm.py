@@ -2,6 +2,7 @@
 
 import json
 
+import laspy
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -61,6 +62,42 @@ def test_files_hold_the_same_surface(made):
     np.testing.assert_allclose(np.sort(xyz[:, 2]), np.sort(z[known]), atol=6e-4)
     assert (here / "dsm" / "plots" / "surface.png").is_file()
     assert not (here / "dsm.tiles").exists()
+
+
+def test_the_cloud_has_colours_normals_and_covariances(made):
+    here, _ = made
+    cloud = laspy.read(here / "dsm" / "dsm.laz")
+    x, y = np.asarray(cloud.x), np.asarray(cloud.y)
+    with RasterReader(here / "dsm" / "dsm.tif") as reader:
+        grid = reader.grid
+        z = reader.read(0, 0, grid.rows, grid.columns)
+    with RasterReader(here / "dsm" / "dsm.tif", band=2) as reader:
+        sigma = reader.read(0, 0, grid.rows, grid.columns)
+    row, column = np.rint(grid.row(y)).astype(int), np.rint(grid.column(x)).astype(int)
+    np.testing.assert_allclose(cloud["sigma_z"], sigma[row, column], rtol=1e-4)
+    normal = np.column_stack([cloud[f"Normal{axis}"] for axis in "XYZ"])
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, rtol=1e-5)
+    inside = (row > 0) & (row < grid.rows - 1) & (column > 0) & (column < grid.columns - 1)
+    by_x = (z[row, np.minimum(column + 1, grid.columns - 1)] - z[row, column - 1]) / (2.0 * grid.cell_x)
+    by_y = (z[row - 1, column] - z[np.minimum(row + 1, grid.rows - 1), column]) / (2.0 * grid.cell_y)
+    slopes = -normal[:, :2] / normal[:, 2:]
+    for found, true in ((slopes[:, 0], by_x), (slopes[:, 1], by_y)):
+        told = inside & np.isfinite(true)
+        # at the edges of tiles the slope is that to one side
+        assert np.mean(np.abs(found - true)[told] < 1e-4) > 0.9
+    s, c = [np.array(cloud[f"sigma_{a}"]) for a in "xyz"], [np.array(cloud[f"cov_{a}"]) for a in ("xy", "xz", "yz")]
+    both = np.array([[s[0] ** 2, c[0], c[1]], [c[0], s[1] ** 2, c[2]], [c[1], c[2], s[2] ** 2]]).transpose(2, 0, 1)
+    assert np.linalg.eigvalsh(both.astype(float)).min() > -1e-9
+    # with control of 5 cm the plan is as good as control and tie points make it
+    assert (s[0] > 0.0).all()
+    assert np.median(s[0]) < 1.0
+
+
+def test_colours_are_those_of_the_photographs(made):
+    here, _ = made
+    cloud = laspy.read(here / "dsm" / "dsm.laz")
+    np.testing.assert_array_equal(cloud.red, cloud.blue)  # grey photographs
+    assert np.std(cloud.red) > 1000.0
 
 
 def _whole(path) -> np.ndarray:

@@ -7,8 +7,10 @@ from rendered_blocks import rendered_block, write_photograph
 
 from aerotri.conventions import InputError
 from aerotri.rasters.grids import Grid
+from aerotri.rasters.images import create_image
 from aerotri.terrain.dense import _mesh_kernels as kernels
 from aerotri.terrain.dense._resampling_kernels import resample
+from aerotri.terrain.dense.colours import Colours
 from aerotri.terrain.dense.epipolar import EpipolarGeometry, EpipolarImages, epipolar_geometry
 from aerotri.terrain.dense.grey_store import GreyStore
 from aerotri.terrain.dense.height_range import range_of_surface
@@ -16,6 +18,7 @@ from aerotri.terrain.dense.measure import DensePlan, measure_surface
 from aerotri.terrain.dense.pairs import Pair, chosen_pairs, noise_correlation
 from aerotri.terrain.dense.parallaxes import parallaxes_of
 from aerotri.terrain.dense.place import place_at
+from aerotri.terrain.dense.points import normals
 from aerotri.terrain.pickets import Area
 
 
@@ -173,10 +176,10 @@ def test_sigma_follows_the_noise():
 def fused(heights: np.ndarray, sigmas: np.ndarray, correlation: np.ndarray):
     shape = heights.shape[1:]
     z, sigma, misfit = (np.empty(shape) for _ in range(3))
-    count = np.zeros(shape, np.int16)
+    members = np.zeros(shape, np.int64)
     used = np.array([0b00011, 0b00110, 0b11000][: len(heights)], np.int64)
-    kernels.fuse(heights, sigmas, correlation, used, 4.0, 0.1, z, sigma, count, misfit)
-    return z[0, 0], sigma[0, 0], count[0, 0]
+    kernels.fuse(heights, sigmas, correlation, used, 4.0, 0.1, z, sigma, members, misfit)
+    return z[0, 0], sigma[0, 0], int(members[0, 0]).bit_count()
 
 
 def test_the_pairs_that_agree_make_the_height():
@@ -200,6 +203,43 @@ def test_pairs_that_share_a_photograph_share_its_noise(hill):
     assert noise_correlation(place, other_side)[0, 1] == pytest.approx(-0.5, abs=0.02)
     apart = [Pair(0, 1, 9.0), Pair(2, 3, 9.0)]
     np.testing.assert_array_equal(noise_correlation(place, apart), np.eye(2))
+
+
+def test_a_colour_is_that_of_the_place_in_its_photograph(hill, tmp_path):
+    rows, columns = np.mgrid[:375, :575]
+    tell = np.stack([100 * columns, 100 * rows, 0 * rows + 7]).astype(np.uint16)
+    paths = []
+    for path in hill.paths:
+        paths.append(tmp_path / path.name)
+        with create_image(paths[-1], 575, 375, 3, "uint16") as writer:
+            writer.write(0, tell)
+    photographs = hill.photographs()
+    rng = np.random.default_rng(2)
+    xyz = np.column_stack([rng.uniform(-40.0, 40.0, (50, 2)), rng.uniform(95.0, 105.0, 50)])
+    shown_by = rng.integers(1, 3, 50)
+    shown_by[0] = -1
+    for cell, tolerance in ((1.0, 2.0), (4.0, 60.0)):  # the mean of four pixels lies half a pixel beside the middle one
+        found = Colours(photographs, paths, cell).of(xyz, shown_by)
+        for k in (1, 2):
+            place = place_at(photographs, xyz.mean(axis=0), 100.0, 0.0)
+            true = 100.0 * (place.project(k, place.from_crs(xyz)) - 0.5)
+            np.testing.assert_allclose(found[shown_by == k, :2], true[shown_by == k], atol=tolerance)
+            assert (found[shown_by == k, 2] == 7).all()
+        assert (found[0] == 0).all()
+
+
+def test_normals_of_a_plane_with_holes():
+    grid = Grid(6, 7, 0.0, 12.0, 2.0, 2.0)
+    x, y = np.meshgrid(grid.x(np.arange(7)), grid.y(np.arange(6)))
+    z = 0.3 * x - 0.2 * y
+    z[2, 3] = np.nan
+    found = normals(z, grid)
+    true = np.array([-0.3, 0.2, 1.0]) / np.linalg.norm([-0.3, 0.2, 1.0])
+    assert np.isnan(found[2, 3]).all()
+    np.testing.assert_allclose(found[np.isfinite(z)], np.tile(true, (41, 1)), atol=1e-12)
+    alone = np.full((3, 3), np.nan)
+    alone[1, 1] = 5.0
+    np.testing.assert_array_equal(normals(alone, Grid(3, 3, 0.0, 3.0, 1.0, 1.0))[1, 1], [0.0, 0.0, 1.0])
 
 
 def test_photographs_beyond_the_memory_allowed_are_read_again(tmp_path):

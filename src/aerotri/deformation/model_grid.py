@@ -145,10 +145,14 @@ class Places:
 
     def variances(self, xyz: np.ndarray, covariance: np.ndarray) -> np.ndarray:
         """(n, 3) m² in the CRS, at (n, 3) m in the frame, of covariances (n, 3, 3) m² there."""
-        if self.frame is not None:
-            jacobian = self.frame.crs_per_local(xyz)
-            covariance = jacobian @ covariance @ np.swapaxes(jacobian, 1, 2)
-        return np.diagonal(covariance, axis1=1, axis2=2)
+        return np.diagonal(self.covariances(xyz, covariance), axis1=1, axis2=2)
+
+    def covariances(self, xyz: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+        """(n, 3, 3) m² in the CRS, at (n, 3) m in the frame, of covariances (n, 3, 3) m² there."""
+        if self.frame is None:
+            return covariance
+        jacobian = self.frame.crs_per_local(xyz)
+        return jacobian @ covariance @ np.swapaxes(jacobian, 1, 2)
 
 
 def places_of(calibration: Adjustment) -> Places:

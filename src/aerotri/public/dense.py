@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from aerotri.formats.files.spool import Spool
-    from aerotri.formats.results.point_cloud import SurfacePoints
     from aerotri.terrain.dense.measure import DenseOutcome
 
 RECORD, SURFACE, MATCHING, COUNT, CLOUD = "dsm.json", "dsm.tif", "matching.tif", "photographs.tif", "dsm.laz"
@@ -270,21 +269,6 @@ def _surface_parts(o: DenseOutcome) -> Iterator[tuple[int, int, np.ndarray, np.n
         yield window.row, window.column, tile.z, np.hypot(tile.sigma, o.shared.over(grid))
 
 
-def _points(o: DenseOutcome) -> Iterator[SurfacePoints]:
-    """The cells of every tile as points."""
-    from aerotri.formats.results.point_cloud import SurfacePoints
-
-    for window, tile in o.files.read_all(list(o.windows)):
-        grid = o.grid.window(window.row, window.column, window.rows, window.columns)
-        row, column = np.nonzero(np.isfinite(tile.z))
-        if len(row):
-            z, matching = tile.z[row, column], tile.sigma[row, column]
-            sigma = np.hypot(matching, o.shared.over(grid)[row, column])
-            yield SurfacePoints(
-                np.column_stack([grid.x(column), grid.y(row), z]), sigma, matching, tile.count[row, column]
-            )
-
-
 def _write(target: Path, dense: DenseSurface, plots: bool) -> None:
     """Write all files whole or not at all."""
     from aerotri.formats.files.atomic import atomic_folder
@@ -292,6 +276,7 @@ def _write(target: Path, dense: DenseSurface, plots: bool) -> None:
     from aerotri.formats.results.point_cloud import write_surface_cloud
     from aerotri.rasters.grids import horizontal_crs
     from aerotri.rasters.surface_files import write_raster_parts, write_surface_parts
+    from aerotri.terrain.dense.points import surface_points
 
     o, crs = dense.record, horizontal_crs(dense.crs)
     noise = dense.summary["noise_length_m"]
@@ -307,7 +292,7 @@ def _write(target: Path, dense: DenseSurface, plots: bool) -> None:
         write_raster_parts(folder / COUNT, count, o.grid, crs, what, np.dtype(np.uint8), 0.0)
         lowest = min(float(np.nanmin(t.z)) for _, t in o.files.read_all(windows) if np.isfinite(t.z).any())
         low = np.array([o.grid.left, o.grid.bounds[1], lowest])
-        write_surface_cloud(folder / CLOUD, _points(o), low, crs)
+        write_surface_cloud(folder / CLOUD, surface_points(o), low, crs)
         if plots:
             from aerotri.report.plots.rendering import save_plots
 

@@ -257,7 +257,13 @@ def terrain_files() -> tuple[DescribedFile, ...]:
         DescribedFile("dsm.tif", DSM, "raster", "The whole surface: band 1 height, band 2 its standard deviation, m."),
         DescribedFile("matching.tif", DSM, "raster", "Standard deviation of the heights from matching alone, m."),
         DescribedFile("photographs.tif", DSM, "raster", "Number of photographs that measured a cell; 0: none."),
-        DescribedFile("dsm.laz", DSM, "other", "The cells as LAZ 1.4 with sigma_z, sigma_z_matching and photographs."),
+        DescribedFile(
+            "dsm.laz",
+            DSM,
+            "other",
+            "The cells as LAZ 1.4 with colours; extra bytes NormalX, NormalY, NormalZ, sigma_x, sigma_y, sigma_z, m, "
+            "cov_xy, cov_xz, cov_yz, m², sigma_z_matching and photographs.",
+        ),
         DescribedFile("plots", DSM, "folder", "The surface and its standard deviation, PNG and SVG.", when=plots),
         DescribedFile("compare.json", COMPARE, "json", "Statistics of the differences of two surfaces.", COMPARE_JSON),
         DescribedFile("difference.tif", COMPARE, "raster", "Differences test − control, m."),

@@ -58,8 +58,16 @@ def variances_at(
     ----------
     rows : photographs of the block that `photographs` counts, −1 where a point has fewer.
     """
+    covariances = covariances_at(calibration, restitution, rows, xyz, photographs)
+    return np.diagonal(covariances, axis1=1, axis2=2).copy()
+
+
+def covariances_at(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photographs: np.ndarray
+) -> np.ndarray:
+    """(n, 3, 3) m² in the CRS; as `variances_at`."""
     local = places_of(calibration).to_local(xyz)
-    return _variances(calibration, restitution, rows, local, photographs, plan=False)
+    return _covariances(calibration, restitution, rows, local, photographs, plan=False)
 
 
 def plan_variances(
@@ -72,17 +80,18 @@ def plan_variances(
     rows : photographs of the block. xyz : (n, 3) m in the CRS. photograph : (n,) place in `rows`.
     """
     local = places_of(calibration).to_local(xyz)
-    return _variances(calibration, restitution, rows, local, photograph[:, None], plan=True)[:, :2]
+    found = _covariances(calibration, restitution, rows, local, photograph[:, None], plan=True)
+    return np.diagonal(found, axis1=1, axis2=2)[:, :2].copy()
 
 
-def _variances(
+def _covariances(
     calibration: Adjustment, restitution: Restitution, rows: np.ndarray, local: np.ndarray, photographs: np.ndarray,
     plan: bool,
 ) -> np.ndarray:  # fmt: skip
-    """(n, 3) m² in the CRS. plan : whether heights are known, and one ray gives X and Y."""
+    """(n, 3, 3) m² in the CRS. plan : whether heights are known, and one ray gives X and Y."""
     frame = places_of(calibration)
     factor = calibration.system.factorise(calibration.solution.equations)
-    variances = np.empty((len(local), 3))
+    covariances = np.empty((len(local), 3, 3))
     for first in range(0, len(local), AT_A_TIME):
         part = slice(first, first + AT_A_TIME)
         j = _by_unknowns(calibration, restitution, rows, local[part], photographs[part], plan)
@@ -94,8 +103,8 @@ def _variances(
             covariance = covariance + model_of_functions(
                 calibration.system, calibration.solution, calibration.model, by_columns, q, 3
             )
-        variances[part] = frame.variances(local[part], covariance)
-    return variances
+        covariances[part] = frame.covariances(local[part], covariance)
+    return covariances
 
 
 def _by_scans(calibration: Adjustment, rays: RayPartials, own: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:

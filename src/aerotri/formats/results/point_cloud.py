@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.results.las_header import check_las
 from aerotri.vectors.geojson import LARGEST_M
+
+if TYPE_CHECKING:
+    from aerotri.terrain.dense.points import SurfacePoints
 
 UNCLASSIFIED, GROUND = 1, 2
 """Classes of points [L: ASPRS LAS 1.4]."""
@@ -19,14 +22,14 @@ SCALE_M = 0.001
 bits then reach over 4000 km."""
 
 
-@dataclass(frozen=True, eq=False)
-class SurfacePoints:
-    """Cells of a surface: xyz (n, 3) m, σ of Z and that of matching (n,) m, number of photographs (n,)."""
-
-    xyz: np.ndarray
-    sigma: np.ndarray
-    matching: np.ndarray
-    photographs: np.ndarray
+SURFACE_FIELDS = (
+    ("NormalX", "f4", "of length 1, upwards"), ("NormalY", "f4", ""), ("NormalZ", "f4", ""),
+    ("sigma_x", "f4", "sigma of X [m]"), ("sigma_y", "f4", "sigma of Y [m]"), ("sigma_z", "f4", "sigma of Z [m]"),
+    ("cov_xy", "f4", "covariance of X, Y [m2]"), ("cov_xz", "f4", "covariance of X, Z [m2]"),
+    ("cov_yz", "f4", "covariance of Y, Z [m2]"), ("sigma_z_matching", "f4", "of matching alone [m]"),
+    ("photographs", "u1", "that measured it"),
+)  # fmt: skip
+"""Name, type and meaning of the extra bytes of a surface; normals are named as PDAL and CloudCompare know them."""
 
 
 def write_point_cloud(path: Path, xyz: np.ndarray, sigma: np.ndarray, ground: np.ndarray, crs: str | None) -> None:
@@ -48,7 +51,7 @@ def write_point_cloud(path: Path, xyz: np.ndarray, sigma: np.ndarray, ground: np
 
 
 def write_surface_cloud(path: Path, parts: Iterable[SurfacePoints], low: np.ndarray, crs: str | None) -> int:
-    """Write the cells of a surface as LAZ 1.4 with `sigma_z`, `sigma_z_matching` and `photographs`; how many.
+    """Write the cells of a surface as LAZ 1.4 with colours and `SURFACE_FIELDS`; how many.
 
     Parameters
     ----------
@@ -57,15 +60,9 @@ def write_surface_cloud(path: Path, parts: Iterable[SurfacePoints], low: np.ndar
     import laspy
     from pyproj import CRS
 
-    header = laspy.LasHeader(point_format=6, version="1.4")
+    header = laspy.LasHeader(point_format=7, version="1.4")
     header.offsets, header.scales = np.floor(low), np.full(3, SCALE_M)
-    header.add_extra_dims(
-        [
-            laspy.ExtraBytesParams("sigma_z", "f4", "sigma of Z [m]"),
-            laspy.ExtraBytesParams("sigma_z_matching", "f4", "of matching alone [m]"),
-            laspy.ExtraBytesParams("photographs", "u1", "that measured it"),
-        ]
-    )
+    header.add_extra_dims([laspy.ExtraBytesParams(*field) for field in SURFACE_FIELDS])
     if crs is not None:
         header.add_crs(CRS.from_user_input(crs))
     count = 0
@@ -74,11 +71,21 @@ def write_surface_cloud(path: Path, parts: Iterable[SurfacePoints], low: np.ndar
             points = laspy.ScaleAwarePointRecord.zeros(len(part.xyz), header=header)
             points.x, points.y, points.z = part.xyz.T
             points["classification"] = np.full(len(part.xyz), UNCLASSIFIED, np.uint8)
-            points["sigma_z"], points["sigma_z_matching"] = part.sigma, part.matching
-            points["photographs"] = part.photographs
+            points["red"], points["green"], points["blue"] = part.colour.T
+            for name, values in zip(SURFACE_FIELDS, _surface_fields(part), strict=True):
+                points[name[0]] = values
             cloud.write_points(points)
             count += len(part.xyz)
     return count
+
+
+def _surface_fields(part: SurfacePoints) -> tuple[np.ndarray, ...]:
+    """Values of `SURFACE_FIELDS`, (n,) each."""
+    xx, xy, xz, yy, yz, zz = part.covariance.T
+    return (
+        *part.normal.T, *(np.sqrt(np.maximum(v, 0.0)) for v in (xx, yy, zz)), xy, xz, yz, part.matching,
+        part.photographs,
+    )  # fmt: skip
 
 
 def read_point_cloud(path: Path, parallel: bool = True) -> tuple[np.ndarray, np.ndarray]:

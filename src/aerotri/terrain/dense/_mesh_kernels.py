@@ -120,13 +120,13 @@ def lay_mesh(xyz, sigma_px, bend_px, per_pixel, value, jump, grid, z, sigma, ben
 
 
 @kernel
-def fuse(heights, sigmas, correlation, used, agree, tolerance, z, sigma, count, misfit):
+def fuse(heights, sigmas, correlation, used, agree, tolerance, z, sigma, members, misfit):
     """One height a cell of those of several pairs, of the largest group that agrees, and its σ.
 
     heights, sigmas : (pairs, rows, columns) m. correlation : (pairs, pairs) of their noise.
     used : (pairs,) bits of the photographs. agree : σ of a difference within which two heights agree.
     tolerance : m besides. z, sigma, misfit : (rows, columns) m out; misfit the weighted sum of squares of heights about
-    their mean over pairs − 1, NaN of one pair. count : (rows, columns) photographs out.
+    their mean over pairs − 1, NaN of one pair. members : (rows, columns) out, bits of the photographs that measured.
     """
     pairs = len(heights)
     member = np.empty(pairs, np.bool_)
@@ -134,7 +134,7 @@ def fuse(heights, sigmas, correlation, used, agree, tolerance, z, sigma, count, 
     for i in range(heights.shape[1]):
         for j in range(heights.shape[2]):
             z[i, j] = sigma[i, j] = misfit[i, j] = np.nan
-            count[i, j] = 0
+            members[i, j] = 0
             most, highest = 0.0, -np.inf
             for p in range(pairs):
                 hp = heights[p, i, j]
@@ -170,6 +170,4 @@ def fuse(heights, sigmas, correlation, used, agree, tolerance, z, sigma, count, 
             z[i, j], sigma[i, j] = mean, np.sqrt(max(variance, 0.0))
             if inside > 1:
                 misfit[i, j] = square / (inside - 1)
-            while bits:
-                count[i, j] += bits & 1
-                bits >>= 1
+            members[i, j] = bits

@@ -69,9 +69,9 @@ class DenseOutcome:
     Parameters
     ----------
     grid : all cells. windows, files : its tiles. shared : what the adjustment adds to σ.
-    photographs : what was matched. level : of resolution they were matched at. cells : that have a height.
-    shared_cells : cells a side of the square that has one noise. across_px : median shift across the base of a pair.
-    factors : of the tiles. pairs : matched in all tiles. resumed : tiles that an earlier run had made.
+    photographs : what was matched; paths : their files. level : of resolution they were matched at.
+    cells : that have a height. shared_cells : cells a side of the square that has one noise.
+    across_px : median shift across the base of a pair. factors : of the tiles. pairs : matched in all tiles. resumed : tiles that an earlier run had made.
     """
 
     grid: Grid
@@ -79,6 +79,7 @@ class DenseOutcome:
     files: TileFiles
     shared: SharedPart
     photographs: Photographs
+    paths: tuple[Path, ...]
     level: int
     cells: int
     shared_cells: float
@@ -210,7 +211,7 @@ def _outcome(
     told = np.array(shared_cells)[np.isfinite(shared_cells)]
     return DenseOutcome(
         grid, tuple(windows), files, shared_part(calibration, photographs, plan.rows, np.array(places), shown),
-        photographs, level, cells, float(np.median(told)) if len(told) else np.nan, np.concatenate(across),
+        photographs, plan.paths, level, cells, float(np.median(told)) if len(told) else np.nan, np.concatenate(across),
         np.array(factors), np.concatenate(pairs), resumed,
     )  # fmt: skip
 

@@ -9,7 +9,7 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
-from aerotri.terrain.adjustment_part import variances_at
+from aerotri.terrain.adjustment_part import covariances_at
 from aerotri.terrain.photographs import Photographs
 
 MOST_RAYS = 8
@@ -20,21 +20,25 @@ NODES = 60
 
 @dataclass(frozen=True, eq=False)
 class SharedPart:
-    """Variances on a coarse grid: (rows, columns) m² of Z, on x rising and y falling."""
+    """Covariances on a coarse grid: (rows, columns, 6) m², XX, XY, XZ, YY, YZ, ZZ, on x rising and y falling."""
 
     x: np.ndarray
     y: np.ndarray
-    variance: np.ndarray
+    covariance: np.ndarray
 
     def over(self, grid: Grid) -> np.ndarray:
-        """(rows, columns) m, σ of the cells of a grid, bilinear."""
+        """(rows, columns) m, σ of Z of the cells of a grid, bilinear."""
+        return np.sqrt(self.covariances(grid, slice(5, 6))[:, :, 0])
+
+    def covariances(self, grid: Grid, chosen: slice = slice(None)) -> np.ndarray:
+        """(rows, columns, k) m² of the cells of a grid, bilinear; which of the six may be chosen."""
         column = np.interp(grid.x(np.arange(grid.columns)), self.x, np.arange(len(self.x)))
         row = np.interp(-grid.y(np.arange(grid.rows)), -self.y, np.arange(len(self.y)))
         i, j = np.minimum(row.astype(int), len(self.y) - 2), np.minimum(column.astype(int), len(self.x) - 2)
-        s, t = (row - i)[:, None], (column - j)[None]
-        v = self.variance
+        s, t = (row - i)[:, None, None], (column - j)[None, :, None]
+        v = self.covariance[:, :, chosen]
         a, b, c, d = v[np.ix_(i, j)], v[np.ix_(i, j + 1)], v[np.ix_(i + 1, j)], v[np.ix_(i + 1, j + 1)]
-        return np.sqrt((1 - s) * ((1 - t) * a + t * b) + s * ((1 - t) * c + t * d))
+        return (1 - s) * ((1 - t) * a + t * b) + s * ((1 - t) * c + t * d)
 
 
 def shared_part(
@@ -51,13 +55,14 @@ def shared_part(
         away = np.hypot(*(photographs.centres[candidates, :2] - place[:2]).T)
         nearest = candidates[np.argsort(away, kind="stable")][:MOST_RAYS]
         chosen[n, : len(nearest)] = nearest
-    variance = variances_at(calibration, photographs.restitution, rows, places, chosen)[:, 2]
+    covariance = covariances_at(calibration, photographs.restitution, rows, places, chosen)
+    six = covariance[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
     low, high = places[:, :2].min(axis=0), places[:, :2].max(axis=0)
     high = np.maximum(high, low + 1e-3)
     x, y = np.linspace(low[0], high[0], NODES), np.linspace(high[1], low[1], NODES)
     nodes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    near = NearestNDInterpolator(places[:, :2], variance)(nodes)
+    near = NearestNDInterpolator(places[:, :2], six)(nodes)
     if len(places) < 4 or np.linalg.matrix_rank(places[:, :2] - places[:, :2].mean(axis=0)) < 2:
-        return SharedPart(x, y, near.reshape(NODES, NODES))
-    linear = LinearNDInterpolator(places[:, :2], variance)(nodes)
-    return SharedPart(x, y, np.where(np.isfinite(linear), linear, near).reshape(NODES, NODES))
+        return SharedPart(x, y, near.reshape(NODES, NODES, 6))
+    linear = LinearNDInterpolator(places[:, :2], six)(nodes)
+    return SharedPart(x, y, np.where(np.isfinite(linear), linear, near).reshape(NODES, NODES, 6))

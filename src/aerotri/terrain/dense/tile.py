@@ -46,7 +46,8 @@ class TileSurface:
 
     Parameters
     ----------
-    z : of the CRS. sigma : of matching. count : photographs. factor : by which agreement of pairs changed the σ.
+    z : of the CRS. sigma : of matching. count : photographs. shown_by : int, the most upright of those that measured a
+        cell, −1 none. factor : by which agreement of pairs changed the σ.
     pairs : photographs, (n, 2). across : (n,) px, median shift across the base of each.
     shared_cells : cells along a side of the square whose noise is one, as neighbours share it; NaN where not known.
     """
@@ -54,6 +55,7 @@ class TileSurface:
     z: np.ndarray
     sigma: np.ndarray
     count: np.ndarray
+    shown_by: np.ndarray
     factor: float
     pairs: np.ndarray
     across: np.ndarray
@@ -109,6 +111,7 @@ def measure_tile(
             empty,
             empty.copy(),
             np.zeros(shape, np.int16),
+            np.full(shape, -1, np.int32),
             1.0,
             np.zeros((0, 2), int),
             np.zeros(0),
@@ -149,21 +152,38 @@ def metres_per_pixel(place: Place, pairs: list[Pair], level: int) -> float:
 
 def _fused(
     place: Place, pairs: list[Pair], layers: list[tuple[np.ndarray, ...]], height: float, tolerance: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
     heights, sigmas, bends = (np.stack(part) for part in zip(*layers, strict=True))
     correlation = noise_correlation(place, pairs)
-    bit = {k: 1 << n for n, k in enumerate(sorted({k for p in pairs for k in (p.left, p.right)}))}
+    photographs = sorted({k for p in pairs for k in (p.left, p.right)}, key=lambda k: _off_nadir(place, k))
+    bit = {k: 1 << n for n, k in enumerate(photographs)}
     used = np.array([bit[p.left] | bit[p.right] for p in pairs], np.int64)
     shape = heights.shape[1:]
     z, sigma, misfit = (np.full(shape, np.nan) for _ in range(3))
-    count = np.zeros(shape, np.int16)
-    kernels.fuse(heights, sigmas, correlation, used, AGREEING_SIGMAS, tolerance, z, sigma, count, misfit)
+    members = np.zeros(shape, np.int64)
+    kernels.fuse(heights, sigmas, correlation, used, AGREEING_SIGMAS, tolerance, z, sigma, members, misfit)
     factor = _factor(misfit)
     patched = _without_patches(z, PATCH_STEP_PX * tolerance)
-    z[~patched], sigma[~patched], count[~patched] = np.nan, np.nan, 0
+    z[~patched], sigma[~patched], members[~patched] = np.nan, np.nan, 0
     known = np.isfinite(heights)
     bend = BEND_SHARE * np.where(known, bends, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return z + height, np.hypot(sigma * factor, bend), count, factor
+    return z + height, np.hypot(sigma * factor, bend), *_seen_by(members, np.array(photographs)), factor
+
+
+def _off_nadir(place: Place, k: int) -> float:
+    """Tangent of the angle from the vertical at which a photograph sees the place."""
+    x, y, z = place.photographs.centres[k] - place.origin
+    return float(np.hypot(x, y) / abs(z)) if z else np.inf
+
+
+def _seen_by(members: np.ndarray, photographs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Number of photographs of every cell, and the first of them, −1 none; bits of `members` are places in the list."""
+    count, first = np.zeros(members.shape, np.int16), np.full(members.shape, -1, np.int32)
+    for n in reversed(range(len(photographs))):
+        has = (members >> n) & 1 > 0
+        count += has
+        first[has] = photographs[n]
+    return count, first
 
 
 def _without_patches(z: np.ndarray, step: float) -> np.ndarray:

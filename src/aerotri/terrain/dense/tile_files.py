@@ -13,7 +13,7 @@ import numpy as np
 from aerotri.rasters.grids import Grid
 from aerotri.terrain.dense.tile import TileSurface
 
-FIELDS = ("z", "sigma", "count", "factor", "pairs", "across", "shared_cells")
+FIELDS = ("z", "sigma", "count", "shown_by", "factor", "pairs", "across", "shared_cells")
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,8 @@ class TileFiles:
         with part.open("wb") as file:
             np.savez(
                 file, z=tile.z, sigma=tile.sigma.astype(np.float32), count=tile.count.astype(np.uint8),
-                factor=np.array(tile.factor), pairs=tile.pairs.astype(np.int64), across=tile.across.astype(np.float64),
+                shown_by=tile.shown_by, factor=np.array(tile.factor),
+                pairs=tile.pairs.astype(np.int64), across=tile.across.astype(np.float64),
                 shared_cells=np.array(tile.shared_cells),
             )  # fmt: skip
         os.replace(part, path)
@@ -70,8 +71,8 @@ class TileFiles:
         if parts["z"].shape != (window.rows, window.columns):
             return None
         return TileSurface(
-            parts["z"], parts["sigma"], parts["count"], float(parts["factor"]), parts["pairs"], parts["across"],
-            float(parts["shared_cells"]),
+            parts["z"], parts["sigma"], parts["count"], parts["shown_by"], float(parts["factor"]), parts["pairs"],
+            parts["across"], float(parts["shared_cells"]),
         )  # fmt: skip
 
     def read_all(self, windows: list[TileWindow]) -> Iterator[tuple[TileWindow, TileSurface]]:
