@@ -24,7 +24,7 @@ def volume(
     surface: Annotated[
         Path,
         typer.Argument(
-            help="Surface: GeoTIFF, or the folder that dtm wrote, whose points are then used for σ.",
+            help="Surface: GeoTIFF, or the folder that dtm or dsm wrote, whose points or cells are then used for σ.",
             rich_help_panel=ARGUMENTS,
         ),
     ],
@@ -40,7 +40,9 @@ def volume(
     boundary: Annotated[
         str | None,
         typer.Option(
-            help="GeoPackage, GeoJSON, WKT file or WKT text. Default: the whole surface.", rich_help_panel=SURFACE
+            help="GeoPackage, GeoJSON, WKT file or WKT text; several polygons are piles, each with its own volume. "
+            "Default: the whole surface.",
+            rich_help_panel=SURFACE,
         ),
     ] = None,
     method: Annotated[
@@ -87,9 +89,12 @@ def volume(
         ),
     ] = None,
     matching_window: Annotated[
-        float,
+        float | None,
         typer.Option(
-            min=0.0, help="Side of the matching window on the ground, m; its cells share noise.", rich_help_panel=SIGMAS
+            min=0.0,
+            help="Side of the matching window on the ground, m; its cells share noise. Default: what dsm wrote into "
+            "the surface.",
+            rich_help_panel=SIGMAS,
         ),
     ] = SIGMA.matching_window_m,
     base_sigma: Annotated[
@@ -107,6 +112,13 @@ def volume(
             rich_help_panel=SIGMAS,
         ),
     ] = False,
+    density: Annotated[
+        float | None,
+        typer.Option(min=1e-3, help="Tonnes of a cubic metre: gives tonnes.", rich_help_panel=METHOD),
+    ] = None,
+    density_sigma: Annotated[
+        float, typer.Option(min=0.0, help="σ of the density, t/m³, common to all piles.", rich_help_panel=SIGMAS)
+    ] = 0.0,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default NAME_volume here.", rich_help_panel=OUTPUT)
     ] = None,
@@ -118,7 +130,7 @@ def volume(
 
     given = VolumeInput(
         surface, base, boundary, cast(Any, method), adjustment, pickets, base_adjustment, base_pickets,
-        cast(Any, layer),
+        cast(Any, layer), density, density_sigma,
     )  # fmt: skip
     options = SigmaOptions(
         matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma,

@@ -29,6 +29,8 @@ class VolumeInput:
     base_adjustment: Path | None
     base_pickets: Path | None = None
     layer: Layer = LAYER
+    density: float | None = None
+    density_sigma: float = 0.0
 
     def check(self) -> None:
         """Refuse what does not go together, in the words of the command line.
@@ -43,6 +45,8 @@ class VolumeInput:
             raise InputError(
                 "--pickets, --base-pickets and --base-adjustment belong to --adjustment", "give the adjustment"
             )
+        if self.density is None and self.density_sigma > 0.0:
+            raise InputError("--density-sigma belongs to --density", "give the density, tonnes per cubic metre")
         if not is_surface(self.base) and (self.base_adjustment is not None or self.base_pickets is not None):
             raise InputError("--base-adjustment and --base-pickets need a surface as base", "give its raster as --base")
 
@@ -69,7 +73,8 @@ def run_volume(
                 section_spacing=plan.spacing, azimuth=plan.azimuth, adjustment=given.adjustment, pickets=given.pickets,
                 base_adjustment=given.base_adjustment, base_pickets=given.base_pickets,
                 matching_sigma_um=s.matching_sigma_um, matching_window=s.matching_window_m, base_sigma=s.base_sigma,
-                boundary_sigma=s.boundary_sigma, corrected=s.corrected, scratch=room, progress=console.stage,
+                boundary_sigma=s.boundary_sigma, corrected=s.corrected, density=given.density,
+                density_sigma=given.density_sigma, scratch=room, progress=console.stage,
             )  # fmt: skip
             if plots:
                 console.progress("plots")
@@ -96,6 +101,9 @@ def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
         f"net {c['net_m3']:.6g} m³{sure}: cut {c['cut_m3']:.6g}, fill {c['fill_m3']:.6g}; {c['method']}, over "
         f"{c['base']['name']}, {c['boundary']['area_m2']:.6g} m² inside {c['boundary']['name']}"
     ]
+    lines += [_pile_line(pile) for pile in c["piles"]]
+    if c["mass"] is not None:
+        lines.append(f"mass: {_tonnes(c['mass'])} at {c['mass']['density_t_per_m3']:g} t/m³")
     if s is not None:
         lines.append("σ by part, m³: " + ", ".join(f"{name} {v:.4g}" for name, v in s["parts_m3"].items()))
         if s["curvature"] is not None:
@@ -111,3 +119,17 @@ def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
             )
     lines += [f"  {one['method']:<24} net {one['net_m3']:.6g} m³" for one in c["methods"]]
     return [*lines, *(f"note: {text}" for text in c["warnings"]), f"Written to {target}"]
+
+
+def _pile_line(pile: dict[str, Any]) -> str:
+    sure = "" if pile["sigma_m3"] is None else f" ± {pile['sigma_m3']:.4g}"
+    mass = "" if pile["mass"] is None else f", {_tonnes(pile['mass'])}"
+    return (
+        f"  {pile['name']}: net {pile['net_m3']:.6g} m³{sure}, cut {pile['cut_m3']:.6g}, fill {pile['fill_m3']:.6g}, "
+        f"on {pile['area_m2']:.6g} m²{mass}"
+    )
+
+
+def _tonnes(mass: dict[str, Any]) -> str:
+    sure = "" if mass["sigma_t"] is None else f" ± {mass['sigma_t']:.4g}"
+    return f"{mass['net_t']:.6g}{sure} t"

@@ -22,11 +22,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from aerotri.formats.files.spool import Spool
+    from aerotri.public.dense import DenseSurface
     from aerotri.public.table import Table
     from aerotri.rasters.metric import MetricReader
 
     Reader: TypeAlias = MetricReader | HeldRaster
-    SurfaceLike: TypeAlias = "Surface | WithSurfaces | FilePath"
+    SurfaceLike: TypeAlias = "Surface | WithSurfaces | DenseSurface | FilePath"
 
 
 class WithSurfaces(Protocol):
@@ -245,6 +246,10 @@ def as_surface(surface: SurfaceLike, layer: Layer = LAYER) -> Surface:
     if isinstance(surface, str | os.PathLike):
         path = Path(surface)
         return Surface(path / f"{layer}.tif" if path.is_dir() else path)
+    from aerotri.public.dense import DenseSurface
+
+    if isinstance(surface, DenseSurface):
+        return surface.surface
     return surface.dsm if layer == "dsm" else surface.dtm
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeGuard
@@ -14,7 +15,7 @@ from aerotri.formats.files.spool import Spool
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.stated import StatedAdjustment
 from aerotri.public.volume_result import THICKNESS, MeasuredVolume
-from aerotri.public.volume_sigma import MeasuredSurface, sigma_of_volume
+from aerotri.public.volume_sigma import MeasuredSurface, SigmaOfVolumes
 from aerotri.volume.settings import (
     BASE,
     LAYER,
@@ -22,6 +23,7 @@ from aerotri.volume.settings import (
     METHOD,
     SECTIONS,
     SIGMA,
+    Density,
     Layer,
     Method,
     SectionPlan,
@@ -34,15 +36,17 @@ if TYPE_CHECKING:
     from aerotri.public.adjustment import Adjustment
     from aerotri.public.surfaces import Reader, SurfaceLike
     from aerotri.public.table import Table
+    from aerotri.volume.accuracy import VolumeSigma
     from aerotri.volume.bases import Base
     from aerotri.volume.boundary import Boundary
     from aerotri.volume.compute import Volumes
+    from aerotri.volume.piles import Pile
     from aerotri.volume.thickness import ThicknessMap
 
 
 def volume(
     surface: SurfaceLike,
-    boundary: BaseGeometry | FilePath | None = None,
+    boundary: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | None = None,
     *,
     layer: Layer = LAYER,
     base: SurfaceLike | float = BASE,
@@ -54,10 +58,12 @@ def volume(
     base_adjustment: Adjustment | FilePath | None = None,
     base_pickets: Table | FilePath | None = None,
     matching_sigma_um: float | None = SIGMA.matching_sigma_um,
-    matching_window: float = SIGMA.matching_window_m,
+    matching_window: float | None = SIGMA.matching_window_m,
     base_sigma: float = SIGMA.base_sigma,
     boundary_sigma: float = SIGMA.boundary_sigma,
     corrected: bool = SIGMA.corrected,
+    density: float | None = None,
+    density_sigma: float = 0.0,
     scratch: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> MeasuredVolume:
@@ -66,8 +72,10 @@ def volume(
     Parameters
     ----------
     surface : raster of heights; or what `aerotri.terrain` returned, or the folder it was written to, whose pickets
-        are used for σ.
-    boundary : GeoPackage, GeoJSON or WKT file, WKT text, or a shapely polygon; the whole surface where None.
+        are used for σ; or what `aerotri.dense_surface` returned, or its folder: σ and noise length of its cells count.
+    boundary : GeoPackage, GeoJSON or WKT file, WKT text, a shapely polygon, or polygons by their names; the whole
+        surface where None. Several polygons are piles: each is measured by itself, with a base of its own, and their
+        sum has a σ that knows what they share.
     layer : which surface of these: 'dsm' with objects (a pile is one), or 'dtm', the ground alone.
     base : height in m, 'level:H', 'plane:X,Y,Z;X,Y,Z;X,Y,Z', 'plane' (fitted to the boundary), 'boundary' (spline
         through it), 'lowest' (level of its lowest point), or another surface.
@@ -79,10 +87,13 @@ def volume(
     base_adjustment : result of a base that is a surface.
     base_pickets : pickets of a base that is a surface.
     matching_sigma_um : µm, σ of an image coordinate of a picket; that of the adjustment where None.
-    matching_window : m, side of the matching window on the ground; its cells share noise.
+    matching_window : m, side of the matching window on the ground; its cells share noise. None: the noise length of a
+        dense surface, 0 of others.
     base_sigma : m, σ of the height of the base, common to all of it.
     boundary_sigma : m, σ of either coordinate of a corner of the boundary.
     corrected : the photographs were corrected for their image errors.
+    density : t/m³, of all that is inside the boundary: gives tonnes.
+    density_sigma : t/m³, its σ, common to all piles.
     scratch : folder for the raster of the thickness until it is saved; the temporary one of the system where None.
     progress : as of `aerotri.adjust`.
 
@@ -114,7 +125,8 @@ def volume(
     options = SigmaOptions(
         matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma, corrected=corrected
     )
-    asked = _Asked(top, below, base, boundary, method, SectionPlan(section_spacing, azimuth), options)
+    known = None if density is None else Density(density, density_sigma)
+    asked = _Asked(top, below, base, boundary, method, SectionPlan(section_spacing, azimuth), options, known)
     with stage_report(progress) as report, ExitStack() as stack:
         return _compute(asked, Spool(scratch), stack, report)
 
@@ -126,10 +138,11 @@ class _Asked:
     top: MeasuredSurface
     below: MeasuredSurface | None
     base: SurfaceLike | float
-    boundary: BaseGeometry | FilePath | None
+    boundary: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | None
     method: Method
     plan: SectionPlan
     options: SigmaOptions
+    density: Density | None = None
 
 
 def is_surface(base: SurfaceLike | float) -> TypeGuard[SurfaceLike]:
@@ -154,8 +167,10 @@ def _stated(adjustment: Adjustment | FilePath | None) -> StatedAdjustment | None
 
 
 def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport) -> MeasuredVolume:
-    from aerotri.formats.results.volume import Sources, volume_json
+    from aerotri.formats.results.volume import Sources, pile_json, volume_json
     from aerotri.rasters.grids import cache_limited
+    from aerotri.volume.bases import PilesBase
+    from aerotri.volume.piles import total_of_piles
     from aerotri.volume.sections import chosen_profiles
 
     top, below = asked.top, asked.below
@@ -164,29 +179,66 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     boundary = _boundary(asked.boundary, reader)
     others: list[Reader] = []
     base = _base(asked.base, below, reader, boundary, stack, others)
+    piles = _piles(asked, base, reader, boundary)
+    if len({id(one.base) for one in piles}) > 1:
+        base = PilesBase(tuple(one.boundary for one in piles), tuple(one.base for one in piles))
     volumes, thickness = _volumes(reader, base, boundary, asked, spool, report)
+    if piles:
+        volumes = total_of_piles(volumes, piles)
     sigma, notes = None, ()
+    sigmas: list[VolumeSigma | None] = [None] * len(piles)
     if top.adjustment is not None:
         report.stage("σ of the volume", None)
-        sigma, notes = sigma_of_volume(top, below, reader, base, boundary, asked.options)
+        finder = SigmaOfVolumes(top, below, reader, asked.options, stack)
+        if piles:
+            each, sigma = finder.of_piles([(one.base, one.boundary) for one in piles])
+            sigmas = [*each]
+        else:
+            sigma = finder.of_one(base, boundary)
+        notes = finder.doubts
     crs = "" if reader.epsg is None else f"EPSG:{reader.epsg}"
     measured_with = (top.adjustment.name, top.name_of_points) if top.adjustment else ("", "")
-    content = volume_json(volumes, base, boundary, Sources(reader.path.name, crs, *measured_with), sigma)
+    sources = Sources(reader.path.name, crs, *measured_with)
+    content = volume_json(volumes, base, boundary, sources, sigma, asked.density)
+    content["piles"] = [pile_json(one, own, asked.density) for one, own in zip(piles, sigmas, strict=True)]
     crs_notes = (reader.note, *(other.note for other in others), boundary.note)
     content["warnings"] = [*(text for text in crs_notes if text), *content["warnings"]]
     profiles = chosen_profiles(reader, base, boundary, volumes.sections)
     return MeasuredVolume(volumes, boundary, content, thickness, profiles, spool, notes)
 
 
-def _boundary(stated: BaseGeometry | FilePath | None, reader: Reader) -> Boundary:
+def _piles(asked: _Asked, base: Base, reader: Reader, boundary: Boundary) -> list[Pile]:
+    """Every polygon of the boundary by itself; a base that follows from the boundary is each one's own."""
+    from aerotri.volume.bases import WORDS, parse_base
+    from aerotri.volume.boundary import boundary_of
+    from aerotri.volume.compute import compute_volumes
+    from aerotri.volume.piles import Pile
+
+    found: list[Pile] = []
+    for name, polygon in boundary.piles:
+        own = boundary_of(polygon, name)
+        below = parse_base(asked.base, reader, own) if isinstance(asked.base, str) and asked.base in WORDS else base
+        try:
+            volumes = compute_volumes(reader, below, own, asked.method, asked.plan)
+        except InputError as error:
+            raise InputError(f"pile '{name}': {error.message}", error.remedy, error.file) from error
+        found.append(Pile(name, own, below, volumes))
+    return found
+
+
+def _boundary(stated: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | None, reader: Reader) -> Boundary:
     from shapely.geometry.base import BaseGeometry
 
-    from aerotri.volume.boundary import boundary_of, boundary_of_grid, read_boundary
+    from aerotri.volume.boundary import boundary_of, boundary_of_grid, boundary_of_piles, read_boundary
 
     if stated is None:
         return boundary_of_grid(reader.grid)
     if isinstance(stated, BaseGeometry):
         return boundary_of(stated, "the polygon given")
+    if isinstance(stated, Mapping):
+        if not stated:
+            raise InputError("no polygon is given", "give a polygon for every name")
+        return boundary_of_piles([(str(name), polygon) for name, polygon in stated.items()], "the polygons given")
     return read_boundary(os.fspath(stated), reader.epsg)
 
 

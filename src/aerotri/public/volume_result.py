@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from aerotri.volume.thickness import ThicknessMap
 
 RECORD, THICKNESS = "volume.json", "thickness.tif"
-OWN_NAMES = (RECORD, THICKNESS, "sections.csv", "plots", "volume.html")
+OWN_NAMES = (RECORD, THICKNESS, "sections.csv", "piles.csv", "plots", "volume.html")
+ALL_PILES = "all together"
 NO_SIGMA = "the volume has no σ", "give the adjustment that the surface was measured with"
 
 
@@ -165,6 +166,21 @@ class MeasuredVolume:
         columns = {"station_m": s.station, **{name: s.sums[:, k] for k, name in enumerate(names)}}
         return _table("sections", columns, {name: "m²" if name.endswith("m2") else "m" for name in columns})
 
+    @cached_property
+    def piles(self) -> Table:
+        """Every polygon of the boundary, and the last row all together: the columns of piles.csv; m², m³ and t.
+
+        Empty where the boundary is one polygon; σ is NaN without an adjustment, tonnes without a density.
+        """
+        s = self.summary
+        rows = [*s["piles"], _of_all(s)] if s["piles"] else []
+        names = ("area_m2", "cut_m3", "fill_m3", "net_m3", "sigma_m3", "no_data_area_m2")
+        columns: dict[str, Any] = {"name": [row["name"] for row in rows]}
+        columns |= {name: [_known(row[name]) for row in rows] for name in names}
+        masses = [row["mass"] or {} for row in rows]
+        columns |= {name: [_known(mass.get(name)) for mass in masses] for name in ("net_t", "sigma_t")}
+        return _table("piles", columns, {name: PILE_UNITS[name[name.rindex("_") :]] for name in columns if "_" in name})
+
     @property
     def thickness(self) -> Surface:
         """Surface less base inside the boundary, a raster on disk as long as it is in use."""
@@ -209,11 +225,25 @@ class MeasuredVolume:
         sure = "" if self.sigma is None else f" ± {self.sigma:.4g} (1 σ)"
         warnings = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
         parts = "" if self.sigma is None else self.parts.html()
+        parts = (self.piles.html() if s["piles"] else "") + parts
         return (
             f"<div><b>{escape(s['dtm'])}: net {self.net:.6g} m³{sure}</b>, cut {self.cut:.6g}, fill {self.fill:.6g} m³ "
             f"over {escape(s['base']['name'])}, {self.area:.6g} m² inside {escape(s['boundary']['name'])}"
             f"{f'<ul>{warnings}</ul>' if warnings else ''}{parts}</div>"
         )
+
+
+PILE_UNITS = {"_m2": "m²", "_m3": "m³", "_t": "t"}
+
+
+def _of_all(summary: dict[str, Any]) -> dict[str, Any]:
+    """The sum of the piles, as one of them."""
+    sigma = None if summary["sigma"] is None else summary["sigma"]["sigma_m3"]
+    return summary | {"name": ALL_PILES, "area_m2": summary["boundary"]["area_m2"], "sigma_m3": sigma}
+
+
+def _known(value: float | None) -> float:
+    return float("nan") if value is None else value
 
 
 def _table(name: str, columns: dict[str, Any], units: dict[str, str]) -> Table:
@@ -230,6 +260,8 @@ def _write(target: Path, found: MeasuredVolume, plots: bool) -> None:
     with atomic_folder(target, own=OWN_NAMES) as folder:
         found.spool.give(THICKNESS, folder / THICKNESS)
         write_rows(found.sections, folder / "sections.csv")
+        if found.summary["piles"]:
+            write_rows(found.piles, folder / "piles.csv")
         if plots:
             from aerotri.report.pages.volume import write_volume_page
             from aerotri.report.plots.rendering import save_plots

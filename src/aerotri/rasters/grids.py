@@ -203,6 +203,10 @@ class RasterReader:
         """What the file says its values count in, in lower case; '' where it does not."""
         return (self._file.units[self.band - 1] or "").strip().lower()
 
+    def tag(self, name: str) -> str:
+        """What the file says under a name in its metadata; '' where it says nothing."""
+        return str(self._file.tags().get(name, ""))
+
     def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
         """A window, (rows, columns) of `dtype`; NaN where nothing is known and beyond the edges."""
         top, left = max(row, 0), max(column, 0)

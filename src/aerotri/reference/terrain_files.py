@@ -159,6 +159,20 @@ PART_WORDS = dict(
         strict=True,
     )
 )
+
+
+def _mass(of: str) -> tuple[Item, ...]:
+    """Keys of the tonnes of a volume."""
+    return (
+        Item(f"{of}.density_t_per_m3", "number", "Density as stated.", "t/m³"),
+        Item(f"{of}.s_density_t_per_m3", "number", "Its standard deviation.", "t/m³"),
+        Item(f"{of}.cut_t", "number", "Tonnes above the base.", "t"),
+        Item(f"{of}.fill_t", "number", "Tonnes below the base.", "t"),
+        Item(f"{of}.net_t", "number", "Tonnes above less tonnes below.", "t"),
+        Item(f"{of}.sigma_t", "number?", "Standard deviation of net_t; null without --adjustment.", "t"),
+    )
+
+
 VOLUME_JSON = (
     VERSION,
     Item("dtm", "text", "File of the surface."),
@@ -219,7 +233,29 @@ VOLUME_JSON = (
     Item("sigma.rays", "whole", "Image points behind them."),
     Item("sigma.adjustment", "text", "Folder of the adjustment."),
     Item("sigma.picket_file", "text", "File of the points; empty where every cell was taken for one."),
+    Item("mass", "object?", "Tonnes of the volume; null without --density."),
+    *_mass("mass"),
+    Item("piles[]", "object", "Every polygon by itself; empty where the boundary is one polygon."),
+    Item("piles[].name", "text", "Its name: attribute name, pile, label or title, else its number in the file."),
+    Item("piles[].area_m2", "number", "Area inside.", "m²"),
+    Item("piles[].base", "text", "Its base, in words."),
+    *(Item(f"piles[].{name}", "number", text, unit) for name, text, unit in VOLUMES),
+    Item("piles[].sigma_m3", "number?", "Standard deviation of its net volume; null without --adjustment.", "m³"),
+    Item("piles[].parts_m3", "object?", "The parts of it, each alone, as of sigma.parts_m3.", "m³"),
+    Item("piles[].mass", "object?", "Its tonnes; null without --density."),
+    *_mass("piles[].mass"),
     Item("warnings[]", "text", "Sentences to read."),
+)
+PILES = (
+    Item("name", "text", "The pile; the last row is all together."),
+    Item("area_m2", "number", "Area inside.", "m²"),
+    Item("cut_m3", "number", "Volume above the base.", "m³"),
+    Item("fill_m3", "number", "Volume below the base.", "m³"),
+    Item("net_m3", "number", "Cut less fill.", "m³"),
+    Item("sigma_m3", "number?", "Standard deviation of the net volume.", "m³"),
+    Item("no_data_area_m2", "number", "Area without heights.", "m²"),
+    Item("net_t", "number?", "Tonnes of the net volume.", "t"),
+    Item("sigma_t", "number?", "Their standard deviation.", "t"),
 )
 SECTIONS = (
     Item("station_m", "number", "Place of the cross section along the azimuth.", "m"),
@@ -271,6 +307,7 @@ def terrain_files() -> tuple[DescribedFile, ...]:
         DescribedFile("volume.json", VOLUME, "json", "The volume, and how sure it is.", VOLUME_JSON),
         DescribedFile("thickness.tif", VOLUME, "raster", "Surface less base inside the boundary, m."),
         DescribedFile("sections.csv", VOLUME, "table", "The cross sections.", SECTIONS),
+        DescribedFile("piles.csv", VOLUME, "table", "Every pile, and all together.", PILES, "with several polygons"),
         DescribedFile("plots", VOLUME, "folder", "Thickness, parts of σ, cross sections, PNG and SVG.", when=plots),
         DescribedFile("volume.html", VOLUME, "page", "The volume on one page.", when=plots),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +14,13 @@ from aerotri.volume.parts import Part
 from aerotri.volume.response import Systematic, systematic
 from aerotri.volume.roughness import Between, roughness_of_cells
 from aerotri.volume.settings import SigmaOptions
-from aerotri.volume.shared import difference_part, same_adjustment, shared_control_covariance, shared_in_words
+from aerotri.volume.shared import (
+    difference_part,
+    same_adjustment,
+    shared_control_covariance,
+    shared_in_words,
+    summed_part,
+)
 from aerotri.volume.sums import cells_within
 
 ALONG_EDGE = 33
@@ -44,6 +51,7 @@ class VolumeSigma:
     systematic : what uncorrected image errors add or would add.
     corrected : whether the photographs were corrected, so that the systematic part is none.
     pickets, rays : behind the adjustment's part. notes : how it was found, sentences.
+    beside : those of the notes that are about base, boundary and ground.
     """
 
     parts: dict[str, float]
@@ -53,6 +61,7 @@ class VolumeSigma:
     pickets: int
     rays: int
     notes: tuple[str, ...] = field(default=())
+    beside: tuple[str, ...] = ()
 
     @property
     def total(self) -> float:
@@ -71,6 +80,49 @@ def volume_sigma(
         adjustment by the difference of the responses, control points that two adjustments share, by name and
         coordinates, by their covariance.
     """
+    ground = _base_variance(base, boundary, surface, options)
+    edge = boundary_variance(surface, base, boundary, options.boundary_sigma)
+    notes = _notes(part, base_part, base, ground, options)
+    return _assembled(part, base_part, _Beside(ground, edge, notes), options)
+
+
+@dataclass(frozen=True, eq=False)
+class PileSigma:
+    """What σ of a sum of volumes is made of: shares, area, m², and σ of one of them."""
+
+    part: Part
+    base_part: Part | None
+    area: float
+    sigma: VolumeSigma
+
+
+def sum_sigma(piles: Sequence[PileSigma], options: SigmaOptions) -> VolumeSigma:
+    """σ of the sum of several volumes of one surface.
+
+    The adjustment moves all of them: its part is that of one functional over the heights of all. The stated σ of the
+    base is common to all; what is left of the base, ground between heights and boundaries are each pile's own.
+    """
+    bases = [one.base_part for one in piles if one.base_part is not None]
+    part = summed_part([one.part for one in piles], options.corrected)
+    base_part = summed_part(bases, options.corrected) if bases else None
+    own = sum(one.sigma.parts["base"] ** 2 - (options.base_sigma * one.area) ** 2 for one in piles)
+    ground = max(own, 0.0) + (options.base_sigma * sum(one.area for one in piles)) ** 2
+    edge = sum(one.sigma.parts["boundary"] ** 2 for one in piles)
+    notes = dict.fromkeys(text for one in piles for text in one.sigma.beside)
+    return _assembled(part, base_part, _Beside(ground, edge, tuple(notes)), options)
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """What does not come from the measurements: variances of base and boundary, m⁶, and sentences."""
+
+    ground: float
+    edge: float
+    notes: tuple[str, ...]
+
+
+def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: SigmaOptions) -> VolumeSigma:
+    """All parts together."""
     both, shared, said = [part] if base_part is None else [part, base_part], 0.0, []
     if base_part is not None and same_adjustment(part, base_part):
         joint, once = difference_part(part, base_part, options.corrected)
@@ -78,14 +130,13 @@ def volume_sigma(
     elif base_part is not None:
         shared, said = shared_control_covariance(part, base_part), [shared_in_words(part, base_part)]
     adjustment = sum(one.response.variance for one in both) - 2.0 * shared
-    ground = _base_variance(base, boundary, surface, options)
     between = _difference([one.between for one in both])
     parts = {
         "adjustment": np.sqrt(max(adjustment, 0.0)),
         "matching": np.sqrt(sum(one.response.noise for one in both)),
         "interpolation": np.sqrt(0.0 if between is None else between.mean_square),
-        "base": np.sqrt(ground),
-        "boundary": np.sqrt(boundary_variance(surface, base, boundary, options.boundary_sigma)),
+        "base": np.sqrt(beside.ground),
+        "boundary": np.sqrt(beside.edge),
     }
     if any(one.calibration.model is not None for one in both):
         parts = {"adjustment": parts["adjustment"], MODEL: np.sqrt(sum(one.response.model for one in both))} | parts
@@ -93,11 +144,10 @@ def volume_sigma(
     first = both[0]
     found = tuple(systematic(first.calibration, first.response, variant) for variant in ("free", "absorbed")
                   if len(first.response.by_parameters))  # fmt: skip
-    notes = (*said, *_notes(first, base_part, base, ground, options))
     return VolumeSigma(
         {name: float(value) for name, value in parts.items()},
         None if between is None else (between.curvature, float(np.sqrt(between.variance))), found, options.corrected,
-        sum(one.pickets for one in both), sum(one.rays for one in both), notes,
+        sum(one.pickets for one in both), sum(one.rays for one in both), (*said, *beside.notes), beside.notes,
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import shapely
 from scipy.interpolate import RectBivariateSpline
 
 from aerotri.conventions import InputError, stated_number
@@ -101,6 +102,61 @@ class SplineBase:
     def on_grid(self, grid: Grid) -> np.ndarray:
         x, y = grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows))[::-1]
         return np.ascontiguousarray(self.lattice(x, y).T[::-1])
+
+
+@dataclass(frozen=True, eq=False)
+class PilesBase:
+    """A base of its own for each of several polygons.
+
+    Parameters
+    ----------
+    boundaries, bases : of the piles, in one order.
+    """
+
+    boundaries: tuple[Boundary, ...]
+    bases: tuple[Base, ...]
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        names = dict.fromkeys(base.name for base in self.bases)
+        return next(iter(names)) if len(names) == 1 else f"a base for each of {len(self.bases)} piles"
+
+    def heights(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """(n,) m, of the pile that is nearest."""
+        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        tree = shapely.STRtree([one.polygon for one in self.boundaries])
+        nearest = np.asarray(tree.nearest(shapely.points(x, y)))
+        out = np.full(x.shape, np.nan)
+        for k, base in enumerate(self.bases):
+            own = nearest == k
+            out[own] = base.heights(x[own], y[own])
+        return out
+
+    def on_grid(self, grid: Grid) -> np.ndarray:
+        """(rows, columns) m; NaN beyond two cells around the piles."""
+        out = np.full((grid.rows, grid.columns), np.nan)
+        inside: list[tuple[tuple[slice, slice], np.ndarray, np.ndarray]] = []
+        for boundary, base in zip(self.boundaries, self.bases, strict=True):
+            row, column, rows, columns = _cells_around(grid, boundary.polygon.bounds)
+            if rows > 0 and columns > 0:
+                part = grid.window(row, column, rows, columns)
+                place = np.s_[row : row + rows, column : column + columns]
+                values = base.on_grid(part)
+                out[place] = np.where(np.isnan(out[place]), values, out[place])
+                inside.append((place, boundary.coverage(part) > 0.0, values))
+        for place, own, values in inside:
+            out[place][own] = values[own]
+        return out
+
+
+def _cells_around(grid: Grid, bounds: tuple[float, float, float, float]) -> tuple[int, int, int, int]:
+    """First row and column, rows and columns, of the cells of a rectangle and two around it."""
+    left, bottom, right, top = bounds
+    row, column = max(int(np.floor(grid.row(top))) - 2, 0), max(int(np.floor(grid.column(left))) - 2, 0)
+    last_row = min(int(np.ceil(grid.row(bottom))) + 2, grid.rows - 1)
+    last_column = min(int(np.ceil(grid.column(right))) + 2, grid.columns - 1)
+    return row, column, last_row - row + 1, last_column - column + 1
 
 
 def level(height: float) -> PlaneBase:

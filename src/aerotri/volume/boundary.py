@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -15,6 +17,11 @@ from aerotri.rasters.grids import Grid, rasterise
 from aerotri.vectors.crs import vector_system
 from aerotri.vectors.polygons import VECTOR_ENDINGS, placed, polygon_features, polygon_of_wkt, srid_of_wkt
 
+NAMES = ("name", "pile", "label", "title")
+"""Attributes that name a polygon, in any case."""
+OVERLAP = 1e-9
+"""Share of the area by which polygons may overlap: rounding of common corners."""
+
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
@@ -23,11 +30,13 @@ class Boundary:
     Parameters
     ----------
     polygon : valid shapely geometry. name : where it came from. note : about its CRS, '' where there is nothing to say.
+    piles : names and polygons that count one by one; empty where the boundary is one.
     """
 
     polygon: BaseGeometry
     name: str
     note: str = ""
+    piles: tuple[tuple[str, BaseGeometry], ...] = ()
 
     @property
     def area(self) -> float:
@@ -79,8 +88,43 @@ def boundary_of(polygon: BaseGeometry, name: str, note: str = "", file: Path | N
     return Boundary(shapely.normalize(polygon), name, note)
 
 
+def boundary_of_piles(
+    piles: Sequence[tuple[str, BaseGeometry]], name: str, note: str = "", file: Path | None = None
+) -> Boundary:
+    """A boundary of several polygons, each with a name; those that overlap count together and not one by one.
+
+    Raises
+    ------
+    InputError
+        When one has no area, crosses itself, or two have the same name.
+    """
+    names = [own for own, _ in piles]
+    twice = {own for own in names if names.count(own) > 1}
+    if twice:
+        raise InputError(f"has two polygons called '{min(twice)}'", "give each its own name", file)
+    each = [(own, boundary_of(polygon, own, file=file).polygon) for own, polygon in piles]
+    whole = _united([polygon for _, polygon in each], file)
+    found = boundary_of(whole, name, note, file)
+    if len(each) == 1:
+        return found
+    overlap = sum(polygon.area for _, polygon in each) - whole.area
+    if overlap > OVERLAP * whole.area:
+        said = f"its polygons overlap by {overlap:.4g} m²: they count together, not one by one"
+        return replace(found, note="; ".join(text for text in (note, said) if text))
+    return replace(found, piles=tuple(each))
+
+
+def _named(attributes: Sequence[Mapping[str, Any]], polygons: list[BaseGeometry]) -> list[tuple[str, BaseGeometry]]:
+    """Polygons with the names their attributes give, else with their numbers."""
+    found = []
+    for number, (own, polygon) in enumerate(zip(attributes, polygons, strict=True), start=1):
+        stated = next((own[key] for key in own if str(key).lower() in NAMES and own[key] not in (None, "")), number)
+        found.append((str(stated), polygon))
+    return found
+
+
 def read_boundary(source: str, epsg: int | None = None) -> Boundary:
-    """The boundary of a file (GeoPackage, GeoJSON, WKT) or of a WKT text; several polygons count together.
+    """The boundary of a file (GeoPackage, GeoJSON, WKT) or of a WKT text; several polygons of a file are piles.
 
     Parameters
     ----------
@@ -94,7 +138,9 @@ def read_boundary(source: str, epsg: int | None = None) -> Boundary:
         polygons = [polygon for _, polygon in features]
         if not polygons:
             raise InputError("has no polygons", "give the boundary of the volume", path)
-        return boundary_of(polygons[0] if len(polygons) == 1 else _united(polygons, path), path.name, note, path)
+        if len(polygons) == 1:
+            return boundary_of(polygons[0], path.name, note, path)
+        return boundary_of_piles(_named([properties for properties, _ in features], polygons), path.name, note, path)
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
@@ -107,7 +153,7 @@ def _of_wkt(text: str, name: str, epsg: int | None, path: Path | None = None) ->
     return boundary_of(placed(polygon_of_wkt(text, path), system, path), name, system.note, path)
 
 
-def _united(polygons: list[BaseGeometry], path: Path) -> BaseGeometry:
+def _united(polygons: list[BaseGeometry], path: Path | None) -> BaseGeometry:
     try:
         return shapely.union_all(polygons)
     except shapely.errors.ShapelyError as error:

@@ -31,11 +31,18 @@ class Functional:
     ----------
     xyz : (k, 3) m. gradient : (k, 3) ∂V/∂(X, Y, Z).
     noise_share : (k,) Σw²/(Σw)² of the heights that a place stands for, 1 where it is one.
+    noise : (k,) Σw²·σ² of their own noise, where its σ is known; None where not.
     """
 
     xyz: np.ndarray
     gradient: np.ndarray
     noise_share: np.ndarray
+    noise: np.ndarray | None = None
+
+    def take(self, rows: np.ndarray) -> Functional:
+        """At some of the places."""
+        noise = None if self.noise is None else self.noise[rows]
+        return Functional(self.xyz[rows], self.gradient[rows], self.noise_share[rows], noise)
 
 
 def triangulated(xyz: np.ndarray) -> np.ndarray:
@@ -104,20 +111,27 @@ def _of_weights(xyz: np.ndarray, corners: np.ndarray, weight: np.ndarray) -> tup
     return float(np.sum(weight * xyz[corners, 2])), gradient
 
 
-def cell_volume(surface: Surface, boundary: Boundary, base: Base | None = None) -> Functional:
+def cell_volume(
+    surface: Surface, boundary: Boundary, base: Base | None = None, sigma: Surface | None = None
+) -> Functional:
     """The gradient of a volume by the cells of a surface, every cell a picket; many cells are put together.
 
     Cells put together keep the sum of their weights at their mean place, and the noise of the single ones.
+
+    Parameters
+    ----------
+    sigma : m, σ of the noise of every cell, on the same cells; None where not known.
     """
     rows, columns = cells_within(surface.grid, boundary)[2:]
     factor = max(1, int(np.ceil(np.sqrt(rows * columns / MOST_CELLS))))
     size = max(factor, 1024 // factor * factor)
     extra = _spline_cells(surface.grid, base)
     parts = [
-        _window_cells(surface, boundary, extra, window, factor) for window in windows(surface.grid, boundary, size)
+        _window_cells(surface, boundary, extra, window, factor, sigma)
+        for window in windows(surface.grid, boundary, size)
     ]
-    xyz, gradient, share = (np.concatenate([part[k] for part in parts]) for k in range(3))
-    return Functional(xyz, gradient, share)
+    xyz, gradient, share, noise = (np.concatenate([part[k] for part in parts]) for k in range(4))
+    return Functional(xyz, gradient, share, None if sigma is None else noise)
 
 
 def _window_cells(
@@ -126,8 +140,9 @@ def _window_cells(
     extra: dict[tuple[int, int], float],
     window: tuple[int, int, int, int],
     factor: int,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places, gradient and noise share of the cells of a window, `factor` × `factor` of them together."""
+    sigma: Surface | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Places, gradient, noise share and noise of the cells of a window, `factor` × `factor` of them together."""
     row, column, rows, columns = window
     grid = surface.grid.window(row, column, rows, columns)
     z = surface.read(row - 1, column - 1, rows + 2, columns + 2).astype(float)
@@ -149,7 +164,15 @@ def _window_cells(
     gradient = np.stack(sums, axis=-1)
     with np.errstate(divide="ignore"):
         share = np.where(gradient[:, 2] != 0.0, squares[used] / gradient[:, 2] ** 2, 1.0)
-    return places, gradient, share
+    noise = np.zeros(len(share)) if sigma is None else _together((weight * _noise(sigma, window)) ** 2, factor)[used]
+    return places, gradient, share, noise
+
+
+def _noise(sigma: Surface, window: tuple[int, int, int, int]) -> np.ndarray:
+    """(rows, columns) m; that of the other cells where one is not known."""
+    values = sigma.read(*window).astype(float)
+    known = np.isfinite(values)
+    return np.where(known, values, np.median(values[known]) if known.any() else 0.0)
 
 
 def _together(values: np.ndarray, factor: int) -> np.ndarray:

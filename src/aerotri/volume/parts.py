@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume.bases import Base, Surface
 from aerotri.volume.boundary import Boundary
+from aerotri.volume.cell_noise import NO_NOISE, CellNoise, cells_sharing, shares_of_noise
 from aerotri.volume.functionals import Functional, cell_volume, tin_volume, triangulated
 from aerotri.volume.pickets import (
     MeasuredPickets,
@@ -70,17 +71,25 @@ class Part:
 
 
 def part_of_cells(
-    calibration: Adjustment, surface: Surface, boundary: Boundary, base: Base | None, options: SigmaOptions
-) -> Part:
-    """The share of a surface whose cells are taken for its pickets, measured in the photographs nearest to them."""
-    functional = cell_volume(surface, boundary, base)
-    cell = surface.grid.cell_x * surface.grid.cell_y
-    share = functional.noise_share * max(1.0, options.matching_window_m**2 / cell)
+    calibration: Adjustment, surface: Surface, boundary: Boundary, base: Base | None, options: SigmaOptions,
+    noise: CellNoise = NO_NOISE,
+) -> Part:  # fmt: skip
+    """The share of a surface whose cells are taken for its pickets, measured in the photographs nearest to them.
+
+    Parameters
+    ----------
+    noise : what the surface says of its cells; a σ or a window that the options state counts instead.
+    """
+    own = noise.sigma if options.matching_sigma_um is None else None
+    functional = cell_volume(surface, boundary, base, own)
+    length = noise.length_m if options.matching_window_m is None else options.matching_window_m
     pickets, seen = pickets_where_seen(
-        calibration, functional.xyz, matching_sigma_mm(calibration, options), options.per_point, share
+        calibration, functional.xyz, matching_sigma_mm(calibration, options), options.per_point, functional.noise_share
     )
     if not seen.any():
         raise InputError("no photograph of the adjustment sees the surface", "check the CRS of surface and block")
+    sharing = cells_sharing(length, surface.grid.cell_x * surface.grid.cell_y)
+    pickets = replace(pickets, noise_share=sharing * shares_of_noise(calibration, pickets, functional.take(seen)))
     response = respond(calibration, pickets, functional.gradient[seen], options.corrected)
     unseen = float(np.abs(functional.gradient[~seen, 2]).sum())
     between = _between_cells(surface, boundary)

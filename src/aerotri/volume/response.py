@@ -194,7 +194,7 @@ def _summed(
             f"a ground point (picket) was measured in photograph '{name}', which was not adjusted",
             "measure again with this adjustment: `aerotri dtm`",
         )
-    points, along = _in_frame(calibration, pickets.xyz, np.asarray(gradient, dtype=float))
+    points, along = in_frame(calibration, pickets.xyz, np.asarray(gradient, dtype=float))
     bounds = chunk_bounds(np.diff(pickets.start).astype(float))
     arrays = _kernels.PicketArrays(pickets.start, image, 1.0 / pickets.sigma_mm, points, along, pickets.noise_share)
     shapes = (len(u.images), 6), u.lens.base.shape, (len(nodes.xy), 2), 1, len(u.shared), 1
@@ -224,7 +224,7 @@ def _scans(calibration: Adjustment) -> Scans:
     return Scans(np.zeros((n, 2)), np.zeros(n), nothing, nothing, np.full((n, 3), -1, dtype=np.int64))
 
 
-def _in_frame(calibration: Adjustment, xyz: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def in_frame(calibration: Adjustment, xyz: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places counted from the local origin, and the gradient along the axes there.
 
     The partials of the CRS are those in the middle of the pickets: they change by 1e-4 in a kilometre.

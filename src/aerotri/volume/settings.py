@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 from typing import Literal, get_args
+
+from aerotri.conventions import InputError
 
 Method = Literal["prisms", "grid", "trapezoidal", "simpson", "simpson38"]
 METHODS: tuple[Method, ...] = get_args(Method)
@@ -28,19 +31,50 @@ class SigmaOptions:
     Parameters
     ----------
     matching_sigma_um : of an image coordinate of a picket; None: σ̂0 of the adjustment's image coordinates.
-    matching_window_m : side of the matching window on the ground, within which neighbouring cells share their noise.
+    matching_window_m : side of the matching window on the ground, within which neighbouring cells share their noise;
+        None: the noise length of a dense surface, 0 of others.
     per_point : photographs a cell is measured in. base_sigma : m, common to the whole base.
     boundary_sigma : m, of either coordinate of every corner. corrected : the photographs were corrected.
     """
 
     matching_sigma_um: float | None = None
-    matching_window_m: float = 0.0
+    matching_window_m: float | None = None
     per_point: int = PER_POINT
     base_sigma: float = 0.0
     boundary_sigma: float = 0.0
     corrected: bool = True
 
 
+@dataclass(frozen=True)
+class Density:
+    """Tonnes of a cubic metre, and their σ, common to all that is measured.
+
+    Raises
+    ------
+    InputError
+        When the density is not positive, or its σ negative.
+    """
+
+    t_per_m3: float
+    sigma: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.t_per_m3 < MOST_DENSE and 0.0 <= self.sigma < MOST_DENSE):
+            raise InputError(
+                f"a density of {self.t_per_m3:g} ± {self.sigma:g} t/m³ is not possible", "give tonnes per cubic metre"
+            )
+
+    def tonnes(self, volume: float) -> float:
+        """t of a volume, m³."""
+        return self.t_per_m3 * volume
+
+    def tonnes_sigma(self, volume: float, sigma: float) -> float:
+        """t, σ of the tonnes of a volume with its σ, m³: √(ρ²σ_V² + V²σ_ρ²)."""
+        return float(hypot(self.t_per_m3 * sigma, volume * self.sigma))
+
+
+MOST_DENSE = 30.0
+"""t/m³ that nothing on Earth exceeds; kilograms per cubic metre do."""
 Layer = Literal["dsm", "dtm"]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
 LAYER: Layer = "dsm"

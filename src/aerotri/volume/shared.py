@@ -9,6 +9,7 @@ noise is that of g: a measurement that is in both cancels.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -55,16 +56,47 @@ def difference_part(surface: Part, base: Part, corrected: bool) -> tuple[Part, f
     return part, float(min(common))
 
 
+def summed_part(parts: Sequence[Part], corrected: bool) -> Part:
+    """The share of the sum of several volumes of one surface: a measurement that is in two of them counts in both.
+
+    Parameters
+    ----------
+    corrected : as of `respond`.
+    """
+    kept: list[Measured] = []
+    for part in parts:
+        if part.measured is None:
+            raise ValueError("the pickets of all parts are needed")
+        used = part.measured.gradient.any(axis=1)
+        kept.append(Measured(part.measured.pickets.take(np.flatnonzero(used)), part.measured.gradient[used]))
+    pickets = _stacked([one.pickets for one in kept])
+    _, place, number = np.unique(_keys(pickets), axis=0, return_index=True, return_inverse=True)
+    gradient = np.zeros((len(place), 3))
+    np.add.at(gradient, number.ravel(), np.concatenate([one.gradient for one in kept]))
+    joint = Measured(pickets.take(place), gradient)
+    first, known = parts[0], [part.between for part in parts if part.between is not None]
+    between = Between(sum(b.curvature for b in known), sum(b.variance for b in known)) if known else None
+    response = respond(first.calibration, joint.pickets, gradient, corrected)
+    unseen = sum(part.unseen for part in parts)
+    return Part(
+        first.calibration, response, between, len(joint.pickets), len(joint.pickets.image), unseen, joint
+    )  # fmt: skip
+
+
+def _stacked(pickets: Sequence[Pickets]) -> Pickets:
+    """All of them one after the other."""
+    counts = np.concatenate([np.diff(one.start) for one in pickets])
+    rows = (np.concatenate(part) for part in zip(
+        *((one.xyz, one.image, one.sigma_mm, one.noise_share) for one in pickets), strict=True
+    ))  # fmt: skip
+    xyz, image, sigma, share = rows
+    return Pickets(xyz, np.concatenate([[0], np.cumsum(counts)]), image, sigma, share)
+
+
 def _joined(first: Measured, second: Measured) -> tuple[Measured, tuple[float, float]]:
     """The pickets of both, each once, with g' − g''; and the share of either's weight that is in both."""
     one, other = first.pickets, second.pickets
-    both = Pickets(
-        np.concatenate([one.xyz, other.xyz]),
-        np.concatenate([one.start, one.start[-1] + other.start[1:]]),
-        np.concatenate([one.image, other.image]),
-        np.concatenate([one.sigma_mm, other.sigma_mm]),
-        np.concatenate([one.noise_share, other.noise_share]),
-    )
+    both = _stacked([one, other])
     _, place, number = np.unique(_keys(both), axis=0, return_index=True, return_inverse=True)
     number = number.ravel()
     gradient = np.zeros((len(place), 3))

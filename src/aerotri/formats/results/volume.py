@@ -12,7 +12,9 @@ from aerotri.volume.accuracy import VolumeSigma
 from aerotri.volume.bases import Base, PlaneBase
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.compute import Volumes
+from aerotri.volume.piles import Pile
 from aerotri.volume.quantity import Volume
+from aerotri.volume.settings import Density
 
 SYSTEMATIC = "change of the volume by image errors, wrong − true, were the photographs used uncorrected"
 
@@ -30,8 +32,9 @@ class Sources:
 
 
 def volume_json(
-    volumes: Volumes, base: Base, boundary: Boundary, sources: Sources, sigma: VolumeSigma | None
-) -> dict[str, Any]:
+    volumes: Volumes, base: Base, boundary: Boundary, sources: Sources, sigma: VolumeSigma | None,
+    density: Density | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """The content of volume.json; m, m², m³."""
     v, s = volumes.chosen, volumes.sections
     warnings = list(volumes.warnings) + ([] if sigma is None else list(sigma.notes))
@@ -43,7 +46,28 @@ def volume_json(
         "lowest_m": _finite(volumes.lowest), "highest_m": _finite(volumes.highest),
         "methods": [{"method": one.method, **_numbers(one), "note": one.note} for one in volumes.by_method],
         "sections": {"spacing_m": s.spacing, "azimuth_deg": s.azimuth, "count": len(s.station)},
-        "sigma": None if sigma is None else _sigma(sigma, v, sources), "warnings": warnings,
+        "sigma": None if sigma is None else _sigma(sigma, v, sources), "mass": _mass(v, sigma, density),
+        "warnings": warnings,
+    }  # fmt: skip
+
+
+def pile_json(pile: Pile, sigma: VolumeSigma | None, density: Density | None) -> dict[str, Any]:
+    """A pile of volume.json: its volume, σ with its parts, tonnes."""
+    v = pile.volumes.chosen
+    return {
+        "name": pile.name, "area_m2": pile.boundary.area, "base": pile.base.name, **_numbers(v),
+        "sigma_m3": None if sigma is None else sigma.total,
+        "parts_m3": None if sigma is None else dict(sigma.parts), "mass": _mass(v, sigma, density),
+    }  # fmt: skip
+
+
+def _mass(v: Volume, sigma: VolumeSigma | None, density: Density | None) -> dict[str, Any] | None:
+    if density is None:
+        return None
+    return {
+        "density_t_per_m3": density.t_per_m3, "s_density_t_per_m3": density.sigma, "cut_t": density.tonnes(v.cut),
+        "fill_t": density.tonnes(v.fill), "net_t": density.tonnes(v.net),
+        "sigma_t": None if sigma is None else density.tonnes_sigma(v.net, sigma.total),
     }  # fmt: skip
 
 

@@ -39,7 +39,7 @@ def volume_html(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot]) -
         name=printable(content["dtm"]), base=printable(content["base"]["name"]),
         boundary=printable(content["boundary"]["name"]), crs=content["crs"], cards=_cards(content),
         warnings=[printable(text, 1000) for text in content["warnings"]], budget=_budget(content),
-        methods=_methods(content), version=content["aerotri"],
+        methods=_methods(content), piles=_piles(content), mass=_mass_words(content), version=content["aerotri"],
         plots=[{"name": name, "source": data_address(plot), "caption": CAPTIONS[name]}
                for name, plot in plots.items()],
     )  # fmt: skip
@@ -90,6 +90,36 @@ def _budget(c: Mapping[str, Any]) -> str:
     if not s["systematic"]["variants"]:
         return text + " No image errors were estimated, so what they do to the volume is not known."
     return text
+
+
+def _piles(c: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Rows of the table of piles, the last one all together."""
+    if not c["piles"]:
+        return []
+    sigma = None if c["sigma"] is None else c["sigma"]["sigma_m3"]
+    whole: dict[str, Any] = {**c, "name": "all together", "area_m2": c["boundary"]["area_m2"], "sigma_m3": sigma}
+    return [
+        (printable(one["name"]), _number(one["area_m2"]), _number(one["cut_m3"]), _number(one["fill_m3"]),
+         _number(one["net_m3"]) if one["sigma_m3"] is None else with_sigma(one["net_m3"], one["sigma_m3"]),
+         _tonnes(one["mass"]))
+        for one in (*c["piles"], whole)
+    ]  # fmt: skip
+
+
+def _tonnes(mass: Mapping[str, Any] | None) -> str:
+    if mass is None:
+        return ""
+    return _number(mass["net_t"]) if mass["sigma_t"] is None else with_sigma(mass["net_t"], mass["sigma_t"])
+
+
+def _mass_words(c: Mapping[str, Any]) -> str:
+    """The tonnes in a sentence."""
+    mass = c["mass"]
+    if mass is None:
+        return ""
+    known = f" ± {mass['s_density_t_per_m3']:g}" if mass["s_density_t_per_m3"] else ""
+    sure = "; its σ counts that of the volume and of the density" if mass["sigma_t"] is not None else ""
+    return f"At {mass['density_t_per_m3']:g}{known} t/m³ the net volume has a mass of {_tonnes(mass)} t{sure}."
 
 
 def _methods(c: Mapping[str, Any]) -> list[tuple[str, ...]]:

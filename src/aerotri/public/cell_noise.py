@@ -1,0 +1,67 @@
+"""The noise of the cells of a dense surface, from what `aerotri dsm` wrote, or as it stands in memory."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.conventions import InputError, stated_number
+from aerotri.public.dense import MATCHING, SURFACE, DenseSurface
+from aerotri.rasters.grids import RasterReader
+from aerotri.rasters.held import HeldRaster
+from aerotri.volume.cell_noise import NO_NOISE, CellNoise
+
+NOISE_LENGTH = "NOISE_LENGTH_M"
+"""Name in the metadata of dsm.tif."""
+BESIDE = "give dsm.tif in the folder that `aerotri dsm` wrote"
+
+
+def noise_of_dense(dense: DenseSurface) -> CellNoise:
+    """Of a dense surface in memory."""
+    o, length = dense.record, dense.summary["noise_length_m"]
+    sigma = np.full((o.grid.rows, o.grid.columns), np.nan, np.float32)
+    for window, tile in o.files.read_all(list(o.windows)):
+        place = np.s_[
+            window.row : window.row + tile.sigma.shape[0], window.column : window.column + tile.sigma.shape[1]
+        ]
+        sigma[place] = tile.sigma
+    return CellNoise(HeldRaster(sigma, o.grid, None, MATCHING), 0.0 if length is None else length)
+
+
+def noise_of_file(path: Path | None, stack: ExitStack) -> CellNoise:
+    """Of a file: none where it is not a dense surface.
+
+    Parameters
+    ----------
+    stack : keeps the raster of σ open.
+
+    Raises
+    ------
+    InputError
+        When its noise length is no length, or the raster of σ beside it belongs to another surface.
+    """
+    if path is None or not path.is_file():
+        return NO_NOISE
+    with RasterReader(path) as reader:
+        length, grid = _length(reader.tag(NOISE_LENGTH), path), reader.grid
+    beside = path.with_name(MATCHING)
+    if path.name != SURFACE or not beside.is_file():
+        return CellNoise(None, length)
+    sigma = stack.enter_context(RasterReader(beside))
+    if sigma.grid != grid:
+        raise InputError(f"has other cells than {path.name} beside it", BESIDE, beside)
+    return CellNoise(sigma, length)
+
+
+def _length(text: str, path: Path) -> float:
+    if not text:
+        return 0.0
+    try:
+        value = stated_number(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value < np.inf:
+        raise InputError(f"states a noise length of '{text}'", BESIDE, path)
+    return value

@@ -1,0 +1,118 @@
+"""Several polygons in one boundary, tonnes, and volumes on dense surfaces: as a user meets them."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+import shapely
+
+import aerotri
+from aerotri import InputError
+from aerotri.commands.volume import VolumeInput, run_volume
+from aerotri.formats.block.folder import write_block
+from aerotri.rasters.grids import Grid
+from aerotri.rasters.surface_files import write_raster_parts, write_surface_parts
+from aerotri.volume.settings import SectionPlan, SigmaOptions
+from small_blocks import small_block
+
+CELL, COUNT, NOISE, LENGTH = 2.0, 120, 0.04, 7.0
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """Two heaps on ground that slopes, as `aerotri dsm` writes them, with the block they were measured in."""
+    folder = tmp_path_factory.mktemp("piles")
+    block, truth = small_block(5, "bluh:1-12")
+    write_block(block, folder / "block")
+    aerotri.adjust(folder / "block").save(folder / "result", plots=False)
+    middle = np.round(np.median(truth.centre[:, :2], axis=0))
+    half = CELL * COUNT / 2.0
+    grid = Grid(COUNT, COUNT, middle[0] - half, middle[1] + half, CELL, CELL)
+    x, y = np.meshgrid(grid.x(np.arange(COUNT)) - middle[0], grid.y(np.arange(COUNT)) - middle[1])
+    z = 100.0 + 0.02 * x
+    for at, high in ((-60.0, 12.0), (60.0, 8.0)):
+        z += np.maximum(high * (1.0 - np.hypot(x - at, y) / 35.0), 0.0)
+    (folder / "dsm").mkdir()
+    tags = {"NOISE_LENGTH_M": f"{LENGTH}"}
+    write_surface_parts(folder / "dsm" / "dsm.tif", [(0, 0, z, np.full_like(z, 0.2))], grid, None, "DSM Z, m", tags)
+    sigma = np.full_like(z, NOISE)
+    what = "σ of Z of matching alone, m"
+    write_raster_parts(folder / "dsm" / "matching.tif", [(0, 0, sigma)], grid, None, what, np.dtype("f4"), -9999.0)
+    polygons = {name: shapely.Point(middle[0] + at, middle[1]).buffer(45.0) for name, at in (("A", -60.0), ("B", 60.0))}
+    features = [
+        {"type": "Feature", "properties": {"Name": name}, "geometry": json.loads(shapely.to_geojson(polygon))}
+        for name, polygon in polygons.items()
+    ]
+    (folder / "piles.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    return folder, polygons
+
+
+def measured(place, boundary, **settings):
+    return aerotri.volume(place[0] / "dsm", boundary, adjustment=place[0] / "result", **settings)
+
+
+def test_noise_of_a_dense_surface_counts_with_its_length(place):
+    """Cells of one σ: the volume's is σ·length·√area, whatever the cell; a length that is stated counts instead."""
+    polygon = place[1]["A"]
+    found = measured(place, polygon, base=100.0)
+    assert found.parts["sigma_m3"][1] == pytest.approx(NOISE * LENGTH * np.sqrt(polygon.area), rel=0.02)
+    other = measured(place, polygon, base=100.0, matching_window=14.0)
+    assert other.parts["sigma_m3"][1] == pytest.approx(2.0 * found.parts["sigma_m3"][1], rel=1e-6)
+    assert other.parts["sigma_m3"][0] == pytest.approx(found.parts["sigma_m3"][0], rel=1e-12)
+
+
+def test_piles_add_up_with_what_they_share(place):
+    """Over a level the sum is one functional over both: the same σ as that of the two polygons as one boundary."""
+    polygons = place[1]
+    found = measured(place, polygons, base=98.0)
+    whole = measured(place, shapely.union_all(list(polygons.values())), base=98.0)
+    piles = found.piles
+    assert list(piles["name"]) == ["A", "B", "all together"]
+    for name in ("net_m3", "cut_m3", "area_m2"):
+        assert piles[name][2] == pytest.approx(piles[name][0] + piles[name][1], rel=1e-12)
+    assert found.net == pytest.approx(whole.net, rel=1e-9)
+    np.testing.assert_allclose(found.parts["sigma_m3"][:2], whole.parts["sigma_m3"][:2], rtol=1e-6)
+    alone = measured(place, polygons["A"], base=98.0)
+    assert piles["sigma_m3"][0] == pytest.approx(alone.sigma, rel=1e-9)
+    # neighbouring heaps go up and down together
+    assert found.sigma > 1.1 * np.hypot(*piles["sigma_m3"][:2])
+
+
+def test_every_pile_has_its_own_base(place):
+    """The lowest place around each; through both boundaries at once there would be one level only."""
+    found = measured(place, place[0] / "piles.geojson", base="lowest", density=1.8, density_sigma=0.09)
+    each = [measured(place, polygon, base="lowest") for polygon in place[1].values()]
+    np.testing.assert_allclose(found.piles["net_m3"][:2], [one.net for one in each], rtol=1e-9)
+    assert found.net == pytest.approx(sum(one.net for one in each), rel=1e-9)
+    mass = found.summary["piles"][0]["mass"]
+    assert mass["net_t"] == pytest.approx(1.8 * each[0].net)
+    assert mass["sigma_t"] == pytest.approx(np.hypot(1.8 * each[0].sigma, 0.09 * each[0].net))
+
+
+def test_the_table_and_the_page(place, tmp_path):
+    given = VolumeInput(
+        place[0] / "dsm", "plane", str(place[0] / "piles.geojson"), "prisms", place[0] / "result", None, None,
+        density=1.6,
+    )  # fmt: skip
+    out = tmp_path / "out"
+    assert run_volume(given, SectionPlan(10.0, 0.0), SigmaOptions(), out, True, True) == 0
+    content = json.loads((out / "volume.json").read_text())
+    rows = list(csv.DictReader((out / "piles.csv").open()))
+    assert [row["name"] for row in rows] == ["A", "B", "all together"]
+    assert float(rows[2]["sigma_m3"]) == pytest.approx(content["sigma"]["sigma_m3"])
+    assert float(rows[2]["net_t"]) == pytest.approx(1.6 * content["net_m3"])
+    page = (out / "volume.html").read_text()
+    assert "<td>A</td>" in page
+    assert "mass of" in page
+
+
+def test_polygons_that_overlap_count_together(place):
+    polygon = place[1]["A"]
+    found = aerotri.volume(place[0] / "dsm", {"one": polygon, "two": polygon.buffer(-10.0)}, base=100.0)
+    assert found.summary["piles"] == []
+    assert any("overlap" in text for text in found.warnings)
+    with pytest.raises(InputError, match="not possible"):
+        aerotri.volume(place[0] / "dsm", polygon, base=100.0, density=1800.0)
