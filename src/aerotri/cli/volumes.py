@@ -104,6 +104,14 @@ def volume(
     boundary_sigma: Annotated[
         float, typer.Option(min=0.0, help="σ of a corner of the boundary, m.", rich_help_panel=SIGMAS)
     ] = SIGMA.boundary_sigma,
+    boundary_from: Annotated[
+        str,
+        typer.Option(
+            help="survey: the boundary is known in space; product: it was drawn on this surface or its orthophoto and "
+            "moves with it.",
+            rich_help_panel=SIGMAS,
+        ),
+    ] = SIGMA.boundary_from,
     uncorrected: Annotated[
         bool,
         typer.Option(
@@ -134,7 +142,7 @@ def volume(
     )  # fmt: skip
     options = SigmaOptions(
         matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma,
-        corrected=not uncorrected,
+        corrected=not uncorrected, boundary_from=cast(Any, boundary_from),
     )  # fmt: skip
     raise typer.Exit(run_volume(given, SectionPlan(section_spacing, azimuth), options, out, plots, json_))
 

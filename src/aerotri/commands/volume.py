@@ -73,8 +73,8 @@ def run_volume(
                 section_spacing=plan.spacing, azimuth=plan.azimuth, adjustment=given.adjustment, pickets=given.pickets,
                 base_adjustment=given.base_adjustment, base_pickets=given.base_pickets,
                 matching_sigma_um=s.matching_sigma_um, matching_window=s.matching_window_m, base_sigma=s.base_sigma,
-                boundary_sigma=s.boundary_sigma, corrected=s.corrected, density=given.density,
-                density_sigma=given.density_sigma, scratch=room, progress=console.stage,
+                boundary_sigma=s.boundary_sigma, boundary_from=s.boundary_from, corrected=s.corrected,
+                density=given.density, density_sigma=given.density_sigma, scratch=room, progress=console.stage,
             )  # fmt: skip
             if plots:
                 console.progress("plots")

@@ -18,11 +18,13 @@ from aerotri.public.volume_result import THICKNESS, MeasuredVolume
 from aerotri.public.volume_sigma import MeasuredSurface, SigmaOfVolumes
 from aerotri.volume.settings import (
     BASE,
+    BOUNDARIES_FROM,
     LAYER,
     LAYERS,
     METHOD,
     SECTIONS,
     SIGMA,
+    BoundaryFrom,
     Density,
     Layer,
     Method,
@@ -61,6 +63,7 @@ def volume(
     matching_window: float | None = SIGMA.matching_window_m,
     base_sigma: float = SIGMA.base_sigma,
     boundary_sigma: float = SIGMA.boundary_sigma,
+    boundary_from: BoundaryFrom = SIGMA.boundary_from,
     corrected: bool = SIGMA.corrected,
     density: float | None = None,
     density_sigma: float = 0.0,
@@ -91,6 +94,8 @@ def volume(
         dense surface, 0 of others.
     base_sigma : m, σ of the height of the base, common to all of it.
     boundary_sigma : m, σ of either coordinate of a corner of the boundary.
+    boundary_from : 'survey', where the boundary is known in space, as from a plan or measured on the ground; 'product',
+        where it was drawn on the surface or the orthophoto of the same adjustment: it moves with them.
     corrected : the photographs were corrected for their image errors.
     density : t/m³, of all that is inside the boundary: gives tonnes.
     density_sigma : t/m³, its σ, common to all piles.
@@ -117,14 +122,19 @@ def volume(
     _refuse_contradictions(adjustment, pickets, base_adjustment, base_pickets)
     if layer not in LAYERS:
         raise InputError(f"there is no layer '{layer}'", f"choose one of {', '.join(LAYERS)}")
+    if boundary_from not in BOUNDARIES_FROM:
+        raise InputError(
+            f"a boundary from '{boundary_from}' is not known", f"choose one of {', '.join(BOUNDARIES_FROM)}"
+        )
     top, below = MeasuredSurface(surface, _stated(adjustment), pickets, layer), None
     if is_surface(base):
         below = MeasuredSurface(base, _stated(base_adjustment), base_pickets, layer)
     elif base_adjustment is not None or base_pickets is not None:
         raise InputError("base_adjustment and base_pickets need a surface as base", "give its raster as base")
     options = SigmaOptions(
-        matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma, corrected=corrected
-    )
+        matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma, corrected=corrected,
+        boundary_from=boundary_from,
+    )  # fmt: skip
     known = None if density is None else Density(density, density_sigma)
     asked = _Asked(top, below, base, boundary, method, SectionPlan(section_spacing, azimuth), options, known)
     with stage_report(progress) as report, ExitStack() as stack:

@@ -85,7 +85,9 @@ class MeasuredSurface:
         if not isinstance(self.given, Surface | str | os.PathLike):
             return self.given.adjustment
         path = self.surface.path
-        for name in () if path is None else (TERRAIN, DENSE):
+        if path is None:
+            return ""
+        for name in (TERRAIN, DENSE):
             try:
                 content = json.loads((path.parent / name).read_text(encoding="utf-8"))
             except (OSError, ValueError):

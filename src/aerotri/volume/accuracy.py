@@ -35,6 +35,7 @@ the base."""
 SMOOTHEST_BELOW = 0.9
 """Exponent of the ground under a spline at most: what a ring shows as smooth need not be so far inwards."""
 PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")
+MOVES = "the boundary is taken as drawn on the surface: a shift or turn of the whole block moves both"
 MODEL = "model"
 """The part beside these where groups of photographs share errors: the model part of the adjustment."""
 
@@ -238,8 +239,10 @@ def _notes(part: Part, base_part: Part | None, base: Base, ground: float, option
     if isinstance(base, SplineBase):
         judged = "the base is judged by how rough the ground outside the boundary is, carried inwards"
         notes.append(judged if ground > 0.0 else "too little ground outside the boundary to judge the base by")
-    if isinstance(base, PlaneBase) and options.base_sigma <= 0.0:
+    if isinstance(base, PlaneBase) and base.nodes is None and options.base_sigma <= 0.0:
         notes.append(f"the base ({base.name}) counts as free of error: give its σ with --base-sigma")
+    if options.boundary_from == "product":
+        notes.append(MOVES)
     if options.boundary_sigma <= 0.0:
         notes.append("the boundary counts as free of error: give its σ with --boundary-sigma")
     return tuple(notes)

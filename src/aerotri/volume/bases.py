@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -41,9 +41,30 @@ class Base(Protocol):
     def on_grid(self, grid: Grid) -> np.ndarray: ...
 
 
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Heights of the surface that a base follows from: xy (k, 2) m; ∫ of the base over the boundary = integral·z, m².
+
+    Both a height and a place of the surface: where the boundary was drawn on the surface, they move with it.
+    """
+
+    xy: np.ndarray
+    integral: np.ndarray
+
+
+def nodes_of(base: Base | None) -> Nodes | None:
+    """What a base follows from; None where it is stated, or a surface of its own."""
+    if isinstance(base, SplineBase):
+        return Nodes(base.xy, base.integral)
+    return base.nodes if isinstance(base, PlaneBase) else None
+
+
 @dataclass(frozen=True)
 class PlaneBase:
-    """Z = z0 + slope_x·(X − x0) + slope_y·(Y − y0); a level where both slopes are 0."""
+    """Z = z0 + slope_x·(X − x0) + slope_y·(Y − y0); a level where both slopes are 0.
+
+    nodes : heights of the surface that it follows from; None where it is stated.
+    """
 
     name: str
     z0: float
@@ -51,6 +72,7 @@ class PlaneBase:
     slope_y: float = 0.0
     x0: float = 0.0
     y0: float = 0.0
+    nodes: Nodes | None = None
 
     def heights(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return self.z0 + self.slope_x * (np.asarray(x) - self.x0) + self.slope_y * (np.asarray(y) - self.y0)
@@ -181,6 +203,16 @@ def plane_through(points: np.ndarray, name: str = "plane") -> PlaneBase:
     return PlaneBase(name, float(z0), float(slope_x), float(slope_y), float(middle[0]), float(middle[1]))
 
 
+def fitted_plane(points: np.ndarray, boundary: Boundary) -> PlaneBase:
+    """The plane nearest in height to the surface along a boundary: (n, 3) m."""
+    plane = plane_through(points, "plane fitted to the boundary")
+    middle = points[:, :2].mean(axis=0)
+    design = np.column_stack([np.ones(len(points)), points[:, :2] - middle])
+    centre = np.array(boundary.polygon.centroid.coords[0]) - middle
+    integral = boundary.area * np.array([1.0, *centre]) @ np.linalg.pinv(design)
+    return replace(plane, nodes=Nodes(points[:, :2], integral))
+
+
 def boundary_heights(surface: Surface, boundary: Boundary, most: int = MOST_NODES) -> np.ndarray:
     """(k, 3) m, the surface along the boundary, evenly spaced, at most `most` places; where it is not known, none.
 
@@ -273,11 +305,13 @@ def parse_base(text: str, surface: Surface, boundary: Boundary) -> Base:
     except ValueError:
         raise InputError(f"--base '{text}' is not understood", "give level:HEIGHT or plane:X,Y,Z;X,Y,Z;X,Y,Z") from None
     if text == "plane":
-        return plane_through(boundary_heights(surface, boundary), "plane fitted to the boundary")
+        return fitted_plane(boundary_heights(surface, boundary), boundary)
     if text == "boundary":
         return spline_through(surface, boundary)
     if text == "lowest":
-        return level(float(boundary_heights(surface, boundary)[:, 2].min()))
+        places = boundary_heights(surface, boundary)
+        lowest = places[[int(np.argmin(places[:, 2]))]]
+        return replace(level(float(lowest[0, 2])), nodes=Nodes(lowest[:, :2], np.array([boundary.area])))
     raise InputError(f"'{text}' is no base", f"give a height, {', '.join(WORDS)} or plane:X,Y,Z;X,Y,Z;X,Y,Z")
 
 

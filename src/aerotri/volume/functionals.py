@@ -14,11 +14,14 @@ import shapely
 
 from aerotri.rasters.grids import Grid
 from aerotri.terrain.tin import corners_in_plan
-from aerotri.volume.bases import Base, SplineBase, Surface
+from aerotri.volume.bases import Base, Nodes, Surface, nodes_of
 from aerotri.volume.boundary import Boundary
+from aerotri.volume.drawn import drawn_cells, drawn_in_plan, slope_of_nodes
 from aerotri.volume.sums import cells_within, windows
 from aerotri.volume.triangles import barycentric, corner_weights
 
+NEXT_TO = 1e-9
+"""Weight of cells outside a boundary that moves, which count by their motion alone."""
 MOST_CELLS = 1_000_000
 """Cells that are carried one by one; neighbours are put together where there are more."""
 
@@ -62,21 +65,27 @@ def triangle_slopes(xyz: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def tin_volume(
-    xyz: np.ndarray, triangles: np.ndarray, boundary: Boundary, base: Base | None = None
+    xyz: np.ndarray, triangles: np.ndarray, boundary: Boundary, base: Base | None = None, drawn: bool = False
 ) -> tuple[float, Functional]:
     """Volume under a TIN over the height 0 (less that of the base's own nodes), and its gradient.
 
     Parameters
     ----------
     xyz : (k, 3) m. triangles : (t, 3).
-    base : matters only where it hangs on the surface itself: a spline through the boundary.
+    base : matters where it hangs on the surface itself, as a spline through the boundary, and where `drawn`.
+    drawn : the boundary was drawn on the surface and moves with it; needs the base.
     """
     inside, weight = corner_weights(boundary, xyz[triangles][:, :, :2])
     value, gradient = _of_weights(xyz, triangles[inside], weight)
-    if isinstance(base, SplineBase):
-        of_base, base_weight = barycentric_weights(xyz, triangles, base.xy, -base.integral)
+    nodes, moved = nodes_of(base), np.zeros_like(gradient)
+    if nodes is not None:
+        of_base, base_weight = barycentric_weights(xyz, triangles, nodes.xy, -nodes.integral)
         more, moved = _of_weights(xyz, triangles[of_base], base_weight)
         value, gradient = value + more, gradient + moved
+    if drawn and base is not None:
+        gradient[:, :2] = drawn_in_plan(xyz, triangles, boundary, base)
+        if nodes is not None:
+            gradient[:, :2] -= moved[:, 2:] * slope_of_nodes(base)
     return value, Functional(xyz, gradient, np.ones(len(xyz)))
 
 
@@ -112,7 +121,11 @@ def _of_weights(xyz: np.ndarray, corners: np.ndarray, weight: np.ndarray) -> tup
 
 
 def cell_volume(
-    surface: Surface, boundary: Boundary, base: Base | None = None, sigma: Surface | None = None
+    surface: Surface,
+    boundary: Boundary,
+    base: Base | None = None,
+    sigma: Surface | None = None,
+    drawn: bool = False,
 ) -> Functional:
     """The gradient of a volume by the cells of a surface, every cell a picket; many cells are put together.
 
@@ -121,13 +134,15 @@ def cell_volume(
     Parameters
     ----------
     sigma : m, σ of the noise of every cell, on the same cells; None where not known.
+    drawn : as of `tin_volume`.
     """
     rows, columns = cells_within(surface.grid, boundary)[2:]
     factor = max(1, int(np.ceil(np.sqrt(rows * columns / MOST_CELLS))))
     size = max(factor, 1024 // factor * factor)
-    extra = _spline_cells(surface.grid, base)
+    extra = _node_cells(surface.grid, nodes_of(base))
+    moving = base if drawn else None
     parts = [
-        _window_cells(surface, boundary, extra, window, factor, sigma)
+        _window_cells(surface, boundary, extra, window, factor, sigma, moving)
         for window in windows(surface.grid, boundary, size)
     ]
     xyz, gradient, share, noise = (np.concatenate([part[k] for part in parts]) for k in range(4))
@@ -141,6 +156,7 @@ def _window_cells(
     window: tuple[int, int, int, int],
     factor: int,
     sigma: Surface | None,
+    moving: Base | None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Places, gradient, noise share and noise of the cells of a window, `factor` × `factor` of them together."""
     row, column, rows, columns = window
@@ -150,17 +166,25 @@ def _window_cells(
     slope_y = (z[:-2, 1:-1] - z[2:, 1:-1]) / (2.0 * grid.cell_y)
     z = z[1:-1, 1:-1]
     weight = boundary.coverage(grid) * grid.cell_x * grid.cell_y
+    of_nodes = np.zeros_like(weight)
     for (i, j), value in extra.items():
         if row <= i < row + rows and column <= j < column + columns:
-            weight[i - row, j - column] += value
+            of_nodes[i - row, j - column] += value
+    weight += of_nodes
     weight[~np.isfinite(z)] = 0.0
     z, slope_x, slope_y = (np.where(np.isfinite(v), v, 0.0) for v in (z, slope_x, slope_y))
     x, y = np.meshgrid(grid.x(np.arange(columns)), grid.y(np.arange(rows)))
+    in_plan = (-slope_x * weight, -slope_y * weight)
     size = np.abs(weight)
+    if moving is not None:
+        slope = slope_of_nodes(moving)
+        by_x, by_y = drawn_cells(surface, boundary, moving, window)
+        in_plan = (by_x - of_nodes * slope[0], by_y - of_nodes * slope[1])
+        size = size + NEXT_TO * np.hypot(*in_plan) * (z != 0.0)
     total, squares = _together(size, factor), _together(weight**2, factor)
     used = total > 0.0
     places = np.stack([_together(size * v, factor)[used] / total[used] for v in (x, y, z)], axis=-1)
-    sums = [_together(v, factor)[used] for v in (-slope_x * weight, -slope_y * weight, weight)]
+    sums = [_together(v, factor)[used] for v in (*in_plan, weight)]
     gradient = np.stack(sums, axis=-1)
     with np.errstate(divide="ignore"):
         share = np.where(gradient[:, 2] != 0.0, squares[used] / gradient[:, 2] ** 2, 1.0)
@@ -185,15 +209,15 @@ def _together(values: np.ndarray, factor: int) -> np.ndarray:
     return padded.reshape(rows // factor, factor, columns // factor, factor).sum(axis=(1, 3))
 
 
-def _spline_cells(grid: Grid, base: Base | None) -> dict[tuple[int, int], float]:
-    """Weights that a spline through the boundary gives to single cells, negative: its heights are bilinear in them."""
+def _node_cells(grid: Grid, nodes: Nodes | None) -> dict[tuple[int, int], float]:
+    """Weights that the nodes of a base give to single cells, negative: their heights are bilinear in them."""
     out: dict[tuple[int, int], float] = {}
-    if not isinstance(base, SplineBase):
+    if nodes is None:
         return out
-    row, column = grid.row(base.xy[:, 1]), grid.column(base.xy[:, 0])
+    row, column = grid.row(nodes.xy[:, 1]), grid.column(nodes.xy[:, 0])
     i, j = np.floor(row).astype(int), np.floor(column).astype(int)
     t, s = row - i, column - j
     for di, dj, share in ((0, 0, (1 - t) * (1 - s)), (0, 1, (1 - t) * s), (1, 0, t * (1 - s)), (1, 1, t * s)):
-        for a, b, value in zip(i + di, j + dj, -base.integral * share, strict=True):
+        for a, b, value in zip(i + di, j + dj, -nodes.integral * share, strict=True):
             out[int(a), int(b)] = out.get((int(a), int(b)), 0.0) + float(value)
     return out

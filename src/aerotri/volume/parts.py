@@ -81,7 +81,7 @@ def part_of_cells(
     noise : what the surface says of its cells; a σ or a window that the options state counts instead.
     """
     own = noise.sigma if options.matching_sigma_um is None else None
-    functional = cell_volume(surface, boundary, base, own)
+    functional = cell_volume(surface, boundary, base, own, options.boundary_from == "product")
     length = noise.length_m if options.matching_window_m is None else options.matching_window_m
     pickets, seen = pickets_where_seen(
         calibration, functional.xyz, matching_sigma_mm(calibration, options), options.per_point, functional.noise_share
@@ -102,7 +102,7 @@ def part_of_pickets(
     options: SigmaOptions,
 ) -> Part:  # fmt: skip
     """The share of a TIN of pickets whose photographs are known."""
-    functional = tin_volume(pickets.xyz, triangles, boundary, base)[1]
+    functional = tin_volume(pickets.xyz, triangles, boundary, base, options.boundary_from == "product")[1]
     response = respond(calibration, pickets, functional.gradient, options.corrected)
     corners = pickets.xyz[triangles][:, :, :2]
     pieces = cut_to(boundary.polygon, corners)

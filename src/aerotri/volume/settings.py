@@ -24,6 +24,10 @@ class SectionPlan:
     azimuth: float = 0.0
 
 
+BoundaryFrom = Literal["survey", "product"]
+BOUNDARIES_FROM: tuple[BoundaryFrom, ...] = get_args(BoundaryFrom)
+
+
 @dataclass(frozen=True)
 class SigmaOptions:
     """What is known beside the adjustment.
@@ -35,6 +39,8 @@ class SigmaOptions:
         None: the noise length of a dense surface, 0 of others.
     per_point : photographs a cell is measured in. base_sigma : m, common to the whole base.
     boundary_sigma : m, of either coordinate of every corner. corrected : the photographs were corrected.
+    boundary_from : 'survey', the boundary is fixed in space, or 'product', it was drawn on the surface or on an
+        orthophoto of the same adjustment and moves with it.
     """
 
     matching_sigma_um: float | None = None
@@ -43,6 +49,7 @@ class SigmaOptions:
     base_sigma: float = 0.0
     boundary_sigma: float = 0.0
     corrected: bool = True
+    boundary_from: BoundaryFrom = "survey"
 
 
 @dataclass(frozen=True)
