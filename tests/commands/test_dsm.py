@@ -38,7 +38,7 @@ def made(tmp_path_factory):
     (here / "plan.toml").write_text(PLAN, encoding="utf-8")
     run("simulate", here / "plan.toml", "--out", here / "block", "--seed", 3, "--render")
     run("adjust", here / "block", "--out", here / "result", "--no-plots")
-    printed = run("dsm", here / "result", here / "block" / "photographs", "--out", here / "dsm", "--json")
+    printed = run("dsm", here / "result", here / "block" / "photographs", "--out", here / "dsm", "--json", "--ground")
     return here, json.loads(printed)
 
 
@@ -91,6 +91,18 @@ def test_the_cloud_has_colours_normals_and_covariances(made):
     # with control of 5 cm the plan is as good as control and tie points make it
     assert (s[0] > 0.0).all()
     assert np.median(s[0]) < 1.0
+
+
+def test_the_ground_is_marked_in_raster_and_cloud(made):
+    here, content = made
+    z, ground, source = (_whole(here / "dsm" / name) for name in ("dsm.tif", "dtm.tif", "ground.tif"))
+    measured, bridged = source == 1, source == 2
+    assert content["ground"]["measured"] == measured.sum() > 0.9 * np.isfinite(z).sum()
+    assert content["ground"]["bridged"] == bridged.sum()
+    np.testing.assert_array_equal(ground[measured], z[measured])
+    np.testing.assert_array_equal(np.isfinite(ground), measured | bridged)
+    classes = np.asarray(laspy.read(here / "dsm" / "dsm.laz").classification)
+    assert (classes == 2).sum() == measured.sum()
 
 
 def test_colours_are_those_of_the_photographs(made):

@@ -18,6 +18,7 @@ from aerotri.terrain.settings import (
     LARGEST_EDGE,
     MOST_PAIRS,
     MOST_PHOTOGRAPHS,
+    MOST_WIDE_M,
     DenseSettings,
     TerrainSettings,
 )
@@ -190,13 +191,23 @@ def dsm(
             "--ideal", help="The photographs are those of imgeo, without image errors.", rich_help_panel=INPUT
         ),
     ] = DENSE_DEFAULTS.ideal,
+    ground: Annotated[
+        bool,
+        typer.Option("--ground", help="Write the ground without objects besides, dtm.tif.", rich_help_panel=OUTPUT),
+    ] = DENSE_DEFAULTS.ground,
+    widest_object: Annotated[
+        float,
+        typer.Option(
+            min=1.0, max=MOST_WIDE_M, help="Widest object that is taken off the ground, m.", rich_help_panel=OUTPUT
+        ),
+    ] = DENSE_DEFAULTS.widest_object,
     plots: Annotated[bool, typer.Option(help="Draw the surface.", rich_help_panel=OUTPUT)] = True,
     json_: Json = False,
 ) -> None:
     """The whole surface by dense matching: a height and its standard deviation for every cell."""
     from aerotri.commands.dsm import run_dsm
 
-    settings = DenseSettings(resolution, area, most_pairs, edge, ideal)
+    settings = DenseSettings(resolution, area, most_pairs, edge, ideal, ground, widest_object)
     raise typer.Exit(run_dsm(result, photographs, out, settings, plots, json_))
 
 

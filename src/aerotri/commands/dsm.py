@@ -60,4 +60,10 @@ def _summary(content: dict[str, Any]) -> list[str]:
     )
     y = c["y_parallax_px"]
     lines.append(f"y-parallax of the pairs: median {y['median']:.2f} px, largest {y['largest']:.2f} px")
+    g = c["ground"]
+    if g is not None:
+        lines.append(
+            f"ground: {g['measured']} cells measured, {g['bridged']} bridged; σ of a bridge "
+            f"{g['bridge']['sigma_at_1_m']:.3f} m · distance^{g['bridge']['power']:.1f}"
+        )
     return lines

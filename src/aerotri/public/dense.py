@@ -27,10 +27,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from aerotri.formats.files.spool import Spool
+    from aerotri.terrain.dense.bare_ground import BareGround
     from aerotri.terrain.dense.measure import DenseOutcome
 
 RECORD, SURFACE, MATCHING, COUNT, CLOUD = "dsm.json", "dsm.tif", "matching.tif", "photographs.tif", "dsm.laz"
-OWN_NAMES = (RECORD, SURFACE, MATCHING, COUNT, CLOUD, "plots")
+GROUND, SOURCE = "dtm.tif", "ground.tif"
+OWN_NAMES = (RECORD, SURFACE, MATCHING, COUNT, CLOUD, GROUND, SOURCE, "plots")
 STATED = "tiles.json"
 DRAWN = 1200
 """Cells drawn along a side, the others skipped."""
@@ -80,6 +82,7 @@ class DenseSurface:
     ----------
     record : the numbers, in tiles. block : name of the block. crs : its coordinate system.
     adjustment : key of the adjustment it was measured with.
+    ground : the ground without objects, None where it was not asked for.
     keeper : what removes the tiles when nobody uses them any more; None where they stay.
     """
 
@@ -87,6 +90,7 @@ class DenseSurface:
     block: str
     crs: str
     adjustment: str
+    ground: BareGround | None = None
     keeper: Spool | None = None
 
     @cached_property
@@ -103,11 +107,32 @@ class DenseSurface:
         return Surface(Heights(grid, z, sigma), horizontal_crs(self.crs), SURFACE)
 
     @cached_property
+    def dtm(self) -> Surface:
+        """The ground without objects and its σ, as `surface` has the whole, held in memory.
+
+        Raises
+        ------
+        InputError
+            When the surface was measured without ground=True.
+        """
+        from aerotri.rasters.grids import horizontal_crs
+        from aerotri.terrain.surface import Surface as Heights
+
+        if self.ground is None:
+            raise InputError("the ground was not filtered", "measure the surface with ground=True")
+        grid = self.record.grid
+        z, sigma = np.full((grid.rows, grid.columns), np.nan), np.full((grid.rows, grid.columns), np.nan)
+        for row, column, heights, total in _ground_parts(self.record, self.ground):
+            place = np.s_[row : row + heights.shape[0], column : column + heights.shape[1]]
+            z[place], sigma[place] = heights, total
+        return Surface(Heights(grid, z, sigma), horizontal_crs(self.crs), GROUND)
+
+    @cached_property
     def summary(self) -> dict[str, Any]:
         """The content of dsm.json: cells, σ and its parts."""
         from aerotri.formats.results.dense import dense_json
 
-        return dense_json(self.record, self.block, self.crs) | {"adjustment": self.adjustment}
+        return dense_json(self.record, self.block, self.crs, self.ground) | {"adjustment": self.adjustment}
 
     @property
     def plot(self) -> DensePlots:
@@ -116,6 +141,8 @@ class DenseSurface:
 
     def save(self, out: FilePath, plots: bool = True) -> Path:
         """Write dsm.tif, matching.tif, photographs.tif, dsm.laz, dsm.json and the plots into a folder.
+
+        Where the ground was filtered, dtm.tif and ground.tif besides.
 
         Parameters
         ----------
@@ -162,6 +189,8 @@ def dense_surface(
     most_pairs: int = DENSE_DEFAULTS.most_pairs,
     edge: float = DENSE_DEFAULTS.edge,
     ideal: bool = DENSE_DEFAULTS.ideal,
+    ground: bool = DENSE_DEFAULTS.ground,
+    widest_object: float = DENSE_DEFAULTS.widest_object,
     tiles: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> DenseSurface:
@@ -176,6 +205,8 @@ def dense_surface(
     most_pairs : pairs of photographs that measure a piece of ground, at most.
     edge : share of the format at its edge that is not used.
     ideal : the photographs are those of `aerotri.ideal_photographs`, free of image errors.
+    ground : filter the ground besides, without objects.
+    widest_object : m, the widest object that is taken off it.
     tiles : folder for the tiles of the surface; a run that was ended goes on with those it finds there. None: a
         temporary one.
     progress : as of `aerotri.adjust`.
@@ -183,7 +214,7 @@ def dense_surface(
     Returns
     -------
     DenseSurface
-        Its `surface` has heights and σ.
+        Its `surface` has heights and σ, its `dtm` those of the ground.
 
     Raises
     ------
@@ -196,7 +227,8 @@ def dense_surface(
     >>> dense = aerotri.dense_surface("saar_result", "photographs")  # doctest: +SKIP
     >>> dense.save("saar_dsm")  # doctest: +SKIP
     """
-    return measure_dense(result, paths_of(photographs), DenseSettings(resolution, area, most_pairs, edge, ideal),
+    return measure_dense(result, paths_of(photographs), DenseSettings(resolution, area, most_pairs, edge, ideal, ground,
+                                                                         widest_object),
                          None if tiles is None else Path(tiles), progress)  # fmt: skip
 
 
@@ -211,6 +243,7 @@ def measure_dense(
     InputError
     """
     from aerotri.formats.files.spool import Spool
+    from aerotri.terrain.dense.bare_ground import bare_ground
     from aerotri.terrain.dense.measure import DensePlan, measure_surface
     from aerotri.terrain.dtm import chosen_rows
     from aerotri.terrain.pickets import Area
@@ -230,8 +263,9 @@ def measure_dense(
     plan = DensePlan(rows, paths, tiles, settings.resolution, area, settings.most_pairs, settings.edge, settings.ideal)
     with stage_report(progress) as report:
         outcome = measure_surface(record, plan, report.stage)
+    ground = bare_ground(outcome, settings.widest_object) if settings.ground else None
     block = record.result.block
-    return DenseSurface(outcome, str(block.name), block.crs, key, keeper)
+    return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper)
 
 
 def _open_tiles(folder: Path, settings: DenseSettings, key: str, paths: tuple[Path, ...]) -> None:
@@ -243,8 +277,9 @@ def _open_tiles(folder: Path, settings: DenseSettings, key: str, paths: tuple[Pa
         When it holds other files, or cannot be written to.
     """
     files = [[path.name, path.stat().st_size, path.stat().st_mtime_ns] for path in paths]
+    of_tiles = {name: value for name, value in asdict(settings).items() if name not in ("ground", "widest_object")}
     stated = json.dumps(
-        {"settings": asdict(settings), "adjustment": key, "photographs": files, "aerotri": __version__}, sort_keys=True
+        {"settings": of_tiles, "adjustment": key, "photographs": files, "aerotri": __version__}, sort_keys=True
     )
     mark = hashlib.sha256(stated.encode()).hexdigest()
     there = folder / STATED
@@ -265,6 +300,13 @@ def _open_tiles(folder: Path, settings: DenseSettings, key: str, paths: tuple[Pa
 def _surface_parts(o: DenseOutcome) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
     """First row and column, heights and their σ, of every tile."""
     for window, tile in o.files.read_all(list(o.windows)):
+        grid = o.grid.window(window.row, window.column, window.rows, window.columns)
+        yield window.row, window.column, tile.z, np.hypot(tile.sigma, o.shared.over(grid))
+
+
+def _ground_parts(o: DenseOutcome, ground: BareGround) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
+    """First row and column, heights of the ground and their σ, of every tile."""
+    for window, tile in ground.tiles():
         grid = o.grid.window(window.row, window.column, window.rows, window.columns)
         yield window.row, window.column, tile.z, np.hypot(tile.sigma, o.shared.over(grid))
 
@@ -292,7 +334,12 @@ def _write(target: Path, dense: DenseSurface, plots: bool) -> None:
         write_raster_parts(folder / COUNT, count, o.grid, crs, what, np.dtype(np.uint8), 0.0)
         lowest = min(float(np.nanmin(t.z)) for _, t in o.files.read_all(windows) if np.isfinite(t.z).any())
         low = np.array([o.grid.left, o.grid.bounds[1], lowest])
-        write_surface_cloud(folder / CLOUD, surface_points(o), low, crs)
+        write_surface_cloud(folder / CLOUD, surface_points(o, dense.ground), low, crs)
+        if dense.ground is not None:
+            write_surface_parts(folder / GROUND, _ground_parts(o, dense.ground), o.grid, crs, "DTM Z, m", tags)
+            source = ((w.row, w.column, tile.source) for w, tile in dense.ground.tiles())
+            what = "ground: 1 measured, 2 bridged"
+            write_raster_parts(folder / SOURCE, source, o.grid, crs, what, np.dtype(np.uint8), 0.0)
         if plots:
             from aerotri.report.plots.rendering import save_plots
 

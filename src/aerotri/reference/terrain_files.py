@@ -93,6 +93,14 @@ DSM_JSON = (
     Item("y_parallax_px", "object", "Shift across the base of a pair, its median over a tile, without sign.", "px"),
     Item("y_parallax_px.median", "number", "Median of the pairs.", "px"),
     Item("y_parallax_px.largest", "number", "Largest of the pairs.", "px"),
+    Item("ground", "object?", "The ground without objects; null without --ground."),
+    Item("ground.measured", "whole", "Cells of the surface that are ground."),
+    Item("ground.bridged", "whole", "Cells that are bridged from the ground around them."),
+    Item("ground.widest_object_m", "number", "Width of the widest object that was taken off.", "m"),
+    Item("ground.bridge", "object", "Error of a bridge: sigma_at_1_m · distance^power, m, distance from the ground."),
+    Item("ground.bridge.sigma_at_1_m", "number", "RMS error one metre from the ground.", "m"),
+    Item("ground.bridge.power", "number", "Power by which it grows with the distance."),
+    Item("ground.bridge.discs", "whole", "Discs of ground that were taken out, bridged and compared to find it."),
     Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
 )
 DIFFERENCE = (
@@ -269,7 +277,7 @@ SECTIONS = (
 
 def terrain_files() -> tuple[DescribedFile, ...]:
     """The files of dtm, dsm, compare and volume."""
-    pairs, plots = "with --pairs", "unless --no-plots"
+    pairs, plots, ground = "with --pairs", "unless --no-plots", "with --ground"
     return (
         DescribedFile("dtm.json", DTM, "json", "Number and accuracy of the ground points.", DTM_JSON),
         DescribedFile(
@@ -294,11 +302,25 @@ def terrain_files() -> tuple[DescribedFile, ...]:
         DescribedFile("matching.tif", DSM, "raster", "Standard deviation of the heights from matching alone, m."),
         DescribedFile("photographs.tif", DSM, "raster", "Number of photographs that measured a cell; 0: none."),
         DescribedFile(
+            "dtm.tif",
+            DSM,
+            "raster",
+            "Ground without objects: band 1 height, band 2 its standard deviation, m.",
+            when=ground,
+        ),
+        DescribedFile(
+            "ground.tif",
+            DSM,
+            "raster",
+            "Where a height of dtm.tif comes from: 1 measured, 2 bridged, 0 none.",
+            when=ground,
+        ),
+        DescribedFile(
             "dsm.laz",
             DSM,
             "other",
             "The cells as LAZ 1.4 with colours; extra bytes NormalX, NormalY, NormalZ, sigma_x, sigma_y, sigma_z, m, "
-            "cov_xy, cov_xz, cov_yz, m², sigma_z_matching and photographs.",
+            "cov_xy, cov_xz, cov_yz, m², sigma_z_matching and photographs. Class 2 is ground.",
         ),
         DescribedFile("plots", DSM, "folder", "The surface and its standard deviation, PNG and SVG.", when=plots),
         DescribedFile("compare.json", COMPARE, "json", "Statistics of the differences of two surfaces.", COMPARE_JSON),

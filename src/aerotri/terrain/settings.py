@@ -23,6 +23,9 @@ EDGE, EDGE_OF_PAIRS = 0.02, 0.10
 """Share of the format at its edge not used: of pairs as Tran (2007) has it; where more vouch for a picket, less."""
 LARGEST_EDGE = 0.4
 """Share of the format that `edge` may take on every side; at a half nothing would be left."""
+WIDEST_OBJECT_M, MOST_WIDE_M = 18.0, 200.0
+"""Width of the widest object that is taken off the ground, that of PDAL's filters.smrf, and the bound of the setting:
+beyond, hills go with the houses."""
 MOST_PAIRS = 12
 """Pairs of a piece of ground, the bound of the setting; more take time and tell nothing new."""
 FEWEST_PHOTOGRAPHS, MOST_PHOTOGRAPHS = 2, 20
@@ -117,6 +120,7 @@ class DenseSettings:
     most_pairs : pairs of photographs that measure a piece of ground, at most.
     edge : share of the format at its edge that is not used.
     ideal : the photographs have been freed of image errors.
+    ground : filter the ground besides. widest_object : m, the widest object that is taken off it.
     """
 
     resolution: float | None = None
@@ -124,6 +128,8 @@ class DenseSettings:
     most_pairs: int = 4
     edge: float = EDGE
     ideal: bool = False
+    ground: bool = False
+    widest_object: float = WIDEST_OBJECT_M
 
     def check(self) -> None:
         """Refuse what makes no sense.
@@ -136,7 +142,7 @@ class DenseSettings:
             raise InputError("the area is empty", "give X and Y of its lower left, then of its upper right corner")
         for name, value, low, high in (
             ("resolution", self.resolution, 1e-6, LARGEST), ("most_pairs", self.most_pairs, 1, MOST_PAIRS),
-            ("edge", self.edge, 0.0, LARGEST_EDGE),
+            ("edge", self.edge, 0.0, LARGEST_EDGE), ("widest_object", self.widest_object, 1.0, MOST_WIDE_M),
         ):  # fmt: skip
             if value is not None and not low <= value <= high:
                 raise InputError(f"{name} {value:g} is not possible", f"give a number from {low:g} to {high:g}")

@@ -15,6 +15,7 @@ from scipy.ndimage import binary_dilation, distance_transform_edt, grey_opening
 
 from aerotri.memory import fitting, refuse_beyond_memory
 from aerotri.rasters.grids import Grid
+from aerotri.terrain.settings import WIDEST_OBJECT_M
 from aerotri.terrain.tin import triangulate
 
 LONGEST_SIDE = 2.6
@@ -28,7 +29,7 @@ FEWEST_LEFT_OUT = 30
 LEAST_POWER, MOST_POWER = 0.5, 2.0
 """Bounds of the power with which the error grows with the interval: 2 is that of straight triangles over smooth ground,
 a half that over ground as rough as a random walk."""
-SMRF_SLOPE, SMRF_WINDOW_M, SMRF_HEIGHT_M, SMRF_SCALE = 0.15, 18.0, 0.5, 1.25
+SMRF_SLOPE, SMRF_WINDOW_M, SMRF_HEIGHT_M, SMRF_SCALE = 0.15, WIDEST_OBJECT_M, 0.5, 1.25
 """Slope, width of the widest object, m, height tolerance, m, and its growth with the slope times the cell: those that
 PDAL's filters.smrf has for this method."""
 
@@ -127,7 +128,9 @@ def interpolation_error(xyz: np.ndarray, node: np.ndarray, interval: float, vari
     return float(two * 2.0 ** -np.clip(power, LEAST_POWER, MOST_POWER))
 
 
-def ground_cells(z: np.ndarray, cell: float, blur: float = 0.0, stated: np.ndarray | None = None) -> np.ndarray:
+def ground_cells(
+    z: np.ndarray, cell: float, blur: float = 0.0, stated: np.ndarray | None = None, widest: float = SMRF_WINDOW_M
+) -> np.ndarray:
     """(rows, columns) bool: cells of a surface that are ground and no object on it.
 
     The simple morphological filter [L: Pingel, Clarke, McBride 2013]: the surface is opened by ever wider discs; what
@@ -139,13 +142,14 @@ def ground_cells(z: np.ndarray, cell: float, blur: float = 0.0, stated: np.ndarr
     blur : m beside an object that are no ground either: the windows of matching have some of the object in them, so
         that walls become slopes, whose feet no opening takes off.
     stated : bool as z, cells that are ground whatever their shape: a stockpile is steeper than the filter allows.
+    widest : m, of the objects.
     """
     known = np.isfinite(z)
     if not known.any():
         return known
     filled = _nearest(z, known)
     last, objects = filled, np.zeros(z.shape, bool)
-    for radius in range(1, max(int(np.ceil(SMRF_WINDOW_M / 2.0 / cell)), 1) + 1):
+    for radius in range(1, max(int(np.ceil(widest / 2.0 / cell)), 1) + 1):
         opened = grey_opening(last, footprint=_disc(radius))
         objects |= last - opened > SMRF_SLOPE * radius * cell
         last = opened

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.terrain.dense.bare_ground import BRIDGED, MEASURED, BareGround
 from aerotri.terrain.dense.measure import DenseOutcome
 from aerotri.version import __version__
 
 
-def dense_json(outcome: DenseOutcome, block: str, crs: str) -> dict[str, Any]:
+def dense_json(outcome: DenseOutcome, block: str, crs: str, ground: BareGround | None = None) -> dict[str, Any]:
     """The content of dsm.json."""
     o = outcome
     sigma, matching, shared, count = (np.concatenate(part) for part in zip(*_samples(o), strict=True))
@@ -30,7 +31,18 @@ def dense_json(outcome: DenseOutcome, block: str, crs: str) -> dict[str, Any]:
         "y_parallax_px": {
             "median": float(np.median(np.abs(o.across_px))), "largest": float(np.abs(o.across_px).max(initial=0.0)),
         },
+        "ground": None if ground is None else _ground(ground),
     }  # fmt: skip
+
+
+def _ground(ground: BareGround) -> dict[str, Any]:
+    measured = bridged = 0
+    for _, tile in ground.tiles():
+        measured += int((tile.source == MEASURED).sum())
+        bridged += int((tile.source == BRIDGED).sum())
+    law = ground.law
+    bridge = {"sigma_at_1_m": law.at_1_m, "power": law.power, "discs": law.discs}
+    return {"measured": measured, "bridged": bridged, "widest_object_m": ground.widest, "bridge": bridge}
 
 
 def _samples(o: DenseOutcome) -> list[tuple[np.ndarray, ...]]:

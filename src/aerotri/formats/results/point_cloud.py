@@ -51,7 +51,7 @@ def write_point_cloud(path: Path, xyz: np.ndarray, sigma: np.ndarray, ground: np
 
 
 def write_surface_cloud(path: Path, parts: Iterable[SurfacePoints], low: np.ndarray, crs: str | None) -> int:
-    """Write the cells of a surface as LAZ 1.4 with colours and `SURFACE_FIELDS`; how many.
+    """Write the cells of a surface as LAZ 1.4 with colours and `SURFACE_FIELDS`, ground as class 2; how many.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def write_surface_cloud(path: Path, parts: Iterable[SurfacePoints], low: np.ndar
         for part in parts:
             points = laspy.ScaleAwarePointRecord.zeros(len(part.xyz), header=header)
             points.x, points.y, points.z = part.xyz.T
-            points["classification"] = np.full(len(part.xyz), UNCLASSIFIED, np.uint8)
+            points["classification"] = np.where(part.ground, GROUND, UNCLASSIFIED).astype(np.uint8)
             points["red"], points["green"], points["blue"] = part.colour.T
             for name, values in zip(SURFACE_FIELDS, _surface_fields(part), strict=True):
                 points[name[0]] = values

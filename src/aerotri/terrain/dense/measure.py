@@ -71,7 +71,8 @@ class DenseOutcome:
     grid : all cells. windows, files : its tiles. shared : what the adjustment adds to σ.
     photographs : what was matched; paths : their files. level : of resolution they were matched at.
     cells : that have a height. shared_cells : cells a side of the square that has one noise.
-    across_px : median shift across the base of a pair. factors : of the tiles. pairs : matched in all tiles. resumed : tiles that an earlier run had made.
+    across_px : median shift across the base of a pair. factors : of the tiles. pairs : matched in all tiles.
+    resumed : tiles that an earlier run had made.
     """
 
     grid: Grid

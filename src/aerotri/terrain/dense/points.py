@@ -12,6 +12,7 @@ from aerotri.rasters.grids import Grid
 from aerotri.terrain.dense.colours import Colours
 
 if TYPE_CHECKING:
+    from aerotri.terrain.dense.bare_ground import BareGround
     from aerotri.terrain.dense.measure import DenseOutcome
 
 
@@ -22,8 +23,8 @@ class SurfacePoints:
     Parameters
     ----------
     xyz : (n, 3) m. covariance : (n, 6) m², XX, XY, XZ, YY, YZ, ZZ. matching : (n,) m, σ of Z of matching alone.
-    photographs : (n,) how many measured it. normal : (n, 3) of length 1, upwards. colour : (n, 3) uint16 red, green,
-        blue.
+    photographs : (n,) how many measured it. normal : (n, 3) of length 1, upwards.
+    colour : (n, 3) uint16 red, green, blue. ground : (n,) bool, whether each is ground.
     """
 
     xyz: np.ndarray
@@ -32,10 +33,11 @@ class SurfacePoints:
     photographs: np.ndarray
     normal: np.ndarray
     colour: np.ndarray
+    ground: np.ndarray
 
 
-def surface_points(outcome: DenseOutcome) -> Iterator[SurfacePoints]:
-    """The points of every tile.
+def surface_points(outcome: DenseOutcome, ground: BareGround | None = None) -> Iterator[SurfacePoints]:
+    """The points of every tile; which are ground is known where it was filtered.
 
     A cell stands where it stands: what matching does to it along the ray is an error of its height there. In X and Y
     it has the σ of the adjustment alone [D].
@@ -59,6 +61,7 @@ def surface_points(outcome: DenseOutcome) -> Iterator[SurfacePoints]:
         yield SurfacePoints(
             xyz, covariance, matching, tile.count[row, column], normals(tile.z, grid)[row, column],
             colours.of(xyz, tile.shown_by[row, column]),
+            np.zeros(len(row), bool) if ground is None else ground.measured(window)[row, column],
         )  # fmt: skip
 
 
