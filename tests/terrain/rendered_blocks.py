@@ -1,6 +1,7 @@
 """A small block with photographs of it, its orientation as good as free of error."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from aerotri.rasters.images import create_image
 from aerotri.results.adjustment import Adjustment
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.rendering import RenderOptions, Scene, make_scene, render
+from aerotri.simulation.rendering_texture import Lattice, Texture
 from aerotri.terrain.photographs import Photographs, photographs_of
 from small_blocks import small_spec
 
@@ -34,6 +36,16 @@ class Rendered:
         return photographs_of(self.calibration, np.arange(len(self.paths)), self.paths)
 
 
+@dataclass(frozen=True)
+class Painted(Texture):
+    """A texture with something painted on it, that `paint` makes of its nodes."""
+
+    paint: Callable[[Lattice], Lattice]
+
+    def lattice(self, low: np.ndarray, high: np.ndarray) -> Lattice:
+        return self.paint(super().lattice(low, high))
+
+
 def write_photograph(path: Path, pixels: np.ndarray) -> Path:
     with create_image(path, pixels.shape[1], pixels.shape[0], 1, pixels.dtype.name) as writer:
         writer.write(0, pixels[None])
@@ -45,6 +57,7 @@ def rendered_block(
     errors: dict | None = None,
     options: RenderOptions | None = None,
     flight: dict | None = None,
+    paint: Callable[[Lattice], Lattice] | None = None,
     **terrain,
 ) -> Rendered:
     tables = small_spec(camera={"cam": CAMERA | ({"errors": errors} if errors else {})})
@@ -58,6 +71,8 @@ def rendered_block(
     spec = parse_spec(tables)
     block, truth = simulate(spec, 1)
     scene = make_scene(spec, 1, block, truth, options or RenderOptions())
+    if paint is not None:
+        scene = replace(scene, texture=Painted(scene.texture.spacing, scene.texture.seed, paint))
     folder.mkdir(exist_ok=True)
     paths = tuple(write_photograph(folder / f"{name}.tif", render(scene, k)) for k, name in enumerate(scene.names))
     return Rendered(block, scene, paths, adjust_keeping_system(block))

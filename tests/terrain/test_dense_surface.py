@@ -19,6 +19,7 @@ from aerotri.terrain.dense.pairs import Pair, chosen_pairs, noise_correlation
 from aerotri.terrain.dense.parallaxes import parallaxes_of
 from aerotri.terrain.dense.place import place_at
 from aerotri.terrain.dense.points import normals
+from aerotri.terrain.dense.tile import step_sigma
 from aerotri.terrain.pickets import Area
 
 
@@ -194,6 +195,20 @@ def test_the_pairs_that_agree_make_the_height():
     assert np.isnan(z)
     assert np.isnan(sigma)
     assert count == 0
+
+
+def test_beside_a_step_sigma_has_a_share_of_it():
+    z = np.full((20, 30), 100.0) + 0.3 * np.arange(30)  # a slope is no step
+    z[:, 15:] += 8.0
+    found = step_sigma(z, 1.0)
+    assert (found[:, [14, 15]] > 3.0).all()
+    assert (found[:, :14] == 0.0).all()
+    assert (found[:, 16:] == 0.0).all()
+    z[:, 13:15] = np.nan
+    found = step_sigma(z, 1.0)
+    assert (found[:, [12, 15]] > 3.0).all()
+    assert (found[:, :12] == 0.0).all()
+    assert (step_sigma(z, 20.0) == 0.0).all()
 
 
 def test_pairs_that_share_a_photograph_share_its_noise(hill):

@@ -30,7 +30,8 @@ from __future__ import annotations
 
 import argparse
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -39,10 +40,11 @@ from scipy.ndimage import binary_dilation
 import aerotri
 from aerotri.public.dense import DenseSurface
 from aerotri.rasters.grids import Grid
+from aerotri.simulation.rendering_texture import Lattice, Texture
 from aerotri.terrain.dense import tile
 from aerotri.terrain.dense.parallaxes import Parallaxes, semi_global
 
-GSD_M, STEEP_M = 0.5, 1.5
+GSD_M, STEEP_M, FEWEST = 0.5, 1.5, 100
 SPEC = {
     "name": "dense",
     "camera": {"cam": {"size_px": [1000, 750], "pixel_um": 30.0, "focal_length_mm": 30.0}},
@@ -68,6 +70,53 @@ SCENES: dict[str, tuple[dict, dict]] = {
     "no texture": ({"kind": "flat"}, {"contrast": 0.004, "noise": 300.0}),
 }  # fmt: skip
 """Ground and how it is rendered."""
+WALL = [[0.0, 0.0, 150.0, 4.0, 12.0], [-60.0, 60.0, 6.0, 6.0, 20.0], [60.0, -60.0, 6.0, 6.0, 20.0]]
+UNDULATING = {"kind": "undulating", "relief_rms_m": 6.0, "wavelength_m": 150.0}
+SCENES |= {
+    "repeated texture": (UNDULATING, {}), "shadow": (UNDULATING, {}), "water": (UNDULATING, {}),
+    "wall": (UNDULATING | {"houses": WALL}, {}), "tilted": (UNDULATING, {}), "y-parallax": (UNDULATING, {}),
+}  # fmt: skip
+OTHER_SPEC: dict[str, dict[str, dict]] = {
+    "tilted": {"flight": {"attitude_sigma_deg": [12.0, 12.0, 10.0]}},
+    "y-parallax": {"tie_points": {"sigma_um": 15.0, "stated_sigma_um": 15.0}},
+}
+"""What differs from the block of the other scenes."""
+PATCH_M, PERIOD_NODES, SHADOW, WATER, CONTRAST = (60.0, 40.0), 12, 0.12, 0.02, 0.25
+"""Half sides of the patch that is painted, nodes after which a texture repeats (a metre each), share of the light
+left in shadow, of the contrast on water, and contrast of the rendering."""
+
+
+def in_patch(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return (np.abs(x) < PATCH_M[0]) & (np.abs(y) < PATCH_M[1])
+
+
+def near_wall(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return (np.abs(x) < 90.0) & (np.abs(y) < 20.0)
+
+
+JUDGED: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
+    "repeated texture": in_patch, "shadow": in_patch, "water": in_patch, "wall": near_wall,
+}  # fmt: skip
+"""Where the errors of a scene are looked at; everywhere in others."""
+
+
+def painted(name: str, lattice: Lattice) -> Lattice:
+    """The texture of the ground with what lies on it in a scene."""
+    if name not in ("repeated texture", "shadow", "water"):
+        return lattice
+    values, spacing = lattice.values.copy(), lattice.spacing
+    rows, columns = lattice.row + np.arange(values.shape[0]), lattice.column + np.arange(values.shape[1])
+    inside = in_patch(spacing * columns[None, :], spacing * rows[:, None])
+    if name == "shadow":
+        other = (SHADOW - 1.0) / CONTRAST + SHADOW * values
+    elif name == "water":
+        other = WATER * values
+    else:
+        pattern = np.random.default_rng(5).normal(scale=2.0, size=(PERIOD_NODES, PERIOD_NODES))
+        other = pattern[np.ix_(rows % PERIOD_NODES, columns % PERIOD_NODES)]
+    return replace(lattice, values=np.where(inside, other, values).astype(np.float32))
+
+
 HEAD = (
     "| scene | coverage | median px | NMAD px | semi-global px | σ px | std z | NMAD z | beyond 4 σ | steep std z |\n"
     "|---|---|---|---|---|---|---|---|---|---|"
@@ -100,14 +149,17 @@ def row(folder: Path, name: str, seed: int) -> str:
     """A line of the table."""
     ground, look = SCENES[name]
     spec = SPEC | {"terrain": {"height_m": 50.0} | ground}
+    spec |= {table: SPEC[table] | other for table, other in OTHER_SPEC.get(name, {}).items()}
     flight = aerotri.simulate(spec, seed)
-    photographs = flight.save(folder / "flown", photographs=True, **look) / "photographs"
+    photographs = render(folder / "flown", flight, name, look)
     result = aerotri.adjust(flight.block, explain=False)
     try:
-        own = cells_of(aerotri.dense_surface(result, photographs), flight)
+        own = cells_of(aerotri.dense_surface(result, photographs), flight, name)
     except aerotri.InputError as error:
         return f"| {name} | {str(error).partition(' — ')[0]} |"
-    alone = cells_of(semi_global_surface(result, photographs), flight)
+    alone = cells_of(semi_global_surface(result, photographs), flight, name)
+    if len(own.error) < FEWEST:
+        return f"| {name} | {own.coverage:.3f} |"
     flat, z = ~own.steep, own.error / own.sigma
     steep = f"{np.std(z[own.steep]):.2f}" if own.steep.sum() > 100 else ""
     numbers = (
@@ -116,6 +168,16 @@ def row(folder: Path, name: str, seed: int) -> str:
         f"{np.std(z[flat]):.2f}", f"{nmad(z[flat]):.2f}", f"{100.0 * np.mean(np.abs(z[flat]) > 4.0):.2f} %", steep,
     )  # fmt: skip
     return f"| {name} | " + " | ".join(numbers) + " |"
+
+
+def render(folder: Path, flight, name: str, look: dict) -> Path:
+    """The folder of the photographs."""
+    bare = Texture.lattice
+    Texture.lattice = lambda self, low, high: painted(name, bare(self, low, high))  # type: ignore[method-assign]
+    try:
+        return flight.save(folder, photographs=True, **look) / "photographs"
+    finally:
+        Texture.lattice = bare
 
 
 def nmad(values: np.ndarray) -> float:
@@ -138,21 +200,26 @@ def semi_global_surface(result: aerotri.Adjustment, photographs: Path) -> DenseS
         tile.parallaxes_of = ours
 
 
-def cells_of(found: DenseSurface, flight) -> Cells:
-    """The cells of a surface against the true ground."""
+def cells_of(found: DenseSurface, flight, name: str) -> Cells:
+    """The cells of a surface against the true ground, where a scene is judged."""
     o = found.record
     errors, sigmas, steeps, able, measured = [], [], [], 0, 0
     for window, part in o.files.read_all(list(o.windows)):
         grid = o.grid.window(window.row, window.column, window.rows, window.columns)
         truth = truth_on(grid, flight)
-        known = np.isfinite(part.z)
-        seen = seen_twice(o, grid, truth)
+        judged = np.ones(truth.shape, bool)
+        if name in JUDGED:
+            x, y = np.meshgrid(grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows)))
+            judged = JUDGED[name](x, y)
+        known = np.isfinite(part.z) & judged
+        seen = seen_twice(o, grid, truth) & judged
         able += int(seen.sum())
         measured += int((known & seen).sum())
         change = np.maximum(*(np.abs(slope) for slope in np.gradient(truth)))
         steep = binary_dilation(change > STEEP_M, iterations=4)
         errors.append((part.z - truth)[known])
-        sigmas.append(part.sigma[known])
+        sigma = np.hypot(part.sigma, o.shared.over(grid)) if name == "y-parallax" else part.sigma
+        sigmas.append(sigma[known])
         steeps.append(steep[known])
     return Cells(np.concatenate(errors), np.concatenate(sigmas), np.concatenate(steeps), measured / max(able, 1))
 

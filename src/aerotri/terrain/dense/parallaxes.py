@@ -130,7 +130,9 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
         (np.abs(value - start) < LARGEST_SHIFT_PX) & (np.abs(across) < LARGEST_ACROSS_PX)
         & (correlation > LEAST_CORRELATION)
     )  # fmt: skip
-    sigma = np.sqrt(factor**2 * variance + LEAST_SIGMA_PX**2)
+    # where a pixel of the window is not known both images are the same: it tells nothing and hides noise
+    share = cv2.boxFilter((start > INVALID / 2).astype(np.float32), -1, (WINDOW_PX, WINDOW_PX))
+    sigma = np.sqrt(factor**2 * variance / np.maximum(share, 0.1) ** 2 + LEAST_SIGMA_PX**2)
     known &= sigma < LARGEST_SIGMA_PX
     nothing = np.float32(np.nan)
     bend = _bend(value, known)

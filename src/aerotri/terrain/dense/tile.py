@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
 
 from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.rasters.grids import Grid
@@ -28,6 +29,9 @@ AGREEING_PX = 1.0
 BEND_SHARE = 0.35
 """Share of the bend of the ground within a window that stays in the heights as an error; chosen [C]: with it the errors
 of rendered scenes over their σ have a standard deviation near 1 (tools/prove/dense_surface.py)."""
+STEP_SHARE, ACROSS_CELLS = 0.45, 7
+"""Share of a step that is σ of the cells beside it, and side of the square in which it is looked for beside a hole;
+chosen [C]: of rendered houses a quarter of these cells has the height of the other side, an RMS of half the step."""
 SMALLEST_PATCH, PATCH_STEP_PX = 50, 2.0
 """Cells of a patch of surface below which it is taken for chance, and the step, in pixels of parallax, that bounds it;
 chosen [C]: five by ten cells, the size of a window of the matching and its neighbours."""
@@ -167,7 +171,31 @@ def _fused(
     z[~patched], sigma[~patched], members[~patched] = np.nan, np.nan, 0
     known = np.isfinite(heights)
     bend = BEND_SHARE * np.where(known, bends, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    bend = np.hypot(bend, step_sigma(z, tolerance))
     return z + height, np.hypot(sigma * factor, bend), *_seen_by(members, np.array(photographs)), factor
+
+
+def step_sigma(z: np.ndarray, least: float) -> np.ndarray:
+    """(rows, columns) m, σ of which side of a step in the surface a cell beside it belongs to; 0 elsewhere.
+
+    Parameters
+    ----------
+    z : (rows, columns) m, NaN where not known. least : m, of a step from cell to cell; beside a hole it may be hidden
+        and is looked for across, where it is twice as much.
+    """
+    known = np.isfinite(z)
+    beside_hole = binary_dilation(~known, np.ones((3, 3), bool))
+    near, across = (_largest_change(z, known, side) for side in (3, ACROSS_CELLS))
+    step = np.where(near > least, near, np.where(beside_hole & (across > 2.0 * least), across, 0.0))
+    return np.where(known, STEP_SHARE * step, 0.0)
+
+
+def _largest_change(z: np.ndarray, known: np.ndarray, side: int) -> np.ndarray:
+    """(rows, columns) m, from a cell to the lowest or highest of a square about it."""
+    low = minimum_filter(np.where(known, z, np.inf), side, mode="nearest")
+    high = maximum_filter(np.where(known, z, -np.inf), side, mode="nearest")
+    with np.errstate(invalid="ignore"):
+        return np.nan_to_num(np.maximum(high - z, z - low), nan=0.0)
 
 
 def _off_nadir(place: Place, k: int) -> float:
