@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from aerotri.public.block_settings import with_settings as with_settings
     from aerotri.public.blocks import read as read
     from aerotri.public.blocks import read_block as read_block
+    from aerotri.public.change import change as change
     from aerotri.public.changes import changes as changes
     from aerotri.public.comparing import compare_parameters as compare_parameters
     from aerotri.public.comparing import crosscheck as crosscheck
@@ -67,6 +68,7 @@ _PLACES = {
     "Table": "aerotri.public.table",
     "changes": "aerotri.public.changes",
     "check": "aerotri.public.block_check",
+    "change": "aerotri.public.change",
     "compare": "aerotri.public.surface_comparison",
     "compare_parameters": "aerotri.public.comparing",
     "correct_dem": "aerotri.public.dem",
@@ -110,6 +112,7 @@ __all__ = [
     "Table",
     "__version__",
     "adjust",
+    "change",
     "changes",
     "check",
     "compare",

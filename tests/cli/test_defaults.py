@@ -7,7 +7,7 @@ from inspect import Parameter, signature
 import pytest
 
 import aerotri
-from aerotri.cli import adjusting, blocks, converting, ortho, run, terrain, volumes
+from aerotri.cli import adjusting, blocks, change, converting, ortho, run, terrain, volumes
 from aerotri.public.simulating import SimulatedBlock
 
 NOTHING = (None, "", (), [], "auto")
@@ -20,6 +20,7 @@ PAIRS = {
     "dtm": (terrain.dtm, aerotri.terrain),
     "ortho": (ortho.ortho, aerotri.orthophoto),
     "dsm": (terrain.dsm, aerotri.dense_surface),
+    "change": (change.change, aerotri.change),
     "volume": (volumes.volume, aerotri.volume),
     "predict volume": (volumes.predict_volume, aerotri.predict.volume),
     "predict attitude": (volumes.predict_attitude, aerotri.predict.attitude),

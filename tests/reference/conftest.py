@@ -173,6 +173,8 @@ def _written(folder: Path) -> Written:
     whole = run("deform", result, out="whole")
     imgeo = run("imgeo", result, next(photographs.glob("*.tif")), out="ideal")
     compared = run("compare", pairs / "dtm.tif", pairs / "dsm.tif", "--align", "shift", out="compared")
+    stable = "POLYGON ((-1e6 -1e6, 1e6 -1e6, 1e6 1e6, -1e6 1e6, -1e6 -1e6))"
+    changed = run("change", dense, dense, "--stable", stable, "--align", "height", out="changed")
     halves = run("halves", second, "--division", "photographs", "--division", "strips", out="halves")
     sets = run("compare-parameters", folder / "plain", "--set", "none", "--set", "brown:K1", "--folds", "2", out="sets")
     checked = run("crosscheck", second, out="checked")
@@ -192,6 +194,7 @@ def _written(folder: Path) -> Written:
         "folder of compare-parameters": (sets,), "folder of halves": (halves,), "folder of deform": (model, whole),
         "folder of demcor": (folder / "corrected",), "folder of imgeo": (imgeo,), "folder of crosscheck": (checked,),
         "folder of dtm": (pairs, project / "dtm"), "folder of dsm": (dense,), "folder of compare": (compared,),
+        "folder of change": (changed,),
         "folder of volume": (project / "volume",), "folder of ortho": (ortho,),
         "truth of simulate": (tiny / "truth", rigged / "truth", rolling / "truth"),
         "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),

@@ -22,6 +22,7 @@ PRINTED_CONTENT = {
     "crosscheck": "crosscheck.json (folder of crosscheck)", "dtm": "dtm.json (folder of dtm)",
     "dsm": "dsm.json (folder of dsm)",
     "halves": "halves.json (folder of halves)", "ortho": "ortho.json (folder of ortho)",
+    "change": "change.json (folder of change)",
     "compare": "compare.json (folder of compare)", "volume": "volume.json (folder of volume)",
     "tiepoints": "tiepoints.json (block of tiepoints)", "run": "run.json (folder of run)",
 }  # fmt: skip

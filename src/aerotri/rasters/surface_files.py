@@ -50,6 +50,14 @@ def write_raster_parts(
     _write_cog(path, banded, grid, crs, (text,), dtype, no_data, {})
 
 
+def write_bands(
+    path: FilePath, bands: Mapping[str, np.ndarray], grid: Grid, crs: Any, tags: Mapping[str, str] | None = None
+) -> None:
+    """Bands (rows, columns) by what they are, as a cloud-optimised GeoTIFF; NaN is no-data."""
+    values = tuple(np.where(np.isfinite(v), v, NO_DATA).astype(np.float32) for v in bands.values())
+    _write_cog(path, [(0, 0, values)], grid, crs, tuple(bands), np.dtype(np.float32), NO_DATA, tags or {})
+
+
 def _write_cog(
     path: FilePath, parts: Iterable[tuple[int, int, tuple[np.ndarray, ...]]], grid: Grid, crs: Any,
     texts: tuple[str, ...], dtype: np.dtype, no_data: float, tags: Mapping[str, str],

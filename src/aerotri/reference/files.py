@@ -8,6 +8,7 @@ from aerotri.reference.adjust_contents import adjust_contents
 from aerotri.reference.adjust_tables import adjust_tables
 from aerotri.reference.block_files import block_files
 from aerotri.reference.block_tables import block_table_files
+from aerotri.reference.change_files import change_files
 from aerotri.reference.halves_files import halves_files
 from aerotri.reference.image_error_files import image_error_files
 from aerotri.reference.ortho_files import ortho_files
@@ -27,6 +28,7 @@ def described_files() -> tuple[DescribedFile, ...]:
         *image_error_files(),
         *terrain_files(),
         *ortho_files(),
+        *change_files(),
         *block_files(),
         *printed_contents(),
     )

@@ -1,0 +1,47 @@
+"""`aerotri change`: what changed between two surfaces, against its σ."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerotri.commands.console import Console
+from aerotri.formats.results.json_text import json_text
+from aerotri.public.folders import refuse_foreign_folder
+
+if TYPE_CHECKING:
+    from aerotri.volume.change.alignment import Align
+
+
+def run_change(
+    first: Path, second: Path, stable: str | None, align: Align, area: str | None, noise_length: float | None,
+    out: Path | None, plots: bool, as_json: bool,
+) -> None:  # fmt: skip
+    """Measure and write; arguments as on the command line."""
+    from aerotri.public.change import RECORD, change
+
+    console = Console(quiet=as_json)
+    target = out or Path(f"{second.resolve().stem}_change")
+    refuse_foreign_folder(target, RECORD)
+    found = change(first, second, stable=stable, align=align, area=area, noise_length=noise_length)
+    found.save(target, plots)
+    if as_json:
+        print(json_text(found.summary))
+    else:
+        console.lines([*_summary(found.summary), f"Written to {target}"])
+
+
+def _summary(c: dict[str, Any]) -> list[str]:
+    lines = [
+        f"{c['cells']} cells of {c['cell_m']:.3g} m; level of detection (95 %) {c['level_of_detection_m']:.3f} m in "
+        f"the median, {c['beyond_level_percent']:.1f} % of the cells beyond it"
+    ]
+    for v in c["volumes"]:
+        lines.append(
+            f"{v['name']}: gained {v['gained_m3']:.6g} ± {v['sigma_gained_m3']:.3g} m³, lost {v['lost_m3']:.6g} ± "
+            f"{v['sigma_lost_m3']:.3g} m³, net {v['net_m3']:.6g} ± {v['sigma_net_m3']:.3g} m³ (1 σ)"
+        )
+    if c["alignment"] is not None:
+        moved = ", ".join(f"{u['name']} {u['value']:+.3g} ± {u['sigma']:.2g}" for u in c["alignment"]["unknowns"])
+        lines.append(f"aligned on {c['alignment']['cells_used']} stable cells: {moved or 'nothing moved'}")
+    return [*lines, *(f"note: {text}" for text in c["warnings"])]

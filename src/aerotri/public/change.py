@@ -1,0 +1,334 @@
+"""Two surfaces of one place at two times: what changed, against its σ."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aerotri.conventions import FilePath, InputError
+from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.table import Table
+from aerotri.public.volume_sigma import MeasuredSurface
+from aerotri.volume.change.alignment import ALIGNS, Align
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from shapely.geometry.base import BaseGeometry
+
+    from aerotri.public.surfaces import SurfaceLike
+    from aerotri.rasters.grids import Grid
+    from aerotri.terrain.surface import Surface as Heights
+    from aerotri.volume.boundary import Boundary
+    from aerotri.volume.change.compute import Change, Epoch
+
+RECORD, RASTER, TABLE, PAGE = "change.json", "change.tif", "change.csv", "change.html"
+OWN_NAMES = (RECORD, RASTER, TABLE, "plots", PAGE)
+WHOLE = "all in common"
+BYTES_OF_CELL = 200
+"""Heights, σ, slopes, difference and what volumes are summed from."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChangePlots:
+    """Plots of a change, each a matplotlib Figure."""
+
+    record: Change
+    summary: dict[str, Any]
+    areas: tuple[Boundary, ...]
+
+    def difference(self) -> Figure:
+        """Map of what changed beyond the level of detection, and of σ."""
+        from aerotri.report.plots.change import plot_change
+
+        return plot_change(self.record, self.summary, self.areas)
+
+    def all(self) -> dict[str, Figure]:
+        """Every plot of the page by the name of its file."""
+        return {"difference": self.difference()}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MeasuredChange:
+    """What `aerotri.change` returns: difference, σ and significance of every cell, volumes gained and lost.
+
+    Parameters
+    ----------
+    record : the numbers, as arrays. summary : content of change.json. areas : polygons of the volumes.
+    """
+
+    record: Change
+    summary: dict[str, Any]
+    areas: tuple[Boundary, ...]
+
+    @property
+    def difference(self) -> np.ndarray:
+        """(rows, columns) m, second less first after the alignment; NaN where not known."""
+        return self.record.difference
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """(rows, columns) m, σ of the difference."""
+        return self.record.sigma
+
+    @property
+    def grid(self) -> Grid:
+        """The cells."""
+        return self.record.grid
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should read, in sentences."""
+        return tuple(self.summary["warnings"])
+
+    @cached_property
+    def volumes(self) -> Table:
+        """Volumes of every area with their σ: the columns of change.csv; m² and m³."""
+        import pyarrow as pa
+
+        rows = [{k: v for k, v in row.items() if not isinstance(v, dict)} for row in self.summary["volumes"]]
+        columns: dict[str, Any] = {name: [row[name] for row in rows] for name in rows[0]}
+        units = {name: "m³" if name.endswith("m3") else "m²" for name in columns if name != "name"}
+        return Table("change", pa.table(columns), units)
+
+    @property
+    def plot(self) -> ChangePlots:
+        """Plots, each a matplotlib Figure."""
+        return ChangePlots(self.record, self.summary, self.areas)
+
+    def save(self, out: FilePath, plots: bool = True) -> Path:
+        """Write change.json, change.tif, change.csv, the plots and the page into a folder.
+
+        Parameters
+        ----------
+        out : folder; an older result there is replaced in one step. plots : draw the plots and the page.
+
+        Returns
+        -------
+        Path of the folder.
+
+        Raises
+        ------
+        InputError
+            When the folder holds other files, or cannot be written to.
+        """
+        target = Path(out)
+        refuse_foreign_folder(target, RECORD)
+        _write(target, self, plots)
+        return target
+
+    def __repr__(self) -> str:
+        v = self.summary["volumes"][0]
+        return f"<aerotri change: net {v['net_m3']:.6g} ± {v['sigma_net_m3']:.3g} m³>"
+
+    def _repr_html_(self) -> str:
+        return self.html()
+
+    def html(self) -> str:
+        """The volumes, as a notebook shows them."""
+        return f"<div>{self.volumes.html()}</div>"
+
+
+def change(
+    first: SurfaceLike,
+    second: SurfaceLike,
+    *,
+    stable: BaseGeometry | FilePath | None = None,
+    align: Align = "shift",
+    area: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | None = None,
+    noise_length: float | None = None,
+) -> MeasuredChange:
+    """What changed between two surfaces, cell by cell against its σ, and the volumes gained and lost.
+
+    Parameters
+    ----------
+    first : the earlier surface: GeoTIFF with σ as second band, folder of `dsm` or `dtm`, or what these returned.
+    second : the later surface.
+    stable : ground that did not change: GeoPackage, GeoJSON or WKT file, WKT text, or a shapely polygon. The second
+        surface is aligned on it, and it tells the noise.
+    align : what the second surface is moved by on stable ground: 'none', 'height', 'shift' (X, Y and height) or 'tilt'
+        (these and two tilts).
+    area : where volumes are wanted: as `stable`, or polygons by their names; all that both have in common where
+        None.
+    noise_length : m, side of the square whose cells share one noise; what the surfaces say, or stable ground
+        shows, where None.
+
+    Returns
+    -------
+    MeasuredChange
+
+    Raises
+    ------
+    InputError
+        For surfaces that do not meet or have no σ, or too little stable ground.
+
+    Examples
+    --------
+    >>> import aerotri, numpy as np
+    >>> before = aerotri.Surface.of_array(
+    ...     np.full((40, 40), 100.0), left=0.0, top=40.0, cell=1.0, sigma=np.full((40, 40), 0.02)
+    ... )
+    >>> z = before.z.copy()
+    >>> z[10:20, 10:20] += 1.0
+    >>> after = aerotri.Surface.of_array(z, left=0.0, top=40.0, cell=1.0, sigma=np.full((40, 40), 0.02))
+    >>> found = aerotri.change(before, after, align="none")
+    >>> f"{found.volumes['gained_m3'][0]:.0f} ± {found.volumes['sigma_gained_m3'][0]:.2f} m³"
+    '100 ± 0.28 m³'
+    """
+    from aerotri.formats.results.change import change_json
+    from aerotri.volume.change.compute import compute_change
+
+    if align not in ALIGNS:
+        raise InputError(f"an alignment by '{align}' is not known", f"choose one of {', '.join(ALIGNS)}")
+    if noise_length is not None and not 0.0 <= noise_length < 1e6:
+        raise InputError(f"a noise length of {noise_length:g} m is not possible", "give metres")
+    with ExitStack() as stack:
+        epochs = [MeasuredSurface(first), MeasuredSurface(second)]
+        epsg = _common_system(epochs)
+        grid = _grid_of(epochs)
+        same = epochs[0].key != "" and epochs[0].key == epochs[1].key
+        (before, of_before), (after, of_after) = (_epoch(one, grid, stack, noise_length, same) for one in epochs)
+        notes = [text for text in (of_before, of_after) if text and stable is None]
+        ground = None if stable is None else _boundary_of(stable, epsg)
+        areas = _areas(area, grid, epsg)
+        held = None if ground is None else ground.coverage(grid) > STABLE_PART
+        if ground is None:
+            if not all(np.isfinite(one.noise).any() for one in (before, after)):
+                raise InputError("a surface has no σ", "give --stable, ground that did not change: it shows the noise")
+            align = "none"
+            if not same:
+                notes.append("without stable ground the surfaces are compared as they lie")
+        if same:
+            notes.append("both surfaces come from one adjustment: its errors cancel")
+        found = compute_change(
+            grid, before, after, held, align, [(name, boundary.coverage(grid)) for name, boundary in areas.items()]
+        )
+    by = dict(zip(found.alignment.names, found.alignment.values.tolist(), strict=True))
+    if max(abs(by.get("dX", 0.0)), abs(by.get("dY", 0.0))) > FARTHEST * grid.cell_x:
+        notes.append("the surfaces are shifted by more than a few cells: bring the second nearer and measure again")
+    names = (epochs[0].surface.label, epochs[1].surface.label)
+    crs = "" if epsg is None else f"EPSG:{epsg}"
+    summary = change_json(found, names, crs, "" if ground is None else ground.name, align, tuple(notes))
+    return MeasuredChange(found, summary, tuple(areas.values()))
+
+
+FARTHEST = 3.0
+"""Cells of shift up to which slopes tell its effect."""
+STABLE_PART = 0.999
+"""Share of a cell that must be stable."""
+
+
+def _common_system(epochs: list[MeasuredSurface]) -> int | None:
+    codes: list[int | None] = []
+    for one in epochs:
+        with one.surface.reader() as reader:
+            codes.append(reader.epsg)
+    if None not in codes and codes[0] != codes[1]:
+        message = f"{epochs[1].surface.label} is in EPSG:{codes[1]}, {epochs[0].surface.label} in EPSG:{codes[0]}"
+        raise InputError(message, "bring them into one CRS")
+    return codes[0] if codes[0] is not None else codes[1]
+
+
+def _grid_of(epochs: list[MeasuredSurface]) -> Grid:
+    """The cells of the coarser surface that lie inside the other one."""
+    from aerotri.memory import refuse_beyond_memory
+
+    grids = [one.surface.grid for one in epochs]
+    own, other = sorted(grids, key=lambda grid: -grid.cell_x * grid.cell_y)
+    left, bottom, right, top = other.bounds
+    row, last_row = (int(np.clip(np.rint(own.row(y)), 0, own.rows - 1)) for y in (top, bottom))
+    column, last_column = (int(np.clip(np.rint(own.column(x)), 0, own.columns - 1)) for x in (left, right))
+    apart = left >= own.bounds[2] or right <= own.bounds[0] or bottom >= own.bounds[3] or top <= own.bounds[1]
+    rows, columns = last_row - row + 1, last_column - column + 1
+    if apart or rows < 3 or columns < 3:
+        raise InputError("the two surfaces do not meet", "check the CRS of both")
+    refuse_beyond_memory(
+        float(BYTES_OF_CELL) * rows * columns,
+        f"a change of {rows} × {columns} cells",
+        "cut out the part that is needed",
+    )
+    return own.window(row, column, rows, columns)
+
+
+def _epoch(given: MeasuredSurface, grid: Grid, stack: ExitStack, length: float | None, same: bool) -> tuple[Epoch, str]:
+    """A surface on the cells of the change, and what the user should know of its σ."""
+    from aerotri.volume.cell_noise import cells_sharing
+    from aerotri.volume.change.compute import Epoch
+
+    heights, noise = given.surface.heights, given.noise(stack)
+    total = _on(heights, heights.sigma, grid)
+    own, adjustment, said = total, np.zeros_like(total), ""
+    if noise.sigma is not None:
+        matching = noise.sigma.read(0, 0, heights.grid.rows, heights.grid.columns).astype(float)
+        own = _on(heights, matching, grid)
+        if not same:
+            adjustment = np.sqrt(np.maximum(total**2 - own**2, 0.0))
+    elif np.isfinite(total).any() and length is None:
+        said = (
+            f"{given.surface.label}: σ is taken for noise of the cells; what all of them share is told by stable ground"
+        )
+    used = noise.length_m if length is None else length
+    return Epoch(_on(heights, heights.z, grid), own, adjustment, cells_sharing(used, grid.cell_x * grid.cell_y)), said
+
+
+def _on(heights: Heights, values: np.ndarray, grid: Grid) -> np.ndarray:
+    """(rows, columns) of a surface's values, bilinear where its cells are others."""
+    from aerotri.terrain.compare import RasterHeights
+
+    x, y = np.meshgrid(grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows)))
+    found = RasterHeights(heights.grid, values).at(np.column_stack([x.ravel(), y.ravel()]), "linear")
+    return found.reshape(grid.rows, grid.columns)
+
+
+def _boundary_of(stated: BaseGeometry | FilePath, epsg: int | None) -> Boundary:
+    from aerotri.volume.boundary import boundary_of, read_boundary
+
+    if isinstance(stated, str | os.PathLike):
+        return read_boundary(os.fspath(stated), epsg)
+    return boundary_of(stated, "the polygon given")
+
+
+def _areas(
+    stated: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | None, grid: Grid, epsg: int | None
+) -> dict[str, Boundary]:
+    """The polygons of volumes by their names; more than one and all together."""
+    import shapely
+
+    from aerotri.volume.boundary import boundary_of, boundary_of_piles
+
+    if stated is None:
+        return {WHOLE: boundary_of(shapely.box(*grid.bounds), WHOLE)}
+    if isinstance(stated, Mapping):
+        if not stated:
+            raise InputError("no polygon is given", "give a polygon for every name")
+        whole = boundary_of_piles([(str(name), polygon) for name, polygon in stated.items()], "the polygons given")
+    else:
+        whole = _boundary_of(stated, epsg)
+    each = {name: boundary_of(polygon, name) for name, polygon in whole.piles}
+    return {**each, "all together": whole} if each else {whole.name: whole}
+
+
+def _write(target: Path, found: MeasuredChange, plots: bool) -> None:
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.formats.results.json_text import write_json
+    from aerotri.public.tables import write_rows
+    from aerotri.rasters.surface_files import write_bands
+
+    c = found.record
+    bands = {"difference second − first, m": c.difference, "σ of the difference, m": c.sigma,
+             "difference over σ": c.significance}  # fmt: skip
+    with atomic_folder(target, own=OWN_NAMES) as folder:
+        write_bands(folder / RASTER, bands, c.grid, found.summary["crs"] or None)
+        write_rows(found.volumes, folder / TABLE)
+        if plots:
+            from aerotri.report.pages.change import write_change_page
+            from aerotri.report.plots.rendering import save_plots
+
+            write_change_page(found.summary, save_plots(found.plot.all(), folder / "plots"), folder / PAGE)
+        write_json(folder / RECORD, found.summary)

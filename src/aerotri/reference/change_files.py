@@ -1,0 +1,89 @@
+"""What change writes."""
+
+from __future__ import annotations
+
+from aerotri.reference.adjust_contents import VERSION
+from aerotri.reference.records import DescribedFile, Item
+from aerotri.volume.change.alignment import ALIGNS
+from aerotri.volume.change.compute import PARTS
+
+CHANGE = "folder of change"
+AREAS = (
+    ("area_m2", "Area with heights in both surfaces."),
+    ("no_data_area_m2", "Area without."),
+    ("gained_area_m2", "Area that gained beyond the level of detection."),
+    ("lost_area_m2", "Area that lost beyond the level of detection."),
+)
+SUMS = (
+    ("gained", "Volume gained, of the cells beyond the level of detection."),
+    ("lost", "Volume lost, of the cells beyond the level of detection."),
+    ("net", "Volume of the difference over all cells."),
+)
+PART_WORDS = {
+    "noise": "Noise of the cells, with the length over which neighbours share it.",
+    "alignment": "Alignment on stable ground.",
+    "adjustment": "What the adjustments add to all cells; 0 with an alignment or one adjustment.",
+}
+
+
+def _sums(of: str, with_parts: bool) -> list[Item]:
+    items: list[Item] = []
+    for name, text in SUMS:
+        items.append(Item(f"{of}{name}_m3", "number", text, "m³"))
+        items.append(Item(f"{of}sigma_{name}_m3", "number", "Standard deviation of it.", "m³"))
+        if with_parts:
+            items.append(Item(f"{of}parts_{name}_m3", "object", "The parts of it, each alone.", "m³"))
+            items += [Item(f"{of}parts_{name}_m3.{part}", "number", PART_WORDS[part], "m³") for part in PARTS]
+    return items
+
+
+CHANGE_JSON = (
+    VERSION,
+    Item("first", "text", "The earlier surface."),
+    Item("second", "text", "The later surface."),
+    Item("crs", "text", "Coordinate system."),
+    Item("cell_m", "number", "Cell of the difference.", "m"),
+    Item("cells", "whole", "Cells with heights in both."),
+    Item("level_of_detection_sigma", "number", "Standard deviations beyond which a change is told from noise, 95 %."),
+    Item("level_of_detection_m", "number?", "The same in metres, median of the cells.", "m"),
+    Item("beyond_level_percent", "number", "Share of the cells beyond it.", "%"),
+    Item("sigma_m", "number?", "Standard deviation of the difference, median of the cells.", "m"),
+    Item("noise_length_m", "number", "Side of the square whose cells share one noise.", "m"),
+    Item("alignment", "object?", "How the second surface was aligned; null without --stable."),
+    Item("alignment.how", "text", "What it was moved by.", values=dict.fromkeys(ALIGNS, "")),
+    Item("alignment.stable", "text", "File or text of the stable ground."),
+    Item("alignment.cells", "whole", "Cells on it."),
+    Item("alignment.cells_used", "whole", "Cells that took part."),
+    Item("alignment.noise_factor", "number", "Noise there over the stated one."),
+    Item("alignment.unknowns[]", "object", "What it was moved by."),
+    Item("alignment.unknowns[].name", "text", "dZ, dX, dY (m), tilt_X, tilt_Y (m/m)."),
+    Item("alignment.unknowns[].value", "number", "Second surface less first."),
+    Item("alignment.unknowns[].sigma", "number", "Standard deviation of it."),
+    Item("volumes[]", "object", "One entry an area; the last is all together."),
+    Item("volumes[].name", "text", "Its name."),
+    *(Item(f"volumes[].{name}", "number", text, "m²") for name, text in AREAS),
+    *_sums("volumes[].", True),
+    Item("warnings[]", "text", "Sentences to read."),
+)
+CHANGE_TABLE = (
+    Item("name", "text", "The area."),
+    *(Item(name, "number", text, "m²") for name, text in AREAS),
+    *_sums("", False),
+)
+
+
+def change_files() -> tuple[DescribedFile, ...]:
+    """The files of change."""
+    plots = "unless --no-plots"
+    return (
+        DescribedFile("change.json", CHANGE, "json", "Volumes gained and lost, alignment, σ.", CHANGE_JSON),
+        DescribedFile(
+            "change.tif",
+            CHANGE,
+            "raster",
+            "Band 1 difference, m; band 2 its standard deviation, m; band 3 their ratio.",
+        ),
+        DescribedFile("change.csv", CHANGE, "table", "Volumes of every area.", CHANGE_TABLE),
+        DescribedFile("plots", CHANGE, "folder", "Map of the change and of σ, PNG and SVG.", when=plots),
+        DescribedFile("change.html", CHANGE, "page", "The change on one page.", when=plots),
+    )

@@ -1,0 +1,83 @@
+"""One self-contained page about a change: volumes with σ, the map, the alignment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from aerotri.report.pages.adjustment import data_address
+from aerotri.report.plots.rendering import RenderedPlot
+from aerotri.report.quality import printable, two_digits, with_sigma
+
+CAPTION = (
+    "Left: difference of the surfaces where it is beyond the level of detection; brown is gained, blue is lost, grey "
+    "cannot be told from noise. Right: σ of the difference."
+)
+UNKNOWNS = {
+    "dZ": ("height", 1e3, "mm"), "dX": ("X", 1e3, "mm"), "dY": ("Y", 1e3, "mm"),
+    "tilt_X": ("tilt along X", 1e6, "mm/km"), "tilt_Y": ("tilt along Y", 1e6, "mm/km"),
+}  # fmt: skip
+
+
+def write_change_page(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot], path: Path) -> None:
+    """Write the page; content of change.json."""
+    environment = Environment(
+        loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    text = environment.get_template("change.html.j2").render(
+        first=printable(content["first"]), second=printable(content["second"]), crs=content["crs"],
+        cards=_cards(content["volumes"][-1]), warnings=[printable(text, 1000) for text in content["warnings"]],
+        sure=_sure(content), rows=[_row(one) for one in content["volumes"]], unknowns=_unknowns(content),
+        alignment=_alignment(content), plots=[data_address(plot) for plot in plots.values()], caption=CAPTION,
+        version=content["aerotri"],
+    )  # fmt: skip
+    path.write_text(text, encoding="utf-8")
+
+
+def _cards(v: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    said = {"gained": "of cells beyond the level of detection", "lost": "of cells beyond the level of detection",
+            "net": "of all cells"}  # fmt: skip
+    return [
+        (of.capitalize(), f"{with_sigma(v[f'{of}_m3'], v[f'sigma_{of}_m3'])} m³", f"{text}, one standard deviation")
+        for of, text in said.items()
+    ]
+
+
+def _row(v: Mapping[str, Any]) -> tuple[str, ...]:
+    numbers = (with_sigma(v[f"{of}_m3"], v[f"sigma_{of}_m3"]) for of in ("gained", "lost", "net"))
+    return printable(v["name"]), f"{v['area_m2']:.0f}", *numbers, f"{v['no_data_area_m2']:.0f}"
+
+
+def _sure(c: Mapping[str, Any]) -> str:
+    parts = c["volumes"][-1]["parts_net_m3"]
+    words = ", ".join(f"{name} {two_digits(value)} m³" for name, value in parts.items())
+    return (
+        f"A change of a single cell is told from noise (95 %) from {two_digits(1e3 * c['level_of_detection_m'])} mm on "
+        f"(median); {c['beyond_level_percent']:.1f} % of the cells are beyond. Where nothing changed, 5 % would be. "
+        f"Neighbouring cells share their noise over {two_digits(c['noise_length_m'])} m. σ of the net volume by part: "
+        f"{words}."
+    )
+
+
+def _unknowns(c: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    if c["alignment"] is None:
+        return []
+    found = []
+    for one in c["alignment"]["unknowns"]:
+        name, factor, unit = UNKNOWNS[one["name"]]
+        found.append((name, with_sigma(factor * one["value"], factor * one["sigma"]), unit))
+    return found
+
+
+def _alignment(c: Mapping[str, Any]) -> str:
+    a = c["alignment"]
+    if a is None:
+        return "No stable ground was given: the surfaces are compared as they lie."
+    return (
+        f"{a['cells_used']} of {a['cells']} cells on stable ground ({printable(a['stable'])}) took part. The noise "
+        f"there is {a['noise_factor']:.2f} times the stated one."
+    )

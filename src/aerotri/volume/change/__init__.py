@@ -1,0 +1,1 @@
+"""Change between two surfaces against its σ."""

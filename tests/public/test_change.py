@@ -1,0 +1,128 @@
+"""Change between two surfaces: a dump of known volume, and ground that did not change."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import shapely
+from scipy.ndimage import uniform_filter
+
+import aerotri
+from aerotri import InputError
+
+SIDE, SIGMA, WINDOW = 120, 0.03, 4
+STABLE = shapely.difference(shapely.box(0, 0, SIDE, SIDE), shapely.box(30, 30, 90, 90))
+AREA = shapely.box(35, 35, 85, 85)
+AT = np.arange(SIDE) + 0.5
+X, Y = np.meshgrid(AT, AT[::-1])
+
+
+def ground(x, y):
+    return 100.0 + 3.0 * np.sin(x / 15.0) * np.cos(y / 20.0) + 0.02 * x
+
+
+def dump(x, y):
+    return np.maximum(5.0 - 0.3 * np.hypot(x - 60.0, y - 60.0), 0.0)
+
+
+def surface(z, rng, name="surface"):
+    """With noise that is the mean of a square of cells."""
+    white = rng.normal(size=(SIDE + 2 * WINDOW, SIDE + 2 * WINDOW))
+    noise = SIGMA * WINDOW * uniform_filter(white, WINDOW)[WINDOW:-WINDOW, WINDOW:-WINDOW]
+    sigma = np.full((SIDE, SIDE), SIGMA)
+    return aerotri.Surface.of_array(z + noise, left=0.0, top=SIDE, cell=1.0, sigma=sigma, name=name)
+
+
+def epochs(seed, heap=True):
+    """The second one shifted, lifted and tilted."""
+    rng = np.random.default_rng(seed)
+    (tx, ty), up, tilt = rng.normal(0.0, 0.2, 2), rng.normal(0.0, 0.1), rng.normal(0.0, 5e-4, 2)
+    z = ground(X - tx, Y - ty) + up + tilt[0] * X + tilt[1] * Y
+    if heap:
+        z = z + dump(X - tx, Y - ty)
+    return surface(ground(X, Y), rng, "may"), surface(z, rng, "june"), (tx, ty)
+
+
+def test_volume_of_a_dump_scatters_as_stated():
+    errors, shifts = [], []
+    for seed in range(25):
+        first, second, (tx, ty) = epochs(seed)
+        found = aerotri.change(first, second, stable=STABLE, align="tilt", area=AREA)
+        v = found.summary["volumes"][0]
+        errors.append((v["net_m3"] - dump(X, Y).sum()) / v["sigma_net_m3"])
+        by = {one["name"]: one for one in found.summary["alignment"]["unknowns"]}
+        shifts += [(by[name]["value"] - true) / by[name]["sigma"] for name, true in (("dX", tx), ("dY", ty))]
+    # 99.9 % of the root mean square of 25, and of 50, normal errors
+    assert 0.6 < np.sqrt(np.mean(np.square(errors))) < 1.48
+    assert 0.7 < np.sqrt(np.mean(np.square(shifts))) < 1.35
+
+
+def test_without_change_one_cell_in_twenty_is_beyond_the_level_of_detection():
+    share = [
+        aerotri.change(*epochs(seed, heap=False)[:2], stable=STABLE, align="tilt").summary["beyond_level_percent"]
+        for seed in range(5)
+    ]
+    assert np.mean(share) == pytest.approx(5.0, abs=1.0)
+
+
+def test_noise_that_neighbours_share_is_seen_on_stable_ground():
+    found = aerotri.change(*epochs(3)[:2], stable=STABLE, align="shift")
+    assert found.summary["noise_length_m"] == pytest.approx(WINDOW, rel=0.3)
+    # four times the noise that is stated
+    halved = [aerotri.Surface.of_array(one.z, left=0.0, top=SIDE, cell=1.0, sigma=one.sigma / 4.0)
+              for one in epochs(3)[:2]]  # fmt: skip
+    again = aerotri.change(*halved, stable=STABLE, align="shift")
+    np.testing.assert_allclose(again.sigma, found.sigma, rtol=0.1)
+
+
+def test_what_is_gained_and_lost():
+    """Without an alignment; a hole and a heap of a metre each, 50 σ."""
+    rng = np.random.default_rng(1)
+    z = ground(X, Y)
+    z[20:30, 20:30] += 1.0
+    z[60:80, 60:80] -= 1.0
+    area = {"heap": shapely.box(20, 90, 30, 100), "hole": shapely.box(55, 35, 85, 65)}
+    before, after = surface(ground(X, Y), rng), surface(z, rng)
+    found = aerotri.change(before, after, align="none", noise_length=WINDOW, area=area)
+    heap, hole, both = found.summary["volumes"]
+    assert heap["gained_m3"] == pytest.approx(100.0, abs=4.0 * heap["sigma_gained_m3"])
+    assert hole["lost_m3"] == pytest.approx(400.0, abs=15.0)
+    assert both["net_m3"] == pytest.approx(heap["net_m3"] + hole["net_m3"])
+    # along either axis the correlations of ten cells, 1 − lag/window, add up to this
+    alike = 10.0 + 2.0 * sum((10.0 - lag) * (1.0 - lag / WINDOW) for lag in range(1, WINDOW))
+    assert heap["sigma_net_m3"] == pytest.approx(np.sqrt(2.0) * SIGMA * alike, rel=1e-6)
+
+
+def test_the_folder(tmp_path):
+    first, second, _ = epochs(1)
+    found = aerotri.change(first.save(tmp_path / "may.tif"), second.save(tmp_path / "june.tif"), stable=STABLE.wkt,
+                           area=AREA.wkt)  # fmt: skip
+    out = found.save(tmp_path / "change")
+    content = json.loads((out / "change.json").read_text())
+    assert content["first"] == "may.tif"
+    assert content["volumes"][0]["net_m3"] == pytest.approx(found.volumes["net_m3"][0])
+    page = (out / "change.html").read_text()
+    assert "±" in page
+    assert page.count("<img") == 1
+    assert {path.name for path in out.iterdir()} == {"change.json", "change.tif", "change.csv", "change.html", "plots",
+                                                     ".aerotri-files"}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [({"align": "turn"}, "not known"), ({"noise_length": -1.0}, "not possible"), ({}, "has no σ"),
+     ({"stable": "POLYGON ((0 0, 1 0, 1 1, 0 0))"}, "stable ground")],
+)  # fmt: skip
+def test_what_is_refused(settings, says):
+    plain = aerotri.Surface.of_array(ground(X, Y), left=0.0, top=SIDE, cell=1.0)
+    with pytest.raises(InputError, match=says):
+        aerotri.change(plain, plain, **settings)
+
+
+def test_surfaces_that_do_not_meet():
+    first = epochs(1)[0]
+    away = aerotri.Surface.of_array(first.z, left=1e4, top=0.0, cell=1.0)
+    with pytest.raises(InputError, match="do not meet"):
+        aerotri.change(first, away)
