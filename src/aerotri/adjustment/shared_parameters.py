@@ -67,6 +67,7 @@ class SharedList:
     sigma: list[float] = field(default_factory=list)
     fields: list[RandomField] = field(default_factory=list)
     position_errors: list[JointPrior] = field(default_factory=list)
+    photograph_fields: list[RandomField] = field(default_factory=list)
 
     def add(
         self, name: str, group: str, kind: str, mark: str = "", prior: Prior = FREE, start: float | None = None
@@ -178,9 +179,15 @@ class LinearColumns:
 
 @dataclass(frozen=True, eq=False)
 class FamilySets:
-    """A linear family: of every combination of camera and group its set, with its first column in the shared list."""
+    """A linear family: of every combination of camera and group its set, with its first column in the shared list.
+
+    Parameters
+    ----------
+    of_ray : (m,) combination of every ray.
+    """
 
     sets: dict[int, tuple[ParameterSet, int]]
+    of_ray: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,15 +196,18 @@ class LinearParameters:
 
     Parameters
     ----------
-    families : one record each. of_ray : (m,) combination of camera and group of every ray.
+    families : one record each.
     """
 
     families: tuple[FamilySets, ...]
-    of_ray: np.ndarray
+
+    def beside(self, family: FamilySets) -> LinearParameters:
+        """These and one more."""
+        return LinearParameters((*self.families, family))
 
     def columns(self, xy: np.ndarray) -> LinearColumns:
         """The columns at positions (m, 2) mm of the rays."""
-        parts = [_family_columns(family.sets, self.of_ray, xy) for family in self.families]
+        parts = [_family_columns(family.sets, family.of_ray, xy) for family in self.families]
         if not parts:
             return LinearColumns(np.zeros((len(xy), 0), np.int64), np.zeros((len(xy), 2, 0)))
         return LinearColumns(
@@ -231,8 +241,8 @@ def linear_parameters(block: Block, images: np.ndarray, ray_image: np.ndarray, s
                         if family == collocation.FAMILY.name:
                             shared.fields.append(random_field(block, chosen, group, first[group]))
                     sets[key] = chosen, first[group]
-            families.append(FamilySets(sets))
-    return LinearParameters(tuple(families), of_ray)
+            families.append(FamilySets(sets, of_ray))
+    return LinearParameters(tuple(families))
 
 
 def _sets_by_camera(block: Block, family: str, items: tuple[str, ...]) -> dict[int, ParameterSet]:

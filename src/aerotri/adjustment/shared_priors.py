@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment.deviations import Deviation, deviation_priors, deviations_of
-from aerotri.adjustment.field_prior import field_prior
+from aerotri.adjustment.field_prior import field_prior, photograph_priors
 from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.adjustment.unknowns import Unknowns
 from aerotri.observations import Block
@@ -22,7 +22,7 @@ class SharedPriors:
     weight, value : (s,) 1/σ² and the observed value of each; weight 0 where it is not observed.
     of_points : (s,) bool, coordinates of points that are not eliminated.
     fields : of the random fields. deviations : the parameters that differ from group to group, and their priors.
-    position_errors : of errors of positions that stay.
+    position_errors : of errors of positions that stay. photograph_fields : of smooth errors of single photographs.
     """
 
     weight: np.ndarray
@@ -32,6 +32,7 @@ class SharedPriors:
     deviations: tuple[Deviation, ...]
     deviation_priors: tuple[JointPrior, ...]
     position_errors: tuple[JointPrior, ...]
+    photograph_fields: tuple[JointPrior, ...]
 
     @classmethod
     def of(cls, unknowns: Unknowns) -> SharedPriors:
@@ -47,6 +48,7 @@ class SharedPriors:
             deviations=deviations,
             deviation_priors=deviation_priors(deviations, block),
             position_errors=tuple(shared.position_errors),
+            photograph_fields=photograph_priors(shared.photograph_fields, block.settings),
         )
 
     def as_settings_say(self, unknowns: Unknowns, block: Block) -> SharedPriors:
@@ -55,6 +57,7 @@ class SharedPriors:
             self,
             fields=tuple(field_prior(field, block.settings) for field in unknowns.shared.fields),
             deviation_priors=deviation_priors(self.deviations, block),
+            photograph_fields=photograph_priors(unknowns.shared.photograph_fields, block.settings),
         )
 
     def without(self, columns: np.ndarray) -> SharedPriors:
@@ -65,8 +68,8 @@ class SharedPriors:
 
     @property
     def joint(self) -> tuple[JointPrior, ...]:
-        """Of several parameters together: random fields, groups, errors of positions."""
-        return (*self.fields, *self.deviation_priors, *self.position_errors)
+        """Of several parameters together: random fields, groups, errors of positions and of photographs."""
+        return (*self.fields, *self.deviation_priors, *self.position_errors, *self.photograph_fields)
 
     @property
     def count(self) -> int:

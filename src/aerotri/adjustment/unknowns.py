@@ -12,6 +12,7 @@ import numpy as np
 
 from aerotri.adjustment import _pair_kernels
 from aerotri.adjustment.kernel_records import RayArrays, Scans
+from aerotri.adjustment.photograph_fields import add_photograph_fields
 from aerotri.adjustment.rig_ties import Ties
 from aerotri.adjustment.rigging import Chain, Mountings, OnRigs, Rigging, photographs_on_rigs, with_leads
 from aerotri.adjustment.scanning import NONE, Scanning, scanning_of
@@ -273,6 +274,8 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
     xy = np.ascontiguousarray(block.image_points.xy[source])
     at = xy if start.at is None else np.ascontiguousarray(start.at[source])
     linear = linear_parameters(block, images, ray_image, shared)
+    if block.settings.photograph_fields.correlated == "on":
+        linear = linear.beside(add_photograph_fields(block, images, ray_image, shared))
     columns = linear.columns(at)
     on_rigs = photographs_on_rigs(block, images, shared, start.centre, start.rotation)
     tied = np.zeros((0, 2), dtype=np.int64)

@@ -14,6 +14,7 @@ from aerotri.diagnosis import (
     moving_errors,
     neighbouring_rays,
     parameters,
+    photograph_fields,
     position_errors,
     rigidity,
 )
@@ -32,6 +33,7 @@ RULES: tuple[Rule, ...] = (
     common_shift.of_common_shift,
     position_errors.of_positions,
     neighbouring_rays.of_neighbouring_rays,
+    photograph_fields.of_photograph_fields,
     rigidity.of_rigs,
     left_out.of_photographs,
     left_out.of_points,

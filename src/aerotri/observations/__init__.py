@@ -25,6 +25,7 @@ from aerotri.observations.block import (
     ImagePoints,
     Images,
     InsSettings,
+    PhotographFieldSettings,
     Settings,
 )
 from aerotri.observations.prior import Prior
@@ -45,6 +46,7 @@ __all__ = [
     "Images",
     "InsSettings",
     "Mounting",
+    "PhotographFieldSettings",
     "Prior",
     "Rig",
     "RollingShutter",

@@ -338,6 +338,27 @@ class CollocationSettings:
 
 
 @dataclass(frozen=True)
+class PhotographFieldSettings:
+    """What `[stochastic]` says of smooth errors of single photographs; None: estimated from the block.
+
+    Parameters
+    ----------
+    correlated : 'on' where the image points of a photograph have such errors in common.
+    sigma_um : of the error, as a weight beside the a-priori σ of the image coordinates.
+    length_mm : correlation length in the image.
+    """
+
+    correlated: str = "off"
+    sigma_um: float | None = None
+    length_mm: float | None = None
+
+    @property
+    def is_given(self) -> bool:
+        """Whether nothing is left to estimate."""
+        return None not in (self.sigma_um, self.length_mm)
+
+
+@dataclass(frozen=True)
 class DeviationSettings:
     """What `[deviations]` says of additional parameters that have values in several groups.
 
@@ -360,6 +381,7 @@ class Settings:
     ins: InsSettings = InsSettings()
     collocation: CollocationSettings = CollocationSettings()
     deviations: DeviationSettings = DeviationSettings()
+    photograph_fields: PhotographFieldSettings = PhotographFieldSettings()
     image_sigma_um: float = 1.0
     refraction: str = "off"
     earth_curvature: str = "off"

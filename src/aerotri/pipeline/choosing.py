@@ -13,7 +13,7 @@ from aerotri.adjustment.solve import SolveOptions
 from aerotri.conventions import FilePath
 from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.diagnosis.doubts import failure
-from aerotri.observations import Block
+from aerotri.observations import Block, PhotographFieldSettings
 from aerotri.pipeline.local import Report
 from aerotri.pipeline.starting import with_start
 from aerotri.pipeline.verdict import with_outcome
@@ -129,7 +129,9 @@ def _prepared_without(block: Block, geoid: FilePath | None) -> Prepared:
     settings = block.settings.adjustment
     robust = "huber" if settings.robust == "data-snooping" else settings.robust
     plain = replace(settings, additional_parameters=(), parameter_selection="off", robust=robust)
-    block = replace(block, settings=replace(block.settings, adjustment=plain))
+    # sets are compared for what all photographs have in common; errors of their own would take part of it
+    settings = replace(block.settings, adjustment=plain, photograph_fields=PhotographFieldSettings())
+    block = replace(block, settings=settings)
     if block.crs != "local":
         block = transform_block(block, frame_of_block(block, geoid))
     prepared = prepare(block)

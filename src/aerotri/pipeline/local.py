@@ -18,12 +18,14 @@ from aerotri.adjustment.weak_geometry import go_on_without, minimise_tied
 from aerotri.diagnosis.common_height import common_height
 from aerotri.diagnosis.common_shift import common_shift_in_words
 from aerotri.diagnosis.doubts import defects_in_words, doubts, failure, refuse_runaway
+from aerotri.diagnosis.photograph_fields import photograph_fields_in_words
 from aerotri.diagnosis.position_errors import position_errors_in_words
 from aerotri.diagnosis.rigidity import movements_in_words, rigidity_in_words
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock, Blunder
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.deviations import Deviations
+from aerotri.results.photograph_fields import PhotographFields
 from aerotri.results.position_errors import PositionErrors
 from aerotri.results.removal import Removal
 from aerotri.statistics.common_shift import common_shift
@@ -32,6 +34,7 @@ from aerotri.statistics.rigidity import rigidity_of
 from aerotri.statistics.summarise import count_observations, inseparable, summarise
 from aerotri.strategies.deviation_estimation import with_estimated_deviations
 from aerotri.strategies.field_estimation import with_estimated_fields
+from aerotri.strategies.photograph_field_estimation import photograph_fields_of, with_photograph_fields
 from aerotri.strategies.position_estimation import position_errors_of, with_position_errors
 from aerotri.strategies.removal import with_datum_of
 from aerotri.strategies.rig_estimation import with_estimated_movements
@@ -61,6 +64,7 @@ class _Stand:
     deviations : how much parameters differ between groups of photographs.
     movements : (k, 2) bool, which σ of movements on weighted rigs were estimated.
     position_errors : what was found of errors of positions that stay; None where they were not estimated.
+    photograph_fields : what was found of smooth errors of single photographs; None where nobody asked.
     """
 
     prepared: Prepared
@@ -70,6 +74,7 @@ class _Stand:
     removals: tuple[Removal, ...] = ()
     deviations: Deviations | None = None
     position_errors: PositionErrors | None = None
+    photograph_fields: PhotographFields | None = None
     movements: np.ndarray | None = None
 
 
@@ -99,6 +104,7 @@ def adjust_local(block: Block, report: Report | None, given_points: np.ndarray |
     stand = _Stand(*_determined(minimise_tied(prepared, options, _redundancy)), block)
     stand = _without_gross_errors(stand, options)
     stand = _with_fields(stand, options)
+    stand = _with_photograph_fields(stand, options)
     stand = _with_deviations(stand, options)
     stand = _with_movements(stand, options)
     stand = _with_position_errors(stand, options)
@@ -128,6 +134,12 @@ def _with_fields(stand: _Stand, options: SolveOptions) -> _Stand:
     """With the covariance of random fields estimated, where there are any."""
     system, solution = with_estimated_fields(stand.prepared.system, stand.solution, options)
     return replace(stand, prepared=replace(stand.prepared, system=system), solution=solution)
+
+
+def _with_photograph_fields(stand: _Stand, options: SolveOptions) -> _Stand:
+    """With the covariance of smooth errors of single photographs estimated, where they are asked for."""
+    prepared, solution, found = with_photograph_fields(stand.prepared, stand.solution, options)
+    return replace(stand, prepared=prepared, solution=solution, photograph_fields=found)
 
 
 def _with_deviations(stand: _Stand, options: SolveOptions) -> _Stand:
@@ -199,7 +211,10 @@ def _with_words(delivered: _Delivered, timings: dict[str, float]) -> Adjustment:
     errors = position_errors_of(system, solution, delivered.factor, sigma0, stand.position_errors)
     rigidity = rigidity_of(system, solution, delivered.factor, result.outcome)
     shift = common_shift(system, solution, delivered.factor, sigma0)
-    result = replace(result, position_errors=errors, rigidity=rigidity, common_shift=shift)
+    fields = photograph_fields_of(system, sigma0, stand.photograph_fields)
+    result = replace(
+        result, position_errors=errors, rigidity=rigidity, common_shift=shift, photograph_fields=fields
+    )  # fmt: skip
     timings = timings | {"statistics": time.perf_counter() - delivered.solved}
     tied = () if stand.deviations is None else (stand.deviations.sentence,)
     said = (*result.outcome.warnings, *tied, *loose_in_words(result, kept), *inseparable(result.parameters))
@@ -207,7 +222,8 @@ def _with_words(delivered: _Delivered, timings: dict[str, float]) -> Adjustment:
     if shared_height is not None:
         sentence = shared_height.sentence(float(np.nanmedian(result.points.sigma[:, 2])))
         said += (sentence,) if sentence else ()
-    said += tuple(words for words in (common_shift_in_words(shift), position_errors_in_words(errors)) if words)
+    found = common_shift_in_words(shift), position_errors_in_words(errors), photograph_fields_in_words(fields)
+    said += tuple(words for words in found if words)
     said += rigidity_in_words(rigidity)
     if result.rig_movements is not None and stand.movements is not None:
         movements = replace(result.rig_movements, estimated=stand.movements[_cameras_that_move(system)])

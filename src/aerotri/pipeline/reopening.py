@@ -63,7 +63,10 @@ def reopen(block: Block, saved: SavedSolution) -> Adjustment:
     rigidity = rigidity_of(system, solution, factor, result.outcome)
     result = replace(result, outcome=replace(result.outcome, notes=saved.notes))
     shift = common_shift(system, solution, factor, result.outcome.sigma0)
-    result = replace(result, position_errors=saved.position_record(), rigidity=rigidity, common_shift=shift)
+    result = replace(
+        result, position_errors=saved.position_record(), photograph_fields=saved.photograph_record(), rigidity=rigidity,
+        common_shift=shift,
+    )  # fmt: skip
     components = saved.component_record()
     if components is not None:
         result = with_components(result, components)

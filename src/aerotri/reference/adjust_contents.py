@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_models import gnss_errors, movements, ray_correlation, rigidity, rolling_shutters
+from aerotri.reference.adjust_models import (
+    gnss_errors,
+    movements,
+    photograph_fields,
+    ray_correlation,
+    rigidity,
+    rolling_shutters,
+)
 from aerotri.reference.adjust_tables import COMPARED, PARAMETERS, PLACE, RIGS, WHERE_MODEL, with_totals
 from aerotri.reference.records import DescribedFile, Item, of_axes, within
 
@@ -152,6 +159,7 @@ ADJUSTMENT = (
     Item("model_part.ratio_height", "number", "The same in Z."),
     Item("model_part.reason", "text", "Why there is no model part; else empty."),
     *gnss_errors(),
+    *photograph_fields(),
     *ray_correlation(),
     Item("rigs[]", "object", "Cameras on rigs; where there are any.", optional=True),
     *within("rigs[]", *RIGS),

@@ -87,6 +87,25 @@ def gnss_errors() -> tuple[Item, ...]:
     return (Item("gnss_errors", "object?", text), *items)
 
 
+def photograph_fields() -> tuple[Item, ...]:
+    what: tuple[tuple[str, Kind, str, str], ...] = (
+        ("source", "text", "Where these errors come from: given in block.toml, or estimated from the block; empty "
+         "where image points are adjusted as independent.", ""),
+        ("sigma_um", "number", "Standard deviation of these errors.", "µm"),
+        ("length_mm", "number?", "Distance in the photograph after which their correlation has fallen to 37 %.", "mm"),
+        ("likelihood_ratio", "number?", "How much better such errors explain the image points than noise does.", ""),
+        ("p", "number?", "Probability of as much by noise alone.", ""),
+        ("level", "number?", "Probability with which noise alone is taken for such errors.", ""),
+        ("nodes_x", "whole", "Nodes of the grid of a photograph along x, between which the error is linear.", ""),
+        ("nodes_y", "whole", "The same along y.", ""),
+        ("photographs", "whole", "Photographs with such errors.", ""),
+        ("reason", "text", "Why nothing was estimated; else empty.", ""),
+    )  # fmt: skip
+    text = "Smooth errors of single photographs; null where block.toml does not ask for them."
+    items = (Item(f"photograph_fields.{name}", kind, said, unit) for name, kind, said, unit in what)
+    return (Item("photograph_fields", "object?", text), *items)
+
+
 def ray_correlation() -> tuple[Item, ...]:
     what: tuple[tuple[str, Kind, str, str], ...] = (
         ("from_px", "number", "Least distance of the two image points.", "px"),

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from aerotri.results.common_shift import CommonShift
     from aerotri.results.deviations import Deviations
     from aerotri.results.model_part import ModelPart
+    from aerotri.results.photograph_fields import PhotographFields
     from aerotri.results.position_errors import PositionErrors
     from aerotri.results.ray_correlation import RayCorrelation
     from aerotri.results.removal import Removal
@@ -331,7 +332,7 @@ class AdjustedBlock:
     how they move on weighted rigs.
     `deviations` says how much parameters differ between groups of photographs that are tied to one another,
     `ray_correlation` how much neighbouring rays of a photograph err alike, `common_shift` what all observed positions
-    are shifted against the control points.
+    are shifted against the control points, `photograph_fields` how much photographs have smooth errors of their own.
     """
 
     block: Block
@@ -357,3 +358,4 @@ class AdjustedBlock:
     rig_movements: RigMovements | None = None
     ray_correlation: RayCorrelation | None = None
     common_shift: CommonShift | None = None
+    photograph_fields: PhotographFields | None = None

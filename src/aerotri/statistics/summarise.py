@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.adjustment import position_errors
+from aerotri.adjustment import photograph_fields, position_errors
 from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.robust import weights_and_costs
@@ -37,7 +37,7 @@ from aerotri.statistics.rig_movements import movement_groups, rig_movements
 from aerotri.statistics.rig_results import mounted_cameras
 from aerotri.statistics.rolling_results import rolling_shutters
 
-OF_POINTS = ("point", "constraint", position_errors.KIND)
+OF_POINTS = ("point", "constraint", position_errors.KIND, photograph_fields.KIND)
 """Kinds of shared parameters that belong to object points or single exposures and not to cameras or flights."""
 
 INSEPARABLE = 0.999
@@ -377,6 +377,8 @@ def _prior_group(system: NormalSystem, solution: Solution, q: Cofactors) -> list
         _joint_group("position errors in time", [prior], solution, q)
         for prior in system.unknowns.shared.position_errors
     ]
+    if system.priors.photograph_fields:
+        fields.append(_joint_group("errors of photographs", system.priors.photograph_fields, solution, q))
     if not known.any():
         return fields
     normed = ((solution.state.shared - np.array(shared.observed)) / sigma)[known]

@@ -11,6 +11,7 @@ observations. All fields of a block have the same σ_d and ℓ [C].
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,11 +20,12 @@ from scipy.optimize import minimize
 
 from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
 from aerotri.adjustment.field_prior import known_or_first
+from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.shared_parameters import RandomField
 from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
-from aerotri.observations import CollocationSettings
+from aerotri.observations import CollocationSettings, PhotographFieldSettings
 from aerotri.statistics.summarise import count_observations, effective_redundancy, weighted_sum
 
 SETTLED = 0.1
@@ -64,24 +66,39 @@ class ReducedToFields:
     @classmethod
     def of(cls, system: NormalSystem, solution: Solution, factor: Factor) -> ReducedToFields:
         """From a solution and the factor of its undamped equations."""
-        shared = system.unknowns.shared
-        nodes = np.concatenate([np.arange(f.columns.start, f.columns.stop) for f in shared.fields])
+        return cls.of_fields(system, solution, factor, system.unknowns.shared.fields, system.priors.fields)
+
+    @classmethod
+    def of_fields(
+        cls,
+        system: NormalSystem,
+        solution: Solution,
+        factor: Factor,
+        fields: Sequence[RandomField],
+        priors: Sequence[JointPrior],
+    ) -> ReducedToFields:
+        """Of some fields with their priors; others are eliminated with theirs."""
+        nodes = np.concatenate([prior.columns for prior in priors])
         normals = border_marginal(factor, nodes)
         values, at = solution.state.shared[nodes], 0
         right = normals @ values
-        for field in system.priors.fields:
-            own = slice(at, at + len(field.weight))
-            normals[own, own] -= field.weight
+        for prior in priors:
+            own = slice(at, at + len(prior.weight))
+            normals[own, own] -= prior.weight
             at = own.stop
         omega = weighted_sum(system, solution) + float(right @ values)
-        return cls(tuple(shared.fields), normals, right, omega, effective_redundancy(system, solution))
+        return cls(tuple(fields), normals, right, omega, effective_redundancy(system, solution))
 
     def deviance(self, known: FieldCovariance) -> float:
         """−2 ln L of σ_d and ℓ; infinite where rounding hides what so weak a prior leaves undetermined."""
         normals, log_determinant, at = self.normals.copy(), 0.0, 0
+        alike: dict[tuple[str, int], tuple[np.ndarray, float]] = {}
         for field in self.fields:
             own = slice(at, at + len(field.items))
-            weight, of_field = field.prior_weight(known.sigma_um, known.length_mm)
+            key = field.camera.name, field.held.shape[1]
+            if field.held.size or key not in alike:
+                alike[key] = field.prior_weight(known.sigma_um, known.length_mm)
+            weight, of_field = alike[key]
             normals[own, own] += weight
             log_determinant += of_field
             at = own.stop
@@ -137,7 +154,7 @@ def border_marginal(factor: Factor, columns: np.ndarray) -> np.ndarray:
 
 
 def estimate_covariance(
-    reduced: ReducedToFields, given: CollocationSettings, start: FieldCovariance
+    reduced: ReducedToFields, given: CollocationSettings | PhotographFieldSettings, start: FieldCovariance
 ) -> FieldCovariance:
     """σ_d and ℓ with the greatest restricted likelihood; what is given stays.
 

@@ -6,19 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
-from aerotri.adjustment.carry_over import reference_state, start_values_at, with_shared
 from aerotri.adjustment.exposures import exposures_of
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.position_errors import KIND
 from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
-from aerotri.adjustment.system import build_system
 from aerotri.observations.block import GnssSettings
 from aerotri.quantiles import chi_square_exceedance
 from aerotri.results.position_errors import CHECK_LEVEL, PositionErrors
-from aerotri.statistics.summarise import count_observations
 from aerotri.strategies.position_likelihood import (
     ErrorModel,
     Given,
@@ -27,6 +23,7 @@ from aerotri.strategies.position_likelihood import (
     best_process,
     observed_rows,
 )
+from aerotri.strategies.readjusting import readjusted
 
 LEVEL = 0.01
 """Probability with which white noise alone is taken for errors that stay."""
@@ -121,16 +118,8 @@ def _adjusted(
     prepared: Prepared, solution: Solution, options: SolveOptions, used: GnssSettings
 ) -> tuple[Prepared, Solution]:
     """The block with other settings of its positions, adjusted from where it stands."""
-    old, state = prepared.system.unknowns, solution.state
-    block = replace(old.block, settings=replace(old.block.settings, gnss=used))
-    row, axis = np.nonzero(old.point_held)
-    held = list(zip(old.points[row].tolist(), axis.tolist(), strict=True)) if len(row) else None
-    system, start = build_system(block, start_values_at(old, state), prepared.ray_status, held)
-    begin = with_shared(system.unknowns, old, start, state)
-    system, again = minimise_at_adjusted(system, begin, count_observations(system).redundancy, options)
-    reference = reference_state(system.unknowns, old, start, prepared.state)
-    left = replace(prepared, system=system, state=reference)
-    return left, replace(again, iterations=solution.iterations + again.iterations)
+    settings = prepared.system.unknowns.block.settings
+    return readjusted(prepared, solution, options, replace(settings, gnss=used))
 
 
 def position_errors_of(

@@ -122,8 +122,8 @@ def _without(
 def with_findings_of(block: Block, used: Block) -> Block:
     """A block with what the adjustment of another form of it found.
 
-    Parameters removed, where they are evaluated, the covariance of fields and of errors of positions, how much
-    groups differ, and how cameras move on weighted rigs.
+    Parameters removed, where they are evaluated, the covariance of fields and of errors of positions and photographs,
+    how much groups differ, and how cameras move on weighted rigs.
     """
     found = used.settings.adjustment
     adjustment = replace(
@@ -135,6 +135,7 @@ def with_findings_of(block: Block, used: Block) -> Block:
         adjustment=adjustment,
         collocation=used.settings.collocation,
         deviations=used.settings.deviations,
+        photograph_fields=used.settings.photograph_fields,
         gnss=used.settings.gnss,
     )
     return replace(block, settings=settings, rigs=used.rigs)

@@ -23,6 +23,7 @@ from aerotri.observations import (
     DeviationSettings,
     GnssSettings,
     InsSettings,
+    PhotographFieldSettings,
     Rig,
     Settings,
 )
@@ -116,6 +117,11 @@ class BlockToml:
             ins=InsSettings(model.ins.boresight, model.ins.drift),
             collocation=CollocationSettings(model.collocation.sigma_um, model.collocation.length_mm),
             deviations=DeviationSettings(model.deviations.kind, model.deviations.sigma_um or None),
+            photograph_fields=PhotographFieldSettings(
+                model.stochastic.correlated,
+                model.stochastic.correlated_sigma_um,
+                model.stochastic.correlation_length_mm,
+            ),
             image_sigma_um=image_sigma_um,
             refraction=model.corrections.refraction,
             earth_curvature=model.corrections.earth_curvature,

@@ -162,6 +162,17 @@ class StochasticModel(Section):
         None, "Standard deviation of an image coordinate where image_points.csv gives none. Needed where the table has "
         "no sx and sy.", "µm"
     )  # fmt: skip
+    correlated: OffOn = key(
+        "off", "on: besides their noise, the image points of a photograph have a smooth error in common, another one "
+        "in every photograph: of matching, film, or a lens that moves. For blocks of up to 222 photographs."
+    )  # fmt: skip
+    correlated_sigma_um: Positive | None = key(
+        None, "Standard deviation of this error; estimated from the block where it is not given.", "µm"
+    )
+    correlation_length_mm: Positive | None = key(
+        None, "Distance in the photograph after which the correlation of this error has fallen to 37 %; estimated from "
+        "the block where it is not given.", "mm"
+    )  # fmt: skip
     default_control_sigma_m: ThreeNotNegative | None = key(
         None, "Standard deviation of X, Y, Z of control and check points where control.csv gives none; 0 holds the "
         "coordinate without error.", "m"

@@ -40,6 +40,8 @@ EXAMPLES: dict[str, Any] = {
     "gnss.lever_arm_sigma_m": [0.01, 0.01, 0.01],
     "gnss.correlation_time_s": 60.0,
     "gnss.correlated_sigma_m": [0.02, 0.03],
+    "stochastic.correlated_sigma_um": 1.5,
+    "stochastic.correlation_length_mm": 5.0,
     "collocation.sigma_um": 2.0,
     "collocation.length_mm": 10.0,
     "rig.NAME.camera.NAME.position_m": {"value": [0.0, -0.05, 0.02], "sigma": [0.01, 0.01, 0.01]},

@@ -14,7 +14,7 @@ from aerotri.formats.text.table_writer import check_names, write_table
 from aerotri.formats.text.toml_text import Inline, toml_of
 from aerotri.functional_model.additional_parameters import format_parameters
 from aerotri.observations import Block, Camera, Mounting, Prior, Rig, RollingShutter
-from aerotri.observations.block import INTERIOR_ELEMENTS, GnssSettings
+from aerotri.observations.block import INTERIOR_ELEMENTS, GnssSettings, PhotographFieldSettings
 
 ANGLE_UNIT = "deg"
 TABLE_NAMES = ("images", "image_points", "control", "gnss_ins", "fiducials", "edits", "constraints")
@@ -173,7 +173,7 @@ def _settings(block: Block) -> dict[str, Any]:
         "rotation": block.rotation,
         "image_unit": "px" if block.interior_fits else "mm",
         "camera": {camera.name: _camera(camera) for camera in block.cameras},
-        "stochastic": {"image_sigma_um": settings.image_sigma_um},
+        "stochastic": {"image_sigma_um": settings.image_sigma_um} | _of_photographs(settings.photograph_fields),
         "adjustment": {
             "additional_parameters": format_parameters(adjustment.additional_parameters),
             "parameter_groups": adjustment.parameter_groups,
@@ -212,6 +212,13 @@ def _settings(block: Block) -> dict[str, Any]:
         content["gnss"]["lever_arm_sigma_m"] = list(settings.gnss.lever_arm_sigma_m)
     content["gnss"] |= _correlated(settings.gnss)
     return content
+
+
+def _of_photographs(fields: PhotographFieldSettings) -> dict[str, Any]:
+    """What says that photographs have smooth errors of their own; nothing where it is not asked for."""
+    content: dict[str, Any] = {} if fields.correlated == "off" else {"correlated": fields.correlated}
+    known = {"correlated_sigma_um": fields.sigma_um, "correlation_length_mm": fields.length_mm}
+    return content | {key: value for key, value in known.items() if value is not None}
 
 
 def _correlated(gnss: GnssSettings) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from aerotri.formats.results.json_text import json_text
 from aerotri.formats.results.solution_checks import SCHEMA, checked_values
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.photograph_fields import PhotographFields
 from aerotri.results.position_errors import PositionErrors
 from aerotri.results.removal import Removal
 from aerotri.results.variance_components import VarianceComponents
@@ -44,7 +45,8 @@ class SavedSolution:
     components : the variance components as JSON, '' where there are none; the block has the σ they led to.
     removals : the parameters that the selection took out, as JSON, '' where there are none.
     verdict, reasons, notes : of the outcome; empty in results of versions that did not have them.
-    position_errors : what was said of the errors of positions as JSON, '' where there is nothing.
+    position_errors, photograph_fields : what was said of the errors of positions and photographs as JSON, '' where
+        there is nothing.
     """
 
     origin: np.ndarray
@@ -72,6 +74,7 @@ class SavedSolution:
     verdict: str = ""
     reasons: tuple[str, ...] = ()
     position_errors: str = ""
+    photograph_fields: str = ""
     notes: tuple[str, ...] = ()
 
     def removal_records(self) -> tuple[Removal, ...]:
@@ -85,6 +88,10 @@ class SavedSolution:
     def position_record(self) -> PositionErrors | None:
         """What was said of the errors of positions; None where there is nothing."""
         return PositionErrors.from_dict(json.loads(self.position_errors)) if self.position_errors else None
+
+    def photograph_record(self) -> PhotographFields | None:
+        """What was said of smooth errors of single photographs; None where nobody asked."""
+        return PhotographFields.from_dict(json.loads(self.photograph_fields)) if self.photograph_fields else None
 
 
 def write_solution(
@@ -133,6 +140,9 @@ def write_solution(
         notes=np.array(result.outcome.notes, dtype=str),
         removals=np.array(json.dumps([removal.as_dict() for removal in result.removals])),
         position_errors=np.array("" if result.position_errors is None else json_text(result.position_errors.as_dict())),
+        photograph_fields=np.array(
+            "" if result.photograph_fields is None else json_text(result.photograph_fields.as_dict())
+        ),
         components=np.array("" if result.components is None else json_text(result.components.as_dict())),
     )
 

@@ -13,6 +13,7 @@ from aerotri.adjustment.ray_status import RAY_STATUS
 from aerotri.adjustment.robust import CODES, WIDEST
 from aerotri.formats.files.npz import Archive, Shape
 from aerotri.observations import Block
+from aerotri.results.photograph_fields import PhotographFields
 from aerotri.results.position_errors import PositionErrors
 from aerotri.results.removal import Removal
 from aerotri.results.variance_components import ChiSquareTest, VarianceComponent
@@ -29,7 +30,7 @@ overflow."""
 SCALARS = {"estimator_code": "iu", "estimator_limit": "f", "sigma0": "f", "iterations": "iu", "status": "U"} | {
     "geoid": "U", "components": "U", "removals": "U",
 }  # fmt: skip
-LATER = {"verdict": "U", "position_errors": "U"}
+LATER = {"verdict": "U", "position_errors": "U", "photograph_fields": "U"}
 """Texts that results of older versions do not have, '' there."""
 
 
@@ -154,6 +155,10 @@ def _check_json(archive: Archive, values: dict[str, Any]) -> None:
         errors = _json(archive, "position_errors", values["position_errors"])
         if not _is_record(errors, PositionErrors):
             raise archive.error("holds no record of the errors of positions")
+    if values["photograph_fields"]:
+        fields = _json(archive, "photograph_fields", values["photograph_fields"])
+        if not _is_record(fields, PhotographFields):
+            raise archive.error("holds no record of the errors of photographs")
     if not values["components"]:
         return
     content = _json(archive, "components", values["components"])
