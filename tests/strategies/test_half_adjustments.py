@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import f as f_distribution
 from scipy.stats import kstest
 
+from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.pipeline import adjust_keeping_system
 from aerotri.pipeline.halves import compare_halves
 from aerotri.strategies.half_adjustment import Hold, Whole, adjust_half
@@ -16,6 +17,7 @@ from aerotri.strategies.half_covariance import HalfPair, shared_rows
 from aerotri.strategies.half_points import cells_in_plan
 from aerotri.strategies.half_tests import agreement, beyond_weighted_sum
 from aerotri.strategies.halves_division import divide, flight_of
+from rig_blocks import rig_block
 from small_blocks import small_block
 
 WELL_HELD = {"distance_bases": 1.0, "sigma_m": [0.03, 0.03, 0.05]}
@@ -70,6 +72,21 @@ def test_division_that_is_not_possible():
     assert record.compared == ()
     assert "one strip" in record.comparisons[0].reason
     assert "same direction" in record.comparisons[1].reason
+
+
+def test_strips_of_a_rig_are_those_of_its_exposures():
+    """Five cameras on two strips and a cross strip, the rows mixed and no strip named."""
+    block, truth = rig_block(3)
+    mixed = np.random.default_rng(1).permutation(len(block.images))
+    flown = block.images.strip[mixed].astype(str)
+    block = replace(block, images=replace(block.images, strip=np.full(len(mixed), "", dtype=object)))
+    rotation = rotation_from_angles(truth.angles, block.rotation)
+    flight = flight_of(block, mixed, truth.centre[mixed], rotation[mixed])
+    strip = dict(zip(flight.rows.tolist(), flight.strip.tolist(), strict=True))
+    pairs = {(name, strip[int(row)]) for row, name in zip(mixed, flown, strict=True)}
+    assert len(pairs) == len(set(flown.tolist())) == 3
+    half = divide(block, flight, "strips").half
+    assert min(int((half == k).sum()) for k in (0, 1)) >= 15
 
 
 def test_noise_free_halves_agree():

@@ -17,7 +17,7 @@ import numpy as np
 
 from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.adjustment.shared_parameters import SharedList, group_of_images
-from aerotri.adjustment.track import exposure_times, order_of_exposure
+from aerotri.adjustment.track import exposure_times, one_an_exposure, order_of_exposure
 from aerotri.conventions import InputError
 from aerotri.functional_model.additional_parameters import (
     FAMILIES,
@@ -131,8 +131,11 @@ def groups_in_flight_order(block: Block) -> tuple[str, ...]:
         return tuple(dict.fromkeys(labels.tolist()))
     strips = images.strip.astype(str)
     strips = strips if all(strips.tolist()) else np.full(len(images), "")
-    track = order_of_exposure(images.centre, strips, images.names, exposure_times(block))
-    return tuple(dict.fromkeys(labels[track].tolist()))
+    alone, exposure = one_an_exposure(block, np.arange(len(images)))
+    track = order_of_exposure(images.centre[alone], strips[alone], images.names[alone], exposure_times(block)[alone])
+    rank = np.empty(len(alone), dtype=np.int64)
+    rank[track] = np.arange(len(alone))
+    return tuple(dict.fromkeys(labels[np.argsort(rank[exposure], kind="stable")].tolist()))
 
 
 def size_mm(camera: Camera, name: str) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.adjustment.track import exposure_times, headings, order_of_exposure, strips_of_track
+from aerotri.adjustment.track import exposure_times, headings, one_an_exposure, order_of_exposure, strips_of_track
 from aerotri.observations import Block
 
 FEWEST_PHOTOGRAPHS = 3
@@ -58,10 +58,15 @@ def flight_of(block: Block, rows: np.ndarray, centre: np.ndarray, rotation: np.n
     """The flight of the photographs `rows` (k,) of a block, with their adjusted centres (k, 3) and rotations."""
     images = block.images
     time, strip = exposure_times(block)[rows], np.asarray(images.strip, dtype=object)[rows]
-    order = order_of_exposure(centre, strip, images.names[rows].astype(str), time)
-    rows, centre, strip = rows[order], centre[order], strip[order]
+    # the cameras of a rig fly one track, not one each
+    alone, exposure = one_an_exposure(block, rows)
+    track = order_of_exposure(centre[alone], strip[alone], images.names[rows[alone]].astype(str), time[alone])
+    of_exposure, rank_of = np.empty(len(alone), dtype=np.int64), np.empty(len(alone), dtype=np.int64)
+    of_exposure[track] = strips_of_track(centre[alone][track], strip[alone][track].astype(str))
+    rank_of[track] = np.arange(len(alone))
+    order = np.argsort(rank_of[exposure], kind="stable")
+    rows, centre, strip, number = rows[order], centre[order], strip[order], of_exposure[exposure][order]
     timed, named = bool(np.isfinite(time).all()), all(str(name) for name in strip)
-    number = strips_of_track(centre, strip.astype(str))
     first = {int(value): k for k, value in reversed(list(enumerate(number)))}
     rank = {value: k for k, value in enumerate(sorted(first, key=lambda value: first[value]))}
     return Flight(
