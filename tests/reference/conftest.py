@@ -12,6 +12,7 @@ import pytest
 
 from aerotri.cli.app import invoke
 from aerotri.formats.block.folder import write_block
+from aerotri.rasters.grids import RasterReader
 from rendered_photographs import Lists, fly, write_gcp_list, write_positions
 from small_blocks import with_adjustment
 from ten_photographs import ten_photographs
@@ -175,6 +176,7 @@ def _written(folder: Path) -> Written:
     compared = run("compare", pairs / "dtm.tif", pairs / "dsm.tif", "--align", "shift", out="compared")
     stable = "POLYGON ((-1e6 -1e6, 1e6 -1e6, 1e6 1e6, -1e6 1e6, -1e6 -1e6))"
     changed = run("change", dense, dense, "--stable", stable, "--align", "height", out="changed")
+    piles = run("volume", dense, "--boundary", _two_polygons(folder, dense / "dsm.tif"), "--density", 1.8, out="piles")
     halves = run("halves", second, "--division", "photographs", "--division", "strips", out="halves")
     sets = run("compare-parameters", folder / "plain", "--set", "none", "--set", "brown:K1", "--folds", "2", out="sets")
     checked = run("crosscheck", second, out="checked")
@@ -195,13 +197,28 @@ def _written(folder: Path) -> Written:
         "folder of demcor": (folder / "corrected",), "folder of imgeo": (imgeo,), "folder of crosscheck": (checked,),
         "folder of dtm": (pairs, project / "dtm"), "folder of dsm": (dense,), "folder of compare": (compared,),
         "folder of change": (changed,),
-        "folder of volume": (project / "volume",), "folder of ortho": (ortho,),
+        "folder of volume": (project / "volume", piles), "folder of ortho": (ortho,),
         "truth of simulate": (tiny / "truth", rigged / "truth", rolling / "truth"),
         "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),
         "control_marks of tiepoints": (project / "block" / "control_marks",), "folder of run": (project,),
         "folder of parameters": (folder / "drawn",),
     }  # fmt: skip
     return Written(folder, places, run.printed)
+
+
+def _two_polygons(folder: Path, surface: Path) -> Path:
+    """Two halves of the middle of a surface."""
+    with RasterReader(surface) as reader:
+        left, bottom, right, top = reader.grid.bounds
+    x, y, half = (left + right) / 2.0, (bottom + top) / 2.0, 0.15 * min(right - left, top - bottom)
+    rings = [[(a, y - half), (b, y - half), (b, y + half), (a, y + half), (a, y - half)]
+             for a, b in ((x - half, x), (x, x + half))]  # fmt: skip
+    features = [
+        {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring]}} for ring in rings
+    ]
+    path = folder / "two.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    return path
 
 
 def _project(run: _Runs) -> Path:

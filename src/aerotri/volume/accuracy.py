@@ -81,7 +81,7 @@ def volume_sigma(
         adjustment by the difference of the responses, control points that two adjustments share, by name and
         coordinates, by their covariance.
     """
-    ground = _base_variance(base, boundary, surface, options)
+    ground = base_variance(base, boundary, surface, options)
     edge = boundary_variance(surface, base, boundary, options.boundary_sigma)
     notes = _notes(part, base_part, base, ground, options)
     return _assembled(part, base_part, _Beside(ground, edge, notes), options)
@@ -203,7 +203,7 @@ def _difference(between: list[Between | None]) -> Between | None:
     return Between(sum(sign * one.curvature for sign, one in known), sum(one.variance for _, one in known))
 
 
-def _base_variance(base: Base, boundary: Boundary, surface: Surface, options: SigmaOptions) -> float:
+def base_variance(base: Base, boundary: Boundary, surface: Surface, options: SigmaOptions) -> float:
     """m⁶, of the base: what is stated for it, and for a spline how rough the ground around suggests it is below."""
     stated = (options.base_sigma * boundary.area) ** 2
     if not isinstance(base, SplineBase):
