@@ -32,8 +32,10 @@ INSIDE = {
     "prove/moving/flights.py": "the strips of a track, as an adjustment finds them",
     "prove/metamorphic_photographs.py": "the first orientation in orders that no file gives",
     "prove/starts.py": "times the start without the adjustment that follows",
+    "prove/volume_drawn_boundary.py": "volumes and σ of pickets at stated places, for outlines that move with them",
     "prove/volume_epochs.py": "the adjustment's part of σ alone, of pickets at stated places",
     "prove/volume_proof/simulated.py": "every part of σ alone, of pickets at stated places",
+    "prove/volume_spline_base.py": "σ of a base alone",
     "reproduce/paper_003_deformation/even_odd.py": "deformation at single points, by another orientation",
     "reproduce/reproduce_paper_000.py": "the paper's formulas for two photographs, which no command uses",
 }
