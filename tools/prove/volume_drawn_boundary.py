@@ -6,6 +6,8 @@ draws it there (product); the base is a spline through it, a plane fitted to it,
 the runs, beside the 99 % band of normal errors. The surface is the TIN of the pickets in every run, and the truth that
 of the true pickets: the ground that a spline cannot know is not in it.
 
+Measures σ of pickets at stated places, for outlines that move with them: imports inside on purpose.
+
 Example: python tools/prove/volume_drawn_boundary.py --runs 60 --out results
 """
 

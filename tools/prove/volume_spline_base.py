@@ -5,6 +5,8 @@ rolling waves of three lengths. The surface is that ground with a pile on it; th
 boundary, and σ of the base is judged, as always, from the ground in a ring outside. Error: volume over the
 spline less the true volume of the pile. Boundaries: a circle, and a long rectangle.
 
+Measures σ of a base alone: imports inside on purpose.
+
 Example: python tools/prove/volume_spline_base.py --runs 200 --out results
 """
 
