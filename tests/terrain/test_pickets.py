@@ -11,7 +11,7 @@ from aerotri.rasters.images import open_photograph
 from aerotri.terrain.dtm import TerrainPlan, chosen_rows, make_terrain_model, models_of
 from aerotri.terrain.error_pickets import with_error_pickets
 from aerotri.terrain.matching import measure, steps_aside
-from aerotri.terrain.photographs import read_pyramid
+from aerotri.terrain.photographs import PyramidStore, read_pyramid, sixteen_bits
 from aerotri.terrain.pickets import Area, MatchOptions, Models, grid_nodes
 
 
@@ -214,7 +214,7 @@ def test_grid_nodes_are_the_same_for_overlapping_areas():
 def test_pyramid_levels_are_means_of_four(tmp_path):
     pixels = np.arange(12 * 10, dtype=np.uint8).reshape(10, 12)
     levels = read_pyramid(write_photograph(tmp_path / "a.tif", pixels), (12, 10), 2)
-    assert levels[0][3, 4] == 256 * int(pixels[3, 4])
+    assert sixteen_bits(levels[0])[3, 4] == 256 * int(pixels[3, 4])
     assert levels[1][2, 1] == 64 * pixels[4:6, 2:4].astype(int).sum()
     with pytest.raises(InputError, match="its camera has"):
         read_pyramid(tmp_path / "a.tif", (10, 12), 1)
@@ -233,3 +233,19 @@ def test_terrain_model_has_sigma_of_matching_and_adjustment(rendered):
     assert (found.adjustment[found.pickets.accepted] >= 0.0).all()
     with pytest.raises(InputError, match="no ground point"):
         make_terrain_model(rendered.calibration, replace(plan, area=Area(np.array([1.0, 1.0]), np.array([2.0, 2.0]))))
+
+
+@pytest.mark.parametrize("kind", ["uint8", "uint16"])
+def test_pyramids_beyond_the_memory_allowed_are_read_again(tmp_path, kind):
+    rng = np.random.default_rng(5)
+    pixels = [rng.integers(0, 255, (64, 96)).astype(kind) for _ in range(3)]
+    paths = [write_photograph(tmp_path / f"{k}.tif", p) for k, p in enumerate(pixels)]
+    times = 256 if kind == "uint8" else 1
+    store = PyramidStore(paths, [(96, 64)] * 3, 3, most_bytes=3 * 64 * 96 * np.dtype(kind).itemsize)
+    for k in (0, 1, 0, 2, 1):
+        np.testing.assert_array_equal(sixteen_bits(store.level(k, 0)), pixels[k].astype(np.uint16) * times)
+        half = pixels[k].reshape(32, 2, 48, 2).sum(axis=(1, 3), dtype=np.int64) * times
+        np.testing.assert_array_equal(store.level(k, 1), (half + 2) // 4)
+        assert store._bytes <= 3 * 64 * 96 * np.dtype(kind).itemsize
+    assert 3 < store.reads < 12
+    assert PyramidStore(paths, [(96, 64)] * 3, 3).level(2, 2).shape == (16, 24)

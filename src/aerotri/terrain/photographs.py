@@ -1,6 +1,6 @@
 """The photographs of a block as matching takes them: image pyramids, and views of a piece of ground.
 
-Grey values are kept in 16 bits, 8-bit photographs times 256, so that means over pixels do not round. A level of the
+Grey values are taken in 16 bits, 8-bit photographs times 256, so that means over pixels do not round. A level of the
 pyramid has half the columns and rows of the one below; its pixels are means of four.
 """
 
@@ -24,9 +24,13 @@ from aerotri.rasters.images import open_photograph
 from aerotri.results.adjustment import Adjustment
 from aerotri.terrain._view_kernels import View
 
-CACHE_BYTES = 3 << 30
-"""Bytes of pyramids kept in memory, 3 GiB; chosen [C]: some twelve photographs of 12 000 × 8000 pixels; less reads
-files again and again."""
+CACHE_BYTES = 900_000_000
+"""Bytes of pyramids kept in memory; chosen [C]: thirty photographs of 12 Mpx or five of 86 Mpx, and well below the 2 GB
+that the whole command may take."""
+ROWS_AT_A_TIME = 1024
+"""Rows that are read and averaged at a time."""
+EIGHT = 256
+"""By which grey values of 8 bits become such of 16."""
 COLOURS = 3
 """Bands that are averaged to grey, red, green and blue: what follows them is infrared or a mask."""
 TABLE_TOLERANCE_PX = 0.01
@@ -37,33 +41,46 @@ CROP_MARGIN_PX = 24
 
 
 class PyramidStore:
-    """Pyramids of photographs, the ones used last kept in memory.
+    """Pyramids of photographs, the levels used last kept in memory.
+
+    The finest level is most of a pyramid: it is read again when it is asked for, after the coarser ones were.
 
     Parameters
     ----------
     paths : of the photographs; sizes : (columns, rows) that each must have. levels : of every pyramid.
+    most_bytes : kept.
     """
 
-    def __init__(self, paths: Sequence[Path], sizes: Sequence[tuple[int, int]], levels: int):
-        self._paths, self._sizes, self.levels = paths, sizes, levels
-        self._kept: OrderedDict[int, list[np.ndarray]] = OrderedDict()
+    def __init__(
+        self, paths: Sequence[Path], sizes: Sequence[tuple[int, int]], levels: int, most_bytes: int = CACHE_BYTES
+    ):
+        self._paths, self._sizes, self.levels, self._most = paths, sizes, levels, most_bytes
+        self._kept: OrderedDict[tuple[int, int], np.ndarray] = OrderedDict()
         self._lock, self._bytes = Lock(), 0
+        self.reads = 0
 
     def level(self, k: int, level: int) -> np.ndarray:
-        """(rows, columns) uint16 of photograph k."""
+        """(rows, columns) of photograph k: uint16, or uint8 for the finest level of 8-bit photographs."""
         with self._lock:
-            if k not in self._kept:
-                self._kept[k] = read_pyramid(self._paths[k], self._sizes[k], self.levels)
-                self._bytes += sum(a.nbytes for a in self._kept[k])
-            self._kept.move_to_end(k)
-            found = self._kept[k][level]
-            while self._bytes > CACHE_BYTES and len(self._kept) > 1:
-                self._bytes -= sum(a.nbytes for a in self._kept.popitem(last=False)[1])
-            return found
+            if (k, level) not in self._kept:
+                self._read(k, level)
+            self._kept.move_to_end((k, level))
+            return self._kept[k, level]
+
+    def _read(self, k: int, level: int) -> None:
+        found = read_pyramid(self._paths[k], self._sizes[k], self.levels)
+        self.reads += 1
+        for n in reversed(range(min(level, 1), self.levels)):
+            if (k, n) not in self._kept:
+                self._kept[k, n] = found[n]
+                self._bytes += found[n].nbytes
+        self._kept.move_to_end((k, level))
+        while self._bytes > self._most and len(self._kept) > 1:
+            self._bytes -= self._kept.popitem(last=False)[1].nbytes
 
 
 def read_pyramid(path: Path, size: tuple[int, int], levels: int) -> list[np.ndarray]:
-    """Grey values of a photograph, then of its coarser levels.
+    """Grey values of a photograph, 8 bits as they are, then of its coarser levels, 16 bits.
 
     Raises
     ------
@@ -75,15 +92,27 @@ def read_pyramid(path: Path, size: tuple[int, int], levels: int) -> list[np.ndar
                 f"is {photograph.columns} × {photograph.rows} pixels large, its camera has {size[0]} × {size[1]}",
                 "give the photographs as they were measured", path,
             )  # fmt: skip
-        pixels = photograph.read(0, photograph.rows)
-    found = [_grey(pixels[: COLOURS if len(pixels) >= COLOURS else 1])]
-    for _ in range(levels - 1):
-        found.append(_halved(found[-1]))
+        # floating point is stretched over the range of the whole photograph
+        step = ROWS_AT_A_TIME if np.issubdtype(photograph.dtype, np.integer) else photograph.rows
+        parts = []
+        for first in range(0, photograph.rows, step):
+            bands = photograph.read(first, min(first + step, photograph.rows))
+            parts.append(_grey(bands[: COLOURS if len(bands) >= COLOURS else 1]))
+    found = [parts[0] if len(parts) == 1 else np.concatenate(parts)]
+    for n in range(levels - 1):
+        found.append(_halved(found[-1], EIGHT if n == 0 and found[0].dtype == np.uint8 else 1))
     return found
 
 
+def sixteen_bits(pixels: np.ndarray) -> np.ndarray:
+    """uint16; what has 8 bits is multiplied by 256."""
+    return pixels.astype(np.uint16) * np.uint16(EIGHT) if pixels.dtype == np.uint8 else pixels
+
+
 def _grey(bands: np.ndarray) -> np.ndarray:
-    """(rows, columns) uint16, the mean of the bands."""
+    """(rows, columns) the mean of the bands, uint16; a single band of 8 bits as it is."""
+    if bands.dtype == np.uint8 and len(bands) == 1:
+        return bands[0]
     if bands.dtype == np.uint8:
         return (bands.sum(axis=0, dtype=np.uint32) * np.uint32(256) // len(bands)).astype(np.uint16)
     if bands.dtype == np.uint16:
@@ -93,10 +122,14 @@ def _grey(bands: np.ndarray) -> np.ndarray:
     return np.nan_to_num((grey - low) * (65535.0 / (high - low if high > low else 1.0))).astype(np.uint16)
 
 
-def _halved(pixels: np.ndarray) -> np.ndarray:
+def _halved(pixels: np.ndarray, times: int) -> np.ndarray:
+    """(rows // 2, columns // 2) uint16, means of four pixels times a number."""
     rows, columns = pixels.shape[0] // 2 * 2, pixels.shape[1] // 2 * 2
-    p = pixels[:rows, :columns].astype(np.uint32)
-    return ((p[::2, ::2] + p[1::2, ::2] + p[::2, 1::2] + p[1::2, 1::2] + 2) // 4).astype(np.uint16)
+    p = pixels[:rows, :columns]
+    total = np.zeros((rows // 2, columns // 2), np.uint32)
+    for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        total += p[i::2, j::2]
+    return ((total * np.uint32(times) + np.uint32(2)) // np.uint32(4)).astype(np.uint16)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +206,7 @@ class Site:
             if part.size == 0:
                 continue
             crops[k] = offset, row, column, *part.shape
-            parts.append(part.ravel())
+            parts.append(sixteen_bits(part).ravel())
             offset += part.size
         pixels = np.concatenate(parts) if parts else np.zeros(1, np.uint16)
         errors = p.tables.for_kernels

@@ -184,7 +184,7 @@ def step_sigma(z: np.ndarray, least: float) -> np.ndarray:
         and is looked for across, where it is twice as much.
     """
     known = np.isfinite(z)
-    beside_hole = binary_dilation(~known, np.ones((3, 3), bool))
+    beside_hole = np.asarray(binary_dilation(~known, np.ones((3, 3), bool)), bool)
     near, across = (_largest_change(z, known, side) for side in (3, ACROSS_CELLS))
     step = np.where(near > least, near, np.where(beside_hole & (across > 2.0 * least), across, 0.0))
     return np.where(known, STEP_SHARE * step, 0.0)
