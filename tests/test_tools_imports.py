@@ -17,6 +17,7 @@ INSIDE = {
     "benchmark/adjusting/ours.py": "times assembly, factorisation, iterations and cofactors one by one",
     "benchmark/adjusting/peers.py": "gives other solvers the equations of the independent model",
     "benchmark/benchmark_imgeo.py": "times the resampling kernel beside cv2.remap",
+    "benchmark/benchmark_dense.py": "times semi-global matching alone on the same epipolar images",
     "benchmark/benchmark_pickets.py": "times the search kernel beside matchTemplate",
     "benchmark/benchmark_reading_others.py": "times the readers of COLMAP and OpenSfM without what is added to them",
     "benchmark/benchmark_rigs.py": "times parts of an iteration of the same flight with and without a rig",

@@ -11,8 +11,8 @@ from aerotri.compiled import kernel
 def solve_shifts(known, means, products, count, shift, across, variance, variance_across, correlation):
     """L = R + o + g·R − u·R_x + v·R_y over a window: u along the base, v across it, gain and offset.
 
-    known : (rows, columns). means : (rows, columns, 4) of D = L − R, R_x, R_y, R over the windows.
-    products : (rows, columns, 10) means of DD, D·R_x, D·R_y, D·R, xx, xy, xR, yy, yR, RR.
+    known : (rows, columns). means : (4, rows, columns) of D = L − R, R_x, R_y, R over the windows.
+    products : (10, rows, columns) means of DD, D·R_x, D·R_y, D·R, xx, xy, xR, yy, yR, RR.
     count : pixels of a window. shift, across, their variances, px², correlation (of L and R) : out; NaN where the
     texture does not tell.
     """
@@ -24,8 +24,8 @@ def solve_shifts(known, means, products, count, shift, across, variance, varianc
             shift[i, j] = across[i, j] = variance[i, j] = variance_across[i, j] = correlation[i, j] = np.nan
             if not known[i, j]:
                 continue
-            d, x, y, r = means[i, j, 0], means[i, j, 1], means[i, j, 2], means[i, j, 3]
-            p = products[i, j]
+            d, x, y, r = means[0, i, j], means[1, i, j], means[2, i, j], means[3, i, j]
+            p = products[:, i, j]
             dd = p[0] - d * d
             b[0], b[1], b[2] = -(p[1] - d * x), p[2] - d * y, p[3] - d * r
             n[0, 0], n[1, 1], n[2, 2] = p[4] - x * x, p[7] - y * y, p[9] - r * r

@@ -155,9 +155,12 @@ def _sums(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     d = left - right
     r = right - np.float32(right.mean())
     size = WINDOW_PX, WINDOW_PX
-    means = np.stack([cv2.boxFilter(a, -1, size) for a in (d, x, y, r)], axis=-1)
     pairs = ((d, d), (d, x), (d, y), (d, r), (x, x), (x, y), (x, r), (y, y), (y, r), (r, r))
-    products = np.stack([cv2.boxFilter(a * b, -1, size) for a, b in pairs], axis=-1)
+    means, products = (np.empty((n, *d.shape), np.float32) for n in (4, len(pairs)))
+    for n, values in enumerate((d, x, y, r)):
+        means[n] = cv2.boxFilter(values, -1, size)
+    for n, (one, other) in enumerate(pairs):
+        products[n] = cv2.boxFilter(one * other, -1, size)
     return means, products
 
 

@@ -1,0 +1,121 @@
+"""How long a dense surface takes, beside OpenCV's StereoSGBM alone on the same epipolar images in the same run.
+
+A strip of vertical photographs over flat ground, 8 bits: every photograph is a part of one random texture. The surface
+is measured with `aerotri.dense_surface`; the time spent in StereoSGBM, of all levels, is taken in the same run. A small
+surface is made before, so that nothing is compiled in the time that counts. Peak memory is that of the whole
+process; another one makes the photographs. Measures times inside the package, so it looks there
+on purpose.
+
+Example
+-------
+    python tools/benchmark/benchmark_dense.py --size 4000 3000 --photographs 4
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+import aerotri
+from aerotri.terrain.dense import parallaxes
+
+GSD_M, PIXEL_UM, END_LAP = 0.1, 6.0, 0.7
+HEAD = (
+    "| photographs | cells | whole s | StereoSGBM s | ratio | peak memory MB | median error px |\n"
+    "|---|---|---|---|---|---|---|"
+)
+
+
+def main() -> None:
+    """Measure and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--size", type=int, nargs=2, default=(4000, 3000), metavar=("COLUMNS", "ROWS"))
+    parser.add_argument("--photographs", type=int, default=3)
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--area", type=float, nargs=4, help="X Y X Y, m; all where not given")
+    parser.add_argument("--only-photographs", type=Path, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    os.environ["AEROTRI_THREADS"] = str(arguments.threads)
+    cv2.setNumThreads(arguments.threads)
+    if arguments.only_photographs is not None:
+        _write(arguments.only_photographs, arguments)
+        return
+    with tempfile.TemporaryDirectory(prefix="aerotri_dense_") as folder:
+        subprocess.run([sys.executable, *sys.argv, "--only-photographs", folder], check=True)
+        print(HEAD)
+        print(_measured(Path(folder), arguments))
+
+
+def _flight(arguments: argparse.Namespace):
+    size = arguments.size
+    plan = {
+        "name": "dense",
+        "camera": {"cam": {"size_px": list(size), "pixel_um": PIXEL_UM, "focal_length_mm": PIXEL_UM * size[0] / 1e3}},
+        "flight": {"gsd_m": GSD_M, "strips": 1, "images_per_strip": arguments.photographs, "end_lap": END_LAP,
+                   "heading_deg": 0.0, "alternating": False},
+        "terrain": {"kind": "flat", "height_m": 50.0},
+        "tie_points": {"per_image": 80, "probability": 0.9, "sigma_um": 0.0, "stated_sigma_um": 0.1, "margin_px": 5.0},
+        "control": {"distance_bases": 1.0, "sigma_m": [0.0, 0.0, 0.0], "stated_sigma_m": [0.001, 0.001, 0.001]},
+    }  # fmt: skip
+    return aerotri.simulate(plan, seed=1)
+
+
+def _write(folder: Path, arguments: argparse.Namespace) -> None:
+    """Every photograph is the part of the ground that it shows, from its simulated projection centre."""
+    flight = _flight(arguments)
+    columns, rows = arguments.size
+    centre = np.array(aerotri.adjust(flight.block, explain=False).record.result.images.centre)
+    first = (centre - centre.min(axis=0)) / GSD_M
+    ground = _texture(rows + int(np.ceil(first[:, 1].max())) + 2, columns + int(np.ceil(first[:, 0].max())) + 2)
+    for name, (x, y, _) in zip(flight.block.images.names, first, strict=True):
+        top = first[:, 1].max() - y
+        shift = np.array([[1.0, 0.0, -x], [0.0, 1.0, -top]])
+        cv2.imwrite(str(folder / f"{name}.tif"), cv2.warpAffine(ground, shift, (columns, rows), flags=cv2.INTER_CUBIC))
+
+
+def _texture(rows: int, columns: int) -> np.ndarray:
+    rng = np.random.default_rng(3)
+    out = np.zeros((rows, columns), np.float32)
+    for level in range(7):
+        part = rng.normal(size=((rows >> level) + 2, (columns >> level) + 2)).astype(np.float32)
+        out += cv2.resize(part, (columns, rows), interpolation=cv2.INTER_CUBIC)
+    return np.clip(128.0 + 15.0 * cv2.GaussianBlur(out, (0, 0), 0.8), 0.0, 255.0).astype(np.uint8)
+
+
+def _measured(folder: Path, arguments: argparse.Namespace) -> str:
+    result = aerotri.adjust(_flight(arguments).block, explain=False)
+    middle = np.array(result.record.result.images.centre).mean(axis=0)
+    aerotri.dense_surface(result, folder, area=(middle[0], middle[1], middle[0] + 15.0, middle[1] + 15.0))
+    spent, ours = [0.0], parallaxes.semi_global
+
+    def timed(images):
+        start = time.perf_counter()
+        found = ours(images)
+        spent[0] += time.perf_counter() - start
+        return found
+
+    parallaxes.semi_global = timed
+    start = time.perf_counter()
+    found = aerotri.dense_surface(result, folder, area=None if arguments.area is None else tuple(arguments.area))
+    whole = time.perf_counter() - start
+    tiles = [tile.z[np.isfinite(tile.z)] for _, tile in found.record.files.read_all(list(found.record.windows))]
+    error = float(np.median(np.concatenate(tiles))) - 50.0
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    columns, rows = arguments.size
+    return (
+        f"| {arguments.photographs} of {columns} × {rows} | {found.record.cells} | {whole:.1f} | {spent[0]:.1f} | "
+        f"{whole / spent[0]:.2f} | {memory:.0f} | {error / GSD_M:+.3f} |"
+    )
+
+
+if __name__ == "__main__":
+    main()
