@@ -121,6 +121,15 @@ def test_what_is_refused(settings, says):
         aerotri.change(plain, plain, **settings)
 
 
+def test_little_stable_ground_does_not_tell_the_noise_length():
+    first, second, _ = epochs(2, heap=False)
+    small = aerotri.change(first, second, stable=shapely.box(0, 0, 12, 12), align="height")
+    assert any("too little stable ground" in text for text in small.warnings)
+    stated = aerotri.change(first, second, stable=shapely.box(0, 0, 12, 12), align="height", noise_length=WINDOW)
+    assert stated.warnings == ()
+    assert stated.summary["volumes"][0]["sigma_net_m3"] > small.summary["volumes"][0]["sigma_net_m3"]
+
+
 def test_surfaces_that_do_not_meet():
     first = epochs(1)[0]
     away = aerotri.Surface.of_array(first.z, left=1e4, top=0.0, cell=1.0)

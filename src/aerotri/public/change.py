@@ -209,6 +209,10 @@ def change(
         found = compute_change(
             grid, before, after, held, align, [(name, boundary.coverage(grid)) for name, boundary in areas.items()]
         )
+    if ground is not None and noise_length is None and found.alignment.sharing == 0.0:
+        notes.append("too little stable ground to tell over what length neighbouring cells share noise: --noise-length")
+    if ground is not None and align == "none":
+        notes.append("nothing was moved: a mean difference on stable ground is in the volumes and not in σ")
     by = dict(zip(found.alignment.names, found.alignment.values.tolist(), strict=True))
     if max(abs(by.get("dX", 0.0)), abs(by.get("dY", 0.0))) > FARTHEST * grid.cell_x:
         notes.append("the surfaces are shifted by more than a few cells: bring the second nearer and measure again")

@@ -37,7 +37,7 @@ class Alignment:
     ----------
     names : of the unknowns, m and m/m. values : (u,). covariance : (u, u).
     middle : (2,) m, about which the surface is tilted. cells, used : stable ones, and those that took part.
-    factor : noise on stable ground over the stated σ. sharing : cells of one noise.
+    factor : noise on stable ground over the stated σ. sharing : cells of one noise, 0 where too few tell.
     """
 
     names: tuple[str, ...] = ()
@@ -106,7 +106,7 @@ def align(
     factor = robust_sigma((d - a @ x) / s)
     sharing = cells_of_one_noise(left)
     scaled = a[used] / s[used, None]
-    covariance = factor**2 * sharing * np.linalg.inv(scaled.T @ scaled) if names else np.zeros((0, 0))
+    covariance = factor**2 * max(sharing, 1.0) * np.linalg.inv(scaled.T @ scaled) if names else np.zeros((0, 0))
     return Alignment(names, x, covariance, middle, int(stable.sum()), int(used.sum()), factor, sharing)
 
 

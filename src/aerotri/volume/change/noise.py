@@ -9,7 +9,7 @@ from aerotri.conventions import SIGMA_PER_MAD
 
 FEWEST_BLOCKS = 50
 """Blocks of cells at least whose means tell the noise length: its σ is then 10 %; chosen [C]."""
-FILLED = 0.8
+FILLED = 0.5
 """Share of the cells of a block that must be known."""
 
 
@@ -23,19 +23,21 @@ def robust_sigma(values: np.ndarray) -> float:
 def cells_of_one_noise(noise: np.ndarray) -> float:
     """How many cells share one noise, at least 1, from normalised noise (rows, columns), NaN where not known.
 
+    0 where there are too few blocks to tell.
+
     [D] The mean of a block of n cells with m of one noise has n/m times less variance than a cell, when n is much
     larger than m. Of squares of 2ᵏ cells the largest that give `FEWEST_BLOCKS` blocks are taken.
     """
     known = np.isfinite(noise)
     spread = robust_sigma(noise[known])
-    found, side = 1.0, 2
+    found, side = 0.0, 2
     while spread > 0.0:
         means, count = _block_means(noise, side)
         if len(means) < FEWEST_BLOCKS:
             break
-        found = _whole(float(np.mean(means**2) * np.mean(count)) / spread**2, side)
+        found = max(1.0, _whole(float(np.mean(means**2) * np.mean(count)) / spread**2, side))
         side *= 2
-    return max(found, 1.0)
+    return found
 
 
 def _whole(cells: float, side: int) -> float:
