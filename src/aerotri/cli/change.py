@@ -13,7 +13,8 @@ from aerotri.cli.options import ARGUMENTS, METHOD, OUTPUT, SIGMAS, TERRAIN, Json
 
 @app.command(
     rich_help_panel=TERRAIN,
-    epilog="Example: aerotri change may/dsm june/dsm --stable road.geojson --area dump.geojson --out change",
+    epilog="Example: aerotri change drone_dtm drone_dsm --align none --area blocks/drone_site/pile.geojson "
+    "--out change",
 )
 def change(
     first: Annotated[

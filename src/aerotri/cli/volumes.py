@@ -122,7 +122,7 @@ def volume(
     ] = False,
     density: Annotated[
         float | None,
-        typer.Option(min=1e-3, help="Tonnes of a cubic metre: gives tonnes.", rich_help_panel=METHOD),
+        typer.Option(min=1e-3, help="Mass of a cubic metre, t/m³: gives tonnes.", rich_help_panel=METHOD),
     ] = None,
     density_sigma: Annotated[
         float, typer.Option(min=0.0, help="σ of the density, t/m³, common to all piles.", rich_help_panel=SIGMAS)
