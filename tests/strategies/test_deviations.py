@@ -18,6 +18,7 @@ from aerotri.observations import Block, DeviationSettings
 from aerotri.pipeline import adjust, adjust_keeping_system, reopen
 from aerotri.strategies.deviation_estimation import LEAST, ReducedToGroups
 from dense_algebra import TINY, dense_design
+from rig_blocks import rig_block
 from small_blocks import small_block, with_adjustment
 
 PARAMETERS = "bluh:9+3"
@@ -299,3 +300,15 @@ def test_size_of_a_pattern():
     camera = replace(small_block(1)[0].cameras[0], size_px=(1000, 1000))
     h = camera.half_format_mm[0]
     assert size_mm(camera, "brown.K1") == pytest.approx(h**3 * np.sqrt(2.0 / 7.0 + 2.0 / 5.0), rel=0.02)
+
+
+def test_cameras_that_share_the_parameters_of_a_strip_are_named():
+    """By camera each has its own and nothing is said; by strip the heads of a rig share a set."""
+    block = with_adjustment(rig_block(2)[0], additional_parameters=parse_parameters("brown:K1"), model_part="off")
+    said = {
+        how: [w for w in adjust(with_adjustment(block, parameter_groups=how)).outcome.warnings if "share one set" in w]
+        for how in ("camera", "strip")
+    }
+    assert not said["camera"]
+    assert len(said["strip"]) == 1
+    assert "have 5 cameras" in said["strip"][0]

@@ -11,6 +11,7 @@ from aerotri.adjustment.ray_status import ray_status
 from aerotri.adjustment.rig_start import rig_start_values
 from aerotri.adjustment.robust import STAGES
 from aerotri.adjustment.scanning import motions_in_words
+from aerotri.adjustment.shared_parameters import cameras_of_groups, group_of_images
 from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import (
     ORIENTATION_ELEMENTS,
@@ -66,7 +67,7 @@ def prepare(block: Block, given_points: np.ndarray | None = None) -> Prepared:
     lonely = partnerless_in_words(block) if block.settings.adjustment.datum == "control" else ()
     u = system.unknowns
     of_motion = motions_in_words(u.block, u.images, u.scanning)
-    return Prepared(system, state, status, (*warnings, *lonely, *_held_in_words(u), *of_motion))
+    return Prepared(system, state, status, (*warnings, *lonely, *_held_in_words(u), *of_motion, *_mixed_in_words(u)))
 
 
 def _held_in_words(unknowns: Unknowns) -> tuple[str, ...]:
@@ -76,6 +77,23 @@ def _held_in_words(unknowns: Unknowns) -> tuple[str, ...]:
     held = counted(count, "coordinate", "coordinates")
     of_points = counted(points, "control point")
     return (f"{held} of {of_points} with σ = 0 held at the given value",)
+
+
+def _mixed_in_words(unknowns: Unknowns) -> tuple[str, ...]:
+    """That cameras share the parameters of a group."""
+    block, images = unknowns.block, unknowns.images
+    if "additional" not in unknowns.shared.kinds:
+        return ()
+    cameras = cameras_of_groups(block.images.camera[images], group_of_images(block)[images])
+    mixed = max(cameras, key=lambda group: cameras[group])
+    if cameras[mixed] == 1:
+        return ()
+    how = block.settings.adjustment.parameter_groups
+    return (
+        f"the photographs of group '{mixed}' have {cameras[mixed]} cameras, which share one set of additional "
+        f'parameters (parameter_groups = "{how}"). That is right for cameras that err alike; '
+        'parameter_groups = "camera" gives each its own',
+    )
 
 
 def _freed_of_the_air(block: Block, start: StartValues) -> Block:

@@ -5,6 +5,7 @@ The list made here is the border of the normal equations; `Unknowns` is the only
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -124,6 +125,17 @@ def group_of_images(block: Block) -> np.ndarray:
             file="block.toml",
         )
     return np.asarray(block.images.columns[how], dtype=object)
+
+
+def cameras_of_groups(camera: np.ndarray, group: np.ndarray) -> dict[str, int]:
+    """How many cameras the photographs of every group have.
+
+    Parameters
+    ----------
+    camera : (n,) index. group : (n,) str.
+    """
+    pairs = dict.fromkeys(zip(group.astype(str).tolist(), camera.tolist(), strict=True))
+    return Counter(name for name, _ in pairs)
 
 
 def lens_table(block: Block, images: np.ndarray, shared: SharedList) -> LensTable:

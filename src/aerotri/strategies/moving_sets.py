@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from aerotri.adjustment.prepare import Prepared
+from aerotri.adjustment.shared_parameters import cameras_of_groups
 from aerotri.results.parameter_comparison import SetOutcome
 from aerotri.statistics.clusters import OF_ONE_EXPOSURE, cluster_schemes
 from aerotri.strategies.parameter_choice import distances
@@ -73,7 +74,10 @@ def _best(comparer: SetComparer, outcomes: Sequence[SetOutcome]) -> list[SetOutc
 
 
 def _columns(prepared: Prepared, strips: np.ndarray | None) -> dict[str, int]:
-    """Columns of images.csv by which parameters may change, and how many groups each has."""
+    """Columns of images.csv by which parameters may change, and how many groups each has.
+
+    Groups whose photographs have several cameras are none: these would share one set.
+    """
     u = prepared.system.unknowns
     images = u.block.images
     values = {k: v for k, v in images.columns.items() if k not in OF_ONE_EXPOSURE}
@@ -83,6 +87,7 @@ def _columns(prepared: Prepared, strips: np.ndarray | None) -> dict[str, int]:
     for name, column in values.items():
         own = column[u.images].astype(str)
         count = len(set(own.tolist()))
-        if all(own.tolist()) and FEWEST_GROUPS <= count <= len(own) // 2:
+        of_one_camera = max(cameras_of_groups(images.camera[u.images], own).values(), default=0) <= 1
+        if of_one_camera and all(own.tolist()) and FEWEST_GROUPS <= count <= len(own) // 2:
             counts[name] = count
     return counts
