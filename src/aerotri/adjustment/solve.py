@@ -20,7 +20,7 @@ from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
 from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for
 from aerotri.adjustment.secants import Secants
 from aerotri.adjustment.sparse_cholesky import Factor
-from aerotri.adjustment.steps import Place, Trial, place_at, stretched, take_step, until_better
+from aerotri.adjustment.steps import Place, Trial, lengthened, place_at, stretched, take_step, until_better
 from aerotri.adjustment.stopping import (
     BENT_STEP_TOLERANCE,
     EARLY_STEP_TOLERANCE,
@@ -170,6 +170,8 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
         if step is None:
             return course.ended("not converged", at)
         is_plain = damping.value == 0.0 and (secants is not None or not step.points_settled)
+        if is_plain and secants is not None:
+            step = lengthened(system, at, step)
         secants, stage = _heeding(secants, stage, step, at, damping)
         if stage.is_robust and is_plain and secants is None:
             step = stretched(system, at, step, last_decrement)

@@ -27,6 +27,16 @@ SUSPECT_PIVOT = 1e-11
 """Pivot (relative to a unit diagonal) below which a factor serves for one step only: a hundred times what is taken for
 rounding (`sparse_cholesky.PIVOT_LIMIT`)."""
 
+STEEP = 0.9
+"""Slope at the end of a step, over that at its beginning, from which on the step was too short [L: the curvature
+condition of Wolfe with the c2 of quasi-Newton methods, Nocedal and Wright, 2006, section 3.1]."""
+
+DOUBLINGS = 8
+"""Times at most that a step too short is doubled."""
+
+SHORTENINGS, SHORTEST = 4, 0.05
+"""Times at most that a whole step that leads too far is shortened, and the least share of it each time."""
+
 LEAST_RATIO, LONGEST_STRETCH = 0.5, 5.0
 """Contraction from which on a step of re-weighting is lengthened: a faster one needs none. And the most it is
 lengthened by: beyond a contraction of .8 the ratio of two steps is too uncertain to go by."""
@@ -125,6 +135,23 @@ def stretched(system: NormalSystem, at: Place, step: Trial, last_decrement: floa
     return replace(step, place=there) if there.equations.cost < step.equations.cost else step
 
 
+def lengthened(system: NormalSystem, at: Place, step: Trial) -> Trial:
+    """A step along which the slope hardly falls off, doubled as long as that leads further down.
+
+    Where the residuals bend the sum of squares against the normal matrix, its steps are too short: from a saddle they
+    grow by a few hundredths each.
+    """
+    slope = float(step.reduced @ at.equations.right)
+    for _ in range(DOUBLINGS):
+        if float(step.reduced @ step.equations.right) <= STEEP * slope:
+            break
+        further = _at_share(system, at, step, 2.0)
+        if not further.equations.cost < step.equations.cost:
+            break
+        step, slope = further, 2.0 * slope
+    return step
+
+
 def place_at(system: NormalSystem, state: State, estimator: Estimator) -> Place:
     """The place of a state, its equations assembled."""
     return Place(state, system.assemble(state, 0.0, estimator), estimator)
@@ -158,7 +185,29 @@ def _trustworthy(system: NormalSystem, at: Place, step: Trial, secants: Secants)
     if (tried is None or not tried.keeps_promise(at.equations)) and len(secants):
         secants.forget()
         tried = _tried(system, at, step.factor, 0.0, secants)
-    return tried if tried is not None and tried.keeps_promise(at.equations) else None
+    if tried is None or tried.keeps_promise(at.equations):
+        return tried
+    return _shortened(system, at, tried)
+
+
+def _shortened(system: NormalSystem, at: Place, step: Trial) -> Trial | None:
+    """The part of a step that keeps its promise, looked for where a parabola through what is known has its minimum."""
+    whole, slope, share = step, float(step.reduced @ at.equations.right), 1.0
+    for _ in range(SHORTENINGS):
+        bend = step.equations.cost - at.equations.cost + 2.0 * share * slope
+        least = share * share * slope / bend if np.isfinite(bend) and bend > 0.0 else 0.0
+        share = float(np.clip(least, SHORTEST * share, 0.5 * share))
+        step = _at_share(system, at, whole, share)
+        if at.equations.cost - step.equations.cost >= LEAST_GAIN * share * slope:
+            return step
+    return None
+
+
+def _at_share(system: NormalSystem, at: Place, step: Trial, share: float) -> Trial:
+    """A step of another length, points at their minimum."""
+    move = Step(share * step.move.images, share * step.move.shared, share * step.move.points)
+    there = system.settle_points(system.unknowns.advance(at.state, move), step.place.estimator)
+    return replace(step, place=place_at(system, there, step.place.estimator), move=move)
 
 
 def _with_settled_points(system: NormalSystem, step: Trial) -> Trial:

@@ -25,6 +25,7 @@ import numpy as np
 from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
 from aerotri.adjustment.carry_over import start_values_at, with_shared
 from aerotri.adjustment.defects import checked_factor
+from aerotri.adjustment.error_transfer import with_image_errors
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.solve import Solution, SolveOptions
@@ -43,6 +44,9 @@ from aerotri.strategies.parameter_evidence import Divisions, divisions_of, evide
 
 SIGNIFICANT_T = 1.96
 """|p|/σ from which a parameter counts as significant: 95 % of the normal distribution, two-sided [L]."""
+FIRST_ITERATIONS = 6
+"""Iterations at most with the covariance that a random field has to begin with [C]: it is estimated soon after, and one
+that is too small holds the field back for tens of iterations."""
 NOWHERE = Accuracy.of(np.zeros((0, 3)))
 HYPERPARAMETERS = 2
 """Parameters of a random field's covariance that BIC counts: σ_d and the correlation length."""
@@ -99,7 +103,9 @@ class SetComparer:
         except InputError as error:
             return _failed(candidate, error.message)
         if self._last is not None:
-            state = with_shared(system.unknowns, self._last[0], state, self._last[1])
+            last, ended = self._last
+            state = with_shared(system.unknowns, last.unknowns, state, ended)
+            state = with_image_errors(system, state, last, ended)
         if self._divisions is None:
             # the same points and divisions for every set
             self._divisions = divisions_of(system.unknowns, state)
@@ -107,7 +113,7 @@ class SetComparer:
         found, adjusted = self._adjusted(system, state, candidate)
         if adjusted is not None:
             self._last = adjusted
-            self._start = start_values_at(*adjusted)
+            self._start = start_values_at(adjusted[0].unknowns, adjusted[1])
         return found
 
     def comparison(self, outcomes: Sequence[SetOutcome]) -> ParameterComparison:
@@ -118,10 +124,12 @@ class SetComparer:
 
     def _adjusted(
         self, system: NormalSystem, state: State, candidate: Candidate
-    ) -> tuple[SetOutcome, tuple[Unknowns, State] | None]:
+    ) -> tuple[SetOutcome, tuple[NormalSystem, State] | None]:
         """What a set did, and where its adjustment stands if there is one."""
         options = self._options
-        system, solution = minimise_at_adjusted(system, state, count_observations(system).redundancy, options)
+        first = replace(options, max_iterations=min(options.max_iterations, FIRST_ITERATIONS))
+        to_start = first if system.priors.fields else options
+        system, solution = minimise_at_adjusted(system, state, count_observations(system).redundancy, to_start)
         if solution.defects:
             return _failed(candidate, f"rank deficient: {'; '.join(solution.defects)}"), None
         system, solution = with_estimated_fields(system, solution, options)
@@ -134,7 +142,7 @@ class SetComparer:
         found = self._judged(system, solution, factor, candidate)
         if deviations is not None:
             found = replace(found, p=deviations.p, ratio=deviations.ratio)
-        return found, (system.unknowns, solution.state)
+        return found, (system, solution.state)
 
     def _judged(self, system: NormalSystem, solution: Solution, factor: Factor, candidate: Candidate) -> SetOutcome:
         u = system.unknowns
