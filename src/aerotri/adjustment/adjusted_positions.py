@@ -42,7 +42,7 @@ def acts_by_position(system: NormalSystem) -> bool:
     u = system.unknowns
     if u.block.settings.adjustment.parameter_position == "measured":
         return False
-    by_position = u.rays.ap_index.shape[1] > 0 or u.scanning is not None
+    by_position = u.rays.ap_index.shape[1] > 0 or u.rays.held is not None or u.scanning is not None
     return bool(by_position or (u.lens.columns[:, BROWN] >= 0).any())
 
 
@@ -132,7 +132,10 @@ def _at_measured_positions(system: NormalSystem) -> NormalSystem:
 def _evaluated_at(system: NormalSystem, at: np.ndarray) -> NormalSystem:
     u, other = system.unknowns, copy(system)
     columns = u.linear.columns(at)
-    rays = replace(u.rays, at=np.ascontiguousarray(at), ap_index=columns.index, ap_value=columns.value)
+    rays = replace(
+        u.rays, at=np.ascontiguousarray(at), ap_index=columns.index, ap_value=columns.value,
+        held=u.linear.held.image_errors(at),
+    )  # fmt: skip
     other.unknowns = replace(u, rays=rays)
     return other
 

@@ -22,7 +22,7 @@ from aerotri.functional_model.additional_parameters import (
     parameter_set,
 )
 from aerotri.functional_model.additional_parameters.beside_field import patterns_of_other_unknowns
-from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES
+from aerotri.functional_model.additional_parameters.registry import LINEAR_FAMILIES, parameter_sets
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, interior_row
 from aerotri.observations import Block, Camera, Prior
 from aerotri.observations.block import INTERIOR_ELEMENTS
@@ -203,19 +203,45 @@ class FamilySets:
 
 
 @dataclass(frozen=True, eq=False)
+class HeldParameters:
+    """Linear parameters with a value that is held: of every combination of camera and group those of each family.
+
+    Parameters
+    ----------
+    sets : with their values. of_ray : (m,) combination of every ray.
+    """
+
+    sets: dict[int, list[tuple[ParameterSet, np.ndarray]]]
+    of_ray: np.ndarray
+
+    def image_errors(self, xy: np.ndarray) -> np.ndarray | None:
+        """(m, 2) mm at positions (m, 2) mm of the rays; None where nothing is held."""
+        if not self.sets:
+            return None
+        errors = np.zeros_like(xy)
+        for key, held in self.sets.items():
+            own = np.flatnonzero(self.of_ray == key)
+            for chosen, values in held:
+                errors[own] += chosen.basis(*xy[own].T) @ values
+        return errors
+
+
+@dataclass(frozen=True, eq=False)
 class LinearParameters:
     """The linear additional parameters of a block.
 
     Parameters
     ----------
     families : one record each.
+    held : those with a value that is no unknown.
     """
 
     families: tuple[FamilySets, ...]
+    held: HeldParameters
 
     def beside(self, family: FamilySets) -> LinearParameters:
         """These and one more."""
-        return LinearParameters((*self.families, family))
+        return LinearParameters((*self.families, family), self.held)
 
     def columns(self, xy: np.ndarray) -> LinearColumns:
         """The columns at positions (m, 2) mm of the rays."""
@@ -247,14 +273,33 @@ def linear_parameters(block: Block, images: np.ndarray, ray_image: np.ndarray, s
             of_camera = _sets_by_camera(block, family, items)
             for (camera, group), key in number.items():
                 if camera in of_camera:
-                    chosen = _without_removed(block, of_camera[camera], group)
+                    chosen = _without_removed(block, _without_held(of_camera[camera]), group)
                     if group not in first:
                         first[group] = _add_set(shared, chosen, group)
                         if family == collocation.FAMILY.name:
                             shared.fields.append(random_field(block, chosen, group, first[group]))
+                    _refuse_other_values(shared, chosen, first[group])
                     sets[key] = chosen, first[group]
             families.append(FamilySets(sets, of_ray))
-    return LinearParameters(tuple(families))
+    return LinearParameters(tuple(families), HeldParameters(_held_sets(block, number), of_ray))
+
+
+def _held_sets(block: Block, number: dict[tuple[int, str], int]) -> dict[int, list[tuple[ParameterSet, np.ndarray]]]:
+    """The parameters that are held at the value their camera states, by the number of a (camera, group)."""
+    chosen = dict(block.settings.adjustment.additional_parameters)
+    found = {}
+    for (row, group), key in number.items():
+        camera = block.cameras[row]
+        values = {name: prior.value for name, prior in camera.parameters.items() if prior.value != 0.0}
+        for name, prior in camera.parameters.items():
+            parameter = Parameter.of(name)
+            estimated = parameter.item in chosen.get(parameter.family, ()) and not prior.fixed
+            if estimated or (name, group) in block.settings.adjustment.parameters_removed:
+                values.pop(name, None)
+        if values:
+            sets = parameter_sets(values, camera)
+            found[key] = [(one, np.array([values[name] for name in one.names])) for one in sets]
+    return found
 
 
 def _sets_by_camera(block: Block, family: str, items: tuple[str, ...]) -> dict[int, ParameterSet]:
@@ -262,6 +307,33 @@ def _sets_by_camera(block: Block, family: str, items: tuple[str, ...]) -> dict[i
     fitting = [c for c in used if LINEAR_FAMILIES[family].fits(block.cameras[c])]
     # without a fitting camera let parameter_set say what is wrong
     return {c: parameter_set(family, items, block.cameras[c]) for c in fitting or used}
+
+
+def _without_held(chosen: ParameterSet) -> ParameterSet:
+    """The set without what its camera holds."""
+    held = {name for name, prior in chosen.camera.parameters.items() if prior.fixed}
+    left = tuple(item for name, item in zip(chosen.names, chosen.items, strict=True) if name not in held)
+    return replace(chosen, items=left)
+
+
+def _refuse_other_values(shared: SharedList, chosen: ParameterSet, first: int) -> None:
+    """Refuse cameras that share parameters but state different values of them, or hold different ones.
+
+    Raises
+    ------
+    InputError
+    """
+    for k, name in enumerate(chosen.names, start=first):
+        prior = chosen.camera.parameters.get(name, FREE)
+        sigma = np.inf if prior.sigma is None else prior.sigma
+        same = k < len(shared) and shared.names[k] == name
+        if not same or (shared.observed[k], shared.sigma[k]) != (prior.value, sigma):
+            raise InputError(
+                f"camera '{chosen.camera.name}' shares its additional parameters with other cameras, which state "
+                f"another value of {name} or hold it",
+                f'state the same in [camera.{chosen.camera.name}.parameters], or set parameter_groups = "camera"',
+                file="block.toml",
+            )
 
 
 def _without_removed(block: Block, chosen: ParameterSet, group: str) -> ParameterSet:
@@ -275,7 +347,8 @@ def _add_set(shared: SharedList, chosen: ParameterSet, group: str) -> int:
     """The set appended to the shared list; its first column."""
     first = len(shared)
     for name, item in zip(chosen.names, chosen.items, strict=True):
-        shared.add(name, group, "additional", mark_of(chosen.family, item))
+        prior = chosen.camera.parameters.get(name, FREE)
+        shared.add(name, group, "additional", mark_of(chosen.family, item), prior)
     return first
 
 

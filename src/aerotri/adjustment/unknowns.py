@@ -57,7 +57,13 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays as `kernel_records` describes them; `source` is their row in the block."""
+    """Rays as `kernel_records` describes them.
+
+    Parameters
+    ----------
+    source : (m,) their row in the block.
+    held : (m, 2) mm, image errors by additional parameters that are held; None where there are none.
+    """
 
     start: np.ndarray
     image: np.ndarray
@@ -68,11 +74,13 @@ class Rays:
     ap_index: np.ndarray
     ap_value: np.ndarray
     source: np.ndarray
+    held: np.ndarray | None = None
 
     def arrays(self) -> RayArrays:
-        """As kernels take them."""
+        """As kernels take them: free of the image errors that are held."""
+        xy = self.xy if self.held is None else self.xy - self.held
         return RayArrays(
-            self.start, self.image, self.lens_row, self.xy, self.at, self.inv_sigma, self.ap_index, self.ap_value,
+            self.start, self.image, self.lens_row, xy, self.at, self.inv_sigma, self.ap_index, self.ap_value,
         )  # fmt: skip
 
 
@@ -299,6 +307,7 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
             ap_index=columns.index,
             ap_value=columns.value,
             source=source,
+            held=linear.held.image_errors(at),
         ),
         lens=lens,
         linear=linear,

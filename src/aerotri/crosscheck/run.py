@@ -27,7 +27,8 @@ def crosscheck(
     Raises
     ------
     InputError
-        For a block with rigid rigs or a rolling shutter, which the peers do not know.
+        For a block with rigid rigs, a rolling shutter or given values of linear parameters, which the peers do not
+        know.
     """
     if adjusted.rigs:
         raise InputError(
@@ -40,6 +41,12 @@ def crosscheck(
             "the cross-check knows no rolling shutter",
             f"cross-check an adjustment without [camera.{camera}.rolling_shutter]",
         )
+    for camera in adjusted.block.cameras:
+        if camera.parameters:
+            raise InputError(
+                "the cross-check knows no given values of additional parameters",
+                f"cross-check an adjustment without [camera.{camera.name}.parameters]",
+            )
     tell: Callable[[str], None] = report or (lambda text: None)
     tell("adjusting through pycolmap")
     colmap = _colmap(adjusted, adjust)

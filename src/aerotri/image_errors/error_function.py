@@ -159,6 +159,7 @@ def _values_in_force(adjusted: AdjustedBlock, group: ImageGroup) -> dict[str, fl
     p = adjusted.parameters
     given = {f"brown.{item}": prior.value for item, prior in group.camera.brown.items()}
     given |= {f"lens.{item}": prior.value for item, prior in group.camera.lens.items()}
+    given |= {name: prior.value for name, prior in group.camera.parameters.items()}
     for name in p.names[(p.status == "removed") & (p.groups == group.name)]:
         given.pop(str(name), None)
     rows = np.flatnonzero(parameters_of_group(adjusted, group))

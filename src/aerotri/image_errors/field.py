@@ -293,6 +293,7 @@ def _values_in_force(adjusted: AdjustedBlock, group: ImageGroup, rows: np.ndarra
     p = adjusted.parameters
     given = {f"brown.{item}": prior.value for item, prior in group.camera.brown.items()}
     given |= {f"lens.{item}": prior.value for item, prior in group.camera.lens.items()}
+    given |= {name: prior.value for name, prior in group.camera.parameters.items()}
     for name in p.names[p.status == "removed"]:
         given.pop(str(name), None)
     return given | {str(name): float(value) for name, value in zip(p.names[rows], p.value[rows], strict=True)}

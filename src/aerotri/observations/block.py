@@ -39,6 +39,7 @@ class Camera:
     brown : `Prior` of Brown's parameters by name (`BROWN_NAMES`, units mm^-k); a function of the measured position.
     lens : `Prior` of the forward lens parameters by name (`LENS_NAMES`, dimensionless); a function of the ideal
         direction, as OpenCV, COLMAP, Bundler and Metashape have it.
+    parameters : `Prior` of parameters of the linear families by name ('bluh.9', 'legendre.bx2y0').
     projection : one of `PROJECTIONS`: an ideal ray at the angle θ to the axis lies c·tan θ (perspective) or c·θ
         (fisheye, equidistant) from the principal point.
     flight_axis : image axis along the flight ('+x', '-x', '+y', '-y') or None when not stated.
@@ -54,6 +55,7 @@ class Camera:
     interior: Mapping[str, Prior]
     brown: Mapping[str, Prior] = field(default_factory=dict)
     lens: Mapping[str, Prior] = field(default_factory=dict)
+    parameters: Mapping[str, Prior] = field(default_factory=dict)
     projection: str = "perspective"
     flight_axis: str | None = None
     fiducials: Mapping[str, tuple[float, float]] = field(default_factory=dict)

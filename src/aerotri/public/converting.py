@@ -212,13 +212,13 @@ def _at_start_values(
     block: Block, points: np.ndarray | None, to: Target
 ) -> tuple[OrientedBlock | None, tuple[str, ...]]:
     """The block at the orientations it came with; None where it has none and the format needs them."""
-    from aerotri.formats.assembly.oriented import OrientedBlock
+    from aerotri.formats.assembly.oriented import OrientedBlock, given_errors
     from aerotri.functional_model.rotation import rotation_from_angles
 
     rotation = rotation_from_angles(block.images.angles, block.rotation)
     known = np.full((len(block.points), 3), np.nan) if points is None else points
     used = np.ones(len(block.image_points), bool)
-    oriented = OrientedBlock(block, block.images.centre, rotation, known, used)
+    oriented = OrientedBlock(block, block.images.centre, rotation, known, used, *given_errors(block))
     if oriented.oriented.any():
         return oriented, ("the orientations are those of the files, not adjusted",)
     return (oriented, ()) if to == "patb" else (None, ())

@@ -14,7 +14,11 @@ Count = Callable[[Block], int]
 
 
 def _lens(block: Block) -> int:
-    priors = [prior for camera in block.cameras for prior in (*camera.brown.values(), *camera.lens.values())]
+    priors = [
+        prior
+        for camera in block.cameras
+        for prior in (*camera.brown.values(), *camera.lens.values(), *camera.parameters.values())
+    ]
     return sum(prior.value != 0.0 for prior in priors)
 
 

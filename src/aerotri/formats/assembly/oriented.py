@@ -139,7 +139,22 @@ def oriented_block(block: Block, points: np.ndarray) -> OrientedBlock:
     if not known.any():
         raise InputError(f"block '{block.name}' has no orientations", "adjust it first and export the result")
     rotation = rotation_from_angles(block.images.angles, block.rotation)
-    return OrientedBlock(block, block.images.centre, rotation, points, np.ones(len(block.image_points), bool))
+    used = np.ones(len(block.image_points), bool)
+    return OrientedBlock(block, block.images.centre, rotation, points, used, *given_errors(block))
+
+
+def given_errors(block: Block) -> tuple[np.ndarray | None, tuple[np.ndarray, ...]]:
+    """Image errors by linear parameters whose values the cameras state: `OrientedBlock.errors` and `format_errors`."""
+    from aerotri.formats.foreign.lens_fit import format_grid_mm
+
+    rays = block.image_points
+    errors, of_format = np.zeros_like(rays.xy), []
+    for number, camera in enumerate(block.cameras):
+        values = {name: prior.value for name, prior in camera.parameters.items()}
+        own = np.flatnonzero(block.images.camera[rays.image] == number)
+        errors[own] = _linear_errors(camera, values, rays.xy[own])
+        of_format.append(_linear_errors(camera, values, format_grid_mm(camera)))
+    return (errors, tuple(of_format)) if any(one.any() for one in of_format) else (None, ())
 
 
 def oriented_from_adjusted(adjusted: AdjustedBlock) -> OrientedBlock:
@@ -178,7 +193,8 @@ def _values_in_force(adjusted: AdjustedBlock, group: ImageGroup) -> dict[str, fl
     p = adjusted.parameters
     rows = np.flatnonzero((p.groups == group.name) & (p.kinds == "additional"))
     values = np.where(p.status[rows] == "removed", 0.0, p.value[rows])
-    return dict(zip(p.names[rows].tolist(), values.tolist(), strict=True))
+    given = {name: prior.value for name, prior in group.camera.parameters.items()}
+    return given | dict(zip(p.names[rows].tolist(), values.tolist(), strict=True))
 
 
 def _adjusted_camera(adjusted: AdjustedBlock, group: ImageGroup, values: dict[str, float]) -> Camera:

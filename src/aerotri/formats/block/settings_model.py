@@ -27,6 +27,7 @@ from aerotri.formats.block.settings_types import (
     Two,
 )
 from aerotri.formats.text.described_key import key
+from aerotri.functional_model.additional_parameters.given_values import reason_against
 from aerotri.observations import Camera, Mounting, Prior, Rig
 from aerotri.observations.block import BROWN_NAMES, INTERIOR_ELEMENTS, LENS_NAMES
 
@@ -40,7 +41,7 @@ class InteriorModel(Section):
 
 
 class BrownModel(Section):
-    """Start values and σ of Brown's lens parameters; they act only where `additional_parameters` names them."""
+    """Values and σ of Brown's lens parameters. What `additional_parameters` does not name is held at its value."""
 
     K1: PriorModel | None = key(None, "Brown's radial distortion, term r³.", "mm⁻²")
     K2: PriorModel | None = key(None, "Brown's radial distortion, term r⁵.", "mm⁻⁴")
@@ -102,6 +103,11 @@ class CameraModel(Section):
     lens: LensModel = key(
         LensModel(), 'Start values and σ of the OpenCV lens parameters, for additional_parameters "lens:…".'
     )
+    parameters: dict[str, PriorModel] = key(
+        {}, 'Values and σ of parameters of the other families, by name, as in "bluh.9" = { value = 1.2e-7, '
+        "fixed = true }: from a calibration or another block. What `additional_parameters` does not name is held at "
+        "its value."
+    )  # fmt: skip
     interior_orientation: Literal["affine", "projective", "similarity"] | None = key(
         None, "Scanned film: transformation from pixels of the scan to the calibrated fiducial marks."
     )
@@ -118,6 +124,14 @@ class CameraModel(Section):
     def _fisheye_of_one_sensor(self) -> CameraModel:
         if self.projection == "fisheye" and self.model != "frame":
             raise ValueError(f'projection = "fisheye" does not go with model = "{self.model}", it needs "frame"')
+        return self
+
+    @model_validator(mode="after")
+    def _parameters_of_families(self) -> CameraModel:
+        for name in self.parameters:
+            why = reason_against(name, self.model)
+            if why:
+                raise ValueError(f"parameters.{name}: {why}")
         return self
 
     @model_validator(mode="after")
@@ -142,6 +156,7 @@ class CameraModel(Section):
             interior=interior,
             brown=_priors(self.brown, BROWN_NAMES),
             lens=_priors(self.lens, LENS_NAMES),
+            parameters={name: model.prior() for name, model in self.parameters.items()},
             projection=self.projection,
             flight_axis=self.flight_axis,
             fiducials={name: (float(x), float(y)) for name, (x, y) in self.fiducials.items()},

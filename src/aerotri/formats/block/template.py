@@ -33,6 +33,7 @@ EXAMPLES: dict[str, Any] = {
     "name": "my_block",
     "camera.NAME.flight_axis": "+y",
     "camera.NAME.interior_orientation": "affine",
+    "camera.NAME.parameters": {"bluh.9": {"value": 1.2e-7, "fixed": True}},
     "camera.NAME.rolling_shutter.readout_ms": {"value": 30.0},
     "camera.NAME.rolling_shutter.speed_m_s": 8.0,
     "camera.NAME.fiducials": {"1": [-106.0, -106.0]},
@@ -223,7 +224,8 @@ def _table_of(annotation: Any) -> type[BaseModel] | None:
 
 
 def _is_prior(annotation: Any) -> bool:
-    return annotation in (PriorModel, ThreePriorsModel) or PriorModel in get_args(annotation)
+    one = get_origin(annotation) is not dict and PriorModel in get_args(annotation)
+    return one or annotation in (PriorModel, ThreePriorsModel)
 
 
 def _words(annotation: Any) -> tuple[str, ...]:

@@ -251,7 +251,7 @@ def _camera(camera: Camera) -> dict[str, Any]:
         content["interior"] = {
             name: Inline({"fixed": False}) if prior.sigma is None else _prior(prior) for name, prior in unknown.items()
         }
-    for section, priors in (("brown", camera.brown), ("lens", camera.lens)):
+    for section, priors in (("brown", camera.brown), ("lens", camera.lens), ("parameters", camera.parameters)):
         if priors:
             content[section] = {name: _prior(prior) for name, prior in priors.items()}
     if camera.interior_orientation is not None:
