@@ -110,7 +110,7 @@ def _by_times(centre: np.ndarray, time: np.ndarray, strip: np.ndarray) -> tuple[
     steps = steps[steps > 0.0]
     if not len(steps):
         return velocity, source
-    longest, rounding = LONGEST_STEP * float(np.median(steps)), _rounding(time)
+    longest, rounding = LONGEST_STEP * float(np.median(steps)), time_rounding(time)
     lengths = [np.linalg.norm(_step_velocities(centre[run], time[run], longest), axis=1) for run in runs]
     speeds = np.concatenate(lengths)
     speeds = speeds[np.isfinite(speeds)]
@@ -129,7 +129,7 @@ def _in_time(rows: np.ndarray, time: np.ndarray) -> np.ndarray:
     return rows[np.argsort(time[rows], kind="stable")]
 
 
-def _rounding(time: np.ndarray) -> float:
+def time_rounding(time: np.ndarray) -> float:
     """s that times were rounded to: 1 where all are whole seconds, as in EXIF, else none."""
     known = time[np.isfinite(time)]
     return 1.0 if len(known) and (known == np.round(known)).all() else 0.0

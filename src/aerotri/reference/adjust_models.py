@@ -137,6 +137,8 @@ def rolling_shutters() -> tuple[Item, ...]:
         Item(f"{camera}.readout_ms", "number", "Time from the exposure of the first row to that of the last.", "ms"),
         Item(f"{camera}.sigma_ms", "number", "Its standard deviation; 0: held.", "ms"),
         Item(f"{camera}.total_sigma_ms", "number", "The same with the model part.", "ms"),
+        Item(f"{camera}.time_rounding_s", "number", "What the times of its photographs are rounded to; 0 where they "
+             "are finer than seconds, or not used.", "s"),
         Item(f"{camera}.status", "text", "How it was found.", values={
             "estimated": "free", "weighted": "with an observed value", "fixed": "held"}),
         Item(f"{camera}.row_direction", "text", "Direction in which the rows are read."),

@@ -21,6 +21,7 @@ class Readout:
     photographs : of the camera. speed_m_s : median over them. moved_m : median way during the readout.
     velocities : how many photographs have their velocity from where, see `adjustment.track_velocity`.
     total_sigma_ms : with the model part, see `statistics.model_part`; σ itself where there is none.
+    time_rounding_s : what the times of its photographs are rounded to, 1 for whole seconds; 0 where they are finer.
     """
 
     camera: str
@@ -33,6 +34,7 @@ class Readout:
     moved_m: float
     velocities: dict[str, int] = field(default_factory=dict)
     total_sigma_ms: float = 0.0
+    time_rounding_s: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """As adjustment.json has it."""
@@ -47,7 +49,17 @@ class Readout:
             value += f" (total σ {self.total_sigma_ms:.2g} ms)"
         return (
             f"the readout time of camera '{self.camera}' is {value}: at {self.speed_m_s:.2g} m/s it moves by "
-            f"{abs(self.moved_m):.2g} m while a photograph is read"
+            f"{abs(self.moved_m):.2g} m while a photograph is read{self._about_times}"
+        )
+
+    @property
+    def _about_times(self) -> str:
+        if not self.time_rounding_s:
+            return ""
+        return (
+            ". The times of its photographs are whole seconds: velocities are means over several of them, and how far "
+            "they err is not in σ. Give times with fractions of a second where the camera or its log has them "
+            "(column time of gnss_ins.csv)"
         )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
+from aerotri.adjustment.track_velocity import TIMED, time_rounding, times_of
 from aerotri.results.rolling_shutter import Motions, Readout, RollingShutters
 from aerotri.statistics.covariance import Cofactors
 
@@ -21,6 +22,7 @@ def rolling_shutters(system: NormalSystem, solution: Solution, q: Cofactors, sig
     velocity, spin = scanning.motion(state.shared)
     speed = np.linalg.norm(velocity, axis=1)
     readout, camera = scanning.readout(state.shared), u.block.images.camera[u.images]
+    time = times_of(u.block)[u.images]
     found = []
     for k in np.unique(camera[scanning.rolling]).tolist():
         rows = np.flatnonzero(camera == k)
@@ -40,6 +42,7 @@ def rolling_shutters(system: NormalSystem, solution: Solution, q: Cofactors, sig
                 moved_m=float(1e-3 * readout[rows[0]] * np.median(speed[rows])),
                 velocities=dict(Counter(scanning.source[rows].tolist())),
                 total_sigma_ms=sigma,
+                time_rounding_s=time_rounding(time[rows]) if TIMED in scanning.source[rows] else 0.0,
             )
         )
     rows = np.flatnonzero(scanning.rolling)

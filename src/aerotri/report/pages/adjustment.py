@@ -32,6 +32,7 @@ from aerotri.report.tables import adjustment as tables
 from aerotri.report.tables import parameters as parameter_tables
 from aerotri.report.tables import precision as precision_tables
 from aerotri.report.tables import rigs as rig_tables
+from aerotri.report.tables import rolling_shutters as shutter_tables
 from aerotri.report.tables import work as work_tables
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.parameter_comparison import ParameterComparison
@@ -169,6 +170,7 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         | {"work": work_tables.work_table(work), "effects": _effects(adjusted, beside)}
         | _parameter_tables(adjusted, beside),
         "rig_verdicts": rig_tables.verdicts(adjusted),
+        "shutter_verdict": shutter_tables.verdict(adjusted),
         "effects_missing": _why_no_effects(adjusted),
         "selection": adjusted.block.settings.adjustment.parameter_selection == "on",
         "changes": [_change(change) for change in beside.changes],
@@ -243,6 +245,8 @@ def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
         "rigidity": rig_tables.rigidity_table(adjusted),
         "rig_photographs": rig_tables.photographs_table(adjusted),
         "rig_stations": rig_tables.stations_table(adjusted),
+        "readouts": shutter_tables.readouts_table(adjusted),
+        "shutter_test": shutter_tables.shutter_test_table(adjusted),
         "parameters": tables.parameters(adjusted),
         "correlations": precision_tables.correlations(adjusted),
         "precision": precision_tables.precision(adjusted),
