@@ -51,23 +51,25 @@ class DensePlots:
     block: str
 
     def surface(self) -> Figure:
-        """The surface, lit from the north-west, and the σ of its cells."""
+        """The surface, lit from the north-west as far as it was measured, and the σ of its matching."""
         from aerotri.rasters.grids import Grid
-        from aerotri.report.plots.terrain import plot_heights
+        from aerotri.report.plots.terrain import plot_dense
 
         o = self.record
         step = max(-(-max(o.grid.rows, o.grid.columns) // DRAWN), 1)
         rows, columns = -(-o.grid.rows // step), -(-o.grid.columns // step)
-        z, sigma = np.full((rows, columns), np.nan), np.full((rows, columns), np.nan)
-        for row, column, heights, total in _surface_parts(o):
+        z, matching, total = (np.full((rows, columns), np.nan) for _ in range(3))
+        for window, tile in o.files.read_all(list(o.windows)):
+            row, column = window.row, window.column
+            sigma = np.hypot(tile.sigma, o.shared.over(o.grid.window(row, column, window.rows, window.columns)))
             first = -row % step, -column % step
-            taken, s = heights[first[0] :: step, first[1] :: step], total[first[0] :: step, first[1] :: step]
             i, j = (row + first[0]) // step, (column + first[1]) // step
-            z[i : i + taken.shape[0], j : j + taken.shape[1]] = taken
-            sigma[i : i + taken.shape[0], j : j + taken.shape[1]] = s
-        whole = o.grid
-        drawn = Grid(rows, columns, whole.left, whole.top, whole.cell_x * step, whole.cell_y * step)
-        return plot_heights(drawn, z, sigma, self.block, o.photographs.places.frame is None)
+            for whole, part in ((z, tile.z), (matching, tile.sigma), (total, sigma)):
+                taken = part[first[0] :: step, first[1] :: step]
+                whole[i : i + taken.shape[0], j : j + taken.shape[1]] = taken
+        drawn = Grid(rows, columns, o.grid.left, o.grid.top, o.grid.cell_x * step, o.grid.cell_y * step)
+        is_local = o.photographs.places.frame is None
+        return plot_dense(drawn, z, matching, float(np.nanmedian(total)), self.block, is_local)
 
     def all(self) -> dict[str, Figure]:
         """Every plot by the name of its file."""

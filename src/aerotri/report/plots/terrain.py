@@ -67,10 +67,32 @@ def plot_heights(grid: Grid, z: np.ndarray, sigma: np.ndarray | None, name: str,
     return _plot_heights(grid, z, sigma, name, subtitle, is_local)
 
 
+def plot_dense(grid: Grid, z: np.ndarray, matching: np.ndarray, total: float, name: str, is_local: bool) -> Figure:
+    """A dense surface as far as it was measured, and the σ of its matching, which changes from cell to cell.
+
+    Parameters
+    ----------
+    z, matching : (rows, columns) m, NaN where not measured.
+    total : m, median σ of the heights with the part of the adjustment.
+    """
+    known = np.isfinite(z)
+    rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+    part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    z, matching = z[part], matching[part]
+    subtitle = (
+        f"cells of {length_text(float(f'{grid.cell_x:.3g}'))}; heights {np.nanmin(z):.1f} … {np.nanmax(z):.1f} m; "
+        f"white: not measured\nσ of matching, drawn: median {np.nanmedian(matching):.3f} m; with the adjustment "
+        f"{total:.3f} m"
+    )
+    shown = grid.window(int(rows[0]), int(columns[0]), *z.shape)
+    return _plot_heights(shown, z, matching, name, subtitle, is_local, "σ of matching [m]")
+
+
 @styled
 def _plot_heights(
-    grid: Grid, z: np.ndarray, sigma: np.ndarray | None, name: str, subtitle: str, is_local: bool
-) -> Figure:
+    grid: Grid, z: np.ndarray, sigma: np.ndarray | None, name: str, subtitle: str, is_local: bool,
+    label: str = "σ of Z [m]",
+) -> Figure:  # fmt: skip
     width, height = _size(grid, WIDTH - 1.4 if sigma is None else (WIDTH - 3.3) / 2.0)
     figure = new_figure(height + 1.75, f"Surface – {plain(name)}", subtitle)
     left = axes_at(figure, 0.75, 0.75, width, height)
@@ -85,13 +107,14 @@ def _plot_heights(
     _contours(left, grid, z)
     _coordinates(left, width, height, local=is_local)
     if sigma is not None:
-        _plot_sigma(figure, 0.75 + width + 0.75, (width, height), grid, sigma[::every, ::every], is_local)
+        _plot_sigma(figure, 0.75 + width + 0.75, (width, height), grid, sigma[::every, ::every], is_local, label)
     return figure
 
 
 def _plot_sigma(
-    figure: Figure, place: float, size: tuple[float, float], grid: Grid, sigma: np.ndarray, is_local: bool
-) -> None:
+    figure: Figure, place: float, size: tuple[float, float], grid: Grid, sigma: np.ndarray, is_local: bool,
+    label: str,
+) -> None:  # fmt: skip
     """σ of the heights as grey tones, from `place` on; inches."""
     right = axes_at(figure, place, 0.75, *size)
     low, high = np.nanpercentile(sigma, [1, 99])
@@ -99,7 +122,7 @@ def _plot_sigma(
     _coordinates(right, *size, local=is_local)
     right.set_ylabel("")
     scale = axes_at(figure, place + size[0] + 0.15, 0.75, 0.14, size[1])
-    figure.colorbar(image, cax=scale).set_label("σ of Z [m]")
+    figure.colorbar(image, cax=scale).set_label(label)
 
 
 @styled
