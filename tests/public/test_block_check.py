@@ -237,6 +237,14 @@ def test_micrometres_and_metres_that_are_millimetres(ten):
     assert "is σ in metres?" in text
 
 
+def test_a_fisheye_is_said(ten):
+    camera = replace(ten.cameras[0], model="frame", projection="fisheye")
+    found = aerotri.check(replace(ten, cameras=(camera,)))
+    assert "frame with a fisheye lens" in "\n".join(found.lines())
+    assert found.summary["cameras"][0]["projection"] == "fisheye"
+    assert "fisheye" not in "\n".join(aerotri.check(ten).lines())
+
+
 def test_names_that_look_alike():
     assert alike(["GCP-01", "gcp 1", "GCP_2", "1_11", "11_1", "111", "A/IMG_1.jpg", "B/IMG_1.jpg"]) == [
         ("GCP-01", "gcp 1")

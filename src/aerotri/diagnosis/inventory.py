@@ -22,6 +22,7 @@ class CameraUse:
     pixel_um: float
     focal_length_mm: float
     photographs: int
+    projection: str
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,8 @@ def _known(values: np.ndarray) -> int:
 
 def _camera_use(camera: Camera, photographs: int) -> CameraUse:
     return CameraUse(
-        camera.name, camera.model, camera.size_px, camera.pixel_um, camera.focal_length_mm, photographs
+        camera.name, camera.model, camera.size_px, camera.pixel_um, camera.focal_length_mm, photographs,
+        camera.projection,
     )  # fmt: skip
 
 

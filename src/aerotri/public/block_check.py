@@ -12,7 +12,7 @@ from aerotri.formats.results.json_text import number_or_none
 from aerotri.observations import Block
 
 if TYPE_CHECKING:
-    from aerotri.diagnosis.inventory import Extent, GroundPointCounts, Inventory
+    from aerotri.diagnosis.inventory import CameraUse, Extent, GroundPointCounts, Inventory
 
 UNITS = {"deg": "degrees", "gon": "gon", "rad": "radians"}
 MOST_CAMERAS = 6
@@ -188,7 +188,7 @@ def _heading(found: BlockCheck) -> list[str]:
     strips = f" in {counted(len(i.strips), 'strip')}" if i.strips else ""
     lines.append(f"{counted(i.photographs, 'photograph')}{strips}")
     lines += [
-        f"  camera {one.name}: {counted(one.photographs, 'photograph')}, {one.model}, {one.size_px[0]} × "
+        f"  camera {one.name}: {counted(one.photographs, 'photograph')}, {_kind(one)}, {one.size_px[0]} × "
         f"{one.size_px[1]} px of {one.pixel_um:g} µm, focal length {one.focal_length_mm:g} mm"
         for one in i.cameras[:MOST_CAMERAS]
     ]
@@ -199,6 +199,11 @@ def _heading(found: BlockCheck) -> list[str]:
         f"observed: {counted(i.with_gnss, 'GNSS position')}, {counted(i.with_ins, 'INS attitude')}"
     )
     return [*lines, *_image_points(i), _ground("control points", i.control), _ground("check points", i.check)]
+
+
+def _kind(camera: CameraUse) -> str:
+    """'frame', 'frame with a fisheye lens'."""
+    return f"{camera.model} with a fisheye lens" if camera.projection == "fisheye" else camera.model
 
 
 def _image_points(i: Inventory) -> list[str]:

@@ -200,6 +200,7 @@ CHECK = (
     Item("cameras[].pixel_um", "number", "Size of a pixel.", "µm"),
     Item("cameras[].focal_length_mm", "number", "Principal distance.", "mm"),
     Item("cameras[].photographs", "whole", "Photographs it took."),
+    Item("cameras[].projection", "text", "Kind of lens.", values={"perspective": "usual", "fisheye": "fisheye"}),
     Item("strips[]", "object", "The strips."),
     Item("strips[].name", "text", "Name of the strip."),
     Item("strips[].photographs", "whole", "Its photographs."),
