@@ -10,6 +10,8 @@ from aerotri.formats.assembly.oriented import given_errors, oriented_from_adjust
 from aerotri.formats.block.folder import read_block, write_block
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.image_errors import image_groups, systematic_errors
+from aerotri.image_errors.error_exports import ideal_camera
+from aerotri.image_errors.error_function import error_function
 from aerotri.observations import Prior
 from aerotri.pipeline import adjust
 from small_blocks import ERRING, small_block, with_adjustment
@@ -64,6 +66,13 @@ def test_held_errors_are_in_the_field_and_in_what_is_handed_on(freed, held):
     a, b = oriented_from_adjusted(freed), oriented_from_adjusted(held)
     np.testing.assert_allclose(b.errors, a.errors, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(given_errors(held.block)[0], b.errors, rtol=0.0, atol=1e-12)
+
+
+def test_ideal_photographs_have_none_left(held):
+    """What was taken out of corrected photographs is not in the camera of their block."""
+    errors = error_function(held, image_groups(held.block)[0])
+    assert not errors.is_zero
+    assert ideal_camera(errors).parameters == {}
 
 
 def test_without_the_values_the_result_is_another(freed, held):

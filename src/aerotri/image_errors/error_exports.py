@@ -71,7 +71,7 @@ def ideal_camera(errors: ErrorFunction) -> Camera:
         name: Prior(float(value), fixed=True) for name, value in zip(INTERIOR_ELEMENTS, errors.interior, strict=True)
     }
     return replace(
-        errors.camera, interior=interior, brown={}, lens={}, fiducials={}, interior_orientation=None
+        errors.camera, interior=interior, brown={}, lens={}, parameters={}, fiducials={}, interior_orientation=None
     )  # fmt: skip
 
 

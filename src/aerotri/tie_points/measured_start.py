@@ -119,7 +119,7 @@ def _bare(block: Block) -> Block:
     xy = tangent * focal[of_camera, None] + bar[of_camera]
     own = np.flatnonzero(once & ~off & np.isfinite(xy).all(axis=1))
     points = ImagePoints(rays.image[own], rays.point[own], xy[own], rays.sigma[own])
-    cameras = tuple(replace(camera, brown={}, lens={}, rolling_shutter=None) for camera in block.cameras)
+    cameras = tuple(replace(camera, brown={}, lens={}, parameters={}, rolling_shutter=None) for camera in block.cameras)
     return replace(block, image_points=points, cameras=cameras)
 
 

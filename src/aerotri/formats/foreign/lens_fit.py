@@ -125,7 +125,7 @@ def fitted_camera(
     fitted = {name: Prior(value, fixed=True) for name, value in best.values(names).items()}
     what = "its lens" if errors is None or not errors.any() else "its additional parameters"
     said = f"camera '{camera.name}': {program} has no words for {what}; the nearest lens is written, {best.text}"
-    return replace(camera, lens=fitted, brown={}), (said,)
+    return replace(camera, lens=fitted, brown={}, parameters={}), (said,)
 
 
 def _nearest(camera: Camera, ideal: np.ndarray, bent: np.ndarray, names: Sequence[str]) -> FittedLens:
