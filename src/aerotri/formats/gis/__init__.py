@@ -1,0 +1,1 @@
+"""Results for programs that draw maps: layers of a GeoPackage, GeoParquet, STAC."""
