@@ -59,7 +59,7 @@ def ground_statistics(adjusted: AdjustedBlock, results: GroundPointResults) -> G
     given = np.isfinite(d)
     n = given.sum(axis=0)
     filled = np.where(given, d, 0.0)
-    sigma = _sigma_given(adjusted, results)
+    sigma = sigma_given(adjusted, results)
     of_residuals = (adjusted.outcome.sigma0 * sigma) ** 2 * results.r
     variance = results.total_sigma**2 + sigma**2 if results is adjusted.check else of_residuals
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -70,7 +70,7 @@ def ground_statistics(adjusted: AdjustedBlock, results: GroundPointResults) -> G
     return GroundStatistics(n, rms, mean, largest, expected)
 
 
-def _sigma_given(adjusted: AdjustedBlock, results: GroundPointResults) -> np.ndarray:
+def sigma_given(adjusted: AdjustedBlock, results: GroundPointResults) -> np.ndarray:
     """(k, 3) m, σ of the given coordinates; 0 where none was given."""
     control = adjusted.block.control
     row_of = {int(point): row for row, point in enumerate(control.point)}
