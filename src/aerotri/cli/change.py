@@ -20,10 +20,11 @@ def change(
     first: Annotated[
         Path,
         typer.Argument(
-            help="Earlier surface: GeoTIFF with σ as second band, or folder of dsm or dtm.", rich_help_panel=ARGUMENTS
+            help="Earlier surface: GeoTIFF with σ as second band, or folder of dsm or dtm; or a cloud, LAS or LAZ.",
+            rich_help_panel=ARGUMENTS,
         ),
     ],
-    second: Annotated[Path, typer.Argument(help="Later surface.", rich_help_panel=ARGUMENTS)],
+    second: Annotated[Path, typer.Argument(help="Later surface, or point cloud.", rich_help_panel=ARGUMENTS)],
     stable: Annotated[
         str | None,
         typer.Option(
@@ -55,13 +56,49 @@ def change(
             rich_help_panel=SIGMAS,
         ),
     ] = None,
+    cylinder: Annotated[
+        float | None,
+        typer.Option(
+            min=1e-6, help="Of clouds: diameter of the cylinder whose points are averaged, m.", rich_help_panel=METHOD
+        ),
+    ] = None,
+    normal: Annotated[
+        float | None,
+        typer.Option(min=1e-6, help="Of clouds: diameter of the ball that gives a normal, m.", rich_help_panel=METHOD),
+    ] = None,
+    reach: Annotated[
+        float | None,
+        typer.Option(min=1e-6, help="Of clouds: largest distance that is sought, m.", rich_help_panel=METHOD),
+    ] = None,
+    spacing: Annotated[
+        float | None, typer.Option(min=1e-6, help="Of clouds: spacing of the places, m.", rich_help_panel=METHOD)
+    ] = None,
+    registration: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            help="Of clouds: error of the position of one to the other, m, 1 σ. Default: from --stable.",
+            rich_help_panel=SIGMAS,
+        ),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default NAME_change here.", rich_help_panel=OUTPUT)
     ] = None,
     plots: Annotated[bool, typer.Option(help="Draw the map and the page.", rich_help_panel=OUTPUT)] = True,
     json_: Json = False,
 ) -> None:
-    """What changed between two surfaces: every cell against its σ, volumes gained and lost with σ."""
-    from aerotri.commands.change import run_change
+    """What changed between two surfaces: every cell against its σ, volumes gained and lost; distances of clouds."""
+    from aerotri.commands.change import run_change, run_cloud_change
+    from aerotri.conventions import InputError
+    from aerotri.public.cloud_change import is_cloud
 
+    sizes = {"cylinder": cylinder, "normal": normal, "reach": reach, "spacing": spacing, "registration": registration}
+    if is_cloud(first) and is_cloud(second):
+        if area is not None or noise_length is not None:
+            raise InputError("--area, --noise-length: of surfaces, and clouds were given", "leave them out")
+        run_cloud_change(first, second, sizes, stable, out, plots, json_)
+        return
+    given = [f"--{name}" for name, value in sizes.items() if value is not None]
+    if given:
+        raise InputError(f"{', '.join(given)}: of point clouds, and surfaces were given", "give two LAS or LAZ files")
     run_change(first, second, stable, cast(Any, align), area, noise_length, out, plots, json_)

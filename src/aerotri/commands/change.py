@@ -31,6 +31,39 @@ def run_change(
         console.lines([*_summary(found.summary), f"Written to {target}"])
 
 
+def run_cloud_change(
+    first: Path, second: Path, sizes: dict[str, float | None], stable: str | None, out: Path | None, plots: bool,
+    as_json: bool,
+) -> None:  # fmt: skip
+    """The same of point clouds; `sizes` as of `aerotri.cloud_change`."""
+    from aerotri.public.cloud_change import RECORD, cloud_change
+
+    console = Console(quiet=as_json)
+    target = out or Path(f"{second.resolve().stem}_change")
+    refuse_foreign_folder(target, RECORD)
+    found = cloud_change(first, second, stable=stable, **sizes)
+    found.save(target, plots)
+    if as_json:
+        print(json_text(found.summary))
+    else:
+        console.lines([*_cloud_summary(found.summary), f"Written to {target}"])
+
+
+def _cloud_summary(c: dict[str, Any]) -> list[str]:
+    lines = [
+        f"{c['with_distance']} of {c['core_points']} places every {c['spacing_m']:.3g} m have a distance; cylinders of "
+        f"{c['cylinder_m']:.3g} m, normals from {c['normal_m']:.3g} m, at most {c['reach_m']:.3g} m away",
+        f"σ of a distance (from the {'σ of the points' if c['sigma_from'] == 'points' else 'scatter of the points'}): "
+        f"median {c['sigma_m']:.3f} m; registration {c['registration_m']:.3f} m",
+        f"level of detection (95 %) {c['level_of_detection_m']:.3f} m in the median, {c['beyond_level_percent']:.1f} % "
+        "of the places beyond it",
+    ]
+    if c["stable"] is not None:
+        stable = c["stable"]
+        lines.append(f"stable ground: {stable['core_points']} places, mean distance {stable['mean_m']:+.3f} m")
+    return [*lines, *(f"note: {text}" for text in c["warnings"])]
+
+
 def _summary(c: dict[str, Any]) -> list[str]:
     lines = [
         f"{c['cells']} cells of {c['cell_m']:.3g} m; level of detection (95 %) {c['level_of_detection_m']:.3f} m in "

@@ -7,7 +7,7 @@ from aerotri.reference.records import DescribedFile, Item
 from aerotri.volume.change.alignment import ALIGNS
 from aerotri.volume.change.compute import PARTS
 
-CHANGE = "folder of change"
+CHANGE, SURFACES = "folder of change", "of surfaces"
 AREAS = (
     ("area_m2", "Area with heights in both surfaces."),
     ("no_data_area_m2", "Area without."),
@@ -72,18 +72,72 @@ CHANGE_TABLE = (
 )
 
 
+CLOUD_JSON = (
+    VERSION,
+    Item("first", "text", "The earlier cloud."),
+    Item("second", "text", "The later cloud."),
+    Item("crs", "text", "Coordinate system."),
+    Item("cylinder_m", "number", "Diameter of the cylinder whose points are averaged.", "m"),
+    Item("normal_m", "number", "Diameter of the ball whose points give a normal.", "m"),
+    Item("reach_m", "number", "Largest distance that was sought.", "m"),
+    Item("spacing_m", "number", "Spacing of the places.", "m"),
+    Item("points_first", "whole", "Points of the earlier cloud."),
+    Item("points_second", "whole", "Points of the later cloud."),
+    Item("core_points", "whole", "Places."),
+    Item("with_distance", "whole", "Places with a distance: both clouds have four points or more there."),
+    Item(
+        "sigma_from",
+        "text",
+        "What σ is from.",
+        values={"points": "σ and covariances of the points", "scatter": "scatter of the points along the normal"},
+    ),
+    Item("registration_m", "number", "Error of the position of one cloud to the other, 1 σ.", "m"),
+    Item("stable", "object?", "Stable ground; null without --stable."),
+    Item("stable.core_points", "whole", "Places with a distance on it."),
+    Item("stable.mean_m", "number", "Mean distance on it.", "m"),
+    Item("sigma_m", "number", "Standard deviation of a distance, median of the places.", "m"),
+    Item("level_of_detection_m", "number", "Level of detection (95 %), median of the places.", "m"),
+    Item("beyond_level_percent", "number", "Share of the places beyond it.", "%"),
+    Item("warnings[]", "text", "Sentences to read."),
+)
+CLOUD_TABLE = (
+    *(Item(axis, "number", f"{axis} of the place.", "m") for axis in "XYZ"),
+    *(Item(f"normal_{axis}", "number?", f"{axis} of the normal, of length 1, upwards.") for axis in "XYZ"),
+    Item("distance", "number?", "Second cloud less first, along the normal.", "m"),
+    Item("sigma", "number?", "Standard deviation of it.", "m"),
+    Item("level_of_detection", "number?", "Level of detection, 95 %.", "m"),
+    Item("beyond", "yes/no", "Whether the distance is beyond it."),
+    Item("points_first", "whole", "Points of the earlier cloud in the cylinder."),
+    Item("points_second", "whole", "Points of the later cloud in the cylinder."),
+)
+
+
 def change_files() -> tuple[DescribedFile, ...]:
     """The files of change."""
     plots = "unless --no-plots"
     return (
-        DescribedFile("change.json", CHANGE, "json", "Volumes gained and lost, alignment, σ.", CHANGE_JSON),
+        DescribedFile(
+            "change.json", CHANGE, "json", "Volumes gained and lost, alignment, σ.", CHANGE_JSON, when=SURFACES
+        ),
         DescribedFile(
             "change.tif",
             CHANGE,
             "raster",
             "Band 1 difference, m; band 2 its standard deviation, m; band 3 their ratio.",
+            when=SURFACES,
         ),
-        DescribedFile("change.csv", CHANGE, "table", "Volumes of every area.", CHANGE_TABLE),
+        DescribedFile("change.csv", CHANGE, "table", "Volumes of every area.", CHANGE_TABLE, when=SURFACES),
+        DescribedFile(
+            "cloud_change.json", CHANGE, "json", "Distances of two clouds in short.", CLOUD_JSON, when="of point clouds"
+        ),
+        DescribedFile(
+            "distances.parquet",
+            CHANGE,
+            "table",
+            "Distances of two clouds, a row a place.",
+            CLOUD_TABLE,
+            when="of point clouds",
+        ),
         DescribedFile("plots", CHANGE, "folder", "Map of the change and of σ, PNG and SVG.", when=plots),
-        DescribedFile("change.html", CHANGE, "page", "The change on one page.", when=plots),
+        DescribedFile("change.html", CHANGE, "page", "The change on one page.", when="of surfaces, unless --no-plots"),
     )

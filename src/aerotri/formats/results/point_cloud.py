@@ -117,6 +117,36 @@ def read_point_cloud(path: Path, parallel: bool = True) -> tuple[np.ndarray, np.
     return xyz, classes
 
 
+def read_precise_cloud(path: Path) -> tuple[np.ndarray, np.ndarray | None, int | None]:
+    """Points (n, 3) m of a LAS or LAZ file, their covariances (n, 6) m² and the code of their CRS; None where unknown.
+
+    Covariances XX, YY, ZZ, XY, XZ, YZ are those of `SURFACE_FIELDS`; with `sigma_x` to `sigma_z` alone the rest is 0.
+
+    Raises
+    ------
+    InputError
+    """
+    import laspy
+
+    xyz, _ = read_point_cloud(path)
+    refuse_cloud_units(path)
+    try:
+        cloud = laspy.read(path)
+        there = set(cloud.point_format.dimension_names)
+        names = ("sigma_x", "sigma_y", "sigma_z", "cov_xy", "cov_xz", "cov_yz")
+        columns = [np.asarray(cloud[name], dtype=float) if name in there else np.zeros(len(xyz)) for name in names]
+        crs = cloud.header.parse_crs()
+    except Exception as error:  # as above
+        raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
+    system = None if crs is None else (crs.sub_crs_list[0] if crs.is_compound else crs).to_epsg()
+    if not {"sigma_x", "sigma_y", "sigma_z"} <= there:
+        return xyz, None, system
+    covariance = np.column_stack([*(column**2 for column in columns[:3]), *columns[3:]])
+    if not np.isfinite(covariance).all():
+        raise InputError("has points whose σ is no number", "write the cloud anew", path)
+    return xyz, covariance, system
+
+
 def refuse_cloud_units(path: Path) -> None:
     """Refuse a LAS or LAZ file whose CRS counts in degrees or feet.
 

@@ -24,7 +24,7 @@ QUIET = (0.90, 0.90, 0.90, 1.0)
 def plot_change(change: Change, content: Mapping[str, Any], areas: Sequence[Boundary]) -> Figure:
     """Two maps side by side on one scale of coordinates."""
     left, bottom, right, top = change.grid.bounds
-    width = min((WIDTH - 3.2) / 2.0, HIGHEST * (right - left) / (top - bottom))
+    width = min((WIDTH - 3.6) / 2.0, HIGHEST * (right - left) / (top - bottom))
     height = width * (top - bottom) / (right - left)
     step = max(1, max(change.difference.shape) // MOST_CELLS)
     d, sigma = change.difference[::step, ::step], change.sigma[::step, ::step]
