@@ -8,6 +8,7 @@ from types import SimpleNamespace
 VERBS = {
     "tie_points": "aerotri.public.tying.tie_points", "adjust": "aerotri.public.adjusting.adjust_folder",
     "terrain": "aerotri.public.terrain.terrain", "volume": "aerotri.public.volume.volume",
+    "dense": "aerotri.public.dense.dense_surface", "orthophoto": "aerotri.public.ortho.orthophoto",
 }  # fmt: skip
 
 
@@ -44,6 +45,9 @@ class Saved:
 
     def html(self):
         return "<p>saved</p>"
+
+    def _repr_html_(self):
+        return self.html()
 
 
 def adjusted(verdict, status="converged"):

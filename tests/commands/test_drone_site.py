@@ -46,8 +46,8 @@ def place(tmp_path_factory):
 ORDER = (
     "simulate", "tiepoints", "adjust", "diff", "deform", "compare-parameters", "parameters", "dtm", "compare", "volume",
     "demcor", "imgeo", "crosscheck", "convert", "init", "check", "predict volume", "predict attitude",
-    "predict picket-interval", "explain", "halves", "ortho", "dsm",
-    "change",
+    "predict picket-interval", "explain", "halves", "export", "ortho", "dsm",
+    "change", "accuracy",
 )  # fmt: skip
 """So that each has what it needs; that of run is the one of the README."""
 BEFORE = {"diff": "adjust blocks/frederiksstad_ultracam --parameters none --no-plots --out plain_result"}
@@ -58,8 +58,9 @@ WRITES = {
     "tiepoints": "drone_block/block.toml", "dtm": "drone_dtm/dsm.tif", "compare": "difference/compare.json",
     "volume": "pile_volume/volume.json", "demcor": "dsm_corrected.tif", "imgeo": "ideal/2_002.tif",
     "crosscheck": "crosscheck/crosscheck.json", "convert": "drone_colmap/images.txt", "init": "gravel_pit/block.toml",
-    "halves": "frederiksstad_ultracam_halves/halves.json", "ortho": "drone_ortho/ortho.tif", "dsm": "drone_dsm/dsm.tif",
-    "change": "change/change.json",
+    "halves": "frederiksstad_ultracam_halves/halves.json",
+    "export": "frederiksstad_ultracam_export/result.gpkg", "ortho": "drone_ortho/ortho.tif", "dsm": "drone_dsm/dsm.tif",
+    "change": "change/change.json", "accuracy": "frederiksstad_ultracam_accuracy/accuracy.json",
 }  # fmt: skip
 
 

@@ -47,7 +47,7 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
         focal_length_mm=8.8, seed=4, interval=5.0, boundary="pile.gpkg", base="lowest",
         further={"tie_points": {"features": 2000}, "volume": {"plots": False}},
     )  # fmt: skip
-    tie, adjust, terrain, volume = fakes.called
+    tie, adjust, terrain, volume, dense, ortho = fakes.called
     assert tie[1] == (str(photographs),)
     assert (tie[2]["control"], tie[2]["features"], tie[2]["seed"]) == ("gcp_list.txt", 2000, 4)
     assert adjust == ("adjust", (str(out / "block"), str(out / "result")), {"parameters": "auto", "plots": True})
@@ -57,6 +57,8 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
     assert volume[1] == (str(out / "dtm"),)
     assert (volume[2]["boundary"], volume[2]["base"]) == ("pile.gpkg", "lowest")
     assert volume[2]["adjustment"] == out / "result"
+    assert dense == ("dense", (str(out / "result"), str(photographs)), {"tiles": out / "dsm.tiles"})
+    assert ortho[1] == (str(out / "result"), str(photographs), str(out / "dsm"), str(out / "ortho"))
     lines = [step["arguments"] for step in json.loads((out / "run.json").read_text())["steps"]]
     assert lines[0] == [
         "tiepoints", str(photographs), "--out", str(out / "block"), "--gcp", "gcp_list.txt", "--control-sigma-m",
@@ -66,19 +68,22 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
     assert lines[1] == ["adjust", str(out / "block"), "--out", str(out / "result"), "--parameters", "auto"]
     assert lines[3][:4] == ["volume", str(out / "dtm"), "--adjustment", str(out / "result")]
     assert lines[3][-7:] == ["--boundary", "pile.gpkg", "--base", "lowest", "--layer", "dtm", "--no-plots"]
+    assert lines[4] == ["dsm", str(out / "result"), str(photographs), "--out", str(out / "dsm")]
+    assert lines[5] == ["ortho", str(out / "result"), str(photographs), str(out / "dsm"), "--out", str(out / "ortho")]
     assert project.block == "adjusted"
-    assert project.volume is not None
+    assert None not in (project.volume, project.dense, project.orthophoto)
 
 
 def test_the_layer_of_the_volume_is_told(fakes, photographs, tmp_path):
     """The DTM where nothing is said, with all inside the boundary as ground; the surface with objects if asked for."""
-    aerotri.run(photographs, tmp_path / "out", boundary="pile.gpkg")
+    aerotri.run(photographs, tmp_path / "out", boundary="pile.gpkg", dense=False)
+    assert ends_of(tmp_path / "out")["ortho"] == ("left out", "--no-dense was given")
     assert fakes.called[-2][2]["ground_within"] == "pile.gpkg"
     assert fakes.called[-1][2]["layer"] == "dtm"
     steps = json.loads((tmp_path / "out" / "run.json").read_text())["steps"]
     assert steps[2]["arguments"][-2:] == ["--ground-within", "pile.gpkg"]
     assert steps[3]["arguments"][-2:] == ["--layer", "dtm"]
-    aerotri.run(photographs, tmp_path / "other", boundary="pile.gpkg", layer="dsm")
+    aerotri.run(photographs, tmp_path / "other", boundary="pile.gpkg", layer="dsm", dense=False)
     assert fakes.called[-1][2]["layer"] == "dsm"
 
 
@@ -110,6 +115,8 @@ def test_a_step_that_fails_ends_the_run(fakes, photographs, tmp_path):
         "adjust": ("failed", "too little ground — give more"),
         "dtm": ("left out", "adjust is missing"),
         "volume": ("left out", "no --boundary was given"),
+        "dsm": ("left out", "adjust is missing"),
+        "ortho": ("left out", "adjust is missing"),
     }
     assert (project.verdict, project.complete, project.block) == ("failed", False, "a block")
     fakes.ends["tie_points"] = InputError("2 photographs", "give more")
@@ -129,7 +136,20 @@ def test_nothing_is_built_on_a_rejected_adjustment(fakes, photographs, tmp_path)
     assert ends_of(out)["dtm"] == ("left out", "adjust is rejected; --go-on builds on it all the same")
     assert project.verdict == "rejected"
     assert not aerotri.run(photographs, out, go_on=True).complete
-    assert fakes.verbs[2:] == ["tie_points", "adjust", "terrain"]
+    assert fakes.verbs[2:] == ["tie_points", "adjust", "terrain", "dense", "orthophoto"]
+
+
+def test_a_step_ends_only_what_is_built_on_it(fakes, photographs, tmp_path):
+    """Without terrain no volume, but surface and orthophoto; without surface no orthophoto, but the volume."""
+    out = tmp_path / "out"
+    fakes.ends["terrain"] = InputError("no ground", "fly lower")
+    aerotri.run(photographs, out, boundary="pile.gpkg")
+    assert fakes.verbs == ["tie_points", "adjust", "terrain", "dense", "orthophoto"]
+    assert ends_of(out)["volume"] == ("left out", "dtm is missing")
+    del fakes.ends["terrain"]
+    fakes.ends["dense"] = InputError("no texture", "fly lower")
+    aerotri.run(photographs, out, boundary="pile.gpkg")
+    assert (ends_of(out)["volume"][0], ends_of(out)["ortho"]) == ("done", ("left out", "dsm is missing"))
 
 
 def test_names_cannot_run_anything(fakes, tmp_path):

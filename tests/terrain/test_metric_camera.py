@@ -49,3 +49,11 @@ def test_metric_camera_against_its_dem(shared_data, tmp_path):
         assert abs(found["median"]) < 0.2 * GSD
         assert found["nmad"] < nmad * GSD
         assert found["rmse"] < 2.0 * nmad * GSD
+    # dense: cells of two pixels; the DEM's own errors are in the difference
+    area = ("--area", *AREA, "--no-plots", "--json")
+    dense = run("dsm", result, photographs, "--out", tmp_path / "dsm", *area)
+    compared = ("--out", tmp_path / "compared", "--no-plots", "--json")
+    found = run("compare", tmp_path / "dsm" / "dsm.tif", data / "dem.tif", *compared)["difference_m"]
+    assert abs(found["median"]) < 0.2 * GSD
+    assert found["nmad"] < 0.55 * GSD
+    assert 0.8 < found["rmse"] / dense["sigma_Z_m"]["median"] < 1.5

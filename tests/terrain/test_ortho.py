@@ -11,7 +11,9 @@ from aerotri.conventions import px_from_mm
 from aerotri.deformation.restitution import FREE, restitution_of
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.pipeline import adjust_keeping_system
+from aerotri.rasters.bridging import BridgedReader
 from aerotri.rasters.grids import Grid, RasterReader
+from aerotri.rasters.held import HeldRaster
 from aerotri.rasters.mosaics import read_mosaic
 from aerotri.rasters.surface_files import write_surface
 from aerotri.simulation import _rendering_kernels as rendering
@@ -189,6 +191,52 @@ def test_gains_and_offsets_are_found(town, tmp_path):
     shifted = found.balance.offset[:, 0] * 65535.0 + found.balance.gain[:, 0] * offset
     assert np.ptp(shifted) < 0.02 * made.scene.options.mean
     assert found.balance.after < 0.2 * found.balance.before
+
+
+def test_narrow_holes_are_bridged_for_the_picture(hills, tmp_path):
+    """A hole of 12 m is shown where 15 m may be bridged, and marked; one of 40 m stays, and so does the border."""
+    made = hills[0]
+    surface = true_surface(made, tmp_path / "surface.tif", 2.0, 90.0)
+    with RasterReader(surface) as heights, RasterReader(surface, band=2) as sigma:
+        grid = heights.grid
+        z, s = heights.read(0, 0, 90, 90), sigma.read(0, 0, 90, 90)
+    narrow, wide = np.s_[30:36, 60:66], np.s_[50:70, 15:35]
+    z[narrow] = z[wide] = z[:5] = np.nan
+    write_surface(tmp_path / "holes.tif", z, np.where(np.isnan(z), np.nan, s), grid, None, "Z, m")
+    without, _ = make(made, tmp_path / "holes.tif", tmp_path / "without", cell=2.0)
+    found, bands = make(made, tmp_path / "holes.tif", tmp_path / "with", cell=2.0, fill=15.0)
+    assert without.bridged == 0
+    # the 36 cells of the hole, and corners of the wide one and of the border that the disc does not reach
+    assert 36 <= found.bridged <= 60
+    assert found.heights >= without.heights + found.bridged
+    numbers = read_mosaic(tmp_path / "with" / "photographs.tif")
+    assert int(numbers[1].sum()) == found.bridged
+    at_narrow, at_wide = ((int(found.grid.row(y)), int(found.grid.column(x))) for x, y in
+                          ((grid.x(62.5), grid.y(32.5)), (grid.x(25), grid.y(60))))  # fmt: skip
+    assert (bands[-1][at_narrow] > 0, numbers[1][at_narrow]) == (True, 1)
+    assert (bands[-1][at_wide] > 0, numbers[1][at_wide]) == (False, 0)
+    assert read_mosaic(tmp_path / "without" / "photographs.tif").shape[0] == 1
+
+
+def test_bridges_are_the_same_in_every_window():
+    """Read as a whole or in parts; heights between those around; nothing beyond the border of what was measured."""
+    rng = np.random.default_rng(4)
+    z = rng.normal(1000.0, 3.0, (80, 90)).astype(np.float32)
+    z[rng.random(z.shape) < 0.3] = np.nan
+    z[20:60, 30:70] = np.nan
+    z[:, :6] = np.nan
+    reader = BridgedReader(HeldRaster(z, Grid(80, 90, 0.0, 80.0, 1.0, 1.0), None, "z"), 6.0)
+    whole = reader.read(0, 0, 80, 90)
+    for row, column in ((0, 0), (13, 27), (40, 50)):
+        np.testing.assert_allclose(
+            reader.read(row, column, 30, 40), whole[row : row + 30, column : column + 40], rtol=0.0, atol=1e-3
+        )
+    np.testing.assert_array_equal(whole[np.isfinite(z)], z[np.isfinite(z)])
+    made = np.isfinite(whole) & np.isnan(z)
+    assert made.sum() > 1000
+    assert np.isnan(whole[30:50, 40:60]).all()
+    assert np.isnan(whole[:, :3]).all()
+    assert np.nanmin(z) <= whole[made].min() < whole[made].max() <= np.nanmax(z)
 
 
 def test_seams_have_nearly_the_smallest_energy():

@@ -70,6 +70,13 @@ def ortho(
             "--ideal", help="The photographs are those of imgeo, without image errors.", rich_help_panel=INPUT
         ),
     ] = DEFAULTS.ideal,
+    fill: Annotated[
+        float,
+        typer.Option(
+            min=0.0, help="Bridge holes of the surface that are at most so wide, m; for the picture, without σ.",
+            rich_help_panel=METHOD,
+        ),
+    ] = DEFAULTS.fill,
     plots: Annotated[
         bool, typer.Option(help="Draw the orthophoto and the points in it.", rich_help_panel=OUTPUT)
     ] = True,
@@ -78,5 +85,5 @@ def ortho(
     """True orthophoto: every cell of the ground from the photograph that sees it best, with σ of positions."""
     from aerotri.commands.ortho import run_ortho
 
-    settings = OrthoSettings(cell, area, edge, cast(Any, resampling), balance, seams, ideal)
+    settings = OrthoSettings(cell, area, edge, cast(Any, resampling), balance, seams, ideal, fill)
     raise typer.Exit(run_ortho(result, photographs, surface, layer, out, settings, plots, json_))

@@ -42,7 +42,9 @@ def run(
     source: Annotated[Path, typer.Argument(help="Folder of photographs, or a block.", rich_help_panel=ARGUMENTS)],
     out: Annotated[
         Path,
-        typer.Option(help="Folder to write: block, result, dtm, volume, and one report.", rich_help_panel=OUTPUT),
+        typer.Option(
+            help="Folder to write: block, result, dtm, volume, dsm, ortho, and one report.", rich_help_panel=OUTPUT
+        ),
     ],
     gcp: MarkedControl = "",
     check: CheckPoints = None,
@@ -74,6 +76,9 @@ def run(
         str, typer.Option(help="Base of the volume, as aerotri volume takes it.", rich_help_panel=SURFACE)
     ] = "",
     layer: SurfaceLayer = RUN_LAYER,
+    dense: Annotated[
+        bool, typer.Option(help="The dense surface and the orthophoto as well.", rich_help_panel=SURFACE)
+    ] = True,
     plots: Annotated[bool, typer.Option(help="Draw the plots of the adjustment.", rich_help_panel=OUTPUT)] = True,
     go_on: Annotated[
         bool,
@@ -81,7 +86,7 @@ def run(
     ] = False,
     json_: Json = False,
 ) -> None:
-    """Everything: photographs to tie points, adjustment, terrain and volume, with one report."""
+    """Everything: photographs to tie points, adjustment, terrain, volume and orthophoto, with one report."""
     from aerotri.commands.convert import three_values
     from aerotri.commands.dtm import metres_or_auto
     from aerotri.commands.run import run_all
@@ -92,6 +97,6 @@ def run(
         "positions": positions, "camera": camera, "focal_length_mm": focal_length_mm, "pixel_um": pixel_um, "crs": crs,
         "geoid": geoid, "seed": seed, "parameters": parameters,
         "interval": metres_or_auto(interval) if interval else None,
-        "boundary": boundary, "base": base, "layer": layer, "plots": plots, "go_on": go_on,
+        "boundary": boundary, "base": base, "layer": layer, "dense": dense, "plots": plots, "go_on": go_on,
     }  # fmt: skip
     raise typer.Exit(run_all(source, out, settings, json_))

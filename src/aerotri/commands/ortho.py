@@ -57,6 +57,8 @@ def outcome_lines(found: Orthophoto) -> list[str]:
         f"photograph sees, {area['other_photograph']:.0f} m² are hidden in the photograph around them and taken from "
         "another"
     )
+    if area["bridged"] > 0.0:
+        lines.append(f"{area['bridged']:.0f} m² of it over bridged holes of the surface: σ is not known there")
     parts = [f"orientation {sigma['orientation']['median']:.3f}", f"image {sigma['image']['median']:.3f}"]
     if sigma["surface"] is not None:
         parts.insert(0, f"heights {sigma['surface']['median']:.3f}")

@@ -102,6 +102,16 @@ class _Told:
             self._console.note(note)
         self._print(outcome_lines(volume.summary, folder))
 
+    def _dsm(self, surface: Any, folder: Path) -> None:
+        from aerotri.commands.dsm import outcome_lines
+
+        self._print(outcome_lines(surface, folder))
+
+    def _ortho(self, found: Any, folder: Path) -> None:
+        from aerotri.commands.ortho import outcome_lines
+
+        self._print(outcome_lines(found))
+
 
 def _lines(project: Project) -> list[str]:
     lines = ["──"]

@@ -104,6 +104,10 @@ class Orthophoto:
         return f"<aerotri orthophoto of {s['block']!r}: {s['columns']} × {s['rows']} cells of {s['cell_m']:g} m>"
 
     def _repr_html_(self) -> str:
+        return self.html()
+
+    def html(self) -> str:
+        """Cells and σ, as a notebook shows them."""
         s = self.summary
         return (
             f"<div><b>{escape(str(s['block']))}</b>: {s['columns']} × {s['rows']} cells of {s['cell_m']:g} m, σ of a "
@@ -124,6 +128,7 @@ def orthophoto(
     balance: bool = DEFAULTS.balance,
     seams: bool = DEFAULTS.seams,
     ideal: bool = DEFAULTS.ideal,
+    fill: float = DEFAULTS.fill,
     layer: Layer = LAYER,
     plots: bool = True,
     progress: ProgressLike = None,
@@ -143,6 +148,7 @@ def orthophoto(
     balance : bring the colours of the photographs to one another.
     seams : lay seams where photographs look alike; without, every cell is from its best photograph.
     ideal : the photographs are those of `aerotri.ideal_photographs`, free of image errors.
+    fill : m, holes of the surface that are at most so wide are bridged for the picture; σ is not known there.
     layer : surface of a terrain model: with objects (dsm) or without (dtm).
     plots : draw the orthophoto and the points in it.
     progress : as of `aerotri.adjust`.
@@ -165,7 +171,7 @@ def orthophoto(
     >>> found.summary["sigma_m"]["total"]["median"]  # doctest: +SKIP
     0.041
     """
-    settings = OrthoSettings(cell, area, edge, resampling, balance, seams, ideal)
+    settings = OrthoSettings(cell, area, edge, resampling, balance, seams, ideal, fill)
     if layer not in LAYERS:
         raise InputError(f"there is no layer '{layer}'", f"choose one of {', '.join(LAYERS)}")
     return make_ortho(result, paths_of(photographs), as_surface(surface, layer), Path(out), settings, plots, progress)

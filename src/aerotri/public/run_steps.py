@@ -11,12 +11,17 @@ from aerotri.conventions import InputError
 from aerotri.volume.settings import LAYER
 
 RECORD, REPORT = "run.json", "report.html"
-BLOCK, RESULT, DTM, VOLUME = "block", "result", "dtm", "volume"
-Verb = Literal["tie_points", "adjust", "terrain", "volume"]
+BLOCK, RESULT, DTM, VOLUME, DSM, ORTHO = "block", "result", "dtm", "volume", "dsm", "ortho"
+Verb = Literal["tie_points", "adjust", "terrain", "volume", "dense", "orthophoto"]
+BUILT_ON: Mapping[Verb, Verb] = {
+    "adjust": "tie_points", "terrain": "adjust", "volume": "terrain", "dense": "adjust", "orthophoto": "dense",
+}  # fmt: skip
+"""The step that each takes up."""
 OPTIONS = {"control": "gcp"}
 """Options of the command line whose names differ from the settings'."""
 NEEDS_PHOTOGRAPHS = "it needs photographs, and a block was given"
 NO_BOUNDARY = "no --boundary was given"
+NOT_DENSE = "--no-dense was given"
 
 
 @dataclass(frozen=True)
@@ -46,12 +51,14 @@ def is_block(source: Path) -> bool:
     return source.name == "block.toml" or (source / "block.toml").is_file()
 
 
-def steps_of(source: Path, out: Path, settings: Mapping[Verb, Mapping[str, Any]]) -> dict[Verb, Step]:
+def steps_of(
+    source: Path, out: Path, settings: Mapping[Verb, Mapping[str, Any]], dense: bool = True
+) -> dict[Verb, Step]:
     """What there is to do, in its order.
 
     Parameters
     ----------
-    settings : of every verb, by the names of its arguments.
+    settings : of every verb, by the names of its arguments. dense : also the dense surface and the orthophoto.
 
     Raises
     ------
@@ -60,7 +67,7 @@ def steps_of(source: Path, out: Path, settings: Mapping[Verb, Mapping[str, Any]]
     """
     if not is_block(source) and not source.is_dir():
         raise InputError("is neither a folder of photographs nor a block", "give the folder", source)
-    block, result, dtm, volume = (str(out / name) for name in (BLOCK, RESULT, DTM, VOLUME))
+    block, result, dtm, volume, dsm, ortho = (str(out / name) for name in (BLOCK, RESULT, DTM, VOLUME, DSM, ORTHO))
     refuse_of_photographs(source, settings)
     begun = str(source) if is_block(source) else block
     steps: dict[Verb, Step] = {
@@ -68,13 +75,19 @@ def steps_of(source: Path, out: Path, settings: Mapping[Verb, Mapping[str, Any]]
         "adjust": Step("adjust", RESULT, "Adjustment", ("adjust", begun, "--out", result)),
         "terrain": Step("dtm", DTM, "Terrain", ("dtm", result, str(source), "--out", dtm)),
         "volume": Step("volume", VOLUME, "Volume", ("volume", dtm, "--adjustment", result, "--out", volume)),
+        "dense": Step("dsm", DSM, "Dense surface", ("dsm", result, str(source), "--out", dsm)),
+        "orthophoto": Step("ortho", ORTHO, "Orthophoto", ("ortho", result, str(source), dsm, "--out", ortho)),
     }
     if is_block(source):
         del steps["tie_points"]
-        for verb in ("terrain", "volume"):
-            steps[verb] = replace(steps[verb], status="left out", reason=NEEDS_PHOTOGRAPHS)
-    elif not settings["volume"].get("boundary"):
-        steps["volume"] = replace(steps["volume"], status="left out", reason=NO_BOUNDARY)
+    without: dict[Verb, str] = {}
+    if is_block(source):
+        without = dict.fromkeys(("terrain", "volume", "dense", "orthophoto"), NEEDS_PHOTOGRAPHS)
+    else:
+        without |= {} if settings["volume"].get("boundary") else {"volume": NO_BOUNDARY}
+        without |= {} if dense else {"dense": NOT_DENSE, "orthophoto": NOT_DENSE}
+    for verb, reason in without.items():
+        steps[verb] = replace(steps[verb], status="left out", reason=reason)
     return {
         verb: replace(step, arguments=step.arguments + command_line(settings[verb])) for verb, step in steps.items()
     }

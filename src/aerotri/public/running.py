@@ -14,7 +14,20 @@ from aerotri.deformation.absorbed import AbsorptionFailedError
 from aerotri.formats.results.json_text import write_json
 from aerotri.public.blocks import Sigmas
 from aerotri.public.progress import Progress, ProgressLike, StageReport, stage_report
-from aerotri.public.run_steps import BLOCK, DTM, RECORD, REPORT, RESULT, Step, Verb, is_block, is_missing, steps_of
+from aerotri.public.run_steps import (
+    BLOCK,
+    BUILT_ON,
+    DSM,
+    DTM,
+    RECORD,
+    REPORT,
+    RESULT,
+    Step,
+    Verb,
+    is_block,
+    is_missing,
+    steps_of,
+)
 from aerotri.results.failure import AdjustmentFailedError
 from aerotri.tie_points.settings import DEFAULTS
 from aerotri.volume.settings import RUN_LAYER, Layer
@@ -22,6 +35,8 @@ from aerotri.volume.settings import RUN_LAYER, Layer
 if TYPE_CHECKING:
     from aerotri.observations import Block
     from aerotri.public.adjustment import Adjustment
+    from aerotri.public.dense import DenseSurface
+    from aerotri.public.ortho import Orthophoto
     from aerotri.public.terrain import TerrainModel
     from aerotri.public.tying import TiedPhotographs
     from aerotri.public.volume_result import MeasuredVolume
@@ -39,6 +54,7 @@ class Project:
     source : what it began with.
     steps : each with how it ended.
     tied : the photographs tied. adjustment : also where it was rejected. surface : the terrain. volume : over it.
+    dense : the surface of all that stands on the ground. orthophoto : over it.
     seconds : that it took.
     """
 
@@ -49,6 +65,8 @@ class Project:
     adjustment: Adjustment | None = None
     surface: TerrainModel | None = None
     volume: MeasuredVolume | None = None
+    dense: DenseSurface | None = None
+    orthophoto: Orthophoto | None = None
     seconds: float = 0.0
 
     @property
@@ -90,7 +108,8 @@ class Project:
             f"<td>{escape(step.reason or str(self.folder / step.folder))}</td></tr>"
             for step in self.steps
         )
-        shown = [one.html() for one in (self.adjustment, self.surface, self.volume) if one is not None]
+        made = (self.adjustment, self.surface, self.volume, self.dense, self.orthophoto)
+        shown = [one.html() for one in made if one is not None]
         return f"<div><table><caption>{escape(self.verdict)}</caption>{rows}</table>{''.join(shown)}</div>"
 
 
@@ -114,13 +133,14 @@ def run(
     boundary: Any = None,
     base: Any = None,
     layer: Layer = RUN_LAYER,
+    dense: bool = True,
     plots: bool = True,
     go_on: bool = False,
     further: Mapping[Verb, Mapping[str, Any]] | None = None,
     on_step: OnStep | None = None,
     progress: ProgressLike = None,
 ) -> Project:
-    """Everything: photographs to tie points, adjustment, terrain and volume, with one report.
+    """Everything: photographs to tie points, adjustment, terrain, volume, surface and orthophoto, with one report.
 
     Parameters
     ----------
@@ -144,6 +164,7 @@ def run(
     base : of the volume, see `aerotri.volume`.
     layer : surface of the volume: 'dtm', within the boundary all that was measured, beside it the ground without
         objects; or 'dsm', with objects everywhere.
+    dense : the dense surface and the orthophoto as well.
     plots : draw the plots of the adjustment.
     go_on : go on after an adjustment that was rejected.
     further : more settings of a step by the name of its verb, {'terrain': {'window': 21}}.
@@ -167,7 +188,7 @@ def run(
     ...     block = aerotri.simulate(aerotri.example_flight(), seed=1).save(f"{place}/block")
     ...     project = aerotri.run(block, f"{place}/project", parameters="none", plots=False)
     >>> project.verdict, [step.status for step in project.steps]
-    ('accepted', ['done', 'left out', 'left out'])
+    ('accepted', ['done', 'left out', 'left out', 'left out', 'left out'])
     """
     marked, names = not is_missing(control), {"check": tuple(check)}
     from_block = is_block(Path(source))
@@ -184,13 +205,15 @@ def run(
         },
         "terrain": {"interval": interval, "ground_within": boundary},
         "volume": {"boundary": boundary, "base": base, "layer": layer} if not is_missing(boundary) else {},
+        "dense": {}, "orthophoto": {},
     }  # fmt: skip
     for verb, more in (further or {}).items():
         settings[verb] |= more
     place = Path(source)
     target = Path(f"{place.resolve().name}_project" if out is None else out)
     with stage_report(progress) as report:
-        return _Chain(Project(target, place), settings, go_on, on_step, report).run()
+        steps = steps_of(place, target, settings, dense)
+        return _Chain(Project(target, place), steps, settings, go_on, on_step, report).run()
 
 
 class _Chain:
@@ -198,26 +221,29 @@ class _Chain:
 
     Parameters
     ----------
-    project : to be filled. settings : of every verb.
+    project : to be filled. steps : what there is to do. settings : of every verb.
     """
 
     def __init__(
-        self, project: Project, settings: Mapping[Verb, Mapping[str, Any]], go_on: bool, on_step: OnStep | None,
-        report: StageReport,
+        self, project: Project, steps: Mapping[Verb, Step], settings: Mapping[Verb, Mapping[str, Any]], go_on: bool,
+        on_step: OnStep | None, report: StageReport,
     ):  # fmt: skip
-        self._project, self._settings, self._go_on = project, settings, go_on
+        self._project, self._steps, self._settings, self._go_on = project, steps, settings, go_on
         self._tell: OnStep = on_step or (lambda step, outcome: None)
         self._progress: Progress = report.stage
 
     def run(self) -> Project:
         """The project, with its record and its report written."""
-        project, begun, missing = self._project, time.perf_counter(), ""
-        for verb, step in steps_of(project.source, project.folder, self._settings).items():
-            if not step.status and missing:
-                step = replace(step, status="left out", reason=missing)
+        project, begun = self._project, time.perf_counter()
+        missing: dict[Verb, str] = {}
+        for verb, step in self._steps.items():
+            ending = missing.get(BUILT_ON.get(verb, verb), "")
+            if not step.status and ending:
+                step = replace(step, status="left out", reason=ending)
             if not step.status:
                 step, ending = self._done(verb, step)
-                missing = missing or ending
+            if ending:
+                missing[verb] = ending
             project.steps.append(step)
         project.seconds = time.perf_counter() - begun
         write_report(project.summary, project.folder)
@@ -299,6 +325,33 @@ class _Chain:
         )  # fmt: skip
         found.save(folder, plots)
         self._project.volume = found
+        return found
+
+    def _dense(self, folder: Path) -> DenseSurface:
+        import shutil
+
+        from aerotri.public.dense import RECORD as DENSE_RECORD
+        from aerotri.public.dense import dense_surface
+        from aerotri.public.folders import refuse_foreign_folder
+
+        settings, plots = self._given("dense")
+        refuse_foreign_folder(folder, DENSE_RECORD)
+        tiles = folder.with_name(f"{folder.name}.tiles")
+        result = self._project.folder / RESULT
+        found = dense_surface(result, self._project.source, tiles=tiles, progress=self._progress, **settings)
+        found.save(folder, plots)
+        shutil.rmtree(tiles, ignore_errors=True)
+        self._project.dense = found
+        return found
+
+    def _orthophoto(self, folder: Path) -> Orthophoto:
+        from aerotri.public.ortho import orthophoto
+
+        (settings, plots), place = self._given("orthophoto"), self._project.folder
+        found = orthophoto(
+            place / RESULT, self._project.source, place / DSM, folder, plots=plots, progress=self._progress, **settings
+        )  # fmt: skip
+        self._project.orthophoto = found
         return found
 
 

@@ -11,6 +11,7 @@ AREAS = (
     ("orthophoto", "Area that a photograph shows."),
     ("without_photograph", "Area whose height is known and that no photograph sees."),
     ("other_photograph", "Area that is hidden in the photograph of its surroundings and is taken from another."),
+    ("bridged", "Area of the orthophoto over holes of the surface that were bridged (--fill); σ is not known there."),
 )
 QUANTILES = (
     ("median", "Half of the area is below."), ("q90", "90 % of the area are below."),
@@ -83,7 +84,9 @@ def ortho_files() -> tuple[DescribedFile, ...]:
             "The orthophoto, cloud-optimised with overviews. The last band is the mask, 0 where no photograph sees.",
         ),
         DescribedFile(
-            "photographs.tif", ORTHO, "raster", "Number of the photograph of every cell, −1 for none."
+            "photographs.tif", ORTHO, "raster",
+            "Number of the photograph of every cell, −1 for none. With --fill a second band: 1 where the height was "
+            "bridged.",
         ),
         DescribedFile(
             "sigma.tif", ORTHO, "raster", "Standard deviation of X and Y, each, on the coarse grid of the seams, m."

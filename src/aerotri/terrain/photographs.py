@@ -269,6 +269,8 @@ def photographs_of(
     cameras = [block.cameras[c] for c in block.images.camera[rows]]
     pixel = min(camera.pixel_mm for camera in cameras)
     if ideal:
+        # rows of a rolling shutter have been moved to where the middle of the readout shows them
+        orientation = orientation.standing_still
         restitution = replace(restitution, errors=tuple(_without_errors(e) for e in restitution.errors))
     tables = error_tables(restitution.errors, TABLE_TOLERANCE_PX * pixel)
     ground = mean_ground(calibration)

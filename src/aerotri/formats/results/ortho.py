@@ -62,6 +62,7 @@ def ortho_json(outcome: OrthoOutcome, block: Block, surface: str, resampling: st
         "area_m2": {
             "surface": o.heights * area, "orthophoto": covered * area,
             "without_photograph": (o.heights - covered) * area, "other_photograph": o.hidden * area,
+            "bridged": o.bridged * area,
         },
         "sigma_m": {
             "total": _quantiles(a.total), "surface": None if a.surface is None else _quantiles(a.surface),

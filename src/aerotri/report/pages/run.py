@@ -4,15 +4,29 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from aerotri.report.quality import printable
 
+RESULT = "result"
+"""Folder of the adjustment."""
 LARGEST_PLOTS = 12
 """Plots of a step that has no report of its own."""
+IN_PARTS = ("cells", "sigma_Z_m", "sigma_m", "area_m2")
+"""Figures of surfaces and orthophotos that consist of several."""
+
+
+PICTURES = (
+    ("ortho", "orthophoto.png", "Orthophoto"),
+    ("dsm", "surface.png", "Dense surface: heights and the σ of matching"),
+    ("volume", "thickness.png", "Volume: height over the base"),
+)
+"""What the page begins with: step, plot and caption."""
 
 
 def run_page(content: dict[str, Any], folder: Path) -> str:
@@ -27,23 +41,78 @@ def run_page(content: dict[str, Any], folder: Path) -> str:
         loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    steps = [_step(step, folder / step["folder"]) for step in content["steps"]]
+    done = {step["name"]: folder / step["folder"] for step in content["steps"] if step["status"] == "done"}
+    shown = _pictures(done)
+    steps = [_step(step, folder / step["folder"], set(shown)) for step in content["steps"]]
     template = environment.get_template("run.html.j2")
-    return template.render(source=printable(content["source"]), seconds=content["seconds"], steps=steps)
+    adjusted = _read(folder / RESULT / "adjustment.json")
+    return template.render(
+        source=printable(content["source"]), seconds=content["seconds"], steps=steps, verdict=_verdict(adjusted),
+        results=_results({name: _read(place / f"{name}.json") for name, place in done.items()}),
+        pictures=list(shown.values()),
+    )  # fmt: skip
 
 
-def _step(step: dict[str, Any], folder: Path) -> dict[str, Any]:
+def _pictures(done: Mapping[str, Path]) -> dict[Path, tuple[str, str]]:
+    """Caption and content of the plots that the page begins with, by their files."""
+    places = [(done[name] / "plots" / plot, caption) for name, plot, caption in PICTURES if name in done]
+    return {place: (caption, _encoded(place)) for place, caption in places if place.is_file()}
+
+
+def _encoded(path: Path) -> str:
+    return base64.b64encode(path.read_bytes()).decode("ascii")
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """The content of a JSON file, {} where there is none."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def _verdict(adjusted: Mapping[str, Any]) -> tuple[str, list[str]]:
+    """The verdict on the adjustment, '' where there is none, and its reasons."""
+    return str(adjusted.get("verdict", "")), [printable(str(reason), 1000) for reason in adjusted.get("reasons", [])]
+
+
+def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
+    """What was measured and how sure it is, a line each."""
+    found = []
+    if volume := of_step.get("volume"):
+        sigma = (volume.get("sigma") or {}).get("sigma_m3")
+        parts = [f"{volume['net_m3']:.{_places(sigma)}f} m³"]
+        parts += [f" ± {sigma:.{_places(sigma)}f} m³ (1 σ)"] if sigma else [", without σ"]
+        found.append(("Volume, net", "".join(parts)))
+    if surface := of_step.get("dsm"):
+        sigma = surface["sigma_Z_m"]["median"]
+        found.append(("Dense surface", f"cells of {surface['cell_m']:.3g} m; σ of heights {sigma:.3f} m (median)"))
+    if image := of_step.get("ortho"):
+        total = image["sigma_m"]["total"]
+        text = f"cells of {image['cell_m']:g} m; σ of positions {total['median']:.3f} m (median), 95 % below "
+        found.append(("Orthophoto", f"{text}{total['q95']:.3f} m"))
+    return found
+
+
+def _places(sigma: float | None) -> int:
+    """Decimals that show two digits of a σ."""
+    return 1 if not sigma else int(np.clip(1 - np.floor(np.log10(sigma)), 0, 6))
+
+
+def _step(step: dict[str, Any], folder: Path, shown: set[Path]) -> dict[str, Any]:
     done = step["status"] == "done"
     pages = [place for place in (folder / "report.html", folder / "volume.html") if done and place.is_file()]
     page = pages[0].read_text(encoding="utf-8") if pages else ""
-    plots = sorted((folder / "plots").glob("*.png"))[:LARGEST_PLOTS] if done and not page else []
+    there = sorted((folder / "plots").glob("*.png")) if done and not page else []
+    plots = [plot for plot in there if plot not in shown][:LARGEST_PLOTS]
     return {
         **step,
         "reason": printable(step["reason"], 1000),
         "command": printable("aerotri " + " ".join(step["arguments"]), 1000),
         "figures": _figures(folder) if done else [],
         "page": page,
-        "plots": [(plot.stem.replace("_", " "), base64.b64encode(plot.read_bytes()).decode("ascii")) for plot in plots],
+        "plots": [(plot.stem.replace("_", " "), _encoded(plot)) for plot in plots],
         "marking": done and (folder / "control_marks" / "marking.html").is_file(),
     }
 
@@ -52,14 +121,20 @@ def _figures(folder: Path) -> list[tuple[str, str]]:
     """Numbers, texts and sentences at the top of the JSON files of a step, in their own words."""
     found = []
     for path in sorted(folder.glob("*.json")):
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            continue
-        if isinstance(content, dict):
-            found += [(key.replace("_", " "), _text(value)) for key, value in content.items() if _is_plain(value)]
-            found += [("", printable(text, 1000)) for text in content.get("messages", []) if isinstance(text, str)]
+        content = _read(path)
+        found += [(key.replace("_", " "), _text(value)) for key, value in content.items() if _is_plain(value)]
+        for key in IN_PARTS:
+            if isinstance(content.get(key), dict):
+                found += _parts(key.replace("_", " "), content[key])
+        found += [("", printable(text, 1000)) for text in content.get("messages", []) if isinstance(text, str)]
     return found
+
+
+def _parts(name: str, value: Any) -> list[tuple[str, str]]:
+    """Numbers within others, each by the names that lead to it."""
+    if isinstance(value, dict):
+        return [one for key, part in value.items() for one in _parts(f"{name}: {key.replace('_', ' ')}", part)]
+    return [(name, _text(value))] if _is_plain(value) else []
 
 
 def _is_plain(value: Any) -> bool:

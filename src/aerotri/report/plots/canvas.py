@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
 
 from aerotri.report.quality import printable
 
@@ -165,9 +165,20 @@ def value_text(value: float, place: int | None = None) -> str:
     return f"{value:g}".replace("-", "−")
 
 
+ROOM_OF_TWO = 1.4
+"""Inches of an axis that two coordinates of seven digits take beside one another."""
+
+
 def coordinate_axes(axes: Axes, width: float, height: float, labels: tuple[str, str]) -> None:
     """Round, whole coordinates along axes of so many inches, and their labels."""
-    axes.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 1.0)), steps=[1, 2, 5, 10]))
+    along = MaxNLocator(max(1, int(width / 1.0)), steps=[1, 2, 5, 10])
+    if width < ROOM_OF_TWO:
+        low, high = sorted(axes.get_xlim())
+        inside = [value for value in along.tick_values(low, high) if low <= value <= high]
+        middle = min(inside, key=lambda value: abs(value - 0.5 * (low + high)), default=0.5 * (low + high))
+        axes.xaxis.set_major_locator(FixedLocator([middle]))
+    else:
+        axes.xaxis.set_major_locator(along)
     axes.yaxis.set_major_locator(MaxNLocator(max(2, int(height / 0.7)), steps=[1, 2, 5, 10]))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(FuncFormatter(coordinate_text))

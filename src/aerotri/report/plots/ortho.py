@@ -44,7 +44,7 @@ def plot_orthophoto(outcome: OrthoOutcome, folder: Path, block_name: str) -> Fig
     """The orthophoto with its seams, and σ of the positions of its coarse cells."""
     o, g = outcome, outcome.grid
     ratio = g.rows / g.columns
-    width = min((WIDTH - 3.3) / 2.0, HIGHEST / ratio)
+    width = min((WIDTH - 3.8) / 2.0, HIGHEST / ratio)
     height = width * ratio
     covered = 100.0 * float(o.cells.sum()) / max(o.heights, 1)
     subtitle = (
@@ -54,13 +54,13 @@ def plot_orthophoto(outcome: OrthoOutcome, folder: Path, block_name: str) -> Fig
     )
     figure = new_figure(height + 1.75, f"Orthophoto – {plain(block_name)}", subtitle)
     left, bottom, right, top = g.bounds
-    axes = axes_at(figure, 0.75, 0.75, width, height)
+    axes = axes_at(figure, 0.95, 0.75, width, height)
     extent = (left, right, bottom, top)
     axes.imshow(_shown(read_mosaic(folder / IMAGE, longest=MOST_CELLS)), extent=extent, interpolation="nearest")
     lines = [np.array(part.coords) for line in seam_lines(o)[1] for part in line.geoms]
     axes.add_collection(LineCollection(lines, colors=ACCENT, linewidths=0.6))
     coordinate_axes(axes, width, height, _names(o))
-    second = axes_at(figure, 0.75 + width + 0.75, 0.75, width, height)
+    second = axes_at(figure, 0.95 + width + 0.95, 0.75, width, height)
     sigma, coarse = o.accuracy.total, o.candidates.grid.bounds
     low, high = np.nanpercentile(sigma, [1, 99])
     image = second.imshow(
@@ -71,7 +71,7 @@ def plot_orthophoto(outcome: OrthoOutcome, folder: Path, block_name: str) -> Fig
     second.set_ylim(bottom, top)
     coordinate_axes(second, width, height, _names(o))
     second.set_ylabel("")
-    scale = axes_at(figure, 0.75 + 2.0 * width + 0.9, 0.75, 0.14, height)
+    scale = axes_at(figure, 0.95 + 2.0 * width + 1.1, 0.75, 0.14, height)
     figure.colorbar(image, cax=scale).set_label("σ of X and Y [m]")
     return figure
 

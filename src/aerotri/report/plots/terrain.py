@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
+from scipy.ndimage import gaussian_filter
 
 from aerotri.rasters.grids import Grid
 from aerotri.report.plots.canvas import (
@@ -34,6 +35,10 @@ HIGHEST = 6.4
 HOLE = "#cfe0f2"
 MOST_CELLS = 1200
 """Cells drawn along a side, the others skipped; chosen [C]: about the pixels of the picture."""
+SHADE_CELLS = 1.0
+"""σ of the smoothing of a surface before it is lit, cells; chosen [C]: noise of single cells would hide the shapes."""
+OUTLYING = 0.002
+"""Share of the measured cells at each side of a picture that may lie beyond it [C]: a few far cells would shrink it."""
 ERROR_MARKS = {
     PicketStatus.BACKWARD: ("x", "backward"), PicketStatus.AMBIGUOUS: ("+", "ambiguous"),
     PicketStatus.NEIGHBOURS: ("s", "off its neighbours"), PicketStatus.PEAK: ("^", "peak or pit"),
@@ -76,7 +81,7 @@ def plot_dense(grid: Grid, z: np.ndarray, matching: np.ndarray, total: float, na
     total : m, median σ of the heights with the part of the adjustment.
     """
     known = np.isfinite(z)
-    rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+    rows, columns = (_between(known.sum(axis=axis)) for axis in (1, 0))
     part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     z, matching = z[part], matching[part]
     subtitle = (
@@ -88,18 +93,25 @@ def plot_dense(grid: Grid, z: np.ndarray, matching: np.ndarray, total: float, na
     return _plot_heights(shown, z, matching, name, subtitle, is_local, "σ of matching [m]")
 
 
+def _between(counts: np.ndarray) -> tuple[int, int]:
+    """First and last row, or column, between which nearly all measured cells lie."""
+    share = np.cumsum(counts) / max(int(counts.sum()), 1)
+    first, last = np.searchsorted(share, [OUTLYING, 1.0 - OUTLYING])
+    return int(first), int(min(last, len(counts) - 1))
+
+
 @styled
 def _plot_heights(
     grid: Grid, z: np.ndarray, sigma: np.ndarray | None, name: str, subtitle: str, is_local: bool,
     label: str = "σ of Z [m]",
 ) -> Figure:  # fmt: skip
-    width, height = _size(grid, WIDTH - 1.4 if sigma is None else (WIDTH - 3.3) / 2.0)
+    width, height = _size(grid, WIDTH - 1.6 if sigma is None else (WIDTH - 3.8) / 2.0)
     figure = new_figure(height + 1.75, f"Surface – {plain(name)}", subtitle)
-    left = axes_at(figure, 0.75, 0.75, width, height)
+    left = axes_at(figure, 0.95, 0.75, width, height)
     every = _every(z)
     shown = z[::every, ::every]
     light = LightSource(315, 45)
-    filled = np.where(np.isfinite(shown), shown, np.nanmedian(z))
+    filled = _smoothed(np.where(np.isfinite(shown), shown, np.nan))
     step = grid.cell_x * every
     shade = light.hillshade(filled, vert_exag=_exaggeration(filled), dx=step, dy=step)
     shade = np.where(np.isfinite(shown), shade, 1.0)
@@ -107,7 +119,7 @@ def _plot_heights(
     _contours(left, grid, z)
     _coordinates(left, width, height, local=is_local)
     if sigma is not None:
-        _plot_sigma(figure, 0.75 + width + 0.75, (width, height), grid, sigma[::every, ::every], is_local, label)
+        _plot_sigma(figure, 0.95 + width + 0.95, (width, height), grid, sigma[::every, ::every], is_local, label)
     return figure
 
 
@@ -211,6 +223,15 @@ def _extent(grid: Grid) -> tuple[float, float, float, float]:
 
 def _every(values: np.ndarray) -> int:
     return max(1, -(-max(values.shape) // MOST_CELLS))
+
+
+def _smoothed(z: np.ndarray) -> np.ndarray:
+    """Heights without the noise of single cells, for shading alone; holes filled by what is around them."""
+    known = np.isfinite(z)
+    weight = gaussian_filter(known.astype(float), SHADE_CELLS)
+    middle = float(np.nanmedian(z))
+    mean = gaussian_filter(np.where(known, z - middle, 0.0), SHADE_CELLS) / np.maximum(weight, 1e-9)
+    return np.where(weight > 1e-6, mean, 0.0) + middle
 
 
 def _exaggeration(z: np.ndarray) -> float:

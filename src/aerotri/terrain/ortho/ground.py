@@ -8,6 +8,7 @@ from threading import Lock
 
 import numpy as np
 
+from aerotri.rasters.bridging import BridgedReader
 from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.terrain._view_kernels import View
 from aerotri.terrain.ortho._sight_kernels import (
@@ -40,7 +41,7 @@ class GroundSurface:
     reader : of its heights. low, high : (r, c) m of blocks of `SCAN` cells; ∞ and −∞ where nothing is known.
     """
 
-    reader: RasterReader
+    reader: RasterReader | BridgedReader
     low: np.ndarray
     high: np.ndarray
     lock: Lock
@@ -53,6 +54,18 @@ class GroundSurface:
         """(rows, columns) float32 m; NaN where not known and beyond the edges."""
         with self.lock:
             return self.reader.read(row, column, rows, columns).astype(np.float32)
+
+    def bridged(self, grid: Grid) -> np.ndarray | None:
+        """(r, c) bool, cells of a grid whose height is not from measured ones alone; None where nothing is bridged."""
+        if not isinstance(self.reader, BridgedReader):
+            return None
+        i, j = self.grid.row(grid.y(np.arange(grid.rows))), self.grid.column(grid.x(np.arange(grid.columns)))
+        row, column = int(np.floor(i.min())), int(np.floor(j.min()))
+        with self.lock:
+            z = self.reader.measured.read(row, column, int(i.max()) - row + 2, int(j.max()) - column + 2)
+        rows = [np.floor(i).astype(np.int64) - row, np.ceil(i).astype(np.int64) - row]
+        columns = [np.floor(j).astype(np.int64) - column, np.ceil(j).astype(np.int64) - column]
+        return np.any([np.isnan(z[np.ix_(a, b)]) for a in rows for b in columns], axis=0)
 
     def span(self, row: int, column: int, rows: int, columns: int) -> tuple[float, float]:
         """Lowest and highest height of a window, or somewhat beyond it; ∞ and −∞ where nothing is known."""
@@ -78,7 +91,7 @@ class GroundSurface:
         return max(int(min(far, free)), 0) + 2
 
 
-def ground_surface(reader: RasterReader) -> GroundSurface:
+def ground_surface(reader: RasterReader | BridgedReader) -> GroundSurface:
     """A surface, after one look at all of its heights."""
     g = reader.grid
     shape = -(-g.rows // SCAN), -(-g.columns // SCAN)

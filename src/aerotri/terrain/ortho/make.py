@@ -10,6 +10,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.memory import refuse_beyond_memory
+from aerotri.rasters.bridging import BridgedReader
 from aerotri.rasters.grids import Grid, RasterReader, RasterWriter, cache_limited, horizontal_crs
 from aerotri.rasters.mosaics import write_mosaic
 from aerotri.results.adjustment import Adjustment
@@ -37,6 +38,7 @@ IMAGE, NUMBERS, SIGMAS = "ortho.tif", "photographs.tif", "sigma.tif"
 COMPRESSED = {"compress": "deflate", "predictor": 3}
 BYTES_OF_COARSE_CELL = 900
 """All that a coarse cell has, at the stage that takes most; 3 bands."""
+PHOTOGRAPH_BAND, BRIDGED_BAND = "number of the photograph", "1: the height was not measured but bridged"
 Report = Callable[[str, float], None]
 
 
@@ -50,7 +52,7 @@ class OrthoOutcome:
     bands, dtype : of the colours.
     candidates, choice, balance, accuracy : of the coarse cells.
     cells : (n,) cells of every photograph. heights : cells with a height. hidden : those among them that the
-        photograph chosen for their place does not see.
+        photograph chosen for their place does not see. bridged : cells of the image over bridged holes of the surface.
     """
 
     grid: Grid
@@ -65,6 +67,7 @@ class OrthoOutcome:
     cells: np.ndarray
     heights: int
     hidden: int
+    bridged: int
 
 
 def make_orthophoto(
@@ -91,7 +94,7 @@ def make_orthophoto(
     sizes = [cameras[c].size_px for c in calibration.local.block.images.camera[chosen[0]]]
     pixels = PixelStore(chosen[1], sizes)
     with cache_limited():
-        ground = ground_surface(surface[0])
+        ground = ground_surface(BridgedReader(surface[0], settings.fill) if settings.fill > 0.0 else surface[0])
         if not np.isfinite(ground.low).any():
             raise InputError("has no heights", "give another surface", surface[0].path)
         gsd = float(np.median(photographs.gsd))
@@ -107,13 +110,12 @@ def make_orthophoto(
             photographs, pixels, ground, candidates, choice, balance, settings.edge, settings.resampling
         )  # fmt: skip
         crs = horizontal_crs(calibration.result.block.crs)
-        cells, heights, hidden = _written(sources, grid, folder, crs, report)
+        cells, counts = _written(sources, grid, folder, crs, report)
     with RasterWriter(folder / SIGMAS, candidates.grid, crs=crs, options=COMPRESSED) as writer:
         writer.describe("σ of X and Y, m")
         writer.write(0, 0, accuracy.total.astype(np.float32))
     return OrthoOutcome(
-        grid, photographs, gsd, pixels.bands, pixels.dtype.name, candidates, choice, balance, accuracy, cells, heights,
-        hidden,
+        grid, photographs, gsd, pixels.bands, pixels.dtype.name, candidates, choice, balance, accuracy, cells, *counts,
     )  # fmt: skip
 
 
@@ -174,24 +176,33 @@ def _candidates(
 
 def _written(
     sources: Sources, grid: Grid, folder: Path, crs: str | None, report: Report
-) -> tuple[np.ndarray, int, int]:
-    """Write all tiles; cells of every photograph, cells with heights and hidden ones among them."""
-    cells, heights, hidden = np.zeros(len(sources.photographs), np.int64), 0, 0
+) -> tuple[np.ndarray, tuple[int, int, int]]:
+    """Write all tiles; cells of every photograph; cells with heights, hidden ones, and those over bridged holes."""
+    cells, heights, hidden, bridges = np.zeros(len(sources.photographs), np.int64), 0, 0, 0
     bands = (*(f"band {b + 1}" for b in range(sources.pixels.bands)), "mask")
 
     def one(place: tuple[int, int, Grid]) -> Tile | None:
         return make_tile(sources, *place)
 
+    layers = (PHOTOGRAPH_BAND, *([BRIDGED_BAND] if isinstance(sources.surface.reader, BridgedReader) else []))
     with (
         write_mosaic(folder / IMAGE, grid, bands, sources.pixels.dtype.name, crs, True) as image,
-        write_mosaic(folder / NUMBERS, grid, ("number of the photograph",), "int32", crs, False) as numbers,
+        write_mosaic(folder / NUMBERS, grid, layers, "int32", crs, False) as numbers,
     ):
         for tile in results_in_threads(one, list(tiles_of(grid, TILE)), lambda done: report("cells", 0.95 * done)):
             if tile is None:
                 continue
             image.write(tile.row, tile.column, tile.colours)
-            numbers.write(tile.row, tile.column, tile.number[None])
+            numbers.write(tile.row, tile.column, _numbers_of(tile))
             cells += np.bincount(tile.number[tile.number >= 0], minlength=len(cells))
             heights, hidden = heights + tile.heights, hidden + tile.hidden
+            bridges += 0 if tile.bridged is None else int((tile.bridged & (tile.number >= 0)).sum())
         report("overviews", 0.95)
-    return cells, heights, hidden
+    return cells, (heights, hidden, bridges)
+
+
+def _numbers_of(tile: Tile) -> np.ndarray:
+    """(bands, r, c) int32, the photograph of every cell, and whether its height was bridged."""
+    if tile.bridged is None:
+        return tile.number[None]
+    return np.stack([tile.number, tile.bridged.astype(np.int32)])

@@ -49,7 +49,8 @@ class Tile:
     ----------
     row, column : of its first cell. colours : (bands + 1, r, c), the last one the mask, 0 where no photograph sees.
     number : (r, c) int32 photograph, −1 for none. heights : cells with a height. hidden : those among them that the
-        photograph chosen for their place does not see.
+        photograph chosen for their place does not see. bridged : (r, c) bool, cells over bridged holes of the surface;
+        None where none are bridged.
     """
 
     row: int
@@ -58,6 +59,7 @@ class Tile:
     number: np.ndarray
     heights: int
     hidden: int
+    bridged: np.ndarray | None
 
 
 def make_tile(sources: Sources, row: int, column: int, grid: Grid) -> Tile | None:
@@ -92,7 +94,8 @@ def make_tile(sources: Sources, row: int, column: int, grid: Grid) -> Tile | Non
         todo &= number < 0
     mask = np.where(number >= 0, np.iinfo(out.dtype).max, 0).astype(out.dtype)
     colours = np.concatenate([np.moveaxis(out, -1, 0), mask[None]])
-    return Tile(row, column, colours, number, int(known.sum()), hidden)
+    bridged = s.surface.bridged(grid)
+    return Tile(row, column, colours, number, int(known.sum()), hidden, None if bridged is None else bridged & known)
 
 
 def _wanted(sources: Sources, row: int, column: int, shape: tuple[int, int]) -> list[np.ndarray]:
