@@ -1,4 +1,4 @@
-"""Cut the pictures of the page on the report: `python docs/figures/report.py`. Takes a Chromium on the path."""
+"""Cut the pictures of two pages, report and accuracy: `python docs/figures/report.py`. Takes a Chromium."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ CUTS = (
     ("accepted", "report_good", "good", "warnings"),
     ("accepted", "report_precision", "warnings", "ground"),
     ("doubtful", "report_doubtful", None, "adjusted"),
+    ("stated", "accuracy_page", None, "errors"),
 )
 """Result, name of the picture, headings at which it begins (None: the top) and ends."""
 MEASURE = """<script>document.body.dataset.places = JSON.stringify(Object.fromEntries(
@@ -54,25 +55,31 @@ def photographed(browser: str, report: Path, shot: Path) -> dict[str, int]:
     return json.loads(html.unescape(found[1]))
 
 
-def main() -> None:
-    """Adjust the sample block with and without additional parameters, and cut."""
+def cut_page(browser: str, page: Path, result: str) -> None:
+    """Cut the pictures of one page."""
     from PIL import Image
 
+    shot = page.with_name("shot.png")
+    places = photographed(browser, page, shot)
+    with Image.open(shot) as picture:
+        for owner, name, first, last in CUTS:
+            if owner == result:
+                cut = page.with_name(f"{name}.png")
+                picture.crop((0, places[first] - 12 if first else 0, WIDTH, places[last] - 14)).save(cut)
+                small(cut, FOLDER / f"{name}.png")
+
+
+def main() -> None:
+    """Adjust the sample block with and without additional parameters, state its accuracy, and cut."""
     browser = next(name for name in ("chromium", "chromium-browser", "google-chrome") if shutil.which(name))
     FOLDER.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as place:
         work = Path(place)
         for result, parameters in (("accepted", None), ("doubtful", "none")):
             aerotri.adjust(aerotri.read_block(BLOCK), parameters=parameters).save(work / result)
-            shot = work / f"{result}.png"
-            places = photographed(browser, work / result / "report.html", shot)
-            with Image.open(shot) as picture:
-                for owner, name, first, last in CUTS:
-                    if owner == result:
-                        top = places[first] - 12 if first else 0
-                        cut = work / f"{name}.png"
-                        picture.crop((0, top, WIDTH, places[last] - 14)).save(cut)
-                        small(cut, FOLDER / f"{name}.png")
+            cut_page(browser, work / result / "report.html", result)
+        stated = aerotri.accuracy(work / "accepted", class_horizontal=0.075, class_vertical=0.12)
+        cut_page(browser, stated.save(work / "stated") / "accuracy.html", "stated")
         for name in PLOTS:
             small(work / "accepted" / "plots" / f"{name}.png", FOLDER / f"{name}.png")
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from aerotri.public import geometry as geometry
     from aerotri.public import parameters as parameters
     from aerotri.public import predict as predict
+    from aerotri.public.accuracy import accuracy as accuracy
     from aerotri.public.adjustment import Adjustment as Adjustment
     from aerotri.public.block_check import check as check
     from aerotri.public.block_settings import with_settings as with_settings
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from aerotri.public.blocks import read_block as read_block
     from aerotri.public.change import change as change
     from aerotri.public.changes import changes as changes
+    from aerotri.public.cloud_change import cloud_change as cloud_change
     from aerotri.public.comparing import compare_parameters as compare_parameters
     from aerotri.public.comparing import crosscheck as crosscheck
     from aerotri.public.converting import convert as convert
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from aerotri.public.dem import correct_dem as correct_dem
     from aerotri.public.dense import dense_surface as dense_surface
     from aerotri.public.editing import edit as edit
+    from aerotri.public.exporting import export as export
     from aerotri.public.halves import halves as halves
     from aerotri.public.ideal import ideal_photographs as ideal_photographs
     from aerotri.public.image_errors import ImageErrors as ImageErrors
@@ -66,9 +69,11 @@ _PLACES = {
     "InputError": "aerotri.conventions",
     "Surface": "aerotri.public.surfaces",
     "Table": "aerotri.public.table",
+    "accuracy": "aerotri.public.accuracy",
     "changes": "aerotri.public.changes",
     "check": "aerotri.public.block_check",
     "change": "aerotri.public.change",
+    "cloud_change": "aerotri.public.cloud_change",
     "compare": "aerotri.public.surface_comparison",
     "compare_parameters": "aerotri.public.comparing",
     "correct_dem": "aerotri.public.dem",
@@ -80,6 +85,7 @@ _PLACES = {
     "adjust": "aerotri.public.results",
     "convert": "aerotri.public.converting",
     "example_flight": "aerotri.public.simulating",
+    "export": "aerotri.public.exporting",
     "geometry": "aerotri.public.geometry",
     "halves": "aerotri.public.halves",
     "ideal_photographs": "aerotri.public.ideal",
@@ -111,10 +117,12 @@ __all__ = [
     "Surface",
     "Table",
     "__version__",
+    "accuracy",
     "adjust",
     "change",
     "changes",
     "check",
+    "cloud_change",
     "compare",
     "compare_parameters",
     "convert",
@@ -125,6 +133,7 @@ __all__ = [
     "drawing",
     "edit",
     "example_flight",
+    "export",
     "geometry",
     "halves",
     "ideal_photographs",

@@ -8,12 +8,14 @@ import pytest
 from aerotri.conventions import InputError
 from aerotri.formats.assembly.oriented import given_errors, oriented_from_adjusted
 from aerotri.formats.block.folder import read_block, write_block
+from aerotri.formats.results.adjustment import adjustment_json
 from aerotri.functional_model.additional_parameters import parse_parameters
 from aerotri.image_errors import image_groups, systematic_errors
 from aerotri.image_errors.error_exports import ideal_camera
 from aerotri.image_errors.error_function import error_function
 from aerotri.observations import Prior
 from aerotri.pipeline import adjust
+from aerotri.report.tables.parameters import held_table
 from small_blocks import ERRING, small_block, with_adjustment
 
 PARAMETERS = "bluh:1-12"
@@ -141,3 +143,12 @@ def test_cameras_that_share_parameters_state_the_same(freed):
     block = replace(block, cameras=cameras, images=replace(block.images, camera=camera))
     with pytest.raises(InputError, match=r"another value of bluh\.7"):
         adjust(with_adjustment(block, parameter_groups="block", additional_parameters=parse_parameters(PARAMETERS)))
+
+
+def test_held_values_stand_in_the_result(freed, held, values):
+    """adjustment.json and the report name what was held; where nothing was, there is no such key."""
+    (camera,) = adjustment_json(held)["cameras"]
+    assert camera["held_parameters"] == values
+    assert "held_parameters" not in adjustment_json(freed)["cameras"][0]
+    assert [(name, value) for _, name, value in held_table(held).rows] == list(values.items())
+    assert held_table(freed).rows == ()

@@ -19,7 +19,9 @@ from aerotri.conventions import InputError
 
 WITHOUT_TARGET = {"init", "check", "diff", "explain", "predict volume", "predict attitude", "predict picket-interval"}
 """Commands that print what they find; the folder of init is what it is about."""
-UNIT = re.compile(r"\b(m|mm|µm|t/m³|pixels|degrees|per cent|[Ss]hare|0 to 1|a number|grey values|1 over this number)\b")
+UNIT = re.compile(
+    r"\b(m|mm|cm|km²|µm|t/m³|pixels|degrees|per cent|[Ss]hare|0 to 1|a number|grey values|1 over this number)\b"
+)
 COUNT = re.compile(r"\b(number|pixels|Number)\b")
 DIFFERENT = {
     "area": "a rectangle to measure, or the polygons of a change",

@@ -13,6 +13,7 @@ import pytest
 from aerotri.cli.app import invoke
 from aerotri.formats.block.folder import write_block
 from aerotri.rasters.grids import RasterReader
+from gis_blocks import in_crs, plain_block
 from rendered_photographs import Lists, fly, write_gcp_list, write_positions
 from small_blocks import with_adjustment
 from ten_photographs import ten_photographs
@@ -175,9 +176,15 @@ def _written(folder: Path) -> Written:
     imgeo = run("imgeo", result, next(photographs.glob("*.tif")), out="ideal")
     compared = run("compare", pairs / "dtm.tif", pairs / "dsm.tif", "--align", "shift", out="compared")
     stable = "POLYGON ((-1e6 -1e6, 1e6 -1e6, 1e6 1e6, -1e6 1e6, -1e6 -1e6))"
+    clouds = run("change", dense / "dsm.laz", dense / "dsm.laz", "--registration", 0.01, out="clouds")
     changed = run("change", dense, dense, "--stable", stable, "--align", "height", out="changed")
     piles = run("volume", dense, "--boundary", _two_polygons(folder, dense / "dsm.tif"), "--density", 1.8, out="piles")
     halves = run("halves", second, "--division", "photographs", "--division", "strips", out="halves")
+    write_block(in_crs(plain_block()), folder / "placed")
+    placed = run("adjust", folder / "placed", "--no-plots", out="placed_result")
+    for to in ("gpkg", "geoparquet", "stac"):
+        exported = run("export", placed, "--to", to, "--flown", "2026-05-17", out="exported")
+    stated = run("accuracy", second, "--class-horizontal", 10, out="accuracy")
     sets = run("compare-parameters", folder / "plain", "--set", "none", "--set", "brown:K1", "--folds", "2", out="sets")
     checked = run("crosscheck", second, out="checked")
     run("init", folder / "begun")
@@ -193,10 +200,11 @@ def _written(folder: Path) -> Written:
     places = {
         "block folder": (tiny, folder / "plain", project / "block"),
         "result of adjust": (first, second, result, of_rig, of_weighted, of_shutter),
-        "folder of compare-parameters": (sets,), "folder of halves": (halves,), "folder of deform": (model, whole),
+        "folder of compare-parameters": (sets,), "folder of halves": (halves,),
+        "folder of accuracy": (stated,), "folder of deform": (model, whole),
         "folder of demcor": (folder / "corrected",), "folder of imgeo": (imgeo,), "folder of crosscheck": (checked,),
         "folder of dtm": (pairs, project / "dtm"), "folder of dsm": (dense,), "folder of compare": (compared,),
-        "folder of change": (changed,),
+        "folder of change": (changed, clouds), "folder of export": (exported,),
         "folder of volume": (project / "volume", piles), "folder of ortho": (ortho,),
         "truth of simulate": (tiny / "truth", rigged / "truth", rolling / "truth"),
         "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),

@@ -1,8 +1,9 @@
 """How long projects of other programs take to read, beside merely reading their files.
 
 Image points are made up: every object point is seen by ten photographs. Of OpenSfM the peers are pyarrow parsing
-tracks.csv and the json module parsing reconstruction.json; of COLMAP pycolmap, and the bytes alone. `aerotri.read` also
-intersects all points to say how the image points fit. Measures single readers: imports inside on purpose.
+tracks.csv and the json module parsing reconstruction.json; of COLMAP pycolmap, for binary models and for text, and the
+bytes alone. `aerotri.read` also intersects points to say how the image points fit. Measures single readers: imports
+inside on purpose.
 
 Example
 -------
@@ -60,7 +61,15 @@ def main() -> None:
         _say("COLMAP, the reader", lambda: read_colmap(place / "colmap"))
         _say("COLMAP, aerotri.read", lambda: aerotri.read(place / "colmap"))
         _say("the model by pycolmap alone", lambda: len(pycolmap.Reconstruction(place / "colmap").images))
+        pycolmap.Reconstruction(place / "colmap").write_text(_made(place / "text"))
+        _say("COLMAP as text, the reader", lambda: read_colmap(place / "text"))
+        _say("the text by pycolmap alone", lambda: len(pycolmap.Reconstruction(place / "text").images))
         _say("its bytes alone", lambda: [np.fromfile(path, np.uint8) for path in (place / "colmap").iterdir()])
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir()
+    return folder
 
 
 def _say(name: str, work: Callable[[], object]) -> None:

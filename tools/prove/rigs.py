@@ -29,12 +29,12 @@ SIGMA_M = 0.02
 """σ of a nominal position; the nominal angles are start values only."""
 
 
-def with_rig(block: aerotri.Block, constraint: str = "rigid") -> aerotri.Block:
+def with_rig(block: aerotri.Block, constraint: str = "rigid", sigma_m: float = SIGMA_M) -> aerotri.Block:
     """The block with its five heads on one rig; an exposure is a station."""
     station = np.array([name[1:] for name in block.images.names.tolist()], dtype=object)
     cameras = {
         head: observations.Mounting(
-            tuple(observations.Prior(float(v), SIGMA_M) for v in position),
+            tuple(observations.Prior(float(v), sigma_m) for v in position),
             tuple(observations.Prior(float(np.radians(v))) for v in MOUNTING_DEG[head]),
         )
         for head, position in POSITION_M.items()
@@ -170,8 +170,10 @@ def main() -> None:
     )
     parser.add_argument("--leave-out", action="store_true", help="every control point in turn")
     parser.add_argument("--orientations", type=Path, help="file of start orientations; written where it is not there")
+    parser.add_argument("--position-sigma", type=float, default=SIGMA_M, help="σ of the nominal positions, m")
     options = parser.parse_args()
-    block = whole_stations(with_rig(exposures(unoriented(options.folder), 0, options.exposures)))
+    block = exposures(unoriented(options.folder), 0, options.exposures)
+    block = whole_stations(with_rig(block, sigma_m=options.position_sigma))
     found: dict[str, aerotri.Adjustment] = {}
     for name in options.constraints.split(","):
         own = replace(block, rigs=tuple(replace(rig, constraint=name) for rig in block.rigs))

@@ -16,13 +16,25 @@ if interruption.is_program():
 
 import typer
 
-from aerotri.cli import adjusting, blocks, change, converting, explaining, image_errors, ortho, run, terrain, volumes
+from aerotri.cli import (
+    adjusting,
+    blocks,
+    change,
+    converting,
+    explaining,
+    exporting,
+    image_errors,
+    ortho,
+    run,
+    terrain,
+    volumes,
+)
 from aerotri.cli.app import app
 from aerotri.conventions import InputError
 
 __all__ = [
-    "adjusting", "app", "blocks", "change", "converting", "explaining", "image_errors", "main", "ortho", "run",
-    "terrain", "volumes",
+    "adjusting", "app", "blocks", "change", "converting", "explaining", "exporting", "image_errors", "main", "ortho",
+    "run", "terrain", "volumes",
 ]  # fmt: skip
 
 BAD_INPUT, BUG = 2, 3

@@ -148,6 +148,43 @@ def halves(
 
 
 @app.command(
+    rich_help_panel=ADJUSTMENT,
+    epilog="Example: aerotri accuracy frederiksstad_ultracam_result --class-horizontal 7.5 --class-vertical 12",
+)
+def accuracy(
+    result: ResultFolder,
+    class_horizontal: Annotated[
+        float | None,
+        typer.Option(min=1e-6, help="Largest RMSE_H that is allowed, cm: the class asked for.", rich_help_panel=INPUT),
+    ] = None,
+    class_vertical: Annotated[
+        float | None,
+        typer.Option(min=1e-6, help="Largest RMSE_V that is allowed, cm: the class asked for.", rich_help_panel=INPUT),
+    ] = None,
+    vegetated: Annotated[
+        Path | None,
+        typer.Option(help="Text file with the check points in vegetation, one name a line.", rich_help_panel=INPUT),
+    ] = None,
+    project_area: Annotated[
+        float | None,
+        typer.Option(
+            min=1e-9,
+            help="Project area, km², for the number of check points. Default: within the outermost ground points.",
+            rich_help_panel=INPUT,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; default NAME_accuracy here.", rich_help_panel=OUTPUT)
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Accuracy by check points, as the ASPRS standard asks for it: a page for the client."""
+    from aerotri.commands.accuracy import run_accuracy
+
+    raise typer.Exit(run_accuracy(result, class_horizontal, class_vertical, vegetated, project_area, out, json_))
+
+
+@app.command(
     "compare-parameters",
     rich_help_panel=ADJUSTMENT,
     epilog="Example: aerotri compare-parameters blocks/frederiksstad_ultracam --set none --set bluh:1-12 --folds 3",

@@ -37,6 +37,7 @@ class WorkItem:
     priority : 1 wrong (chance does not explain it), 2 weak (little holds or controls it), 3 doubtful.
     kind : one of `KINDS`. where : names. what : the finding with its numbers. hint : what to do.
     severity : how many times beyond its limit; infinite for what was left out.
+    points, images : rows of the object points and photographs that it is about.
     """
 
     priority: int
@@ -45,6 +46,8 @@ class WorkItem:
     what: str
     severity: float
     hint: str
+    points: tuple[int, ...] = ()
+    images: tuple[int, ...] = ()
 
 
 def residual_items(adjusted: AdjustedBlock, tests: RayTests) -> list[WorkItem]:
@@ -76,8 +79,9 @@ def _ground_coordinates(adjusted: AdjustedBlock, scale: float) -> list[WorkItem]
             if kind == "control" and results.r[row, axis] > 0.0:
                 what += f", given value off by {-d / results.r[row, axis]:+.3f} m"
             priority = 1 if size[row, axis] > sure else 3
-            name = str(adjusted.block.points[results.point[row]])
-            items.append(WorkItem(priority, kind, name, what, float(size[row, axis] / limit), hint))
+            point = int(results.point[row])
+            name, severity = str(adjusted.block.points[point]), float(size[row, axis] / limit)
+            items.append(WorkItem(priority, kind, name, what, severity, hint, points=(point,)))
     return items
 
 
@@ -99,10 +103,12 @@ def _rays(adjusted: AdjustedBlock, tests: RayTests) -> list[WorkItem]:
         what = f"w{axis} {tests.w[row]:+.1f}, error {error_um:+.1f} µm ({tests.estimated_px[row]:+.1f} px)"
         if others:
             what += f"; {others} more {'ray' if others == 1 else 'rays'} of the point"
-        where = f"{block.points[point]} in {block.images.names[block.image_points.image[row]]}"
+        image = int(block.image_points.image[row])
+        where = f"{block.points[point]} in {block.images.names[image]}"
         kind = "control ray" if is_control[point] else "ray"
         hint = _ray_hint(int(adjusted.points.rays[point]), others, float(adjusted.rays.weight[row]))
-        items.append(WorkItem(1 if w > tests.sure else 3, kind, where, what, float(w / tests.limit), hint))
+        priority, severity = 1 if w > tests.sure else 3, float(w / tests.limit)
+        items.append(WorkItem(priority, kind, where, what, severity, hint, (point,), (image,)))
     return items
 
 
@@ -137,7 +143,8 @@ def _control_of_photographs(adjusted: AdjustedBlock, tests: RayTests) -> list[Wo
             names = [str(name) for name in block.images.names[photographs]]
             where = names[0] if len(names) == 1 else f"{len(names)} photographs ({', '.join(names[:3])}, …)"
             severity = float(total[photographs].max() / limit)
-            items.append(WorkItem(1, "control ray", where, what, severity, CONTROL_HINTS[len(names) > 1]))
+            hint, own = CONTROL_HINTS[len(names) > 1], tuple(photographs.tolist())
+            items.append(WorkItem(1, "control ray", where, what, severity, hint, images=own))
     return items
 
 
@@ -149,6 +156,7 @@ def _observations(adjusted: AdjustedBlock, scale: float) -> list[WorkItem]:
     alpha = adjusted.block.settings.adjustment.alpha
     size = np.abs(np.nan_to_num(observed.w)) / max(scale, 1.0)
     limit, sure = critical_value(alpha), sure_value(alpha, int(np.isfinite(observed.w).sum()))
+    photographs = {str(name): row for row, name in enumerate(adjusted.block.images.names)}
     items = []
     for row in np.flatnonzero(size > limit):
         in_angle = observed.group[row] == "attitudes"
@@ -156,5 +164,7 @@ def _observations(adjusted: AdjustedBlock, scale: float) -> list[WorkItem]:
         what = f"{observed.group[row]} {observed.component[row]}: adjusted − observed {v}, w {observed.w[row]:+.1f}"
         hint = "look at the observation and its σ; at shift and drift where many are listed"
         priority = 1 if size[row] > sure else 3
-        items.append(WorkItem(priority, "observation", str(observed.label[row]), what, float(size[row] / limit), hint))
+        label, severity = str(observed.label[row]), float(size[row] / limit)
+        own = (photographs[label],) if observed.group[row] != "constraints" and label in photographs else ()
+        items.append(WorkItem(priority, "observation", label, what, severity, hint, images=own))
     return items

@@ -91,13 +91,13 @@ def _left_out(adjusted: AdjustedBlock) -> list[WorkItem]:
     for image in np.flatnonzero(adjusted.images.rays == 0):
         what = f"left out of the adjustment, {measured[image]} image points measured"
         hint = "give it start values, or measure more points" if measured[image] else "measure points in it"
-        items.append(WorkItem(1, "left out", str(block.images.names[image]), what, np.inf, hint))
+        items.append(WorkItem(1, "left out", str(block.images.names[image]), what, np.inf, hint, images=(int(image),)))
     there = np.concatenate([adjusted.control.point, adjusted.check.point])
     rays = np.bincount(block.image_points.point, minlength=len(block.points))
     for point in np.setdiff1d(block.control.point, there):
         what = f"given coordinates, {rays[point]} {'ray' if rays[point] == 1 else 'rays'} measured, not used"
         hint = "see whether it was switched off, or measure it in another photograph" if rays[point] else "measure it"
-        items.append(WorkItem(3, "left out", str(block.points[point]), what, 1.0, hint))
+        items.append(WorkItem(3, "left out", str(block.points[point]), what, 1.0, hint, points=(int(point),)))
     return items
 
 
@@ -110,7 +110,8 @@ def _parts(adjusted: AdjustedBlock, ties: Ties, limits: WorkLimits) -> list[Work
         what = f"{len(cut.part)} photographs with {cut.common} points in common with all others"
         severity = limits.shared_points / cut.common if cut.common else np.inf
         hint = "measure tie points between the part and its neighbours"
-        items.append(WorkItem(2 if cut.common >= 3 else 1, "part", shown, what, severity, hint))
+        own = tuple(int(image) for image in cut.part)
+        items.append(WorkItem(2 if cut.common >= 3 else 1, "part", shown, what, severity, hint, images=own))
     return items
 
 
@@ -143,7 +144,7 @@ def _photographs(adjusted: AdjustedBlock, ties: Ties, limits: WorkLimits) -> lis
             severity = float(max(size for size, _ in found))
             only_residuals = len(found) == 1 and found[0][1].startswith("residuals")
             hint = "blurred, or of another camera?" if only_residuals else "measure tie points in it and its neighbours"
-            items.append(WorkItem(2, "photograph", str(names[image]), what, severity, hint))
+            items.append(WorkItem(2, "photograph", str(names[image]), what, severity, hint, images=(int(image),)))
     return items
 
 
@@ -197,5 +198,6 @@ def _points(adjusted: AdjustedBlock, limits: WorkLimits) -> list[WorkItem]:
         what = f"{points.rays[point]} rays meet at {angle[point]:.1f}°; " if np.isfinite(angle[point]) else "one ray; "
         what += f"σ{'XYZ'[axis]} {sigma[point, axis]:.3f} m, {ratio[point, axis]:.1f} times the median"
         hint = "measure it in photographs farther apart, or do without it"
-        items.append(WorkItem(3, "point", str(names[point]), what, float(severity[point]), hint))
+        own = (int(point),)
+        items.append(WorkItem(3, "point", str(names[point]), what, float(severity[point]), hint, points=own))
     return items

@@ -59,6 +59,20 @@ class ErrorFunction:
         d = self._by_position(xy)
         return d if not self.lens.any() else xy - self._without_lens(xy - d)
 
+    def directions(self, xy: np.ndarray) -> np.ndarray:
+        """(n, 3) directions in the camera frame of the rays through measured positions (n, 2) mm; any length.
+
+        Of a fisheye as well. NaN where the lens records no ray.
+        """
+        xy = np.asarray(xy, dtype=float)
+        distorted = (xy - self._by_position(xy) - self.interior[1:]) / self.interior[0]
+        ideal = lens.unbend(distorted, self.lens)
+        if not self.camera.is_fisheye:
+            return np.column_stack([ideal, np.full(len(ideal), -1.0)])
+        angle = np.hypot(ideal[:, 0], ideal[:, 1])
+        angle = np.where(angle < np.pi, angle, np.nan)
+        return np.column_stack([ideal * np.sinc(angle / np.pi)[:, None], -np.cos(angle)])
+
     def measured(self, ideal: np.ndarray, within: Bounds | None = None) -> np.ndarray:
         """Measured positions of ideal ones: m = lens(ideal) + d(m) by fixed point.
 
@@ -126,8 +140,19 @@ class ErrorFunction:
 
 
 def error_function(adjusted: AdjustedBlock, group: ImageGroup) -> ErrorFunction:
-    """All additional parameters in force in a group, estimated or given; what the selection removed is not."""
+    """All additional parameters in force in a group, estimated or given; what the selection removed is not.
+
+    Raises
+    ------
+    InputError
+        For a fisheye.
+    """
     _refuse_fisheye(group.camera)
+    return errors_in_force(adjusted, group)
+
+
+def errors_in_force(adjusted: AdjustedBlock, group: ImageGroup) -> ErrorFunction:
+    """As `error_function`; of a fisheye too, which has `directions` only."""
     values = _values_in_force(adjusted, group)
     sets = tuple(
         (chosen, np.array([values[name] for name in chosen.names]))
@@ -139,7 +164,7 @@ def error_function(adjusted: AdjustedBlock, group: ImageGroup) -> ErrorFunction:
         interior=interior_elements(adjusted, group.camera)[0],
         linear=sets,
         brown=np.array([values.get(f"brown.{item}", 0.0) for item in brown.ITEMS]),
-        lens=lens.vector({item: values.get(f"lens.{item}", 0.0) for item in lens.ITEMS}),
+        lens=lens.vector({item: values.get(f"lens.{item}", 0.0) for item in lens.ITEMS}, group.camera.is_fisheye),
     )
 
 

@@ -107,6 +107,13 @@ ADJUSTMENT = (
             Item(f"cameras[].t_{name}", "number?", f"Total of both.{WHERE_MODEL}", "mm", optional=True),
         )
     ),
+    Item(
+        "cameras[].held_parameters",
+        "object",
+        "Additional parameters of the camera that were held, by name. Only where there are any.",
+        optional=True,
+    ),
+    Item("cameras[].held_parameters.*", "number", "The value that block.toml states."),
     Item("blunders[]", "object", "Suspected gross errors, the largest first."),
     Item("blunders[].image", "text", "Photograph; empty for a control point."),
     Item("blunders[].point", "text", "Point."),

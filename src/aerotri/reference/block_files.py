@@ -212,6 +212,8 @@ def block_files() -> tuple[DescribedFile, ...]:
         DescribedFile("result", RUN, "folder", "The adjustment, as of adjust."),
         DescribedFile("dtm", RUN, "folder", "The terrain, as of dtm.", when="of photographs"),
         DescribedFile("volume", RUN, "folder", "The volume, as of volume.", when="with --boundary"),
+        DescribedFile("dsm", RUN, "folder", "The dense surface, as of dsm.", when="of photographs, unless --no-dense"),
+        DescribedFile("ortho", RUN, "folder", "The orthophoto, as of ortho.", when="of photographs, unless --no-dense"),
         DescribedFile("block", RESULT, "folder", "The block as it was adjusted."),
         DescribedFile("solution.npz", RESULT, "other", "The solution, from which later commands take covariances."),
         DescribedFile(

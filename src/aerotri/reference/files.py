@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 
+from aerotri.reference.accuracy_files import accuracy_files
 from aerotri.reference.adjust_contents import adjust_contents
 from aerotri.reference.adjust_tables import adjust_tables
 from aerotri.reference.block_files import block_files
 from aerotri.reference.block_tables import block_table_files
 from aerotri.reference.change_files import change_files
+from aerotri.reference.export_files import export_files
 from aerotri.reference.halves_files import halves_files
 from aerotri.reference.image_error_files import image_error_files
 from aerotri.reference.ortho_files import ortho_files
@@ -25,6 +27,8 @@ def described_files() -> tuple[DescribedFile, ...]:
         *adjust_contents(),
         *adjust_tables(),
         *halves_files(),
+        *export_files(),
+        *accuracy_files(),
         *image_error_files(),
         *terrain_files(),
         *ortho_files(),

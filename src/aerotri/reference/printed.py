@@ -114,6 +114,12 @@ CONVERT = (
     Item("format", "text", "Its format."),
     Item("messages[]", "text", "What was matched, assumed, or cannot be held by the target."),
 )
+EXPORT = (
+    Item("target", "text", "Folder written."),
+    Item("format", "text", "What was written.", values={"gpkg": "", "geoparquet": "", "stac": ""}),
+    Item("files[]", "text", "Files written into it."),
+    Item("messages[]", "text", "What is to be known of it."),
+)
 PREDICT_VOLUME = (
     Item("models_between_control", "whole", "Stereo models from one control point to the next."),
     Item("models_per_strip", "whole", "Stereo models in a strip."),
@@ -246,6 +252,7 @@ def printed_contents() -> tuple[DescribedFile, ...]:
         ("parameters", "The additional parameters there are.", PARAMETERS),
         ("simulate", "How much was simulated.", SIMULATE),
         ("convert", "What was converted.", CONVERT),
+        ("export", "What was exported.", EXPORT),
         ("compare-parameters", "compare_parameters.json, and the choice.", (*COMPARE_PARAMETERS, CHOICE)),
         ("init", "Which files were written.", INIT),
         ("check", "What a block holds and lacks.", CHECK),

@@ -28,6 +28,16 @@ PRINTED_WORDS = (
         "Vertical root mean square error: the RMS of the differences in Z at control or check points, m.",
     ),
     Word(
+        "RMSE_3D", "aerotri accuracy", "Root mean square error in space: √(RMSE_H² + RMSE_V²), with the survey error.",
+    ),
+    Word("NVA", "aerotri accuracy", "Vertical accuracy outside vegetation: RMSE_V of the check points on open ground."),
+    Word("VVA", "aerotri accuracy", "Vertical accuracy in vegetation: RMSE_V of the check points named as vegetated."),
+    Word(
+        "class reached", "aerotri accuracy",
+        "The accuracy class that the check points show: their RMSE rounded up to a millimetre.",
+        "To claim a class, its check and control points have to be surveyed to half of it as well.",
+    ),
+    Word(
         "redundancy", "aerotri adjust",
         "Observations less unknowns: what tests the measurements. With none an error cannot be seen.",
     ),

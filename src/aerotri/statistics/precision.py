@@ -180,6 +180,19 @@ def centre_ellipsoids(adjusted: AdjustedBlock, probability: float | None = None)
     return ellipsoids(adjusted.images.total_covariance[:, :3, :3], probability)
 
 
+def plan_ellipses(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Standard error ellipses in plan (axes of one σ, 39 %) of (k, 3, 3) covariances; NaN where one is not known.
+
+    Returns
+    -------
+    a, b : (k,) m, semi-axes, a ≥ b. azimuth : (k,) rad of the axis a, from +Y (north) towards +X, 0 to π.
+    """
+    xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
+    middle, spread = (xx + yy) / 2.0, np.hypot((xx - yy) / 2.0, xy)
+    azimuth = np.mod(np.arctan2(2.0 * xy, yy - xx) / 2.0, np.pi)
+    return np.sqrt(middle + spread), np.sqrt(np.maximum(middle - spread, 0.0)), azimuth
+
+
 def ellipsoids(covariance: np.ndarray, probability: float | None = None) -> Ellipsoids:
     """Ellipsoids of (k, 3, 3) covariances, NaN where one is not known.
 

@@ -80,9 +80,10 @@ def boundary_of(polygon: BaseGeometry, name: str, note: str = "", file: Path | N
         When it has no area, or crosses itself.
     """
     if not polygon.is_valid:
-        raise InputError(
-            f"the boundary '{name}' is not valid: {shapely.is_valid_reason(polygon)}", "correct the polygon", file
-        )
+        # GEOS computes the place of a fault even where coordinates are beyond all numbers
+        with np.errstate(all="ignore"):
+            reason = shapely.is_valid_reason(polygon)
+        raise InputError(f"the boundary '{name}' is not valid: {reason}", "correct the polygon", file)
     if not polygon.area > 0.0:
         raise InputError(f"the boundary '{name}' has no area", "give a polygon", file)
     return Boundary(shapely.normalize(polygon), name, note)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aerotri.conventions import InputError
 from aerotri.formats.assembly.oriented import oriented_block
 from aerotri.formats.foreign.colmap import read_colmap, write_colmap
 from aerotri.functional_model.rotation import rotation_from_angles
@@ -116,3 +117,27 @@ def test_a_model_of_single_cameras_has_no_rigs(flown, tmp_path):
     again, _ = read_colmap(tmp_path / "model")
     assert again.rigs == ()
     assert "station" not in again.images.columns
+
+
+def test_a_pose_on_the_rig_that_is_missing_or_no_number(flown, tmp_path):
+    """Frames hold poses of their reference camera alone: without the other's pose on the rig it is refused by name."""
+    block, truth = flown
+    model, _ = written(block, truth.points, tmp_path / "model")
+    (rig,) = model.rigs.values()
+    sensor = next(iter(rig.non_ref_sensors))
+    matrix = rig.sensor_from_rig(sensor).matrix().copy()
+    matrix[0, 3] = np.nan
+    rig.set_sensor_from_rig(sensor, pycolmap.Rigid3d(matrix))
+    (tmp_path / "nan").mkdir()
+    model.write_binary(tmp_path / "nan")
+    again, _ = read_colmap(tmp_path / "nan", pixel_um=4.0)
+    assert sorted(mounting.known for mounting in again.rigs[0].cameras.values()) == [False, True]
+    written(block, truth.points, tmp_path / "none")
+    rigs = tmp_path / "none" / "rigs.bin"
+    raw = rigs.read_bytes()
+    # number of rigs, number, sensors, reference; then type and number of the first sensor, whether it has a pose, pose
+    flag = 8 + 4 + 4 + 8 + 8
+    assert raw[flag] == 1
+    rigs.write_bytes(raw[:flag] + b"\0" + raw[flag + 1 + 56 :])
+    with pytest.raises(InputError, match=r"the pose of image '.*' on its rig is missing"):
+        read_colmap(tmp_path / "none", pixel_um=4.0)

@@ -81,9 +81,10 @@ def _projects(written: dict[str, dict[str, bytes]]) -> list[Target]:
     from aerotri.formats.assembly.project import Request, read_project
 
     targets = []
-    for kind in ("bal", "colmap", "colmap-text", "bundler", "opensfm"):
-        files = written[kind]
-        source = f"{kind.removesuffix('-text')}:"
+    flown = {f"{kind}, rig": seeds.rig_project(kind) for kind in ("colmap", "colmap-text", "opensfm")}
+    single = {kind: written[kind] for kind in ("bal", "colmap", "colmap-text", "bundler", "opensfm")}
+    for kind, files in (single | flown).items():
+        source = f"{kind.partition(',')[0].removesuffix('-text')}:"
 
         def read(folder: Path, source: str = source) -> object:
             _detected(folder / "x")
@@ -160,7 +161,8 @@ def _blocks() -> list[Target]:
     for name, files in (("block", seeds.block_folder("csv")), ("block, film", seeds.film_folder()),
                         ("block, parquet", seeds.block_folder("parquet"))):  # fmt: skip
         targets += [Target(name, files, tuple(files), aerotri.read_block)] * 2
-    return targets
+    files = {name.removeprefix("x/"): raw for name, raw in seeds.rig_project("block").items()}
+    return [*targets, Target("block, rig and rolling shutter", files, tuple(files), aerotri.read_block)]
 
 
 def _results() -> list[Target]:
@@ -247,6 +249,7 @@ def _settings() -> list[Target]:
     from aerotri.formats.foreign.ign import read_ign_camera
     from aerotri.formats.foreign.orientation_list import read_ortho_camera
     from aerotri.formats.foreign.pix4d import read_pix4d_offset
+    from aerotri.formats.text.name_list import read_point_names
     from aerotri.simulation.reading import read_spec
 
     spec = (seeds.ROOT / "blocks" / "frederiksstad_ultracam" / "simulation.toml").read_bytes()
@@ -257,5 +260,7 @@ def _settings() -> list[Target]:
         _single("cameras.toml", CAMERA, "camera.toml", read_cameras_toml),
         _single("ign camera", ign, "c.txt", lambda path: read_ign_camera(path, 4.0)),
         _single("ortho camera", yaml, "c.yaml", read_ortho_camera),
+        _single("point names", b"point\n# in vegetation\nK01\nK02\n", "names.txt",
+                lambda path: read_point_names(path, {"K01", "K02", "K03"}, "check point")),
         _single("pix4d offset", b"1.5 2.5 3\n", "o.xyz", read_pix4d_offset),
-    ]
+    ]  # fmt: skip

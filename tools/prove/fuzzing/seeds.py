@@ -53,6 +53,30 @@ def written(formats: tuple[str, ...]) -> dict[str, dict[str, bytes]]:
     return found
 
 
+def rig_project(format: str) -> dict[str, bytes]:
+    """Three exposures of two cameras on a rig in a format, or as a block with a rolling shutter and given values."""
+    from dataclasses import replace
+
+    import aerotri
+    from aerotri import observations
+
+    flight = {"gsd_m": 0.1, "strips": 1, "images_per_strip": 3, "end_lap": 0.7, "speed_m_s": 10.0}
+    rigs = of_tests("rig_blocks")
+    changes = {"flight": flight, "tie_points": {"per_image": 8, "probability": 0.9, "sigma_um": 2.0}}
+    changes["gnss"] = {"sigma_m": [0.1, 0.1, 0.1]}
+    if format == "block":
+        rolling = rigs.NADIR | {"rolling_shutter": {"readout_ms": 20.0}}
+        changes["camera"] = {"nadir": rolling, "fore": rigs.OBLIQUE}
+    block, truth = rigs.rig_block(1, cameras=("fore",), **changes)
+    block = replace(block, images=replace(block.images, centre=truth.centre, angles=truth.angles))
+    if format == "block":
+        given = {"bluh.1": observations.Prior(1e-4, 1e-5), "legendre.bx2y0": observations.Prior(2e-4, fixed=True)}
+        block = replace(block, cameras=tuple(replace(camera, parameters=given) for camera in block.cameras))
+    with tempfile.TemporaryDirectory() as folder:
+        aerotri.convert(block, Path(folder) / "x", format, points=truth.points)
+        return contents(Path(folder))
+
+
 def metashape_project(ending: str) -> dict[str, bytes]:
     """The project of the tests: content by path within a folder."""
     with tempfile.TemporaryDirectory() as folder:

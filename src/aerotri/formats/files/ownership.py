@@ -98,6 +98,19 @@ def carry_over(old: Path, new: Path, own: Collection[str], gone: Collection[str]
         _bring(source, place)
 
 
+def keep_written(old: Path, new: Path, names: Collection[str]) -> None:
+    """Bring files that this program wrote earlier, and nobody changed, into a new folder before its files are listed.
+
+    Parameters
+    ----------
+    old : may be missing. names : of files in it that are not written anew.
+    """
+    ledger = recorded_files(old) or {}
+    for name in names:
+        if is_own(old, Path(name), ledger):
+            _bring(old / name, new / name)
+
+
 def _dropped(old: Path, rel: Path, own: Collection[str], ledger: dict[str, str] | None) -> bool:
     """Whether an older entry is ours and may go."""
     if rel.parts[0] not in own:

@@ -237,12 +237,21 @@ def _name(image: Any, folder: Path) -> str:
         raise InputError("the name of an image is not UTF-8", "export the model anew", folder) from error
 
 
+def _pose(image: Any, folder: Path) -> np.ndarray:
+    """(3, 4) camera from world."""
+    try:
+        return image.cam_from_world().matrix()
+    except RuntimeError as error:
+        message = f"the pose of image '{_name(image, folder)}' on its rig is missing"
+        raise InputError(message, "export the model anew", folder) from error
+
+
 def _images_of(model: Any, ids: list[int], camera_place: dict[int, int], folder: Path) -> Images:
     centre, angles = np.full((len(ids), 3), np.nan), np.full((len(ids), 3), np.nan)
     for row, number in enumerate(ids):
         image = model.images[number]
         if image.has_pose:
-            colmap_from_world = image.cam_from_world().matrix()
+            colmap_from_world = _pose(image, folder)
             if not (np.abs(colmap_from_world) <= LARGEST_NUMBER).all():
                 continue
             rotation = colmap_from_world[:, :3].T @ COLMAP_FROM_CAMERA

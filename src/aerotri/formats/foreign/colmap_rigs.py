@@ -15,6 +15,7 @@ import numpy as np
 
 from aerotri.adjustment.rigging import robust_mean
 from aerotri.formats.assembly.oriented import OrientedBlock
+from aerotri.formats.text.tables import LARGEST_NUMBER
 from aerotri.functional_model.rotation import angles_from_rotation, logarithm, rotation_from_angles
 from aerotri.observations import Mounting, Prior, Rig
 from aerotri.observations.rigs import station_places
@@ -66,6 +67,8 @@ def _mounting(pose: Any, order: str) -> Mounting:
     if pose is None:
         return Mounting(known=False)
     matrix = np.asarray(pose.matrix())
+    if not (np.abs(matrix) <= LARGEST_NUMBER).all():
+        return Mounting(known=False)
     rotation = COLMAP_FROM_CAMERA @ matrix[:, :3].T @ COLMAP_FROM_CAMERA
     position = -COLMAP_FROM_CAMERA @ matrix[:, :3].T @ matrix[:, 3]
     x, y, z = (Prior(float(value)) for value in position)

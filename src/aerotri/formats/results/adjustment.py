@@ -317,7 +317,8 @@ def _cameras(adjusted: AdjustedBlock) -> list[dict[str, Any]]:
             total = np.hypot(model, interior_elements(adjusted, camera)[1])
             for letter, sigmas in (("m", model), ("t", total)):
                 entry |= {f"{letter}_{k}": number_or_none(v) for k, v in zip(INTERIOR_ELEMENTS, sigmas, strict=True)}
-        cameras.append(entry)
+        held = {parameter: prior.value for parameter, prior in camera.parameters.items() if prior.fixed}
+        cameras.append(entry | ({"held_parameters": held} if held else {}))
     return cameras
 
 

@@ -199,6 +199,7 @@ def _change(change: Change) -> dict[str, str]:
 def _parameter_tables(adjusted: AdjustedBlock, beside: Findings) -> dict[str, tables.Table]:
     none = tables.Table("", (), ())
     return {
+        "held": parameter_tables.held_table(adjusted),
         "fields": parameter_tables.fields_table(adjusted),
         "removals": parameter_tables.removals_table(adjusted),
         "changes": parameter_tables.changes_table(beside.changes),

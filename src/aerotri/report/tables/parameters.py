@@ -54,6 +54,18 @@ def comparison_table(comparison: ParameterComparison) -> Table:
     return Table("Sets of additional parameters compared", tuple(columns), tuple(rows))
 
 
+def held_table(adjusted: AdjustedBlock) -> Table:
+    """Additional parameters that cameras state and that were held."""
+    columns = (Column("camera"), Column("parameter"), Column("value", "", ".4e"))
+    rows = [
+        (camera.name, name, prior.value)
+        for camera in adjusted.block.cameras
+        for name, prior in camera.parameters.items()
+        if prior.fixed
+    ]
+    return Table("Additional parameters held at the values of block.toml", columns, tuple(rows))
+
+
 def removals_table(adjusted: AdjustedBlock) -> Table:
     """What the selection took out, in order, and why."""
     columns = (Column("order", "", "d"), Column("parameter"), Column("group"), Column("value", "", ".4e"),
