@@ -20,7 +20,7 @@ def change(
     first: Annotated[
         Path,
         typer.Argument(
-            help="Earlier surface: GeoTIFF with σ as second band, or folder of dsm or dtm; or a cloud, LAS or LAZ.",
+            help="Earlier surface: GeoTIFF with σ as second band, or folder of dsm, dtm or run; or a LAS or LAZ cloud.",
             rich_help_panel=ARGUMENTS,
         ),
     ],
@@ -81,6 +81,18 @@ def change(
             rich_help_panel=SIGMAS,
         ),
     ] = None,
+    first_adjustment: Annotated[
+        Path | None,
+        typer.Option(
+            help="Result that the first surface was measured with. With both, σ knows what bends the surfaces and "
+            "what they share: control, camera.",
+            rich_help_panel=SIGMAS,
+        ),
+    ] = None,
+    second_adjustment: Annotated[
+        Path | None,
+        typer.Option(help="Result of the second surface; the same one if they share it.", rich_help_panel=SIGMAS),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default NAME_change here.", rich_help_panel=OUTPUT)
     ] = None,
@@ -94,11 +106,16 @@ def change(
 
     sizes = {"cylinder": cylinder, "normal": normal, "reach": reach, "spacing": spacing, "registration": registration}
     if is_cloud(first) and is_cloud(second):
-        if area is not None or noise_length is not None:
-            raise InputError("--area, --noise-length: of surfaces, and clouds were given", "leave them out")
+        of_surfaces = (area, noise_length, first_adjustment, second_adjustment)
+        if any(one is not None for one in of_surfaces):
+            raise InputError(
+                "--area, --noise-length, --first-adjustment, --second-adjustment: of surfaces, and clouds were given",
+                "leave them out",
+            )
         run_cloud_change(first, second, sizes, stable, out, plots, json_)
         return
     given = [f"--{name}" for name, value in sizes.items() if value is not None]
     if given:
         raise InputError(f"{', '.join(given)}: of point clouds, and surfaces were given", "give two LAS or LAZ files")
-    run_change(first, second, stable, cast(Any, align), area, noise_length, out, plots, json_)
+    adjustments = (first_adjustment, second_adjustment)
+    run_change(first, second, stable, cast(Any, align), area, noise_length, adjustments, out, plots, json_)

@@ -15,15 +15,20 @@ if TYPE_CHECKING:
 
 def run_change(
     first: Path, second: Path, stable: str | None, align: Align, area: str | None, noise_length: float | None,
-    out: Path | None, plots: bool, as_json: bool,
+    adjustments: tuple[Path | None, Path | None], out: Path | None, plots: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Measure and write; arguments as on the command line."""
+    from aerotri.compiled import compilation_notice
     from aerotri.public.change import RECORD, change
 
     console = Console(quiet=as_json)
     target = out or Path(f"{second.resolve().stem}_change")
     refuse_foreign_folder(target, RECORD)
-    found = change(first, second, stable=stable, align=align, area=area, noise_length=noise_length)
+    console.stage(compilation_notice() or "comparing", None)
+    found = change(
+        first, second, stable=stable, align=align, area=area, noise_length=noise_length,
+        first_adjustment=adjustments[0], second_adjustment=adjustments[1],
+    )  # fmt: skip
     found.save(target, plots)
     if as_json:
         print(json_text(found.summary))

@@ -13,26 +13,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.public.change_epochs import common_system, doubts_of, epoch_of, epochs_of, grid_of, names_of, pair_of
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.table import Table
-from aerotri.public.volume_sigma import MeasuredSurface
 from aerotri.volume.change.alignment import ALIGNS, Align
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from shapely.geometry.base import BaseGeometry
 
+    from aerotri.public.adjustment import Adjustment
     from aerotri.public.surfaces import SurfaceLike
     from aerotri.rasters.grids import Grid
-    from aerotri.terrain.surface import Surface as Heights
     from aerotri.volume.boundary import Boundary
-    from aerotri.volume.change.compute import Change, Epoch
+    from aerotri.volume.change.compute import Change
 
 RECORD, RASTER, TABLE, PAGE = "change.json", "change.tif", "change.csv", "change.html"
 OWN_NAMES = (RECORD, RASTER, TABLE, "plots", PAGE)
 WHOLE = "all in common"
-BYTES_OF_CELL = 200
-"""Heights, σ, slopes, difference and what volumes are summed from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,12 +141,15 @@ def change(
     align: Align = "shift",
     area: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | None = None,
     noise_length: float | None = None,
+    first_adjustment: Adjustment | FilePath | None = None,
+    second_adjustment: Adjustment | FilePath | None = None,
 ) -> MeasuredChange:
     """What changed between two surfaces, cell by cell against its σ, and the volumes gained and lost.
 
     Parameters
     ----------
-    first : the earlier surface: GeoTIFF with σ as second band, folder of `dsm` or `dtm`, or what these returned.
+    first : the earlier surface: GeoTIFF with σ as second band, folder of `dsm` or `dtm`, or what these returned; or a
+        folder of `run`, whose dense surface (else its terrain) and adjustment are taken.
     second : the later surface.
     stable : ground that did not change: GeoPackage, GeoJSON or WKT file, WKT text, or a shapely polygon. The second
         surface is aligned on it, and it tells the noise.
@@ -158,6 +159,10 @@ def change(
         None.
     noise_length : m, side of the square whose cells share one noise; what the surfaces say, or stable ground
         shows, where None.
+    first_adjustment : what the first surface was measured with, a result or its folder. With both adjustments σ knows
+        what bends a surface beyond the alignment, and what both have in common: one adjustment, control points,
+        values of the camera.
+    second_adjustment : of the second; the same one for two surfaces of one adjustment.
 
     Returns
     -------
@@ -189,11 +194,11 @@ def change(
     if noise_length is not None and not 0.0 <= noise_length < 1e6:
         raise InputError(f"a noise length of {noise_length:g} m is not possible", "give metres")
     with ExitStack() as stack:
-        epochs = [MeasuredSurface(first), MeasuredSurface(second)]
-        epsg = _common_system(epochs)
-        grid = _grid_of(epochs)
+        epochs = epochs_of((first, second), (first_adjustment, second_adjustment))
+        epsg = common_system(epochs)
+        grid = grid_of(epochs)
         same = epochs[0].key != "" and epochs[0].key == epochs[1].key
-        (before, of_before), (after, of_after) = (_epoch(one, grid, stack, noise_length, same) for one in epochs)
+        (before, of_before), (after, of_after) = (epoch_of(one, grid, stack, noise_length, same) for one in epochs)
         notes = [text for text in (of_before, of_after) if text and stable is None]
         ground = None if stable is None else _boundary_of(stable, epsg)
         areas = _areas(area, grid, epsg)
@@ -204,11 +209,13 @@ def change(
             align = "none"
             if not same:
                 notes.append("without stable ground the surfaces are compared as they lie")
-        if same:
+        pair = pair_of(epochs, grid, (before.z, after.z), epsg)
+        if pair is not None:
+            notes += [*doubts_of(epochs), pair.in_words()]
+        elif same:
             notes.append("both surfaces come from one adjustment: its errors cancel")
-        found = compute_change(
-            grid, before, after, held, align, [(name, boundary.coverage(grid)) for name, boundary in areas.items()]
-        )
+        parts = [(name, boundary.coverage(grid)) for name, boundary in areas.items()]
+        found = compute_change(grid, before, after, held, align, parts, pair)
     if ground is not None and noise_length is None and found.alignment.sharing == 0.0:
         notes.append("too little stable ground to tell over what length neighbouring cells share noise: --noise-length")
     if ground is not None and align == "none":
@@ -216,9 +223,8 @@ def change(
     by = dict(zip(found.alignment.names, found.alignment.values.tolist(), strict=True))
     if max(abs(by.get("dX", 0.0)), abs(by.get("dY", 0.0))) > FARTHEST * grid.cell_x:
         notes.append("the surfaces are shifted by more than a few cells: bring the second nearer and measure again")
-    names = (epochs[0].surface.label, epochs[1].surface.label)
     crs = "" if epsg is None else f"EPSG:{epsg}"
-    summary = change_json(found, names, crs, "" if ground is None else ground.name, align, tuple(notes))
+    summary = change_json(found, names_of(epochs), crs, "" if ground is None else ground.name, align, tuple(notes))
     return MeasuredChange(found, summary, tuple(areas.values()))
 
 
@@ -226,68 +232,6 @@ FARTHEST = 3.0
 """Cells of shift up to which slopes tell its effect."""
 STABLE_PART = 0.999
 """Share of a cell that must be stable."""
-
-
-def _common_system(epochs: list[MeasuredSurface]) -> int | None:
-    codes: list[int | None] = []
-    for one in epochs:
-        with one.surface.reader() as reader:
-            codes.append(reader.epsg)
-    if None not in codes and codes[0] != codes[1]:
-        message = f"{epochs[1].surface.label} is in EPSG:{codes[1]}, {epochs[0].surface.label} in EPSG:{codes[0]}"
-        raise InputError(message, "bring them into one CRS")
-    return codes[0] if codes[0] is not None else codes[1]
-
-
-def _grid_of(epochs: list[MeasuredSurface]) -> Grid:
-    """The cells of the coarser surface that lie inside the other one."""
-    from aerotri.memory import refuse_beyond_memory
-
-    grids = [one.surface.grid for one in epochs]
-    own, other = sorted(grids, key=lambda grid: -grid.cell_x * grid.cell_y)
-    left, bottom, right, top = other.bounds
-    row, last_row = (int(np.clip(np.rint(own.row(y)), 0, own.rows - 1)) for y in (top, bottom))
-    column, last_column = (int(np.clip(np.rint(own.column(x)), 0, own.columns - 1)) for x in (left, right))
-    apart = left >= own.bounds[2] or right <= own.bounds[0] or bottom >= own.bounds[3] or top <= own.bounds[1]
-    rows, columns = last_row - row + 1, last_column - column + 1
-    if apart or rows < 3 or columns < 3:
-        raise InputError("the two surfaces do not meet", "check the CRS of both")
-    refuse_beyond_memory(
-        float(BYTES_OF_CELL) * rows * columns,
-        f"a change of {rows} × {columns} cells",
-        "cut out the part that is needed",
-    )
-    return own.window(row, column, rows, columns)
-
-
-def _epoch(given: MeasuredSurface, grid: Grid, stack: ExitStack, length: float | None, same: bool) -> tuple[Epoch, str]:
-    """A surface on the cells of the change, and what the user should know of its σ."""
-    from aerotri.volume.cell_noise import cells_sharing
-    from aerotri.volume.change.compute import Epoch
-
-    heights, noise = given.surface.heights, given.noise(stack)
-    total = _on(heights, heights.sigma, grid)
-    own, adjustment, said = total, np.zeros_like(total), ""
-    if noise.sigma is not None:
-        matching = noise.sigma.read(0, 0, heights.grid.rows, heights.grid.columns).astype(float)
-        own = _on(heights, matching, grid)
-        if not same:
-            adjustment = np.sqrt(np.maximum(total**2 - own**2, 0.0))
-    elif np.isfinite(total).any() and length is None:
-        said = (
-            f"{given.surface.label}: σ is taken for noise of the cells; what all of them share is told by stable ground"
-        )
-    used = noise.length_m if length is None else length
-    return Epoch(_on(heights, heights.z, grid), own, adjustment, cells_sharing(used, grid.cell_x * grid.cell_y)), said
-
-
-def _on(heights: Heights, values: np.ndarray, grid: Grid) -> np.ndarray:
-    """(rows, columns) of a surface's values, bilinear where its cells are others."""
-    from aerotri.terrain.compare import RasterHeights
-
-    x, y = np.meshgrid(grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows)))
-    found = RasterHeights(heights.grid, values).at(np.column_stack([x.ravel(), y.ravel()]), "linear")
-    return found.reshape(grid.rows, grid.columns)
 
 
 def _boundary_of(stated: BaseGeometry | FilePath, epsg: int | None) -> Boundary:

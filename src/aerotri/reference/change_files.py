@@ -22,7 +22,9 @@ SUMS = (
 PART_WORDS = {
     "noise": "Noise of the cells, with the length over which neighbours share it.",
     "alignment": "Alignment on stable ground.",
-    "adjustment": "What the adjustments add to all cells; 0 with an alignment or one adjustment.",
+    "adjustment": "What the adjustments add: by their equations where both are given; else to all cells alike, 0 with "
+    "an alignment or one adjustment.",
+    "model": "Its model part, where groups of photographs share errors; 0 where the adjustments are not given.",
 }
 
 

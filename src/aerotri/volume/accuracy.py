@@ -17,6 +17,7 @@ from aerotri.volume.settings import SigmaOptions
 from aerotri.volume.shared import (
     difference_part,
     same_adjustment,
+    shared_camera_covariance,
     shared_control_covariance,
     shared_in_words,
     summed_part,
@@ -78,8 +79,8 @@ def volume_sigma(
     Parameters
     ----------
     base_part : responses to the base's own volume, counted positive. What both were measured with counts once: one
-        adjustment by the difference of the responses, control points that two adjustments share, by name and
-        coordinates, by their covariance.
+        adjustment by the difference of the responses; control points and values of a camera that two adjustments
+        share, by name and value, by their covariance.
     """
     ground = base_variance(base, boundary, surface, options)
     edge = boundary_variance(surface, base, boundary, options.boundary_sigma)
@@ -129,7 +130,8 @@ def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: Sig
         joint, once = difference_part(part, base_part, options.corrected)
         both, said = [joint], [_one_adjustment(once)]
     elif base_part is not None:
-        shared, said = shared_control_covariance(part, base_part), [shared_in_words(part, base_part)]
+        shared = shared_control_covariance(part, base_part) + shared_camera_covariance(part, base_part)
+        said = [shared_in_words(part, base_part)]
     adjustment = sum(one.response.variance for one in both) - 2.0 * shared
     between = _difference([one.between for one in both])
     parts = {

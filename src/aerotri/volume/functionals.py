@@ -181,14 +181,14 @@ def _window_cells(
         by_x, by_y = drawn_cells(surface, boundary, moving, window)
         in_plan = (by_x - of_nodes * slope[0], by_y - of_nodes * slope[1])
         size = size + NEXT_TO * np.hypot(*in_plan) * (z != 0.0)
-    total, squares = _together(size, factor), _together(weight**2, factor)
+    total, squares = together(size, factor), together(weight**2, factor)
     used = total > 0.0
-    places = np.stack([_together(size * v, factor)[used] / total[used] for v in (x, y, z)], axis=-1)
-    sums = [_together(v, factor)[used] for v in (*in_plan, weight)]
+    places = np.stack([together(size * v, factor)[used] / total[used] for v in (x, y, z)], axis=-1)
+    sums = [together(v, factor)[used] for v in (*in_plan, weight)]
     gradient = np.stack(sums, axis=-1)
     with np.errstate(divide="ignore"):
         share = np.where(gradient[:, 2] != 0.0, squares[used] / gradient[:, 2] ** 2, 1.0)
-    noise = np.zeros(len(share)) if sigma is None else _together((weight * _noise(sigma, window)) ** 2, factor)[used]
+    noise = np.zeros(len(share)) if sigma is None else together((weight * _noise(sigma, window)) ** 2, factor)[used]
     return places, gradient, share, noise
 
 
@@ -199,8 +199,8 @@ def _noise(sigma: Surface, window: tuple[int, int, int, int]) -> np.ndarray:
     return np.where(known, values, np.median(values[known]) if known.any() else 0.0)
 
 
-def _together(values: np.ndarray, factor: int) -> np.ndarray:
-    """Sums over factor × factor cells."""
+def together(values: np.ndarray, factor: int) -> np.ndarray:
+    """Sums over factor × factor cells of (rows, columns); those at the lower and right edges may be of fewer."""
     if factor == 1:
         return values
     rows, columns = (-(-n // factor) * factor for n in values.shape)

@@ -1,4 +1,4 @@
-"""What two surfaces share: errors of one adjustment, measurements that are in both, control of two epochs.
+"""What two surfaces share: errors of one adjustment, measurements that are in both, control and camera of two epochs.
 
 [D] The volume between two surfaces of one adjustment is one functional over the pickets of both, with the gradient
 g = g' − g'' where a picket is in both. Its response to the adjustment is c = c' − c'', so that whatever moves both
@@ -13,12 +13,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from aerotri.adjustment import rigging
+from aerotri.adjustment.scanning import READOUT
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume.parts import Measured, Part
 from aerotri.volume.pickets import Pickets
 from aerotri.volume.response import control_response, respond
 from aerotri.volume.roughness import Between
 
+OF_CAMERA = ("interior", "additional", rigging.KIND)
+"""Kinds of unknowns that belong to a camera and outlast a flight."""
 SAME_PLACE_M = 1e-6
 """Pickets at one place with one height, in the same photographs, are the same measurement."""
 
@@ -141,14 +145,48 @@ def shared_control_covariance(first: Part, second: Part) -> float:
     return s0[0] * s0[1] * total
 
 
-def shared_in_words(first: Part, second: Part) -> str:
-    """A sentence about what two adjustments have in common as far as it is known."""
+def shared_camera_covariance(first: Part, second: Part) -> float:
+    """Covariance of two functionals adjusted in blocks of their own that took values of one camera from a calibration.
+
+    [D] As of control: the error of a value that both observed moves both, h'·h''·σ², h = ∂V/∂(observed value).
+    """
+    sides = [_observed_camera(one) for one in (first, second)]
+    common = sides[0].keys() & sides[1].keys()
+    s0 = [one.calibration.local.outcome.sigma0 for one in (first, second)]
+    return s0[0] * s0[1] * sum(sides[0][key] * sides[1][key] / key[3] for key in sorted(common))
+
+
+def _observed_camera(part: Part) -> dict[tuple[str, str, float, float], float]:
+    """∂V by every observed value of a camera: by name, camera, value and weight 1/σ²."""
+    system = part.calibration.system
+    shared, priors = system.unknowns.shared, system.priors
+    solved = part.response.solved[-len(shared) :] if len(shared) else np.zeros(0)
+    return {
+        (str(name), str(group), float(value), float(weight)): float(weight * by)
+        for name, group, kind, value, weight, by in zip(
+            shared.names, shared.groups, shared.kinds, priors.value, priors.weight, solved, strict=True
+        )
+        if weight > 0.0 and (kind in OF_CAMERA or name == READOUT)
+    }
+
+
+def shared_in_words(first: Part, second: Part, names: tuple[str, str] = ("surface", "base")) -> str:
+    """A sentence about what two adjustments have in common as far as it is known.
+
+    Parameters
+    ----------
+    names : of the two, as the sentence calls them.
+    """
     points = sum(bool(np.any(variance)) for _, _, variance in _shared_control(first, second))
-    names = [set(one.calibration.result.block.images.names.astype(str).tolist()) for one in (first, second)]
-    photographs = len(names[0] & names[1])
-    said = "surface and base come from two adjustments, taken for independent"
-    if points:
-        said += f" but for the {points} control points that both have with the same coordinates"
+    values = len(_observed_camera(first).keys() & _observed_camera(second).keys())
+    images = [set(one.calibration.result.block.images.names.astype(str).tolist()) for one in (first, second)]
+    photographs = len(images[0] & images[1])
+    said = f"{names[0]} and {names[1]} come from two adjustments, taken for independent"
+    common = [f"the {points} control points that both have with the same coordinates"] if points else []
+    if values:
+        common.append(f"the {values} values of the camera that both took with the same σ")
+    if common:
+        said += f" but for {' and '.join(common)}"
     if photographs:
         said += (
             f"; {photographs} photographs have the same names in both: what their image points and their camera "

@@ -16,6 +16,7 @@ CAPTION = (
     "Left: difference of the surfaces where it is beyond the level of detection; brown is gained, blue is lost, grey "
     "cannot be told from noise. Right: σ of the difference."
 )
+PARTS = {"adjustment": "adjustments", "model": "model part of the adjustments"}
 UNKNOWNS = {
     "dZ": ("height", 1e3, "mm"), "dX": ("X", 1e3, "mm"), "dY": ("Y", 1e3, "mm"),
     "tilt_X": ("tilt along X", 1e6, "mm/km"), "tilt_Y": ("tilt along Y", 1e6, "mm/km"),
@@ -54,7 +55,7 @@ def _row(v: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _sure(c: Mapping[str, Any]) -> str:
     parts = c["volumes"][-1]["parts_net_m3"]
-    words = ", ".join(f"{name} {two_digits(value)} m³" for name, value in parts.items())
+    words = ", ".join(f"{PARTS.get(name, name)} {two_digits(value)} m³" for name, value in parts.items() if value > 0.0)
     return (
         f"A change of a single cell is told from noise (95 %) from {two_digits(1e3 * c['level_of_detection_m'])} mm on "
         f"(median); {c['beyond_level_percent']:.1f} % of the cells are beyond. Where nothing changed, 5 % would be. "

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
@@ -53,17 +55,37 @@ def plot_change(change: Change, content: Mapping[str, Any], areas: Sequence[Boun
         image = axes.imshow(values, extent=extent, interpolation="nearest", aspect="auto", **style)
         for one in areas:
             axes.add_collection(LineCollection(one.rings, colors=INK, linewidths=0.9))
-        axes.set_xlim(left, right)
-        axes.set_ylim(bottom, top)
-        axes.xaxis.set_major_locator(MaxNLocator(3))
-        axes.yaxis.set_major_locator(MaxNLocator(5))
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_formatter(FuncFormatter(coordinate_text))
-        axes.set_xlabel("X [m]")
-        if k == 0:
-            axes.set_ylabel("Y [m]")
-        else:
-            axes.set_yticklabels([])
-        scale = axes_at(figure, x0 + width + 0.1, 0.75, 0.14, height)
-        figure.colorbar(image, cax=scale).set_label(label)
+        finish_map(figure, axes, image, label, (left, bottom, right, top), k == 0)
     return figure
+
+
+def finish_map(
+    figure: Figure,
+    axes: Axes,
+    image: ScalarMappable,
+    label: str,
+    bounds: tuple[float, float, float, float],
+    first: bool,
+) -> None:
+    """Limits, coordinates and the scale of colours of one of two maps side by side.
+
+    Parameters
+    ----------
+    bounds : left, bottom, right, top, m. first : whether it is the left one, which has the coordinates of both.
+    """
+    left, bottom, right, top = bounds
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
+    axes.xaxis.set_major_locator(MaxNLocator(3))
+    axes.yaxis.set_major_locator(MaxNLocator(5))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(coordinate_text))
+    axes.set_xlabel("X [m]")
+    if first:
+        axes.set_ylabel("Y [m]")
+    else:
+        axes.set_yticklabels([])
+    across, up = figure.get_size_inches()
+    place = axes.get_position()
+    x0, y0, height = place.x1 * across, place.y0 * up, place.height * up
+    figure.colorbar(image, cax=axes_at(figure, x0 + 0.1, y0, 0.14, height)).set_label(label)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from aerotri.report.plots.canvas import WIDTH, axes_at, coordinate_text, new_figure, plain, styled
+from aerotri.report.plots.canvas import WIDTH, axes_at, new_figure, plain, styled
+from aerotri.report.plots.change import finish_map
 from aerotri.report.plots.volume import COLOURS
 from aerotri.volume.change.clouds import CloudDistances
 
@@ -48,17 +48,5 @@ def plot_distances(found: CloudDistances, content: Mapping[str, Any]) -> Figure:
         if k == 0:
             axes.scatter(*found.core[known & ~beyond, :2].T, s=size, c=QUIET, marker="s", lw=0)
         image = axes.scatter(*found.core[rows, :2].T, s=size, c=values[rows], marker="s", lw=0, **style)
-        axes.set_xlim(left, right)
-        axes.set_ylim(bottom, top)
-        axes.xaxis.set_major_locator(MaxNLocator(3))
-        axes.yaxis.set_major_locator(MaxNLocator(5))
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_formatter(FuncFormatter(coordinate_text))
-        axes.set_xlabel("X [m]")
-        if k == 0:
-            axes.set_ylabel("Y [m]")
-        else:
-            axes.set_yticklabels([])
-        scale = axes_at(figure, x0 + width + 0.1, 0.75, 0.14, height)
-        figure.colorbar(image, cax=scale).set_label(label)
+        finish_map(figure, axes, image, label, (left, bottom, right, top), k == 0)
     return figure

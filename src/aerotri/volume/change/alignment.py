@@ -38,6 +38,7 @@ class Alignment:
     names : of the unknowns, m and m/m. values : (u,). covariance : (u, u).
     middle : (2,) m, about which the surface is tilted. cells, used : stable ones, and those that took part.
     factor : noise on stable ground over the stated σ. sharing : cells of one noise, 0 where too few tell.
+    gain : (rows, columns, u) of x̂ = Σ gain·difference, 0 of cells that did not take part; None without an alignment.
     """
 
     names: tuple[str, ...] = ()
@@ -48,6 +49,7 @@ class Alignment:
     used: int = 0
     factor: float = 1.0
     sharing: float = 1.0
+    gain: np.ndarray | None = None
 
     def design(self, grid: Grid, z: np.ndarray) -> np.ndarray:
         """(rows, columns, u) partials of z₂ − z₁ by the unknowns; z of the second surface."""
@@ -60,9 +62,15 @@ NO_ALIGNMENT = Alignment()
 def design_of(names: tuple[str, ...], grid: Grid, z: np.ndarray, middle: np.ndarray) -> np.ndarray:
     """(rows, columns, u) partials by the unknowns of these names."""
     x, y = np.meshgrid(grid.x(np.arange(grid.columns)) - middle[0], grid.y(np.arange(grid.rows)) - middle[1])
-    down, along = np.gradient(_smoothed(z), grid.cell_y, grid.cell_x)
-    of = {"dZ": np.ones_like(z), "dX": -along, "dY": down, "tilt_X": x, "tilt_Y": y}
+    slope_x, slope_y = slopes_of(grid, z)
+    of = {"dZ": np.ones_like(z), "dX": -slope_x, "dY": -slope_y, "tilt_X": x, "tilt_Y": y}
     return np.stack([of[name] for name in names], axis=-1) if names else np.zeros((*z.shape, 0))
+
+
+def slopes_of(grid: Grid, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, columns) m/m along X and Y, of means of cells; NaN where not known."""
+    down, along = np.gradient(_smoothed(z), grid.cell_y, grid.cell_x)
+    return along, -down
 
 
 def _smoothed(z: np.ndarray) -> np.ndarray:
@@ -106,8 +114,13 @@ def align(
     factor = robust_sigma((d - a @ x) / s)
     sharing = cells_of_one_noise(left)
     scaled = a[used] / s[used, None]
-    covariance = factor**2 * max(sharing, 1.0) * np.linalg.inv(scaled.T @ scaled) if names else np.zeros((0, 0))
-    return Alignment(names, x, covariance, middle, int(stable.sum()), int(used.sum()), factor, sharing)
+    inverse = np.linalg.inv(scaled.T @ scaled) if names else np.zeros((0, 0))
+    gain = np.zeros((*difference.shape, len(names)))
+    taking_part = np.zeros(difference.shape, bool)
+    taking_part[known] = used
+    gain[taking_part] = (scaled / s[used, None]) @ inverse
+    covariance = factor**2 * max(sharing, 1.0) * inverse
+    return Alignment(names, x, covariance, middle, int(stable.sum()), int(used.sum()), factor, sharing, gain)
 
 
 def _robust(a: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

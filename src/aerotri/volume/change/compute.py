@@ -3,7 +3,8 @@
 [D] σ² of a cell is that of both noises, scaled to what stable ground shows, and that of the alignment, aCaᵀ. Without an
 alignment the adjustments' parts stand in its place; they cancel where both surfaces come from one adjustment. A
 volume Σw·d has the variance of its noise, with the square of cells that share one, of the alignment, (Σw·a)C(Σw·a)ᵀ,
-and of the adjustments, (Σ|w|·σ_adjustment)², as if every cell erred alike: the most that it can be.
+and of the adjustments. Where these are given it follows from their equations, see `adjusted`, after the alignment too;
+else it is (Σ|w|·σ_adjustment)², as if every cell erred alike: the most that it can be.
 """
 
 from __future__ import annotations
@@ -14,12 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.rasters.grids import Grid
+from aerotri.volume.change.adjusted import AdjustedPair, AlignedPair
 from aerotri.volume.change.alignment import NO_ALIGNMENT, Align, Alignment, align
 from aerotri.volume.change.noise import variance_of_sum
 
 LEVEL = 1.959963985
 """Of 95 %: changes beyond so many σ are told from noise."""
-PARTS = ("noise", "alignment", "adjustment")
+PARTS = ("noise", "alignment", "adjustment", "model")
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,14 +96,14 @@ class Change:
 
 def compute_change(
     grid: Grid, first: Epoch, second: Epoch, stable: np.ndarray | None, how: Align,
-    areas: Sequence[tuple[str, np.ndarray]],
+    areas: Sequence[tuple[str, np.ndarray]], adjusted: AdjustedPair | None = None,
 ) -> Change:  # fmt: skip
     """The change, cell by cell and as volumes.
 
     Parameters
     ----------
     stable : (rows, columns) bool, ground that did not change; None where none is known.
-    areas : names, and which part of every cell is inside, 0 … 1.
+    areas : names, and which part of every cell is inside, 0 … 1. adjusted : both with their adjustments, where given.
 
     Raises
     ------
@@ -119,10 +121,14 @@ def compute_change(
     moved = len(found.names) > 0
     difference = raw - design @ found.values
     by_alignment = np.einsum("rcu,uv,rcv->rc", design, found.covariance, design)
-    adjustment = np.zeros_like(raw) if moved else np.hypot(first.adjustment, second.adjustment)
+    pair = None if adjusted is None else adjusted.aligned(found, design)
+    if pair is not None:
+        adjustment = pair.sigma()
+    else:
+        adjustment = np.zeros_like(raw) if moved else np.hypot(first.adjustment, second.adjustment)
     sigma = np.sqrt(noise**2 + by_alignment + adjustment**2)
     difference = np.where(np.isfinite(sigma), difference, np.nan)
-    cells = _Cells(grid, difference, noise, adjustment, design, found, sharing)
+    cells = _Cells(grid, difference, noise, adjustment, design, found, sharing, pair)
     significant = np.abs(difference) > LEVEL * sigma
     volumes = tuple(cells.volume(name, part, significant) for name, part in areas)
     return Change(grid, difference, np.where(np.isfinite(difference), sigma, np.nan), found, volumes, sharing)
@@ -148,6 +154,7 @@ class _Cells:
     design: np.ndarray
     alignment: Alignment
     sharing: float
+    pair: AlignedPair | None
 
     def volume(self, name: str, part: np.ndarray, significant: np.ndarray) -> ChangedVolume:
         """Of the cells of an area."""
@@ -166,9 +173,13 @@ class _Cells:
         used = weight > 0.0
         own = np.where(used, weight * np.where(used, self.noise, 0.0), 0.0)
         moved = np.einsum("rc,rcu->u", weight, np.where(used[..., None], self.design, 0.0))
+        noise, model = (np.sum(weight * np.where(used, self.adjustment, 0.0)) ** 2, 0.0)
+        if self.pair is not None:
+            noise, model = self.pair.variances(weight)
         values = (
             np.sqrt(variance_of_sum(own, self.sharing)),
             np.sqrt(max(float(moved @ self.alignment.covariance @ moved), 0.0)),
-            np.sum(weight * np.where(used, self.adjustment, 0.0)),
+            np.sqrt(noise),
+            np.sqrt(model),
         )
         return {name: float(value) for name, value in zip(PARTS, values, strict=True)}

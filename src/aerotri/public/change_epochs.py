@@ -1,0 +1,211 @@
+"""The two epochs of a change: surfaces, what they were measured with, and the cells that both have."""
+
+from __future__ import annotations
+
+import os
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerotri.conventions import FilePath, InputError
+from aerotri.public.models import check_crs
+from aerotri.public.run_steps import DSM, DTM, RESULT
+from aerotri.public.saving import RECORD
+from aerotri.public.stated import StatedAdjustment
+from aerotri.public.volume_sigma import MeasuredSurface
+
+if TYPE_CHECKING:
+    from aerotri.public.adjustment import Adjustment
+    from aerotri.public.surfaces import SurfaceLike
+    from aerotri.rasters.grids import Grid
+    from aerotri.terrain.surface import Surface as Heights
+    from aerotri.volume.change.adjusted import AdjustedPair
+    from aerotri.volume.change.compute import Epoch
+
+Epochs = tuple[MeasuredSurface, MeasuredSurface]
+BYTES_OF_CELL = 280
+"""Heights, σ, slopes, difference, what volumes are summed from, and how the alignment follows from the cells."""
+
+
+def epochs_of(
+    surfaces: tuple[SurfaceLike, SurfaceLike], adjustments: tuple[Adjustment | FilePath | None, ...]
+) -> Epochs:
+    """The surfaces with their adjustments as far as they are known.
+
+    Parameters
+    ----------
+    surfaces : each may be a folder of `run`, which holds both. adjustments : as stated; these count.
+
+    Raises
+    ------
+    InputError
+        For a result without a surface, for one adjustment alone, and for runs of which only one has a dense surface.
+    """
+    kinds = [_kind_of_run(one) for one in surfaces]
+    if {DSM, DTM} <= {kind for kind in kinds if kind}:
+        raise InputError(
+            "one epoch has a dense surface, the other one only terrain", "give the folders of two of a kind"
+        )
+    first, second = (
+        _epoch_of_run(one, kind, adjustment) if kind else _stated(one, adjustment)
+        for one, kind, adjustment in zip(surfaces, kinds, adjustments, strict=True)
+    )
+    if (first.adjustment is None) != (second.adjustment is None):
+        if any(one is not None for one in adjustments):
+            raise InputError(
+                "the adjustment of one surface is given alone",
+                "give both: --first-adjustment and --second-adjustment; one result for both where they share it",
+            )
+        return MeasuredSurface(first.given), MeasuredSurface(second.given)
+    return first, second
+
+
+def _kind_of_run(given: SurfaceLike) -> str:
+    """The folder inside a run that is taken, '' where it is no run."""
+    if not isinstance(given, str | os.PathLike):
+        return ""
+    folder = Path(given)
+    if not (folder / RESULT / RECORD).is_file():
+        return ""
+    for kind in (DSM, DTM):
+        if (folder / kind).is_dir():
+            return kind
+    raise InputError("the run has neither a dense surface nor terrain", "run it with its photographs", folder)
+
+
+def _epoch_of_run(given: SurfaceLike, kind: str, adjustment: Adjustment | FilePath | None) -> MeasuredSurface:
+    folder = Path(os.fspath(given))  # type: ignore[arg-type]
+    return MeasuredSurface(folder / kind, StatedAdjustment(folder / RESULT if adjustment is None else adjustment))
+
+
+def _stated(given: SurfaceLike, adjustment: Adjustment | FilePath | None) -> MeasuredSurface:
+    if isinstance(given, str | os.PathLike) and (Path(given) / RECORD).is_file():
+        raise InputError(
+            "is a result of an adjustment, and has no surface",
+            "measure one, `aerotri dsm RESULT PHOTOS`, and give its folder",
+            Path(given),
+        )
+    return MeasuredSurface(given, None if adjustment is None else StatedAdjustment(adjustment))
+
+
+def pair_of(
+    epochs: Epochs, grid: Grid, heights: tuple[np.ndarray, np.ndarray], epsg: int | None
+) -> AdjustedPair | None:
+    """Both surfaces with their adjustments; None where these are not known.
+
+    Parameters
+    ----------
+    heights : (rows, columns) m on the cells of `grid`, of either.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.volume.change.adjusted import adjusted_pair
+
+    first, second = (one.adjustment for one in epochs)
+    if first is None or second is None:
+        return None
+    for one, stated in zip(epochs, (first, second), strict=True):
+        check_crs(stated.record, epsg, one.surface.path or Path(one.surface.label))
+    if not (np.isfinite(heights[0]) & np.isfinite(heights[1])).any():
+        raise InputError("the two surfaces have no cell in common", "check the CRS of both")
+    # one result given twice is one adjustment, not two that have all in common
+    records = (first.record, first.record if second.is_same(first) else second.record)
+    return adjusted_pair(grid, heights, records)
+
+
+def doubts_of(epochs: Epochs) -> list[str]:
+    """Sentences on adjustments that are not simply accepted."""
+    return [one.adjustment.doubt for one in epochs if one.adjustment is not None and one.adjustment.doubt]
+
+
+def names_of(epochs: Epochs) -> tuple[str, str]:
+    """As they stand in results: with as many of the folders above as tell them apart."""
+    labels = [one.surface.label for one in epochs]
+    paths = [one.surface.path for one in epochs]
+    if labels[0] == labels[1] and paths[0] is not None and paths[1] is not None:
+        parts = [path.resolve().parts for path in (paths[0], paths[1])]
+        for count in range(2, min(map(len, parts)) + 1):
+            if parts[0][-count] != parts[1][-count]:
+                labels = ["/".join(own[-count:]) for own in parts]
+                break
+    return labels[0], labels[1]
+
+
+def common_system(epochs: Epochs) -> int | None:
+    """EPSG code that both are in, None where neither says it.
+
+    Raises
+    ------
+    InputError
+    """
+    codes: list[int | None] = []
+    for one in epochs:
+        with one.surface.reader() as reader:
+            codes.append(reader.epsg)
+    if None not in codes and codes[0] != codes[1]:
+        message = f"{epochs[1].surface.label} is in EPSG:{codes[1]}, {epochs[0].surface.label} in EPSG:{codes[0]}"
+        raise InputError(message, "bring them into one CRS")
+    return codes[0] if codes[0] is not None else codes[1]
+
+
+def grid_of(epochs: Epochs) -> Grid:
+    """The cells of the coarser surface that lie inside the other one.
+
+    Raises
+    ------
+    InputError
+        When the surfaces do not meet, or do not fit into memory.
+    """
+    from aerotri.memory import refuse_beyond_memory
+
+    grids = [one.surface.grid for one in epochs]
+    own, other = sorted(grids, key=lambda grid: -grid.cell_x * grid.cell_y)
+    left, bottom, right, top = other.bounds
+    row, last_row = (int(np.clip(np.rint(own.row(y)), 0, own.rows - 1)) for y in (top, bottom))
+    column, last_column = (int(np.clip(np.rint(own.column(x)), 0, own.columns - 1)) for x in (left, right))
+    apart = left >= own.bounds[2] or right <= own.bounds[0] or bottom >= own.bounds[3] or top <= own.bounds[1]
+    rows, columns = last_row - row + 1, last_column - column + 1
+    if apart or rows < 3 or columns < 3:
+        raise InputError("the two surfaces do not meet", "check the CRS of both")
+    refuse_beyond_memory(
+        float(BYTES_OF_CELL) * rows * columns,
+        f"a change of {rows} × {columns} cells",
+        "cut out the part that is needed",
+    )
+    return own.window(row, column, rows, columns)
+
+
+def epoch_of(
+    given: MeasuredSurface, grid: Grid, stack: ExitStack, length: float | None, same: bool
+) -> tuple[Epoch, str]:
+    """A surface on the cells of the change, and what the user should know of its σ."""
+    from aerotri.volume.cell_noise import cells_sharing
+    from aerotri.volume.change.compute import Epoch
+
+    heights, noise = given.surface.heights, given.noise(stack)
+    total = _on(heights, heights.sigma, grid)
+    own, adjustment, said = total, np.zeros_like(total), ""
+    if noise.sigma is not None:
+        matching = noise.sigma.read(0, 0, heights.grid.rows, heights.grid.columns).astype(float)
+        own = _on(heights, matching, grid)
+        if not same:
+            adjustment = np.sqrt(np.maximum(total**2 - own**2, 0.0))
+    elif np.isfinite(total).any() and length is None:
+        said = (
+            f"{given.surface.label}: σ is taken for noise of the cells; what all of them share is told by stable ground"
+        )
+    used = noise.length_m if length is None else length
+    return Epoch(_on(heights, heights.z, grid), own, adjustment, cells_sharing(used, grid.cell_x * grid.cell_y)), said
+
+
+def _on(heights: Heights, values: np.ndarray, grid: Grid) -> np.ndarray:
+    """(rows, columns) of a surface's values, bilinear where its cells are others."""
+    from aerotri.terrain.compare import RasterHeights
+
+    x, y = np.meshgrid(grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows)))
+    found = RasterHeights(heights.grid, values).at(np.column_stack([x.ravel(), y.ravel()]), "linear")
+    return found.reshape(grid.rows, grid.columns)
