@@ -316,29 +316,32 @@ def _ground_parts(o: DenseOutcome, ground: BareGround) -> Iterator[tuple[int, in
 def _write(target: Path, dense: DenseSurface, plots: bool) -> None:
     """Write all files whole or not at all."""
     from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.formats.results.copc import octree_over
     from aerotri.formats.results.json_text import write_json
     from aerotri.formats.results.point_cloud import write_surface_cloud
-    from aerotri.rasters.grids import horizontal_crs
+    from aerotri.rasters.grids import crs_of_heights, horizontal_crs
     from aerotri.rasters.surface_files import write_raster_parts, write_surface_parts
     from aerotri.terrain.dense.points import surface_points
 
     o, crs = dense.record, horizontal_crs(dense.crs)
-    noise = dense.summary["noise_length_m"]
+    of_heights, noise = crs_of_heights(dense.crs), dense.summary["noise_length_m"]
     tags = {} if noise is None else {"NOISE_LENGTH_M": f"{noise:.4g}"}
     windows = list(o.windows)
     with atomic_folder(target, own=OWN_NAMES) as folder:
-        write_surface_parts(folder / SURFACE, _surface_parts(o), o.grid, crs, "DSM Z, m", tags)
+        write_surface_parts(folder / SURFACE, _surface_parts(o), o.grid, of_heights, "DSM Z, m", tags)
         matching = ((w.row, w.column, tile.sigma) for w, tile in o.files.read_all(windows))
         what = "σ of Z of matching alone, m"
         write_raster_parts(folder / MATCHING, matching, o.grid, crs, what, np.dtype(np.float32), -9999.0)
         count = ((w.row, w.column, tile.count) for w, tile in o.files.read_all(windows))
         what = "photographs that measured a cell"
         write_raster_parts(folder / COUNT, count, o.grid, crs, what, np.dtype(np.uint8), 0.0)
-        lowest = min(float(np.nanmin(t.z)) for _, t in o.files.read_all(windows) if np.isfinite(t.z).any())
-        low = np.array([o.grid.left, o.grid.bounds[1], lowest])
-        write_surface_cloud(folder / CLOUD, surface_points(o, dense.ground), low, crs)
+        heights = [(np.nanmin(t.z), np.nanmax(t.z)) for _, t in o.files.read_all(windows) if np.isfinite(t.z).any()]
+        left, bottom, right, top = o.grid.bounds
+        low, high = np.array([left, bottom, np.min(heights)]), np.array([right, top, np.max(heights)])
+        tree = octree_over(low, high, o.grid.cell_x)
+        write_surface_cloud(folder / CLOUD, surface_points(o, dense.ground), tree, of_heights)
         if dense.ground is not None:
-            write_surface_parts(folder / GROUND, _ground_parts(o, dense.ground), o.grid, crs, "DTM Z, m", tags)
+            write_surface_parts(folder / GROUND, _ground_parts(o, dense.ground), o.grid, of_heights, "DTM Z, m", tags)
             source = ((w.row, w.column, tile.source) for w, tile in dense.ground.tiles())
             what = "ground: 1 measured, 2 bridged"
             write_raster_parts(folder / SOURCE, source, o.grid, crs, what, np.dtype(np.uint8), 0.0)

@@ -367,17 +367,19 @@ def _write(target: Path, model: TerrainModel, plots: bool) -> None:
     from aerotri.formats.results.pickets import write_pickets
     from aerotri.formats.results.point_cloud import write_point_cloud
     from aerotri.public.tables import write_rows
-    from aerotri.rasters.grids import horizontal_crs, write_raster
+    from aerotri.rasters.grids import crs_of_heights, horizontal_crs, write_raster
     from aerotri.rasters.surface_files import write_surface
 
     outcome, p, crs = model.record, model.record.pickets, horizontal_crs(model.crs)
+    of_heights = crs_of_heights(model.crs)
     with atomic_folder(target, own=OWN_NAMES) as folder:
         write_pickets(folder / PICKETS, p, outcome.adjustment)
         own = p.accepted
         sigma = np.sqrt(p.covariance[own, 2, 2] + outcome.adjustment[own, 2])
-        write_point_cloud(folder / "pickets.laz", p.xyz[own], sigma, outcome.ground[own], crs)
+        write_point_cloud(folder / "pickets.laz", p.xyz[own], sigma, outcome.ground[own], of_heights)
         for name, surface in (("dsm", outcome.dsm), ("dtm", outcome.dtm)):
-            write_surface(folder / f"{name}.tif", surface.z, surface.sigma, surface.grid, crs, f"{name.upper()} Z, m")
+            title = f"{name.upper()} Z, m"
+            write_surface(folder / f"{name}.tif", surface.z, surface.sigma, surface.grid, of_heights, title)
         if outcome.models is not None:
             write_raster(folder / "model.tif", outcome.number, outcome.dsm.grid, crs, "number of the model")
             write_rows(model.models, folder / "models.csv")

@@ -309,6 +309,11 @@ def horizontal_crs(crs: str) -> str | None:
     return None if crs == "local" else crs.partition("+")[0]
 
 
+def crs_of_heights(crs: str) -> str | None:
+    """The CRS of a file of heights of a block: with its vertical part where it has one, None for 'local'."""
+    return None if crs == "local" else crs
+
+
 def cache_limited() -> Any:
     """A context in which GDAL keeps `CACHE_MB` of blocks and no more."""
     import rasterio

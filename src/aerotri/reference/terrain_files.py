@@ -319,7 +319,8 @@ def terrain_files() -> tuple[DescribedFile, ...]:
             "dsm.laz",
             DSM,
             "other",
-            "The cells as LAZ 1.4 with colours; extra bytes NormalX, NormalY, NormalZ, sigma_x, sigma_y, sigma_z, m, "
+            "The cells as COPC 1.0, which is LAZ 1.4, with colours; extra bytes NormalX, NormalY, NormalZ, sigma_x, "
+            "sigma_y, sigma_z, m, "
             "cov_xy, cov_xz, cov_yz, m², sigma_z_matching and photographs. Class 2 is ground.",
         ),
         DescribedFile("plots", DSM, "folder", "The surface and its standard deviation, PNG and SVG.", when=plots),

@@ -1,4 +1,4 @@
-"""Point clouds, LAS and LAZ; nothing else knows laspy."""
+"""Point clouds, LAS and LAZ; nothing but this and `copc` knows laspy."""
 
 from __future__ import annotations
 
@@ -9,10 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.formats.results.copc import write_copc
 from aerotri.formats.results.las_header import check_las
 from aerotri.vectors.geojson import LARGEST_M
 
 if TYPE_CHECKING:
+    from laspy import LasHeader
+
+    from aerotri.formats.results.copc import Octree
     from aerotri.terrain.dense.points import SurfacePoints
 
 UNCLASSIFIED, GROUND = 1, 2
@@ -50,33 +54,38 @@ def write_point_cloud(path: Path, xyz: np.ndarray, sigma: np.ndarray, ground: np
         cloud.write(file, do_compress=True)
 
 
-def write_surface_cloud(path: Path, parts: Iterable[SurfacePoints], low: np.ndarray, crs: str | None) -> int:
-    """Write the cells of a surface as LAZ 1.4 with colours and `SURFACE_FIELDS`, ground as class 2; how many.
+def write_surface_cloud(path: Path, parts: Iterable[SurfacePoints], tree: Octree, crs: str | None) -> int:
+    """Write the cells of a surface as COPC, which is LAZ 1.4, with colours and `SURFACE_FIELDS`; how many.
+
+    Ground has class 2.
 
     Parameters
     ----------
-    parts : points, part by part. low : (3,) m, near the lowest coordinates.
+    parts : points, part by part. tree : over all of them.
     """
     import laspy
     from pyproj import CRS
 
     header = laspy.LasHeader(point_format=7, version="1.4")
-    header.offsets, header.scales = np.floor(low), np.full(3, SCALE_M)
+    header.offsets, header.scales = np.floor(tree.low), np.full(3, SCALE_M)
     header.add_extra_dims([laspy.ExtraBytesParams(*field) for field in SURFACE_FIELDS])
     if crs is not None:
         header.add_crs(CRS.from_user_input(crs))
-    count = 0
-    with path.open("wb") as file, laspy.open(file, mode="w", header=header, do_compress=True, closefd=False) as cloud:
-        for part in parts:
-            points = laspy.ScaleAwarePointRecord.zeros(len(part.xyz), header=header)
-            points.x, points.y, points.z = part.xyz.T
-            points["classification"] = np.where(part.ground, GROUND, UNCLASSIFIED).astype(np.uint8)
-            points["red"], points["green"], points["blue"] = part.colour.T
-            for name, values in zip(SURFACE_FIELDS, _surface_fields(part), strict=True):
-                points[name[0]] = values
-            cloud.write_points(points)
-            count += len(part.xyz)
-    return count
+    return write_copc(path, header, (_records(part, header) for part in parts), tree)
+
+
+def _records(part: SurfacePoints, header: LasHeader) -> np.ndarray:
+    """Packed points of a part."""
+    import laspy
+
+    points = laspy.ScaleAwarePointRecord.zeros(len(part.xyz), header=header)
+    points.x, points.y, points.z = part.xyz.T
+    points["return_number"] = points["number_of_returns"] = np.ones(len(part.xyz), np.uint8)
+    points["classification"] = np.where(part.ground, GROUND, UNCLASSIFIED).astype(np.uint8)
+    points["red"], points["green"], points["blue"] = part.colour.T
+    for name, values in zip(SURFACE_FIELDS, _surface_fields(part), strict=True):
+        points[name[0]] = values
+    return points.array
 
 
 def _surface_fields(part: SurfacePoints) -> tuple[np.ndarray, ...]:
