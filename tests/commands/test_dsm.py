@@ -8,10 +8,12 @@ import pytest
 from typer.testing import CliRunner
 
 import aerotri
+from aerotri import cli
 from aerotri.cli import app
 from aerotri.conventions import InputError
 from aerotri.formats.results.point_cloud import read_point_cloud
 from aerotri.rasters.grids import RasterReader
+from aerotri.terrain.dense import measure
 
 PLAN = """
 name = "tiny"
@@ -145,6 +147,50 @@ def test_the_function_gives_what_the_command_writes_and_goes_on_with_its_tiles(m
     assert both.mean() > 0.9
     assert np.median(np.abs(part - first.surface.z[:50, :50])[both]) < content["sigma_Z_m"]["matching"]
     assert "cells of 2" in repr(first)
+
+
+def test_files_are_the_same_wherever_tiles_are_measured(made, tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(measure, "TILE_PX", 100)
+    here, _ = made
+    given = ("dsm", here / "result", here / "block" / "photographs", "--area", -150, -150, 150, 150)
+    found = {}
+    for text in ("threads", "processes:2", "dask:local:2"):
+        out = tmp_path / text.replace(":", "_")
+        printed = run(*given, "--out", out, "--executor", text)
+        assert ("Dask dashboard: " in printed) == text.startswith("dask")
+        found[text] = {path.relative_to(out): path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    assert len(found["threads"]) == 6
+    assert found["processes:2"] == found["threads"]
+    assert found["dask:local:2"] == found["threads"]
+
+
+def test_a_tile_that_cannot_be_measured_is_named_and_ends_with_1(made, tmp_path, monkeypatch, capsys):
+    """The tiles that were measured stay for the next run."""
+    here, _ = made
+
+    def failing(shared, window):
+        raise RuntimeError("no luck")
+
+    monkeypatch.setattr(measure, "do_window", failing)
+    out = tmp_path / "dsm"
+    monkeypatch.setattr("sys.argv", ["aerotri", "dsm", *map(str, (
+        here / "result", here / "block" / "photographs", "--out", out, "--area", -50, -50, 50, 50
+    ))])  # fmt: skip
+    assert cli._ended() == 1
+    told = capsys.readouterr().err
+    assert "1 of 1 tiles could not be computed: tile at row 0, column 0 of level" in told
+    assert "(RuntimeError: no luck) — run the command again" in told
+    assert not out.exists()
+    assert (tmp_path / "dsm.tiles").is_dir()
+
+
+@pytest.mark.parametrize("text", ["dusk", "processes:0"])
+def test_what_is_no_executor_is_refused_before_anything_is_done(made, tmp_path, text):
+    here, _ = made
+    with pytest.raises(InputError, match="executor"):
+        run("dsm", here / "result", here / "block" / "photographs", "--out", tmp_path / "dsm", "--executor", text)
+    assert not list(tmp_path.iterdir())
 
 
 def test_wrong_settings_and_places_are_refused(made, tmp_path):

@@ -6,7 +6,6 @@ would gain little: its threads wait for one another at every call, on a busy mac
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
@@ -18,7 +17,10 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from aerotri.conventions import InputError
+from aerotri.execution.threads import thread_count
 from aerotri.memory import available_bytes
+
+__all__ = ["blas_threads", "chunk_bounds", "refuse_more_than_there_is", "run_chunks", "thread_count"]
 
 T = TypeVar("T")
 
@@ -27,14 +29,6 @@ CHUNKS = 4
 
 SMALL_WORK = 5e9
 """Multiplications of a factorisation below which two threads of BLAS gain less than a fifth: a tenth of a second."""
-
-
-def thread_count() -> int:
-    """Threads for kernels: AEROTRI_THREADS, or the processors this process may use."""
-    asked = os.environ.get("AEROTRI_THREADS", "")
-    if asked.isdigit() and int(asked) > 0:
-        return int(asked)
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @cache

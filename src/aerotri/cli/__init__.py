@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import errno
 import os
 import sys
 from typing import Any
@@ -31,16 +30,16 @@ from aerotri.cli import (
 )
 from aerotri.cli.app import app
 from aerotri.conventions import InputError
+from aerotri.execution.work import NO_SPACE, TasksFailedError
 
 __all__ = [
     "adjusting", "app", "blocks", "change", "converting", "explaining", "exporting", "image_errors", "main", "ortho",
     "run", "terrain", "volumes",
 ]  # fmt: skip
 
-BAD_INPUT, BUG = 2, 3
-"""Exit status for input that cannot be used, the same as typer's for a bad command line, and for an error of the
-program itself."""
-NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+FAILED, BAD_INPUT, BUG = 1, 2, 3
+"""Exit status for work without a result, for input that cannot be used, the same as typer's for a bad command line, and
+for an error of the program itself."""
 UsageError: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
 """What typer raises for a command line that cannot be read; where the class stands depends on its version."""
 
@@ -48,7 +47,8 @@ UsageError: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__nam
 def main() -> None:
     """Entry point.
 
-    Exit codes: 0 done, 1 the adjustment failed, 2 bad input, 3 an error of this program, 130 and 143 interrupted.
+    Exit codes: 0 done, 1 the adjustment or a task failed, 2 bad input, 3 an error of this program, 130 and 143
+    interrupted.
     """
     interruption.while_running()
     try:
@@ -93,6 +93,10 @@ def _ended() -> int:
         return error.exit_code
     except InputError as error:
         return _told(f"aerotri: {error}", BAD_INPUT)
+    except TasksFailedError as error:
+        if os.environ.get("AEROTRI_DEBUG"):
+            raise
+        return _told(f"aerotri: {error}", FAILED)
     except BrokenPipeError:
         # whoever read our outcome has read enough; it stands in the files
         _forget_output()

@@ -10,7 +10,7 @@ import typer
 ARGUMENTS, INPUT, CONTROL, CAMERA, PLACE, SIGMAS = (
     "Arguments", "Input", "Control and check points", "Camera", "Coordinate system", "Standard deviations",
 )  # fmt: skip
-METHOD, SURFACE, OUTPUT, HELP = "Method", "Surface and base", "Output", "Help"
+METHOD, SURFACE, MACHINES, OUTPUT, HELP = "Method", "Surface and base", "Machines", "Output", "Help"
 """Panels of options."""
 FIRST, BLOCKS, ADJUSTMENT, IMAGE_ERRORS, TERRAIN, PLANNING = (
     "All steps", "Blocks", "Adjustment", "Image errors", "Terrain and volumes", "Before the flight",
@@ -29,6 +29,15 @@ Overwrite = Annotated[
         rich_help_panel=OUTPUT,
     ),
 ]  # fmt: skip
+Workers = Annotated[
+    str,
+    typer.Option(
+        "--executor",
+        help="Where the work is done: threads, processes:N of this machine, dask:ADDRESS of a Dask scheduler, or "
+        "dask:local:N. The outcome is the same.",
+        rich_help_panel=MACHINES,
+    ),
+]
 BlockFolder = Annotated[Path, typer.Argument(help="Block folder, or its block.toml.", rich_help_panel=ARGUMENTS)]
 ResultFolder = Annotated[Path, typer.Argument(help="Result folder of `aerotri adjust`.", rich_help_panel=ARGUMENTS)]
 GeoidGrid = Annotated[

@@ -8,7 +8,8 @@ from typing import Annotated, Any, cast
 import typer
 
 from aerotri.cli.app import app, predict
-from aerotri.cli.options import ARGUMENTS, INPUT, METHOD, OUTPUT, TERRAIN, Json, ResultFolder
+from aerotri.cli.options import ARGUMENTS, INPUT, METHOD, OUTPUT, TERRAIN, Json, ResultFolder, Workers
+from aerotri.execution.choice import THREADS
 from aerotri.terrain.settings import (
     ALIGNMENT,
     DEFAULTS,
@@ -201,6 +202,7 @@ def dsm(
             min=1.0, max=MOST_WIDE_M, help="Widest object that is taken off the ground, m.", rich_help_panel=OUTPUT
         ),
     ] = DENSE_DEFAULTS.widest_object,
+    executor: Workers = THREADS,
     plots: Annotated[bool, typer.Option(help="Draw the surface.", rich_help_panel=OUTPUT)] = True,
     json_: Json = False,
 ) -> None:
@@ -208,7 +210,7 @@ def dsm(
     from aerotri.commands.dsm import run_dsm
 
     settings = DenseSettings(resolution, area, most_pairs, edge, ideal, ground, widest_object)
-    raise typer.Exit(run_dsm(result, photographs, out, settings, plots, json_))
+    raise typer.Exit(run_dsm(result, photographs, out, settings, plots, json_, executor))
 
 
 @app.command(

@@ -57,6 +57,10 @@ class Console:
         """Replace the moving line; off a terminal a line when a stage begins, and now and then within it."""
         if not text:
             return
+        if text.startswith("Dask "):
+            # an address that the user may want later
+            self.note(text)
+            return
         stage = re.split(r"[0-9]", text, maxsplit=1)[0].strip()
         is_new, self._stage = stage != self._stage, stage
         if self._moving:

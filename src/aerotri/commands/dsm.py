@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
+from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.terrain.settings import DenseSettings
@@ -17,18 +18,20 @@ if TYPE_CHECKING:
 
 
 def run_dsm(
-    source: Path, photographs: list[Path], out: Path | None, settings: DenseSettings, plots: bool, as_json: bool
-) -> int:
+    source: Path, photographs: list[Path], out: Path | None, settings: DenseSettings, plots: bool, as_json: bool,
+    executor: str = THREADS,
+) -> int:  # fmt: skip
     """Exit code of the command; arguments as on the command line."""
     from aerotri.public.adjustment import Adjustment
     from aerotri.public.dense import RECORD, measure_dense
 
     console = Console(quiet=as_json)
     settings.check()
+    chosen(executor)
     target = out or Path(f"{source.resolve().name.removesuffix('_result')}_dsm")
     refuse_foreign_folder(target, RECORD)
     tiles = target.with_name(f"{target.name}.tiles")
-    found = measure_dense(Adjustment(reopened(source, console)), photographs, settings, tiles, console.stage)
+    found = measure_dense(Adjustment(reopened(source, console)), photographs, settings, tiles, console.stage, executor)
     console.progress("writing")
     found.save(target, plots)
     shutil.rmtree(tiles, ignore_errors=True)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.execution.choice import THREADS, chosen
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
@@ -194,6 +195,7 @@ def dense_surface(
     ground: bool = DENSE_DEFAULTS.ground,
     widest_object: float = DENSE_DEFAULTS.widest_object,
     tiles: FilePath | None = None,
+    executor: str = THREADS,
     progress: ProgressLike = None,
 ) -> DenseSurface:
     """Match the photographs densely: a height with its σ for every cell of a raster.
@@ -210,7 +212,8 @@ def dense_surface(
     ground : filter the ground besides, without objects.
     widest_object : m, the widest object that is taken off it.
     tiles : folder for the tiles of the surface; a run that was ended goes on with those it finds there. None: a
-        temporary one.
+        temporary one. Workers on other machines have to see it.
+    executor : where the tiles are measured: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'.
     progress : as of `aerotri.adjust`.
 
     Returns
@@ -222,6 +225,8 @@ def dense_surface(
     ------
     InputError
         For a setting that makes no sense, photographs that are not found, or where nothing could be matched.
+    TasksFailedError
+        When tiles could not be measured; it names them.
 
     Examples
     --------
@@ -231,19 +236,20 @@ def dense_surface(
     """
     return measure_dense(result, paths_of(photographs), DenseSettings(resolution, area, most_pairs, edge, ideal, ground,
                                                                          widest_object),
-                         None if tiles is None else Path(tiles), progress)  # fmt: skip
+                         None if tiles is None else Path(tiles), progress, executor)  # fmt: skip
 
 
 def measure_dense(
     result: Adjustment | FilePath, photographs: Sequence[Path], settings: DenseSettings, tiles: Path | None,
-    progress: ProgressLike = None,
+    progress: ProgressLike = None, executor: str = THREADS,
 ) -> DenseSurface:  # fmt: skip
     """As `dense_surface`, with the settings in one record.
 
     Raises
     ------
-    InputError
+    InputError, TasksFailedError
     """
+    from aerotri.execution.opening import opened
     from aerotri.formats.files.spool import Spool
     from aerotri.terrain.dense.bare_ground import bare_ground
     from aerotri.terrain.dense.measure import DensePlan, measure_surface
@@ -252,6 +258,7 @@ def measure_dense(
     from aerotri.volume.shared import adjustment_key
 
     settings.check()
+    chosen(executor)
     record = (result if isinstance(result, Adjustment) else open_result(result)).record
     rows, paths = rows_and_files(record, photographs, chosen_rows(record, "all"))
     key = adjustment_key(record)
@@ -263,8 +270,8 @@ def measure_dense(
         _open_tiles(tiles, settings, key, paths)
     area = None if settings.area is None else Area(np.array(settings.area[:2]), np.array(settings.area[2:]))
     plan = DensePlan(rows, paths, tiles, settings.resolution, area, settings.most_pairs, settings.edge, settings.ideal)
-    with stage_report(progress) as report:
-        outcome = measure_surface(record, plan, report.stage)
+    with stage_report(progress) as report, opened(executor, report.said) as workers:
+        outcome = measure_surface(record, plan, report.stage, workers)
     ground = bare_ground(outcome, settings.widest_object) if settings.ground else None
     block = record.result.block
     return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper)
@@ -288,7 +295,7 @@ def _open_tiles(folder: Path, settings: DenseSettings, key: str, paths: tuple[Pa
     try:
         folder.mkdir(parents=True, exist_ok=True)
         held = [path for path in folder.iterdir() if path.name != STATED]
-        if any(path.suffix not in (".npz", ".part") for path in held):
+        if any(path.suffix not in (".npz", ".part", ".shared") for path in held):
             raise InputError("holds other files than tiles", "give another folder for the tiles", folder)
         if there.is_file() and there.read_text(encoding="utf-8") == mark:
             return

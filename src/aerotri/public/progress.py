@@ -32,6 +32,10 @@ class StageReport:
         if self._tell is not None:
             self._tell(name, share)
 
+    def said(self, text: str) -> None:
+        """A sentence about where the work is done."""
+        self.stage(text, None)
+
     def iteration(self, number: int, sigma0: float, damping: float) -> None:
         """An iteration of the adjustment: how many there will be is not known."""
         damped = ", steps shortened" if damping else ""

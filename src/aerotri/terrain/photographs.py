@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 import numpy as np
 
@@ -58,6 +59,10 @@ class PyramidStore:
         self._kept: OrderedDict[tuple[int, int], np.ndarray] = OrderedDict()
         self._lock, self._bytes = Lock(), 0
         self.reads = 0
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Another process reads the photographs itself."""
+        return PyramidStore, ([path.absolute() for path in self._paths], self._sizes, self.levels, self._most)
 
     def level(self, k: int, level: int) -> np.ndarray:
         """(rows, columns) of photograph k: uint16, or uint8 for the finest level of 8-bit photographs."""

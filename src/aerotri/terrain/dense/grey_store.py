@@ -6,6 +6,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 import cv2
 import numpy as np
@@ -38,6 +39,10 @@ class GreyStore:
         self._kept: OrderedDict[tuple[int, int], np.ndarray] = OrderedDict()
         self._lock, self._bytes = Lock(), 0
         self.reads = 0
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Another process reads the photographs itself."""
+        return GreyStore, ([path.absolute() for path in self._paths], self._sizes, self._most)
 
     def level(self, k: int, level: int) -> np.ndarray:
         """(rows, columns) uint8 of photograph k; its pixels are means of 2^level × 2^level.

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from aerotri.adjustment.parallel import thread_count
 from aerotri.conventions import InputError
+from aerotri.execution.threads import Threads
+from aerotri.execution.work import Executor, Work
 from aerotri.memory import refuse_beyond_memory
 from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
@@ -36,6 +36,8 @@ FEWEST_PIXELS = 250
 COARSE_PAIRS = 3
 BYTES_OF_CELL = 60
 """Of a coarse level, held as a whole with what bounds its heights."""
+BYTES_OF_TILE = 1_200_000_000
+"""Memory of a process that measures a tile."""
 MOST_PLACES = 400
 """Where the share of the adjustment is computed, linear between them: it changes slowly over a block."""
 Report = Callable[[str, float], None]
@@ -90,19 +92,46 @@ class DenseOutcome:
     resumed: int
 
 
-def measure_surface(calibration: Adjustment, plan: DensePlan, report: Report | None = None) -> DenseOutcome:
+@dataclass(frozen=True, eq=False)
+class TileWork:
+    """What all tiles of a level share.
+
+    Parameters
+    ----------
+    photographs : to be matched, with their pixels in `store`. grid : all cells. heights : between which they lie.
+    options : of the matching. files : where tiles are written.
+    """
+
+    photographs: Photographs
+    store: GreyStore
+    grid: Grid
+    heights: HeightRange
+    options: TileOptions
+    files: TileFiles
+
+
+def measure_surface(
+    calibration: Adjustment, plan: DensePlan, report: Report | None = None, executor: Executor | None = None
+) -> DenseOutcome:
     """Match all tiles, from coarse to fine.
+
+    Parameters
+    ----------
+    executor : does the tiles; threads where None.
 
     Raises
     ------
     InputError
         When a photograph cannot be read, or nothing could be matched.
+    TasksFailedError
+        When tiles could not be computed.
     """
 
     def tell(stage: str, share: float) -> None:
         if report is not None:
             report(stage, share)
 
+    executor = executor or Threads()
     photographs = photographs_of(calibration, plan.rows, plan.paths, plan.ideal)
     block = calibration.local.block
     sizes = [block.cameras[c].size_px for c in block.images.camera[plan.rows].tolist()]
@@ -114,12 +143,15 @@ def measure_surface(calibration: Adjustment, plan: DensePlan, report: Report | N
     coarsest = max(min(MOST_LEVEL, int(np.log2(max(min(min(s) for s in sizes) / FEWEST_PIXELS, 1.0)))), finest)
     heights = range_of_prior(first_prior(calibration.result.points.xyz, area, gsd, coarsest + 1))
     if coarsest > finest:
-        heights = _coarse(photographs, store, area, heights, plan, coarsest, gsd, partial(tell, "coarse surface"))
+        heights = _coarse(
+            photographs, store, area, heights, plan, coarsest, gsd, executor, partial(tell, "coarse surface")
+        )
     grid = grid_of_area(area, cell)
     files = TileFiles(plan.folder, finest)
     windows = tile_windows(grid, tile_side(grid, gsd, finest))
     options = TileOptions(finest, plan.pairs, plan.edge, True)
-    resumed = do_windows(photographs, store, grid, windows, heights, options, files, partial(tell, "surface"))
+    work = TileWork(photographs, store, grid, heights, options, files)
+    resumed = do_windows(work, windows, executor, partial(tell, "surface"))
     return _outcome(calibration, plan, photographs, grid, windows, files, finest, resumed)
 
 
@@ -137,7 +169,7 @@ def tile_side(grid: Grid, gsd: float, level: int) -> int:
 
 def _coarse(
     photographs: Photographs, store: GreyStore, area: Area, heights: HeightRange, plan: DensePlan, level: int,
-    gsd: float, report: Callable[[float], None],
+    gsd: float, executor: Executor, report: Callable[[float], None],
 ) -> HeightRange:  # fmt: skip
     grid = grid_of_area(area, CELLS_PER_GSD * gsd * 2**level)
     refuse_beyond_memory(
@@ -147,7 +179,7 @@ def _coarse(
     files = TileFiles(plan.folder, level)
     windows = tile_windows(grid, tile_side(grid, gsd, level))
     options = TileOptions(level, COARSE_PAIRS, plan.edge, False)
-    do_windows(photographs, store, grid, windows, heights, options, files, report)
+    do_windows(TileWork(photographs, store, grid, heights, options, files), windows, executor, report)
     z = np.full((grid.rows, grid.columns), np.nan)
     for window, tile in files.read_all(windows):
         z[window.row : window.row + window.rows, window.column : window.column + window.columns] = tile.z
@@ -162,29 +194,35 @@ def _coarse(
 
 
 def do_windows(
-    photographs: Photographs, store: GreyStore, grid: Grid, windows: Sequence[TileWindow], heights: HeightRange,
-    options: TileOptions, files: TileFiles, report: Callable[[float], None],
-) -> int:  # fmt: skip
+    shared: TileWork, windows: Sequence[TileWindow], executor: Executor, report: Callable[[float], None]
+) -> int:
     """Measure the tiles that are not there yet; how many were.
 
     Raises
     ------
-    InputError
+    InputError, TasksFailedError
     """
+    level = shared.options.level
+    names = [f"tile at row {w.row}, column {w.column} of level {level}" for w in windows]
+    files = replace(shared.files, folder=shared.files.folder.absolute())
+    work = Work(
+        do_window, replace(shared, files=files), windows, names, "tiles", files.folder, BYTES_OF_TILE,
+        "run the command again: tiles that are done are kept",
+    )  # fmt: skip
+    try:
+        return sum(executor.run(work, report))
+    finally:
+        files.remove_unfinished()
 
-    def one(window: TileWindow) -> int:
-        if files.read(window) is not None:
-            return 1
-        part = grid.window(window.row, window.column, window.rows, window.columns)
-        files.write(window, measure_tile(photographs, store, part, heights, options))
-        return 0
 
-    resumed = 0
-    with ThreadPoolExecutor(thread_count()) as pool:
-        for n, was_there in enumerate(pool.map(one, windows)):
-            resumed += was_there
-            report((n + 1) / len(windows))
-    return resumed
+def do_window(shared: TileWork, window: TileWindow) -> int:
+    """Measure a tile that is not there yet; 1 where it was."""
+    s = shared
+    if s.files.read(window) is not None:
+        return 1
+    part = s.grid.window(window.row, window.column, window.rows, window.columns)
+    s.files.write(window, measure_tile(s.photographs, s.store, part, s.heights, s.options))
+    return 0
 
 
 def _outcome(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,7 +51,8 @@ class TileFiles:
     def write(self, window: TileWindow, tile: TileSurface) -> None:
         """Write a tile whole or not at all."""
         path = self.path(window)
-        part = path.with_suffix(".part")
+        # a tile may be measured twice at the same time, where a worker is held for lost
+        part = path.with_suffix(f".{uuid.uuid4().hex}.part")
         with part.open("wb") as file:
             np.savez(
                 file, z=tile.z, sigma=tile.sigma.astype(np.float32), count=tile.count.astype(np.uint8),
@@ -74,6 +76,11 @@ class TileFiles:
             parts["z"], parts["sigma"], parts["count"], parts["shown_by"], float(parts["factor"]), parts["pairs"],
             parts["across"], float(parts["shared_cells"]),
         )  # fmt: skip
+
+    def remove_unfinished(self) -> None:
+        """Remove what killed workers left of tiles."""
+        for part in self.folder.glob(f"level{self.level}_*.part"):
+            part.unlink(missing_ok=True)
 
     def read_all(self, windows: list[TileWindow]) -> Iterator[tuple[TileWindow, TileSurface]]:
         """Tiles one after the other; all must be there."""

@@ -1,0 +1,185 @@
+"""Tasks on workers of Dask, which nothing else in the program knows."""
+
+from __future__ import annotations
+
+import logging
+import queue
+import uuid
+from contextlib import ExitStack
+from importlib.util import find_spec
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import dask
+from distributed import Client, LocalCluster
+
+from aerotri.conventions import InputError
+from aerotri.execution.elsewhere import ONE_THREAD, outcome_in, parcels, perform
+from aerotri.execution.work import MOST_TRIES, Ledger, Outcome, R, Report, S, Say, T, Work
+from aerotri.memory import SHARE, available_bytes, refuse_beyond_memory
+
+MEMORY = "MEMORY"
+"""Name of the resource, in bytes, that workers offer (`dask worker --resources MEMORY=8e9`) and tasks take."""
+CONNECT_S, LOOK_S = "20s", 5.0
+"""For the scheduler to answer; between two looks whether there are workers."""
+
+
+class Dask:
+    """The workers of a scheduler that runs already, or of one that is started here.
+
+    Parameters
+    ----------
+    address : of the scheduler, or its JSON file; '' to start one. workers : to start, each with one thread.
+    say : takes a sentence for the user.
+    """
+
+    def __init__(self, address: str, workers: int, say: Say):
+        self._address, self._count, self._say = address, workers, say
+        self._stack = ExitStack()
+        self._client: Any = None
+        self._told_waiting = False
+
+    def __enter__(self) -> Self:
+        if self._address:
+            self._client = self._stack.enter_context(_connected(self._address))
+            self._say_dashboard()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    def run(self, work: Work[S, T, R], report: Report | None = None) -> list[R]:
+        """See `work.Executor`."""
+        if not self._address:
+            count = min(self._count, len(work.tasks))
+            refuse_beyond_memory(
+                count * work.bytes_each, f"{count} {work.what} at once", "give fewer workers, {share} times as many"
+            )
+            if self._client is None:
+                self._start()
+        options = {"pure": False, **self._resources(work)}
+        ledger: Ledger[R] = Ledger(work, report)
+        with parcels(work) as waiting:
+            lost = self._do(waiting, work, options, ledger)
+            # one after the other, so that none pays for what another did to their worker
+            for number in lost:
+                alone = {number: waiting[number]}
+                self._do(alone, work, options, ledger, is_last=True)
+        return ledger.values()
+
+    def _do(
+        self, waiting: list[bytes] | dict[int, bytes], work: Work[Any, Any, Any], options: dict[str, Any],
+        ledger: Ledger[Any], is_last: bool = False,
+    ) -> list[int]:  # fmt: skip
+        """Submit tasks and take what comes of them; numbers of those whose workers were lost too often."""
+        numbered = dict(enumerate(waiting)) if isinstance(waiting, list) else waiting
+        mark, done = uuid.uuid4().hex[:8], queue.Queue[Any]()
+        futures = {
+            self._client.submit(perform, parcel, key=f"{work.names[k]} {mark}-{k}", **options): k
+            for k, parcel in numbered.items()
+        }
+        lost: list[int] = []
+        try:
+            for future in futures:
+                future.add_done_callback(done.put)
+            for _ in range(len(futures)):
+                future = self._next(done)
+                number = futures[future]
+                if future.status == "finished":
+                    ledger.take(number, outcome_in(future.result()))
+                elif is_last or future.status != "error":
+                    ledger.take(number, Outcome(failed=_reason(future)))
+                else:
+                    lost.append(number)
+        finally:
+            self._client.cancel([future for future in futures if not future.done()])
+        return sorted(lost)
+
+    def _next(self, done: queue.Queue[Any]) -> Any:
+        """The next task that ended; says so where nobody works."""
+        while True:
+            try:
+                return done.get(timeout=LOOK_S)
+            except queue.Empty:
+                if not self._told_waiting and not self._workers():
+                    self._say(f"Dask scheduler {self._client.scheduler.address}: no worker at the moment, waiting")
+                    self._told_waiting = True
+
+    def _start(self) -> None:
+        there = available_bytes()
+        memory = {} if there is None else {"resources": {MEMORY: SHARE * there / self._count}}
+        self._stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": MOST_TRIES - 1}))
+        cluster = self._stack.enter_context(
+            LocalCluster(
+                n_workers=self._count, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL, env=ONE_THREAD, **memory,
+            )
+        )  # fmt: skip
+        self._client = self._stack.enter_context(Client(cluster))
+        self._say_dashboard()
+
+    def _say_dashboard(self) -> None:
+        if find_spec("bokeh") is not None or self._address:
+            self._say(f"Dask dashboard: {self._client.dashboard_link}")
+        else:
+            self._say("Dask dashboard: needs bokeh, pip install bokeh")
+
+    def _workers(self) -> dict[str, Any]:
+        return self._client.scheduler_info(n_workers=-1)["workers"]
+
+    def _resources(self, work: Work[Any, Any, Any]) -> dict[str, Any]:
+        """What a task takes of a worker.
+
+        Raises
+        ------
+        InputError
+            When no worker has so much.
+        """
+        if not self._workers():
+            self._say(f"Dask scheduler {self._client.scheduler.address}: no worker yet, waiting")
+            self._client.wait_for_workers(1)
+        workers = list(self._workers().values())
+        offered = [worker["resources"][MEMORY] for worker in workers if MEMORY in worker.get("resources", {})]
+        free = offered or [_memory_of_thread(worker) for worker in workers]
+        if max(free) < work.bytes_each:
+            raise InputError(
+                f"a task takes {work.bytes_each / 2**30:.1f} GiB of memory, no worker has more than "
+                f"{max(free) / 2**30:.1f} GiB for one",
+                "start workers with fewer threads (--nthreads 1) and more memory (--memory-limit, --resources MEMORY=…)"
+                if self._address
+                else "give fewer workers",
+            )
+        return {"resources": {MEMORY: work.bytes_each}} if offered else {}
+
+
+def _memory_of_thread(worker: dict[str, Any]) -> float:
+    """Bytes that a task has where a worker does as many as it has threads; unlimited where none is stated."""
+    return worker["memory_limit"] / worker["nthreads"] if worker.get("memory_limit") else float("inf")
+
+
+def _connected(address: str) -> Client:
+    is_file = address.endswith(".json")
+    if is_file and not Path(address).is_file():
+        raise InputError("there is no such file of a Dask scheduler", "give its address, tcp://HOST:8786", address)
+    try:
+        given = {"scheduler_file": address} if is_file else {"address": address}
+        return Client(**given, timeout=CONNECT_S)
+    except (OSError, ValueError, TypeError) as error:
+        said = " ".join(str(error).split())[:200]
+        raise InputError(
+            f"no Dask scheduler answers at {address} ({type(error).__name__}: {said})",
+            "start one (dask scheduler) and give its address, tcp://HOST:8786",
+        ) from error
+
+
+def _reason(future: Any) -> str:
+    """Why a task has no outcome."""
+    if future.status != "error":
+        return "the Dask scheduler was lost"
+    error = future.exception()
+    if type(error).__name__ == "KilledWorker":
+        return "its Dask workers ended whenever they did it; perhaps memory was short"
+    return f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"

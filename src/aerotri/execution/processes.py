@@ -1,0 +1,180 @@
+"""Tasks in processes of this machine. A process that is killed takes its task only, and that is begun again."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections import deque
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from types import TracebackType
+from typing import Any, Self
+
+from aerotri.conventions import InputError
+from aerotri.execution.elsewhere import ONE_THREAD, outcome_in, parcels, perform
+from aerotri.execution.work import MOST_TRIES, Ledger, Outcome, R, Report, S, T, Work
+from aerotri.memory import refuse_beyond_memory
+
+READY = b"ready"
+PATIENCE_S = 5.0
+"""For a process to end by itself before it is ended."""
+
+
+class Processes:
+    """Processes that live from the first work to the end of the context.
+
+    Parameters
+    ----------
+    count : of processes, each with one thread.
+    """
+
+    def __init__(self, count: int):
+        self._count = count
+        self._workers: list[_Worker] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for worker in self._workers:
+            worker.end(at_once=kind is not None)
+        self._workers.clear()
+
+    def run(self, work: Work[S, T, R], report: Report | None = None) -> list[R]:
+        """See `work.Executor`."""
+        count = min(self._count, len(work.tasks))
+        refuse_beyond_memory(
+            count * work.bytes_each, f"{count} {work.what} at once", "give fewer processes, {share} times as many"
+        )
+        with parcels(work) as waiting:
+            return _Run(work, waiting, self._workers, count, report).values()
+
+
+class _Run:
+    """One work: which process does which task, and how often a task was begun."""
+
+    def __init__(
+        self, work: Work[Any, Any, Any], parcels: list[bytes], workers: list[_Worker], count: int, report: Report | None
+    ):
+        self._parcels, self._workers, self._count = parcels, workers, count
+        self._ledger: Ledger[Any] = Ledger(work, report)
+        self._left = deque(range(len(parcels)))
+        self._begun = [0] * len(parcels)
+
+    def values(self) -> list[Any]:
+        """Results in the order of the tasks."""
+        while self._left or any(worker.task is not None for worker in self._workers):
+            self._start_missing()
+            self._hand_out()
+            for worker in wait_for(self._workers):
+                self._hear(worker)
+        return self._ledger.values()
+
+    def _start_missing(self) -> None:
+        busy = sum(worker.task is not None for worker in self._workers)
+        while len(self._workers) < min(self._count, len(self._left) + busy):
+            self._workers.append(_Worker())
+
+    def _hand_out(self) -> None:
+        for worker in self._workers:
+            if worker.is_ready and worker.task is None and self._left:
+                worker.task = self._left.popleft()
+                self._begun[worker.task] += 1
+                # a process that has just been killed is heard of by `_hear`
+                with suppress(OSError):
+                    worker.connection.send_bytes(self._parcels[worker.task])
+
+    def _hear(self, worker: _Worker) -> None:
+        try:
+            content = worker.connection.recv_bytes()
+        except (EOFError, OSError):
+            self._lost(worker)
+            return
+        if content == READY:
+            worker.is_ready = True
+            return
+        task, worker.task = worker.task, None
+        assert task is not None
+        self._ledger.take(task, outcome_in(content))
+
+    def _lost(self, worker: _Worker) -> None:
+        """Its task is begun again in another process, unless it was so often."""
+        self._workers.remove(worker)
+        ending = worker.end(at_once=False)
+        if not worker.is_ready:
+            raise InputError(
+                f"a process could not be started ({ending})",
+                "see the lines above; a script begins its work under: if __name__ == '__main__':",
+            )
+        if worker.task is None:
+            return
+        if self._begun[worker.task] < MOST_TRIES:
+            self._left.appendleft(worker.task)
+        else:
+            text = f"its process ended {MOST_TRIES} times, {ending}; perhaps memory was short"
+            self._ledger.take(worker.task, Outcome(failed=text))
+
+
+class _Worker:
+    """A process, the line to it, and the number of the task that it does; None where it has none."""
+
+    def __init__(self) -> None:
+        context = get_context("spawn")
+        self.connection, other = context.Pipe()
+        self.task: int | None = None
+        self.is_ready = False
+        self._process: SpawnProcess = context.Process(target=_serve, args=(other,), daemon=True)
+        with _environment(ONE_THREAD):
+            self._process.start()
+        other.close()
+
+    def end(self, at_once: bool) -> str:
+        """End the process; how it ended, in words."""
+        self.connection.close()
+        if at_once:
+            self._process.terminate()
+        self._process.join(PATIENCE_S)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+        code = self._process.exitcode or 0
+        return f"by signal {-code}" if code < 0 else f"with exit code {code}"
+
+
+def wait_for(workers: list[_Worker]) -> list[_Worker]:
+    """Those that have something to say, or have ended."""
+    if not workers:
+        return []
+    heard = wait([worker.connection for worker in workers])
+    return [worker for worker in workers if worker.connection in heard]
+
+
+def _serve(connection: Connection) -> None:
+    """What a process does: task after task, until the line is closed."""
+    # an interrupt of the terminal reaches all processes; ours ends the others
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    with suppress(EOFError, OSError):
+        connection.send_bytes(READY)
+        while True:
+            connection.send_bytes(perform(connection.recv_bytes()))
+
+
+@contextmanager
+def _environment(values: dict[str, str]) -> Generator[None]:
+    """The variables set while a process is started, which takes them over."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
