@@ -110,7 +110,7 @@ class Dask:
 
     def _start(self) -> None:
         there = available_bytes()
-        memory = {} if there is None else {"resources": {MEMORY: SHARE * there / self._count}}
+        memory: dict[str, Any] = {} if there is None else {"resources": {MEMORY: SHARE * there / self._count}}
         self._stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": MOST_TRIES - 1}))
         cluster = self._stack.enter_context(
             LocalCluster(
@@ -165,7 +165,7 @@ def _connected(address: str) -> Client:
     if is_file and not Path(address).is_file():
         raise InputError("there is no such file of a Dask scheduler", "give its address, tcp://HOST:8786", address)
     try:
-        given = {"scheduler_file": address} if is_file else {"address": address}
+        given: dict[str, Any] = {"scheduler_file": address} if is_file else {"address": address}
         return Client(**given, timeout=CONNECT_S)
     except (OSError, ValueError, TypeError) as error:
         said = " ".join(str(error).split())[:200]

@@ -44,6 +44,11 @@ class GreyStore:
         """Another process reads the photographs itself."""
         return GreyStore, ([path.absolute() for path in self._paths], self._sizes, self._most)
 
+    @property
+    def most_bytes(self) -> int:
+        """Bytes that are kept at most."""
+        return min(self._most, sum(columns * rows for columns, rows in self._sizes))
+
     def level(self, k: int, level: int) -> np.ndarray:
         """(rows, columns) uint8 of photograph k; its pixels are means of 2^level × 2^level.
 

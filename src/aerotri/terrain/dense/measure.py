@@ -36,8 +36,8 @@ FEWEST_PIXELS = 250
 COARSE_PAIRS = 3
 BYTES_OF_CELL = 60
 """Of a coarse level, held as a whole with what bounds its heights."""
-BYTES_OF_TILE = 1_200_000_000
-"""Memory of a process that measures a tile."""
+BYTES_OF_TILE = 750_000_000
+"""Memory of a process that measures a tile of the finest level, measured, without the photographs that it keeps."""
 MOST_PLACES = 400
 """Where the share of the adjustment is computed, linear between them: it changes slowly over a block."""
 Report = Callable[[str, float], None]
@@ -206,8 +206,8 @@ def do_windows(
     names = [f"tile at row {w.row}, column {w.column} of level {level}" for w in windows]
     files = replace(shared.files, folder=shared.files.folder.absolute())
     work = Work(
-        do_window, replace(shared, files=files), windows, names, "tiles", files.folder, BYTES_OF_TILE,
-        "run the command again: tiles that are done are kept",
+        do_window, replace(shared, files=files), windows, names, "tiles", files.folder,
+        BYTES_OF_TILE + shared.store.most_bytes, "run the command again: tiles that are done are kept",
     )  # fmt: skip
     try:
         return sum(executor.run(work, report))
