@@ -90,9 +90,10 @@ class Dask:
                 number = futures[future]
                 if future.status == "finished":
                     ledger.take(number, outcome_in(future.result()))
-                elif is_last or future.status != "error":
+                elif is_last:
                     ledger.take(number, Outcome(failed=_reason(future)))
                 else:
+                    # whatever became of it, its worker did: a result that was lost with the worker counts alike
                     lost.append(number)
         finally:
             self._client.cancel([future for future in futures if not future.done()])
