@@ -60,3 +60,15 @@ def test_the_same_ground_is_measured_in_corrected_photographs(flown):
     assert abs(found.bias) < sigma
     assert found.rmse < 3.0 * sigma
     assert wrong.rmse > 3.0 * found.rmse
+
+
+def test_other_processes_make_the_same_photographs(flown):
+    """Every photograph has a map of its own, which goes to the process with it."""
+    folder, _, result = flown
+    photographs = sorted((folder / "flown" / "photographs").glob("*.tif"))[:2]
+    own = aerotri.ideal_photographs(result, photographs, folder / "own")
+    apart = aerotri.ideal_photographs(result, photographs, folder / "apart", executor="processes:2")
+    for name in own.photographs["written"]:
+        assert (own.folder / name).read_bytes() == (apart.folder / name).read_bytes()
+    left = [[one["relief_rms_px"] for one in found.summary["photographs"]] for found in (own, apart)]
+    assert left[0] == left[1]

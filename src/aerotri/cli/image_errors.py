@@ -8,7 +8,8 @@ from typing import Annotated, Any, cast
 import typer
 
 from aerotri.cli.app import app
-from aerotri.cli.options import ARGUMENTS, IMAGE_ERRORS, INPUT, METHOD, OUTPUT, Json, Overwrite, ResultFolder
+from aerotri.cli.options import ARGUMENTS, IMAGE_ERRORS, INPUT, METHOD, OUTPUT, Json, Overwrite, ResultFolder, Workers
+from aerotri.execution.choice import THREADS
 from aerotri.rasters.photograph_settings import COMPRESSION, RESAMPLING
 
 
@@ -158,6 +159,7 @@ def imgeo(
             help="Parameter group (camera, day) of photographs that are not in the block.", rich_help_panel=METHOD
         ),
     ] = None,
+    executor: Workers = THREADS,
     overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:
@@ -165,4 +167,4 @@ def imgeo(
     from aerotri.commands.imgeo import ImgeoOptions, run_imgeo
 
     options = ImgeoOptions(cast(Any, resampling), cast(Any, compression), group)
-    run_imgeo(result, photographs or [], out, options, json_, overwrite)
+    run_imgeo(result, photographs or [], out, options, json_, overwrite, executor)

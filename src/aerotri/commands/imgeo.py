@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
+from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.rasters.photograph_settings import (
@@ -54,8 +55,9 @@ class ImgeoOptions:
 
 
 def run_imgeo(
-    result: Path, photographs: list[Path], out: Path, options: ImgeoOptions, as_json: bool, overwrite: bool = False
-) -> None:
+    result: Path, photographs: list[Path], out: Path, options: ImgeoOptions, as_json: bool, overwrite: bool = False,
+    executor: str = THREADS,
+) -> None:  # fmt: skip
     """Resample and export; arguments as on the command line.
 
     Raises
@@ -69,9 +71,11 @@ def run_imgeo(
     console = Console(quiet=as_json)
     refuse_foreign_folder(out, RECORD)
     options.check()
+    chosen(executor)
     found = ideal_photographs(
         Adjustment(reopened(result, console)), photographs, out, resampling=options.resampling,
-        compression=options.compression, group=options.group, overwrite=overwrite, progress=console.stage,
+        compression=options.compression, group=options.group, overwrite=overwrite, executor=executor,
+        progress=console.stage,
     )  # fmt: skip
     if as_json:
         print(json_text(found.summary))

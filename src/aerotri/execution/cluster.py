@@ -21,6 +21,14 @@ from aerotri.memory import SHARE, available_bytes, refuse_beyond_memory
 
 MEMORY = "MEMORY"
 """Name of the resource, in bytes, that workers offer (`dask worker --resources MEMORY=8e9`) and tasks take."""
+OWN_CLUSTER: dict[str, Any] = {
+    "distributed.scheduler.allowed-failures": MOST_TRIES - 1,
+    # memory given back to the system at once costs a third of the time of a tile
+    "distributed.nanny.pre-spawn-environ": {},
+}
+"""Settings of Dask for workers that are started here."""
+UNWATCHED = {"DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False"}
+"""Environment of such workers: they do not look a hundred times a second where they are in the program."""
 CONNECT_S, LOOK_S = "20s", 5.0
 """For the scheduler to answer; between two looks whether there are workers."""
 
@@ -112,11 +120,11 @@ class Dask:
     def _start(self) -> None:
         there = available_bytes()
         memory: dict[str, Any] = {} if there is None else {"resources": {MEMORY: SHARE * there / self._count}}
-        self._stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": MOST_TRIES - 1}))
+        self._stack.enter_context(dask.config.set(OWN_CLUSTER))
         cluster = self._stack.enter_context(
             LocalCluster(
                 n_workers=self._count, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
-                silence_logs=logging.CRITICAL, env=ONE_THREAD, **memory,
+                silence_logs=logging.CRITICAL, env={**ONE_THREAD, **UNWATCHED}, **memory,
             )
         )  # fmt: skip
         self._client = self._stack.enter_context(Client(cluster))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.execution.choice import THREADS, chosen
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import paths_of, refuse_existing_file, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from aerotri.formats.results.image_errors import Exports
     from aerotri.image_errors import ImageGroup
     from aerotri.image_errors.error_function import ErrorFunction
-    from aerotri.image_errors.ideal_map import IdealMap
     from aerotri.observations import Block, Camera
     from aerotri.results.adjusted_block import AdjustedBlock
     from aerotri.results.adjustment import Adjustment as Record
@@ -96,6 +95,7 @@ def ideal_photographs(
     compression: Compression = COMPRESSION,
     group: str | None = None,
     overwrite: bool = False,
+    executor: str = THREADS,
     progress: ProgressLike = None,
 ) -> IdealPhotographs:
     """Write photographs without systematic image errors, their camera, and the errors for other programs.
@@ -109,6 +109,7 @@ def ideal_photographs(
     compression : of the files; a lossy one is not kept.
     group : parameter group (camera, day) of photographs that are not in the block.
     overwrite : replace files that aerotri has not written, or that were changed since.
+    executor : where photographs are resampled: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'.
     progress : as of `aerotri.adjust`.
 
     Returns
@@ -120,6 +121,8 @@ def ideal_photographs(
     InputError
         For a file that is no photograph of the block or its camera, or a folder that holds other files; nothing is
         written before all files are known.
+    TasksFailedError
+        When photographs could not be resampled; it names them.
 
     Examples
     --------
@@ -138,6 +141,7 @@ def ideal_photographs(
 
     folder = Path(out)
     _check(resampling, compression)
+    chosen(executor)
     refuse_foreign_folder(folder, RECORD)
     calibration = StatedAdjustment(result).record
     adjusted = calibration.result
@@ -150,7 +154,7 @@ def ideal_photographs(
         exports = exports_of(adjusted, errors, resampling)
         record = _write_exports(exports, folder, [job.name for job in jobs], overwrite)
         record["photographs"] = _resample_all(
-            calibration, jobs, errors, folder, (resampling, compression), report
+            calibration, jobs, errors, folder, (resampling, compression), report, executor
         )  # fmt: skip
         _write_record(record, folder)
     names = [entry["ideal_camera"] for entry in record["groups"]]
@@ -252,40 +256,48 @@ def _refuse_unknown_motion(adjusted: AdjustedBlock, groups: tuple[ImageGroup, ..
 
 def _resample_all(
     calibration: Record, jobs: list[_Job], errors: dict[int, ErrorFunction], out: Path,
-    how: tuple[Resampling, Compression], report: StageReport,
+    how: tuple[Resampling, Compression], report: StageReport, executor: str,
 ) -> list[dict[str, Any]]:  # fmt: skip
     from aerotri.compiled import compilation_notice
     from aerotri.deformation.moving_photographs import moving_errors, relief_left
     from aerotri.deformation.orientation import calibrated_orientation
-    from aerotri.formats.files.atomic import atomic_file
+    from aerotri.execution.opening import opened
+    from aerotri.formats.files.atomic import room_beside
     from aerotri.image_errors.ideal_map import ideal_map
-    from aerotri.image_errors.ideal_photographs import ideal_photograph
+    from aerotri.public.resampling import ResampledPhotograph, Resamplings, resample_photographs
 
-    if jobs and (notice := compilation_notice()):
+    if not jobs:
+        return []
+    if notice := compilation_notice():
         report.stage(notice, None)
-    maps: dict[int, IdealMap] = {}
-    done = []
     orientation = calibrated_orientation(calibration)
-    for number, job in enumerate(jobs):
-        own = moving_errors(calibration, orientation, job.row, errors[job.group]) if job.row >= 0 else None
-        if own is None and job.group not in maps:
-            maps[job.group] = ideal_map(errors[job.group])
+    own = [moving_errors(calibration, orientation, j.row, errors[j.group]) if j.row >= 0 else None for j in jobs]
+    maps = {k: ideal_map(errors[k]) for k in sorted({j.group for j, o in zip(jobs, own, strict=True) if o is None})}
+    to_do = [
+        ResampledPhotograph(j.source.absolute(), j.name, j.group, o) for j, o in zip(jobs, own, strict=True)
+    ]  # fmt: skip
+    done = 0.0
 
-        def told(share: float, number: int = number) -> None:
-            report.stage("correcting", (number + share) / len(jobs))
+    def told(share: float) -> None:
+        nonlocal done
+        done = share
+        report.stage("correcting", share)
 
-        started = time.perf_counter()
-        (out / job.name).parent.mkdir(parents=True, exist_ok=True)
-        with atomic_file(out / job.name) as place:
-            mapped = maps[job.group] if own is None else ideal_map(own)
-            lost = ideal_photograph(job.source, place, mapped, *how, told)
-        done.append({
+    def within(share: float) -> None:
+        report.stage("correcting", done + share / len(jobs))
+
+    shared = Resamplings(maps, out, *how, within)
+    with opened(executor, report.said) as workers, room_beside(out) as room:
+        found = resample_photographs(shared, to_do, workers, room, told)
+    record = []
+    for job, errors_of, (lost, seconds) in zip(jobs, own, found, strict=True):
+        record.append({
             "file": str(job.source), "written": job.name, "group": errors[job.group].group,
-            "left_out": list(lost), "seconds": round(time.perf_counter() - started, 3),
+            "left_out": list(lost), "seconds": seconds,
         })  # fmt: skip
-        if own is not None:
-            done[-1]["relief_rms_px"] = relief_left(calibration, orientation, job.row, own)
-    return done
+        if errors_of is not None:
+            record[-1]["relief_rms_px"] = relief_left(calibration, orientation, job.row, errors_of)
+    return record
 
 
 def _table(name: str, rows: list[dict[str, Any]], units: dict[str, str], columns: Sequence[str] = ()) -> Table:
