@@ -126,13 +126,15 @@ def demcor(
             rich_help_panel=METHOD,
         ),
     ] = None,
+    executor: Workers = THREADS,
     overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:
     """Correct a DEM for the deformation of its models: heights and plan, window by window, with σ."""
     from aerotri.commands.demcor import run_demcor
 
-    raise typer.Exit(run_demcor(result, dem, out, pair, models, model_table, dem_orientation, json_, overwrite))
+    code = run_demcor(result, dem, out, pair, models, model_table, dem_orientation, json_, overwrite, executor)
+    raise typer.Exit(code)
 
 
 @app.command(

@@ -8,12 +8,13 @@ from typing import Any
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
+from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.results.json_text import json_text
 
 
 def run_demcor(
     source: Path, dem: Path, out: Path, pair: tuple[str, str] | None, models: Path | None, table: Path | None,
-    orientation: str | None, as_json: bool, overwrite: bool = False,
+    orientation: str | None, as_json: bool, overwrite: bool = False, executor: str = THREADS,
 ) -> int:  # fmt: skip
     """Exit code of the command; arguments as on the command line."""
     from aerotri.deformation.absorbed import AbsorptionFailedError
@@ -24,6 +25,7 @@ def run_demcor(
     console = Console(quiet=as_json)
     if (pair is None) == (models is None):
         raise InputError("either --pair or --models says which photographs the DEM was made of", "give one of the two")
+    chosen(executor)
     if out.resolve() == dem.resolve():
         raise InputError("source and target are the same", "choose another --out", out)
     refuse_foreign_files(out, overwrite)
@@ -32,7 +34,7 @@ def run_demcor(
         with room_beside(out) as room:
             found = correct_dem(
                 dem, result, pair=pair, models=models, model_table=table, orientation=orientation, scratch=room,
-                progress=console.stage,
+                executor=executor, progress=console.stage,
             )  # fmt: skip
             found.save(out, overwrite)
     except AbsorptionFailedError as failure:

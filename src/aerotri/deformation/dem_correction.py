@@ -11,14 +11,25 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from aerotri.adjustment.parallel import thread_count
+from aerotri.deformation.dem_tasks import (
+    BYTES_OF_WINDOW,
+    DemTasks,
+    Window,
+    correct_one,
+    corrected_window,
+    nodes_within,
+    read_window,
+)
 from aerotri.deformation.dem_window import CorrectedWindow, DemModels, added_sums, no_sums
 from aerotri.deformation.model_map import ModelMap
-from aerotri.deformation.seam_steps import SeamSteps, added_steps, window_steps
+from aerotri.deformation.seam_steps import SeamSteps, added_steps
 from aerotri.deformation.stereo_model import covariance_of, pair_model
+from aerotri.execution.work import Executor, Work
 from aerotri.rasters.grids import Grid, RasterReader, RasterWriter
 from aerotri.rasters.held import HeldRaster
 
@@ -35,8 +46,6 @@ shifts are no deformation."""
 SAMPLE_POINTS = 200
 """Places over the DEM, 14 × 14, at which the shifts of every model are looked up [C]: a cell shifted further makes its
 window start again with a wider overlap."""
-DZ_STEP_M = 2.0**-14
-"""dZ is written in whole multiples of this: 0.06 mm, and its file becomes smaller."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +73,7 @@ class DemOutcome:
 class _Task:
     """A window being corrected: first row, first column, rows, columns; its halo; what comes of it."""
 
-    window: tuple[int, int, int, int]
+    window: Window
     halo: int
     future: Future[tuple[CorrectedWindow, SeamSteps]]
 
@@ -76,6 +85,8 @@ def correct_dem(
     writer: RasterWriter,
     dz_writer: RasterWriter,
     report: Callable[[float], None] | None = None,
+    executor: Executor | None = None,
+    folder: Path | None = None,
 ) -> DemOutcome:
     """Correct a DEM.
 
@@ -84,8 +95,16 @@ def correct_dem(
     numbers : model of every cell, numbered as in `models`.
     writer, dz_writer : of the corrected DEM and of dZ, on the grid of the reader.
     report : called with the share that is done.
+    executor : other processes that do the windows; None: threads. folder : for files of windows, where there is one.
+
+    Raises
+    ------
+    InputError, TasksFailedError
     """
-    return _Correction(models, numbers, reader, writer, dz_writer).run(report)
+    correction = _Correction(models, numbers, reader, writer, dz_writer)
+    if executor is None or folder is None:
+        return correction.run(report)
+    return correction.run_apart(executor, folder, report)
 
 
 class _Correction:
@@ -104,10 +123,11 @@ class _Correction:
         cells = max(1, -(-max(grid.rows, grid.columns) // SIGMA_CELLS))
         self._sigma_grid = grid.coarser(cells)
         shape = self._sigma_grid.rows, self._sigma_grid.columns
-        self._sigma_at = [
+        row, column = (
             np.minimum(np.arange(n) * cells + cells // 2, most - 1)
             for n, most in zip(shape, (grid.rows, grid.columns), strict=True)
-        ]
+        )
+        self._sigma_at = row, column
         self._heights, self._models_at = np.full(shape, np.nan), np.full(shape, -1, np.int64)
 
     def run(self, report: Callable[[float], None] | None) -> DemOutcome:
@@ -123,31 +143,52 @@ class _Correction:
                         report(done / (grid.rows * grid.columns))
             while waiting:
                 done += self._finish(pool, waiting.popleft())
+        return self._outcome(begun)
+
+    def run_apart(self, executor: Executor, folder: Path, report: Callable[[float], None] | None) -> DemOutcome:
+        """The same by other processes, their windows put together in order."""
+        begun, grid = time.perf_counter(), self._reader.grid
+        windows = list(windows_of(grid, self._models.places.frame is not None))
+        shared = DemTasks(
+            self._models, self._numbers, self._reader, self._halo, MOST_HALO, self._sigma_at, folder.absolute()
+        )
+        names = [f"window at row {row}, column {column}" for row, column, _, _ in windows]
+        work = Work(correct_one, shared, windows, names, "windows", shared.folder, BYTES_OF_WINDOW)
+        for window, done in zip(windows, executor.run(work, report), strict=True):
+            self._widest = max(self._widest, done.halo)
+            self._sums, self._steps = added_sums(self._sums, done.sums), added_steps(self._steps, done.steps)
+            self._exact += done.exact
+            self._seconds["read"] += done.seconds
+            coarse = np.ix_(*nodes_within(self._sigma_at, window))
+            self._heights[coarse], self._models_at[coarse] = done.heights, done.models
+            with np.load(shared.path(window), allow_pickle=False) as held:
+                self._write(window, held["z"], held["dz"])
+            shared.path(window).unlink()
+        return self._outcome(begun)
+
+    def _outcome(self, begun: float) -> DemOutcome:
         sigma = self._sigma()
         self._seconds["total"] = time.perf_counter() - begun
         return DemOutcome(
             self._sums, self._exact, self._steps, self._widest, sigma, self._sigma_grid, dict(self._seconds)
         )  # fmt: skip
 
-    def _begin(self, pool: ThreadPoolExecutor, window: tuple[int, int, int, int], halo: int) -> _Task:
-        """Read a window (first row, first column, rows, columns) with its halo and have it corrected."""
+    def _write(self, window: Window, z: np.ndarray, dz: np.ndarray) -> None:
         begun = time.perf_counter()
-        row, column, rows, columns = window
-        around = (row - halo, column - halo, rows + 2 * halo, columns + 2 * halo)
-        z = self._reader.read(*around)
-        number = self._numbers.numbers(self._reader.grid, *around)
+        self._writer.write(window[0], window[1], z)
+        self._dz_writer.write(window[0], window[1], dz)
+        self._seconds["write"] += time.perf_counter() - begun
+
+    def _begin(self, pool: ThreadPoolExecutor, window: Window, halo: int) -> _Task:
+        """Read a window with its halo and have it corrected."""
+        begun = time.perf_counter()
+        rows, columns = window[2:]
+        z, number = read_window(self._reader, self._numbers, window, halo)
         self._seconds["read"] += time.perf_counter() - begun
         inner = np.s_[halo : halo + rows, halo : halo + columns]
-        self._note(row, column, z[inner], number[inner])
-
-        def correct() -> tuple[CorrectedWindow, SeamSteps]:
-            found = self._models.correct(z, number, self._reader.grid, around[0], around[1], halo)
-            several = len(self._models.names) > 1
-            steps = window_steps(z[inner], found.z, number[inner]) if several else SeamSteps.none()
-            np.multiply(np.round(found.dz / DZ_STEP_M), DZ_STEP_M, out=found.dz)
-            return found, steps
-
-        return _Task(window, halo, pool.submit(correct))
+        self._note(window, z[inner], number[inner])
+        given = self._models, self._reader.grid, window, halo, z, number
+        return _Task(window, halo, pool.submit(corrected_window, *given))
 
     def _finish(self, pool: ThreadPoolExecutor, task: _Task) -> int:
         """Write a window; once more with a wider halo where cells are shifted beyond it. Returns its cells.
@@ -161,21 +202,14 @@ class _Correction:
         self._widest = max(self._widest, task.halo)
         self._sums, self._steps = added_sums(self._sums, found.sums), added_steps(self._steps, steps)
         self._exact += found.exact
-        begun = time.perf_counter()
-        row, column, rows, columns = task.window
-        self._writer.write(row, column, found.z)
-        self._dz_writer.write(row, column, found.dz)
-        self._seconds["write"] += time.perf_counter() - begun
-        return rows * columns
+        self._write(task.window, found.z, found.dz)
+        return task.window[2] * task.window[3]
 
-    def _note(self, row: int, column: int, z: np.ndarray, number: np.ndarray) -> None:
+    def _note(self, window: Window, z: np.ndarray, number: np.ndarray) -> None:
         """Keep height and model where σ will be computed: in the middle of every cell of the coarse grid."""
-        inside = [
-            np.flatnonzero((at >= first) & (at < first + size))
-            for at, first, size in zip(self._sigma_at, (row, column), z.shape, strict=True)
-        ]
-        coarse = np.ix_(*inside)
-        here = np.ix_(self._sigma_at[0][inside[0]] - row, self._sigma_at[1][inside[1]] - column)
+        row, column = nodes_within(self._sigma_at, window)
+        here = np.ix_(self._sigma_at[0][row] - window[0], self._sigma_at[1][column] - window[1])
+        coarse = np.ix_(row, column)
         self._heights[coarse], self._models_at[coarse] = z[here], number[here]
 
     def _sigma(self) -> np.ndarray:
@@ -194,7 +228,7 @@ class _Correction:
         return sigma
 
 
-def windows_of(grid: Grid, in_crs: bool) -> Iterator[tuple[int, int, int, int]]:
+def windows_of(grid: Grid, in_crs: bool) -> Iterator[Window]:
     """First row, first column, rows and columns of the windows of a DEM."""
     size = WINDOW
     if in_crs:

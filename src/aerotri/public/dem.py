@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.files.spool import Spool
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import refuse_existing_file
@@ -130,6 +131,7 @@ def correct_dem(
     model_table: FilePath | None = None,
     orientation: Adjustment | Absorbed | FilePath | None = None,
     scratch: FilePath | None = None,
+    executor: str = THREADS,
     progress: ProgressLike = None,
 ) -> CorrectedDem:
     """Free a DEM of the deformation of its stereo models: heights and plan, window by window, with σ.
@@ -144,7 +146,9 @@ def correct_dem(
     model_table : table number,left,right of a raster; NAME.csv or models.csv beside it where None.
     orientation : the one the DEM was made with: a result or its folder, images.csv, or 'absorbed' (of an adjustment
         without additional parameters); that of `result` where None.
-    scratch : folder for the rasters until they are saved; the temporary one of the system where None.
+    scratch : folder for the rasters until they are saved; the temporary one of the system where None. Workers on other
+        machines have to see it.
+    executor : where windows are corrected: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'.
     progress : as of `aerotri.adjust`.
 
     Returns
@@ -155,6 +159,8 @@ def correct_dem(
     ------
     InputError
         When files cannot be read, the block lacks a photograph, or nothing of the DEM lies in the models.
+    TasksFailedError
+        When windows could not be corrected; it names them.
 
     Examples
     --------
@@ -168,6 +174,7 @@ def correct_dem(
     """
     if (pair is None) == (models is None):
         raise InputError("either a pair or a map of models says what the DEM was made of", "give one of the two")
+    chosen(executor)
     from aerotri.deformation.dem_window import dem_models
     from aerotri.deformation.model_map import OneModel, PolygonMap
     from aerotri.deformation.restitution import FREE, restitution_of
@@ -186,7 +193,7 @@ def correct_dem(
         numbers = OneModel(*pair) if pair is not None else _model_map(models, model_table, reader, stack)
         crs_note = numbers.note if isinstance(numbers, PolygonMap) else ""
         models_of_dem = dem_models(record, photographs, numbers.names)
-        content = _correct(models_of_dem, numbers, reader, str(record.result.block.name), spool, report)
+        content = _correct(models_of_dem, numbers, reader, str(record.result.block.name), spool, report, executor)
     return CorrectedDem(content, as_surface(dem).path, spool, tuple(text for text in (doubt, crs_note) if text))
 
 
@@ -287,11 +294,12 @@ def _orientation(record: Record, stated: Adjustment | FilePath | None) -> tuple[
 
 
 def _correct(
-    models: DemModels, numbers: ModelMap, reader: Reader, block: str, spool: Spool, report: StageReport
+    models: DemModels, numbers: ModelMap, reader: Reader, block: str, spool: Spool, report: StageReport, executor: str
 ) -> dict[str, Any]:
     """Correct and write the rasters; returns the content of the JSON file."""
     from aerotri.adjustment.parallel import thread_count
     from aerotri.deformation import dem_correction
+    from aerotri.execution.opening import opened
     from aerotri.formats.results.deformation import correction_json
     from aerotri.rasters.grids import NO_DATA, RasterWriter, write_raster
 
@@ -303,12 +311,14 @@ def _correct(
         "threads": thread_count(),
     }
     with (
+        opened(executor, report.said) as workers,
         RasterWriter(spool.folder / DEM, reader.grid, reader.dtype, **common) as writer,
         RasterWriter(spool.folder / DZ, reader.grid, np.float32, **common) as dz_writer,
     ):
         dz_writer.describe("dZ taken off the DEM, m")
         outcome = dem_correction.correct_dem(
-            models, numbers, reader, writer, dz_writer, partial(report.stage, "correcting")
+            models, numbers, reader, writer, dz_writer, partial(report.stage, "correcting"),
+            None if chosen(executor).kind == "threads" else workers, spool.folder,
         )  # fmt: skip
     _refuse_nothing(outcome, models, reader.path)
     write_raster(spool.folder / SIGMA_DZ, outcome.sigma, outcome.sigma_grid, reader.crs, "σ of dZ, m")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from aerotri.image_errors.moving_errors import MovingErrors
 
 BYTES_OF_PHOTOGRAPH = 500_000_000
-"""Memory of a process that resamples a photograph by rows, whatever its size; measured."""
+"""Memory of a process that resamples a photograph, by rows, whatever its size: 0.36 GB were measured."""
 
 
 @dataclass(frozen=True, eq=False)

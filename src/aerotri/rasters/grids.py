@@ -151,6 +151,10 @@ class RasterReader:
             self._file.close()
             raise
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Another process opens the file itself."""
+        return type(self), (self.path.absolute(), self.band)
+
     def _look(self) -> None:
         t = self._file.transform
         self.grid = Grid(self._file.height, self._file.width, t.c, t.f, t.a, -t.e)

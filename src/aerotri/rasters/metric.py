@@ -71,6 +71,7 @@ class MetricReader(RasterReader):
 
     def __init__(self, path: FilePath, band: int = 1, target: str | None = None):
         super().__init__(path, band)
+        self._target = target
         self._source: Any = None
         self._factor = METRE
         try:
@@ -78,6 +79,9 @@ class MetricReader(RasterReader):
         except InputError:
             self._file.close()
             raise
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return MetricReader, (self.path.absolute(), self.band, self._target)
 
     def _bring_to_metres(self, target: str | None) -> None:
         units = units_of(self)
