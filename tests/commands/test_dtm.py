@@ -6,6 +6,7 @@ import sqlite3
 import struct
 from itertools import pairwise
 
+import killed_windows
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -15,6 +16,7 @@ from aerotri.conventions import InputError
 from aerotri.formats.results.pickets import read_pickets
 from aerotri.formats.results.point_cloud import read_point_cloud
 from aerotri.rasters.grids import RasterReader
+from aerotri.terrain import tiles
 
 PLAN = """
 name = "tiny"
@@ -174,3 +176,30 @@ def test_interval_by_pilot(made):
     assert known
     assert known == sorted(known)
     assert printed["pilot"]["interval_m"] > 0.0
+
+
+def files_of(given, out, executor):
+    """Contents of what a run leaves, by name."""
+    run(*given, "--out", out, "--no-plots", "--executor", executor)
+    assert not [path for path in out.parent.iterdir() if path.name.startswith(".")]
+    return {path.name: path.read_bytes() for path in out.iterdir()}
+
+
+def test_files_are_the_same_wherever_tiles_are_measured(made, tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(tiles, "TILE_NODES", 8)
+    by_threads = files_of(made[2], tmp_path / "a" / "dtm", "threads")
+    assert {"dtm.json", "pickets.parquet", "pickets.laz", "dsm.tif", "dtm.tif"} <= set(by_threads)
+    assert files_of(made[2], tmp_path / "b" / "dtm", "processes:2") == by_threads
+    assert files_of(made[2], tmp_path / "c" / "dtm", "dask:local:2") == by_threads
+
+
+@pytest.mark.parametrize("executor", ["processes:2", "dask:local:2"])
+def test_a_worker_killed_in_mid_run_changes_nothing(made, tmp_path, monkeypatch, executor):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(tiles, "TILE_NODES", 8)
+    expected = files_of(made[2], tmp_path / "a" / "dtm", "threads")
+    monkeypatch.setenv("AEROTRI_KILLED", str(tmp_path / "killed"))
+    monkeypatch.setattr(tiles, "do_tile", killed_windows.killed_tile)
+    assert files_of(made[2], tmp_path / "b" / "dtm", executor) == expected
+    assert (tmp_path / "killed").exists()

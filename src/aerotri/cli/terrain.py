@@ -130,6 +130,7 @@ def dtm(
             "--ideal", help="The photographs are those of imgeo, without image errors.", rich_help_panel=INPUT
         ),
     ] = False,
+    executor: Workers = THREADS,
     plots: Annotated[bool, typer.Option(help="Draw the surface and the points.", rich_help_panel=OUTPUT)] = True,
     json_: Json = False,
 ) -> None:
@@ -140,7 +141,7 @@ def dtm(
         metres_or_auto(interval), cell, pairs, step, cast(Any, subset), area, window, threshold, agreeing, edge,
         most_photographs, breaklines, ground_within, ideal,
     )  # fmt: skip
-    raise typer.Exit(run_dtm(result, photographs, out, settings, plots, json_))
+    raise typer.Exit(run_dtm(result, photographs, out, settings, plots, json_, executor))
 
 
 @app.command(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError, stated_number
+from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.terrain.settings import TerrainSettings
@@ -32,19 +34,25 @@ def metres_or_auto(text: str) -> float | None:
 
 
 def run_dtm(
-    source: Path, photographs: list[Path], out: Path | None, settings: TerrainSettings, plots: bool, as_json: bool
-) -> int:
+    source: Path, photographs: list[Path], out: Path | None, settings: TerrainSettings, plots: bool, as_json: bool,
+    executor: str = THREADS,
+) -> int:  # fmt: skip
     """Exit code of the command; arguments as on the command line."""
+    from aerotri.formats.files.atomic import room_beside
     from aerotri.public.adjustment import Adjustment
     from aerotri.public.terrain import RECORD, measure_terrain
 
     console = Console(quiet=as_json)
     settings.check()
+    chosen(executor)
     target = out or Path(f"{source.resolve().name.removesuffix('_result')}_dtm")
     refuse_foreign_folder(target, RECORD)
-    found = measure_terrain(Adjustment(reopened(source, console)), photographs, settings, console.stage)
-    console.progress("writing")
-    found.save(target, plots)
+    result = Adjustment(reopened(source, console))
+    with ExitStack() as stack:
+        room = None if chosen(executor).kind == "threads" else stack.enter_context(room_beside(target))
+        found = measure_terrain(result, photographs, settings, console.stage, executor, room)
+        console.progress("writing")
+        found.save(target, plots)
     if as_json:
         print(json_text(found.summary))
     else:

@@ -71,6 +71,14 @@ class Executor(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Workplace:
+    """Who does tasks, and the folder into which what they share is written for other processes."""
+
+    executor: Executor
+    folder: Path
+
+
 class TasksFailedError(Exception):
     """Some tasks have no result; the message names them.
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.execution.choice import THREADS, chosen
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
@@ -205,6 +206,8 @@ def terrain(
     breaklines: FilePath | None = DEFAULTS.breaklines,
     ground_within: BaseGeometry | FilePath | None = DEFAULTS.ground_within,
     ideal: bool = DEFAULTS.ideal,
+    executor: str = THREADS,
+    scratch: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> TerrainModel:
     """Measure the ground by image matching, with σ, and lay surfaces through it with and without objects.
@@ -228,6 +231,9 @@ def terrain(
     ground_within : outline within which everything is ground, as `aerotri.volume` takes its boundary: a stockpile is
         steep and would be taken off the DTM as an object.
     ideal : the photographs are those of `aerotri.ideal_photographs`, free of image errors.
+    executor : where the points are measured: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'.
+    scratch : folder for what other processes need, as long as they work; the temporary one of the system where None.
+        Workers on other machines have to see it.
     progress : as of `aerotri.adjust`.
 
     Returns
@@ -239,6 +245,8 @@ def terrain(
     ------
     InputError
         For a setting that makes no sense, photographs that are not found, or where hardly anything could be matched.
+    TasksFailedError
+        When tiles could not be measured; it names them.
 
     Examples
     --------
@@ -263,24 +271,29 @@ def terrain(
         ground_within,
         ideal,
     )
-    return measure_terrain(result, paths_of(photographs), settings, progress)
+    return measure_terrain(result, paths_of(photographs), settings, progress, executor, scratch)
 
 
 def measure_terrain(
-    result: Adjustment | FilePath, photographs: Sequence[Path], settings: TerrainSettings, progress: ProgressLike = None
-) -> TerrainModel:
+    result: Adjustment | FilePath, photographs: Sequence[Path], settings: TerrainSettings,
+    progress: ProgressLike = None, executor: str = THREADS, scratch: FilePath | None = None,
+) -> TerrainModel:  # fmt: skip
     """As `terrain`, with the settings in one record.
 
     Raises
     ------
-    InputError
+    InputError, TasksFailedError
     """
+    from aerotri.execution.opening import opened
+    from aerotri.execution.work import Workplace
+    from aerotri.formats.files.spool import Spool
     from aerotri.terrain.dtm import make_terrain_model
     from aerotri.volume.shared import adjustment_key
 
     settings.check()
+    chosen(executor)
     record = (result if isinstance(result, Adjustment) else open_result(result)).record
-    block = record.result.block
+    block, spool = record.result.block, Spool(scratch)
     with stage_report(progress) as report:
         plan, notes = terrain_plan(record, photographs, settings)
         name = ""
@@ -288,7 +301,8 @@ def measure_terrain(
             outline = outline_of(settings.ground_within, block.crs)
             plan, name = replace(plan, ground_within=outline.polygon), outline.name
             notes = (*notes, outline.note) if outline.note else notes
-        outcome = make_terrain_model(record, plan, report.stage)
+        with opened(executor, report.said) as workers:
+            outcome = make_terrain_model(record, plan, report.stage, Workplace(workers, spool.folder))
     return TerrainModel(outcome, str(block.name), block.crs, adjustment_key(record), notes, name)
 
 

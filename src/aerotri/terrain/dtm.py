@@ -14,6 +14,7 @@ from aerotri.conventions import InputError, counted
 from aerotri.deformation.block_models import strip_pairs
 from aerotri.deformation.model_geometry import geometry_of
 from aerotri.deformation.stereo_model import pair_model
+from aerotri.execution.work import Workplace
 from aerotri.rasters.grids import Grid, rasterise
 from aerotri.results.adjustment import Adjustment
 from aerotri.terrain.adjustment_part import adjustment_variances
@@ -117,12 +118,18 @@ def chosen_rows(calibration: Adjustment, subset: str) -> np.ndarray:
     return found[oriented[found]]
 
 
-def make_terrain_model(calibration: Adjustment, plan: TerrainPlan, report: Report | None = None) -> TerrainOutcome:
+def make_terrain_model(
+    calibration: Adjustment, plan: TerrainPlan, report: Report | None = None, at: Workplace | None = None
+) -> TerrainOutcome:
     """Measure pickets, find those in error, make surfaces.
+
+    Parameters
+    ----------
+    at : where tiles are measured; None: in threads.
 
     Raises
     ------
-    InputError
+    InputError, TasksFailedError
     """
 
     def tell(stage: str, share: float) -> None:
@@ -140,7 +147,7 @@ def make_terrain_model(calibration: Adjustment, plan: TerrainPlan, report: Repor
         most_photographs=plan.most_photographs,
     )  # fmt: skip
     models = models_of(calibration, photographs, plan.step) if plan.pairs else None
-    pickets = measure(photographs, known, options, plan.area, models, lambda share: tell("matching", share))
+    pickets = measure(photographs, known, options, plan.area, models, lambda share: tell("matching", share), at)
     _refuse_few(pickets.accepted)
     pickets = with_error_pickets(pickets, gsd / base_ratio(photographs, pickets))
     tell("statistics", 0.97)

@@ -9,13 +9,16 @@ steps aside, as in Tran (2007). What is measured is matched backwards.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import KDTree
 
 from aerotri.conventions import SIGMA_PER_MAD, InputError
+from aerotri.execution.threads import Threads
+from aerotri.execution.work import Workplace
 from aerotri.terrain import _picket_kernels as kernels
 from aerotri.terrain._plan_kernels import LEAST_CORRELATION, Plan
 from aerotri.terrain._search_kernels import find_heights
@@ -23,7 +26,7 @@ from aerotri.terrain.photographs import Photographs, Site
 from aerotri.terrain.picket_status import PicketStatus
 from aerotri.terrain.pickets import Area, MatchOptions, Models, Pickets, footprint, grid_nodes
 from aerotri.terrain.prior import COARSE_NODES_PX, SPARE_PX, Prior, cleaned, first_prior
-from aerotri.terrain.tiles import Tile, do_tiles
+from aerotri.terrain.tiles import Tile, TileWork, do_tiles
 
 STEP_PX, COARSE_STEP_PX = 0.5, 0.5
 """Posts of parallax between heights that are tried, in the finest and in coarser levels; chosen [C]: the peak of a
@@ -50,7 +53,7 @@ Report = Callable[[float], None]
 
 def measure(
     photographs: Photographs, known: np.ndarray, options: MatchOptions, area: Area | None = None,
-    models: Models | None = None, report: Report | None = None,
+    models: Models | None = None, report: Report | None = None, at: Workplace | None = None,
 ) -> Pickets:  # fmt: skip
     """Measure pickets.
 
@@ -59,12 +62,15 @@ def measure(
     known : (k, 3) points of the ground in the CRS, such as the object points of the block: where heights are looked for
         at first.
     area : where; as far as photographs reach unless given. models : the pairs to be matched; any photographs without.
-    report : called with the share that is done.
+    report : called with the share that is done. at : where tiles are measured; None: in threads.
 
     Raises
     ------
     InputError
+    TasksFailedError
+        When tiles could not be measured.
     """
+    at = at or Workplace(Threads(), Path())
     area = footprint(photographs) if area is None else area
     gsd = float(np.median(photographs.gsd))
     nodes = grid_nodes(area, options.interval)
@@ -84,14 +90,14 @@ def measure(
             if report is not None:
                 report((done + share * work[level]) / sum(work))
 
-        prior = _coarse_level(photographs, area, prior, level, spacing, gsd, options, models, partly)
+        prior = _coarse_level(photographs, area, prior, level, spacing, gsd, options, models, partly, at)
         done += work[level]
 
     def last(share: float) -> None:
         if report is not None:
             report((done + share * work[0]) / sum(work))
 
-    pickets = _fine_level(photographs, nodes, prior, gsd, options, models, last)
+    pickets = _fine_level(photographs, nodes, prior, gsd, options, models, last, at)
     return with_sigma0(pickets, options.window_px * gsd)
 
 
@@ -105,6 +111,7 @@ def _coarse_level(
     options: MatchOptions,
     models: Models | None,
     report: Report,
+    at: Workplace,
 ) -> Prior:
     x, y = (
         np.linspace(a, b, max(int(np.ceil((b - a) / spacing)) + 1, 3)) for a, b in zip(area.low, area.high, strict=True)
@@ -114,13 +121,10 @@ def _coarse_level(
     ratio = np.full(len(nodes), np.nan)
     window = gsd * 2**level
 
-    def one(tile: Tile) -> None:
-        h, s = np.empty(len(tile.delta)), np.empty(len(tile.delta))
-        find_heights(tile.view, tile.nodes, Plan(COARSE_WINDOW, window, COARSE_STEP_PX, MOST_STEPS), h, s)
-        heights[tile.own], scores[tile.own] = tile.site.place[2] + h, s
-        ratio[tile.own] = tile.base_ratios()
-
-    do_tiles(photographs, nodes, prior, level, window * COARSE_WINDOW, options, models, one, report)
+    plan = Plan(COARSE_WINDOW, window, COARSE_STEP_PX, MOST_STEPS)
+    work = TileWork(photographs, nodes, prior, level, window * COARSE_WINDOW, options, models, coarse_heights, plan)
+    for own, found in do_tiles(work, at, report):
+        heights[own], scores[own], ratio[own] = found
     shape = len(y), len(x)
     per_post = window / float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else np.nan
     if not np.isfinite(per_post):
@@ -138,6 +142,7 @@ def _fine_level(
     options: MatchOptions,
     models: Models | None,
     report: Report,
+    at: Workplace,
 ) -> Pickets:
     n, m = len(nodes), 2 if models is not None else options.most_photographs
     out = Pickets(
@@ -152,25 +157,75 @@ def _fine_level(
         options.agreeing, options.largest_sigma_px, min(FINE_START, options.threshold),
     )  # fmt: skip
 
-    def one(tile: Tile) -> None:
-        k = len(tile.own)
-        found = kernels.MeasuredNodes(
-            status=np.empty(k, np.int8), tries=np.zeros(k, np.int16), point=np.full((k, 3), np.nan),
-            covariance=np.full((k, 3, 3), np.nan), used=np.zeros((k, m), bool), numbers=np.full((k, 4), np.nan),
-            shifts=np.zeros((k, m, 6)),
-        )  # fmt: skip
-        kernels.measure_pickets(tile.view, tile.nodes, prior.curvatures(nodes[tile.own]), aside, plan, found)
-        measured = (found.status == PicketStatus.ACCEPTED) | (found.status >= PicketStatus.BACKWARD)
-        out.status[tile.own], out.tries[tile.own] = found.status, found.tries
-        out.correlation[tile.own], out.model[tile.own] = found.numbers[:, LEAST_CORRELATION], tile.model
-        rows, points = tile.own[measured], found.point[measured]
-        out.xyz[rows], out.covariance[rows] = tile.site.from_delta(points), found.covariance[measured]
-        out.photographs[rows], place = _packed(tile.chosen[measured], found.used[measured])
-        first_shift = found.shifts[measured][np.arange(len(rows)), place]
-        out.misfit[rows] = _misfit(tile.site, points, out.photographs[rows, :2], first_shift)
-
-    do_tiles(photographs, nodes, prior, 0, gsd * options.window_px + np.abs(aside).max(), options, models, one, report)
+    work = TileWork(
+        photographs, nodes, prior, 0, gsd * options.window_px + np.abs(aside).max(), options, models, fine_pickets,
+        FineHow(aside, plan, m),
+    )  # fmt: skip
+    for own, found in do_tiles(work, at, report):
+        out.status[own], out.tries[own] = found.status, found.tries
+        out.correlation[own], out.model[own] = found.correlation, found.model
+        rows = own[found.measured]
+        out.xyz[rows], out.covariance[rows] = found.xyz, found.covariance
+        out.photographs[rows], out.misfit[rows] = found.photographs, found.misfit
     return out
+
+
+def coarse_heights(shared: TileWork, tile: Tile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Heights of the nodes of a tile (n,) m, their correlations, and base over height of their photographs."""
+    h, s = np.empty(len(tile.delta)), np.empty(len(tile.delta))
+    find_heights(tile.view, tile.nodes, shared.how, h, s)
+    return tile.site.place[2] + h, s, tile.base_ratios()
+
+
+@dataclass(frozen=True, eq=False)
+class FineHow:
+    """Steps aside (t, 2) m, the plan of the kernels, and photographs of a picket at most."""
+
+    aside: np.ndarray
+    plan: Plan
+    most: int
+
+
+@dataclass(frozen=True, eq=False)
+class FoundPickets:
+    """Of the n nodes of a tile; m of them are measured.
+
+    Parameters
+    ----------
+    status, tries, correlation, model : (n,) as of `Pickets`. measured : (n,) bool.
+    xyz, covariance, photographs, misfit : (m, …) as of `Pickets`.
+    """
+
+    status: np.ndarray
+    tries: np.ndarray
+    correlation: np.ndarray
+    model: np.ndarray
+    measured: np.ndarray
+    xyz: np.ndarray
+    covariance: np.ndarray
+    photographs: np.ndarray
+    misfit: np.ndarray
+
+
+def fine_pickets(shared: TileWork, tile: Tile) -> FoundPickets:
+    """The pickets of a tile."""
+    k, how = len(tile.own), shared.how
+    found = kernels.MeasuredNodes(
+        status=np.empty(k, np.int8), tries=np.zeros(k, np.int16), point=np.full((k, 3), np.nan),
+        covariance=np.full((k, 3, 3), np.nan), used=np.zeros((k, how.most), bool), numbers=np.full((k, 4), np.nan),
+        shifts=np.zeros((k, how.most, 6)),
+    )  # fmt: skip
+    curvatures = shared.prior.curvatures(shared.nodes[tile.own])
+    kernels.measure_pickets(tile.view, tile.nodes, curvatures, how.aside, how.plan, found)
+    measured = (found.status == PicketStatus.ACCEPTED) | (found.status >= PicketStatus.BACKWARD)
+    points = found.point[measured]
+    photographs, place = _packed(tile.chosen[measured], found.used[measured])
+    first_shift = found.shifts[measured][np.arange(len(points)), place]
+    return FoundPickets(
+        found.status, found.tries, found.numbers[:, LEAST_CORRELATION], tile.model, measured,
+        tile.site.from_delta(points), found.covariance[measured], photographs,
+        _misfit(tile.site, points, photographs[:, :2], first_shift),
+    )  # fmt: skip
 
 
 def _packed(chosen: np.ndarray, used: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -64,6 +64,11 @@ class PyramidStore:
         """Another process reads the photographs itself."""
         return PyramidStore, ([path.absolute() for path in self._paths], self._sizes, self.levels, self._most)
 
+    @property
+    def most_bytes(self) -> int:
+        """Bytes that are kept at most, of pixels with 16 bits."""
+        return min(self._most, sum(8 * columns * rows // 3 for columns, rows in self._sizes))
+
     def level(self, k: int, level: int) -> np.ndarray:
         """(rows, columns) of photograph k: uint16, or uint8 for the finest level of 8-bit photographs."""
         with self._lock:

@@ -1,14 +1,14 @@
-"""Nodes near one another with the crops of the photographs that show them, done in threads."""
+"""Nodes near one another with the crops of the photographs that show them, as tasks."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from aerotri.adjustment.parallel import thread_count
+from aerotri.execution.work import Work, Workplace
 from aerotri.terrain import _view_kernels as kernels
 from aerotri.terrain._plan_kernels import Nodes
 from aerotri.terrain.photographs import Photographs, Site, site_at
@@ -21,6 +21,8 @@ work."""
 LARGEST_TILE_PX = 1500
 """Longest side of a tile in pixels of its level; chosen [C]: crops of 1500 × 1500 pixels, 4.5 MB, in up to 20
 photographs and all threads fit into memory."""
+BYTES_OF_TILE = 450_000_000
+"""Memory of a process that measures tiles, without the photographs that it keeps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,50 +60,64 @@ def _tiles(nodes: np.ndarray, reach: float) -> Iterator[np.ndarray]:
     yield from np.split(order, np.flatnonzero(np.diff(key[order])) + 1)
 
 
-def do_tiles(
-    photographs: Photographs,
-    nodes: np.ndarray,
-    prior: Prior,
-    level: int,
-    reach: float,
-    options: MatchOptions,
-    models: Models | None,
-    one: Callable[[Tile], None],
-    report: Callable[[float], None],
-) -> None:
-    """Do something to all tiles, in threads."""
-    gsd = float(np.median(photographs.gsd)) * 2**level
+@dataclass(frozen=True, eq=False)
+class TileWork:
+    """What all tiles of a level share.
+
+    Parameters
+    ----------
+    photographs : that are matched. nodes : (n, 2) m. prior : where heights are looked for. level : of the pyramids.
+    reach : m by which windows reach beyond a tile. options, models : as of `matching.measure`.
+    one : a function of a module, takes this and a tile. how : what else it needs.
+    """
+
+    photographs: Photographs
+    nodes: np.ndarray
+    prior: Prior
+    level: int
+    reach: float
+    options: MatchOptions
+    models: Models | None
+    one: Callable[[TileWork, Tile], Any]
+    how: Any
+
+
+def do_tiles(shared: TileWork, at: Workplace, report: Callable[[float], None]) -> Iterator[tuple[np.ndarray, Any]]:
+    """Numbers of the nodes of every tile that photographs show, and what was found for them.
+
+    Raises
+    ------
+    InputError, TasksFailedError
+    """
+    nodes = shared.nodes
+    gsd = float(np.median(shared.photographs.gsd)) * 2**shared.level
     spacing = np.sqrt(np.ptp(nodes[:, 0]) * np.ptp(nodes[:, 1]) / max(len(nodes), 1)) or gsd
     parts = list(_tiles(nodes, min(TILE_NODES * max(spacing, gsd), LARGEST_TILE_PX * gsd)))
-
-    def work(own: np.ndarray) -> None:
-        tile = _make_tile(photographs, nodes[own], own, prior, level, reach, options, models)
-        if (tile.chosen[:, 0] >= 0).any():
-            one(tile)
-
-    with ThreadPoolExecutor(thread_count()) as pool:
-        for k, _ in enumerate(pool.map(work, parts)):
-            report((k + 1) / len(parts))
+    middles = [nodes[own].mean(axis=0) for own in parts]
+    names = [f"tile about X {x:.0f}, Y {y:.0f} of level {shared.level}" for x, y in middles]
+    memory = BYTES_OF_TILE + shared.photographs.store.most_bytes
+    work = Work(do_tile, shared, parts, names, "tiles", at.folder, memory)
+    for own, found in zip(parts, at.executor.run(work, report), strict=True):
+        if found is not None:
+            yield own, found
 
 
-def _make_tile(
-    photographs: Photographs,
-    nodes: np.ndarray,
-    own: np.ndarray,
-    prior: Prior,
-    level: int,
-    reach: float,
-    options: MatchOptions,
-    models: Models | None,
-) -> Tile:
-    z, slopes, spare = prior.at(nodes)
+def do_tile(shared: TileWork, own: np.ndarray) -> Any:
+    """What is found for some nodes; None where no photograph shows them."""
+    tile = _make_tile(shared, own)
+    return shared.one(shared, tile) if (tile.chosen[:, 0] >= 0).any() else None
+
+
+def _make_tile(shared: TileWork, own: np.ndarray) -> Tile:
+    nodes, options, models = shared.nodes[own], shared.options, shared.models
+    z, slopes, spare = shared.prior.at(nodes)
     middle = 0.5 * (nodes.min(axis=0) + nodes.max(axis=0))
-    site = site_at(photographs, *middle.tolist())
+    site = site_at(shared.photographs, *middle.tolist())
     delta = np.column_stack([nodes, z]) - site.place
     ranges = np.column_stack([delta[:, 2] - spare, delta[:, 2] + spare])
     low, high = delta.min(axis=0), delta.max(axis=0)
     low[2], high[2] = ranges[:, 0].min(), ranges[:, 1].max()
-    view = site.view(level, low, high, options.edge, reach)
+    view = site.view(shared.level, low, high, options.edge, shared.reach)
     shown = np.flatnonzero(view.crops[:, 3] > 0)
     number = np.full(len(nodes), -1)
     if models is not None:
