@@ -8,6 +8,7 @@ import pytest
 
 import aerotri
 from aerotri import InputError
+from aerotri.execution.work import TasksFailedError
 from aerotri.public.run_steps import command_line
 from chain_of_fakes import Fakes, ends_of
 
@@ -161,3 +162,28 @@ def test_names_cannot_run_anything(fakes, tmp_path):
         assert "<img src=x" not in shown
         assert "<script>x" not in shown
     assert "<td>12</td>" in page
+
+
+def test_the_executor_is_passed_on_and_told(fakes, photographs, tmp_path):
+    out = tmp_path / "out"
+    aerotri.run(photographs, out, executor="processes:2")
+    _, _, terrain, dense, ortho = fakes.called
+    assert terrain[2]["executor"] == dense[2]["executor"] == "processes:2"
+    assert terrain[2]["scratch"].parent == out
+    assert not [path for path in out.iterdir() if path.name.startswith(".")]
+    assert "executor" not in ortho[2]
+    lines = {s["name"]: s["arguments"] for s in json.loads((out / "run.json").read_text())["steps"]}
+    assert lines["dsm"][-2:] == lines["dtm"][-2:] == ["--executor", "processes:2"]
+    assert "--executor" not in lines["ortho"]
+    with pytest.raises(InputError, match="'thread' is no executor"):
+        aerotri.run(photographs, out, executor="thread")
+
+
+def test_a_step_whose_tasks_failed_is_named_and_others_go_on(fakes, photographs, tmp_path):
+    fakes.ends["terrain"] = TasksFailedError([("tile 3", "no luck")], 9, "tiles", "run again")
+    project = aerotri.run(photographs, tmp_path / "out", boundary="pile.gpkg")
+    ends = ends_of(tmp_path / "out")
+    assert ends["dtm"] == ("failed", "1 of 9 tiles could not be computed: tile 3 (no luck) — run again")
+    assert ends["volume"] == ("left out", "dtm is missing")
+    assert ends["ortho"][0] == "done"
+    assert not project.complete

@@ -27,7 +27,9 @@ from aerotri.cli.options import (
     Seed,
     SurfaceLayer,
     SystemOfPhotographs,
+    Workers,
 )
+from aerotri.execution.choice import THREADS
 from aerotri.tie_points.settings import DEFAULTS
 from aerotri.volume.settings import RUN_LAYER
 
@@ -79,6 +81,7 @@ def run(
     dense: Annotated[
         bool, typer.Option(help="The dense surface and the orthophoto as well.", rich_help_panel=SURFACE)
     ] = True,
+    executor: Workers = THREADS,
     plots: Annotated[bool, typer.Option(help="Draw the plots of the adjustment.", rich_help_panel=OUTPUT)] = True,
     go_on: Annotated[
         bool,
@@ -98,5 +101,6 @@ def run(
         "geoid": geoid, "seed": seed, "parameters": parameters,
         "interval": metres_or_auto(interval) if interval else None,
         "boundary": boundary, "base": base, "layer": layer, "dense": dense, "plots": plots, "go_on": go_on,
+        "executor": executor,
     }  # fmt: skip
     raise typer.Exit(run_all(source, out, settings, json_))

@@ -65,11 +65,12 @@ class _Told:
         """Bad input stands in the summary; why an adjustment has no result is told here."""
         from aerotri.commands.adjust import failure_text
         from aerotri.deformation.absorbed import AbsorptionFailedError
+        from aerotri.execution.work import TasksFailedError
         from aerotri.results.failure import AdjustmentFailedError
 
         if isinstance(error, AdjustmentFailedError):
             self._console.failure(failure_text(error))
-        elif isinstance(error, AbsorptionFailedError):
+        elif isinstance(error, AbsorptionFailedError | TasksFailedError):
             self._console.failure(str(error))
 
     def _print(self, lines: list[str]) -> None:

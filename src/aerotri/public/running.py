@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from html import escape
 from pathlib import Path
@@ -11,6 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.deformation.absorbed import AbsorptionFailedError
+from aerotri.execution.choice import THREADS, chosen
+from aerotri.execution.opening import opened
+from aerotri.execution.work import TasksFailedError
 from aerotri.formats.results.json_text import write_json
 from aerotri.public.blocks import Sigmas
 from aerotri.public.progress import Progress, ProgressLike, StageReport, stage_report
@@ -137,6 +141,7 @@ def run(
     plots: bool = True,
     go_on: bool = False,
     further: Mapping[Verb, Mapping[str, Any]] | None = None,
+    executor: str = THREADS,
     on_step: OnStep | None = None,
     progress: ProgressLike = None,
 ) -> Project:
@@ -168,6 +173,8 @@ def run(
     plots : draw the plots of the adjustment.
     go_on : go on after an adjustment that was rejected.
     further : more settings of a step by the name of its verb, {'terrain': {'window': 21}}.
+    executor : where terrain and dense surface are measured: 'threads', 'processes:N', 'dask:ADDRESS' or
+        'dask:local:N'.
     on_step : takes each step when it begins, with None, and when it ended, with what it gave or why it failed.
     progress : see `aerotri.adjust`.
 
@@ -192,6 +199,7 @@ def run(
     """
     marked, names = not is_missing(control), {"check": tuple(check)}
     from_block = is_block(Path(source))
+    elsewhere = None if chosen(executor).kind == "threads" else executor
     settings: dict[Verb, dict[str, Any]] = {
         "tie_points": {
             "control": control, "control_sigma_m": control_sigma_m, "control_prefix": control_prefix if marked else "",
@@ -203,9 +211,9 @@ def run(
             "control_prefix": "" if marked else control_prefix,
             "plots": plots, **(names if from_block else {}),
         },
-        "terrain": {"interval": interval, "ground_within": boundary},
+        "terrain": {"interval": interval, "ground_within": boundary, "executor": elsewhere},
         "volume": {"boundary": boundary, "base": base, "layer": layer} if not is_missing(boundary) else {},
-        "dense": {}, "orthophoto": {},
+        "dense": {"executor": elsewhere}, "orthophoto": {},
     }  # fmt: skip
     for verb, more in (further or {}).items():
         settings[verb] |= more
@@ -213,6 +221,8 @@ def run(
     target = Path(f"{place.resolve().name}_project" if out is None else out)
     with stage_report(progress) as report:
         steps = steps_of(place, target, settings, dense)
+        with opened(executor, report.said):
+            pass  # a scheduler that does not answer is told now, not after hours
         return _Chain(Project(target, place), steps, settings, go_on, on_step, report).run()
 
 
@@ -260,6 +270,9 @@ class _Chain:
             # all is well with the input, but the equations have no solution
             outcome, ending = error, "is missing"
             step = replace(step, status="failed", reason=f"aerotri {step.name} ended with 1")
+        except TasksFailedError as error:
+            outcome, ending = error, "is missing"
+            step = replace(step, status="failed", reason=str(error))
         except InputError as error:
             if not self._project.steps:
                 raise
@@ -301,6 +314,7 @@ class _Chain:
         return found
 
     def _terrain(self, folder: Path) -> TerrainModel:
+        from aerotri.formats.files.atomic import room_beside
         from aerotri.public.folders import refuse_foreign_folder
         from aerotri.public.terrain import RECORD as DTM_RECORD
         from aerotri.public.terrain import terrain
@@ -308,8 +322,11 @@ class _Chain:
         settings, plots = self._given("terrain")
         refuse_foreign_folder(folder, DTM_RECORD)
         result = self._project.folder / RESULT
-        found = terrain(result, self._project.source, progress=self._progress, **settings)
-        found.save(folder, plots)
+        with ExitStack() as stack:
+            if "executor" in settings:
+                settings["scratch"] = stack.enter_context(room_beside(folder))
+            found = terrain(result, self._project.source, progress=self._progress, **settings)
+            found.save(folder, plots)
         self._project.surface = found
         return found
 

@@ -22,7 +22,7 @@ LARGEST_TILE_PX = 1500
 """Longest side of a tile in pixels of its level; chosen [C]: crops of 1500 × 1500 pixels, 4.5 MB, in up to 20
 photographs and all threads fit into memory."""
 BYTES_OF_TILE = 450_000_000
-"""Memory of a process that measures tiles, without the photographs that it keeps."""
+"""Memory of a process that measures tiles, without the photographs that it keeps: 0.4 GB were measured."""
 
 
 @dataclass(frozen=True, eq=False)
