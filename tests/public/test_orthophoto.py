@@ -74,6 +74,46 @@ def test_accuracy_has_its_parts(made):
         assert point["sigma"] is None or point["sigma"] > 0.0
 
 
+def test_a_run_that_was_ended_goes_on(made, tmp_path, monkeypatch):
+    """Tiles of 64 cells: ended after three of them, one cut off; the files are those of a run in one go."""
+    import importlib
+
+    here, result, _ = made
+    make = importlib.import_module("aerotri.terrain.ortho.make")
+    monkeypatch.setattr(make, "TILE", 64)
+    given = result, here / "block" / "photographs", here / "surface.tif"
+    tiles, whole = tmp_path / "tiles", make.make_tile
+    wanted = aerotri.orthophoto(*given, tmp_path / "one", cell=0.5, plots=False)
+    done = []
+
+    def ending(*arguments):
+        if len(done) == 5:
+            raise KeyboardInterrupt
+        done.append(arguments)
+        return whole(*arguments)
+
+    monkeypatch.setattr(make, "make_tile", ending)
+    with pytest.raises(KeyboardInterrupt):
+        aerotri.orthophoto(*given, tmp_path / "two", cell=0.5, plots=False, tiles=tiles)
+    assert not (tmp_path / "two").exists()
+    monkeypatch.setattr(make, "make_tile", whole)
+    kept = sorted(tiles.glob("ortho_*.npz"))
+    assert 3 <= len(kept) <= 5
+    kept[0].write_bytes(kept[0].read_bytes()[:100])
+    found = aerotri.orthophoto(*given, tmp_path / "two", cell=0.5, plots=False, tiles=tiles)
+    assert found.summary["tiles_resumed"] == len(kept) - 1
+    for name in ("ortho.tif", "photographs.tif", "sigma.tif"):
+        with rasterio.open(tmp_path / "one" / name) as one, rasterio.open(tmp_path / "two" / name) as two:
+            np.testing.assert_array_equal(one.read(), two.read())
+    assert found.summary | {"tiles_resumed": 0} == wanted.summary
+    # other settings do not take them up
+    again = aerotri.orthophoto(*given, tmp_path / "two", cell=0.5, plots=False, tiles=tiles, seams=False)
+    assert again.summary["tiles_resumed"] == 0
+    (tiles / "notes.txt").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match="other files than tiles"):
+        aerotri.orthophoto(*given, tmp_path / "two", cell=0.5, plots=False, tiles=tiles)
+
+
 def test_a_surface_in_memory_gives_the_same(made):
     here, result, found = made
     with rasterio.open(here / "surface.tif") as file:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ from aerotri.commands.results import reopened
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.tile_folder import remove_tiles, tiles_beside
 from aerotri.terrain.settings import DenseSettings
 
 if TYPE_CHECKING:
@@ -30,11 +30,11 @@ def run_dsm(
     chosen(executor)
     target = out or Path(f"{source.resolve().name.removesuffix('_result')}_dsm")
     refuse_foreign_folder(target, RECORD)
-    tiles = target.with_name(f"{target.name}.tiles")
+    tiles = tiles_beside(target)
     found = measure_dense(Adjustment(reopened(source, console)), photographs, settings, tiles, console.stage, executor)
     console.progress("writing")
     found.save(target, plots)
-    shutil.rmtree(tiles, ignore_errors=True)
+    remove_tiles(tiles)
     if as_json:
         print(json_text(found.summary))
     else:

@@ -25,6 +25,7 @@ def run_ortho(
     from aerotri.public.folders import refuse_foreign_folder
     from aerotri.public.ortho import RECORD, make_ortho
     from aerotri.public.surfaces import as_surface
+    from aerotri.public.tile_folder import remove_tiles, tiles_beside
 
     console = Console(quiet=as_json)
     settings.check()
@@ -34,7 +35,9 @@ def run_ortho(
         raise InputError(f"there is no layer '{layer}'", f"choose one of {', '.join(LAYERS)}")
     ground = as_surface(surface, layer)
     result = Adjustment(reopened(source, console))
-    found = make_ortho(result, photographs, ground, target, settings, plots, console.stage)
+    tiles = tiles_beside(target)
+    found = make_ortho(result, photographs, ground, target, settings, plots, tiles, console.stage)
+    remove_tiles(tiles)
     if as_json:
         print(json_text(found.summary))
     else:
@@ -57,6 +60,8 @@ def outcome_lines(found: Orthophoto) -> list[str]:
         f"photograph sees, {area['other_photograph']:.0f} m² are hidden in the photograph around them and taken from "
         "another"
     )
+    if s["tiles_resumed"]:
+        lines.append(f"tiles made before: {s['tiles_resumed']}")
     if area["bridged"] > 0.0:
         lines.append(f"{area['bridged']:.0f} m² of it over bridged holes of the surface: σ is not known there")
     parts = [f"orientation {sigma['orientation']['median']:.3f}", f"image {sigma['image']['median']:.3f}"]

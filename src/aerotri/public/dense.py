@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -21,8 +19,8 @@ from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
 from aerotri.public.surfaces import Surface
 from aerotri.public.terrain import rows_and_files
+from aerotri.public.tile_folder import fingerprints, open_tiles
 from aerotri.terrain.settings import DENSE_DEFAULTS, DenseSettings
-from aerotri.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,7 +32,6 @@ if TYPE_CHECKING:
 RECORD, SURFACE, MATCHING, COUNT, CLOUD = "dsm.json", "dsm.tif", "matching.tif", "photographs.tif", "dsm.laz"
 GROUND, SOURCE = "dtm.tif", "ground.tif"
 OWN_NAMES = (RECORD, SURFACE, MATCHING, COUNT, CLOUD, GROUND, SOURCE, "plots")
-STATED = "tiles.json"
 DRAWN = 1200
 """Cells drawn along a side, the others skipped."""
 
@@ -267,7 +264,8 @@ def measure_dense(
         keeper = Spool()
         tiles = keeper.folder
     else:
-        _open_tiles(tiles, settings, key, paths)
+        of_tiles = {name: value for name, value in asdict(settings).items() if name not in ("ground", "widest_object")}
+        open_tiles(tiles, {"settings": of_tiles, "adjustment": key, "photographs": fingerprints(paths)})
     area = None if settings.area is None else Area(np.array(settings.area[:2]), np.array(settings.area[2:]))
     plan = DensePlan(rows, paths, tiles, settings.resolution, area, settings.most_pairs, settings.edge, settings.ideal)
     with stage_report(progress) as report, opened(executor, report.said) as workers:
@@ -275,35 +273,6 @@ def measure_dense(
     ground = bare_ground(outcome, settings.widest_object) if settings.ground else None
     block = record.result.block
     return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper)
-
-
-def _open_tiles(folder: Path, settings: DenseSettings, key: str, paths: tuple[Path, ...]) -> None:
-    """Make the folder of the tiles; tiles of other settings, photographs or adjustments are removed.
-
-    Raises
-    ------
-    InputError
-        When it holds other files, or cannot be written to.
-    """
-    files = [[path.name, path.stat().st_size, path.stat().st_mtime_ns] for path in paths]
-    of_tiles = {name: value for name, value in asdict(settings).items() if name not in ("ground", "widest_object")}
-    stated = json.dumps(
-        {"settings": of_tiles, "adjustment": key, "photographs": files, "aerotri": __version__}, sort_keys=True
-    )
-    mark = hashlib.sha256(stated.encode()).hexdigest()
-    there = folder / STATED
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        held = [path for path in folder.iterdir() if path.name != STATED]
-        if any(path.suffix not in (".npz", ".part", ".shared") for path in held):
-            raise InputError("holds other files than tiles", "give another folder for the tiles", folder)
-        if there.is_file() and there.read_text(encoding="utf-8") == mark:
-            return
-        for path in held:
-            path.unlink()
-        there.write_text(mark, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot be written to: {error}", "give another place for the tiles", folder) from error
 
 
 def _surface_parts(o: DenseOutcome) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,10 +14,11 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import paths_of, refuse_foreign_folder
-from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
 from aerotri.public.surfaces import as_surface
 from aerotri.public.terrain import ENDINGS
+from aerotri.public.tile_folder import fingerprints, open_tiles
 from aerotri.terrain.ortho.settings import DEFAULTS, OrthoSettings, Sampling
 from aerotri.volume.settings import LAYERS, Layer
 
@@ -131,6 +132,7 @@ def orthophoto(
     fill: float = DEFAULTS.fill,
     layer: Layer = LAYER,
     plots: bool = True,
+    tiles: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> Orthophoto:
     """Make a true orthophoto: every cell of the ground from the photograph that sees it best.
@@ -151,6 +153,8 @@ def orthophoto(
     fill : m, holes of the surface that are at most so wide are bridged for the picture; σ is not known there.
     layer : surface of a terrain model: with objects (dsm) or without (dtm).
     plots : draw the orthophoto and the points in it.
+    tiles : folder for the tiles of the orthophoto; a run that was ended goes on with those it finds there. None: they
+        are not kept.
     progress : as of `aerotri.adjust`.
 
     Returns
@@ -174,12 +178,14 @@ def orthophoto(
     settings = OrthoSettings(cell, area, edge, resampling, balance, seams, ideal, fill)
     if layer not in LAYERS:
         raise InputError(f"there is no layer '{layer}'", f"choose one of {', '.join(LAYERS)}")
-    return make_ortho(result, paths_of(photographs), as_surface(surface, layer), Path(out), settings, plots, progress)
+    kept = None if tiles is None else Path(tiles)
+    ground = as_surface(surface, layer)
+    return make_ortho(result, paths_of(photographs), ground, Path(out), settings, plots, kept, progress)
 
 
 def make_ortho(
     result: Adjustment | FilePath, photographs: Sequence[Path], surface: SurfaceLike, out: Path,
-    settings: OrthoSettings, plots: bool = True, progress: ProgressLike = None,
+    settings: OrthoSettings, plots: bool = True, tiles: Path | None = None, progress: ProgressLike = None,
 ) -> Orthophoto:  # fmt: skip
     """As `orthophoto`, with the settings in one record.
 
@@ -189,16 +195,20 @@ def make_ortho(
     """
     from aerotri.formats.files.atomic import atomic_folder
     from aerotri.rasters.grids import horizontal_crs
+    from aerotri.terrain.ortho.make import make_orthophoto
 
     settings.check()
     refuse_foreign_folder(out, RECORD)
     record = (result if isinstance(result, Adjustment) else open_result(result)).record
     chosen = _photographs(record, photographs)
     ground = as_surface(surface, LAYER)
+    if tiles is not None:
+        open_tiles(tiles, _stated(record, chosen[1], ground, settings))
     with ExitStack() as stack, stage_report(progress) as report:
         heights, sigma, notes = _opened(ground, horizontal_crs(record.result.block.crs), stack)
         folder = stack.enter_context(atomic_folder(out, own=OWN_NAMES))
-        outcome, summary, points = _made(record, chosen, (heights, sigma), ground.label, settings, folder, report)
+        made = make_orthophoto(record, chosen, (heights, sigma), settings, folder, report.stage, tiles)
+        outcome, summary, points = _described(record, made, ground.label, settings, folder)
         if plots:
             from aerotri.report.plots.rendering import save_plots
 
@@ -208,21 +218,37 @@ def make_ortho(
     return Orthophoto(out, summary, outcome, points, notes)
 
 
-def _made(
-    record: Record, chosen: tuple[np.ndarray, tuple[Path, ...]], surface: tuple[Any, Any], name: str,
-    settings: OrthoSettings, folder: Path, report: StageReport,
-) -> tuple[OrthoOutcome, dict[str, Any], tuple[Any, ...]]:  # fmt: skip
+def _described(
+    record: Record, outcome: OrthoOutcome, name: str, settings: OrthoSettings, folder: Path
+) -> tuple[OrthoOutcome, dict[str, Any], tuple[Any, ...]]:
+    """Write seams and record beside the image."""
     from aerotri.formats.results.json_text import write_json
     from aerotri.formats.results.ortho import marked_points, ortho_json, write_seams
     from aerotri.rasters.grids import horizontal_crs
-    from aerotri.terrain.ortho.make import make_orthophoto
 
     block = record.result.block
-    outcome = make_orthophoto(record, chosen, surface, settings, folder, report.stage)
     write_seams(folder / SEAMS, outcome, horizontal_crs(block.crs))
     summary = ortho_json(outcome, block, name, settings.resampling)
     write_json(folder / RECORD, summary)
     return outcome, summary, tuple(marked_points(outcome, block))
+
+
+def _stated(record: Record, paths: Sequence[Path], surface: Any, settings: OrthoSettings) -> dict[str, Any]:
+    """All that tiles depend on."""
+    import hashlib
+
+    from aerotri.volume.shared import adjustment_key
+
+    if surface.path is None:
+        heights = surface.heights
+        held = hashlib.sha256(np.ascontiguousarray(heights.z).tobytes()).hexdigest()
+        of_surface: list[Any] = [held, repr(heights.grid)]
+    else:
+        of_surface = fingerprints([surface.path])
+    return {
+        "settings": asdict(settings), "adjustment": adjustment_key(record), "surface": of_surface,
+        "photographs": fingerprints(paths),
+    }  # fmt: skip
 
 
 def _photographs(record: Record, given: Sequence[Path]) -> tuple[np.ndarray, tuple[Path, ...]]:

@@ -345,29 +345,31 @@ class _Chain:
         return found
 
     def _dense(self, folder: Path) -> DenseSurface:
-        import shutil
-
         from aerotri.public.dense import RECORD as DENSE_RECORD
         from aerotri.public.dense import dense_surface
         from aerotri.public.folders import refuse_foreign_folder
+        from aerotri.public.tile_folder import remove_tiles, tiles_beside
 
         settings, plots = self._given("dense")
         refuse_foreign_folder(folder, DENSE_RECORD)
-        tiles = folder.with_name(f"{folder.name}.tiles")
+        tiles = tiles_beside(folder)
         result = self._project.folder / RESULT
         found = dense_surface(result, self._project.source, tiles=tiles, progress=self._progress, **settings)
         found.save(folder, plots)
-        shutil.rmtree(tiles, ignore_errors=True)
+        remove_tiles(tiles)
         self._project.dense = found
         return found
 
     def _orthophoto(self, folder: Path) -> Orthophoto:
         from aerotri.public.ortho import orthophoto
+        from aerotri.public.tile_folder import remove_tiles, tiles_beside
 
         (settings, plots), place = self._given("orthophoto"), self._project.folder
         found = orthophoto(
-            place / RESULT, self._project.source, place / DSM, folder, plots=plots, progress=self._progress, **settings
+            place / RESULT, self._project.source, place / DSM, folder, plots=plots, tiles=tiles_beside(folder),
+            progress=self._progress, **settings,
         )  # fmt: skip
+        remove_tiles(tiles_beside(folder))
         self._project.orthophoto = found
         return found
 

@@ -41,6 +41,7 @@ ORTHO_JSON = (
         "Interpolation in the photographs.",
         values={"bicubic": "", "bilinear": "", "nearest": ""},
     ),
+    Item("tiles_resumed", "whole", "Pieces that an earlier run, which was ended, had made."),
     Item("area_m2", "object", "Areas.", "m²"),
     *(Item(f"area_m2.{name}", "number", text, "m²") for name, text in AREAS),
     Item("sigma_m", "object", "Standard deviation of X and Y of what the orthophoto shows, each.", "m"),

@@ -27,6 +27,8 @@ NOISE = 1e-3
 """Least standard deviation of colours, share of white [C]: one without any texture says nothing about gains."""
 CORRELATED_CELLS = 25.0
 """Neighbouring cells differ alike: one in so many counts [C]."""
+MOST_COUNTED = 20_000_000
+"""Pairs of photographs that are counted in a table; more are sorted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,10 +111,19 @@ def _sums(
         first.append(one[usable].astype(float))
         second.append(other[usable].astype(float))
     x, y = np.concatenate(first), np.concatenate(second)
-    which, at = np.unique(np.concatenate(pairs), return_inverse=True)
+    which, at = _numbered(np.concatenate(pairs), count * count)
     sums = np.stack([np.bincount(at, w, len(which)) for w in (np.ones_like(x), x, y, x * x, y * y, x * y)], axis=1)
     enough = sums[:, 0] >= FEWEST_CELLS
     return which[enough] // count, which[enough] % count, sums[enough]
+
+
+def _numbered(values: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Whole numbers below `most` that occur, rising, and the place of every value among them."""
+    if most > MOST_COUNTED:
+        return np.unique(values, return_inverse=True)
+    there = np.zeros(most, bool)
+    there[values] = True
+    return np.flatnonzero(there), (np.cumsum(there) - 1)[values]
 
 
 def _solved(n: int, a: np.ndarray, b: np.ndarray, sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -29,6 +29,7 @@ from aerotri.terrain.ortho.ground import TILE, GroundSurface, ground_surface, ti
 from aerotri.terrain.ortho.pixels import PixelStore
 from aerotri.terrain.ortho.seams import Choice, choose
 from aerotri.terrain.ortho.settings import OrthoSettings
+from aerotri.terrain.ortho.tile_files import OrthoTiles
 from aerotri.terrain.ortho.tiles import Sources, Tile, make_tile
 from aerotri.terrain.photographs import Photographs, photographs_of
 from aerotri.terrain.pickets import footprint
@@ -53,6 +54,7 @@ class OrthoOutcome:
     candidates, choice, balance, accuracy : of the coarse cells.
     cells : (n,) cells of every photograph. heights : cells with a height. hidden : those among them that the
         photograph chosen for their place does not see. bridged : cells of the image over bridged holes of the surface.
+    resumed : tiles that an earlier run had made.
     """
 
     grid: Grid
@@ -68,6 +70,7 @@ class OrthoOutcome:
     heights: int
     hidden: int
     bridged: int
+    resumed: int
 
 
 def make_orthophoto(
@@ -77,13 +80,15 @@ def make_orthophoto(
     settings: OrthoSettings,
     folder: Path,
     report: Report,
+    tiles: Path | None = None,
 ) -> OrthoOutcome:
     """Make an orthophoto and write its rasters.
 
     Parameters
     ----------
     chosen : photographs of the block, and their files. surface : its heights, and their σ where it has them; in
-        metres and in the CRS of the block. folder : to write to.
+        metres and in the CRS of the block. folder : to write to. tiles : where tiles are kept, those that are there are
+        taken up; None: not.
 
     Raises
     ------
@@ -110,7 +115,8 @@ def make_orthophoto(
             photographs, pixels, ground, candidates, choice, balance, settings.edge, settings.resampling
         )  # fmt: skip
         crs = horizontal_crs(calibration.result.block.crs)
-        cells, counts = _written(sources, grid, folder, crs, report)
+        kept = None if tiles is None else OrthoTiles(tiles)
+        cells, counts = _written(sources, grid, folder, crs, kept, report)
     with RasterWriter(folder / SIGMAS, candidates.grid, crs=crs, options=COMPRESSED) as writer:
         writer.describe("σ of X and Y, m")
         writer.write(0, 0, accuracy.total.astype(np.float32))
@@ -175,21 +181,31 @@ def _candidates(
 
 
 def _written(
-    sources: Sources, grid: Grid, folder: Path, crs: str | None, report: Report
-) -> tuple[np.ndarray, tuple[int, int, int]]:
-    """Write all tiles; cells of every photograph; cells with heights, hidden ones, and those over bridged holes."""
-    cells, heights, hidden, bridges = np.zeros(len(sources.photographs), np.int64), 0, 0, 0
+    sources: Sources, grid: Grid, folder: Path, crs: str | None, kept: OrthoTiles | None, report: Report
+) -> tuple[np.ndarray, tuple[int, int, int, int]]:
+    """Write all tiles; cells of every photograph; cells with heights, hidden ones, those over bridged holes, and tiles
+    that an earlier run had made."""
+    cells, heights, hidden, bridges, resumed = np.zeros(len(sources.photographs), np.int64), 0, 0, 0, 0
     bands = (*(f"band {b + 1}" for b in range(sources.pixels.bands)), "mask")
 
-    def one(place: tuple[int, int, Grid]) -> Tile | None:
-        return make_tile(sources, *place)
+    def one(place: tuple[int, int, Grid]) -> tuple[bool, Tile | None]:
+        row, column, own = place
+        if kept is None:
+            return False, make_tile(sources, row, column, own)
+        was_there, tile = kept.read(row, column, (own.rows, own.columns))
+        if not was_there:
+            tile = make_tile(sources, row, column, own)
+            kept.write(row, column, tile)
+        return was_there, tile
 
     layers = (PHOTOGRAPH_BAND, *([BRIDGED_BAND] if isinstance(sources.surface.reader, BridgedReader) else []))
     with (
         write_mosaic(folder / IMAGE, grid, bands, sources.pixels.dtype.name, crs, True) as image,
         write_mosaic(folder / NUMBERS, grid, layers, "int32", crs, False) as numbers,
     ):
-        for tile in results_in_threads(one, list(tiles_of(grid, TILE)), lambda done: report("cells", 0.95 * done)):
+        places = list(tiles_of(grid, TILE))
+        for was_there, tile in results_in_threads(one, places, lambda done: report("cells", 0.95 * done)):
+            resumed += was_there
             if tile is None:
                 continue
             image.write(tile.row, tile.column, tile.colours)
@@ -198,7 +214,7 @@ def _written(
             heights, hidden = heights + tile.heights, hidden + tile.hidden
             bridges += 0 if tile.bridged is None else int((tile.bridged & (tile.number >= 0)).sum())
         report("overviews", 0.95)
-    return cells, (heights, hidden, bridges)
+    return cells, (heights, hidden, bridges, resumed)
 
 
 def _numbers_of(tile: Tile) -> np.ndarray:

@@ -42,6 +42,8 @@ class PixelStore:
         self._lock, self._bytes = Lock(), 0
         self._locks = [Lock() for _ in paths]
         self.bands, self.dtype, self._white = self._kind()
+        pixels = sum(columns * rows for columns, rows in sizes)
+        self._all_fit = pixels * self.bands * self.dtype.itemsize <= CACHE_BYTES
 
     def _kind(self) -> tuple[int, np.dtype, float]:
         first: tuple[int, np.dtype] | None = None
@@ -78,7 +80,16 @@ class PixelStore:
 
     def reduced(self, k: int, times: float) -> np.ndarray:
         """(rows, columns, bands) of the whole photograph k, about so many times smaller; not kept."""
+        import cv2
+
         columns, rows = (max(int(side / max(times, 1.0)), 1) for side in self._sizes[k])
+        # where all stay in memory they are read once
+        if self._all_fit and (whole := self._whole(k)) is not None:
+            parts = (
+                cv2.resize(np.ascontiguousarray(whole[:, :, b : b + 4]), (columns, rows), interpolation=cv2.INTER_AREA)
+                for b in range(0, self.bands, 4)
+            )
+            return np.concatenate([part.reshape(rows, columns, -1) for part in parts], axis=2)
         with open_photograph(self._paths[k]) as photograph:
             return by_pixel(photograph.reduced(rows, columns))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.rasters.grids import Grid
-from aerotri.terrain.ortho._sight_kernels import Cells, look
+from aerotri.terrain.ortho._sight_kernels import Cells, centres_for, look
 from aerotri.terrain.ortho.balance import Balance
 from aerotri.terrain.ortho.candidates import Candidates
 from aerotri.terrain.ortho.ground import GroundSurface, TileGround, tile_ground
@@ -78,8 +78,9 @@ def make_tile(sources: Sources, row: int, column: int, grid: Grid) -> Tile | Non
     number = np.full(shape, -1, np.int32)
     known = ~np.isnan(ground.cells.z)
     todo, hidden = known.copy(), 0
-    for place, wanted in enumerate(_wanted(sources, row, column, shape)):
-        for k in np.unique(wanted[todo]).tolist():
+    for place, chosen in enumerate((s.choice.number, *s.candidates.found)):
+        own, wanted = _wanted(chosen, s.candidates.step, row, column, shape)
+        for k in np.unique(own).tolist():
             if k >= 0:
                 _take(sources, ground, k, todo & (wanted == k), out, number)
         todo &= number < 0
@@ -98,12 +99,17 @@ def make_tile(sources: Sources, row: int, column: int, grid: Grid) -> Tile | Non
     return Tile(row, column, colours, number, int(known.sum()), hidden, None if bridged is None else bridged & known)
 
 
-def _wanted(sources: Sources, row: int, column: int, shape: tuple[int, int]) -> list[np.ndarray]:
-    """(r, c) photographs of the cells: those chosen, then the candidates of their coarse cells, the best first."""
-    step = sources.candidates.step
+def _wanted(
+    chosen: np.ndarray, step: int, row: int, column: int, shape: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Photographs of the coarse cells of a tile, and (r, c) of its cells.
+
+    Parameters
+    ----------
+    chosen : of all coarse cells. step : cells along a side of one. row, column : of the tile's first cell.
+    """
     i, j = (row + np.arange(shape[0])) // step, (column + np.arange(shape[1])) // step
-    part = np.ix_(i, j)
-    return [sources.choice.number[part], *(layer[part] for layer in sources.candidates.found)]
+    return chosen[i[0] : i[-1] + 1, j[0] : j[-1] + 1], chosen[np.ix_(i, j)]
 
 
 def _take(
@@ -117,13 +123,13 @@ def _take(
     c = ground.cells
     cells = Cells(c.z[part], c.origin + c.cell * np.array([columns[0], -rows[0]]), c.cell)
     column, row = np.empty(cells.z.shape, np.float32), np.empty(cells.z.shape, np.float32)
-    look(ground.view, k, cells, ground.obstacles, wanted[part], column, row)
+    look(ground.view, k, cells, ground.obstacles, wanted[part], centres_for(ground.obstacles), column, row)
     seen = ~np.isnan(column)
     if not seen.any():
         return
     colours = _sampled(sources, k, column, row, seen, c.cell)
-    out[part][seen] = colours[seen]
-    number[part][seen] = k
+    np.copyto(out[part], colours, where=seen[:, :, None])
+    np.copyto(number[part], np.int32(k), where=seen)
 
 
 def _sampled(
@@ -163,4 +169,10 @@ def _in_balance(colours: np.ndarray, balance: Balance, k: int, white: float) -> 
     gain, offset = balance.gain[k].astype(np.float32), balance.offset[k].astype(np.float32) * np.float32(white)
     if (gain == 1.0).all() and (offset == 0.0).all():
         return colours
+    if colours.dtype == np.uint8:
+        import cv2
+
+        table = np.clip(np.rint(np.arange(256, dtype=np.float32)[:, None] * gain + offset), 0.0, white)
+        parts = [cv2.LUT(colours[:, :, b], table[:, b].astype(np.uint8)) for b in range(colours.shape[2])]
+        return np.stack(parts, axis=-1)
     return np.clip(np.rint(colours * gain + offset), 0.0, white).astype(colours.dtype)

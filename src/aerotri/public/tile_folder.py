@@ -1,0 +1,60 @@
+"""The folder that keeps the tiles of a run, so that one that was ended goes on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from aerotri.conventions import InputError
+from aerotri.version import __version__
+
+STATED = "tiles.json"
+SUFFIXES = (".npz", ".part", ".shared")
+
+
+def tiles_beside(target: Path) -> Path:
+    """Where the tiles of a result are kept until it is written."""
+    return target.with_name(f"{target.name}.tiles")
+
+
+def remove_tiles(folder: Path) -> None:
+    """When the result is written."""
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def fingerprints(paths: Iterable[Path]) -> list[list[Any]]:
+    """Name, size and time of files: tiles of other ones are not taken up."""
+    return [[path.name, path.stat().st_size, path.stat().st_mtime_ns] for path in paths]
+
+
+def open_tiles(folder: Path, stated: Mapping[str, Any]) -> None:
+    """Make the folder of the tiles; tiles of anything else than what is stated are removed.
+
+    Parameters
+    ----------
+    stated : all that the tiles depend on, as JSON has it.
+
+    Raises
+    ------
+    InputError
+        When it holds other files, or cannot be written to.
+    """
+    text = json.dumps({**stated, "aerotri": __version__}, sort_keys=True)
+    mark = hashlib.sha256(text.encode()).hexdigest()
+    there = folder / STATED
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        held = [path for path in folder.iterdir() if path.name != STATED]
+        if any(path.suffix not in SUFFIXES for path in held):
+            raise InputError("holds other files than tiles", "give another folder for the tiles", folder)
+        if there.is_file() and there.read_text(encoding="utf-8") == mark:
+            return
+        for path in held:
+            path.unlink()
+        there.write_text(mark, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot be written to: {error}", "give another place for the tiles", folder) from error
