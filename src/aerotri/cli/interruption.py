@@ -18,8 +18,7 @@ class Interrupted(KeyboardInterrupt):
 
 def is_program() -> bool:
     """Whether this process is the command line program, and not one that imports it."""
-    multiprocessing = sys.modules.get("multiprocessing.process")
-    if multiprocessing is not None and multiprocessing.parent_process() is not None:
+    if "--multiprocessing-fork" in sys.orig_argv:
         return False  # a process that the program started
     name = os.path.basename(sys.argv[0]) if sys.argv else ""
     return name == "-m" or name.removesuffix(".exe") == "aerotri" or name.endswith("aerotri/cli/__main__.py")

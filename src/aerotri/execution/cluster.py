@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import logging
 import queue
+import signal
 import uuid
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import dask
-from distributed import Client, LocalCluster
+from distributed import Client, LocalCluster, WorkerPlugin
 
 from aerotri.conventions import InputError
 from aerotri.execution.elsewhere import ONE_THREAD, outcome_in, parcels, perform
@@ -128,6 +129,7 @@ class Dask:
             )
         )  # fmt: skip
         self._client = self._stack.enter_context(Client(cluster))
+        self._client.register_plugin(_NotInterrupted())
         self._say_dashboard()
 
     def _say_dashboard(self) -> None:
@@ -162,6 +164,15 @@ class Dask:
                 else "give fewer workers",
             )
         return {"resources": {MEMORY: work.bytes_each}} if offered else {}
+
+
+class _NotInterrupted(WorkerPlugin):
+    """An interrupt of the terminal reaches all processes; ours ends the workers, which say nothing."""
+
+    def setup(self, worker: Any) -> None:
+        """Called in the main thread of a worker when it begins."""
+        with suppress(ValueError):
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _memory_of_thread(worker: dict[str, Any]) -> float:
