@@ -19,6 +19,7 @@ from aerotri.version import __version__
 if TYPE_CHECKING:
     from aerotri import observations as observations
     from aerotri.conventions import InputError as InputError
+    from aerotri.execution.work import TasksFailedError as TasksFailedError
     from aerotri.observations import Block as Block
     from aerotri.pipeline import AdjustmentFailedError as AdjustmentFailedError
     from aerotri.public import drawing as drawing
@@ -69,6 +70,7 @@ _PLACES = {
     "InputError": "aerotri.conventions",
     "Surface": "aerotri.public.surfaces",
     "Table": "aerotri.public.table",
+    "TasksFailedError": "aerotri.execution.work",
     "accuracy": "aerotri.public.accuracy",
     "changes": "aerotri.public.changes",
     "check": "aerotri.public.block_check",
@@ -116,6 +118,7 @@ __all__ = [
     "InputError",
     "Surface",
     "Table",
+    "TasksFailedError",
     "__version__",
     "accuracy",
     "adjust",
