@@ -79,11 +79,21 @@ SCENES: dict[str, tuple[dict, dict]] = {
     "no texture": ({"kind": "flat"}, {"contrast": 0.004, "noise": 300.0}),
 }  # fmt: skip
 """Ground and how it is rendered."""
+
+
+def crowns() -> list[list[float]]:
+    """Sixty blocks of 4 to 8 m, 4 to 12 m high, in no order: as trees stand, each as a box."""
+    rng = np.random.default_rng(7)
+    xy, side, height = rng.uniform(-130.0, 130.0, (60, 2)), rng.uniform(4.0, 8.0, 60), rng.uniform(4.0, 12.0, 60)
+    return [[float(x), float(y), float(s), float(s), float(h)] for (x, y), s, h in zip(xy, side, height, strict=True)]
+
+
 WALL = [[0.0, 0.0, 150.0, 4.0, 12.0], [-60.0, 60.0, 6.0, 6.0, 20.0], [60.0, -60.0, 6.0, 6.0, 20.0]]
 UNDULATING = {"kind": "undulating", "relief_rms_m": 6.0, "wavelength_m": 150.0}
 SCENES |= {
     "repeated texture": (UNDULATING, {}), "shadow": (UNDULATING, {}), "water": (UNDULATING, {}),
-    "wall": (UNDULATING | {"houses": WALL}, {}), "tilted": (UNDULATING, {}), "y-parallax": (UNDULATING, {}),
+    "wall": (UNDULATING | {"houses": WALL}, {}), "trees": (UNDULATING | {"houses": crowns()}, {}),
+    "tilted": (UNDULATING, {}), "y-parallax": (UNDULATING, {}),
 }  # fmt: skip
 OTHER_SPEC: dict[str, dict[str, dict]] = {
     "tilted": {"flight": {"attitude_sigma_deg": [12.0, 12.0, 10.0]}},
