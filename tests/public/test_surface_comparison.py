@@ -31,6 +31,24 @@ def raised(surface, by):
     return replace(surface, source=replace(surface.source, z=surface.z + by), name="raised")
 
 
+def test_sigma_of_the_bias_knows_what_neighbours_share(control):
+    """Means of noise with and without correlation scatter as stated; Σz² of 30 in the 99.9 % band."""
+    from scipy.ndimage import uniform_filter
+    from scipy.stats import chi2
+
+    for window in (1, 5):
+        z = []
+        for seed in range(30):
+            white = np.random.default_rng([seed, window]).normal(0.0, 0.2, control.z.shape)
+            noise = window * uniform_filter(white, window, mode="wrap")
+            found = aerotri.compare(raised(control, noise), control)
+            assert found.bias_sigma is not None
+            z.append(found.bias / found.bias_sigma)
+            assert found.noise_length == pytest.approx(window * CELL, rel=0.35)
+        low, high = chi2.ppf([0.0005, 0.9995], 30)
+        assert low < np.sum(np.square(z)) < high
+
+
 def test_a_known_difference(control):
     noise = np.random.default_rng(3).normal(0.3, 0.2, control.z.shape)
     found = aerotri.compare(raised(control, noise), control)

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 RECORD = "compare.json"
 OWN_NAMES = (RECORD, "difference.tif", "plots")
+GROSS = 4.0
+"""NMAD from the median beyond which a difference does not tell the noise; chosen [C]: normal noise has none there."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,6 +60,25 @@ class SurfaceComparison:
     def bias(self) -> float:
         """m, mean of the differences."""
         return self.record.statistics.bias
+
+    @cached_property
+    def noise_length(self) -> float | None:
+        """m, side of the square whose cells share one noise, from the differences; None where too few tell."""
+        from aerotri.volume.change.noise import cells_of_one_noise
+
+        d, s = self.record.difference, self.record.statistics
+        usual = np.abs(d - s.median) <= GROSS * max(s.nmad, 1e-12)
+        cells = cells_of_one_noise(np.where(usual, d - np.mean(d[usual]), np.nan)) if usual.any() else 0.0
+        return float(np.sqrt(cells)) * self.record.grid.cell_x if cells > 0.0 else None
+
+    @property
+    def bias_sigma(self) -> float | None:
+        """m, σ of the mean difference as its cells scatter: those of one noise count once; None where not known."""
+        if self.noise_length is None:
+            return None
+        s, grid = self.record.statistics, self.record.grid
+        independent = max(s.count * grid.cell_x * grid.cell_y / self.noise_length**2, 1.0)
+        return s.std / float(np.sqrt(independent))
 
     @property
     def nmad(self) -> float:
@@ -91,7 +112,8 @@ class SurfaceComparison:
         """The content of compare.json."""
         from aerotri.formats.results.terrain import comparison_json
 
-        return comparison_json(self.record, self.test, self.control, self.method)
+        sure = {"sigma_bias_m": self.bias_sigma, "noise_length_m": self.noise_length}
+        return comparison_json(self.record, self.test, self.control, self.method) | sure
 
     def plot(self) -> Figure:
         """The differences as a map and as a histogram."""

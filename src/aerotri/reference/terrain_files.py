@@ -132,6 +132,8 @@ COMPARE_JSON = (
     Item("alignment.shift_m[]", "number", "Shift in X, Y, Z.", "m"),
     Item("alignment.rotation_rad[]", "number", "Rotation about X, Y, Z.", "rad"),
     Item("alignment.about_m[]", "number", "Point of the rotation.", "m"),
+    Item("sigma_bias_m", "number?", "Standard deviation of the mean difference: cells of one noise count once.", "m"),
+    Item("noise_length_m", "number?", "Side of the square whose cells share one noise; null where too few tell.", "m"),
 )
 METHOD_WORDS = dict(
     zip(
