@@ -24,6 +24,8 @@ ROWS_AT_A_TIME = 1024
 TAIL_PERCENT = 0.1
 """Share of the pixels of more than 8 bits that may be cut at either end when they are brought to 8 bits; chosen [C]: a
 few specular pixels would otherwise leave the ground two dozen grey values."""
+MOST_SAMPLED = 1_000_000
+"""Pixels of a photograph that its range of grey values is taken of."""
 
 
 class GreyStore:
@@ -101,7 +103,8 @@ def _stretched(grey: np.ndarray) -> np.ndarray:
     known = np.isfinite(grey)
     if not known.any():
         return np.zeros(grey.shape, np.uint8)
-    low, high = np.percentile(grey[known], [TAIL_PERCENT, 100.0 - TAIL_PERCENT])
+    sample = grey[known]
+    low, high = np.percentile(sample[:: len(sample) // MOST_SAMPLED + 1], [TAIL_PERCENT, 100.0 - TAIL_PERCENT])
     scaled = (np.where(known, grey, low) - low) * (255.0 / (high - low if high > low else 1.0))
     return np.clip(scaled + 0.5, 0.0, 255.0).astype(np.uint8)
 
