@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from aerotri.public.image_errors import ImageErrors as ImageErrors
     from aerotri.public.models import deform as deform
     from aerotri.public.ortho import orthophoto as orthophoto
+    from aerotri.public.planning import plan_flight as plan_flight
     from aerotri.public.results import adjust as adjust
     from aerotri.public.results import open_result as open_result
     from aerotri.public.running import run as run
@@ -95,6 +96,7 @@ _PLACES = {
     "open_result": "aerotri.public.results",
     "orthophoto": "aerotri.public.ortho",
     "parameters": "aerotri.public.parameters",
+    "plan_flight": "aerotri.public.planning",
     "predict": "aerotri.public.predict",
     "read": "aerotri.public.blocks",
     "read_block": "aerotri.public.blocks",
@@ -144,6 +146,7 @@ __all__ = [
     "open_result",
     "orthophoto",
     "parameters",
+    "plan_flight",
     "predict",
     "read",
     "read_block",

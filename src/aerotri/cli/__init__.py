@@ -24,6 +24,7 @@ from aerotri.cli import (
     exporting,
     image_errors,
     ortho,
+    planning,
     run,
     terrain,
     volumes,
@@ -34,7 +35,7 @@ from aerotri.execution.work import NO_SPACE, TasksFailedError
 
 __all__ = [
     "adjusting", "app", "blocks", "change", "converting", "explaining", "exporting", "image_errors", "main", "ortho",
-    "run", "terrain", "volumes",
+    "planning", "run", "terrain", "volumes",
 ]  # fmt: skip
 
 FAILED, BAD_INPUT, BUG = 1, 2, 3

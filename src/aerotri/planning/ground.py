@@ -70,7 +70,9 @@ def ground_of_dem(path: Path, area: Area, reach: float) -> Ground:
     left, bottom, right, top = area.polygon.buffer(reach).bounds
     with MetricReader(path, target=area.crs) as reader:
         if area.crs is not None and reader.epsg is not None and f"EPSG:{reader.epsg}" != area.crs:
-            raise InputError(f"is in EPSG:{reader.epsg}, the plan in {area.crs}", f"give --crs EPSG:{reader.epsg}", path)
+            raise InputError(
+                f"is in EPSG:{reader.epsg}, the plan in {area.crs}", f"give --crs EPSG:{reader.epsg}", path
+            )
         step = max(reader.grid.cell_x, max(right - left, top - bottom) / MOST_NODES)
         x, y = np.arange(left, right + step, step), np.arange(bottom, top + step, step)
         shape = len(y), len(x)

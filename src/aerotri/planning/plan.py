@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -216,8 +216,3 @@ def shortest_interval(flight: Flight) -> float:
     """s between two exposures of a strip, at least."""
     gaps = [np.diff(flight.time[own]).min() for own in flight.strips if len(own) > 1]
     return float(min(gaps)) if gaps else np.inf
-
-
-def with_target(record: PlanRecord, target: Target) -> PlanRecord:
-    """The same plan judged by another target."""
-    return replace(record, target=target)

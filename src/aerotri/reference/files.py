@@ -14,6 +14,7 @@ from aerotri.reference.export_files import export_files
 from aerotri.reference.halves_files import halves_files
 from aerotri.reference.image_error_files import image_error_files
 from aerotri.reference.ortho_files import ortho_files
+from aerotri.reference.plan_files import plan_files
 from aerotri.reference.printed import printed_contents
 from aerotri.reference.records import DescribedFile
 from aerotri.reference.terrain_files import terrain_files
@@ -33,6 +34,7 @@ def described_files() -> tuple[DescribedFile, ...]:
         *terrain_files(),
         *ortho_files(),
         *change_files(),
+        *plan_files(),
         *block_files(),
         *printed_contents(),
     )
