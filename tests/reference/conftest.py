@@ -196,6 +196,10 @@ def _written(folder: Path) -> Written:
     run("predict attitude", "--tolerance", 1, "--thickness", 5)
     run("predict picket-interval", "--gsd", 0.1)
     run("predict picket-interval", "--pilot", result, "--photographs", photographs)
+    where = "SRID=25832;POLYGON ((500000 5800000, 500080 5800000, 500080 5800060, 500000 5800000))"
+    planned = run(
+        "plan", where, "--camera", "p1", "--gsd", 0.02, "--ground", 100, "--target", "asprs 9cm", out="planned"
+    )
     project = _project(run)
     places = {
         "block folder": (tiny, folder / "plain", project / "block"),
@@ -205,7 +209,7 @@ def _written(folder: Path) -> Written:
         "folder of demcor": (folder / "corrected",), "folder of imgeo": (imgeo,), "folder of crosscheck": (checked,),
         "folder of dtm": (pairs, project / "dtm"), "folder of dsm": (dense,), "folder of compare": (compared,),
         "folder of change": (changed, clouds), "folder of export": (exported,),
-        "folder of volume": (project / "volume", piles), "folder of ortho": (ortho,),
+        "folder of plan": (planned,), "folder of volume": (project / "volume", piles), "folder of ortho": (ortho,),
         "truth of simulate": (tiny / "truth", rigged / "truth", rolling / "truth"),
         "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),
         "control_marks of tiepoints": (project / "block" / "control_marks",), "folder of run": (project,),

@@ -23,6 +23,7 @@ PRINTED_CONTENT = {
     "dsm": "dsm.json (folder of dsm)",
     "halves": "halves.json (folder of halves)", "ortho": "ortho.json (folder of ortho)",
     "change": "change.json (folder of change)", "accuracy": "accuracy.json (folder of accuracy)",
+    "plan": "plan.json (folder of plan)",
     "compare": "compare.json (folder of compare)", "volume": "volume.json (folder of volume)",
     "tiepoints": "tiepoints.json (block of tiepoints)", "run": "run.json (folder of run)",
 }  # fmt: skip

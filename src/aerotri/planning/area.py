@@ -73,7 +73,7 @@ def read_area(source: str, wanted: str | None = None) -> Area:
     boundary = read_boundary(source, None if target is None else int(target.partition(":")[2]))
     polygon = boundary.polygon
     left, bottom, right, top = polygon.bounds
-    if target is None and -180.0 <= left and right <= 180.0 and -90.0 <= bottom and top <= 90.0:
+    if target is None and max(-left, right) <= 180.0 and max(-bottom, top) <= 90.0:
         raise InputError(
             f"'{boundary.name}' seems to have longitudes and latitudes, and names no CRS",
             "give SRID=4326; before the WKT, GeoJSON, or coordinates in metres",

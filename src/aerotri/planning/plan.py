@@ -112,8 +112,8 @@ def make_plan(
 
     Parameters
     ----------
-    given : names, coordinates (k, 3) m and σ (k, 3) m of control that is there. wanted : control points to add; None for
-        as many as the target needs, `most` at most.
+    given : names, coordinates (k, 3) m and σ (k, 3) m of control that is there.
+    wanted : control points to add; None for as many as the target needs, `most` at most.
     """
     say("strips")
     flight, seen = plan_strips(area, ground, camera, options)
@@ -138,8 +138,8 @@ def make_plan(
         for name, row, step in zip(names, candidates, steps, strict=True)
     )
     return PlanRecord(
-        area, ground, camera, options, target, flight, seen, expected, block, expected.xyz[expected.ground], places.step,
-        blocks, own, np.bincount(block.image_points.point, minlength=len(block.points))[expected.ground],
+        area, ground, camera, options, target, flight, seen, expected, block, expected.xyz[expected.ground],
+        places.step, blocks, own, np.bincount(block.image_points.point, minlength=len(block.points))[expected.ground],
         float(np.sqrt(max(joint.quality.volume, 0.0))), added, (*given[0], *map(str, names)),
         np.concatenate([expected.xyz[expected.given], expected.xyz[candidates]]), share, mode,
         _warnings(options, flight, len(places.ground) - g, added, len(given[0])),

@@ -115,8 +115,8 @@ def plan_files() -> tuple[DescribedFile, ...]:
         DescribedFile("plan.json", PLACE, "json", "The plan in numbers.", PLAN),
         DescribedFile("waypoints.csv", PLACE, "table", "Exposures in the order flown.", WAYPOINTS),
         DescribedFile("sigma_z.tif", PLACE, "raster", bands),
-        DescribedFile("plan.gpkg", PLACE, "layers", layers),
-        DescribedFile("plan.kml", PLACE, "layers", "The same without footprints as KML.", when="with a CRS"),
+        DescribedFile("plan.gpkg", PLACE, "other", layers),
+        DescribedFile("plan.kml", PLACE, "other", "The same without footprints as KML.", when="with a CRS"),
         DescribedFile("plan.html", PLACE, "page", "The plan with maps of σ, to print and hand over."),
-        DescribedFile("block", PLACE, "block", "One simulated flight as a block, with truth/."),
+        DescribedFile("block", PLACE, "folder", "One simulated flight as a block, with truth/."),
     )

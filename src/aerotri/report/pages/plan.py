@@ -159,7 +159,7 @@ def _map(r: PlanRecord, sigma: np.ndarray) -> PlanMap:
     def drawn(xy: np.ndarray) -> np.ndarray:
         return np.column_stack([xy[:, 0] - low[0], high[1] - xy[:, 1]]) * scale
 
-    limits = _limits(r.sigma[:, 2])
+    limits = _limits(np.concatenate([r.sigma[:, 2], r.deformation[:, 2]]))
     shade = np.clip(np.searchsorted(limits, sigma), 0, CLASSES - 1)
     side = r.step * scale
     cells = tuple((float(x - side / 2), float(y - side / 2), side, GREYS[k])
@@ -176,9 +176,10 @@ def _map(r: PlanRecord, sigma: np.ndarray) -> PlanMap:
 
 
 def _limits(sigma: np.ndarray) -> np.ndarray:
-    """Upper limits of all greys but the last, m: even steps of a round size up to the largest σ."""
-    step = _round_up(float(sigma.max()) / CLASSES)
-    return step * np.arange(1, CLASSES)
+    """Upper limits of all greys but the last, m: even steps of a round size between the smallest and largest σ."""
+    low, high = float(sigma.min()), float(sigma.max())
+    step = _round_up(max(high - low, 0.02 * high) / (CLASSES - 1))
+    return step * (np.floor(low / step) + np.arange(1, CLASSES))
 
 
 def _legend(limits: np.ndarray) -> tuple[tuple[str, str], ...]:
