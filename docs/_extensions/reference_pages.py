@@ -33,6 +33,7 @@ GROUPS = {
     "folder of export": ("export", "Folder of `aerotri export`"),
     "layers of result.gpkg": ("export", "Layers of result.gpkg"),
     "folder of accuracy": ("accuracy", "Folder of `aerotri accuracy`"),
+    "folder of plan": ("plan", "Folder of `aerotri plan`"),
     "folder of deform": ("deform", "Folder of `aerotri deform`"),
     "folder of demcor": ("demcor", "Files of `aerotri demcor`"),
     "folder of imgeo": ("imgeo", "Folder of `aerotri imgeo`"),

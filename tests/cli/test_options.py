@@ -26,6 +26,8 @@ COUNT = re.compile(r"\b(number|pixels|Number)\b")
 DIFFERENT = {
     "area": "a rectangle to measure, or the polygons of a change",
     "base": "of a volume, or between photographs",
+    "camera": "a camera by its name too where a flight is planned",
+    "ground": "a table of ground points, or the height of level ground",
     "offset": "a file of Pix4D, or the place of a site",
 }
 """Options of one name that differ in what they take, and why."""

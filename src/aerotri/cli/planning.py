@@ -46,10 +46,10 @@ def plan(
         ),
     ] = None,
     forward_overlap: Annotated[
-        float, typer.Option(help="Overlap in a strip at least, 0 to 0.95.", rich_help_panel=FLIGHT)
+        float, typer.Option(help="Overlap in a strip at least, a share of 0 to 0.95.", rich_help_panel=FLIGHT)
     ] = 0.8,
     side_overlap: Annotated[
-        float, typer.Option(help="Overlap of strips at least, 0 to 0.95.", rich_help_panel=FLIGHT)
+        float, typer.Option(help="Overlap of strips at least, a share of 0 to 0.95.", rich_help_panel=FLIGHT)
     ] = 0.6,
     direction: Annotated[
         float | None,
@@ -70,12 +70,14 @@ def plan(
     ] = 3,
     speed: Annotated[float, typer.Option(help="Speed, m/s.", rich_help_panel=FLIGHT)] = 10.0,
     turn: Annotated[
-        float, typer.Option(min=0.0, help="Time from a strip to the next, s.", rich_help_panel=FLIGHT)
+        float, typer.Option(min=0.0, help="Time from a strip to the next, a number of seconds.", rich_help_panel=FLIGHT)
     ] = 15.0,
-    interval: Annotated[
+    exposure_interval: Annotated[
         float,
         typer.Option(
-            min=0.0, help="Time the camera needs between exposures, s; 0: not checked.", rich_help_panel=FLIGHT
+            min=0.0,
+            help="Time the camera needs between exposures, a number of seconds; 0: not checked.",
+            rich_help_panel=FLIGHT,
         ),
     ] = 0.0,
     positions_sigma: Annotated[
@@ -120,7 +122,9 @@ def plan(
     ] = 200,
     tie_probability: Annotated[
         float,
-        typer.Option(help="Probability that a photograph that sees a tie point measures it.", rich_help_panel=METHOD),
+        typer.Option(
+            help="Probability that a photograph that sees a tie point measures it, 0 to 1.", rich_help_panel=METHOD
+        ),
     ] = 0.6,
     image_sigma: Annotated[float, typer.Option(help="σ of an image coordinate, pixels.", rich_help_panel=SIGMAS)] = 0.5,
     most_photographs: Annotated[
@@ -137,7 +141,7 @@ def plan(
     asked = {
         "camera": camera, "gsd": gsd, "dem": dem, "ground": ground, "crs": crs, "forward_overlap": forward_overlap,
         "side_overlap": side_overlap, "direction": direction, "cross_strips": cross_strips, "height_mode": height_mode,
-        "rays": rays, "speed": speed, "turn": turn, "interval": interval,
+        "rays": rays, "speed": speed, "turn": turn, "interval": exposure_interval,
         "positions_sigma": None if positions_sigma == "none" else _pair(positions_sigma, "--positions-sigma"),
         "control": int(control) if control.isascii() and control.isdigit() and len(control) < 9 else control,
         "control_sigma": _pair(control_sigma, "--control-sigma"), "most_control": most_control, "target": target,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -11,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerotri.conventions import InputError
 from aerotri.vectors.crs import LON_LAT, stated_crs
-from aerotri.vectors.geojson import crs_of_name, read_geojson
+from aerotri.vectors.geojson import GeoJsonFeature, crs_of_name, read_geojson
 from aerotri.vectors.geopackage import read_geopackage
 from aerotri.vectors.polygons import srid_of_wkt
 from aerotri.volume.boundary import read_boundary
@@ -106,12 +108,12 @@ def _is_text(path: Path) -> bool:
         return False
 
 
-def _like_degrees(features: list) -> bool:
+def _like_degrees(features: Sequence[GeoJsonFeature]) -> bool:
     flat = [np.asarray(ring, dtype=float)[:, :2] for one in features for ring in _rings(one.coordinates)]
     return bool(flat) and bool((np.abs(np.concatenate(flat)) <= [180.0, 90.0]).all())
 
 
-def _rings(coordinates: object) -> list:
+def _rings(coordinates: Any) -> list[Any]:
     """Lists of places within nested lists."""
     if not isinstance(coordinates, list | tuple) or not coordinates:
         return []

@@ -19,9 +19,11 @@ from aerotri.observations import (
     Settings,
 )
 from aerotri.planning.area import Area
-from aerotri.planning.flight import Flight, photographs_of, rays_to
+from aerotri.planning.flight import Flight, photographs_of, rays_to, true_camera
 from aerotri.planning.ground import Ground
 from aerotri.planning.options import PlanOptions
+from aerotri.simulation.camera_errors import image_error_fields
+from aerotri.simulation.camera_spec import ErrorSpec
 from aerotri.simulation.measuring import Imaging, tie_rays
 from aerotri.simulation.projection import Rays
 from aerotri.simulation.random_streams import scattered, stream
@@ -176,11 +178,11 @@ def _numbered(
         control=control, gnss_ins=_positions(flight, options), settings=_settings(camera, options),
     )  # fmt: skip
     by_axis = np.array([options.control_sigma[0], options.control_sigma[0], options.control_sigma[1]])
-    return Expected(block, xyz, *own, by_axis)
+    return Expected(block, xyz, own[0], own[1], own[2], by_axis)
 
 
 def _imaging(flight: Flight, camera: Camera) -> Imaging:
-    fields = {(camera.name, ""): lambda x, y: np.zeros((len(x), 2))}
+    fields = image_error_fields([true_camera(camera)], {camera.name: ErrorSpec()}, [""], SEED)
     return Imaging(photographs_of(flight, camera), np.full(len(flight), ""), fields, [0.0])
 
 

@@ -85,8 +85,8 @@ class Seen:
 
 def true_camera(camera: Camera) -> TrueCamera:
     """The camera without errors."""
-    values = (camera.interior[name].value for name in ("focal_length_mm", "x0_mm", "y0_mm"))
-    return TrueCamera(camera, *values, np.zeros(14), np.zeros(2))
+    focal, x0, y0 = (camera.interior[name].value for name in ("focal_length_mm", "x0_mm", "y0_mm"))
+    return TrueCamera(camera, focal, x0, y0, np.zeros(14), np.zeros(2))
 
 
 def photographs_of(flight: Flight, camera: Camera) -> Photographs:
@@ -192,7 +192,7 @@ class _Layout:
 
     def strips(self, margin: float) -> list[Strip]:
         """Main strips from one side of the area to the other, then cross strips."""
-        spacing = self.first_spacing()
+        spacing, main = self.first_spacing(), list[Strip]()
         for _ in range(TRIES):
             main = list(self._main(spacing, margin))
             if self._side(np.array([s.places[0, 1] for s in main]), np.array([s.altitude for s in main])) >= (

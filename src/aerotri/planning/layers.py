@@ -37,7 +37,9 @@ def plan_layers(r: PlanRecord) -> list[Layer]:
          "length_m": np.array([float(np.linalg.norm(f.centre[own[-1]] - f.centre[own[0]])) for own in f.strips])},
         True, "Strips in the order flown",
     )  # fmt: skip
-    exposures = Layer("exposures", "POINT", shapely.points(f.centre), exposure_columns(r), True, "Exposures in order")
+    exposures = Layer(
+        "exposures", "POINT", np.asarray(shapely.points(f.centre)), exposure_columns(r), True, "Exposures in order"
+    )
     prints = Layer("footprints", "POLYGON", _footprints(r), {"image": f.names, "strip": f.strip},
                    text="Photographs on level ground at the height below them")  # fmt: skip
     return [area, strips, exposures, prints, _control_layer(r)]
@@ -60,7 +62,7 @@ def _control_layer(r: PlanRecord) -> Layer:
     after = np.array([np.nan] * given + [one.after for one in r.added])
     order = np.array([0] * given + list(range(1, len(r.added) + 1)), dtype=np.int64)
     columns = {"point": np.array(r.control_names, dtype=str), "order": order, "before": before, "after": after}
-    points = shapely.points(r.control) if len(r.control) else np.array([], dtype=object)
+    points = np.asarray(shapely.points(r.control)) if len(r.control) else np.array([], dtype=object)
     fields = {"order": "0: control that was given", "before": "quantity judged by without it, m or m³",
               "after": "quantity judged by with it, m or m³"}  # fmt: skip
     return Layer("control", "POINT", points, columns, True, "Control points, in the order of their gain", fields)

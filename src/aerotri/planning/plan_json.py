@@ -33,7 +33,7 @@ def plan_json(r: PlanRecord) -> dict[str, Any]:
             "rays": o.rays,
             "speed_m_s": o.speed,
             "turn_s": o.turn,
-            "positions_sigma_m": None if o.positions_sigma is None else list(o.positions_sigma),
+            "positions_sigma_m": list(o.positions_sigma or ()),
             "control_sigma_m": list(o.control_sigma),
             "tie_points": o.tie_points,
             "tie_probability": o.probability,

@@ -249,8 +249,10 @@ def plan_flight(
     height = gsd * chosen.interior["focal_length_mm"].value / chosen.pixel_mm
     reach = 3.0 * height * max(chosen.half_format_mm) / chosen.interior["focal_length_mm"].value
     terrain = _terrain(dem, ground, where, reach)
-    say = progress or (lambda text: None)
-    return FlightPlan(make_plan(where, terrain, chosen, options, goal, given, wanted, most_control, say))
+    made = make_plan(
+        where, terrain, chosen, options, goal, given, wanted, most_control, *(() if progress is None else (progress,))
+    )
+    return FlightPlan(made)
 
 
 def _crs_of(dem: FilePath | None) -> str | None:

@@ -49,7 +49,7 @@ ASKED = within(
     Item("rays", "whole", "Photographs of every place, at least."),
     Item("speed_m_s", "number", "Speed.", "m/s"),
     Item("turn_s", "number", "Time from a strip to the next.", "s"),
-    Item("positions_sigma_m[]", "number?", "σ of camera positions in plan and height; null without.", "m"),
+    Item("positions_sigma_m[]", "number", "σ of camera positions in plan and height; empty without.", "m"),
     Item("control_sigma_m[]", "number", "σ of control in plan and height.", "m"),
     Item("tie_points", "whole", "Image points expected in a photograph."),
     Item("tie_probability", "number", "Probability that a photograph that sees a tie point measures it."),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -187,7 +188,7 @@ def _legend(limits: np.ndarray) -> tuple[tuple[str, str], ...]:
     return tuple(zip(GREYS, texts, strict=True))
 
 
-def _rings(r: PlanRecord, drawn) -> str:
+def _rings(r: PlanRecord, drawn: Callable[[np.ndarray], np.ndarray]) -> str:
     import shapely
 
     rings = [ring for one in shapely.get_parts(r.area.polygon) for ring in (one.exterior, *one.interiors)]
