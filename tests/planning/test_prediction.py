@@ -112,3 +112,25 @@ def test_targets():
     assert parse_target("asprs 5-cm class".removesuffix(" class")) == Target("asprs", 0.05)
     assert parse_target("sigma-z 0.03") == Target("sigma-z", 0.03)
     assert parse_target("sigma-volume 20m3".removesuffix("m3")).unit == "m³"
+
+
+def test_predicted_sigma_against_flights():
+    """Errors of the ground points of 12 flights over their predicted σ, by coordinate and by quarter of the area.
+
+    The points of a flight share their errors, so a flight counts as few independent numbers: for 12 flights the bound
+    holds at four standard deviations of a single one.
+    """
+    found = planned(replace(OPTIONS, positions_sigma=(0.03, 0.05)), wanted=3)
+    names = found.block.points[found.expected.ground].tolist()
+    errors = []
+    for seed in range(1, 13):
+        result = aerotri.adjust(measured(found.block, seed))
+        row = {name: k for k, name in enumerate(result.points["point"].tolist())}
+        xyz = np.column_stack([result.points[axis] for axis in "XYZ"])[[row[name] for name in names]]
+        errors.append((xyz - found.ground_points) / found.sigma)
+    xy = found.ground_points[:, :2]
+    quarter = (xy > np.median(xy, axis=0)) @ [1, 2]
+    for q in range(4):
+        rms = np.sqrt((np.array(errors)[:, quarter == q] ** 2).mean(axis=(0, 1)))
+        assert (rms > 1.0 - 4.0 / np.sqrt(24)).all()
+        assert (rms < 1.0 + 4.0 / np.sqrt(24)).all()

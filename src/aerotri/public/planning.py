@@ -63,10 +63,11 @@ class FlightPlan:
     def ground_points(self) -> Table:
         """A row a ground point of the map: place, σ, the part of σ_Z that neighbours share, photographs; m."""
         r = self.record
-        columns = {axis: r.ground_points[:, k] for k, axis in enumerate("XYZ")}
+        columns = {"point": r.block.points[r.expected.ground]}
+        columns |= {axis: r.ground_points[:, k] for k, axis in enumerate("XYZ")}
         columns |= {f"s{axis}": r.sigma[:, k] for k, axis in enumerate("XYZ")}
         columns |= {"shared_sZ": r.deformation[:, 2], "rays": r.rays}
-        return Table.of("ground points", columns, dict.fromkeys((*columns,)[:-1], "m"))
+        return Table.of("ground points", columns, dict.fromkeys((*columns,)[1:-1], "m"))
 
     @property
     def control(self) -> Table:

@@ -1,0 +1,103 @@
+"""The σ that `aerotri plan` predicts against the errors of simulated flights.
+
+A plan is flown many times with other errors of its measurements, each flight is adjusted by `aerotri.adjust`, and the
+errors of the ground points are divided by the predicted σ. Their standard deviation over the flights has to be 1 within
+its own uncertainty, at every ground point.
+
+    python tools/prove/plan.py --flights 100 --out tools/results/plan.md
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import chi2
+
+import aerotri
+from aerotri.public.planning import FlightPlan
+
+AREA = "POLYGON ((0 0, 320 20, 300 210, 60 180, 0 0))"
+PLANS = {
+    "four corners": {"control": 4},
+    "control to a target": {"target": "sigma-z 0.035"},
+    "GNSS, one control point": {"control": 1, "positions_sigma": (0.03, 0.05)},
+    "GNSS, lens calibrated": {
+        "control": 3, "positions_sigma": (0.03, 0.05), "self_calibration": "brown:K1+K2+P1+P2", "cross_strips": 1,
+    },
+}  # fmt: skip
+CELLS = 5
+"""Of the map along each side, in the table."""
+
+
+def normalised(plan: FlightPlan, flights: int) -> np.ndarray:
+    """(flights, g, 3) errors of the ground points over their predicted σ."""
+    table = plan.ground_points
+    truth = np.column_stack([table[axis] for axis in "XYZ"])
+    sigma = np.column_stack([table[f"s{axis}"] for axis in "XYZ"])
+    found = []
+    for seed in range(1, flights + 1):
+        result = aerotri.adjust(plan.fly(seed))
+        row = {name: k for k, name in enumerate(result.points["point"].tolist())}
+        own = [row[name] for name in table["point"].tolist()]
+        xyz = np.column_stack([result.points[axis] for axis in "XYZ"])[own]
+        found.append((xyz - truth) / sigma)
+    return np.array(found)
+
+
+def cell_numbers(xy: np.ndarray) -> np.ndarray:
+    """(g,) cell of every ground point, row by row."""
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    place = np.minimum((CELLS * (xy - low) / (high - low)).astype(int), CELLS - 1)
+    return CELLS * place[:, 1] + place[:, 0]
+
+
+def lines_of(name: str, plan: FlightPlan, errors: np.ndarray) -> list[str]:
+    """What one plan showed."""
+    table = plan.ground_points
+    cell = cell_numbers(np.column_stack([table["X"], table["Y"]]))
+    flights = len(errors)
+    by_point = np.sqrt((errors**2).mean(axis=0))
+    low, high = (np.sqrt(chi2.ppf(p, flights) / flights) for p in (0.025, 0.975))
+    inside = ((by_point >= low) & (by_point <= high)).mean(axis=0)
+    whole = np.sqrt((errors**2).mean(axis=(0, 1)))
+    out = [
+        f"## {name}", "",
+        f"{len(plan.exposures)} photographs, {len(plan.control)} control points, {len(table)} ground points, {flights} "
+        f"flights. σ of Z predicted: median {np.median(table['sZ']):.3f} m, largest {np.max(table['sZ']):.3f} m.", "",
+        "| | X | Y | Z |", "|---|---|---|---|",
+        "| standard deviation of error over σ, all | " + " | ".join(f"{v:.3f}" for v in whole) + " |",
+        "| smallest of a ground point | " + " | ".join(f"{v:.2f}" for v in by_point.min(axis=0)) + " |",
+        "| largest of a ground point | " + " | ".join(f"{v:.2f}" for v in by_point.max(axis=0)) + " |",
+        f"| ground points between {low:.2f} and {high:.2f} (95 % expected) | "
+        + " | ".join(f"{100 * v:.0f} %" for v in inside) + " |", "",
+        "Z by cells of the area, north at the top:", "",
+        "|" + " |" * CELLS, "|" + "---|" * CELLS,
+    ]  # fmt: skip
+    for row in reversed(range(CELLS)):
+        values = [errors[:, cell == CELLS * row + column, 2] for column in range(CELLS)]
+        out.append("| " + " | ".join(f"{np.sqrt((v**2).mean()):.2f}" if v.size else "" for v in values) + " |")
+    return [*out, ""]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--flights", type=int, default=100)
+    parser.add_argument("--out", type=Path)
+    given = parser.parse_args()
+    lines = ["# Predicted σ of planned flights against simulated flights", "",
+             "The ground points of one flight share their errors, so the numbers of neighbouring cells move together.",
+             ""]  # fmt: skip
+    for name, asked in PLANS.items():
+        plan = aerotri.plan_flight(
+            AREA, camera="p1", gsd=0.03, ground=100.0, tie_points=100, forward_overlap=0.7, side_overlap=0.5, **asked
+        )  # fmt: skip
+        lines += lines_of(name, plan, normalised(plan, given.flights))
+        print("\n".join(lines), flush=True)
+        if given.out is not None:
+            given.out.write_text("\n".join(lines), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
