@@ -58,7 +58,7 @@ def plan(
             rich_help_panel=FLIGHT,
         ),
     ] = None,
-    cross_strips: Annotated[int, typer.Option(min=0, help="Strips across.", rich_help_panel=FLIGHT)] = 0,
+    cross_strips: Annotated[int, typer.Option(min=0, help="Number of strips across.", rich_help_panel=FLIGHT)] = 0,
     height_mode: Annotated[
         str,
         typer.Option(
@@ -66,7 +66,8 @@ def plan(
         ),
     ] = "constant",
     rays: Annotated[
-        int, typer.Option(min=2, help="Photographs of every place of the area, at least.", rich_help_panel=FLIGHT)
+        int,
+        typer.Option(min=2, help="Number of photographs of every place of the area, at least.", rich_help_panel=FLIGHT),
     ] = 3,
     speed: Annotated[float, typer.Option(help="Speed, m/s.", rich_help_panel=FLIGHT)] = 10.0,
     turn: Annotated[
@@ -99,7 +100,7 @@ def plan(
         str, typer.Option(help="σ of control: of X and Y, and of Z, m.", rich_help_panel=SIGMAS)
     ] = "0.02,0.03",
     most_control: Annotated[
-        int, typer.Option(min=0, help="Control points added at most.", rich_help_panel=CONTROL)
+        int, typer.Option(min=0, help="Largest number of control points added.", rich_help_panel=CONTROL)
     ] = 30,
     target: Annotated[
         str | None,
@@ -118,7 +119,7 @@ def plan(
         ),
     ] = "none",
     tie_points: Annotated[
-        int, typer.Option(min=20, help="Image points expected in a photograph.", rich_help_panel=METHOD)
+        int, typer.Option(min=20, help="Number of image points expected in a photograph.", rich_help_panel=METHOD)
     ] = 200,
     tie_probability: Annotated[
         float,
@@ -128,7 +129,8 @@ def plan(
     ] = 0.6,
     image_sigma: Annotated[float, typer.Option(help="σ of an image coordinate, pixels.", rich_help_panel=SIGMAS)] = 0.5,
     most_photographs: Annotated[
-        int, typer.Option(min=1, help="A plan of more photographs is refused.", rich_help_panel=METHOD)
+        int,
+        typer.Option(min=1, help="Largest number of photographs; a plan of more is refused.", rich_help_panel=METHOD),
     ] = 1500,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default NAME_plan here.", rich_help_panel=OUTPUT)
