@@ -26,10 +26,14 @@ OWN_CLUSTER: dict[str, Any] = {
     "distributed.scheduler.allowed-failures": MOST_TRIES - 1,
     # memory given back to the system at once costs a third of the time of a tile
     "distributed.nanny.pre-spawn-environ": {},
+    "distributed.admin.tick.interval": "500 ms",
 }
 """Settings of Dask for workers that are started here."""
-UNWATCHED = {"DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False"}
-"""Environment of such workers: they do not look a hundred times a second where they are in the program."""
+UNWATCHED = {
+    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
+    "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "500 ms",
+}
+"""Environment of such workers: they do not look fifty times a second how fast and where in the program they are."""
 CONNECT_S, LOOK_S = "20s", 5.0
 """For the scheduler to answer; between two looks whether there are workers."""
 
