@@ -31,13 +31,13 @@ CELLS = 5
 """Of the map along each side, in the table."""
 
 
-def normalised(plan: Any, flights: int) -> np.ndarray:
+def normalised(plan: Any, flights: int, first: int = 1) -> np.ndarray:
     """(flights, g, 3) errors of the ground points over their predicted σ."""
     table = plan.ground_points
     truth = np.column_stack([table[axis] for axis in "XYZ"])
     sigma = np.column_stack([table[f"s{axis}"] for axis in "XYZ"])
     found = []
-    for seed in range(1, flights + 1):
+    for seed in range(first, first + flights):
         result = aerotri.adjust(plan.fly(seed))
         row = {name: k for k, name in enumerate(result.points["point"].tolist())}
         own = [row[name] for name in table["point"].tolist()]
@@ -84,16 +84,20 @@ def lines_of(name: str, plan: Any, errors: np.ndarray) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--flights", type=int, default=100)
+    parser.add_argument("--first-seed", type=int, default=1)
+    parser.add_argument("--only", help="name of one of the plans")
     parser.add_argument("--out", type=Path)
     given = parser.parse_args()
     lines = ["# Predicted σ of planned flights against simulated flights", "",
              "The ground points of one flight share their errors, so the numbers of neighbouring cells move together.",
              ""]  # fmt: skip
     for name, asked in PLANS.items():
+        if given.only not in (None, name):
+            continue
         plan = aerotri.plan_flight(
             AREA, camera="p1", gsd=0.03, ground=100.0, tie_points=100, forward_overlap=0.7, side_overlap=0.5, **asked
         )  # fmt: skip
-        lines += lines_of(name, plan, normalised(plan, given.flights))
+        lines += lines_of(name, plan, normalised(plan, given.flights, given.first_seed))
         print("\n".join(lines), flush=True)
         if given.out is not None:
             given.out.write_text("\n".join(lines), encoding="utf-8")
