@@ -19,7 +19,7 @@ from scipy.stats import chi2
 import aerotri
 
 AREA = "POLYGON ((0 0, 320 20, 300 210, 60 180, 0 0))"
-PLANS = {
+PLANS: dict[str, dict[str, Any]] = {
     "four corners": {"control": 4},
     "control to a target": {"target": "sigma-z 0.035"},
     "GNSS, one control point": {"control": 1, "positions_sigma": (0.03, 0.05)},
