@@ -19,7 +19,6 @@ from pathlib import Path
 import numpy as np
 
 import aerotri
-from aerotri.terrain.dtm import chosen_rows
 from reproduce_paper_003_dem import CM, RESULTS, SETS, SUBSETS, prepare
 
 HEAD = """# Paper 003, figures 5 to 8, with dense surfaces: even against odd photographs
@@ -43,9 +42,11 @@ class Measured:
 def surface(here: Path, result: str, subset: str) -> Measured:
     """Of the even or the odd photographs."""
     adjustment = aerotri.open_result(here / result)
-    rows = chosen_rows(adjustment.record, subset)
-    names = [f"{name}.tif" for name in adjustment.block.images.names[rows].astype(str)]
-    given = [here / "block" / "photographs" / name for name in names]
+    images = adjustment.block.images
+    given = []
+    for strip in sorted(set(images.strip.astype(str))):
+        own = images.names[images.strip.astype(str) == strip].astype(str)
+        given += [here / "block" / "photographs" / f"{name}.tif" for name in own[0 if subset == "odd" else 1 :: 2]]
     target = here / f"dense {result} {subset}"
     if not (target / "dsm.json").exists():
         aerotri.dense_surface(adjustment, given).save(target, plots=False)

@@ -48,8 +48,5 @@ def _summary(found: SurfaceComparison) -> list[str]:
         f"LE90 {s.le90:.3f}, largest {s.max:.3f} m",
     ]
     if found.bias_sigma is not None:
-        lines.append(
-            f"σ of the bias {found.bias_sigma:.3f} m, as neighbouring cells share their noise over "
-            f"{found.noise_length:.3g} m"
-        )
+        lines.append(f"σ of the bias {found.bias_sigma:.3f} m; noise length {found.noise_length:.3g} m")
     return [*lines, *([c.alignment_text] if c.alignment_text else [])]
