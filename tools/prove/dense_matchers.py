@@ -3,8 +3,8 @@
 The scenes of dense_surface.py. Each matcher gives whole surfaces by itself, and is refined by our least squares as
 `aerotri dsm` does. The third matcher compares census transforms of 9 × 7 pixels by the number of bits that differ
 (Zabih and Woodfill 1994), summed over eight directions (Hirschmüller 2008), with the penalties of `PENALTIES`, a
-parabola for the part of a pixel, left against right, and the same filter of speckles. It puts matchers in place of the
-one inside the package on purpose.
+parabola for the part of a pixel, left against right, and the same filter of speckles. Measures
+matchers in place of the one inside the package, on purpose.
 
     python tools/prove/dense_matchers.py [FOLDER] [--scenes hill …] [--keep]
 
