@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import json
+import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -76,8 +81,6 @@ def test_accuracy_has_its_parts(made):
 
 def test_a_run_that_was_ended_goes_on(made, tmp_path, monkeypatch):
     """Tiles of 64 cells: ended after three of them, one cut off; the files are those of a run in one go."""
-    import importlib
-
     here, result, _ = made
     make = importlib.import_module("aerotri.terrain.ortho.make")
     monkeypatch.setattr(make, "TILE", 64)
@@ -112,6 +115,57 @@ def test_a_run_that_was_ended_goes_on(made, tmp_path, monkeypatch):
     (tiles / "notes.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(InputError, match="other files than tiles"):
         aerotri.orthophoto(*given, tmp_path / "two", cell=0.5, plots=False, tiles=tiles)
+
+
+KILLED = """
+import importlib, os, signal
+make = importlib.import_module("aerotri.terrain.ortho.make")
+make.TILE, whole, done = 64, make.make_tile, []
+
+def killed(*arguments):
+    if len(done) == 5:
+        os.kill(os.getpid(), signal.SIGKILL)
+    done.append(arguments)
+    return whole(*arguments)
+
+make.make_tile = killed
+from aerotri.cli import main
+main()
+"""
+"""The command in a process that is killed at its sixth tile."""
+
+
+def test_a_killed_command_goes_on(made, tmp_path, monkeypatch):
+    """kill -9, then the same command: the files are those of a run in one go, byte by byte, and no tiles are left."""
+    here, result, _ = made
+    result.save(tmp_path / "result", plots=False)
+    words = ["ortho", tmp_path / "result", here / "block" / "photographs", here / "surface.tif", "--cell", "0.5",
+             "--no-plots", "--out"]  # fmt: skip
+    words = [str(word) for word in words]
+    killed = subprocess.run(
+        [sys.executable, "-c", KILLED, *words, str(tmp_path / "two")],
+        env=os.environ | {"AEROTRI_THREADS": "1"}, capture_output=True, check=False,
+    )  # fmt: skip
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
+    assert not (tmp_path / "two").exists()
+    assert len(list((tmp_path / "two.tiles").glob("ortho_*.npz"))) == 5
+    monkeypatch.setattr(importlib.import_module("aerotri.terrain.ortho.make"), "TILE", 64)
+    for name, said in (("one", False), ("two", True)):
+        done = CliRunner().invoke(app, [*words, str(tmp_path / name)], catch_exceptions=False)
+        assert ("tiles made before: 5" in done.output) is said
+    for name in ("ortho.tif", "photographs.tif", "sigma.tif"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    one, two = (list(_layers(tmp_path / name / "seams.gpkg")) for name in ("one", "two"))
+    assert one == two
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one", "result", "two"]
+
+
+def _layers(path: Path):
+    """Name and features of the layers of a GeoPackage."""
+    return (
+        (name, [(f.kind, f.properties, [[ring.tolist() for ring in part] for part in f.parts]) for f in rows])
+        for name, _, rows in read_geopackage(path)
+    )
 
 
 def test_a_surface_in_memory_gives_the_same(made):
