@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.observations.prior import Prior
+from aerotri.observations.project import Project
 from aerotri.observations.rigs import Rig
 from aerotri.observations.rolling_shutter import RollingShutter
 
@@ -405,6 +406,7 @@ class Block:
     rigs : cameras on one frame; the column `station` of the images says which photographs belong to one exposure.
     interior_fits : of scanned photographs by index, the `functional_model.interior.FiducialFit` that brought their
         image points from pixels of the scan to the mm that `image_points` holds.
+    project : client, operator and the like.
     """
 
     name: str
@@ -422,6 +424,7 @@ class Block:
     constraints: Constraints | None = None
     interior_fits: Mapping[int, Any] = field(default_factory=dict)
     rigs: tuple[Rig, ...] = ()
+    project: Project = field(default_factory=Project)
 
     @property
     def counts(self) -> dict[str, int]:

@@ -15,6 +15,15 @@ from aerotri.reference.records import DescribedFile, Item, of_axes, within
 
 VERSION = Item("aerotri", "text", "Version of aerotri that wrote the file.")
 BLOCK = Item("block", "text", "Name of the block.")
+PROJECT = (
+    Item("project", "object", "What [project] of block.toml says; empty texts where it says nothing."),
+    Item("project.title", "text", "Title of the project."),
+    Item("project.client", "text", "Who ordered the work."),
+    Item("project.operator", "text", "Who computes."),
+    Item("project.company", "text", "Company of the operator."),
+    Item("project.survey_date", "text", "Day of the survey, YYYY-MM-DD."),
+    Item("project.notes", "text", "Notes."),
+)
 STATUS_WORDS = {
     "converged": "the iterations came to an end",
     "not converged": "they did not",
@@ -48,6 +57,7 @@ def _ground_points(name: str, what: str) -> tuple[Item, ...]:
 ADJUSTMENT = (
     VERSION,
     BLOCK,
+    *PROJECT,
     Item("status", "text", "How the iterations ended.", values=STATUS_WORDS),
     Item(
         "verdict",

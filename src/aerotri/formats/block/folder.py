@@ -92,6 +92,7 @@ def read_block(path: FilePath, rays_needed: bool = True, images_needed: bool = T
         constraints=read_constraints(_table_file(folder, "constraints"), points),
         interior_fits=fits,
         rigs=rigs,
+        project=model.project.project(),
     )
     _check_names_in_settings(block, settings)
     return block

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, Field, model_validator
 
 from aerotri.conventions import LARGEST
+from aerotri.formats.block.project_model import ProjectModel
 from aerotri.formats.block.settings_types import (
     Fraction,
     NotNegative,
@@ -439,6 +440,7 @@ class BlockModel(Section):
         DeviationsModel(), "How additional parameters differ between groups of photographs."
     )
     rig: dict[str, RigModel] = key({}, "Rigs: cameras on one frame, one table [rig.NAME] each.")
+    project: ProjectModel = key(ProjectModel(), "Title, client and the like: they stand at the head of the report.")
 
 
 class CamerasModel(Section):

@@ -206,6 +206,8 @@ def _settings(block: Block) -> dict[str, Any]:
         content["collocation"] = {key: value for key, value in known.items() if value is not None}
     if settings.deviations.kind != "free":
         content["deviations"] = {"kind": settings.deviations.kind, "sigma_um": dict(settings.deviations.sigma_um or {})}
+    if block.project.given():
+        content["project"] = block.project.given()
     if block.rigs:
         content["rig"] = {rig.name: _rig(rig) for rig in block.rigs}
     if settings.gnss.lever_arm_sigma_m is not None:

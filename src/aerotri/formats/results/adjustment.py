@@ -134,6 +134,7 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
     return {
         "aerotri": _version(),
         "block": str(block.name),
+        "project": block.project.as_dict(),
         "status": o.status,
         "verdict": o.verdict,
         "reasons": list(o.reasons),

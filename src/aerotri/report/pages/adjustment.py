@@ -24,6 +24,7 @@ from aerotri.diagnosis import Finding
 from aerotri.diagnosis.free_verdict import in_words
 from aerotri.diagnosis.work_list import WorkList, work_list
 from aerotri.image_errors import Change
+from aerotri.observations.project import Project
 from aerotri.report import quality
 from aerotri.report.pages.interactive_plan import interactive_plan
 from aerotri.report.plots.crosscheck import crosscheck_table
@@ -89,6 +90,12 @@ CAPTIONS = {
     "rays_per_point": "In how many photographs the points were measured.",
 }
 
+PROJECT_WORDS = {
+    "title": "Project", "client": "Client", "operator": "Operator", "company": "Company",
+    "survey_date": "Date of the survey", "notes": "Notes",
+}  # fmt: skip
+"""What the keys of [project] are called on the page."""
+
 
 @dataclass(frozen=True)
 class Findings:
@@ -148,10 +155,19 @@ def write_report(
     Path(path).write_text(report_html(adjusted, plots, findings), encoding="utf-8")
 
 
+def _project(project: Project) -> list[tuple[str, str]]:
+    """What `[project]` of block.toml says, with words for it; the lines of the notes stand apart."""
+    lines = project.notes.splitlines()
+    texts = [(PROJECT_WORDS[name], text) for name, text in project.given().items() if name != "notes"]
+    texts += [("" if i else PROJECT_WORDS["notes"], line) for i, line in enumerate(lines)]
+    return [(word, quality.printable(text, 4000)) for word, text in texts]
+
+
 def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside: Findings) -> dict[str, Any]:
     work = work_list(adjusted) if beside.work is None else beside.work
     return {
         "name": quality.printable(adjusted.block.name),
+        "project": _project(adjusted.block.project),
         "outcome": adjusted.outcome,
         "reasons": [quality.printable(reason, 1000) for reason in adjusted.outcome.reasons],
         "what_to_do": [
