@@ -26,7 +26,17 @@ CUTS = (
 """Result, name of the picture, headings at which it begins (None: the top) and ends."""
 MEASURE = """<script>document.body.dataset.places = JSON.stringify(Object.fromEntries(
 [...document.querySelectorAll("[id]")].map(e => [e.id, Math.round(e.getBoundingClientRect().top)])))</script>"""
-PLOTS = ("ground_points", "systematic_errors", "averaged_residuals", "residual_histogram", "ray_correlation")
+PLOTS = (
+    "ground_points",
+    "systematic_errors",
+    "averaged_residuals",
+    "residual_histogram",
+    "ray_correlation",
+    "overlap",
+    "error_ellipses",
+    "column_row_residuals",
+    "photograph_residuals",
+)
 
 
 def small(source: Path, target: Path) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from aerotri.conventions import InputError
 from aerotri.formats.block.folder import write_block
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.results.adjustment import write_csv, write_result
@@ -17,6 +18,8 @@ from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from aerotri.diagnosis import Finding
     from aerotri.diagnosis.work_list import WorkList
     from aerotri.image_errors import Change
@@ -33,6 +36,9 @@ RESULT_NAMES = (
     "parameter_changes.json", "parameter_changes.csv", "compare_parameters.json", "compare_parameters.csv",
     "work_list.csv", "parameter_effects.csv", "rigs.csv", "rig_stations.csv", "rig_movements.csv",
 )  # fmt: skip
+
+MOST_EXACT = 5000
+"""Photographs whose footprints are computed over the relief for the map of the overlap; chosen [C]: some seconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +147,7 @@ def _draw(adjustment: Adjustment, found: Evaluation, folder: Path, checked: Free
     from aerotri.report.plots.comparison import plot_comparison
     from aerotri.report.plots.overview import all_plots, save_plots
 
-    figures = all_plots(adjustment.result, found.changes)
+    figures = all_plots(adjustment.result, found.changes, _footprints(adjustment))
     if adjustment.compared is not None:
         figures["compare_parameters"] = plot_comparison(adjustment.compared)
     beside = Findings(
@@ -149,3 +155,15 @@ def _draw(adjustment: Adjustment, found: Evaluation, folder: Path, checked: Free
         lights=found.lights,
     )  # fmt: skip
     write_report(adjustment.result, save_plots(figures, folder / "plots"), folder / "report.html", beside)
+
+
+def _footprints(adjustment: Adjustment) -> np.ndarray | None:
+    """Footprints over the relief; None where there are so many that those on the mean height have to do."""
+    from aerotri.deformation.footprints import footprints
+
+    if len(adjustment.result.block.images) > MOST_EXACT:
+        return None
+    try:
+        return footprints(adjustment).polygons
+    except InputError:
+        return None

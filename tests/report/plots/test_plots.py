@@ -25,8 +25,8 @@ from aerotri.report.plots.overview import (
 from synthetic import make_adjusted_block, ultracam
 
 NAMES = [
-    "block_plan", "ground_points", "systematic_errors", "averaged_residuals", "correlations", "residual_histogram",
-    "rays_per_point",
+    "block_plan", "overlap", "error_ellipses", "ground_points", "systematic_errors", "averaged_residuals",
+    "correlations", "residual_histogram", "column_row_residuals", "photograph_residuals", "rays_per_point",
 ]  # fmt: skip
 
 

@@ -31,6 +31,7 @@ from aerotri.report.plots.crosscheck import crosscheck_table
 from aerotri.report.plots.rendering import RenderedPlot, render_plots
 from aerotri.report.tables import adjustment as tables
 from aerotri.report.tables import parameters as parameter_tables
+from aerotri.report.tables import photographs as photograph_tables
 from aerotri.report.tables import precision as precision_tables
 from aerotri.report.tables import rigs as rig_tables
 from aerotri.report.tables import rolling_shutters as shutter_tables
@@ -38,6 +39,8 @@ from aerotri.report.tables import work as work_tables
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.parameter_comparison import ParameterComparison
 from aerotri.statistics.parameter_effects import ParameterEffects
+from aerotri.statistics.photograph_residuals import photograph_residuals
+from aerotri.statistics.position_differences import position_differences
 from aerotri.strategies.free_stages import FreeCheck
 
 LARGEST_SVG = 450_000
@@ -56,6 +59,22 @@ CONTENTS = (
 
 CAPTIONS = {
     "block_plan": "Projection centres, strips, footprints on the mean height of the ground, control and check points.",
+    "overlap": (
+        "In how many photographs the ground is seen. The darker the fewer; hatched: fewer than three, where a gross "
+        "error of a tie point stays unseen. The line bounds the ground seen by three or more."
+    ),
+    "trajectory": (
+        "Adjusted position of the antenna − given position. Jumps and slopes are errors of the positions; a constant "
+        "difference is one of the datum, the lever arm or the principal distance."
+    ),
+    "error_ellipses": (
+        "Error ellipses of object points for 95 %, thinned. The darker an ellipse, the larger the σ of the height."
+    ),
+    "column_row_residuals": (
+        "Mean residuals along the columns and rows of the image. Filled dots are more than noise, all means tested "
+        "together. A curve means that the additional parameters leave a systematic error of the camera."
+    ),
+    "photograph_residuals": "How large the residuals are in every photograph; filled: larger than chance makes them.",
     "change": (
         "The systematic image errors of two groups and their difference, on one scale. Dark arrows differ from zero at "
         "95 %."
@@ -274,6 +293,8 @@ def _tables(adjusted: AdjustedBlock) -> dict[str, tables.Table]:
         "weak_points": tables.weak_points(adjusted),
         "weak_images": tables.weak_images(adjusted),
         "images": tables.images(adjusted),
+        "photograph_residuals": photograph_tables.photograph_residuals_table(photograph_residuals(adjusted), adjusted),
+        "positions": photograph_tables.positions_table(position_differences(adjusted), adjusted),
     }
 
 

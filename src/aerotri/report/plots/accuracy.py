@@ -50,7 +50,7 @@ def plot_height_accuracy(adjusted: AdjustedBlock) -> Figure:
     step = max(extent.width, extent.height) / NODES
     x, y = np.arange(extent.left, extent.right, step), np.arange(extent.bottom, extent.top, step)
     values = median_around(xy, sigma, x, y)
-    norm, shades = _classes(values)
+    norm, shades = shade_classes(values)
     axes.pcolormesh(x, y, values, cmap=shades, norm=norm, shading="nearest", zorder=0, rasterized=True)
     scale = axes_at(figure, 0.95 + width + 0.2, 1.1, 0.16, height)
     figure.colorbar(ScalarMappable(norm, shades), cax=scale).set_label("σ of Z [m]")
@@ -80,7 +80,7 @@ def _heights(adjusted: AdjustedBlock) -> tuple[np.ndarray, np.ndarray]:
     return adjusted.points.xyz[there, :2], adjusted.points.total_sigma[there, 2]
 
 
-def _classes(values: np.ndarray) -> tuple[BoundaryNorm, ListedColormap]:
+def shade_classes(values: np.ndarray) -> tuple[BoundaryNorm, ListedColormap]:
     """Round limits of the classes and their greys; a block that is equally good everywhere has a scale too."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     low, high = (low, high) if high > 1.001 * low else (0.9 * low, 1.1 * high)

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from aerotri.image_errors import Change, averaged_residuals, field_on_grid, image_groups
+from aerotri.image_errors.residual_profiles import residual_profiles
 from aerotri.report.plots.block import plot_block_plan, plot_ground_points, plot_rays_per_point
 from aerotri.report.plots.camera import plot_averaged_residuals, plot_systematic_errors
+from aerotri.report.plots.ellipses import plot_error_ellipses
+from aerotri.report.plots.overlap import plot_overlap
 from aerotri.report.plots.panels import Panel, plot_panels
 from aerotri.report.plots.reliability import plot_reliability
 from aerotri.report.plots.rendering import save_plots
+from aerotri.report.plots.residual_profiles import plot_photograph_residuals, plot_residual_profiles
 from aerotri.report.plots.residuals import (
     correlated_parameters,
     plot_correlations,
@@ -19,7 +24,10 @@ from aerotri.report.plots.residuals import (
     plot_residual_histogram,
 )
 from aerotri.report.plots.rigs import plot_rig
+from aerotri.report.plots.trajectory import plot_trajectory
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.statistics.photograph_residuals import photograph_residuals
+from aerotri.statistics.position_differences import position_differences
 
 __all__ = [
     "all_plots",
@@ -27,13 +35,18 @@ __all__ = [
     "plot_block_plan",
     "plot_change",
     "plot_correlations",
+    "plot_error_ellipses",
     "plot_ground_points",
+    "plot_overlap",
+    "plot_photograph_residuals",
     "plot_ray_correlation",
     "plot_rays_per_point",
     "plot_reliability",
     "plot_residual_histogram",
+    "plot_residual_profiles",
     "plot_rig",
     "plot_systematic_errors",
+    "plot_trajectory",
     "save_plots",
 ]
 
@@ -42,7 +55,9 @@ MOST_GROUPS = 8
 draw."""
 
 
-def all_plots(adjusted: AdjustedBlock, changes: Sequence[Change] = ()) -> dict[str, Figure]:
+def all_plots(
+    adjusted: AdjustedBlock, changes: Sequence[Change] = (), prints: np.ndarray | None = None
+) -> dict[str, Figure]:
     """The figures of the report by a name fit for a file, in the order of the report.
 
     Plots over the image format are drawn for the first eight image groups and numbered from the second on.
@@ -50,9 +65,15 @@ def all_plots(adjusted: AdjustedBlock, changes: Sequence[Change] = ()) -> dict[s
     Parameters
     ----------
     changes : of the image errors between groups, as `group_changes` finds them.
+    prints : (n,) footprints over the relief, see `plot_overlap`.
     """
     name = adjusted.block.name
     figures = {"block_plan": plot_block_plan(adjusted)}
+    _add(figures, "overlap", plot_overlap(adjusted, prints))
+    positions = position_differences(adjusted)
+    if positions is not None:
+        figures["trajectory"] = plot_trajectory(positions, name)
+    _add(figures, "error_ellipses", plot_error_ellipses(adjusted))
     if len(adjusted.control) or len(adjusted.check):
         figures["ground_points"] = plot_ground_points(adjusted)
     for number, group in enumerate(image_groups(adjusted.block)[:MOST_GROUPS], start=1):
@@ -70,12 +91,20 @@ def all_plots(adjusted: AdjustedBlock, changes: Sequence[Change] = ()) -> dict[s
     if len(correlated_parameters(adjusted)) >= 2:
         figures["correlations"] = plot_correlations(adjusted)
     figures["residual_histogram"] = plot_residual_histogram(adjusted)
+    _add(figures, "column_row_residuals", plot_residual_profiles(residual_profiles(adjusted), name))
+    _add(figures, "photograph_residuals", plot_photograph_residuals(photograph_residuals(adjusted), adjusted))
     if adjusted.ray_correlation is not None and adjusted.ray_correlation.nearest >= 0:
         figures["ray_correlation"] = plot_ray_correlation(adjusted.ray_correlation, name)
     figures["rays_per_point"] = plot_rays_per_point(adjusted)
     if adjusted.effects is not None:
         figures["reliability"] = plot_reliability(adjusted)
     return figures
+
+
+def _add(figures: dict[str, Figure], name: str, figure: Figure | None) -> None:
+    """Keep a figure that there is."""
+    if figure is not None:
+        figures[name] = figure
 
 
 def plot_change(adjusted: AdjustedBlock, change: Change) -> Figure:
