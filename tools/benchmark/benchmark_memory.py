@@ -4,6 +4,8 @@ A strip over hilly ground is rendered, 8 bits in three colours, and adjusted. `d
 `ortho` makes the whole of the strip at the GSD, over waves of 10 m that it reads from a file. Peak memory is the
 largest resident set that the system states for the process, the program and the pages of mapped files included.
 
+Measures the commands from within their processes: imports aerotri.cli on purpose, and writes the surface as dsm does.
+
 Example
 -------
     python tools/benchmark/benchmark_memory.py --photographs 3 --side 200 > tools/results/benchmark_memory.md

@@ -42,8 +42,8 @@ def _summary(found: SurfaceComparison) -> list[str]:
     c = found.record
     s = c.statistics
     lines = [
-        f"{s.count} cells of {c.grid.cell_x:g} m compared, {100 * c.coverage:.1f} % of the cells of the control surface; "
-        f"{found.method}",
+        f"{s.count} cells of {c.grid.cell_x:g} m compared, "
+        f"{100 * c.coverage:.1f} % of the cells of the control surface; {found.method}",
         f"bias {s.bias:+.3f} m, median {s.median:+.3f}, RMSE {s.rmse:.3f}, σ {s.std:.3f}, NMAD {s.nmad:.3f}, "
         f"LE90 {s.le90:.3f}, largest {s.max:.3f} m",
     ]

@@ -74,7 +74,7 @@ def overlap_of(polygons: np.ndarray, centres: np.ndarray) -> Overlap | None:
     for polygon, (j, i), (to_j, to_i) in zip(there, first.tolist(), last.tolist(), strict=True):
         count[i:to_i, j:to_j] += shapely.contains_xy(polygon, *np.meshgrid(x[j:to_j], y[i:to_i]))
     known = centres[np.isfinite(centres).all(axis=1)]
-    hull = shapely.convex_hull(shapely.multipoints(known))
+    hull = shapely.MultiPoint(known).convex_hull
     inside = np.zeros_like(count, dtype=bool)
     if hull.geom_type == "Polygon":
         shapely.prepare(hull)

@@ -11,7 +11,7 @@ import functools
 import io
 import warnings
 from collections.abc import Callable
-from typing import Any, ParamSpec, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import matplotlib
 import numpy as np
@@ -23,6 +23,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
 from aerotri.report.quality import printable
 
 P = ParamSpec("P")
+F = TypeVar("F", bound=Figure | None)
 
 WIDTH = 8.6
 """Inches of a plot; chosen [C]: scaled into the margins of an A4 page its letters are still readable."""
@@ -61,11 +62,11 @@ STYLE: dict[str, Any] = {
 }
 
 
-def styled(plot: Callable[P, Figure]) -> Callable[P, Figure]:
+def styled(plot: Callable[P, F]) -> Callable[P, F]:
     """Draw with the report's look whatever the user's matplotlibrc says, and leave his settings as they were."""
 
     @functools.wraps(plot)
-    def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
+    def wrapper(*args: P.args, **kwargs: P.kwargs) -> F:
         with matplotlib.rc_context(cast(Any, STYLE)):
             return plot(*args, **kwargs)
 
