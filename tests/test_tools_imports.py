@@ -18,6 +18,7 @@ INSIDE = {
     "benchmark/adjusting/peers.py": "gives other solvers the equations of the independent model",
     "benchmark/benchmark_imgeo.py": "times the resampling kernel beside cv2.remap",
     "benchmark/benchmark_dense.py": "times semi-global matching alone on the same epipolar images",
+    "benchmark/benchmark_memory.py": "runs the commands within processes whose memory is read",
     "benchmark/benchmark_pickets.py": "times the search kernel beside matchTemplate",
     "benchmark/benchmark_reading_others.py": "times the readers of COLMAP and OpenSfM without what is added to them",
     "benchmark/benchmark_rigs.py": "times parts of an iteration of the same flight with and without a rig",
@@ -42,7 +43,7 @@ INSIDE = {
     "reproduce/reproduce_paper_000.py": "the paper's formulas for two photographs, which no command uses",
 }
 """Files of tools/ that may import modules within the package, and what they measure there."""
-COMMANDS = ("prove/fuzzing/hostile.py", "prove/kill.py")
+COMMANDS = ("benchmark/benchmark_memory.py", "prove/fuzzing/hostile.py", "prove/kill.py")
 """Of these, those that test the commands; the others run them as users do, in a process of their own."""
 
 

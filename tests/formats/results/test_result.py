@@ -24,8 +24,8 @@ COLUMNS = {
 }
 RESIDUALS = "image, point, x, y, vx, vy, rx, ry, wx, wy, weight, status"
 KEYS = (
-    "aerotri, block, status, verdict, reasons, message, iterations, sigma0, sigma0_um, vtpv, observations, unknowns, "
-    "conditions, redundancy, groups, check_points, control_points, additional_parameters, cameras, blunders, "
+    "aerotri, block, project, status, verdict, reasons, message, iterations, sigma0, sigma0_um, vtpv, observations, "
+    "unknowns, conditions, redundancy, groups, check_points, control_points, additional_parameters, cameras, blunders, "
     "deviations, model_part, gnss_errors, photograph_fields, ray_correlation, notes, warnings, timings_s"
 )
 ENTRY_KEYS = {
