@@ -13,7 +13,7 @@ from matplotlib.collections import EllipseCollection
 from aerotri.image_errors.residual_profiles import residual_profiles
 from aerotri.observations.block import GnssIns
 from aerotri.report.plots.ellipses import error_ellipses, one_a_cell, plot_error_ellipses
-from aerotri.report.plots.overlap import plot_overlap
+from aerotri.report.plots.overlap import area_text, plot_overlap
 from aerotri.report.plots.residual_profiles import plot_photograph_residuals, plot_residual_profiles
 from aerotri.report.plots.trajectory import MOST_DOTS, plot_trajectory
 from aerotri.statistics.photograph_residuals import photograph_residuals
@@ -114,3 +114,16 @@ def test_sixty_thousand_photographs_are_thinned():
     dots = sum(len(line.get_xdata()) for axes in figure.axes[:1] for line in axes.lines if line.get_marker() == "o")
     assert dots <= MOST_DOTS
     assert f"of {n} photographs drawn" in text
+
+
+def test_areas_in_words():
+    assert [area_text(a) for a in (3.5, 5270.4, 13_100.0, 3.88e6)] == ["3.5 m²", "5270 m²", "1.31 ha", "3.88 km²"]
+
+
+def test_ellipses_larger_than_the_block_are_drawn_smaller():
+    """σ of many metres, of a block without control: drawn small, and the text says so."""
+    adjusted = make_adjusted_block(3, 8, 200)
+    covariance = np.tile(np.diag([1e6, 1e6, 1e6]), (len(adjusted.block.points), 1, 1))
+    figure = plot_error_ellipses(replace(adjusted, points=replace(adjusted.points, covariance=covariance)))
+    larger = float(words(figure).split("drawn ")[1].split()[0])
+    assert larger < 0.1

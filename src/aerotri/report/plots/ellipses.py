@@ -65,11 +65,11 @@ def plot_error_ellipses(adjusted: AdjustedBlock) -> Figure | None:
     width, height = plan.plan_size(extent, WIDTH - 2.4, 6.4)
     cell = max(extent.width, extent.height) / CELLS
     shown = one_a_cell(xy, found.major, cell)
-    larger = max(nice_number(FILLED * cell / (2.0 * float(np.quantile(found.major[shown], 0.75)))), 1.0)
+    larger = nice_number(FILLED * cell / (2.0 * float(np.quantile(found.major[shown], 0.75))))
     worst = int(np.argmax(found.major))
     name = plain(adjusted.block.points[found.point[worst]], 24)
     subtitle = (
-        f"{100 * PROBABILITY:.0f} %, drawn {larger:,.0f} times as large as the ground; {len(shown)} of {len(xy)} "
+        f"{100 * PROBABILITY:.0f} %, drawn {larger:.10g} times as large as the ground; {len(shown)} of {len(xy)} "
         "points: the one of median size in every cell\n"
         f"longer semi-axis of all: median {np.median(found.major):.3g} m, 95 % below "
         f"{np.quantile(found.major, 0.95):.3g} m, largest {found.major[worst]:.3g} m ({name})"

@@ -78,7 +78,7 @@ def area_text(square_metres: float) -> str:
                 if square_metres < 1e3 * size
                 else f"{square_metres / size:.0f} {unit}"
             )
-    return f"{square_metres:.3g} m²"
+    return f"{square_metres:.0f} m²" if square_metres >= 100.0 else f"{square_metres:.3g} m²"
 
 
 def _flat(adjusted: AdjustedBlock) -> np.ndarray:

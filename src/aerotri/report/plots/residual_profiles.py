@@ -19,7 +19,7 @@ PANEL = 1.45
 MOST_DOTS = 3000
 """Photographs that are drawn, those with the largest residuals always; chosen [C]: more are not told apart."""
 NAMED = 5
-"""Photographs that are named; chosen [C]."""
+"""Photographs that are named at most, of those beyond chance; chosen [C]: the table has more."""
 
 
 @styled
@@ -88,7 +88,7 @@ def _draw_curve(axes: Axes, profile: ResidualProfile, component: int, limit: flo
 
 @styled
 def plot_photograph_residuals(found: PhotographResiduals, adjusted: AdjustedBlock) -> Figure | None:
-    """RMS of the residuals of every photograph, in the order of the block; the worst are named.
+    """RMS of the residuals of every photograph, in the order of the block; the worst beyond chance are named.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def plot_photograph_residuals(found: PhotographResiduals, adjusted: AdjustedBloc
     axes.set_xlabel("number of the photograph in the block")
     axes.set_ylabel("RMS of a coordinate [px]")
     axes.spines[["top", "right"]].set_visible(False)
-    _name_worst(axes, adjusted, order[:NAMED], rms)
+    _name_worst(axes, adjusted, order[beyond[order]][:NAMED], rms)
     handles = [Line2D([], [], color=GREY, lw=1.0, ls=(0, (6, 2)), label="all photographs"),
                Line2D([], [], ls="none", marker="o", ms=3.6, color=INK, label="beyond chance")]  # fmt: skip
     figure.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0 - 0.3 / WIDTH, 0.02), ncols=2)
