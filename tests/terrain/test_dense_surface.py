@@ -120,13 +120,13 @@ def test_pixels_with_their_parallax_lie_where_they_were_projected_from(hill):
         for _ in range(50):
             delta = parallax[k] - np.interp(j - delta, np.arange(columns), g.known[i])
         value[k, i, j] = delta
-        xyz, per_pixel = np.empty((rows, columns, 3)), np.empty((rows, columns))
+        xyz, per_pixel = np.empty((3, rows, columns)), np.empty((rows, columns))
         rays = kernels.Rays(
             g.f, g.base, g.first, g.known, g.centre, np.ascontiguousarray(g.rotation), place.to_crs, place.reach
         )
         kernels.place_of_pixels(rays, value[k], xyz, per_pixel)
-        np.testing.assert_allclose(xyz[i, j], q[k], atol=2e-2)
-        assert np.isnan(xyz[0, 0]).all()
+        np.testing.assert_allclose(xyz[:, i, j], q[k], atol=2e-2)
+        assert np.isnan(xyz[:, 0, 0]).all()
 
 
 def textured_pair(shift: float, across: float, noise: float, seed: int) -> EpipolarImages:

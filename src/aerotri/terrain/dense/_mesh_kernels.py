@@ -31,92 +31,117 @@ class Rays(NamedTuple):
 
 @kernel
 def place_of_pixels(rays, value, out, per_pixel):
-    """CRS less origin (rows, columns, 3) m of pixels with parallaxes, and m of height a pixel of parallax is.
+    """CRS less origin (3, rows, columns) m of pixels with parallaxes, and m of height a pixel of parallax is.
 
     value : (rows, columns) px beyond P, NaN unknown.
     """
-    rows, columns = value.shape
-    t = np.empty(10)
-    q = np.empty(3)
-    r = rays.rotation
-    for i in range(rows):
-        for j in range(columns):
-            if not np.isfinite(value[i, j]):
-                out[i, j, 0] = out[i, j, 1] = out[i, j, 2] = per_pixel[i, j] = np.nan
-                continue
-            column, row = rays.first[0] + j, rays.first[1] + i
-            at = min(max(j - value[i, j], 0.0), columns - 1.001)
-            left = int(at)
-            by_column = rays.known[i, left + 1] - rays.known[i, left]
-            parallax = value[i, j] + rays.known[i, left] + (at - left) * by_column
-            depth = rays.f * rays.base / parallax
-            if not depth > 0.0:
-                out[i, j, 0] = out[i, j, 1] = out[i, j, 2] = per_pixel[i, j] = np.nan
-                continue
-            u0, u1, u2 = depth * column / rays.f, -depth * row / rays.f, -depth
-            for a in range(3):
-                q[a] = (rays.centre[a] + r[a, 0] * u0 + r[a, 1] * u1 + r[a, 2] * u2) / rays.reach
-            t[0], t[1], t[2], t[3] = 1.0, q[0], q[1], q[2]
-            t[4], t[5], t[6] = q[0] * q[0], q[1] * q[1], q[2] * q[2]
-            t[7], t[8], t[9] = q[0] * q[1], q[0] * q[2], q[1] * q[2]
-            for a in range(3):
-                total = 0.0
-                for b in range(10):
-                    total += rays.to_crs[a, b] * t[b]
-                out[i, j, a] = total
-            down = r[2, 0] * u0 + r[2, 1] * u1 + r[2, 2] * u2
-            per_pixel[i, j] = abs(down) * (1.0 - by_column) / parallax
+    for i in range(value.shape[0]):
+        _place_of_row(rays, i, value[i], rays.known[i], out[0, i], out[1, i], out[2, i], per_pixel[i])
 
 
 @leaf_kernel
-def _lay_triangle(a, b, c, sa, sb, sc, grid, z, sigma, bend, ba, bb, bc):
+def _place_of_row(rays, i, value, known, x, y, z, per_pixel):
+    """Of the pixels of row i, without a branch: so several are computed at once."""
+    r, c, m = rays.rotation, rays.centre, rays.to_crs
+    columns = value.shape[0]
+    share = 1.0 / rays.reach
+    up = -(rays.first[1] + i) / rays.f
+    for j in range(columns):
+        found = value[j]
+        at = min(max(j - (found if found == found else 0.0), 0.0), columns - 1.001)
+        left = int(at)
+        by_column = known[left + 1] - known[left]
+        parallax = found + known[left] + (at - left) * by_column
+        depth = rays.f * rays.base / parallax
+        depth = depth if depth > 0.0 else np.nan
+        u0, u1, u2 = depth * ((rays.first[0] + j) / rays.f), depth * up, -depth
+        down = r[2, 0] * u0 + r[2, 1] * u1 + r[2, 2] * u2
+        a = (c[0] + r[0, 0] * u0 + r[0, 1] * u1 + r[0, 2] * u2) * share
+        b = (c[1] + r[1, 0] * u0 + r[1, 1] * u1 + r[1, 2] * u2) * share
+        d = (c[2] + down) * share
+        aa, bb, dd, ab, ad, bd = a * a, b * b, d * d, a * b, a * d, b * d
+        x[j] = (
+            m[0, 0] + m[0, 1] * a + m[0, 2] * b + m[0, 3] * d + m[0, 4] * aa + m[0, 5] * bb + m[0, 6] * dd
+            + m[0, 7] * ab + m[0, 8] * ad + m[0, 9] * bd
+        )  # fmt: skip
+        y[j] = (
+            m[1, 0] + m[1, 1] * a + m[1, 2] * b + m[1, 3] * d + m[1, 4] * aa + m[1, 5] * bb + m[1, 6] * dd
+            + m[1, 7] * ab + m[1, 8] * ad + m[1, 9] * bd
+        )  # fmt: skip
+        z[j] = (
+            m[2, 0] + m[2, 1] * a + m[2, 2] * b + m[2, 3] * d + m[2, 4] * aa + m[2, 5] * bb + m[2, 6] * dd
+            + m[2, 7] * ab + m[2, 8] * ad + m[2, 9] * bd
+        )  # fmt: skip
+        per_pixel[j] = abs(down) * (1.0 - by_column) / parallax
+
+
+@kernel
+def lay_mesh(place, sigma_px, bend_px, per_pixel, value, jump, z, sigma, bend):
+    """Heights of the cells of a grid from the triangles between neighbouring pixels.
+
+    place : (3, rows, columns) column and row of the grid, whole at centres of cells, and height, m.
+    sigma_px, bend_px, value : (rows, columns) px. per_pixel : m of height a px.
+    jump : px, largest difference of parallax between neighbours of one surface.
+    z, sigma, bend : (rows, columns) m, of the grid, out; NaN before.
+    """
+    _lay_rows(place, sigma_px, bend_px, per_pixel, value, jump, np.empty(value.shape[1] - 1, np.bool_), z, sigma, bend)
+
+
+@leaf_kernel
+def _lay_rows(place, sigma_px, bend_px, per_pixel, value, jump, reaches, z, sigma, bend):
+    for i in range(value.shape[0] - 1):
+        _reach_cells(place[:, i], place[:, i + 1], value[i], value[i + 1], jump, reaches)
+        for j in range(value.shape[1] - 1):
+            if not reaches[j]:
+                continue
+            d1, d2 = value[i, j + 1], value[i + 1, j]
+            for i0, j0 in ((i, j), (i + 1, j + 1)):
+                d0 = value[i0, j0]
+                if abs(d0 - d1) <= jump and abs(d0 - d2) <= jump:
+                    _lay_triangle((i0, j0), (i, j + 1), (i + 1, j), place, sigma_px, bend_px, per_pixel, z, sigma, bend)
+
+
+@leaf_kernel
+def _reach_cells(above, below, value_above, value_below, jump, reaches):
+    """Whether the centre of a cell may lie between four pixels; of all between two rows, several at once."""
+    for j in range(reaches.shape[0]):
+        a, b, c, d = above[0, j], above[0, j + 1], below[0, j], below[0, j + 1]
+        columns = np.floor(max(max(a, b), max(c, d))) >= np.ceil(min(min(a, b), min(c, d)))
+        a, b, c, d = above[1, j], above[1, j + 1], below[1, j], below[1, j + 1]
+        rows = np.floor(max(max(a, b), max(c, d))) >= np.ceil(min(min(a, b), min(c, d)))
+        corner = value_above[j] + value_below[j + 1]
+        one_surface = abs(value_above[j + 1] - value_below[j]) <= jump
+        # where one corner is not known the triangle of the others is looked at
+        reaches[j] = ((columns & rows) | (corner != corner)) & one_surface
+
+
+@leaf_kernel
+def _lay_triangle(p, q, r, place, sigma_px, bend_px, per_pixel, z, sigma, bend):
     """Heights of the cells whose centres lie in a triangle; the highest surface of one pair counts."""
-    left, top, cell = grid
-    ax, ay = (a[0] - left) / cell - 0.5, (top - a[1]) / cell - 0.5
-    bx, by = (b[0] - left) / cell - 0.5, (top - b[1]) / cell - 0.5
-    cx, cy = (c[0] - left) / cell - 0.5, (top - c[1]) / cell - 0.5
+    ax, ay, bx, by = place[0, p[0], p[1]], place[1, p[0], p[1]], place[0, q[0], q[1]], place[1, q[0], q[1]]
+    cx, cy = place[0, r[0], r[1]], place[1, r[0], r[1]]
     twice = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-    if twice == 0.0:
-        return
     first_column = max(int(np.ceil(min(ax, bx, cx))), 0)
     last_column = min(int(np.floor(max(ax, bx, cx))), z.shape[1] - 1)
     first_row = max(int(np.ceil(min(ay, by, cy))), 0)
     last_row = min(int(np.floor(max(ay, by, cy))), z.shape[0] - 1)
+    if first_row > last_row or first_column > last_column or twice == 0.0:
+        return
+    za, zb, zc = place[2, p[0], p[1]], place[2, q[0], q[1]], place[2, r[0], r[1]]
+    ma, mb, mc = per_pixel[p[0], p[1]], per_pixel[q[0], q[1]], per_pixel[r[0], r[1]]
     for i in range(first_row, last_row + 1):
         for j in range(first_column, last_column + 1):
             wb = ((j - ax) * (cy - ay) - (cx - ax) * (i - ay)) / twice
             wc = ((bx - ax) * (i - ay) - (j - ax) * (by - ay)) / twice
             wa = 1.0 - wb - wc
             if wa >= -1e-9 and wb >= -1e-9 and wc >= -1e-9:
-                height = wa * a[2] + wb * b[2] + wc * c[2]
+                height = wa * za + wb * zb + wc * zc
                 if not z[i, j] >= height:
                     z[i, j] = height
-                    sigma[i, j] = wa * sa + wb * sb + wc * sc
-                    bend[i, j] = wa * ba + wb * bb + wc * bc
-
-
-@kernel
-def lay_mesh(xyz, sigma_px, bend_px, per_pixel, value, jump, grid, z, sigma, bend):
-    """Heights of the cells of a grid from the triangles between neighbouring pixels.
-
-    xyz : (rows, columns, 3) m. sigma_px, bend_px, value : (rows, columns) px. per_pixel : m of height a px.
-    jump : px, largest difference of parallax between neighbours of one surface. grid : left, top, cell, m.
-    z, sigma, bend : (rows, columns) m, of the grid, out; NaN before.
-    """
-    for i in range(value.shape[0] - 1):
-        for j in range(value.shape[1] - 1):
-            for half in range(2):
-                i0, j0 = (i, j) if half == 0 else (i + 1, j + 1)
-                i1, j1, i2, j2 = i, j + 1, i + 1, j
-                d0, d1, d2 = value[i0, j0], value[i1, j1], value[i2, j2]
-                if not (abs(d0 - d1) <= jump and abs(d0 - d2) <= jump and abs(d1 - d2) <= jump):
-                    continue
-                m0, m1, m2 = per_pixel[i0, j0], per_pixel[i1, j1], per_pixel[i2, j2]
-                _lay_triangle(
-                    xyz[i0, j0], xyz[i1, j1], xyz[i2, j2],
-                    m0 * sigma_px[i0, j0], m1 * sigma_px[i1, j1], m2 * sigma_px[i2, j2], grid, z, sigma, bend,
-                    m0 * bend_px[i0, j0], m1 * bend_px[i1, j1], m2 * bend_px[i2, j2],
-                )  # fmt: skip
+                    of = wa * ma * sigma_px[p[0], p[1]] + wb * mb * sigma_px[q[0], q[1]]
+                    sigma[i, j] = of + wc * mc * sigma_px[r[0], r[1]]
+                    of = wa * ma * bend_px[p[0], p[1]] + wb * mb * bend_px[q[0], q[1]]
+                    bend[i, j] = of + wc * mc * bend_px[r[0], r[1]]
 
 
 @kernel

@@ -1,55 +1,143 @@
-"""Shift of windows by least squares, of all pixels of an epipolar pair, from sums over windows."""
+"""Shift of windows by least squares, of all pixels of an epipolar pair.
+
+Sums over windows run along: a row is added and the one that leaves the window taken off. Columns are worked in parts
+whose sums stay in the processor's nearest memory; that is three times as fast as OpenCV's boxFilter of every product.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from aerotri.compiled import kernel
+from aerotri.compiled import kernel, leaf_kernel
+
+HALF = 3
+"""Pixels of a window on either side of its middle."""
+PART = 256
+"""Columns that are worked together."""
+KEPT_ROWS = 8
+"""Rows kept, one more than a window has."""
+SIGNALS, SUMS = 4, 14
+"""D = L − R, the gradients X and Y of both images' mean, R; their sums, then those of DD, DX, DY, DR, XX, XY, XR, YY,
+YR, RR."""
 
 
 @kernel
-def solve_shifts(known, means, products, count, shift, across, variance, variance_across, correlation):
-    """L = R + o + g·R − u·R_x + v·R_y over a window: u along the base, v across it, gain and offset.
+def shift_windows(left, right, level, known, shift, across, variance, variance_across, correlation):
+    """L = R + o + g·R − u·X + v·Y over a window: u along the base, v across it, gain and offset.
 
-    known : (rows, columns). means : (4, rows, columns) of D = L − R, R_x, R_y, R over the windows.
-    products : (10, rows, columns) means of DD, D·R_x, D·R_y, D·R, xx, xy, xR, yy, yR, RR.
-    count : pixels of a window. shift, across, their variances, px², correlation (of L and R) : out; NaN where the
-    texture does not tell.
+    left, right : (rows, columns) float32. level : float32, a mean grey value, taken off R. known : (rows, columns).
+    shift, across, their variances, px², correlation (of L and R) : out, float32; NaN where not known, where the texture
+    does not tell and at the edge of the images.
     """
-    n = np.empty((3, 3))
-    q = np.empty((3, 3))
-    b = np.empty(3)
-    for i in range(known.shape[0]):
-        for j in range(known.shape[1]):
-            shift[i, j] = across[i, j] = variance[i, j] = variance_across[i, j] = correlation[i, j] = np.nan
-            if not known[i, j]:
+    rows, columns = left.shape
+    side = 2 * HALF + 1
+    kept = np.zeros((KEPT_ROWS, SIGNALS, PART + 2 * HALF), np.float32)
+    sums = np.zeros((SUMS, PART + 2 * HALF))
+    means = np.zeros((SUMS, PART))
+    for out in (shift, across, variance, variance_across, correlation):
+        out[:] = np.nan
+    for first in range(HALF + 1, columns - HALF - 1, PART):
+        n = min(PART, columns - HALF - 1 - first)
+        part = slice(first, first + n)
+        sums[:] = 0.0
+        kept[:] = 0.0
+        for i in range(1, rows - 1):
+            new, old = kept[i % KEPT_ROWS], kept[(i - side) % KEPT_ROWS]
+            _signals(left, right, level, i, first - HALF, n + 2 * HALF, new)
+            _move_sums(new, old, n + 2 * HALF, sums)
+            if i < side:
                 continue
-            d, x, y, r = means[0, i, j], means[1, i, j], means[2, i, j], means[3, i, j]
-            p = products[:, i, j]
-            dd = p[0] - d * d
-            b[0], b[1], b[2] = -(p[1] - d * x), p[2] - d * y, p[3] - d * r
-            n[0, 0], n[1, 1], n[2, 2] = p[4] - x * x, p[7] - y * y, p[9] - r * r
-            n[0, 1] = n[1, 0] = -(p[5] - x * y)
-            n[0, 2] = n[2, 0] = -(p[6] - x * r)
-            n[1, 2] = n[2, 1] = p[8] - y * r
-            if not (n[0, 0] > 1e-3 and n[1, 1] > 1e-3 and n[2, 2] > 1e-2):
-                continue
-            q[0, 0] = n[1, 1] * n[2, 2] - n[1, 2] * n[1, 2]
-            q[0, 1] = n[0, 2] * n[1, 2] - n[0, 1] * n[2, 2]
-            q[0, 2] = n[0, 1] * n[1, 2] - n[0, 2] * n[1, 1]
-            q[1, 1] = n[0, 0] * n[2, 2] - n[0, 2] * n[0, 2]
-            q[1, 2] = n[0, 1] * n[0, 2] - n[0, 0] * n[1, 2]
-            q[2, 2] = n[0, 0] * n[1, 1] - n[0, 1] * n[0, 1]
-            determinant = n[0, 0] * q[0, 0] + n[0, 1] * q[0, 1] + n[0, 2] * q[0, 2]
-            if not determinant > 1e-4 * n[0, 0] * n[1, 1] * n[2, 2]:
-                continue
-            u = (q[0, 0] * b[0] + q[0, 1] * b[1] + q[0, 2] * b[2]) / determinant
-            v = (q[0, 1] * b[0] + q[1, 1] * b[1] + q[1, 2] * b[2]) / determinant
-            g = (q[0, 2] * b[0] + q[1, 2] * b[1] + q[2, 2] * b[2]) / determinant
-            left = max(dd - u * b[0] - v * b[1] - g * b[2], 0.0)
-            shift[i, j], across[i, j] = u, v
-            noise = left / (count - 4.0)
-            variance[i, j], variance_across[i, j] = noise * q[0, 0] / determinant, noise * q[1, 1] / determinant
-            # L = D + R: its variance and what it shares with R, before the shift
-            own = dd + 2.0 * b[2] + n[2, 2]
-            correlation[i, j] = (b[2] + n[2, 2]) / np.sqrt(max(own * n[2, 2], 1e-12))
+            _means(sums, n, means)
+            at = i - HALF
+            _solve(
+                known[at, part], means, shift[at, part], across[at, part], variance[at, part],
+                variance_across[at, part], correlation[at, part],
+            )  # fmt: skip
+
+
+@leaf_kernel
+def _signals(left, right, level, i, first, n, out):
+    """Of n pixels of row i; gradients by Scharr's weights."""
+    near, middle = np.float32(3.0 / 64.0), np.float32(10.0 / 64.0)
+    for j in range(n):
+        c = first + j
+        out[0, j] = left[i, c] - right[i, c]
+        out[3, j] = right[i, c] - level
+    for j in range(n):
+        c = first + j
+        a, b = left[i - 1, c - 1] + right[i - 1, c - 1], left[i - 1, c + 1] + right[i - 1, c + 1]
+        d, e = left[i + 1, c - 1] + right[i + 1, c - 1], left[i + 1, c + 1] + right[i + 1, c + 1]
+        x = (left[i, c + 1] + right[i, c + 1]) - (left[i, c - 1] + right[i, c - 1])
+        y = (left[i + 1, c] + right[i + 1, c]) - (left[i - 1, c] + right[i - 1, c])
+        out[1, j] = near * ((b - a) + (e - d)) + middle * x
+        out[2, j] = near * ((d - a) + (e - b)) + middle * y
+
+
+@leaf_kernel
+def _move_sums(new, old, n, sums):
+    """Sums over the rows of a window, one row on."""
+    for k in range(SIGNALS):
+        total, a, b = sums[k], new[k], old[k]
+        for j in range(n):
+            total[j] = total[j] + a[j] - b[j]
+    k = SIGNALS
+    for one in range(SIGNALS):
+        for other in range(one, SIGNALS):
+            total, a, b, c, d = sums[k], new[one], new[other], old[one], old[other]
+            for j in range(n):
+                total[j] = total[j] + a[j] * b[j] - c[j] * d[j]
+            k += 1
+
+
+@leaf_kernel
+def _means(sums, n, out):
+    """Over whole windows."""
+    share = 1.0 / (2 * HALF + 1) ** 2
+    for k in range(SUMS):
+        s, to = sums[k], out[k]
+        for j in range(n):
+            to[j] = share * (((s[j] + s[j + 1]) + (s[j + 2] + s[j + 3])) + ((s[j + 4] + s[j + 5]) + s[j + 6]))
+
+
+@leaf_kernel
+def _solve(known, means, shift, across, variance, variance_across, correlation):
+    """Of the windows of a part of a row, without a branch: so several pixels are solved at once."""
+    nothing = np.float32(np.nan)
+    count = (2 * HALF + 1) ** 2
+    for j in range(known.shape[0]):
+        d, x, y, r = means[0, j], means[1, j], means[2, j], means[3, j]
+        dd = means[4, j] - d * d
+        b0, b1, b2 = d * x - means[5, j], means[6, j] - d * y, means[7, j] - d * r
+        n00, n11, n22 = means[8, j] - x * x, means[11, j] - y * y, means[13, j] - r * r
+        n01, n02, n12 = x * y - means[9, j], x * r - means[10, j], means[12, j] - y * r
+        q00, q11, q22 = n11 * n22 - n12 * n12, n00 * n22 - n02 * n02, n00 * n11 - n01 * n01
+        q01, q02, q12 = n02 * n12 - n01 * n22, n01 * n12 - n02 * n11, n01 * n02 - n00 * n12
+        determinant = n00 * q00 + n01 * q01 + n02 * q02
+        told = (n00 > 1e-3) & (n11 > 1e-3) & (n22 > 1e-2) & (determinant > 1e-4 * n00 * n11 * n22) & known[j]
+        share = 1.0 / (determinant if told else 1.0)
+        u = (q00 * b0 + q01 * b1 + q02 * b2) * share
+        v = (q01 * b0 + q11 * b1 + q12 * b2) * share
+        g = (q02 * b0 + q12 * b1 + q22 * b2) * share
+        noise = max(dd - u * b0 - v * b1 - g * b2, 0.0) * share / (count - 4.0)
+        # L = D + R: its variance and what it shares with R, before the shift
+        own = dd + 2.0 * b2 + n22
+        alike = (b2 + n22) / np.sqrt(max(own * n22, 1e-12))
+        shift[j] = u if told else nothing
+        across[j] = v if told else nothing
+        variance[j] = noise * q00 if told else nothing
+        variance_across[j] = noise * q11 if told else nothing
+        correlation[j] = alike if told else nothing
+
+
+@kernel
+def keep_seen(found, lowest, left_known, right_known, out):
+    """Parallaxes that OpenCV gives in sixteenths as px; NaN where there is none or a pixel of the two is not known.
+
+    found : (rows, columns) int16. lowest : px, the least that was tried. out : float32.
+    """
+    for i in range(found.shape[0]):
+        for j in range(found.shape[1]):
+            value = found[i, j] / 16.0
+            at = int(np.rint(j - value))
+            seen = value >= lowest and left_known[i, j] and 0 <= at < found.shape[1] and right_known[i, at]
+            out[i, j] = value if seen else np.nan

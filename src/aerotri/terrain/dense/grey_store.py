@@ -103,10 +103,13 @@ def _stretched(grey: np.ndarray) -> np.ndarray:
     known = np.isfinite(grey)
     if not known.any():
         return np.zeros(grey.shape, np.uint8)
-    sample = grey[known]
-    low, high = np.percentile(sample[:: len(sample) // MOST_SAMPLED + 1], [TAIL_PERCENT, 100.0 - TAIL_PERCENT])
-    scaled = (np.where(known, grey, low) - low) * (255.0 / (high - low if high > low else 1.0))
-    return np.clip(scaled + 0.5, 0.0, 255.0).astype(np.uint8)
+    if not known.all():
+        grey = np.where(known, grey, np.float32(grey[known].min()))
+    sample = grey.ravel()[np.flatnonzero(known)[:: known.sum() // MOST_SAMPLED + 1]]
+    low, high = np.percentile(sample, [TAIL_PERCENT, 100.0 - TAIL_PERCENT])
+    scaled = grey - np.float32(low)
+    scaled *= np.float32(255.0 / (high - low if high > low else 1.0))
+    return np.clip(scaled + np.float32(0.5), 0.0, 255.0, out=scaled).astype(np.uint8)
 
 
 def reduced(pixels: np.ndarray, level: int) -> np.ndarray:

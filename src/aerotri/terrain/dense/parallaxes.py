@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from aerotri.conventions import SIGMA_PER_MAD
-from aerotri.terrain.dense._refinement_kernels import solve_shifts
+from aerotri.terrain.dense._refinement_kernels import HALF, keep_seen, shift_windows
 from aerotri.terrain.dense._resampling_kernels import align
 from aerotri.terrain.dense.epipolar import EpipolarImages
 
@@ -30,7 +30,7 @@ BOTH_WAYS_PX = 1
 """Largest difference of left-to-right and right-to-left."""
 SPECKLE_PX, SPECKLE_STEP = 100, 2
 """Pixels of a patch of its own parallax below which it is taken out, and the step that bounds it; the manual's."""
-WINDOW_PX = 7
+WINDOW_PX = 2 * HALF + 1
 """Side of the windows of least squares; chosen [C]; other sides were not compared."""
 ROUNDS = 2
 """Of least squares; a third moves the medians of synthetic pairs by less than .01 px."""
@@ -48,8 +48,8 @@ LARGEST_SIGMA_PX = 1.0
 """σ of a parallax at which nothing is known."""
 FEWEST_TELL = 200
 """Shifts across the base of which a factor is taken."""
-MOST_TELL = 100_000
-"""Shifts whose medians are taken, spread over a tile; chosen [C]: they are then sure to half a per cent of a spread."""
+MOST_TELL = 30_000
+"""Shifts whose medians are taken, spread over a tile; chosen [C]: they are then sure to a per cent of a spread."""
 INVALID = -1e4
 
 
@@ -78,9 +78,8 @@ def parallaxes_of(images: EpipolarImages, refine: bool = True) -> Parallaxes:
     refine : by least squares; without, σ is that of rounding.
     """
     found = semi_global(images)
-    value = np.where(np.isfinite(found), found, INVALID).astype(np.float32)
-    value = cv2.medianBlur(value, 3)
-    value[~np.isfinite(found)] = INVALID
+    value = cv2.medianBlur(np.nan_to_num(found, nan=INVALID), 3)
+    value[np.isnan(found)] = INVALID
     if not refine:
         known = value > INVALID / 2
         nothing = np.full(value.shape, np.nan, np.float32)
@@ -98,17 +97,14 @@ def semi_global(images: EpipolarImages) -> np.ndarray:
         disp12MaxDiff=BOTH_WAYS_PX, preFilterCap=CLIPPED_GRADIENT, uniquenessRatio=UNIQUE_PERCENT,
         speckleWindowSize=SPECKLE_PX, speckleRange=SPECKLE_STEP, mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
     )  # fmt: skip
-    found = matcher.compute(_bytes(images.left), _bytes(images.right)).astype(np.float32) / 16.0
-    known = (found >= g.lowest) & images.left_known
-    rows, columns = np.nonzero(known)
-    at = np.rint(columns - found[rows, columns]).astype(np.int64)
-    inside = (at >= 0) & (at < found.shape[1])
-    known[rows, columns] = inside & images.right_known[rows, np.clip(at, 0, found.shape[1] - 1)]
-    return np.where(known, found, np.nan).astype(np.float32)
+    found = matcher.compute(_bytes(images.left), _bytes(images.right))
+    out = np.empty(found.shape, np.float32)
+    keep_seen(found, g.lowest, images.left_known, images.right_known, out)
+    return out
 
 
 def _bytes(grey: np.ndarray) -> np.ndarray:
-    return np.clip(np.rint(grey), 0.0, 255.0).astype(np.uint8)
+    return cv2.convertScaleAbs(np.maximum(grey, 0.0))
 
 
 def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
@@ -122,8 +118,8 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
     for _ in range(ROUNDS):
         value = _smoothed(value, known)
         align(right, value, middle, known, left, aligned)
-        means, products = _sums(left, aligned)
-        solve_shifts(known, means, products, float(WINDOW_PX**2), shift, across, variance, of_across, correlation)
+        level = np.float32(aligned.mean())
+        shift_windows(left, aligned, level, known, shift, across, variance, of_across, correlation)
         known = known & (np.abs(shift) < LARGEST_SHIFT_PX)
         value = np.where(known, value + shift, INVALID).astype(np.float32)
         left_across, factor = _noise(across, of_across, known)
@@ -147,23 +143,6 @@ def _smoothed(value: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Smooth where it is continuous: neighbours further off than a pixel do not count."""
     out = cv2.bilateralFilter(value, 7, 0.7, 2.5)
     return np.where(known, out, INVALID).astype(np.float32)
-
-
-def _sums(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Means over windows, as `solve_shifts` takes them; gradients are those of both images."""
-    both = 0.5 * (left + right)
-    x = cv2.Scharr(both, cv2.CV_32F, 1, 0, scale=1.0 / 32.0)
-    y = cv2.Scharr(both, cv2.CV_32F, 0, 1, scale=1.0 / 32.0)
-    d = left - right
-    r = right - np.float32(right.mean())
-    size = WINDOW_PX, WINDOW_PX
-    pairs = ((d, d), (d, x), (d, y), (d, r), (x, x), (x, y), (x, r), (y, y), (y, r), (r, r))
-    means, products = (np.empty((n, *d.shape), np.float32) for n in (4, len(pairs)))
-    for n, values in enumerate((d, x, y, r)):
-        means[n] = cv2.boxFilter(values, -1, size)
-    for n, (one, other) in enumerate(pairs):
-        products[n] = cv2.boxFilter(one * other, -1, size)
-    return means, products
 
 
 def _noise(across: np.ndarray, variance: np.ndarray, known: np.ndarray) -> tuple[float, float]:

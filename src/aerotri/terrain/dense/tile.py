@@ -135,12 +135,16 @@ def _heights(
         g.f, g.base, g.first, g.known, np.ascontiguousarray(g.centre), np.ascontiguousarray(g.rotation),
         np.ascontiguousarray(place.to_crs), place.reach,
     )  # fmt: skip
-    xyz = np.empty((*found.value.shape, 3))
+    place_of = np.empty((3, *found.value.shape))
     per_pixel = np.empty(found.value.shape)
-    kernels.place_of_pixels(rays, found.value, xyz, per_pixel)
+    kernels.place_of_pixels(rays, found.value, place_of, per_pixel)
+    # metres of the CRS to columns and rows of the grid, whole at centres of cells
+    for axis, start, sign in ((0, grid.left - place.origin[0], 1.0), (1, grid.top - place.origin[1], -1.0)):
+        place_of[axis] -= start
+        place_of[axis] *= sign / grid.cell_x
+        place_of[axis] -= 0.5
     z, sigma, bend = (np.full((grid.rows, grid.columns), np.nan) for _ in range(3))
-    about = grid.left - place.origin[0], grid.top - place.origin[1], grid.cell_x
-    kernels.lay_mesh(xyz, found.sigma, found.bend, per_pixel, found.value, LARGEST_JUMP_PX, about, z, sigma, bend)
+    kernels.lay_mesh(place_of, found.sigma, found.bend, per_pixel, found.value, LARGEST_JUMP_PX, z, sigma, bend)
     return z, sigma, bend
 
 
