@@ -279,7 +279,11 @@ def test_seams_have_nearly_the_smallest_energy():
         value = rng.uniform(0.0, 3.0, (2, 1, 3, 4)).astype(np.float32)
         unary = np.ascontiguousarray(rng.uniform(0.0, 1.0, (3, 4, 2)).astype(np.float32))
         right, below = np.empty((3, 4, 2, 2), np.float32), np.empty((3, 4, 2, 2), np.float32)
-        kernels.seam_costs(found, value, 5.0, 0.05, right, below)
+        difference = np.empty((3, 4, 2, 2), np.float32)
+        kernels.differences(found, value, np.float32(5.0), difference)
+        kernels.seam_costs(
+            np.ascontiguousarray(np.moveaxis(found, 0, -1)), difference, np.float32(5.0), np.float32(0.05), right, below
+        )
         messages, label = np.zeros((4, 3, 4, 2), np.float32), np.zeros((3, 4), np.int32)
         for _ in range(12):
             for backwards in (False, True):
@@ -291,6 +295,35 @@ def test_seams_have_nearly_the_smallest_energy():
     assert min(gaps) > -1e-6
     assert np.mean(np.array(gaps) < 1e-5) >= 0.9
     assert max(gaps) < 0.1
+
+
+def test_costs_of_seams_are_differences_of_the_two_photographs():
+    """Against the definition, with lists of photographs that differ from cell to cell and end early."""
+    rng = np.random.default_rng(7)
+    count, rows, columns, most, least = 3, 4, 5, np.float32(0.8), np.float32(0.05)
+    found = np.argsort(rng.random((5, rows, columns)), axis=0)[:count].astype(np.int32)
+    found[1:, 0, 1], found[2, 2, 2], found[:, 3, 3] = -1, -1, -1
+    value = rng.uniform(0.0, 1.0, (count, 2, rows, columns)).astype(np.float32)
+    difference = np.empty((rows, columns, count, count), np.float32)
+    kernels.differences(found, value, most, difference)
+    right, below = (np.empty((rows, columns, count, count), np.float32) for _ in range(2))
+    kernels.seam_costs(np.ascontiguousarray(np.moveaxis(found, 0, -1)), difference, most, least, right, below)
+
+    def at(i, j, one, other):
+        lists = found[:, i, j].tolist()
+        if one not in lists or other not in lists:
+            return most
+        return min(np.abs(value[lists.index(one), :, i, j] - value[lists.index(other), :, i, j]).mean(), most)
+
+    for i, j in itertools.product(range(rows), range(columns)):
+        for (k, m), cost in (((i, j + 1), right), ((i + 1, j), below)):
+            if k == rows or m == columns:
+                continue
+            for a, b in itertools.product(range(count), repeat=2):
+                one, other = int(found[a, i, j]), int(found[b, k, m])
+                none = one == other or one < 0 or other < 0
+                wanted = 0.0 if none else least + 0.5 * (at(i, j, one, other) + at(k, m, one, other))
+                assert cost[i, j, a, b] == pytest.approx(wanted, abs=1e-6)
 
 
 def test_seams_go_around_what_differs(town, tmp_path):

@@ -130,7 +130,7 @@ def _make_dem(path: Path, middle: np.ndarray, width: float, cells: int, options:
                "transform": rasterio.Affine(cell, 0.0, left, 0.0, -cell, top), **options}  # fmt: skip
     rng = np.random.default_rng(1)
     x = left + (np.arange(cells) + 0.5) * cell
-    with rasterio.Env(GDAL_CACHEMAX=256), rasterio.open(path, "w", **profile) as writer:
+    with rasterio.Env(GDAL_CACHEMAX=256 << 20), rasterio.open(path, "w", **profile) as writer:
         for first in range(0, cells, WINDOW):
             y = top - (np.arange(first, min(first + WINDOW, cells)) + 0.5)[:, None] * cell
             z = 60.0 + 20.0 * np.sin(x / 300.0) * np.cos(y / 250.0) + 0.03 * rng.standard_normal((len(y), cells))
@@ -206,7 +206,7 @@ def _copy(source: str, target: str, arguments: argparse.Namespace) -> None:
     from rasterio.windows import Window
 
     with (
-        rasterio.Env(GDAL_CACHEMAX=256),
+        rasterio.Env(GDAL_CACHEMAX=256 << 20),
         rasterio.open(source) as reader,
         rasterio.open(target, "w", **(reader.profile | {"num_threads": arguments.threads})) as writer,
     ):

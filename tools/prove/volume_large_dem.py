@@ -33,7 +33,7 @@ def write_cone(path: Path, cells: int) -> float:
     profile = {"driver": "GTiff", "width": cells, "height": cells, "count": 1, "dtype": "float32",
                "tiled": True, "blockxsize": 512, "blockysize": 512,
                "BIGTIFF": "IF_SAFER", "transform": rasterio.Affine(1.0, 0.0, 0.0, 0.0, -1.0, cells)}  # fmt: skip
-    with rasterio.Env(GDAL_CACHEMAX=64), rasterio.open(path, "w", **profile) as writer:
+    with rasterio.Env(GDAL_CACHEMAX=64 << 20), rasterio.open(path, "w", **profile) as writer:
         for row in range(0, cells, PIECE):
             for column in range(0, cells, PIECE):
                 rows, columns = away[row : row + PIECE], away[column : column + PIECE]

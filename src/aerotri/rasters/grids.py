@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 NO_DATA = -9999.0
 """Stands for what is not known in the files of this program."""
-CACHE_MB = 256
-"""Blocks that GDAL keeps: it would take a share of the machine's memory otherwise."""
+CACHE_BYTES = 256 << 20
+"""Of blocks that GDAL keeps: it would take a share of the machine's memory otherwise. rasterio hands bytes on, not MB."""
 TILE = 512
 """Side of the tiles of files written, pixels; a multiple of 16 as TIFF asks for, and the size usual for cloud-optimised
 files."""
@@ -319,10 +319,10 @@ def crs_of_heights(crs: str) -> str | None:
 
 
 def cache_limited() -> Any:
-    """A context in which GDAL keeps `CACHE_MB` of blocks and no more."""
+    """A context in which GDAL keeps `CACHE_BYTES` of blocks and no more."""
     import rasterio
 
-    return rasterio.Env(GDAL_CACHEMAX=CACHE_MB)
+    return rasterio.Env(GDAL_CACHEMAX=CACHE_BYTES)
 
 
 def rasterise(

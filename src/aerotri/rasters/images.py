@@ -33,7 +33,7 @@ TILE_PX = 512
 are read for nothing."""
 SETTINGS: dict[str, Any] = {
     "GDAL_ERROR_ON_LIBJPEG_WARNING": "YES",
-    "GDAL_CACHEMAX": 128,
+    "GDAL_CACHEMAX": 128 << 20,
     "GDAL_TIFF_INTERNAL_MASK": "YES",
 }
 """A truncated JPEG is an error, not a grey lower half."""

@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import LEAST_ROOM, InputError
-from aerotri.rasters.grids import CACHE_MB, TILE, Grid, window_of
+from aerotri.rasters.grids import CACHE_BYTES, TILE, Grid, window_of
 
 OPAQUE = {"uint8": 255, "uint16": 65535}
 """Of the last band, the mask: what a cell has that a photograph shows; the others have 0."""
 COLOURS = 3
 """Bands that are red, green and blue where there are as many."""
+LEVEL = 1
+"""Of deflate [C]: photographs take 6 % more room than at the usual 6, and two thirds of its time."""
 NUMBERS_NO_DATA = -1
 """Of a raster of whole numbers: none."""
 
@@ -61,10 +63,10 @@ def write_mosaic(
     made: dict[str, Any] = {"tiled": True, "blockxsize": TILE, "blockysize": TILE, "bigtiff": "IF_SAFER"}
     made |= {"interleave": "pixel", "SPARSE_OK": True} | _colours(len(bands)) if average else {"SPARSE_OK": True}
     # the resampling of overviews leaves the edge of what is known as it is
-    cloud = {"compress": "DEFLATE", "predictor": "YES", "bigtiff": "IF_SAFER", "num_threads": "ALL_CPUS",
+    cloud = {"compress": "DEFLATE", "level": LEVEL, "predictor": "YES", "bigtiff": "IF_SAFER", "num_threads": "ALL_CPUS",
              "overview_resampling": "AVERAGE" if average else "NEAREST"}  # fmt: skip
     try:
-        with warnings.catch_warnings(), rasterio.Env(GDAL_CACHEMAX=CACHE_MB):
+        with warnings.catch_warnings(), rasterio.Env(GDAL_CACHEMAX=CACHE_BYTES):
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
             with rasterio.open(
                 plain, "w", driver="GTiff", height=grid.rows, width=grid.columns, count=len(bands), dtype=dtype,

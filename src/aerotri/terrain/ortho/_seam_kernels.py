@@ -14,53 +14,63 @@ from aerotri.compiled import kernel
 
 
 @kernel
-def _place(found, number, i, j):
-    for q in range(len(found)):
-        if found[q, i, j] == number:
-            return q
-    return -1
-
-
-@kernel
-def _difference(found, value, i, j, a, b, most):
-    """Mean difference over the bands of photographs a and b at a cell, `most` where one does not see it."""
-    p, q = _place(found, a, i, j), _place(found, b, i, j)
-    if p < 0 or q < 0:
-        return most
-    total = 0.0
-    for band in range(value.shape[1]):
-        total += abs(value[p, band, i, j] - value[q, band, i, j])
-    total /= value.shape[1]
-    return total if total < most else most
-
-
-@kernel
-def seam_cost(found, value, i, j, k, m, a, b, most, least):
-    """V of neighbours (i, j), which takes photograph a, and (k, m), which takes b."""
-    if a == b or a < 0 or b < 0:
-        return 0.0
-    at = _difference(found, value, i, j, a, b, most) + _difference(found, value, k, m, a, b, most)
-    return least + 0.5 * at
-
-
-@kernel
-def seam_costs(found, value, most, least, right, below):
-    """V of all cells and their neighbours to the right and below, (r, c, q, q) float32 out."""
+def differences(found, value, most, out):
+    """Mean difference over the bands of any two candidates of a cell, at most `most`; (r, c, q, q) float32 out."""
     count, rows, columns = found.shape
+    bands = value.shape[1]
     for i in range(rows):
         for j in range(columns):
             for a in range(count):
-                for b in range(count):
-                    right[i, j, a, b], below[i, j, a, b] = 0.0, 0.0
-                    own = found[a, i, j]
-                    if j + 1 < columns:
-                        right[i, j, a, b] = seam_cost(
-                            found, value, i, j, i, j + 1, own, found[b, i, j + 1], most, least
-                        )
-                    if i + 1 < rows:
-                        below[i, j, a, b] = seam_cost(
-                            found, value, i, j, i + 1, j, own, found[b, i + 1, j], most, least
-                        )
+                out[i, j, a, a] = 0.0
+                for b in range(a):
+                    total = np.float32(0.0)
+                    for band in range(bands):
+                        total += abs(value[a, band, i, j] - value[b, band, i, j])
+                    out[i, j, a, b] = out[i, j, b, a] = min(total / bands, most)
+
+
+@kernel
+def _seams(here, there, at_here, at_there, most, least, out):
+    """V of all candidates of two neighbours, (q, q) out.
+
+    here, there : (q,) photographs of either. at_here, at_there : (q, q) differences of these.
+    """
+    count = len(here)
+    for b in range(count):
+        place = -1
+        for a in range(count):
+            if here[a] == there[b]:
+                place = a
+        for a in range(count):
+            if here[a] == there[b] or here[a] < 0 or there[b] < 0:
+                out[a, b] = 0.0
+            else:
+                out[a, b] = least + 0.5 * (at_here[a, place] if place >= 0 else most)
+    for a in range(count):
+        place = -1
+        for b in range(count):
+            if here[a] == there[b]:
+                place = b
+        for b in range(count):
+            if here[a] != there[b] and here[a] >= 0 and there[b] >= 0:
+                out[a, b] += 0.5 * (at_there[place, b] if place >= 0 else most)
+
+
+@kernel
+def seam_costs(found, difference, most, least, right, below):
+    """V of all cells and their neighbours to the right and below, (r, c, q, q) float32 out.
+
+    found : (r, c, q) photographs. difference : (r, c, q, q), of `differences`.
+    """
+    rows, columns, _ = found.shape
+    for i in range(rows):
+        for j in range(columns):
+            right[i, j], below[i, j] = 0.0, 0.0
+            own, at = found[i, j], difference[i, j]
+            if j + 1 < columns:
+                _seams(own, found[i, j + 1], at, difference[i, j + 1], most, least, right[i, j])
+            if i + 1 < rows:
+                _seams(own, found[i + 1, j], at, difference[i + 1, j], most, least, below[i, j])
 
 
 @kernel

@@ -9,7 +9,7 @@ little is held by pseudo-observations g = 1 ± `GAIN_SIGMA`, o = 0 ± `OFFSET_SI
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,8 @@ NOISE = 1e-3
 """Least standard deviation of colours, share of white [C]: one without any texture says nothing about gains."""
 CORRELATED_CELLS = 25.0
 """Neighbouring cells differ alike: one in so many counts [C]."""
+MOST_CELLS = 100_000
+"""Coarse cells that colours are held against one another in; of more, rows and columns are left out evenly [C]."""
 MOST_COUNTED = 20_000_000
 """Pairs of photographs that are counted in a table; more are sorted."""
 
@@ -57,6 +59,11 @@ def no_balance(count: int, candidates: Candidates) -> Balance:
 
 def balance_of(count: int, candidates: Candidates) -> Balance:
     """Gains and offsets of n photographs."""
+    every = max(int(np.sqrt(candidates.z.size / MOST_CELLS)), 1)
+    thin = np.s_[:, ::every, ::every]
+    candidates = replace(
+        candidates, found=candidates.found[thin], value=candidates.value[:, :, ::every, ::every], z=candidates.z[thin[1:]]
+    )  # fmt: skip
     bands = candidates.value.shape[1]
     gain, offset = np.ones((count, bands)), np.zeros((count, bands))
     before = _spread(_differences(candidates, gain, offset))

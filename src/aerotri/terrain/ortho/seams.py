@@ -9,8 +9,9 @@ import numpy as np
 from aerotri.terrain.ortho import _seam_kernels as kernels
 from aerotri.terrain.ortho.candidates import Candidates
 
-PASSES = 12
-"""Of messages, forwards and backwards each; chosen [C]: the energy hardly falls any more."""
+PASSES, BETWEEN, LEAST_GAIN = 12, 3, 0.01
+"""Of messages, forwards and backwards each, at most; after so many each the labels are looked at, and no more are sent
+where these cost no less by that share [C]."""
 MOST, LEAST = 5.0, 0.05
 """Cost of a difference at most, in standard deviations, and of a seam where nothing differs [C]: at a car not more than
 at a house, and seams no longer than needed."""
@@ -60,14 +61,30 @@ def _moved(candidates: Candidates, colours: np.ndarray) -> np.ndarray:
     unary = np.ascontiguousarray(np.moveaxis(_own_cost(candidates), 0, -1))
     shape = (*found.shape[1:], len(found), len(found))
     right, below = np.empty(shape, np.float32), np.empty(shape, np.float32)
-    kernels.seam_costs(found, scaled, MOST, LEAST, right, below)
+    difference = np.empty(shape, np.float32)
+    kernels.differences(found, scaled, np.float32(MOST), difference)
+    lists = np.ascontiguousarray(np.moveaxis(found, 0, -1))
+    kernels.seam_costs(lists, difference, np.float32(MOST), np.float32(LEAST), right, below)
+    return _least_cost(unary, right, below)
+
+
+def _least_cost(unary: np.ndarray, right: np.ndarray, below: np.ndarray) -> np.ndarray:
+    """(r, c) int32 labels of the least cost found, none dearer than the best photograph of every cell."""
     messages = np.zeros((4, *unary.shape), np.float32)
-    for _ in range(PASSES):
-        for backwards in (False, True):
-            kernels.pass_messages(unary, right, below, messages, backwards)
-    label = np.zeros(found.shape[1:], np.int32)
-    kernels.decide(unary, right, below, messages, label)
-    return label
+    kept = np.zeros(unary.shape[:2], np.int32)
+    least = sum(kernels.energy(unary, right, below, kept))
+    for _ in range(PASSES // BETWEEN):
+        for _ in range(BETWEEN):
+            for backwards in (False, True):
+                kernels.pass_messages(unary, right, below, messages, backwards)
+        label = np.zeros_like(kept)
+        kernels.decide(unary, right, below, messages, label)
+        cost, before = sum(kernels.energy(unary, right, below, label)), least
+        if cost < least:
+            kept, least = label, cost
+        if cost > (1.0 - LEAST_GAIN) * before:
+            break
+    return kept
 
 
 def _own_cost(candidates: Candidates) -> np.ndarray:
