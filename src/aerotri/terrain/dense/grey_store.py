@@ -103,9 +103,10 @@ def _stretched(grey: np.ndarray) -> np.ndarray:
     known = np.isfinite(grey)
     if not known.any():
         return np.zeros(grey.shape, np.uint8)
+    sample = grey.ravel() if known.all() else grey[known]
+    sample = sample[:: len(sample) // MOST_SAMPLED + 1]
     if not known.all():
         grey = np.where(known, grey, np.float32(grey[known].min()))
-    sample = grey.ravel()[np.flatnonzero(known)[:: known.sum() // MOST_SAMPLED + 1]]
     low, high = np.percentile(sample, [TAIL_PERCENT, 100.0 - TAIL_PERCENT])
     scaled = grey - np.float32(low)
     scaled *= np.float32(255.0 / (high - low if high > low else 1.0))

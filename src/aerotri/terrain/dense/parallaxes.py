@@ -16,6 +16,7 @@ import numpy as np
 from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.terrain.dense._refinement_kernels import HALF, keep_seen, shift_windows
 from aerotri.terrain.dense._resampling_kernels import align
+from aerotri.terrain.dense._smoothing_kernels import smooth
 from aerotri.terrain.dense.epipolar import EpipolarImages
 
 BLOCK_PX = 5
@@ -32,6 +33,8 @@ SPECKLE_PX, SPECKLE_STEP = 100, 2
 """Pixels of a patch of its own parallax below which it is taken out, and the step that bounds it; the manual's."""
 WINDOW_PX = 2 * HALF + 1
 """Side of the windows of least squares; chosen [C]; other sides were not compared."""
+SMOOTHED_STEP_PX, SMOOTHED_PX = 0.7, 2.5
+"""σ of the weights by which parallaxes are smoothed, in parallax and in place; chosen [C]."""
 ROUNDS = 2
 """Of least squares; a third moves the medians of synthetic pairs by less than .01 px."""
 LARGEST_SHIFT_PX = 1.0
@@ -48,7 +51,7 @@ LARGEST_SIGMA_PX = 1.0
 """σ of a parallax at which nothing is known."""
 FEWEST_TELL = 200
 """Shifts across the base of which a factor is taken."""
-MOST_TELL = 30_000
+MOST_TELL = 15_000
 """Shifts whose medians are taken, spread over a tile; chosen [C]: they are then sure to a per cent of a spread."""
 INVALID = -1e4
 
@@ -141,8 +144,9 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
 
 def _smoothed(value: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Smooth where it is continuous: neighbours further off than a pixel do not count."""
-    out = cv2.bilateralFilter(value, 7, 0.7, 2.5)
-    return np.where(known, out, INVALID).astype(np.float32)
+    out = np.empty_like(value)
+    smooth(value, known, SMOOTHED_STEP_PX, SMOOTHED_PX, np.float32(INVALID), out)
+    return out
 
 
 def _noise(across: np.ndarray, variance: np.ndarray, known: np.ndarray) -> tuple[float, float]:
