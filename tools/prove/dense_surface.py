@@ -11,25 +11,25 @@ Steep: cells within four of a change of height of more than three pixels from ce
 
     python tools/prove/dense_surface.py [FOLDER] [--scenes hill …]
 
-Last result (the scene without texture is that of an earlier version):
+Last result:
 
     | scene | coverage | median px | NMAD px | semi-global px | σ px | std z | NMAD z | beyond 4 σ | steep std z |
     |---|---|---|---|---|---|---|---|---|---|
     | plain | 0.988 | -0.001 | 0.076 | 0.135 | 0.085 | 0.91 | 0.84 | 0.18 % |  |
-    | undulating | 0.987 | +0.005 | 0.092 | 0.379 | 0.095 | 1.00 | 0.91 | 0.25 % |  |
-    | hill | 0.988 | -0.000 | 0.077 | 0.256 | 0.085 | 0.91 | 0.84 | 0.14 % |  |
-    | quarry | 0.988 | +0.002 | 0.084 | 0.415 | 0.090 | 0.93 | 0.88 | 0.13 % |  |
-    | houses | 0.987 | +0.003 | 0.083 | 0.418 | 0.091 | 0.91 | 0.85 | 0.11 % | 1.11 |
-    | noisy | 0.984 | +0.004 | 0.595 | 0.546 | 0.641 | 0.93 | 0.89 | 0.07 % |  |
-    | weak texture | 0.859 | -0.003 | 1.215 | 1.036 | 1.268 | 0.92 | 0.89 | 0.05 % |  |
+    | undulating | 0.987 | +0.005 | 0.092 | 0.379 | 0.095 | 1.00 | 0.90 | 0.24 % |  |
+    | hill | 0.988 | -0.000 | 0.077 | 0.256 | 0.086 | 0.91 | 0.84 | 0.14 % |  |
+    | quarry | 0.988 | +0.002 | 0.084 | 0.415 | 0.089 | 0.93 | 0.88 | 0.14 % |  |
+    | houses | 0.987 | +0.003 | 0.083 | 0.418 | 0.091 | 0.91 | 0.85 | 0.11 % | 1.10 |
+    | noisy | 0.984 | +0.004 | 0.596 | 0.546 | 0.643 | 0.93 | 0.89 | 0.07 % |  |
+    | weak texture | 0.858 | -0.003 | 1.216 | 1.036 | 1.269 | 0.92 | 0.89 | 0.05 % |  |
     | no texture | no two photographs could be matched |
     | repeated texture | 1.000 | +0.011 | 0.047 | 0.223 | 0.046 | 1.01 | 0.96 | 0.21 % |  |
-    | shadow | 1.000 | +0.012 | 0.270 | 0.389 | 0.365 | 0.85 | 0.81 | 0.05 % |  |
-    | water | 0.170 | +0.002 | 0.252 | 0.769 | 0.340 | 0.96 | 0.84 | 0.37 % |  |
+    | shadow | 1.000 | +0.012 | 0.270 | 0.389 | 0.366 | 0.85 | 0.80 | 0.05 % |  |
+    | water | 0.170 | +0.002 | 0.255 | 0.769 | 0.342 | 0.96 | 0.83 | 0.37 % |  |
     | wall | 0.987 | -0.000 | 0.068 | 0.239 | 0.074 | 0.99 | 0.91 | 0.14 % | 1.65 |
-    | trees | 0.986 | +0.003 | 0.093 | 0.386 | 0.098 | 1.00 | 0.89 | 0.25 % | 1.96 |
-    | tilted | 0.965 | +0.005 | 0.096 | 0.357 | 0.098 | 1.10 | 0.95 | 0.58 % |  |
-    | y-parallax | 0.981 | +0.137 | 0.557 | 0.636 | 0.825 | 0.60 | 0.62 | 0.00 % |  |
+    | trees | 0.986 | +0.003 | 0.093 | 0.386 | 0.098 | 1.00 | 0.89 | 0.25 % | 1.94 |
+    | tilted | 0.965 | +0.005 | 0.096 | 0.357 | 0.097 | 1.10 | 0.95 | 0.57 % |  |
+    | y-parallax | 0.981 | +0.136 | 0.557 | 0.636 | 0.824 | 0.60 | 0.63 | 0.00 % |  |
 
 Steep is all near walls of houses. Beside walls of houses 1 % lies beyond 4 σ; at a wall of 4 m width std z is 1.65. On
 noisy or weak texture semi-global matching alone scatters less: it smooths over more than a window. With tie points of
