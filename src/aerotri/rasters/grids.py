@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 NO_DATA = -9999.0
 """Stands for what is not known in the files of this program."""
 CACHE_BYTES = 256 << 20
-"""Of blocks that GDAL keeps: it would take a share of the machine's memory otherwise. rasterio hands bytes on, not MB."""
+"""Of blocks that GDAL keeps: it would take a share of the machine's memory otherwise. rasterio hands bytes on, not
+MB."""
 TILE = 512
 """Side of the tiles of files written, pixels; a multiple of 16 as TIFF asks for, and the size usual for cloud-optimised
 files."""

@@ -63,8 +63,8 @@ def write_mosaic(
     made: dict[str, Any] = {"tiled": True, "blockxsize": TILE, "blockysize": TILE, "bigtiff": "IF_SAFER"}
     made |= {"interleave": "pixel", "SPARSE_OK": True} | _colours(len(bands)) if average else {"SPARSE_OK": True}
     # the resampling of overviews leaves the edge of what is known as it is
-    cloud = {"compress": "DEFLATE", "level": LEVEL, "predictor": "YES", "bigtiff": "IF_SAFER", "num_threads": "ALL_CPUS",
-             "overview_resampling": "AVERAGE" if average else "NEAREST"}  # fmt: skip
+    cloud = {"compress": "DEFLATE", "level": LEVEL, "predictor": "YES", "bigtiff": "IF_SAFER",
+             "num_threads": "ALL_CPUS", "overview_resampling": "AVERAGE" if average else "NEAREST"}  # fmt: skip
     try:
         with warnings.catch_warnings(), rasterio.Env(GDAL_CACHEMAX=CACHE_BYTES):
             warnings.simplefilter("ignore", NotGeoreferencedWarning)

@@ -16,8 +16,9 @@ POWER = 8
 def smooth(value, known, step, distance, unknown, out):
     """Means of what lies around a pixel, less the farther it is in place and in value.
 
-    value : (rows, columns) float32; what is not known is farther than 4·`step` from all others. known : (rows, columns).
-    step, distance : σ of the weights in value, and in place in pixels. unknown : float32, where not known. out : float32.
+    value : (rows, columns) float32; what is not known is farther than 4·`step` from all others.
+    known : (rows, columns) bool. step, distance : σ of the weights in value, and in place in pixels.
+    unknown : float32, where not known. out : (rows, columns) float32.
     """
     rows, columns = value.shape
     total, weight = np.empty(columns, np.float32), np.empty(columns, np.float32)

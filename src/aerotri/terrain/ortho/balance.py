@@ -60,10 +60,8 @@ def no_balance(count: int, candidates: Candidates) -> Balance:
 def balance_of(count: int, candidates: Candidates) -> Balance:
     """Gains and offsets of n photographs."""
     every = max(int(np.sqrt(candidates.z.size / MOST_CELLS)), 1)
-    thin = np.s_[:, ::every, ::every]
-    candidates = replace(
-        candidates, found=candidates.found[thin], value=candidates.value[:, :, ::every, ::every], z=candidates.z[thin[1:]]
-    )  # fmt: skip
+    thin = np.s_[..., ::every, ::every]
+    candidates = replace(candidates, found=candidates.found[thin], value=candidates.value[thin], z=candidates.z[thin])
     bands = candidates.value.shape[1]
     gain, offset = np.ones((count, bands)), np.zeros((count, bands))
     before = _spread(_differences(candidates, gain, offset))
