@@ -104,7 +104,7 @@ def georeference(crs: str, around: np.ndarray, geoid: FilePath | None = None) ->
     """
     from pyproj import Transformer
 
-    whole = _read_crs(crs)
+    whole = read_crs(crs)
     flat = whole.sub_crs_list[0] if whole.is_compound else whole
     geographic = _checked_geographic(crs, whole, flat)
     horizontal = Transformer.from_crs(flat.to_2d(), geographic.to_2d(), always_xy=True, allow_ballpark=False)
@@ -141,7 +141,7 @@ def utm_on_datum(crs: str, lon: float, lat: float) -> str:
     from pyproj.aoi import AreaOfInterest
     from pyproj.database import query_utm_crs_info
 
-    whole = _read_crs(crs)
+    whole = read_crs(crs)
     geographic = (whole.sub_crs_list[0] if whole.is_compound else whole).geodetic_crs
     name = "WGS 84" if geographic is None else geographic.name
     area = AreaOfInterest(lon, lat, lon, lat)
@@ -153,7 +153,7 @@ def utm_on_datum(crs: str, lon: float, lat: float) -> str:
 
 def area_of_use(crs: str) -> tuple[float, float, float, float] | None:
     """West, south, east, north in degrees; None where PROJ knows none."""
-    whole = _read_crs(crs)
+    whole = read_crs(crs)
     area = (whole.sub_crs_list[0] if whole.is_compound else whole).area_of_use
     return None if area is None else (area.west, area.south, area.east, area.north)
 
@@ -166,11 +166,18 @@ def is_projected(crs: str) -> bool:
     InputError
         When PROJ does not know it.
     """
-    whole = _read_crs(crs)
+    whole = read_crs(crs)
     return bool((whole.sub_crs_list[0] if whole.is_compound else whole).is_projected)
 
 
-def _read_crs(crs: str) -> CRS:
+def read_crs(crs: str) -> CRS:
+    """The system of a code.
+
+    Raises
+    ------
+    InputError
+        When it is not understood or not known.
+    """
     from pyproj import CRS
     from pyproj.exceptions import CRSError
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
+from pathlib import PurePosixPath
 
 
 @dataclass(frozen=True)
@@ -17,6 +18,7 @@ class Project:
     company : of the operator.
     survey_date : day of the survey, YYYY-MM-DD.
     notes : anything else that belongs on the report.
+    logo : name of a picture in the block folder. logo_content : its bytes.
     """
 
     title: str = ""
@@ -25,10 +27,18 @@ class Project:
     company: str = ""
     survey_date: str = ""
     notes: str = ""
+    logo: str = ""
+    logo_content: bytes = field(default=b"", repr=False)
+
+    @property
+    def logo_ending(self) -> str:
+        """'.png', '.jpg' or '.svg'; '' without a logo."""
+        ending = PurePosixPath(self.logo).suffix.lower()
+        return ".jpg" if ending == ".jpeg" else ending
 
     def as_dict(self) -> dict[str, str]:
         """All entries by name."""
-        return {one.name: str(getattr(self, one.name)) for one in fields(self)}
+        return {one.name: str(getattr(self, one.name)) for one in fields(self) if one.name != "logo_content"}
 
     def given(self) -> dict[str, str]:
         """The entries that say something, by name."""

@@ -52,7 +52,7 @@ def write_block(
         raise InputError(f"tables = '{tables}'", "tables are written as csv or parquet")
     with atomic_folder(folder, own=OWN_ENTRIES) as place:
         _check_all_names(block)
-        (place / "block.toml").write_bytes(_utf8(toml_of(_settings(block))))
+        (place / "block.toml").write_bytes(_utf8(toml_of(settings_content(block))))
         for name, columns in _tables(block).items():
             if rounded:
                 columns = {column: with_meaning(column, values) for column, values in columns.items()}
@@ -164,7 +164,8 @@ def _members(names: np.ndarray) -> str:
     return " ".join(names.tolist())
 
 
-def _settings(block: Block) -> dict[str, Any]:
+def settings_content(block: Block) -> dict[str, Any]:
+    """What block.toml of a block holds, by its keys; what was not given has its default."""
     settings, adjustment = block.settings, block.settings.adjustment
     content: dict[str, Any] = {
         "name": block.name,

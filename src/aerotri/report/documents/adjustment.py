@@ -1,0 +1,151 @@
+"""The report of an adjustment as a document."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from aerotri.adjustment.ray_status import RayStatus
+from aerotri.formats.block.writer import settings_content
+from aerotri.formats.text.toml_text import value_text
+from aerotri.observations import Block
+from aerotri.report.documents import accuracy_tables, camera_tables
+from aerotri.report.documents.figures import adjustment_figures
+from aerotri.report.documents.head import Context, document
+from aerotri.report.documents.parts import (
+    Document,
+    Part,
+    entries,
+    heading,
+    pairs,
+    paragraph,
+    picture,
+    table,
+    verdict,
+)
+from aerotri.report.documents.words import Words, breakable
+from aerotri.report.quality import asprs_warning
+from aerotri.results.adjusted_block import AdjustedBlock
+
+NOT_SETTINGS = ("name", "crs", "project")
+"""Keys of block.toml that stand in the head."""
+MOST_POINTS = 500
+"""Control or check points that are listed; chosen [C]: some ten pages, all are in control.csv and check.csv."""
+
+
+def adjustment_report(adjusted: AdjustedBlock, context: Context, version: str) -> Document:
+    """The report of an adjustment.
+
+    Parameters
+    ----------
+    adjusted : the result in the coordinates of the block.
+    context : language, date of computation, project.
+    version : of aerotri that computed the result.
+    """
+    words, o = context.words, adjusted.outcome
+    parts: list[Part] = [verdict(words(f"verdict.{o.verdict or 'none'}"), words(f"verdict.{o.verdict or 'none'}_text"),
+                                 [breakable(text) for text in o.reasons])]  # fmt: skip
+    parts += [heading(words("report.accuracy")), *_accuracy(adjusted, words)]
+    parts += [heading(words("report.adjusted")), pairs(_numbers(adjusted, words))]
+    parts += [heading(words("report.groups")), accuracy_tables.group_table(adjusted, words)]
+    parts += [heading(words("report.cameras")), *_cameras(adjusted, words)]
+    parts += [heading(words("report.sigmas")), accuracy_tables.sigma_table(adjusted, words)]
+    if adjusted.points.model is not None:
+        parts.append(paragraph(words("report.about_total"), small=True))
+    for key, points in (("control", adjusted.control), ("check", adjusted.check)):
+        if len(points):
+            parts.append(heading(words(f"report.{key}", count=words.whole(len(points)))))
+            parts.append(_first(accuracy_tables.ground_table(adjusted, points, words)))
+            if len(points) > MOST_POINTS:
+                said = words("report.first_points", most=MOST_POINTS, count=words.whole(len(points)))
+                parts.append(paragraph(said, small=True))
+    parts.append(paragraph(words("report.about_points"), small=True))
+    parts += _messages(adjusted, words)
+    files, pictures = adjustment_figures(adjusted)
+    parts.append(heading(words("report.pictures")))
+    parts += [picture(file, words(f"figure.{name}")) for name, file in pictures]
+    parts += [heading(words("report.settings")), *settings_parts(adjusted.block, words)]
+    return document(context, words("report.title"), adjusted.block.crs, version, parts, files)
+
+
+def _first(part: Part) -> Part:
+    return part | {"rows": part["rows"][:MOST_POINTS]}
+
+
+def _accuracy(adjusted: AdjustedBlock, words: Words) -> list[Part]:
+    if not len(adjusted.check) and not len(adjusted.control):
+        return [paragraph(words("accuracy.none"))]
+    parts = [accuracy_tables.accuracy_table(adjusted, words)]
+    if not len(adjusted.check):
+        parts.append(paragraph(words("accuracy.no_check")))
+    return [*parts, paragraph(words("accuracy.about"), small=True)]
+
+
+def _numbers(adjusted: AdjustedBlock, words: Words) -> list[tuple[str, str]]:
+    block, o = adjusted.block, adjusted.outcome
+    used = int(np.sum(adjusted.rays.status == RayStatus.USED))
+    known = int(np.isfinite(adjusted.points.xyz).all(axis=1).sum())
+    gnss = 0 if block.gnss_ins is None else len(block.gnss_ins)
+    of = [words("numbers_of.of", part=words.whole(part), whole=words.whole(whole))
+          for part, whole in ((known, len(block.points)), (used, len(block.image_points)))]  # fmt: skip
+    texts = {
+        "status": words.term("status", o.status), "iterations": words.whole(o.iterations),
+        "sigma0": f"{words.number(o.sigma0, 3)} ({words.number(o.sigma0_um, 2)} µm)",
+        "photographs": words.whole(len(block.images)), "points": of[0], "rays": of[1],
+        "ground": words("numbers_of.control_check", control=len(adjusted.control), check=len(adjusted.check)),
+        "gnss": words.whole(gnss) if gnss else words("numbers_of.none"),
+        "observations": words.whole(o.observations), "unknowns": words.whole(o.unknowns),
+        "conditions": words.whole(o.conditions), "redundancy": words.whole(o.redundancy),
+    }  # fmt: skip
+    return [(words(f"numbers_of.{key}"), text) for key, text in texts.items()]
+
+
+def _cameras(adjusted: AdjustedBlock, words: Words) -> list[Part]:
+    parts: list[Part] = []
+    for camera in adjusted.block.cameras:
+        parts.append(pairs([(words("camera.camera"), breakable(camera.name)),
+                            *camera_tables.projection_words(camera, words)]))  # fmt: skip
+    parts.append(camera_tables.interior_table(adjusted, adjusted.block.cameras, words))
+    rows = camera_tables.parameter_rows(adjusted)
+    if len(rows):
+        parts.append(heading(words("report.parameters")))
+        parts.append(camera_tables.parameter_table(adjusted, rows, words))
+        parts.append(paragraph(words("parameters.about"), small=True))
+    return parts
+
+
+def _messages(adjusted: AdjustedBlock, words: Words) -> list[Part]:
+    """Warnings and notes of the program, in the language of the program."""
+    found = asprs_warning(adjusted)
+    warnings = [*adjusted.outcome.warnings, *([found] if found else [])]
+    parts: list[Part] = [heading(words("report.warnings")), *in_english(words)]
+    parts.append(entries(breakable(text) for text in warnings) if warnings else paragraph(words("report.no_warnings")))
+    if adjusted.outcome.notes:
+        parts += [heading(words("report.notes")), entries(breakable(text) for text in adjusted.outcome.notes)]
+    return parts
+
+
+def in_english(words: Words) -> list[Part]:
+    """That messages and pictures are in English, for readers of another language."""
+    return [] if words.language == "en" else [paragraph(words("head.language_of_program"), small=True)]
+
+
+def settings_parts(block: Block, words: Words) -> list[Part]:
+    """All settings by their keys of block.toml, defaults included."""
+    content = {key: value for key, value in settings_content(block).items() if key not in NOT_SETTINGS}
+    rows = [(breakable(key), breakable(text)) for key, text in _flat(content, "")]
+    return [paragraph(words("report.about_settings"), small=True),
+            table([words("settings.key"), words("settings.value")], rows, words=2, small=True)]  # fmt: skip
+
+
+def _flat(content: Mapping[str, Any], before: str) -> list[tuple[str, str]]:
+    """Keys with their tables before them, and values as block.toml writes them."""
+    found: list[tuple[str, str]] = []
+    for key, value in content.items():
+        if isinstance(value, Mapping):
+            found += _flat(value, f"{before}{key}.")
+        else:
+            found.append((f"{before}{key}", value_text(value)))
+    return found

@@ -1,0 +1,71 @@
+"""What a document consists of, as plain data: the head, and parts that the template sets one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+Part = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Document:
+    """What the template is given.
+
+    Parameters
+    ----------
+    content : title, head, parts and the fixed words, as JSON can hold them.
+    files : pictures that the content names, by the names of their files.
+    """
+
+    content: dict[str, Any]
+    files: dict[str, bytes] = field(default_factory=dict)
+
+
+def heading(text: str, new_page: bool = False) -> Part:
+    """Title of a section."""
+    return {"kind": "heading", "text": text, "new_page": new_page}
+
+
+def paragraph(text: str, small: bool = False) -> Part:
+    """Running text."""
+    return {"kind": "text", "text": text, "small": small}
+
+
+def verdict(word: str, text: str, reasons: Sequence[str]) -> Part:
+    """The framed judgement with its reasons."""
+    return {"kind": "verdict", "word": word, "text": text, "reasons": list(reasons)}
+
+
+def entries(texts: Iterable[str]) -> Part:
+    """A list with a dash before each."""
+    return {"kind": "list", "items": list(texts)}
+
+
+def pairs(rows: Iterable[tuple[str, str]]) -> Part:
+    """Words with what they say."""
+    return {"kind": "pairs", "rows": [list(row) for row in rows]}
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[str]], words: int = 1, small: bool = False) -> Part:
+    """A table; its head is repeated on every page.
+
+    Parameters
+    ----------
+    columns : headings, with units.
+    words : so many columns from the left hold words, the others numbers.
+    small : whether letters are smaller, for tables of many columns.
+    """
+    return {"kind": "table", "columns": list(columns), "rows": [list(row) for row in rows], "words": words,
+            "small": small}  # fmt: skip
+
+
+def picture(file: str, caption: str, height_cm: float | None = None) -> Part:
+    """A picture over the width of the page, or at most as high as stated."""
+    return {"kind": "picture", "file": file, "caption": caption, "height": height_cm}
+
+
+def signature(fields: Sequence[str]) -> Part:
+    """Lines to sign on; never apart from one another."""
+    return {"kind": "signature", "fields": list(fields)}
