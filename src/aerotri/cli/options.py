@@ -11,6 +11,7 @@ ARGUMENTS, INPUT, CONTROL, CAMERA, PLACE, SIGMAS = (
     "Arguments", "Input", "Control and check points", "Camera", "Coordinate system", "Standard deviations",
 )  # fmt: skip
 METHOD, SURFACE, MACHINES, OUTPUT, HELP = "Method", "Surface and base", "Machines", "Output", "Help"
+DOCUMENTS = "Documents"
 """Panels of options."""
 FIRST, BLOCKS, ADJUSTMENT, IMAGE_ERRORS, TERRAIN, PLANNING = (
     "All steps", "Blocks", "Adjustment", "Image errors", "Terrain and volumes", "Before the flight",

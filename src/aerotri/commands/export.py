@@ -1,4 +1,4 @@
-"""`aerotri export`: a result for a GIS, for tables with geometries, for a catalogue."""
+"""`aerotri export`: a result for a GIS, for tables with geometries, for a catalogue, as a document."""
 
 from __future__ import annotations
 
@@ -10,8 +10,14 @@ from aerotri.commands.console import Console
 from aerotri.formats.results.json_text import json_text
 
 
-def run_export(result: Path, to: Any, out: Path | None, scale: float | None, flown: str, as_json: bool) -> None:
+def run_export(
+    result: Path, to: Any, out: Path | None, scale: float | None, flown: str, of_document: dict[str, Any], as_json: bool
+) -> None:
     """Export; arguments as on the command line.
+
+    Parameters
+    ----------
+    of_document : language, document, camera and project, as of `aerotri.export`.
 
     Raises
     ------
@@ -22,7 +28,7 @@ def run_export(result: Path, to: Any, out: Path | None, scale: float | None, flo
 
     console = Console(quiet=as_json)
     target = out or Path(f"{folder_name(result).removesuffix('_result')}_export")
-    found = export(result, target, to, scale=scale, flown=flown, progress=console.stage)
+    found = export(result, target, to, scale=scale, flown=flown, **of_document, progress=console.stage)
     if as_json:
         content = {"target": str(target), "format": to, "files": list(found.files), "messages": list(found.notes)}
         print(json_text(content))

@@ -6,24 +6,35 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal, cast, get_args
 
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError, counted
 from aerotri.public.adjustment import Adjustment
+from aerotri.public.change import MeasuredChange
+from aerotri.public.documents import (
+    PDF_NAMES,
+    DocumentKind,
+    DocumentOptions,
+    Made,
+    adjustment_document,
+    certificate,
+    is_volume_or_change,
+)
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.public.volume_result import MeasuredVolume
 
 if TYPE_CHECKING:
     from aerotri.deformation.footprints import Footprints
     from aerotri.formats.gis.stac import Asset
     from aerotri.vectors.geopackage_writer import Layer
 
-ExportFormat = Literal["gpkg", "geoparquet", "stac"]
+ExportFormat = Literal["gpkg", "geoparquet", "stac", "pdf"]
 GPKG, POINTS, RAYS, ITEM = "result.gpkg", "points.parquet", "rays.parquet", "item.json"
 WRITTEN: dict[str, tuple[str, ...]] = {"gpkg": (GPKG,), "geoparquet": (POINTS, RAYS), "stac": (ITEM,)}
-EXPORT_NAMES = (GPKG, POINTS, RAYS, ITEM)
+EXPORT_NAMES = (GPKG, POINTS, RAYS, ITEM, *PDF_NAMES)
 BESIDE = ("dtm", "dsm", "ortho", "volume")
 """Folders of `aerotri run` beside its result that have files of their own."""
 
@@ -43,24 +54,34 @@ class Exported:
 
 
 def export(
-    result: Adjustment | FilePath,
+    result: Adjustment | MeasuredVolume | MeasuredChange | FilePath,
     out: FilePath,
     to: ExportFormat = "gpkg",
     *,
     scale: float | None = None,
     flown: str = "",
+    language: str = "en",
+    document: DocumentKind = "report",
+    camera: str = "",
+    project: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> Exported:
     """Write a result for other programs into a folder; files of other formats that are there stay.
 
     Parameters
     ----------
-    result : of an adjustment, or the folder of one.
+    result : of an adjustment, or the folder of one; as PDF also a volume or a change, or the folder of one.
     out : folder to write.
     to : 'gpkg', result.gpkg with layers and styles for QGIS; 'geoparquet', points.parquet and rays.parquet; 'stac',
-        item.json for a catalogue.
+        item.json for a catalogue; 'pdf', a document: adjustment.pdf, calibration.pdf, volume.pdf or change.pdf. It needs
+        the package typst.
     scale : by how much error ellipses and differences are drawn larger in result.gpkg; chosen where None.
     flown : date or time of the flight, '2026-05-17' or '2026-05-17T10:30:00Z', for a catalogue.
+    language : of the document, 'en' or 'de'.
+    document : of an adjustment, 'report' or 'calibration', the certificate of its cameras.
+    camera : name of the camera of a calibration certificate; '' for all that took photographs.
+    project : block folder, or result of an adjustment, whose `[project]` stands at the head of the certificate of a
+        volume or a change; looked for beside the result where None.
     progress : see `aerotri.adjust`.
 
     Returns
@@ -70,8 +91,8 @@ def export(
     Raises
     ------
     InputError
-        When the folder holds no result, the format is not known, the block has local coordinates and the format none,
-        or the folder to write holds other files.
+        When the folder holds no result, the format, language, document or camera is not known, the block has local
+        coordinates and the format none, typst is needed and missing, or the folder to write holds other files.
 
     Examples
     --------
@@ -86,16 +107,45 @@ def export(
     from aerotri.public.results import open_result
 
     target = Path(out)
+    options = DocumentOptions(language, document, camera, project)
     refuse_export(target, to, scale)
+    _refuse_options(to, options)
     with stage_report(progress) as report:
+        if to == "pdf" and is_volume_or_change(result):
+            made = certificate(cast("MeasuredVolume", result), options, report)
+            return _keep(made, target, ())
+        if isinstance(result, MeasuredVolume | MeasuredChange) or is_volume_or_change(result):
+            raise InputError(f"a volume or a change is not written as {to}", "use pdf, or give an adjustment")
         if not isinstance(result, Adjustment):
             report.stage("reading", None)
             result = open_result(result)
+        if to == "pdf":
+            _refuse_not_converged(result)
+            return _keep(adjustment_document(result, options, report), target, _doubt(result))
         _refuse_unfinished(result)
         with atomic_folder(target, own=WRITTEN[to]) as folder:
             keep_written(target, folder, [name for name in EXPORT_NAMES if name not in WRITTEN[to]])
             notes = _write(result, folder, target, to, scale, flown, report)
     return Exported(target, WRITTEN[to], (*_doubt(result), *notes))
+
+
+def _keep(made: Made, target: Path, doubts: tuple[str, ...]) -> Exported:
+    """Write a document; other exports stay."""
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.formats.files.ownership import keep_written
+
+    with atomic_folder(target, own=(made.name,)) as folder:
+        keep_written(target, folder, [name for name in EXPORT_NAMES if name != made.name])
+        (folder / made.name).write_bytes(made.pdf)
+    return Exported(target, (made.name,), (*doubts, *made.notes))
+
+
+def _refuse_options(to: str, options: DocumentOptions) -> None:
+    """Refuse options of documents for other formats, and what no document can be."""
+    if to == "pdf":
+        options.check()
+    elif options != DocumentOptions():
+        raise InputError("language, document, camera and project belong to documents", "use them with pdf")
 
 
 def refuse_export(target: Path, to: str, scale: float | None) -> None:
@@ -106,7 +156,9 @@ def refuse_export(target: Path, to: str, scale: float | None) -> None:
     InputError
     """
     if to not in get_args(ExportFormat):
-        raise InputError(f"'{to}' is not a format that results are exported to", f"use {', '.join(WRITTEN)}")
+        raise InputError(
+            f"'{to}' is not a format that results are exported to", f"use {', '.join(get_args(ExportFormat))}"
+        )
     if scale is not None and not 0.0 < scale < np.inf:
         raise InputError(f"a scale of {scale:g} is not possible", "give a number greater than 0")
     refuse_foreign_folder(target, *EXPORT_NAMES)
@@ -115,11 +167,15 @@ def refuse_export(target: Path, to: str, scale: float | None) -> None:
 def _refuse_unfinished(result: Adjustment) -> None:
     from aerotri.coordinates.georeference import is_projected
 
-    if result.status != "converged":
-        raise InputError(f"the adjustment ended '{result.status}'", "give the result of a converged one")
+    _refuse_not_converged(result)
     crs = result.block.crs
     if crs != "local" and not is_projected(crs):
         raise InputError(f"the result is in {crs}, which counts in degrees", "adjust the block in a projected CRS")
+
+
+def _refuse_not_converged(result: Adjustment) -> None:
+    if result.status != "converged":
+        raise InputError(f"the adjustment ended '{result.status}'", "give the result of a converged one")
 
 
 def _doubt(result: Adjustment) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ PROJECT = (
     Item("project.company", "text", "Company of the operator."),
     Item("project.survey_date", "text", "Day of the survey, YYYY-MM-DD."),
     Item("project.notes", "text", "Notes."),
+    Item("project.logo", "text", "Name of the logo in the block folder."),
 )
 STATUS_WORDS = {
     "converged": "the iterations came to an end",

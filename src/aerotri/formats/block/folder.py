@@ -15,6 +15,7 @@ import numpy as np
 
 from aerotri.conventions import RADIANS_PER, FilePath, InputError
 from aerotri.formats.block.extras import read_constraints, read_edits
+from aerotri.formats.block.logo import with_logo
 from aerotri.formats.block.points import read_control, read_gnss_ins, read_image_points
 from aerotri.formats.block.scanned_film import read_fiducials
 from aerotri.formats.block.writer import write_block
@@ -92,7 +93,7 @@ def read_block(path: FilePath, rays_needed: bool = True, images_needed: bool = T
         constraints=read_constraints(_table_file(folder, "constraints"), points),
         interior_fits=fits,
         rigs=rigs,
-        project=model.project.project(),
+        project=with_logo(model.project.project(), settings),
     )
     _check_names_in_settings(block, settings)
     return block

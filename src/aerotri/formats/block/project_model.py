@@ -27,7 +27,9 @@ class ProjectModel(Section):
     survey_date: str = key("", "Day of the survey as YYYY-MM-DD.")
     notes: str = key("", "Anything else that belongs on the report; line breaks are kept.")
 
-    @field_validator("title", "client", "operator", "company")
+    logo: str = key("", "Picture in the block folder, PNG, JPEG or SVG, for the head of reports.")
+
+    @field_validator("title", "client", "operator", "company", "logo")
     @classmethod
     def _one_line(cls, text: str) -> str:
         if re.search(CONTROL_CHARACTERS, text):

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from aerotri.conventions import RADIANS_PER, FilePath, InputError
+from aerotri.formats.block.logo import logo_to_write
 from aerotri.formats.block.scanned_film import measured_px
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.text.table_writer import check_names, write_table
@@ -50,8 +51,12 @@ def write_block(
     """
     if tables not in ("csv", "parquet"):
         raise InputError(f"tables = '{tables}'", "tables are written as csv or parquet")
-    with atomic_folder(folder, own=OWN_ENTRIES) as place:
+    logo = logo_to_write(block.project)
+    with atomic_folder(folder, own=(*OWN_ENTRIES, *logo)) as place:
         _check_all_names(block)
+        for name, picture in logo.items():
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            (place / name).write_bytes(picture)
         (place / "block.toml").write_bytes(_utf8(toml_of(settings_content(block))))
         for name, columns in _tables(block).items():
             if rounded:
@@ -207,8 +212,9 @@ def settings_content(block: Block) -> dict[str, Any]:
         content["collocation"] = {key: value for key, value in known.items() if value is not None}
     if settings.deviations.kind != "free":
         content["deviations"] = {"kind": settings.deviations.kind, "sigma_um": dict(settings.deviations.sigma_um or {})}
-    if block.project.given():
-        content["project"] = block.project.given()
+    project = {key: text for key, text in block.project.given().items() if key != "logo" or block.project.logo_content}
+    if project:
+        content["project"] = project
     if block.rigs:
         content["rig"] = {rig.name: _rig(rig) for rig in block.rigs}
     if settings.gnss.lever_arm_sigma_m is not None:

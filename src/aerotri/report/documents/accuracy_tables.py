@@ -90,8 +90,16 @@ def group_table(adjusted: AdjustedBlock, words: Words) -> Part:
     rows: list[tuple[str, ...]] = []
     for one in adjusted.groups:
         unit, factor = unit_of_group(one.name)
-        rows.append((words.term("group", one.name), unit, words.whole(one.count), words.number(one.redundancy, 1),
+        rows.append((_group_name(one.name, words), unit, words.whole(one.count), words.number(one.redundancy, 1),
                      words.plain(factor * one.sigma_apriori), words.plain(factor * one.rms),
                      words.plain(factor * one.sigma_aposteriori)))  # fmt: skip
     keys = ("name", "unit", "count", "redundancy", "before", "rms", "after")
     return table([words(f"groups.{key}") for key in keys], rows, words=2)
+
+
+def _group_name(name: str, words: Words) -> str:
+    """A group in words; those of one camera have its name."""
+    kind = "image points"
+    if name.startswith(f"{kind} "):
+        return f"{words.term('group', kind)} {breakable(name.removeprefix(kind).strip())}"
+    return words.term("group", name)

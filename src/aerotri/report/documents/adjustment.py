@@ -14,10 +14,10 @@ from aerotri.observations import Block
 from aerotri.report.documents import accuracy_tables, camera_tables
 from aerotri.report.documents.figures import adjustment_figures
 from aerotri.report.documents.head import Context, document
+from aerotri.report.documents.messages import in_english, message_parts
 from aerotri.report.documents.parts import (
     Document,
     Part,
-    entries,
     heading,
     pairs,
     paragraph,
@@ -65,7 +65,7 @@ def adjustment_report(adjusted: AdjustedBlock, context: Context, version: str) -
     parts += _messages(adjusted, words)
     files, pictures = adjustment_figures(adjusted)
     parts.append(heading(words("report.pictures")))
-    parts += [picture(file, words(f"figure.{name}")) for name, file in pictures]
+    parts += [picture(file, words(f"figure.{name}"), narrow=name != "plan") for name, file in pictures]
     parts += [heading(words("report.settings")), *settings_parts(adjusted.block, words)]
     return document(context, words("report.title"), adjusted.block.crs, version, parts, files)
 
@@ -120,16 +120,7 @@ def _messages(adjusted: AdjustedBlock, words: Words) -> list[Part]:
     """Warnings and notes of the program, in the language of the program."""
     found = asprs_warning(adjusted)
     warnings = [*adjusted.outcome.warnings, *([found] if found else [])]
-    parts: list[Part] = [heading(words("report.warnings")), *in_english(words)]
-    parts.append(entries(breakable(text) for text in warnings) if warnings else paragraph(words("report.no_warnings")))
-    if adjusted.outcome.notes:
-        parts += [heading(words("report.notes")), entries(breakable(text) for text in adjusted.outcome.notes)]
-    return parts
-
-
-def in_english(words: Words) -> list[Part]:
-    """That messages and pictures are in English, for readers of another language."""
-    return [] if words.language == "en" else [paragraph(words("head.language_of_program"), small=True)]
+    return [*in_english(words), *message_parts(warnings, words, adjusted.outcome.notes)]
 
 
 def settings_parts(block: Block, words: Words) -> list[Part]:

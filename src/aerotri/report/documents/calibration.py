@@ -157,7 +157,7 @@ def _pictures(
         for name, figure in camera_figures(adjusted, group).items()
     }
     files, names = as_files(render_plots({name: figure for name, (_, figure) in figures.items()}))
-    parts = [picture(names[name], words(f"figure.{caption}")) for name, (caption, _) in figures.items()]
+    parts = [picture(names[name], words(f"figure.{caption}"), narrow=True) for name, (caption, _) in figures.items()]
     return [heading(words("calibration.field")), *parts] if parts else [], files
 
 
@@ -177,11 +177,12 @@ def _correlations(adjusted: AdjustedBlock, camera: Camera, rows: np.ndarray, wor
         return [title, paragraph(words("calibration.pairs", least=words.number(NAMED_FROM, 1)), small=True),
                 _pairs(names, r, words)]  # fmt: skip
     parts = [title, paragraph(words("calibration.percent"), small=True)]
+    labels = [f"{k}  {name}" for k, name in enumerate(names, start=1)]
     for start in range(0, len(chosen), COLUMNS):
         columns = range(start, min(start + COLUMNS, len(chosen)))
-        below = [(names[i], *(_percent(r[i, j], words) if j <= i else "" for j in columns))
+        below = [(labels[i], *(_percent(r[i, j], words) if j <= i else "" for j in columns))
                  for i in range(start, len(chosen))]  # fmt: skip
-        parts.append(table(["", *(names[j] for j in columns)], below, words=1, small=True))
+        parts.append(table([words("parameters.name"), *(str(j + 1) for j in columns)], below, words=1, small=True))
     return parts
 
 

@@ -86,7 +86,7 @@ def projection_words(camera: Camera, words: Words) -> list[tuple[str, str]]:
     size = f"{words.number(columns * pixel * 1e-3, 3)} mm × {words.number(lines * pixel * 1e-3, 3)} mm"
     rows = [
         (words("camera.format"), f"{columns} × {lines} px, {size}"),
-        (words("camera.pixel"), f"{words.plain(pixel, 6)} µm"),
+        (words("camera.pixel"), f"{words.short(pixel)} µm"),
         (words("camera.model"), f"{camera.model}, {words.term('projection', camera.projection)}"),
     ]
     if camera.flight_axis is not None:

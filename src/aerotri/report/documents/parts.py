@@ -61,9 +61,9 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]], words: int = 1,
             "small": small}  # fmt: skip
 
 
-def picture(file: str, caption: str, height_cm: float | None = None) -> Part:
-    """A picture over the width of the page, or at most as high as stated."""
-    return {"kind": "picture", "file": file, "caption": caption, "height": height_cm}
+def picture(file: str, caption: str, narrow: bool = False) -> Part:
+    """A picture over the width of the page, or narrower, so that two stand on a page."""
+    return {"kind": "picture", "file": file, "caption": caption, "narrow": narrow}
 
 
 def signature(fields: Sequence[str]) -> Part:

@@ -92,6 +92,10 @@ class Words:
         return self.number(value, decimals(value, digits)) if 1e-4 <= abs(value) < 1e9 or not value else (
             self.scientific(value, digits - 1))  # fmt: skip
 
+    def short(self, value: float) -> str:
+        """A value that was stated, without zeros at its end."""
+        return self._localised(f"{value:.9g}")
+
     def scientific(self, value: float | None, digits: int) -> str:
         """Such as '−6.0252·10⁻⁶'."""
         if value is None or not np.isfinite(value):

@@ -177,9 +177,17 @@ def write_report(
 def _project(project: Project) -> list[tuple[str, str]]:
     """What `[project]` of block.toml says, with words for it; the lines of the notes stand apart."""
     lines = project.notes.splitlines()
-    texts = [(PROJECT_WORDS[name], text) for name, text in project.given().items() if name != "notes"]
+    texts = [(PROJECT_WORDS[name], text) for name, text in project.given().items() if name not in ("notes", "logo")]
     texts += [("" if i else PROJECT_WORDS["notes"], line) for i, line in enumerate(lines)]
     return [(word, quality.printable(text, 4000)) for word, text in texts]
+
+
+def logo_address(project: Project) -> str:
+    """The logo inside a page, as a data address; '' where there is none."""
+    kind = {".png": "png", ".jpg": "jpeg", ".svg": "svg+xml"}.get(project.logo_ending)
+    if kind is None or not project.logo_content:
+        return ""
+    return f"data:image/{kind};base64,{base64.b64encode(project.logo_content).decode('ascii')}"
 
 
 def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside: Findings) -> dict[str, Any]:
@@ -187,6 +195,7 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
     return {
         "name": quality.printable(adjusted.block.name),
         "project": _project(adjusted.block.project),
+        "logo": logo_address(adjusted.block.project),
         "outcome": adjusted.outcome,
         "reasons": [quality.printable(reason, 1000) for reason in adjusted.outcome.reasons],
         "what_to_do": [

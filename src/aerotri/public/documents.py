@@ -1,0 +1,223 @@
+"""Results as PDF documents: which document belongs to which result, and what stands at its head."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from aerotri.conventions import FilePath, InputError
+from aerotri.public.adjustment import Adjustment
+from aerotri.public.change import RECORD as CHANGE
+from aerotri.public.change import MeasuredChange
+from aerotri.public.progress import StageReport
+from aerotri.public.volume_result import RECORD as VOLUME
+from aerotri.public.volume_result import MeasuredVolume
+
+if TYPE_CHECKING:
+    from aerotri.observations.project import Project
+    from aerotri.report.documents.head import Context
+    from aerotri.report.plots.rendering import RenderedPlot
+
+DocumentKind = Literal["report", "calibration"]
+REPORT, CALIBRATION, OF_VOLUME, OF_CHANGE = "adjustment.pdf", "calibration.pdf", "volume.pdf", "change.pdf"
+PDF_NAMES = (REPORT, CALIBRATION, OF_VOLUME, OF_CHANGE)
+
+
+@dataclass(frozen=True)
+class DocumentOptions:
+    """What a document is to be.
+
+    Parameters
+    ----------
+    language : code of the language. kind : of the documents of an adjustment. camera : of a calibration; '' for all.
+    project : block folder or result of an adjustment whose [project] stands at the head of the certificate of a volume
+        or a change; None: looked for beside the result.
+    """
+
+    language: str = "en"
+    kind: str = "report"
+    camera: str = ""
+    project: FilePath | None = None
+
+    def check(self) -> None:
+        """Refuse what there is not, before anything is read.
+
+        Raises
+        ------
+        InputError
+        """
+        from aerotri.report.documents.typesetting import typst_module
+        from aerotri.report.documents.words import texts_of
+
+        typst_module()
+        texts_of(self.language)
+        if self.kind not in get_args(DocumentKind):
+            raise InputError(f"there is no document '{self.kind}'", f"use {', '.join(get_args(DocumentKind))}")
+        if self.camera and self.kind != "calibration":
+            raise InputError(
+                f"a camera '{self.camera}' belongs to a calibration certificate", "add document calibration"
+            )
+
+
+@dataclass(frozen=True)
+class Made:
+    """A document. name : of its file. pdf : its bytes. notes : what is to be known, in sentences."""
+
+    name: str
+    pdf: bytes
+    notes: tuple[str, ...] = ()
+
+
+def is_volume_or_change(result: object) -> bool:
+    """Whether a result, or the folder of one, is a volume or a change."""
+    if isinstance(result, MeasuredVolume | MeasuredChange):
+        return True
+    return not isinstance(result, Adjustment) and any((Path(str(result)) / name).is_file() for name in (VOLUME, CHANGE))
+
+
+def adjustment_document(result: Adjustment, options: DocumentOptions, report: StageReport) -> Made:
+    """The report of an adjustment, or the certificate of its cameras.
+
+    Raises
+    ------
+    InputError
+        When no photograph was taken with the camera.
+    """
+    from aerotri.report.documents.adjustment import adjustment_report
+    from aerotri.report.documents.calibration import calibration_certificate
+    from aerotri.report.documents.typesetting import pdf_of
+
+    record = {} if result.folder is None else _read(result.folder / "adjustment.json")
+    adjusted = result.adjusted
+    outcome = adjusted.outcome
+    said = {key: tuple(dict.fromkeys((*record.get(key, ()), *getattr(outcome, key)))) for key in ("warnings", "notes")}
+    adjusted = replace(adjusted, outcome=replace(outcome, **said))
+    made = _time_of(None if result.folder is None else result.folder / "adjustment.json")
+    context = _context(options, made, adjusted.block.project, adjusted.block.name)
+    report.stage("drawing", None)
+    if options.kind == "report":
+        name, found = REPORT, adjustment_report(adjusted, context, _version(record))
+    else:
+        name, found = CALIBRATION, calibration_certificate(adjusted, context, _version(record), options.camera)
+    report.stage("writing", None)
+    return Made(name, pdf_of(found, made))
+
+
+def certificate(
+    result: MeasuredVolume | MeasuredChange | FilePath, options: DocumentOptions, report: StageReport
+) -> Made:
+    """The certificate of a volume or of a change, given itself or its folder.
+
+    Raises
+    ------
+    InputError
+        When the folder cannot be read, or a document of another kind is asked for.
+    """
+    from aerotri.report.documents.change import change_certificate
+    from aerotri.report.documents.typesetting import pdf_of
+    from aerotri.report.documents.volume import volume_certificate
+
+    if options.kind != "report":
+        raise InputError("a volume or a change has no calibration", "give the result of an adjustment")
+    folder = None if isinstance(result, MeasuredVolume | MeasuredChange) else Path(result)
+    is_volume = isinstance(result, MeasuredVolume) if folder is None else (folder / VOLUME).is_file()
+    content, plots = _content_of(result, folder, VOLUME if is_volume else CHANGE)
+    made = _time_of(None if folder is None else folder / (VOLUME if is_volume else CHANGE))
+    project, notes = _project(options.project, folder, content)
+    context = _context(options, made, project, content["dtm"] if is_volume else content["second"])
+    report.stage("writing", None)
+    if is_volume:
+        return Made(OF_VOLUME, pdf_of(volume_certificate(content, plots, context), made), notes)
+    return Made(OF_CHANGE, pdf_of(change_certificate(content, plots, context), made), notes)
+
+
+def _context(options: DocumentOptions, made: datetime, project: Project, name: str) -> Context:
+    from aerotri.report.documents.head import Context
+    from aerotri.report.documents.words import Words
+
+    return Context(Words(options.language), made, project, str(name))
+
+
+def _content_of(result: Any, folder: Path | None, record: str) -> tuple[dict[str, Any], dict[str, RenderedPlot]]:
+    """Content and plots of a volume or a change."""
+    from aerotri.report.plots.rendering import RenderedPlot, render_plots
+
+    if folder is None:
+        return result.summary, render_plots(result.plot.all())
+    content = _read(folder / record)
+    needed = "dtm" if record == VOLUME else "volumes"
+    if needed not in content:
+        said = "is a change of point clouds, which has no volumes" if "core_points" in content else "is damaged"
+        remedy = "give the change of two surfaces" if "core_points" in content else "compute the result again"
+        raise InputError(said, remedy, folder / record)
+    plots: dict[str, RenderedPlot] = {}
+    for name in ("thickness", "budget", "difference"):
+        svg, png = folder / "plots" / f"{name}.svg", folder / "plots" / f"{name}.png"
+        if svg.is_file() and png.is_file():
+            plots[name] = RenderedPlot(svg.read_bytes(), png.read_bytes())
+    return content, plots
+
+
+def _read(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        return {}
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        raise InputError("cannot be read", "compute the result again", path) from None
+    return content if isinstance(content, dict) else {}
+
+
+def _version(record: Mapping[str, Any]) -> str:
+    from aerotri.version import __version__
+
+    return str(record.get("aerotri", __version__))
+
+
+def _time_of(record: Path | None) -> datetime:
+    """When the result was written; now for one that was not."""
+    if record is None or not record.is_file():
+        return datetime.now(UTC)
+    return datetime.fromtimestamp(int(record.stat().st_mtime), UTC)
+
+
+def _project(
+    given: FilePath | None, folder: Path | None, content: Mapping[str, Any]
+) -> tuple[Project, tuple[str, ...]]:
+    """The [project] that was named, or that of the block beside the result; a sentence about where it is from."""
+    from aerotri.observations.project import Project
+
+    for place in [Path(given)] if given is not None else _places(folder, content):
+        toml = next((one for one in (place / "block" / "block.toml", place / "block.toml", place)
+                     if one.is_file() and one.suffix == ".toml"), None)  # fmt: skip
+        if toml is not None:
+            found = _project_of(toml)
+            return found, (f"the head is that of {toml}",) if found.given() else ()
+    if given is not None:
+        raise InputError("holds no block.toml", "give a block folder or the result of an adjustment", Path(given))
+    return Project(), ("nothing is known of a project: name its block with --project",)
+
+
+def _places(folder: Path | None, content: Mapping[str, Any]) -> list[Path]:
+    """Folders beside a result that may hold its block: of `aerotri run`, and the adjustment that it names."""
+    from aerotri.public.run_steps import RECORD
+
+    if folder is None:
+        return []
+    around = folder.resolve().parent
+    sigma = content.get("sigma")
+    named = str(sigma.get("adjustment") or "") if isinstance(sigma, dict) else ""
+    places = [around / "result"] if (around / RECORD).is_file() else []
+    return [*places, around / Path(named).name] if named else places
+
+
+def _project_of(toml: Path) -> Project:
+    from aerotri.formats.block.logo import with_logo
+    from aerotri.formats.block.settings import read_block_toml
+
+    settings = read_block_toml(toml)
+    return with_logo(settings.model.project.project(), settings)
