@@ -61,8 +61,8 @@ def export(
     project: Annotated[
         Path | None,
         typer.Option(
-            help="Block or result whose [project] stands at the head of the PDF of a volume or a change. Default: looked "
-            "for beside it.",
+            help="Block or result whose [project] stands at the head of the PDF of a volume or a change. Default: "
+            "looked for beside it.",
             rich_help_panel=DOCUMENTS,
         ),
     ] = None,

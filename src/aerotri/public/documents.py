@@ -58,9 +58,7 @@ class DocumentOptions:
         if self.kind not in get_args(DocumentKind):
             raise InputError(f"there is no document '{self.kind}'", f"use {', '.join(get_args(DocumentKind))}")
         if self.camera and self.kind != "calibration":
-            raise InputError(
-                f"a camera '{self.camera}' belongs to a calibration certificate", "add document calibration"
-            )
+            raise InputError(f"a camera '{self.camera}' belongs to a calibration certificate", "ask for a calibration")
 
 
 @dataclass(frozen=True)

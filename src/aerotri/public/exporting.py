@@ -73,8 +73,8 @@ def export(
     result : of an adjustment, or the folder of one; as PDF also a volume or a change, or the folder of one.
     out : folder to write.
     to : 'gpkg', result.gpkg with layers and styles for QGIS; 'geoparquet', points.parquet and rays.parquet; 'stac',
-        item.json for a catalogue; 'pdf', a document: adjustment.pdf, calibration.pdf, volume.pdf or change.pdf. It needs
-        the package typst.
+        item.json for a catalogue; 'pdf', a document: adjustment.pdf, calibration.pdf, volume.pdf or change.pdf. It
+        needs the package typst.
     scale : by how much error ellipses and differences are drawn larger in result.gpkg; chosen where None.
     flown : date or time of the flight, '2026-05-17' or '2026-05-17T10:30:00Z', for a catalogue.
     language : of the document, 'en' or 'de'.

@@ -69,9 +69,9 @@ def _total(content: Mapping[str, Any]) -> float | None:
 def _result(c: Mapping[str, Any], words: Words) -> list[tuple[str, str]]:
     rows = [
         (words("volume.net"), known_to(words, c["net_m3"], _total(c), "m³")),
-        (words("volume.cut"), words("volume.on", volume=amount(words, c["cut_m3"]), area=amount(words, c["cut_area_m2"]))),
-        (words("volume.fill"),
-         words("volume.on", volume=amount(words, c["fill_m3"]), area=amount(words, c["fill_area_m2"]))),
+        *((words(f"volume.{of}"),
+           words("volume.on", volume=amount(words, c[f"{of}_m3"]), area=amount(words, c[f"{of}_area_m2"])))
+          for of in ("cut", "fill")),
         (words("volume.thickness"), f"{words.number(c['mean_thickness_m'], 3)} m"),
     ]  # fmt: skip
     mass = c["mass"]

@@ -17,6 +17,7 @@ from aerotri.report.quality import printable
 NO_VALUE = "–"
 LONG_WORD, PIECE = 24, 8
 """Characters from which a word of the user may be broken, and into pieces of how many."""
+NO_KEY = re.compile(r"[^A-Za-z0-9]+")
 MONTH_DAY = re.compile(r"([0-9]{4})-([0-9]{2})-([0-9]{2})")
 
 
@@ -71,7 +72,7 @@ class Words:
 
     def term(self, section: str, word: str) -> str:
         """The translation of a word of the program, itself where there is none."""
-        return self._texts.get(f"{section}.{word.replace(' ', '_')}", breakable(word))
+        return self._texts.get(f"{section}.{NO_KEY.sub('_', word)}", breakable(word))
 
     def number(self, value: float | None, digits: int, signed: bool = False) -> str:
         """A number with so many decimals; '–' where it is not known."""
