@@ -40,7 +40,7 @@ def test_refused(result, tmp_path):
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "a.txt").write_text("a")
     refused = (
-        (result, ["--to", "shp"], "out", "'shp' is not a format.*gpkg, geoparquet, stac"),
+        (result, ["--to", "shp"], "out", "'shp' is not a format.*gpkg, geoparquet, stac, pdf"),
         (result, [], "full", "holds other files"),
         (tmp_path / "full", [], "out", "holds no adjustment"),
         (result, ["--to", "stac", "--flown", "yesterday"], "out", "no date"),

@@ -184,6 +184,8 @@ def _written(folder: Path) -> Written:
     placed = run("adjust", folder / "placed", "--no-plots", out="placed_result")
     for to in ("gpkg", "geoparquet", "stac"):
         exported = run("export", placed, "--to", to, "--flown", "2026-05-17", out="exported")
+    for source, words in ((placed, ()), (placed, ("--document", "calibration")), (piles, ()), (changed, ())):
+        run("export", source, "--to", "pdf", *words, out="exported")
     stated = run("accuracy", second, "--class-horizontal", 10, out="accuracy")
     sets = run("compare-parameters", folder / "plain", "--set", "none", "--set", "brown:K1", "--folds", "2", out="sets")
     checked = run("crosscheck", second, out="checked")

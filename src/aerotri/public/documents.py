@@ -95,7 +95,7 @@ def adjustment_document(result: Adjustment, options: DocumentOptions, report: St
     said = {key: tuple(dict.fromkeys((*record.get(key, ()), *getattr(outcome, key)))) for key in ("warnings", "notes")}
     adjusted = replace(adjusted, outcome=replace(outcome, **said))
     made = _time_of(None if result.folder is None else result.folder / "adjustment.json")
-    context = _context(options, made, adjusted.block.project, adjusted.block.name)
+    context = _context(options, made, adjusted.block.project, adjusted.block.name, True)
     report.stage("drawing", None)
     if options.kind == "report":
         name, found = REPORT, adjustment_report(adjusted, context, _version(record))
@@ -126,18 +126,18 @@ def certificate(
     content, plots = _content_of(result, folder, VOLUME if is_volume else CHANGE)
     made = _time_of(None if folder is None else folder / (VOLUME if is_volume else CHANGE))
     project, notes = _project(options.project, folder, content)
-    context = _context(options, made, project, content["dtm"] if is_volume else content["second"])
+    context = _context(options, made, project, content["dtm"] if is_volume else content["second"], False)
     report.stage("writing", None)
     if is_volume:
         return Made(OF_VOLUME, pdf_of(volume_certificate(content, plots, context), made), notes)
     return Made(OF_CHANGE, pdf_of(change_certificate(content, plots, context), made), notes)
 
 
-def _context(options: DocumentOptions, made: datetime, project: Project, name: str) -> Context:
+def _context(options: DocumentOptions, made: datetime, project: Project, name: str, of_block: bool) -> Context:
     from aerotri.report.documents.head import Context
     from aerotri.report.documents.words import Words
 
-    return Context(Words(options.language), made, project, str(name))
+    return Context(Words(options.language), made, project, str(name), of_block)
 
 
 def _content_of(result: Any, folder: Path | None, record: str) -> tuple[dict[str, Any], dict[str, RenderedPlot]]:

@@ -122,6 +122,13 @@ def export_files() -> tuple[DescribedFile, ...]:
                       "Image points as GeoParquet, lines from the projection centre to the object point.",
                       (*RESIDUALS, *GEOMETRY), "with --to geoparquet"),
         DescribedFile("item.json", PLACE, "json", "The result as an item of a STAC catalogue.", STAC, "with --to stac"),
+        DescribedFile("adjustment.pdf", PLACE, "other", "Report of the adjustment.", when="with --to pdf"),
+        DescribedFile("calibration.pdf", PLACE, "other", "Calibration certificate of the cameras.",
+                      when="with --to pdf --document calibration"),
+        DescribedFile("volume.pdf", PLACE, "other", "Certificate of a volume.",
+                      when="with --to pdf, of a folder of volume"),
+        DescribedFile("change.pdf", PLACE, "other", "Certificate of a change.",
+                      when="with --to pdf, of a folder of change"),
         *layers(),
     )  # fmt: skip
 

@@ -50,8 +50,7 @@ def _areas(c: Mapping[str, Any], words: Words) -> Part:
         for of in KINDS:
             value, sigma = one[f"{of}_m3"], one[f"sigma_{of}_m3"]
             area = one["area_m2"] if of == "net" else one[f"{of}_area_m2"]
-            rows.append((breakable(one["name"]) if one is not c["volumes"][-1] or len(c["volumes"]) > 1 else
-                         words("change.all"), words(f"change.{of}"), amount(words, area),
+            rows.append((words.term("given", one["name"]), words(f"change.{of}"), amount(words, area),
                          words.with_sigma(value, sigma).partition(" ±")[0], two(words, sigma),
                          two(words, WIDE * sigma)))  # fmt: skip
     keys = ("area", "kind", "area_m2", "volume_m3", "sigma_m3", "wide_m3")
@@ -90,7 +89,7 @@ def _alignment(c: Mapping[str, Any], words: Words) -> list[Part]:
     if a is None:
         return [paragraph(words("change.not_aligned"))]
     said = words("change.aligned", used=words.whole(a["cells_used"]), cells=words.whole(a["cells"]),
-                 stable=breakable(a["stable"]), factor=words.number(a["noise_factor"], 2))  # fmt: skip
+                 stable=words.term("given", a["stable"]), factor=words.number(a["noise_factor"], 2))  # fmt: skip
     rows: list[tuple[str, str]] = []
     for one in a["unknowns"]:
         factor, unit = UNITS[one["name"]]

@@ -21,13 +21,14 @@ class Context:
     Parameters
     ----------
     words : the language. made : when the result was computed. project : whom it belongs to.
-    name : of the block or of the surface.
+    name : of the block or of the surface. of_block : whether it is that of a block.
     """
 
     words: Words
     made: datetime
     project: Project
     name: str
+    of_block: bool = True
 
 
 def crs_rows(words: Words, crs: str) -> list[tuple[str, str]]:
@@ -59,7 +60,7 @@ def document(
     rows = [(words(f"head.{key}"), breakable(text)) for key, text in _stated(project) if text]
     if project.survey_date:
         rows.append((words("head.survey_date"), words.date(project.survey_date)))
-    rows += [(words("head.block"), breakable(context.name))] if project.title else []
+    rows += [(words("head.block"), breakable(context.name))] if project.title and context.of_block else []
     rows += [(words("head.computed"), computed), (words("head.version"), f"aerotri {version}")]
     rows += crs_rows(words, crs)
     rows += _notes(words, project)

@@ -9,7 +9,7 @@ from aerotri.report.documents.figures import as_files
 from aerotri.report.documents.head import Context, document, signature_fields
 from aerotri.report.documents.messages import in_english, message_parts
 from aerotri.report.documents.parts import Document, Part, heading, pairs, paragraph, picture, signature, table
-from aerotri.report.documents.words import NO_VALUE, Words, breakable
+from aerotri.report.documents.words import NO_VALUE, Words, breakable, decimals
 from aerotri.report.plots.rendering import RenderedPlot
 
 WIDE = 1.96
@@ -59,7 +59,7 @@ def amount(words: Words, value: float | None) -> str:
     """A volume or an area: no decimals from a hundred on."""
     if value is None:
         return NO_VALUE
-    return words.whole(value) if abs(value) >= 100.0 else words.plain(value)
+    return words.whole(value) if abs(value) >= 100.0 else words.number(value, min(2, decimals(value, 4)))
 
 
 def _total(content: Mapping[str, Any]) -> float | None:
@@ -113,7 +113,10 @@ def _measured(c: Mapping[str, Any], context: Context) -> list[tuple[str, str]]:
         (words("volume.surface"), breakable(c["dtm"])),
         (words("volume.epoch"), words.date(day) if day else words("head.not_stated")),
         (words("volume.base"), words.term("base", base["name"]) + plane),
-        (words("volume.boundary"), f"{breakable(c['boundary']['name'])}, {amount(words, c['boundary']['area_m2'])} m²"),
+        (
+            words("volume.boundary"),
+            f"{words.term('given', c['boundary']['name'])}, {amount(words, c['boundary']['area_m2'])} m²",
+        ),
         (words("volume.method"), words.term("method", c["method"])),
         (words("volume.no_data"), f"{amount(words, c['no_data_area_m2'])} m²"),
     ]
