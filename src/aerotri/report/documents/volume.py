@@ -101,7 +101,7 @@ def _piles(c: Mapping[str, Any], words: Words) -> Part:
 
 
 def _measured(c: Mapping[str, Any], context: Context) -> list[tuple[str, str]]:
-    words, base, day = context.words, c["base"], context.project.survey_date
+    words, base, edge, day = context.words, c["base"], c["boundary"], context.project.survey_date
     plane = ""
     if "z0_m" in base and (base["slope_x"] or base["slope_y"]):
         plane = words("volume.plane", z=words.number(base["z0_m"], 3), x=words.number(base["x0_m"], 1),
