@@ -33,7 +33,7 @@ def test_languages_have_the_same_texts():
 
 def test_keys_that_are_named_are_there():
     """Keys in the source; those with a part that is filled in begin as some key does."""
-    found = [key for file in FOLDER.glob("*.py") for key in re.findall(r'words\(f?"([a-z_.{}]+)', file.read_text())]
+    found = [key for file in FOLDER.glob("*.py") for key in re.findall(r'words\(f?"([a-z_0-9.{}]+)', file.read_text())]
     assert len(found) > 100
     for key in found:
         start = key.partition("{")[0]

@@ -187,10 +187,9 @@ def _correlations(adjusted: AdjustedBlock, camera: Camera, rows: np.ndarray, wor
 
 
 def _pairs(names: Sequence[str], r: np.ndarray, words: Words) -> Part:
-    first, second = np.triu_indices(len(names), 1)
-    high = np.flatnonzero(np.abs(r[first, second]) >= NAMED_FROM)
-    high = high[np.argsort(-np.abs(r[first, second][high]), kind="stable")]
-    rows = [(names[first[k]], names[second[k]], _percent(r[first[k], second[k]], words)) for k in high]
+    found = [(float(r[i, k]), i, k) for i in range(len(names)) for k in range(i + 1, len(names))]
+    high = sorted((one for one in found if abs(one[0]) >= NAMED_FROM), key=lambda one: -abs(one[0]))
+    rows = [(names[i], names[k], _percent(value, words)) for value, i, k in high]
     return table([words("parameters.name"), words("parameters.name"), "r [%]"], rows, words=2)
 
 

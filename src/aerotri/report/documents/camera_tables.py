@@ -51,16 +51,18 @@ def parameter_rows(adjusted: AdjustedBlock, chosen: np.ndarray | None = None) ->
 
 def parameter_table(adjusted: AdjustedBlock, rows: np.ndarray, words: Words) -> Part:
     """Additional parameters with σ, test, effect and the largest correlation."""
-    p, effect = adjusted.parameters, 1e3 * largest_effects(adjusted)
+    p = adjusted.parameters
+    numbers = (p.value, p.sigma, p.total_sigma, p.t, 1e3 * largest_effects(adjusted), p.max_correlation)
     with_model = p.model_sigma is not None
     cells: list[tuple[str, ...]] = []
     for k in rows.tolist():
-        total = [words.scientific(p.total_sigma[k], 1)] if with_model else []
-        r = words.number(p.max_correlation[k], 2, signed=True)
-        partner = f"{r} ({breakable(p.max_correlation_with[k])})" if p.max_correlation_with[k] else r
+        value, sigma, total, t, effect, largest = (float(one[k]) for one in numbers)
+        partner = words.number(largest, 2, signed=True)
+        partner += f" ({breakable(p.max_correlation_with[k])})" if p.max_correlation_with[k] else ""
         cells.append((breakable(p.names[k]), breakable(p.groups[k]), words.term("status", str(p.status[k])),
-                      unit_of(str(p.names[k])), words.scientific(p.value[k], 4), words.scientific(p.sigma[k], 1),
-                      *total, words.number(p.t[k], 1), words.number(effect[k], 2), partner))  # fmt: skip
+                      unit_of(str(p.names[k])), words.scientific(value, 4), words.scientific(sigma, 1),
+                      *([words.scientific(total, 1)] if with_model else []), words.number(t, 1),
+                      words.number(effect, 2), partner))  # fmt: skip
     columns = [words(f"parameters.{key}") for key in ("name", "group", "status", "unit", "value")] + ["σ"]
     columns += [words("parameters.total")] if with_model else []
     columns += ["t", words("parameters.effect"), words("parameters.largest_r")]

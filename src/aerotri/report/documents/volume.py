@@ -83,7 +83,7 @@ def _result(c: Mapping[str, Any], words: Words) -> list[tuple[str, str]]:
 
 
 def _piles(c: Mapping[str, Any], words: Words) -> Part:
-    whole = {**c, "name": "", "area_m2": c["boundary"]["area_m2"], "sigma_m3": _total(c)}
+    whole: dict[str, Any] = {**c, "name": "", "area_m2": c["boundary"]["area_m2"], "sigma_m3": _total(c)}
     with_mass = c["mass"] is not None
     rows: list[tuple[str, ...]] = []
     for one in (*c["piles"], whole):
@@ -115,7 +115,7 @@ def _measured(c: Mapping[str, Any], context: Context) -> list[tuple[str, str]]:
         (words("volume.base"), words.term("base", base["name"]) + plane),
         (
             words("volume.boundary"),
-            f"{words.term('given', c['boundary']['name'])}, {amount(words, c['boundary']['area_m2'])} m²",
+            f"{words.term('given', edge['name'])}, {amount(words, edge['area_m2'])} m²",
         ),
         (words("volume.method"), words.term("method", c["method"])),
         (words("volume.no_data"), f"{amount(words, c['no_data_area_m2'])} m²"),
