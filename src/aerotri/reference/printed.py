@@ -116,7 +116,7 @@ CONVERT = (
 )
 EXPORT = (
     Item("target", "text", "Folder written."),
-    Item("format", "text", "What was written.", values={"gpkg": "", "geoparquet": "", "stac": ""}),
+    Item("format", "text", "What was written.", values={"gpkg": "", "geoparquet": "", "stac": "", "pdf": ""}),
     Item("files[]", "text", "Files written into it."),
     Item("messages[]", "text", "What is to be known of it."),
 )
