@@ -130,6 +130,24 @@ def test_little_stable_ground_does_not_tell_the_noise_length():
     assert stated.summary["volumes"][0]["sigma_net_m3"] > small.summary["volumes"][0]["sigma_net_m3"]
 
 
+def test_surfaces_without_sigma_take_it_from_stable_ground(tmp_path):
+    """Nothing is said of a ratio to σ that nobody stated."""
+    surfaces = []
+    for one in epochs(3)[:2]:
+        heights = one.heights
+        grid = heights.grid
+        surfaces.append(aerotri.Surface.of_array(heights.z, left=grid.left, top=grid.top, cell=grid.cell_x))
+    found = aerotri.change(*surfaces, stable=STABLE, align="shift")
+    known = aerotri.change(*epochs(3)[:2], stable=STABLE, align="shift")
+    assert found.summary["alignment"]["noise_factor"] is None
+    assert known.summary["alignment"]["noise_factor"] == pytest.approx(1.0, abs=0.2)
+    assert found.summary["sigma_m"] == pytest.approx(known.summary["sigma_m"], rel=0.2)
+    for one, said in ((found, "No σ was stated"), (known, "times the stated one")):
+        one.save(tmp_path / said)
+        (page,) = (tmp_path / said).glob("*.html")
+        assert said in page.read_text(encoding="utf-8")
+
+
 def test_surfaces_that_do_not_meet():
     first = epochs(1)[0]
     away = aerotri.Surface.of_array(first.z, left=1e4, top=0.0, cell=1.0)

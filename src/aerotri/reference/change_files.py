@@ -56,7 +56,7 @@ CHANGE_JSON = (
     Item("alignment.stable", "text", "File or text of the stable ground."),
     Item("alignment.cells", "whole", "Cells on it."),
     Item("alignment.cells_used", "whole", "Cells that took part."),
-    Item("alignment.noise_factor", "number", "Noise there over the stated one."),
+    Item("alignment.noise_factor", "number?", "Noise there over the stated one; null where a surface states none."),
     Item("alignment.unknowns[]", "object", "What it was moved by."),
     Item("alignment.unknowns[].name", "text", "dZ, dX, dY (m), tilt_X, tilt_Y (m/m)."),
     Item("alignment.unknowns[].value", "number", "Second surface less first."),

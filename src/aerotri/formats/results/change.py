@@ -27,7 +27,8 @@ def change_json(
         "sigma_m": float(np.median(sigma)) if len(sigma) else None,
         "noise_length_m": float(np.sqrt(c.sharing * c.grid.cell_x * c.grid.cell_y)),
         "alignment": None if not stable else {
-            "how": how, "stable": stable, "cells": a.cells, "cells_used": a.used, "noise_factor": a.factor,
+            "how": how, "stable": stable, "cells": a.cells, "cells_used": a.used,
+            "noise_factor": float(a.factor) if np.isfinite(a.factor) else None,
             "unknowns": [
                 {"name": name, "value": float(value), "sigma": float(np.sqrt(variance))}
                 for name, value, variance in zip(a.names, a.values, np.diag(a.covariance), strict=True)

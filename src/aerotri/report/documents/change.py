@@ -89,7 +89,12 @@ def _alignment(c: Mapping[str, Any], words: Words) -> list[Part]:
     if a is None:
         return [paragraph(words("change.not_aligned"))]
     said = words("change.aligned", used=words.whole(a["cells_used"]), cells=words.whole(a["cells"]),
-                 stable=words.term("given", a["stable"]), factor=words.number(a["noise_factor"], 2))  # fmt: skip
+                 stable=words.term("given", a["stable"]))  # fmt: skip
+    factor = a["noise_factor"]
+    noise = (
+        words("change.not_stated") if factor is None else words("change.noise_there", factor=words.number(factor, 2))
+    )
+    said = f"{said} {noise}"
     rows: list[tuple[str, str]] = []
     for one in a["unknowns"]:
         factor, unit = UNITS[one["name"]]

@@ -78,7 +78,10 @@ def _alignment(c: Mapping[str, Any]) -> str:
     a = c["alignment"]
     if a is None:
         return "No stable ground was given: the surfaces are compared as they lie."
-    return (
-        f"{a['cells_used']} of {a['cells']} cells on stable ground ({printable(a['stable'])}) took part. The noise "
-        f"there is {a['noise_factor']:.2f} times the stated one."
+    factor = a["noise_factor"]
+    noise = (
+        "No σ was stated; it is from the scatter there"
+        if factor is None
+        else f"The noise there is {factor:.2f} times the stated one"
     )
+    return f"{a['cells_used']} of {a['cells']} cells on stable ground ({printable(a['stable'])}) took part. {noise}."

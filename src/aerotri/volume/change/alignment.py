@@ -37,7 +37,8 @@ class Alignment:
     ----------
     names : of the unknowns, m and m/m. values : (u,). covariance : (u, u).
     middle : (2,) m, about which the surface is tilted. cells, used : stable ones, and those that took part.
-    factor : noise on stable ground over the stated σ. sharing : cells of one noise, 0 where too few tell.
+    factor : noise on stable ground over the stated σ, NaN where none is stated.
+    sharing : cells of one noise, 0 where too few tell.
     gain : (rows, columns, u) of x̂ = Σ gain·difference, 0 of cells that did not take part; None without an alignment.
     """
 

@@ -10,7 +10,7 @@ else it is (Σ|w|·σ_adjustment)², as if every cell erred alike: the most that
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -116,6 +116,7 @@ def compute_change(
         stated = np.isfinite(noise).any()
         found = align(grid, 0.5 * (first.z + second.z), raw, noise if stated else np.ones_like(raw), stable, how)
         noise = (max(found.factor, 1.0) if stated else found.factor) * (noise if stated else np.ones_like(raw))
+        found = found if stated else replace(found, factor=np.nan)
     sharing = max(_sharing(first, second), found.sharing)
     design = found.design(grid, second.z)
     moved = len(found.names) > 0
