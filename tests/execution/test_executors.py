@@ -79,7 +79,8 @@ def test_the_task_of_a_killed_worker_runs_again(text, executor, work, tmp_path):
     done = executor(text).run(work(toy_tasks.written, (str(tmp_path), (1, 4), 1)))
     assert done == list(range(6))
     assert all((tmp_path / f"{k}.txt").read_text(encoding="utf-8") == str(k) for k in range(6))
-    assert len(list(tmp_path.glob("begun_1_*"))) == 2
+    # a third time where Dask lost what was done with the worker that the other task killed
+    assert len(list(tmp_path.glob("begun_1_*"))) in ((2, 3) if text.startswith("dask") else (2,))
 
 
 @pytest.mark.parametrize("text", APART)
