@@ -56,7 +56,8 @@ def typst_module() -> Any:
 
 def _compiled(document: Document, made: datetime, form: str) -> Any:
     typst = typst_module()
-    text = json.dumps(document.content, ensure_ascii=False)
+    moment = [made.year, made.month, made.day, made.hour, made.minute, made.second]
+    text = json.dumps(document.content | {"moment": moment}, ensure_ascii=False)
     with tempfile.TemporaryDirectory(prefix="aerotri_pdf") as room:
         place = Path(room)
         template = files("aerotri.report.documents").joinpath(TEMPLATE).read_text(encoding="utf-8")
@@ -66,8 +67,8 @@ def _compiled(document: Document, made: datetime, form: str) -> Any:
             (place / name).write_bytes(content)
         try:
             return typst.compile(
-                str(place / TEMPLATE), root=room, format=form, ppi=110.0, timestamp=int(made.timestamp()),
-                ignore_system_fonts=max(text) < FIRST_UNCOVERED, package_path=room, package_cache_path=room,
+                str(place / TEMPLATE), root=room, format=form, ppi=110.0,
+                ignore_system_fonts=max(text) < FIRST_UNCOVERED, package_path=room,
             )  # fmt: skip
         except typst.TypstError as error:
             said = str(error).splitlines()
