@@ -1,5 +1,7 @@
 """The whole surface by dense matching: geometry of epipolar images, parallaxes with σ, fusion, tiles."""
 
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pytest
@@ -9,13 +11,14 @@ from aerotri.conventions import InputError
 from aerotri.rasters.grids import Grid
 from aerotri.rasters.images import create_image
 from aerotri.terrain.dense import _mesh_kernels as kernels
+from aerotri.terrain.dense import parallaxes
 from aerotri.terrain.dense._resampling_kernels import resample
 from aerotri.terrain.dense.colours import Colours
 from aerotri.terrain.dense.epipolar import EpipolarGeometry, EpipolarImages, epipolar_geometry
 from aerotri.terrain.dense.grey_store import GreyStore
 from aerotri.terrain.dense.height_range import range_of_surface
 from aerotri.terrain.dense.measure import DensePlan, measure_surface
-from aerotri.terrain.dense.pairs import Pair, chosen_pairs, noise_correlation
+from aerotri.terrain.dense.pairs import Candidate, Pair, chosen_pairs, noise_correlation, pair_for_holes, possible_pairs
 from aerotri.terrain.dense.parallaxes import parallaxes_of
 from aerotri.terrain.dense.place import place_at
 from aerotri.terrain.dense.points import normals
@@ -90,7 +93,7 @@ def test_a_place_has_one_row_in_both_epipolar_images(hill):
     place = place_at(hill.photographs(), np.array([0.0, 0.0, 100.0]), 300.0, 0.02)
     rng = np.random.default_rng(1)
     q = np.column_stack([rng.uniform(-60.0, 60.0, (200, 2)), rng.uniform(-20.0, 40.0, 200)])
-    pair = chosen_pairs(place, q, 1)[0]
+    pair = chosen_pairs(possible_pairs(place, q), 1)[0]
     spare = np.array([0.0, 0.0, 10.0])
     g = epipolar_geometry(place, pair.left, pair.right, 0, q, q - spare, q + spare)
     left, right = ((q - place.centres[k]) @ g.rotation for k in (pair.left, pair.right))
@@ -105,7 +108,7 @@ def test_pixels_with_their_parallax_lie_where_they_were_projected_from(hill):
     place = place_at(hill.photographs(), np.array([0.0, 0.0, 100.0]), 300.0, 0.02)
     rng = np.random.default_rng(2)
     ground = np.column_stack([rng.uniform(-60.0, 60.0, (400, 2)), rng.uniform(-20.0, 40.0, 400)])
-    pair = chosen_pairs(place, ground, 1)[0]
+    pair = chosen_pairs(possible_pairs(place, ground), 1)[0]
     spare = np.array([0.0, 0.0, 10.0])
     g = epipolar_geometry(place, pair.left, pair.right, 0, ground, ground - spare, ground + spare)
     rows, columns = g.shape
@@ -294,3 +297,33 @@ def test_photographs_that_show_nothing_alike_are_refused(hill, tmp_path):
     blank = [write_photograph(tmp_path / path.name, np.full((375, 575), 9000, np.uint16)) for path in hill.paths]
     with pytest.raises(InputError, match="no two photographs could be matched"):
         measure_surface(hill.calibration, DensePlan(np.arange(4), tuple(blank), tmp_path))
+
+
+def test_one_more_pair_is_the_one_that_shows_the_holes():
+    shows = np.zeros((3, 100))
+    shows[0], shows[1, :60], shows[2, 50:] = 1.0, 0.9, 0.8
+    candidates = [Candidate(Pair(0, n + 1, 12.0), row) for n, row in enumerate(shows)]
+    holes = np.zeros(100)
+    holes[55:75] = 0.5
+    tried = [candidates[0].pair]
+    found = pair_for_holes(candidates, tried, holes)
+    assert found is not None
+    assert found[0] == candidates[2].pair
+    assert found[1] == pytest.approx(0.5 * 20 / 100)
+    assert pair_for_holes(candidates, [c.pair for c in candidates], holes) is None
+    assert pair_for_holes(candidates, tried, np.full(100, 0.001)) is None
+
+
+def test_what_matches_alone_in_noise_does_not_count(monkeypatch):
+    """Two images of noise: semi-global matching finds patches, least squares keeps none of them."""
+    rng = np.random.default_rng(3)
+    left, right = (100.0 + rng.normal(0.0, 8.0, (300, 400)).astype(np.float32) for _ in range(2))
+    known = np.ones(left.shape, bool)
+    images = SimpleNamespace(
+        left=left, right=right, left_known=known, right_known=known, geometry=SimpleNamespace(lowest=0, count=16)
+    )
+    with_crowd = np.isfinite(parallaxes.parallaxes_of(images).value).mean()  # pyright: ignore
+    monkeypatch.setattr(parallaxes, "LEAST_CROWD", 0.0)
+    without = np.isfinite(parallaxes.parallaxes_of(images).value).mean()  # pyright: ignore
+    assert with_crowd == 0.0
+    assert without > 0.01

@@ -255,7 +255,7 @@ def seen_twice(o, grid: Grid, truth: np.ndarray) -> np.ndarray:
 
     x, y = np.meshgrid(grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows)))
     xyz = np.column_stack([x.ravel(), y.ravel(), truth.ravel()])
-    place = place_at(o.photographs, xyz.mean(axis=0), 500.0, 0.02)
+    place = place_at(o.photographs, xyz.mean(axis=0), 500.0, 0.005)
     q = place.from_crs(xyz)
     return (sum(place.seen(k, q).astype(int) for k in range(len(o.photographs))) >= 2).reshape(truth.shape)
 

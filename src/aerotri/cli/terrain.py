@@ -174,7 +174,8 @@ def dsm(
         typer.Option(
             min=1,
             max=MOST_PAIRS,
-            help="Number of pairs of photographs that measure a piece of ground, at most.",
+            help="Number of pairs of photographs that measure a piece of ground, at most. Up to 8 where cells stay "
+            "without a height.",
             rich_help_panel=MATCHING,
         ),
     ] = DENSE_DEFAULTS.most_pairs,

@@ -203,7 +203,7 @@ def dense_surface(
     photographs : folder or files of the photographs, TIFF or JPEG.
     resolution : m, cell of the surface; two pixels on the ground where None.
     area : m, X and Y of the lower left, then of the upper right corner; as far as photographs reach where None.
-    most_pairs : pairs of photographs that measure a piece of ground, at most.
+    most_pairs : pairs of photographs that measure a piece of ground, at most; up to 8 where there are holes.
     edge : share of the format at its edge that is not used.
     ideal : the photographs are those of `aerotri.ideal_photographs`, free of image errors.
     ground : filter the ground besides, without objects.

@@ -21,6 +21,8 @@ INTERPOLATION, ALIGNMENT = INTERPOLATIONS[0], ALIGNMENTS[0]
 """Of surfaces that are compared, where nothing is stated."""
 EDGE, EDGE_OF_PAIRS = 0.02, 0.10
 """Share of the format at its edge not used: of pairs as Tran (2007) has it; where more vouch for a picket, less."""
+DENSE_EDGE = 0.005
+"""The same of a dense surface; chosen [C]: room for the windows."""
 LARGEST_EDGE = 0.4
 """Share of the format that `edge` may take on every side; at a half nothing would be left."""
 WIDEST_OBJECT_M, MOST_WIDE_M = 18.0, 200.0
@@ -117,7 +119,7 @@ class DenseSettings:
     ----------
     resolution : m, cell of the surface; None: two pixels on the ground.
     area : m, X and Y of the lower left, X and Y of the upper right corner; None: as far as photographs reach.
-    most_pairs : pairs of photographs that measure a piece of ground, at most.
+    most_pairs : pairs of photographs that measure a piece of ground, at most; up to 8 where there are holes.
     edge : share of the format at its edge that is not used.
     ideal : the photographs have been freed of image errors.
     ground : filter the ground besides. widest_object : m, the widest object that is taken off it.
@@ -126,7 +128,7 @@ class DenseSettings:
     resolution: float | None = None
     area: tuple[float, float, float, float] | None = None
     most_pairs: int = 4
-    edge: float = EDGE
+    edge: float = DENSE_EDGE
     ideal: bool = False
     ground: bool = False
     widest_object: float = WIDEST_OBJECT_M

@@ -19,6 +19,8 @@ GAIN = (1.0, 0.6, 0.4, 0.25, 0.15, 0.1)
 third decides between two, others only average."""
 LEAST_GAIN = 0.01
 """Of the whole piece, below which one more pair is not worth its time."""
+LEAST_OF_HOLES = 0.02
+"""Share of a piece that is a hole and shown by one more pair, from which on it is matched; chosen [C]."""
 LARGEST_SCALE = 1.5
 """Ratio of the distances from which the two see the ground; beyond, windows are no longer alike."""
 
@@ -32,17 +34,20 @@ class Pair:
     angle: float
 
 
-def chosen_pairs(place: Place, ground: np.ndarray, most: int) -> list[Pair]:
-    """The pairs that show ground (n, 3) m in q best, the best first.
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A pair, and what it is worth at places on the ground: (n,), 0 where not both photographs show them."""
 
-    Parameters
-    ----------
-    most : pairs, more only where they show what no other does.
-    """
+    pair: Pair
+    worth: np.ndarray
+
+
+def possible_pairs(place: Place, ground: np.ndarray) -> list[Candidate]:
+    """The pairs that show some of the ground (n, 3) m in q under an angle that can be matched."""
     seen = {k: place.seen(k, ground) for k in _near(place, ground)}
     shown = {k: s for k, s in seen.items() if s.any()}
     up = ground.mean(axis=0)
-    candidates: list[tuple[Pair, np.ndarray]] = []
+    candidates: list[Candidate] = []
     rows = sorted(shown)
     for n, a in enumerate(rows):
         for b in rows[n + 1 :]:
@@ -52,8 +57,8 @@ def chosen_pairs(place: Place, ground: np.ndarray, most: int) -> list[Pair]:
             at = ground[both].mean(axis=0) if both.sum() else up
             pair = _pair(place, a, b, at)
             if pair is not None:
-                candidates.append((pair, both * _worth(pair.angle)))
-    return _greedy(candidates, len(ground), most)
+                candidates.append(Candidate(pair, both * _worth(pair.angle)))
+    return candidates
 
 
 def _near(place: Place, ground: np.ndarray) -> list[int]:
@@ -82,8 +87,16 @@ def _worth(angle: float) -> float:
     return ratio if ratio < 1.0 else 1.0 / ratio
 
 
-def _greedy(candidates: list[tuple[Pair, np.ndarray]], places: int, most: int) -> list[Pair]:
-    """One pair after the other, always the one that adds most."""
+def chosen_pairs(candidates: list[Candidate], most: int) -> list[Pair]:
+    """The pairs that show the ground best, the best first: one after the other, always the one that adds most.
+
+    Parameters
+    ----------
+    most : pairs, more only where they show what no other does.
+    """
+    if not candidates:
+        return []
+    places = len(candidates[0].worth)
     count = np.zeros(places, int)
     gain = np.array([*GAIN, 0.0])
     used: dict[int, int] = {}
@@ -92,20 +105,42 @@ def _greedy(candidates: list[tuple[Pair, np.ndarray]], places: int, most: int) -
     while rest:
         worth = gain[np.minimum(count, len(GAIN))]
         gains = [
-            float((worth * shows).sum()) / places / (1.0 + 0.2 * (used.get(p.left, 0) + used.get(p.right, 0)))
-            for p, shows in rest
+            float((worth * c.worth).sum())
+            / places
+            / (1.0 + 0.2 * (used.get(c.pair.left, 0) + used.get(c.pair.right, 0)))
+            for c in rest
         ]
         if len(found) >= most:  # enough, but for what none shows yet
-            gains = [float(((count == 0) * shows).sum()) / places for _, shows in rest]
+            gains = [float(((count == 0) * c.worth).sum()) / places for c in rest]
         best = int(np.argmax(gains))
         if gains[best] < LEAST_GAIN:
             break
-        pair, shows = rest.pop(best)
+        chosen = rest.pop(best)
+        pair = chosen.pair
         found.append(pair)
-        count += shows > 0.0
+        count += chosen.worth > 0.0
         for k in (pair.left, pair.right):
             used[k] = used.get(k, 0) + 1
     return found
+
+
+def pair_for_holes(candidates: list[Candidate], tried: list[Pair], holes: np.ndarray) -> tuple[Pair, float] | None:
+    """The pair not tried yet that shows most of the holes, and which share of the piece it may fill.
+
+    Parameters
+    ----------
+    holes : (n,) share of the ground about each place that has no height; 0 at places outside of the piece.
+
+    Returns
+    -------
+    None where no pair shows enough of them.
+    """
+    rest = [c for c in candidates if c.pair not in tried]
+    if not rest:
+        return None
+    best = max(rest, key=lambda c: float((holes * c.worth).sum()))
+    hoped = float((holes * (best.worth > 0.0)).sum()) / len(holes)
+    return (best.pair, hoped) if hoped >= LEAST_OF_HOLES else None
 
 
 def noise_correlation(place: Place, pairs: list[Pair]) -> np.ndarray:

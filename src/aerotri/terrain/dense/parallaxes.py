@@ -37,14 +37,18 @@ SMOOTHED_STEP_PX, SMOOTHED_PX = 0.7, 2.5
 """σ of the weights by which parallaxes are smoothed, in parallax and in place; chosen [C]."""
 ROUNDS = 2
 """Of least squares; a third moves the medians of synthetic pairs by less than .01 px."""
-LARGEST_SHIFT_PX = 1.0
-"""By which least squares may move a parallax of the semi-global matching; chosen [C]: that is within a pixel of it."""
-LARGEST_ACROSS_PX = 1.0
-"""Shift across the base at which it is no match of this pair; chosen [C]: twice what the orientation of a drone
-flight was seen to leave."""
-LEAST_CORRELATION = 0.5
-"""Correlation of a window below which it counts as not matched; chosen [C]: below, half of the grey values' variance is
-something else."""
+LARGEST_SHIFT_PX = 1.5
+"""By which least squares may move a parallax of the semi-global matching; chosen [C]: that is within a pixel of it, and
+half of one on noise."""
+LARGEST_ACROSS_PX, ACROSS_SIGMAS = 1.0, 2.0
+"""Shift across the base at which it is no match of this pair, and σ of the shift besides; chosen [C]: twice what the
+orientation of a drone flight was seen to leave. A window with edges along the base tells little of it."""
+LEAST_CORRELATION = 0.2
+"""Correlation of a window below which it counts as not matched; chosen [C]: what is not alike is in σ already, so that
+errors over σ of rendered scenes are as with 0.5; of water five times as much is measured."""
+CROWD_PX, LEAST_CROWD = 25, 0.5
+"""Side of the square about a pixel, and the share of it that has to be matched for the pixel to count; chosen [C]:
+noise matches noise now and then, but never all around."""
 LEAST_SIGMA_PX = 0.02
 """σ of a parallax is never stated smaller; chosen [C]: interpolation between pixels leaves that even without noise."""
 LARGEST_SIGMA_PX = 1.0
@@ -128,9 +132,11 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
         left_across, factor = _noise(across, of_across, known)
         middle += left_across
     known &= (
-        (np.abs(value - start) < LARGEST_SHIFT_PX) & (np.abs(across) < LARGEST_ACROSS_PX)
-        & (correlation > LEAST_CORRELATION)
+        (np.abs(value - start) < LARGEST_SHIFT_PX) & (correlation > LEAST_CORRELATION)
+        & (across**2 < LARGEST_ACROSS_PX**2 + (ACROSS_SIGMAS * factor) ** 2 * of_across)
     )  # fmt: skip
+    crowd = cv2.boxFilter(known.astype(np.float32), -1, (CROWD_PX, CROWD_PX))
+    known &= crowd > LEAST_CROWD
     # where a pixel of the window is not known both images are the same: it tells nothing and hides noise
     share = cv2.boxFilter((start > INVALID / 2).astype(np.float32), -1, (WINDOW_PX, WINDOW_PX))
     sigma = np.sqrt(factor**2 * variance / np.maximum(share, 0.1) ** 2 + LEAST_SIGMA_PX**2)

@@ -14,7 +14,7 @@ from aerotri.terrain.dense import _mesh_kernels as kernels
 from aerotri.terrain.dense.epipolar import EpipolarGeometry, epipolar_geometry, epipolar_images
 from aerotri.terrain.dense.grey_store import GreyStore
 from aerotri.terrain.dense.height_range import HeightRange
-from aerotri.terrain.dense.pairs import Pair, chosen_pairs, noise_correlation
+from aerotri.terrain.dense.pairs import Candidate, Pair, chosen_pairs, noise_correlation, pair_for_holes, possible_pairs
 from aerotri.terrain.dense.parallaxes import Parallaxes, parallaxes_of
 from aerotri.terrain.dense.place import Place, place_at
 from aerotri.terrain.photographs import Photographs
@@ -32,6 +32,9 @@ of rendered scenes over their σ have a standard deviation near 1 (tools/prove/d
 STEP_SHARE, ACROSS_CELLS = 0.45, 7
 """Share of a step that is σ of the cells beside it, and side of the square in which it is looked for beside a hole;
 chosen [C]: of rendered houses a quarter of these cells has the height of the other side, an RMS of half the step."""
+LEAST_FILLED = 0.1
+"""Of the holes that one more pair shows, the share that it has to fill for another to be tried; chosen [C]: what two
+pairs in a row cannot match, water or what trees hide, a third will not."""
 SMALLEST_PATCH, PATCH_STEP_PX = 50, 2.0
 """Cells of a patch of surface below which it is taken for chance, and the step, in pixels of parallax, that bounds it;
 chosen [C]: five by ten cells, the size of a window of the matching and its neighbours."""
@@ -92,24 +95,13 @@ def measure_tile(
     reach = 0.5 * float(np.hypot(grid.columns * grid.cell_x, grid.rows * grid.cell_y)) + float(np.ptp([low_z, high_z]))
     place = place_at(photographs, middle, reach, options.edge)
     ground, low, high = (place.from_crs(np.column_stack([nodes, h])) for h in (z, low_z, high_z))
-    pairs = chosen_pairs(place, ground, options.pairs)
+    candidates = possible_pairs(place, ground)
+    work = _TileMatching(place, store, grid, options.level, options.refine, (ground, low, high))
+    matched = [m for pair in chosen_pairs(candidates, options.pairs) if (m := work.match(pair)) is not None]
+    if options.refine and matched:
+        matched += _fill_holes(work, candidates, matched, nodes)
     shape = grid.rows, grid.columns
-    layers: list[tuple[np.ndarray, ...]] = []
-    kept: list[int] = []
-    across: list[float] = []
-    for n, pair in enumerate(pairs):
-        geometry = epipolar_geometry(place, pair.left, pair.right, options.level, ground, low, high)
-        if geometry is None:
-            continue
-        images = epipolar_images(place, geometry, store)
-        if not (images.left_known.any() and images.right_known.any()):
-            continue
-        found = parallaxes_of(images, options.refine)
-        layers.append(_heights(place, geometry, found, grid))
-        kept.append(n)
-        across.append(found.across)
-    used = [pairs[n] for n in kept]
-    if not used:
+    if not matched:
         empty = np.full(shape, np.nan)
         return TileSurface(
             empty,
@@ -121,10 +113,88 @@ def measure_tile(
             np.zeros(0),
             np.nan,
         )
+    used, layers = [m.pair for m in matched], [m.layer for m in matched]
     numbers = np.array([[p.left, p.right] for p in used])
     tolerance = AGREEING_PX * metres_per_pixel(place, used, options.level)
     fused = _fused(place, used, layers, middle[2], tolerance)
-    return TileSurface(*fused, numbers, np.array(across), _shared_cells(layers))
+    return TileSurface(*fused, numbers, np.array([m.across for m in matched]), _shared_cells(layers))
+
+
+@dataclass(frozen=True, eq=False)
+class _Matched:
+    """A pair, its heights above the place, their σ and bend, (rows, columns) m, and its shift across the base, px."""
+
+    pair: Pair
+    layer: tuple[np.ndarray, np.ndarray, np.ndarray]
+    across: float
+
+
+@dataclass(frozen=True, eq=False)
+class _TileMatching:
+    """How pairs of a tile are matched; heights : places (n, 3) m in q, as expected, lowest and highest."""
+
+    place: Place
+    store: GreyStore
+    grid: Grid
+    level: int
+    refine: bool
+    heights: tuple[np.ndarray, np.ndarray, np.ndarray]
+
+    def match(self, pair: Pair) -> _Matched | None:
+        """The heights of a pair; None where its photographs have nothing in common here."""
+        geometry = epipolar_geometry(self.place, pair.left, pair.right, self.level, *self.heights)
+        if geometry is None:
+            return None
+        images = epipolar_images(self.place, geometry, self.store)
+        if not (images.left_known.any() and images.right_known.any()):
+            return None
+        found = parallaxes_of(images, self.refine)
+        return _Matched(pair, _heights(self.place, geometry, found, self.grid), found.across)
+
+
+def _fill_holes(
+    work: _TileMatching, candidates: list[Candidate], matched: list[_Matched], nodes: np.ndarray
+) -> list[_Matched]:
+    """More pairs, one after the other, where cells have no height that other photographs may show.
+
+    Parameters
+    ----------
+    nodes : (n, 2) m, X and Y of the places at which the candidates were looked at.
+    """
+    more: list[_Matched] = []
+    tried = [m.pair for m in matched]
+    holes = np.all([np.isnan(m.layer[0]) for m in matched], axis=0)
+    while len(tried) < kernels.MOST_PAIRS:
+        found = pair_for_holes(candidates, tried, _holes_at(holes, work.grid, nodes))
+        if found is None:
+            break
+        pair, hoped = found
+        tried.append(pair)
+        one = work.match(pair)
+        if one is None:
+            continue
+        left = holes & np.isnan(one.layer[0])
+        filled = float((holes & ~left).mean())
+        if filled > 0.0:
+            more.append(one)
+        holes = left
+        if filled < LEAST_FILLED * hoped:
+            break
+    return more
+
+
+def _holes_at(holes: np.ndarray, grid: Grid, nodes: np.ndarray) -> np.ndarray:
+    """(n,) share of the cells about nodes (n, 2) m that are holes; 0 outside of the grid, so more inside of it."""
+    rows = np.rint((grid.top - nodes[:, 1]) / grid.cell_y - 0.5).astype(int)
+    columns = np.rint((nodes[:, 0] - grid.left) / grid.cell_x - 0.5).astype(int)
+    inside = (rows >= 0) & (rows < grid.rows) & (columns >= 0) & (columns < grid.columns)
+    if not inside.any():
+        return np.full(len(nodes), float(holes.mean()))
+    side = max(int(np.sqrt(holes.size / inside.sum())), 1)
+    share = cv2.boxFilter(holes.astype(np.float32), -1, (side, side))
+    out = np.zeros(len(nodes))
+    out[inside] = share[rows[inside], columns[inside]] * (len(nodes) / inside.sum())
+    return out
 
 
 def _heights(
