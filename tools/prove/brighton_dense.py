@@ -17,10 +17,10 @@ from pathlib import Path
 import laspy
 import numpy as np
 import rasterio
-from brighton_surface import GSD_M, bowl_basis, differences, modelled, nmad, robust_fit
-from dense_surface import semi_global_surface
 
 import aerotri
+from brighton_surface import GSD_M, bowl_basis, differences, modelled, nmad, robust_fit
+from dense_surface import semi_global_surface
 
 FAR_M = 0.2
 HEAD = "| surface | cells | covered | of the cloud's cells | NMAD m | GSD | without bowl, GSD | beyond 0.2 m |"

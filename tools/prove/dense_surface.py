@@ -4,9 +4,10 @@ Measures σ of matching alone and what semi-global matching alone gives, so it l
 Every scene is a block of two strips with 70 % end and 40 % side lap, rendered with noise, its tie points as good as
 free of error, so that what is judged is the matching. Cells that two photographs see count as coverable (from the true
 ground; what a house hides is not taken off). σ is that of matching alone; in the scene of y-parallaxes, whose tie
-points have half a pixel, that of all. Repeated texture, shadow and water are patches of 120 m × 80 m, and the wall is
-the ground within 20 m of it: only there errors are looked at. z is error over σ; NMAD is in pixels on the
-ground, beside the NMAD of semi-global matching alone (OpenCV's, without least squares and without σ) on the same pairs.
+points have half a pixel, that of all. Repeated texture, shadow, water and glass (nothing but noise) are patches of
+120 m × 80 m, and the wall is the ground within 20 m of it: only there errors are looked at. z is error over σ; NMAD is
+in pixels on the ground, beside the NMAD of semi-global matching alone (OpenCV's, without least squares and without σ)
+on the same pairs.
 Steep: cells within four of a change of height of more than three pixels from cell to cell, walls of houses.
 
     python tools/prove/dense_surface.py [FOLDER] [--scenes hill …]
@@ -93,7 +94,8 @@ WALL = [[0.0, 0.0, 150.0, 4.0, 12.0], [-60.0, 60.0, 6.0, 6.0, 20.0], [60.0, -60.
 UNDULATING = {"kind": "undulating", "relief_rms_m": 6.0, "wavelength_m": 150.0}
 SCENES |= {
     "repeated texture": (UNDULATING, {}), "shadow": (UNDULATING, {}), "water": (UNDULATING, {}),
-    "wall": (UNDULATING | {"houses": WALL}, {}), "trees": (UNDULATING | {"houses": crowns()}, {}),
+    "glass": (UNDULATING, {}), "wall": (UNDULATING | {"houses": WALL}, {}),
+    "trees": (UNDULATING | {"houses": crowns()}, {}),
     "tilted": (UNDULATING, {}), "y-parallax": (UNDULATING, {}),
 }  # fmt: skip
 OTHER_SPEC: dict[str, dict[str, dict]] = {
@@ -115,14 +117,14 @@ def near_wall(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 JUDGED: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
-    "repeated texture": in_patch, "shadow": in_patch, "water": in_patch, "wall": near_wall,
+    "repeated texture": in_patch, "shadow": in_patch, "water": in_patch, "glass": in_patch, "wall": near_wall,
 }  # fmt: skip
 """Where the errors of a scene are looked at; everywhere in others."""
 
 
 def painted(name: str, lattice: Lattice) -> Lattice:
     """The texture of the ground with what lies on it in a scene."""
-    if name not in ("repeated texture", "shadow", "water"):
+    if name not in ("repeated texture", "shadow", "water", "glass"):
         return lattice
     values, spacing = lattice.values.copy(), lattice.spacing
     rows, columns = lattice.row + np.arange(values.shape[0]), lattice.column + np.arange(values.shape[1])
@@ -131,6 +133,8 @@ def painted(name: str, lattice: Lattice) -> Lattice:
         other = (SHADOW - 1.0) / CONTRAST + SHADOW * values
     elif name == "water":
         other = WATER * values
+    elif name == "glass":
+        other = 0.0 * values
     else:
         pattern = np.random.default_rng(5).normal(scale=2.0, size=(PERIOD_NODES, PERIOD_NODES))
         other = pattern[np.ix_(rows % PERIOD_NODES, columns % PERIOD_NODES)]

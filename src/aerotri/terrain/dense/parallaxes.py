@@ -46,9 +46,10 @@ orientation of a drone flight was seen to leave. A window with edges along the b
 LEAST_CORRELATION = 0.2
 """Correlation of a window below which it counts as not matched; chosen [C]: what is not alike is in σ already, so that
 errors over σ of rendered scenes are as with 0.5; of water five times as much is measured."""
-CROWD_PX, LEAST_CROWD = 25, 0.5
-"""Side of the square about a pixel, and the share of it that has to be matched for the pixel to count; chosen [C]:
-noise matches noise now and then, but never all around."""
+CROWD_PX, LEAST_ALIKE = 25, 0.45
+"""Side of the square about a pixel, and the mean correlation of the windows in it (0 where nothing matched) for the
+pixel to count; chosen [C]: semi-global matching finds matches in noise by themselves whose windows are alike by .6,
+but over a square of noise the mean stays below .44."""
 LEAST_SIGMA_PX = 0.02
 """σ of a parallax is never stated smaller; chosen [C]: interpolation between pixels leaves that even without noise."""
 LARGEST_SIGMA_PX = 1.0
@@ -135,8 +136,7 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
         (np.abs(value - start) < LARGEST_SHIFT_PX) & (correlation > LEAST_CORRELATION)
         & (across**2 < LARGEST_ACROSS_PX**2 + (ACROSS_SIGMAS * factor) ** 2 * of_across)
     )  # fmt: skip
-    crowd = cv2.boxFilter(known.astype(np.float32), -1, (CROWD_PX, CROWD_PX))
-    known &= crowd > LEAST_CROWD
+    known &= _alike_about(correlation, known, images.left_known) > LEAST_ALIKE
     # where a pixel of the window is not known both images are the same: it tells nothing and hides noise
     share = cv2.boxFilter((start > INVALID / 2).astype(np.float32), -1, (WINDOW_PX, WINDOW_PX))
     sigma = np.sqrt(factor**2 * variance / np.maximum(share, 0.1) ** 2 + LEAST_SIGMA_PX**2)
@@ -146,6 +146,13 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
     return Parallaxes(
         np.where(known, value, nothing), np.where(known, sigma, nothing).astype(np.float32), bend, middle, factor
     )
+
+
+def _alike_about(correlation: np.ndarray, known: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """(rows, columns) mean correlation of the windows about a pixel; 0 where nothing matched, outside left out."""
+    size = CROWD_PX, CROWD_PX
+    alike = cv2.boxFilter(np.where(known, correlation, np.float32(0.0)), -1, size)
+    return alike / np.maximum(cv2.boxFilter(seen.astype(np.float32), -1, size), 1e-3)
 
 
 def _smoothed(value: np.ndarray, known: np.ndarray) -> np.ndarray:
