@@ -37,7 +37,7 @@ class Tree:
     depth: np.ndarray
 
 
-def dissect(n: int, edges: np.ndarray, position: np.ndarray, leaf: int = LEAF) -> Tree:
+def dissect(n: int, edges: np.ndarray, position: np.ndarray, leaf: int = LEAF, last: np.ndarray | None = None) -> Tree:
     """A dissection tree.
 
     Parameters
@@ -45,6 +45,8 @@ def dissect(n: int, edges: np.ndarray, position: np.ndarray, leaf: int = LEAF) -
     n : number of nodes.
     edges : (e, 2) pairs of nodes that share a normal equation block.
     position : (n, 2) plan coordinates used for the cuts; NaN counts as 0.
+    leaf : nodes that are not divided any further.
+    last : (·,) nodes that come last, together in the root; the root is a separator of the others where None.
 
     Returns
     -------
@@ -67,7 +69,16 @@ def dissect(n: int, edges: np.ndarray, position: np.ndarray, leaf: int = LEAF) -
             nodes[child] = (nodes[child][0], own)
         return own
 
-    cut(np.arange(n), np.asarray(edges, dtype=np.int64).reshape(-1, 2))
+    edges = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
+    if last is None:
+        cut(np.arange(n), edges)
+    else:
+        inner = np.ones(n, dtype=bool)
+        inner[last] = False
+        if inner.any():
+            top = cut(np.flatnonzero(inner), edges[inner[edges].all(axis=1)])
+            nodes[top] = (nodes[top][0], top + 1)
+        nodes.append((np.sort(last), -1))
     sizes = np.array([len(members) for members, _ in nodes])
     parent = np.array([above for _, above in nodes])
     depth = np.zeros(len(nodes), dtype=np.int64)

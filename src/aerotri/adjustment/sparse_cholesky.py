@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.linalg.blas import dgemm, dsymm, dsyrk, dtrsm  # pyright: ignore[reportAttributeAccessIssue]
@@ -79,18 +80,36 @@ class Symbolic:
     block_row, block_col : (nb,) photographs of each stored block, row ≤ column; the n diagonal blocks come first.
     position : (n, 2) plan coordinates of the projection centres.
     n_border : number of shared parameters s.
+    last : (·,) photographs that are eliminated last, together; chosen by the dissection where None.
 
     `times_factorised` counts the matrices factorised here; `corner_factor` (s, s) is the triangle of the last border.
     """
 
-    def __init__(self, n: int, block_row: np.ndarray, block_col: np.ndarray, position: np.ndarray, n_border: int):
+    def __init__(
+        self, n: int, block_row: np.ndarray, block_col: np.ndarray, position: np.ndarray, n_border: int,
+        last: np.ndarray | None = None,
+    ):  # fmt: skip
         self.n, self.n_border = n, n_border
         self.block_row, self.block_col = block_row, block_col
         off = block_row != block_col
-        self.tree = dissect(n, np.column_stack([block_row[off], block_col[off]]), position)
+        self.tree = dissect(n, np.column_stack([block_row[off], block_col[off]]), position, last=last)
         self.rank = np.empty(n, dtype=np.int64)
         self.rank[self.tree.order] = np.arange(n)
         self.fronts = self._fronts(self.tree)
+        self._children: list[list[int]] = [[] for _ in self.fronts]
+        for k, front in enumerate(self.fronts):
+            if front.parent >= 0:
+                self._children[front.parent].append(k)
+        self.times_factorised = 0
+        self._allocate()
+
+    def __getstate__(self) -> dict[str, Any]:
+        # the numbers of a factor stay where they are: only the plan travels
+        rooms = ("_panels", "_stacks", "corner_factor")
+        return {name: value for name, value in self.__dict__.items() if name not in rooms}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
         self.times_factorised = 0
         self._allocate()
 
@@ -197,6 +216,11 @@ class Symbolic:
             self._panels[b:c].reshape(len(self.fronts[k].scalar_rows), own, order="F"),
         )
 
+    @property
+    def eliminated(self) -> np.ndarray:
+        """The numbers of all supernodes but the root, a view."""
+        return self._panels[: self._spans[-1][0]]
+
     def update(self, k: int) -> np.ndarray:
         """Update matrix of supernode k on its stack, Fortran order."""
         r = len(self.fronts[k].scalar_rows)
@@ -227,30 +251,40 @@ class Symbolic:
         self, matrix: BorderedMatrix, by_image: np.ndarray, by_border: np.ndarray, corner: np.ndarray
     ) -> float:
         """All fronts from the leaves up, what they leave of the border added to `corner`; the smallest pivot."""
-        children: list[list[int]] = [[] for _ in self.fronts]
         smallest = 1.0
         for k, front in enumerate(self.fronts):
-            top, low, rest = self.panel(k)[0], self.panel(k)[1], self.update(k)
-            flat_top, flat_low, flat_rest = _flat(top), _flat(low), _flat(rest)
-            for part in (flat_top, flat_low, flat_rest):
-                part.fill(0.0)
-            dense = Front(len(top), len(low), flat_top, flat_low)
-            _kernels.scatter_blocks(
-                front.blocks, MatrixBlocks(matrix.blocks, self.block_row, self.block_col, by_image), dense
-            )
-            own = self.tree.order[front.first : front.first + front.n_own]
-            _kernels.scatter_border(own, matrix.border, by_image, by_border, len(low), flat_low)
-            for child in children[k]:
-                _kernels.extend_add(
-                    _flat(self.update(child)), self.fronts[child].place, front.n_own, self.n_border, dense, flat_rest
-                )
+            top, low, rest = self.assemble_front(k, matrix, by_image, by_border)
             if front.n_own:
-                smallest = min(smallest, _eliminate(top, low, rest))
-            if front.parent >= 0:
-                children[front.parent].append(k)
-            elif self.n_border:
+                smallest = min(smallest, eliminate(top, low, rest))
+            if front.parent < 0 and self.n_border:
                 corner += rest
         return smallest
+
+    def assemble_front(
+        self, k: int, matrix: BorderedMatrix, by_image: np.ndarray, by_border: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Supernode k with what the supernodes below leave: own triangle, rows below, update, in place.
+
+        Parameters
+        ----------
+        by_image : (n, 6) of every photograph, by_border : (s,) what rows and columns are multiplied by.
+        """
+        front = self.fronts[k]
+        top, low, rest = self.panel(k)[0], self.panel(k)[1], self.update(k)
+        flat_top, flat_low, flat_rest = _flat(top), _flat(low), _flat(rest)
+        for part in (flat_top, flat_low, flat_rest):
+            part.fill(0.0)
+        dense = Front(len(top), len(low), flat_top, flat_low)
+        _kernels.scatter_blocks(
+            front.blocks, MatrixBlocks(matrix.blocks, self.block_row, self.block_col, by_image), dense
+        )
+        own = self.tree.order[front.first : front.first + front.n_own]
+        _kernels.scatter_border(own, matrix.border, by_image, by_border, len(low), flat_low)
+        for child in self._children[k]:
+            _kernels.extend_add(
+                _flat(self.update(child)), self.fronts[child].place, front.n_own, self.n_border, dense, flat_rest
+            )
+        return top, low, rest
 
     def _scale(self, matrix: BorderedMatrix) -> np.ndarray:
         diagonal = np.concatenate(
@@ -273,7 +307,7 @@ def _factor_triangle(a: np.ndarray) -> float:
     return float((pivots * pivots).min())
 
 
-def _eliminate(top: np.ndarray, low: np.ndarray, rest: np.ndarray) -> float:
+def eliminate(top: np.ndarray, low: np.ndarray, rest: np.ndarray) -> float:
     """One front: L11 = chol(top), L21 = low·L11⁻ᵀ, rest −= L21·L21ᵀ, all in place."""
     smallest = _factor_triangle(top)
     if low.shape[0]:
@@ -385,10 +419,10 @@ class Factor:
             np.zeros((len(s.block_row), B, B)), np.zeros((s.n, s.n_border, B)), np.zeros((s.n_border, s.n_border))
         )
         if s.n_border:
-            out.corner[:] = _symmetric_from_lower(dpotri(s.corner_factor, lower=1)[0])
+            out.corner[:] = self._corner_inverse()
         by_image = np.ascontiguousarray(self._scale[: B * s.n].reshape(s.n, B)[s.rank])
         by_border = self._scale[B * s.n :]
-        buffers = [_Buffers() for _ in range(max((front.depth for front in s.fronts), default=0) + 1)]
+        buffers = [Buffers() for _ in range(max((front.depth for front in s.fronts), default=0) + 1)]
         for k in range(len(s.fronts) - 1, -1, -1):
             front = s.fronts[k]
             top, low, _ = parts = self._inverse_front(k, buffers, out.corner)
@@ -402,7 +436,11 @@ class Factor:
         out.corner[:] *= by_border[:, None] * by_border[None, :]
         return out
 
-    def _inverse_front(self, k: int, buffers: list[_Buffers], corner: np.ndarray) -> _Parts:
+    def _corner_inverse(self) -> np.ndarray:
+        """(s, s) the scaled inverse over the border."""
+        return _symmetric_from_lower(dpotri(self._symbolic.corner_factor, lower=1)[0])
+
+    def _inverse_front(self, k: int, buffers: list[Buffers], corner: np.ndarray) -> Parts:
         """Lower triangle of the inverse over the front's own columns and its rows, in the three parts of a front.
 
         Z_RR comes from the parent, Z_RC = −Z_RR·Y and Z_CC = L11⁻ᵀ·L11⁻¹ − Yᵀ·Z_RC with Y = L21·L11⁻¹.
@@ -433,15 +471,15 @@ class Factor:
         return own, rows, rest
 
 
-_Parts = tuple[np.ndarray, np.ndarray, np.ndarray]
+Parts = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-class _Buffers:
+class Buffers:
     """Work space of one depth of the tree, grown as needed; only one front of a depth is alive at a time."""
 
     def __init__(self):
         self._memory: dict[str, np.ndarray] = {}
-        self.parts: _Parts = (np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0)))
+        self.parts: Parts = (np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0)))
 
     def matrix(self, name: str, rows: int, columns: int) -> np.ndarray:
         """An uninitialised Fortran-ordered matrix."""
