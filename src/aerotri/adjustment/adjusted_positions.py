@@ -65,7 +65,7 @@ def at_adjusted_positions(system: NormalSystem, state: State, estimator: Estimat
         residual = system.right_side(state, estimator).residual
         gross = np.any(np.abs(residual * rays.inv_sigma) > GROSS, axis=1, keepdims=True)
         before, system = system, _evaluated_at(system, np.where(gross, rays.xy, rays.xy - residual))
-        if _moved(before, system) < SETTLED:
+        if positions_moved(before, system) < SETTLED:
             break
     return system
 
@@ -89,7 +89,7 @@ def minimise_at_adjusted(
         if solution.status != "converged":
             break
         there = at_adjusted_positions(system, solution.state, solution.estimator)
-        change = max(_moved(system, there), _moved_by_velocity(system, there, solution.state))
+        change = max(positions_moved(system, there), _moved_by_velocity(system, there, solution.state))
         if round_ == MOST_ROUNDS - 1 or change < STANDING:
             equations = there.assemble(solution.state, 0.0, solution.estimator)
             return there, replace(solution, equations=equations)
@@ -166,7 +166,7 @@ def _moved_by_velocity(system: NormalSystem, there: NormalSystem, state: State) 
     return float(np.sqrt(np.mean(moved**2))) if len(moved) else 0.0
 
 
-def _moved(system: NormalSystem, there: NormalSystem) -> float:
+def positions_moved(system: NormalSystem, there: NormalSystem) -> float:
     """Root mean square change of the positions, in σ."""
     rays = system.unknowns.rays
     change = (there.unknowns.rays.at - rays.at) * rays.inv_sigma

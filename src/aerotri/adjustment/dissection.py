@@ -58,7 +58,7 @@ def dissect(n: int, edges: np.ndarray, position: np.ndarray, leaf: int = LEAF, l
 
     # explicit stack in post-order: a frame is (nodes, edges, parent slot); children are numbered before their parent
     def cut(members: np.ndarray, inner: np.ndarray) -> int:
-        halves = _bisect(members, inner, position, side_of) if len(members) > leaf else None
+        halves = bisect(members, inner, position, side_of) if len(members) > leaf else None
         if halves is None:
             nodes.append((members, -1))
             return len(nodes) - 1
@@ -88,14 +88,19 @@ def dissect(n: int, edges: np.ndarray, position: np.ndarray, leaf: int = LEAF, l
     return Tree(order, np.concatenate([[0], np.cumsum(sizes)]), parent, depth)
 
 
-_Half = tuple[np.ndarray, np.ndarray]
+Half = tuple[np.ndarray, np.ndarray]
 """Members and edges."""
 
 
-def _bisect(
+def bisect(
     members: np.ndarray, edges: np.ndarray, position: np.ndarray, side_of: np.ndarray
-) -> tuple[_Half, _Half, np.ndarray] | None:
-    """Both halves with their edges, and the separator; None where a cut would not pay."""
+) -> tuple[Half, Half, np.ndarray] | None:
+    """Both halves with their edges, and the separator; None where a cut would not pay.
+
+    Parameters
+    ----------
+    members : (·,) of n nodes. edges : (e, 2) among them. position : (n, 2). side_of : (n,) room to work in.
+    """
     best = None
     centred = position[members] - position[members].mean(axis=0)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)

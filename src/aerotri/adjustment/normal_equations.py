@@ -84,9 +84,13 @@ class NormalSystem:
     unknowns : what is to be found.
     extras : observations beside the image points.
     position : (n, 2) plan positions of the photographs, for the ordering.
+    last : photographs that are eliminated last, where the block is a part of another one.
     """
 
-    def __init__(self, unknowns: Unknowns, extras: Sequence[ExtraObservations], position: np.ndarray):
+    def __init__(
+        self, unknowns: Unknowns, extras: Sequence[ExtraObservations], position: np.ndarray,
+        last: np.ndarray | None = None,
+    ):  # fmt: skip
         self.unknowns, self.extras = unknowns, tuple(extras)
         counts = np.diff(unknowns.rays.start).astype(float)
         self._bounds = chunk_bounds(counts * (counts + 4.0))
@@ -95,7 +99,7 @@ class NormalSystem:
         pattern = unknowns.block_row, unknowns.block_col
         self._reduction = None if unknowns.rigging is None else RigReduction(unknowns.rigging, *pattern)
         if self._reduction is None:
-            self.symbolic = Symbolic(n, *pattern, position, s)
+            self.symbolic = Symbolic(n, *pattern, position, s, last)
         else:
             leads, pattern = self._reduction.leads, (self._reduction.block_row, self._reduction.block_col)
             self.symbolic = Symbolic(len(leads), *pattern, position[leads], s)

@@ -82,6 +82,19 @@ def start_values(block: Block, given_points: np.ndarray | None = None) -> StartV
     return StartValues(origin, rotation, centre, points)
 
 
+def given_start(block: Block, origin: np.ndarray) -> StartValues:
+    """Start values of a block whose photographs all are oriented; points by forward intersection.
+
+    Parameters
+    ----------
+    origin : (3,) m, the local origin.
+    """
+    rotation, centre = rotation_from_angles(block.images.angles, block.rotation), block.images.centre - origin
+    points = _full_control(block, origin)
+    intersect_into(points, block, directions_of(block), rotation, centre)
+    return StartValues(origin, rotation, centre, points)
+
+
 def _observed_centres(block: Block, centre: np.ndarray, origin: np.ndarray) -> np.ndarray:
     """(n, 3) m, projection centres given or observed by GNSS, local; NaN where neither."""
     observed = centre.copy()

@@ -22,20 +22,23 @@ from aerotri.observations import Block
 
 
 def build_system(
-    block: Block, start: StartValues, status: np.ndarray, held: list[tuple[int, int]] | None = None
-) -> tuple[NormalSystem, State]:
+    block: Block, start: StartValues, status: np.ndarray, held: list[tuple[int, int]] | None = None,
+    last: np.ndarray | None = None,
+) -> tuple[NormalSystem, State]:  # fmt: skip
     """The normal system of the rays that take part, and its start state.
 
     Parameters
     ----------
     status : (m,) of the rays. held : (row of the block's points, axis) of coordinates held for a minimal or inner
         datum; chosen anew where None.
+    last : photographs of the block that are eliminated last, see `sparse_cholesky.Symbolic`.
     """
     unknowns, state = build_unknowns(block, start, status == RayStatus.USED)
     unknowns, extras = extra_observations(unknowns, state)
     state = replace(state, shared=np.array(unknowns.shared.start, dtype=float))
     unknowns = _with_datum(unknowns, state, extras, held)
-    return NormalSystem(unknowns, extras, state.centre[:, :2]), state
+    rows = None if last is None else np.flatnonzero(np.isin(unknowns.images, last))
+    return NormalSystem(unknowns, extras, state.centre[:, :2], rows), state
 
 
 def _with_datum(

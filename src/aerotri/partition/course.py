@@ -1,0 +1,263 @@
+"""The adjustment of a block in parts: Gauss-Newton as in one piece, its equations gathered from the parts.
+
+In every iteration each part is one task: it follows the solution of what is shared to its own photographs and points,
+and eliminates them again at the new state. Here the shared photographs and parameters are solved for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerotri.adjustment.adjusted_positions import MOST_ROUNDS, STANDING
+from aerotri.adjustment.damping import LAST_DAMPING, Damping
+from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for
+from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
+from aerotri.adjustment.steps import COST_TOLERANCE
+from aerotri.adjustment.stopping import (
+    EARLY_STEP_TOLERANCE,
+    ROBUST_COST_TOLERANCE,
+    ROBUST_STEP_TOLERANCE,
+    is_negligible,
+)
+from aerotri.conventions import InputError
+from aerotri.execution.work import Executor, Work
+from aerotri.partition.common import Common, Left
+from aerotri.partition.part_tasks import (
+    At,
+    Move,
+    PartTask,
+    Reduced,
+    evaluate_part,
+    move_part,
+    reduce_part,
+    refuse_fault,
+    solution_for,
+)
+
+MOST_SCALES = 20
+"""Times that the robust scale follows the residuals within one stage, as in one piece."""
+Report = Callable[[int, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where the adjustment stands: the parts have their equations in files.
+
+    Parameters
+    ----------
+    cost : Σρ of all observations. decrement : of what the parts eliminated.
+    """
+
+    at: At
+    cost: float
+    decrement: float
+
+
+@dataclass(frozen=True, eq=False)
+class Ended:
+    """How it ended.
+
+    Parameters
+    ----------
+    status : 'converged' or 'not converged'. costs : at the start and after every iteration of the last stage.
+    """
+
+    status: str
+    place: Place
+    iterations: int
+    costs: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A solution of what is shared.
+
+    Parameters
+    ----------
+    x : (6·n + s,). decrement : of the whole step.
+    """
+
+    x: np.ndarray
+    decrement: float
+    factor: Factor
+
+
+class Course:
+    """Iterations over the parts of a block.
+
+    Parameters
+    ----------
+    tasks : of the parts. common : what they share. executor : where tasks run. folder : for what tasks share.
+    redundancy : of the whole. unknowns : how many there are. bytes_each : memory of a task.
+    report : called after every iteration with its number and σ0.
+    """
+
+    def __init__(
+        self, tasks: Sequence[PartTask], common: Common, executor: Executor, folder: Path, redundancy: int,
+        unknowns: int, bytes_each: int, report: Report | None = None,
+    ):  # fmt: skip
+        self.tasks, self.common, self.redundancy = list(tasks), common, redundancy
+        self._executor, self._folder, self._bytes = executor, folder, bytes_each
+        self._share = redundancy / max(redundancy + unknowns, 1)
+        self._report, self._tags, self._states, self._iteration = report, 0, 0, 0
+
+    def run(self, function: Callable[[Any, PartTask], Any], shared: Any) -> list[Any]:
+        """A task for every part."""
+        names = [f"part {task.name}" for task in self.tasks]
+        return self._executor.run(
+            Work(function, shared, self.tasks, names, "parts", self._folder, bytes_each=self._bytes)
+        )
+
+    def minimise(self, robust: str, max_iterations: int) -> Ended:
+        """From the start values through the stages of the estimator, then with parameters at adjusted image points."""
+        start = At(0, 0, self.common.start, LEAST_SQUARES, 0.0, self._next_tag())
+        ended = self._through_stages(start, robust, max_iterations)
+        for round_ in range(MOST_ROUNDS):
+            if ended.status != "converged":
+                break
+            at, moved = self._evaluated(ended.place.at)
+            self._drop(ended.place.at)
+            if round_ == MOST_ROUNDS - 1 or moved < STANDING:
+                return replace(ended, place=self._reduced(at))
+            ended = self._through_stages(replace(at, estimator=LEAST_SQUARES), robust, max_iterations)
+        return ended
+
+    def solved(self, place: Place) -> Solved:
+        """The solution of what is shared at a place.
+
+        Raises
+        ------
+        InputError
+            When the observations do not determine it.
+        """
+        matrix, right = self.common.empty()
+        for number, task in enumerate(self.tasks):
+            self.common.add(number, Left(*task.files.left(place.at.tag)), matrix, right)
+        self.common.add_priors(matrix, right, place.at.shared, place.at.damping)
+        try:
+            factor = self.common.symbolic.factorise(matrix)
+        except NotPositiveDefiniteError as error:
+            raise InputError(
+                "the observations do not determine the block",
+                "add control or positions of projection centres; adjust a part alone to see what it lacks",
+            ) from error
+        x = factor.solve(right)
+        return Solved(x, float(right @ x) + place.decrement, factor)
+
+    def _through_stages(self, start: At, robust: str, max_iterations: int) -> Ended:
+        *early, last = STAGES[robust]
+        ended = None
+        for name in early:
+            ended = self._descend(start, name, EARLY_STEP_TOLERANCE, max_iterations)
+            start = ended.place.at
+        return self._descend(start, last, ROBUST_STEP_TOLERANCE, max_iterations)
+
+    def _descend(self, start: At, name: str, tolerance: float, max_iterations: int) -> Ended:
+        """Gauss-Newton with the estimator of one stage."""
+        place = self._reweighted(self._reduced(replace(start, tag=self._next_tag())), name)
+        costs, last_decrement, damping, scales = [place.cost], np.inf, Damping(), 0
+        for _ in range(max_iterations):
+            self._iteration += 1
+            before = place
+            place, decrement, damping = self._improved(place, damping)
+            if place is before:
+                return Ended("not converged", place, self._iteration, tuple(costs))
+            costs.append(place.cost)
+            if self._report is not None:
+                self._report(self._iteration, math.sqrt(place.cost / max(self.redundancy, 1)))
+            settled = damping.value == 0.0 and self._settled(before, place, decrement, last_decrement, name, tolerance)
+            last_decrement = decrement if damping.value == 0.0 else np.inf
+            fresh = self._reweighted(place, name) if scales < MOST_SCALES else place
+            if fresh is not place:
+                place, settled, scales = fresh, False, scales + 1
+            if settled:
+                return Ended("converged", place, self._iteration, tuple(costs))
+        return Ended("not converged", place, self._iteration, tuple(costs))
+
+    def _improved(self, place: Place, damping: Damping) -> tuple[Place, float, Damping]:
+        """The place that a step leads to, damped until it improves; the place itself where none does."""
+        while True:
+            damped = place if damping.value == 0.0 else self._reduced(self._again(place.at, damping.value))
+            solved = self.solved(damped)
+            there = self._moved(damped, solved)
+            if damped is not place:
+                self._drop(damped.at)
+            if there.cost <= place.cost * (1.0 + COST_TOLERANCE):
+                self._drop(place.at)
+                ratio = min((place.cost - there.cost) / max(solved.decrement, 1e-300), 1.0)
+                return there, solved.decrement, damping.lowered(ratio, heeds_curvature=False)
+            self._drop(there.at)
+            damping = damping.raised()
+            if damping.value > LAST_DAMPING:
+                return place, solved.decrement, damping
+
+    def _settled(
+        self, before: Place, after: Place, decrement: float, last_decrement: float, name: str, tolerance: float
+    ) -> bool:
+        """As `stopping.is_settled` says it of a block in one piece."""
+        if name != "off":
+            variance = max(after.cost, 1e-30) / max(self.redundancy, 1)
+            still = abs(before.cost - after.cost) <= ROBUST_COST_TOLERANCE * before.cost
+            return still and decrement <= tolerance**2 * variance
+        contraction = min(1.0, max(1e-2, abs(decrement) / last_decrement)) if np.isfinite(last_decrement) else 1.0
+        return is_negligible(abs(decrement) * contraction, after.cost, self.redundancy)
+
+    def _reduced(self, at: At) -> Place:
+        """The equations of all parts there."""
+        return self._place(at, self.run(reduce_part, at))
+
+    def _moved(self, place: Place, solved: Solved) -> Place:
+        """Where a solution leads all parts."""
+        for number, task in enumerate(self.tasks):
+            solution_for(task, solved.x[self.common.columns(number)])
+        shared = place.at.shared + solved.x[6 * len(self.common.images) :]
+        at = replace(place.at, state=self._next_state(), shared=shared, damping=0.0, tag=self._next_tag())
+        return self._place(at, self.run(move_part, Move(place.at, at)), may_fail=True)
+
+    def _place(self, at: At, found: list[Reduced], may_fail: bool = False) -> Place:
+        if not may_fail:
+            refuse_fault(self.tasks, found)
+        of_priors = self.common.cost_of_priors(at.shared)
+        return Place(at, sum(part.cost for part in found) + of_priors, sum(part.decrement for part in found))
+
+    def _reweighted(self, place: Place, name: str) -> Place:
+        """The place with the estimator that the residuals of all parts ask for; itself where the estimator stands."""
+        fresh = LEAST_SQUARES if name == "off" else self._estimator(place, name)
+        if fresh.is_near(place.at.estimator):
+            return place
+        self._drop(place.at)
+        return self._reduced(replace(place.at, estimator=fresh, tag=self._next_tag()))
+
+    def _estimator(self, place: Place, name: str) -> Estimator:
+        lengths = [task.files.array(f"lengths_{place.at.tag}") for task in self.tasks]
+        return estimator_for(name, np.concatenate(lengths), self._share)
+
+    def _evaluated(self, at: At) -> tuple[At, float]:
+        """Parameters evaluated at the adjusted image points, and how far these moved (root mean square, in σ)."""
+        end = replace(at, positions=at.positions + 1, tag=self._next_tag())
+        found = self.run(evaluate_part, Move(at, end))
+        count = sum(number for _, number in found)
+        for task in self.tasks:
+            task.files.drop(f"system_{at.positions}")
+        return end, math.sqrt(sum(square for square, _ in found) / max(count, 1))
+
+    def _again(self, at: At, damping: float) -> At:
+        return replace(at, damping=damping, tag=self._next_tag())
+
+    def _drop(self, at: At) -> None:
+        for task in self.tasks:
+            task.files.drop_left(at.tag)
+
+    def _next_state(self) -> int:
+        self._states += 1
+        return self._states
+
+    def _next_tag(self) -> str:
+        self._tags += 1
+        return str(self._tags)

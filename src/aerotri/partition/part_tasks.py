@@ -1,0 +1,185 @@
+"""What is done to one part at a time; each is a task that may run anywhere and twice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.adjustment.adjusted_positions import at_adjusted_positions, positions_moved
+from aerotri.adjustment.partial_factor import eliminate_inner, restored
+from aerotri.adjustment.robust import Estimator
+from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
+from aerotri.conventions import InputError
+from aerotri.formats.block.folder import read_block
+from aerotri.partition.common import Left, PartFacts
+from aerotri.partition.part_files import PartFiles
+from aerotri.partition.part_system import PartSystem, part_system
+from aerotri.statistics.summarise import count_observations
+
+
+@dataclass(frozen=True, eq=False)
+class PartTask:
+    """A part.
+
+    Parameters
+    ----------
+    name : of the part. source : folder of its observations. work : folder of its work.
+    shared : (s,) its shared parameters among all; empty before they are known.
+    """
+
+    name: str
+    source: Path
+    work: Path
+    shared: np.ndarray
+
+    @property
+    def files(self) -> PartFiles:
+        return PartFiles(self.work)
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What all parts need to begin.
+
+    Parameters
+    ----------
+    shared_images : str, photographs that stand in several parts, sorted. origin : (3,) m, the local origin.
+    """
+
+    shared_images: np.ndarray
+    origin: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class At:
+    """Where the equations are taken.
+
+    Parameters
+    ----------
+    state : number of the state. positions : round of the positions that parameters are evaluated at.
+    shared : all shared parameters there. estimator : of the weights. damping : λ. tag : names the files.
+    """
+
+    state: int
+    positions: int
+    shared: np.ndarray
+    estimator: Estimator
+    damping: float
+    tag: str
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """From one place to another."""
+
+    start: At
+    end: At
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """What a part tells of its equations; what it leaves is in its files.
+
+    Parameters
+    ----------
+    cost : Σρ. decrement : of what was eliminated. fault : why there are no equations, '' where there are.
+    """
+
+    cost: float
+    decrement: float
+    fault: str = ""
+
+
+def prepare_part(setting: Setting, task: PartTask) -> PartFacts:
+    """Read a part and set up its system."""
+    block = read_block(task.source, rays_needed=False)
+    shared = np.isin(block.images.names, setting.shared_images)
+    part, state = part_system(block, shared, setting.origin)
+    system, u = part.system, part.system.unknowns
+    task.files.keep_system(part, 0)
+    task.files.keep_state(state, 0)
+    counts, s = count_observations(system), len(u.shared)
+    return PartFacts(
+        kept=block.images.names[u.images[part.kept]],
+        position=state.centre[part.kept, :2],
+        labels=tuple(zip(u.shared.names, u.shared.groups, u.shared.kinds, u.shared.marks, strict=True)),
+        start=np.array(u.shared.start, dtype=float),
+        priors=part.priors,
+        images=len(u.images) - len(part.kept),
+        points=len(u.points),
+        rays=len(u.rays.image),
+        observations=counts.observations,
+        unknowns=counts.unknowns - s - 6 * len(part.kept),
+        bytes_needed=system.symbolic.bytes_needed,
+        warnings=part.warnings,
+    )
+
+
+def reduce_part(at: At, task: PartTask) -> Reduced:
+    """The equations of a part at a state, its points and inner photographs eliminated."""
+    part = task.files.system(at.positions)
+    return _reduced(part, at, task)
+
+
+def move_part(move: Move, task: PartTask) -> Reduced:
+    """Follow the solution of what is shared: a new state of the part, and its equations there."""
+    files, start = task.files, move.start
+    part = files.system(start.positions)
+    state = files.state(start.state, start.shared[task.shared])
+    numbers, half = files.eliminated(start.tag)
+    x = restored(part.system.symbolic, numbers).expand(half, files.array("solution"))
+    step = part.system.whole_step(state, x, start.damping, start.estimator)
+    if step is None:
+        return Reduced(np.inf, 0.0, "a step that is no number")
+    files.keep_state(part.system.unknowns.advance(state, step), move.end.state)
+    return _reduced(part, move.end, task)
+
+
+def evaluate_part(move: Move, task: PartTask) -> tuple[float, int]:
+    """Parameters evaluated at the adjusted image points of a state: the sum of the squared changes in σ, and how many."""
+    files, at = task.files, move.start
+    part = files.system(at.positions)
+    state = files.state(at.state, at.shared[task.shared])
+    there = at_adjusted_positions(part.system, state, at.estimator)
+    files.keep_system(replace(part, system=there), move.end.positions)
+    count = 2 * len(there.unknowns.rays.image)
+    return count * positions_moved(part.system, there) ** 2, count
+
+
+def _reduced(part: PartSystem, at: At, task: PartTask) -> Reduced:
+    system, files = part.system, task.files
+    state = files.state(at.state, at.shared[task.shared])
+    equations = system.assemble(state, at.damping, at.estimator)
+    if equations.undetermined >= 0:
+        u = system.unknowns
+        return Reduced(np.inf, 0.0, f"point {u.block.points[u.points[equations.undetermined]]} is not determined")
+    try:
+        factor, matrix = eliminate_inner(system.symbolic, equations.matrix)
+    except NotPositiveDefiniteError:
+        return Reduced(np.inf, 0.0, "its observations do not determine its photographs")
+    rest = factor.reduce_side(equations.right)
+    files.keep_left(Left(matrix, rest.right), factor.eliminated(), rest.half, at.tag)
+    files.keep_array(f"lengths_{at.tag}", system.residual_lengths(equations))
+    return Reduced(equations.cost, rest.decrement + equations.point_decrement)
+
+
+def solution_for(task: PartTask, x: np.ndarray) -> None:
+    """Leave a part its share (6·k + s,) of the solution."""
+    task.files.keep_array("solution", x)
+
+
+def refuse_fault(tasks: list[PartTask], found: list[Reduced]) -> None:
+    """Say which part has no equations.
+
+    Raises
+    ------
+    InputError
+    """
+    for task, part in zip(tasks, found, strict=True):
+        if part.fault:
+            raise InputError(
+                f"part {task.name}: {part.fault}",
+                "adjust this part alone to see what it lacks: aerotri adjust of its folder", task.source,
+            )  # fmt: skip
