@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment.joint_prior import JointPrior
-from aerotri.adjustment.shared_priors import SharedPriors
 from aerotri.adjustment.kernel_records import Inverse
+from aerotri.adjustment.shared_priors import SharedPriors
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Symbolic
 from aerotri.conventions import InputError
 
@@ -26,7 +26,8 @@ class PartFacts:
     labels : (name, group, kind, mark) of its shared parameters. start : (s,) their start values.
     priors : what is known of them beforehand.
     images, points, rays : how many take part. observations, unknowns : without what is shared.
-    bytes_needed : of its factor. warnings : sentences for the user.
+    points_seen, observed : str, names of its points, and of its photographs with observed positions.
+    settings : what block.toml says, to be compared. bytes_needed : of its factor. warnings : sentences for the user.
     """
 
     kept: np.ndarray
@@ -39,6 +40,9 @@ class PartFacts:
     rays: int
     observations: int
     unknowns: int
+    points_seen: np.ndarray
+    observed: np.ndarray
+    settings: str
     bytes_needed: int
     warnings: tuple[str, ...]
 
@@ -81,6 +85,14 @@ class Common:
         self.priors = _together(facts, self.of_shared, len(self.labels))
         self._pairs, row, col = _pattern(self.of_images, len(self.images))
         self.symbolic = Symbolic(len(self.images), row, col, position, len(self.labels))
+
+    @property
+    def weighted(self) -> np.ndarray:
+        """(s,) bool, parameters of which something is known beforehand."""
+        known = self.priors.weight > 0.0
+        for field in self.priors.fields:
+            known[field.columns] = True
+        return known
 
     def columns(self, part: int) -> np.ndarray:
         """(6·k + s,) of a part's shared photographs and parameters among all."""
@@ -133,6 +145,10 @@ class Common:
         return out
 
 
+Places = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Of the blocks that a part leaves: where each belongs, and its photographs."""
+
+
 def _together(facts: Sequence[PartFacts], columns: list[np.ndarray], count: int) -> SharedPriors:
     """What all parts know of the shared parameters, each thing once."""
     weight, value = np.zeros(count), np.zeros(count)
@@ -148,15 +164,15 @@ def _together(facts: Sequence[PartFacts], columns: list[np.ndarray], count: int)
     )  # fmt: skip
 
 
-def _pattern(of_images: list[np.ndarray], n: int):
+def _pattern(of_images: list[np.ndarray], n: int) -> tuple[list[Places], np.ndarray, np.ndarray]:
     """For every part the places of its pairs of photographs and the pairs; rows and columns of all blocks."""
-    pairs = []
+    pairs: list[Places] = []
     for images in of_images:
         first, second = np.nonzero(images[:, None] < images[None, :])
         pairs.append((first, second, images[first] * n + images[second]))
     codes = np.unique(np.concatenate([code for _, _, code in pairs]))
     row, col = np.concatenate([np.arange(n), codes // n]), np.concatenate([np.arange(n), codes % n])
-    out = []
+    out: list[Places] = []
     for images, (first, second, code) in zip(of_images, pairs, strict=True):
         own = np.arange(len(images))
         place = np.concatenate([images, n + np.searchsorted(codes, code)])

@@ -51,12 +51,13 @@ class Place:
 
     Parameters
     ----------
-    cost : Σρ of all observations. decrement : of what the parts eliminated.
+    cost : Σρ of all observations. decrement : of what the parts eliminated; of_points : of the points among it.
     """
 
     at: At
     cost: float
     decrement: float
+    of_points: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +205,7 @@ class Course:
         if name != "off":
             variance = max(after.cost, 1e-30) / max(self.redundancy, 1)
             still = abs(before.cost - after.cost) <= ROBUST_COST_TOLERANCE * before.cost
-            return still and decrement <= tolerance**2 * variance
+            return still and decrement - before.of_points <= tolerance**2 * variance
         contraction = min(1.0, max(1e-2, abs(decrement) / last_decrement)) if np.isfinite(last_decrement) else 1.0
         return is_negligible(abs(decrement) * contraction, after.cost, self.redundancy)
 
@@ -224,7 +225,8 @@ class Course:
         if not may_fail:
             refuse_fault(self.tasks, found)
         of_priors = self.common.cost_of_priors(at.shared)
-        return Place(at, sum(part.cost for part in found) + of_priors, sum(part.decrement for part in found))
+        cost = sum(part.cost for part in found) + of_priors
+        return Place(at, cost, sum(part.decrement for part in found), sum(part.of_points for part in found))
 
     def _reweighted(self, place: Place, name: str) -> Place:
         """The place with the estimator that the residuals of all parts ask for; itself where the estimator stands."""

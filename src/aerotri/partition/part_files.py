@@ -31,15 +31,17 @@ class PartFiles:
 
     def keep_system(self, part: PartSystem, positions: int) -> None:
         """The system with its parameters evaluated at the image points of a round."""
-        self._keep(f"system_{positions}", lambda file: pickle.dump(part, file, pickle.HIGHEST_PROTOCOL))
+        self.keep_object(f"system_{positions}", part)
 
     def system(self, positions: int) -> PartSystem:
-        return pickle.loads((self.folder / f"system_{positions}").read_bytes())
+        return self.object(f"system_{positions}")
 
     def keep_state(self, state: State, number: int) -> None:
         """Where photographs and points stand; shared parameters are kept by who knows all of them."""
-        arrays = {"centre": state.centre, "rotation": state.rotation, "points": state.points}
-        self._keep(f"state_{number}", lambda file: np.savez(file, **arrays))
+        self._keep(
+            f"state_{number}",
+            lambda file: np.savez(file, centre=state.centre, rotation=state.rotation, points=state.points),
+        )
 
     def state(self, number: int, shared: np.ndarray) -> State:
         with np.load(self.folder / f"state_{number}") as kept:
@@ -61,6 +63,12 @@ class PartFiles:
         panels = np.load(self.folder / f"panels_{tag}", mmap_mode="r")
         with np.load(self.folder / f"half_{tag}") as kept:
             return Eliminated(panels, kept["scale"]), kept["half"]
+
+    def keep_object(self, name: str, value: Any) -> None:
+        self._keep(name, lambda file: pickle.dump(value, file, pickle.HIGHEST_PROTOCOL))
+
+    def object(self, name: str) -> Any:
+        return pickle.loads((self.folder / name).read_bytes())
 
     def keep_array(self, name: str, values: np.ndarray) -> None:
         self._keep(name, lambda file: np.save(file, values))

@@ -85,6 +85,8 @@ def refuse_what_parts_cannot(block: Block) -> None:
     families = {family for family, _ in s.adjustment.additional_parameters}
     chosen, fields = "auto" in families, "collocation" in families
     refused = [
+        (block.crs != "local", f'crs = "{block.crs}" of a block in parts',
+         'bring it to a local system: aerotri convert … ; crs = "local" in every block.toml'),
         (len(without) > 0, f"photograph '{''.join(without)}' has no orientation to begin with",
          "give X0, Y0, Z0, omega, phi, kappa of every photograph in images.csv"),
         (s.adjustment.datum != "control", f'datum = "{s.adjustment.datum}" of a block in parts', IN_ONE_PIECE),

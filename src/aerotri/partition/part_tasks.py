@@ -84,11 +84,13 @@ class Reduced:
 
     Parameters
     ----------
-    cost : Σρ. decrement : of what was eliminated. fault : why there are no equations, '' where there are.
+    cost : Σρ. decrement : of what was eliminated; of_points : of the points among it.
+    fault : why there are no equations, '' where there are.
     """
 
     cost: float
-    decrement: float
+    decrement: float = 0.0
+    of_points: float = 0.0
     fault: str = ""
 
 
@@ -112,6 +114,9 @@ def prepare_part(setting: Setting, task: PartTask) -> PartFacts:
         rays=len(u.rays.image),
         observations=counts.observations,
         unknowns=counts.unknowns - s - 6 * len(part.kept),
+        points_seen=block.points,
+        observed=block.images.names[[] if block.gnss_ins is None else block.gnss_ins.image],
+        settings=repr((block.cameras, block.settings, block.crs, block.rotation)),
         bytes_needed=system.symbolic.bytes_needed,
         warnings=part.warnings,
     )
@@ -132,13 +137,13 @@ def move_part(move: Move, task: PartTask) -> Reduced:
     x = restored(part.system.symbolic, numbers).expand(half, files.array("solution"))
     step = part.system.whole_step(state, x, start.damping, start.estimator)
     if step is None:
-        return Reduced(np.inf, 0.0, "a step that is no number")
+        return Reduced(np.inf, fault="a step that is no number")
     files.keep_state(part.system.unknowns.advance(state, step), move.end.state)
     return _reduced(part, move.end, task)
 
 
 def evaluate_part(move: Move, task: PartTask) -> tuple[float, int]:
-    """Parameters evaluated at the adjusted image points of a state: the sum of the squared changes in σ, and how many."""
+    """Parameters evaluated at the adjusted image points of a state; sum of the squared changes in σ, and how many."""
     files, at = task.files, move.start
     part = files.system(at.positions)
     state = files.state(at.state, at.shared[task.shared])
@@ -154,15 +159,16 @@ def _reduced(part: PartSystem, at: At, task: PartTask) -> Reduced:
     equations = system.assemble(state, at.damping, at.estimator)
     if equations.undetermined >= 0:
         u = system.unknowns
-        return Reduced(np.inf, 0.0, f"point {u.block.points[u.points[equations.undetermined]]} is not determined")
+        return Reduced(np.inf, fault=f"point {u.block.points[u.points[equations.undetermined]]} is not determined")
     try:
         factor, matrix = eliminate_inner(system.symbolic, equations.matrix)
     except NotPositiveDefiniteError:
-        return Reduced(np.inf, 0.0, "its observations do not determine its photographs")
+        return Reduced(np.inf, fault="its observations do not determine its photographs")
     rest = factor.reduce_side(equations.right)
     files.keep_left(Left(matrix, rest.right), factor.eliminated(), rest.half, at.tag)
     files.keep_array(f"lengths_{at.tag}", system.residual_lengths(equations))
-    return Reduced(equations.cost, rest.decrement + equations.point_decrement)
+    of_points = equations.point_decrement
+    return Reduced(equations.cost, rest.decrement + of_points, of_points)
 
 
 def solution_for(task: PartTask, x: np.ndarray) -> None:

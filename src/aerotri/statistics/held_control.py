@@ -37,6 +37,12 @@ class HeldTests:
     sigma: np.ndarray
 
 
+def no_held_tests(system: NormalSystem) -> HeldTests:
+    """Of a block that holds no coordinates of control."""
+    nothing = np.full((len(system.unknowns.points), 3), np.nan)
+    return HeldTests(nothing, nothing)
+
+
 def held_tests(system: NormalSystem, solution: Solution, factor: Factor) -> HeldTests:
     """Tests of the coordinates of control that are held.
 

@@ -79,9 +79,7 @@ def summarise(
     """
     block, counts = system.unknowns.block, count_observations(system)
     q = cofactors(system, solution.state, factor, solution.estimator)
-    vtpv, freedom = weighted_sum(system, solution), float(counts.redundancy)
-    if solution.estimator.is_robust:
-        freedom -= _turned_down(solution, q)
+    vtpv, freedom = weighted_sum(system, solution), float(counts.redundancy) - turned_down(solution, q)
     sigma0 = float(np.sqrt(vtpv / freedom)) if freedom > 0.0 else np.nan
     outcome = Outcome(
         status=solution.status,
@@ -96,9 +94,22 @@ def summarise(
         redundancy=counts.redundancy,
         warnings=warnings,
     )
+    return record_of(system, solution, q, outcome, held_tests(system, solution, factor), ray_status)
+
+
+def record_of(
+    system: NormalSystem, solution: Solution, q: Cofactors, outcome: Outcome, tests: HeldTests, ray_status: np.ndarray
+) -> AdjustedBlock:
+    """The result record of a solution whose cofactors and outcome are known.
+
+    Parameters
+    ----------
+    tests : of held coordinates. ray_status : (m,) status of every ray.
+    """
+    block, sigma0 = system.unknowns.block, outcome.sigma0
     rays = _rays(system, solution, q, ray_status)
     points = _points(system, solution, q, rays, sigma0)
-    control, check = _ground_points(system, q, points, held_tests(system, solution, factor))
+    control, check = _ground_points(system, q, points, tests)
     extra_groups, observations = _extra_results(system, solution, q)
     return AdjustedBlock(
         block=block,
@@ -134,13 +145,15 @@ def weighted_sum(system: NormalSystem, solution: Solution) -> float:
     return float(equations.cost - robust_cost.sum() + np.sum(equations.weight * squares))
 
 
-def _turned_down(solution: Solution, q: Cofactors) -> float:
+def turned_down(solution: Solution, q: Cofactors) -> float:
     """Σ(1 − weight)·r, the share of the redundancy that robust weights take away.
 
     [D] vᵀPv over the rest, Σ weight·r, gives σ̂0 of the good observations: a ray switched off counts in neither sum, and
     of normal errors Huber, Danish, Cauchy and adaptive weights leave σ of the unknowns right within 4 %. Over the whole
     redundancy Cauchy's would be 10 % too small.
     """
+    if not solution.estimator.is_robust:
+        return 0.0
     return float(np.sum((1.0 - solution.equations.weight) * q.ray_redundancy.sum(axis=1)))
 
 
@@ -192,37 +205,49 @@ def _rays(system: NormalSystem, solution: Solution, q: Cofactors, status: np.nda
 def shared_parameters(system: NormalSystem, solution: Solution, q: Cofactors, sigma0: float) -> SharedParameters:
     """The shared parameters but for the coordinates of points and what conditions brought along."""
     shared = system.unknowns.shared
-    all_kinds = np.array(shared.kinds, dtype=object)
-    rows = np.flatnonzero(~np.isin(all_kinds.astype(str), OF_POINTS))
-    s, cofactor = len(rows), q.shared[np.ix_(rows, rows)]
-    r = correlations(cofactor)
-    off = np.abs(r - np.diag(np.diagonal(r))) if s else np.zeros((0, 0))
-    partner = off.argmax(axis=1) if s > 1 else np.zeros(s, dtype=int)
-    names, groups, kinds, marks = (
-        np.array(column, dtype=object)[rows] for column in (shared.names, shared.groups, shared.kinds, shared.marks)
-    )
-    lens = np.isin(kinds.astype(str), ("interior", "additional"))
-    total = np.full(s, np.nan)
-    total[lens] = total_correlations(cofactor[np.ix_(lens, lens)])
     weighted = np.isfinite(np.array(shared.sigma).reshape(-1))
     for field in shared.fields:
         weighted[field.columns] = True
     for deviation in system.priors.deviations:
         weighted[deviation.columns] = True
-    weighted = weighted[rows]
+    labels = tuple(zip(shared.names, shared.groups, shared.kinds, shared.marks, strict=True))
+    return parameters_of(labels, solution.state.shared, q.shared, weighted, sigma0)
+
+
+def parameters_of(
+    labels: Sequence[tuple[str, str, str, str]], value: np.ndarray, cofactor: np.ndarray, weighted: np.ndarray,
+    sigma0: float,
+) -> SharedParameters:  # fmt: skip
+    """Shared parameters with σ and correlations, without those of points.
+
+    Parameters
+    ----------
+    labels : (name, group, kind, mark) of each of the s parameters. value : (s,). cofactor : (s, s).
+    weighted : (s,) bool, whether something is known of it beforehand.
+    """
+    columns = np.array(labels, dtype=object).reshape(len(labels), 4)
+    rows = np.flatnonzero(~np.isin(columns[:, 2].astype(str), OF_POINTS))
+    s, cofactor = len(rows), cofactor[np.ix_(rows, rows)]
+    r = correlations(cofactor)
+    off = np.abs(r - np.diag(np.diagonal(r))) if s else np.zeros((0, 0))
+    partner = off.argmax(axis=1) if s > 1 else np.zeros(s, dtype=int)
+    names, groups, kinds, marks = columns[rows].T
+    lens = np.isin(kinds.astype(str), ("interior", "additional"))
+    total = np.full(s, np.nan)
+    total[lens] = total_correlations(cofactor[np.ix_(lens, lens)])
     one_group = len(set(groups.tolist())) <= 1
-    labels = np.array([n if one_group else f"{n} ({g})" for n, g in zip(names, groups, strict=True)], dtype=object)
+    shown = np.array([n if one_group else f"{n} ({g})" for n, g in zip(names, groups, strict=True)], dtype=object)
     return SharedParameters(
         names=names,
         groups=groups,
         kinds=kinds,
         marks=marks,
-        value=solution.state.shared[rows],
+        value=value[rows],
         covariance=sigma0**2 * cofactor,
         max_correlation=r[np.arange(s), partner] if s > 1 else np.full(s, np.nan),
-        max_correlation_with=labels[partner] if s > 1 else np.full(s, "", dtype=object),
+        max_correlation_with=shown[partner] if s > 1 else np.full(s, "", dtype=object),
         total_correlation=total,
-        status=np.where(weighted, "weighted", "estimated").astype(object),
+        status=np.where(weighted[rows], "weighted", "estimated").astype(object),
         reason=np.full(s, "", dtype=object),
     )
 

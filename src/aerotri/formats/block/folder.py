@@ -99,6 +99,23 @@ def read_block(path: FilePath, rays_needed: bool = True, images_needed: bool = T
     return block
 
 
+def read_photographs(path: FilePath) -> Images:
+    """The photographs of a block folder, without its rays.
+
+    Raises
+    ------
+    InputError
+        As `read_block`.
+    """
+    toml = settings_file(Path(path))
+    from aerotri.formats.block.settings import read_block_toml
+
+    settings = read_block_toml(toml)
+    table = _required_table(toml.parent, "images")
+    radians = RADIANS_PER[settings.model.angle_unit]
+    return _images(table, settings.cameras(), settings.rigs(), radians, may_be_empty=False)
+
+
 def settings_file(path: Path) -> Path:
     """The block.toml of a folder, or itself.
 

@@ -1,0 +1,161 @@
+"""`adjust` of a folder of parts: prepared, minimised, σ of everything, tables of the parts and of the whole."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.conventions import InputError
+from aerotri.execution.work import Executor, Work
+from aerotri.formats.block.folder import read_block, read_photographs
+from aerotri.observations import Block
+from aerotri.partition.common import Common, PartFacts
+from aerotri.partition.course import Course, Ended
+from aerotri.partition.part_results import INVERSE, Ending, Written, measure_part, write_part
+from aerotri.partition.part_tasks import PartTask, Setting, prepare_part
+from aerotri.partition.whole import Whole, whole_of
+from aerotri.results.adjusted_block import Outcome
+from aerotri.statistics.summarise import parameters_of
+
+PARTS, WORK = "parts", "work"
+"""Folders: of the parts in a block and in a result; of what the tasks exchange, while they run."""
+BYTES_A_RAY, LEAST_BYTES = 3000, 500_000_000
+"""Memory of a task beside its factor [C]: tables, partials and pairs of a ray; program and libraries."""
+Say = Callable[[str, float | None], None]
+
+
+@dataclass(frozen=True)
+class PartsSettings:
+    """How a block in parts is adjusted.
+
+    Parameters
+    ----------
+    robust : estimator that lowers the weight of gross errors; as the parts say where None.
+    max_iterations : at most, in each stage of a robust estimator; as the parts say where None.
+    """
+
+    robust: str | None = None
+    max_iterations: int | None = None
+
+
+def part_folders(folder: Path) -> list[Path]:
+    """Folders of the parts of a block, in order; none where it is no block in parts."""
+    there = folder / PARTS
+    return sorted(path.parent for path in there.glob("*/block.toml")) if there.is_dir() else []
+
+
+def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSettings, say: Say) -> Whole:
+    """Adjust a block in parts; the tables of the parts are written to parts/ of the result.
+
+    Parameters
+    ----------
+    folder : holds parts/NAME, each a block folder. out : an empty folder to fill, which every worker can write to.
+    say : told what is done, and the share of it.
+    """
+    begun, sources = time.perf_counter(), part_folders(folder)
+    if len(sources) < 2:
+        raise InputError("holds no parts", "divide a block: aerotri divide BLOCK FOLDER --parts N", folder)
+    work = out / WORK
+    try:
+        names, origin = _shared_photographs(sources)
+        tasks = [PartTask(p.name, p.resolve(), (work / p.name).resolve(), np.zeros(0, np.int64)) for p in sources]
+        say("reading the parts", None)
+        facts = executor.run(_reading(Setting(names, origin), tasks, work))
+        first = read_block(sources[0], rays_needed=False)
+        common = _common_of(facts, tasks)
+        tasks = [replace(task, shared=common.of_shared[k]) for k, task in enumerate(tasks)]
+        observations = sum(part.observations for part in facts) + common.priors.count
+        unknowns = sum(part.unknowns for part in facts) + 6 * len(common.images) + len(common.labels)
+        asked, chosen = first.settings.adjustment, settings
+        limit = asked.max_iterations if chosen.max_iterations is None else chosen.max_iterations
+        course = Course(
+            tasks, common, executor, work, observations - unknowns, unknowns,
+            max(part.bytes_needed + BYTES_A_RAY * part.rays for part in facts) + LEAST_BYTES,
+            lambda iteration, sigma0: say(f"iteration {iteration}, σ0 {sigma0:.4g}", min(iteration / limit, 1.0)),
+        )  # fmt: skip
+        ended = course.minimise(chosen.robust or asked.robust, limit)
+        solved = time.perf_counter()
+        say("standard deviations", None)
+        photographs = sum(part.images for part in facts) + len(common.images)
+        whole = _with_sigma(course, ended, first, out, observations, unknowns, photographs)
+        seconds = {"solve": solved - begun, "statistics": time.perf_counter() - solved}
+        warnings = tuple(
+            f"part {t.name}: {said}" for t, part in zip(tasks, facts, strict=True) for said in part.warnings
+        )
+        outcome = replace(whole.outcome, timings_s=seconds, warnings=(*whole.outcome.warnings, *warnings))
+        return replace(whole, record=replace(whole.record, outcome=outcome))
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def _with_sigma(
+    course: Course, ended: Ended, first: Block, out: Path, observations: int, unknowns: int, photographs: int
+) -> Whole:
+    """Inverse, tables of the parts, and what they say together."""
+    place, common = ended.place, course.common
+    inverse = course.solved(place).factor.inverse_on_pattern()
+    for number, task in enumerate(course.tasks):
+        task.files.keep_array(INVERSE, common.inverse_of(number, inverse))
+    measured = course.run(measure_part, place.at)
+    vtpv = sum(part.vtpv for part in measured) + common.cost_of_priors(place.at.shared)
+    freedom = observations - unknowns - sum(part.turned_down for part in measured)
+    if freedom <= 0.0:
+        raise InputError("the observations do not exceed the unknowns", "give more rays, control or positions")
+    sigma0 = float(np.sqrt(vtpv / freedom))
+    outcome = Outcome(
+        status=ended.status,
+        message="" if ended.status == "converged" else f"no convergence within {ended.iterations} iterations",
+        iterations=ended.iterations, sigma0=sigma0, sigma0_um=sigma0 * first.settings.image_sigma_um, vtpv=vtpv,
+        observations=observations, unknowns=unknowns, conditions=0, redundancy=observations - unknowns,
+    )  # fmt: skip
+    written: list[Written] = course.run(write_part, Ending(place.at, outcome, (out / PARTS).resolve()))
+    parameters = parameters_of(common.labels, place.at.shared, inverse.corner, common.weighted, sigma0)
+    return whole_of(first, outcome, parameters, [task.name for task in course.tasks], written, photographs)
+
+
+def _reading(setting: Setting, tasks: list[PartTask], work: Path) -> Work[Setting, PartTask, PartFacts]:
+    size = max(sum(file.stat().st_size for file in task.source.iterdir() if file.is_file()) for task in tasks)
+    names = [f"part {task.name}" for task in tasks]
+    return Work(prepare_part, setting, tasks, names, "parts", work, bytes_each=60 * size + LEAST_BYTES)
+
+
+def _shared_photographs(sources: Sequence[Path]) -> tuple[np.ndarray, np.ndarray]:
+    """Names of the photographs that stand in several parts, sorted; (3,) m, the local origin of all parts."""
+    of_parts = [read_photographs(source) for source in sources]
+    unique, count = np.unique(np.concatenate([images.names for images in of_parts]), return_counts=True)
+    middle = np.nanmean(np.concatenate([images.centre for images in of_parts]), axis=0)
+    return unique[count > 1], np.round(np.nan_to_num(middle))
+
+
+def _common_of(facts: Sequence[PartFacts], tasks: Sequence[PartTask]) -> Common:
+    """What the parts share.
+
+    Raises
+    ------
+    InputError
+        When they do not belong together.
+    """
+    for part, task in zip(facts, tasks, strict=True):
+        if part.settings != facts[0].settings:
+            raise InputError(
+                f"block.toml of part {task.name} differs from that of part {tasks[0].name}",
+                "give all parts the same cameras and settings", task.source / "block.toml",
+            )  # fmt: skip
+    for what, seen in (
+        ("point", [p.points_seen for p in facts]),
+        ("observed position of", [p.observed for p in facts]),
+    ):
+        unique, count = np.unique(np.concatenate(seen), return_counts=True)
+        if (count > 1).any():
+            twice = unique[count > 1][0]
+            names = [task.name for task, own in zip(tasks, seen, strict=True) if twice in own]
+            raise InputError(
+                f"{what} '{twice}' stands in the parts {names[0]} and {names[1]}",
+                "a point with all its rays, and the position of a photograph, belong to one part",
+            )
+    return Common(facts)

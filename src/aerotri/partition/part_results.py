@@ -1,0 +1,134 @@
+"""Standard deviations, redundancy numbers and tests of a part, from the inverse over what all parts share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from aerotri.adjustment.partial_factor import restored
+from aerotri.adjustment.ray_status import RayStatus
+from aerotri.adjustment.solve import Solution
+from aerotri.diagnosis import judge
+from aerotri.formats.results.adjustment import write_result
+from aerotri.partition.part_tasks import At, PartTask
+from aerotri.results.adjusted_block import AdjustedBlock, Blunder, GroundPointResults, ObservationGroup, Outcome
+from aerotri.statistics.covariance import Cofactors
+from aerotri.statistics.held_control import no_held_tests
+from aerotri.statistics.summarise import record_of, turned_down, weighted_sum
+
+MEASURED, INVERSE = "measured", "inverse"
+"""Files of a part: solution and cofactors; the inverse over what it shares."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What σ0 of the whole needs of a part.
+
+    Parameters
+    ----------
+    vtpv : vᵀPv with the final weights. turned_down : redundancy that robust weights take away.
+    """
+
+    vtpv: float
+    turned_down: float
+
+
+@dataclass(frozen=True, eq=False)
+class Ending:
+    """How the whole ended, for the results of its parts.
+
+    Parameters
+    ----------
+    at : where. outcome : of the whole. folder : for the folders of the parts, by name.
+    """
+
+    at: At
+    outcome: Outcome
+    folder: Path
+
+
+@dataclass(frozen=True, eq=False)
+class GroundPoints:
+    """Control or check points of a part.
+
+    Parameters
+    ----------
+    names : (k,) str. xyz, sigma : (k, 3) m, given. adjusted : (k, 3) m. results : what the adjustment says of them.
+    """
+
+    names: np.ndarray
+    xyz: np.ndarray
+    sigma: np.ndarray
+    adjusted: np.ndarray
+    results: GroundPointResults
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """What a part tells of its results, which are in its folder.
+
+    Parameters
+    ----------
+    verdict : 'accepted', 'doubtful' or 'rejected'. reasons : sentences.
+    control, check : its ground points. groups : of its observations. blunders : suspected gross errors.
+    points, rays, left_out : how many.
+    """
+
+    verdict: str
+    reasons: tuple[str, ...]
+    control: GroundPoints
+    check: GroundPoints
+    groups: tuple[ObservationGroup, ...]
+    blunders: tuple[Blunder, ...]
+    points: int
+    rays: int
+    left_out: int
+
+
+def measure_part(at: At, task: PartTask) -> Measured:
+    """Cofactors of photographs, points and rays of a part."""
+    files = task.files
+    part = files.system(at.positions)
+    system = part.system
+    state = files.state(at.state, at.shared[task.shared])
+    numbers, _ = files.eliminated(at.tag)
+    inverse = restored(system.symbolic, numbers).inverse_below(files.array(INVERSE))
+    points, redundancy = system.point_cofactors(state, inverse, at.estimator)
+    n = len(system.unknowns.images)
+    q = Cofactors(
+        inverse.blocks[:n].copy(), inverse.corner, points, np.swapaxes(inverse.border, 1, 2).copy(), redundancy, inverse
+    )
+    solution = Solution("converged", state, system.assemble(state, 0.0, at.estimator), at.estimator, 0)
+    files.keep_object(MEASURED, (solution, q))
+    return Measured(weighted_sum(system, solution), turned_down(solution, q))
+
+
+def write_part(ending: Ending, task: PartTask) -> Written:
+    """Tables of a part, as `aerotri adjust` writes them; σ0 and counts of the outcome are those of the whole."""
+    part = task.files.system(ending.at.positions)
+    solution, q = task.files.object(MEASURED)
+    outcome = replace(ending.outcome, warnings=part.warnings)
+    found = record_of(part.system, solution, q, outcome, no_held_tests(part.system), part.ray_status)
+    verdict = judge(found)
+    found = replace(found, outcome=replace(outcome, verdict=verdict.level, reasons=verdict.reasons))
+    write_result(found, ending.folder / task.name)
+    used = int(np.sum(found.rays.status == RayStatus.USED))
+    return Written(
+        verdict.level, verdict.reasons, _ground_points(found, found.control), _ground_points(found, found.check),
+        found.groups, found.blunders, len(found.block.points), used, len(found.rays.status) - used,
+    )  # fmt: skip
+
+
+def _ground_points(found: AdjustedBlock, results: GroundPointResults) -> GroundPoints:
+    control = found.block.control
+    row = {int(point): k for k, point in enumerate(control.point)}
+    rows = np.array([row[int(point)] for point in results.point], dtype=np.int64)
+    return GroundPoints(
+        found.block.points[results.point],
+        control.xyz[rows],
+        control.sigma[rows],
+        found.points.xyz[results.point],
+        results,
+    )
