@@ -48,6 +48,9 @@ if TYPE_CHECKING:
     from aerotri.public.image_errors import ImageErrors as ImageErrors
     from aerotri.public.models import deform as deform
     from aerotri.public.ortho import orthophoto as orthophoto
+    from aerotri.public.parts import PartsAdjustment as PartsAdjustment
+    from aerotri.public.parts import adjust_parts as adjust_parts
+    from aerotri.public.parts import divide as divide
     from aerotri.public.planning import plan_flight as plan_flight
     from aerotri.public.results import adjust as adjust
     from aerotri.public.results import open_result as open_result
@@ -69,6 +72,7 @@ _PLACES = {
     "Covariance": "aerotri.public.covariance",
     "ImageErrors": "aerotri.public.image_errors",
     "InputError": "aerotri.conventions",
+    "PartsAdjustment": "aerotri.public.parts",
     "Surface": "aerotri.public.surfaces",
     "Table": "aerotri.public.table",
     "TasksFailedError": "aerotri.execution.work",
@@ -86,6 +90,8 @@ _PLACES = {
     "drawing": "aerotri.public.drawing",
     "edit": "aerotri.public.editing",
     "adjust": "aerotri.public.results",
+    "adjust_parts": "aerotri.public.parts",
+    "divide": "aerotri.public.parts",
     "convert": "aerotri.public.converting",
     "example_flight": "aerotri.public.simulating",
     "export": "aerotri.public.exporting",
@@ -118,12 +124,14 @@ __all__ = [
     "Covariance",
     "ImageErrors",
     "InputError",
+    "PartsAdjustment",
     "Surface",
     "Table",
     "TasksFailedError",
     "__version__",
     "accuracy",
     "adjust",
+    "adjust_parts",
     "change",
     "changes",
     "check",
@@ -135,6 +143,7 @@ __all__ = [
     "crosscheck",
     "deform",
     "dense_surface",
+    "divide",
     "drawing",
     "edit",
     "example_flight",

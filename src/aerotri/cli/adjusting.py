@@ -21,7 +21,10 @@ from aerotri.cli.options import (
     Json,
     ResultFolder,
     Robust,
+    Workers,
 )
+from aerotri.conventions import InputError
+from aerotri.execution.choice import THREADS
 
 
 @app.command(
@@ -69,18 +72,50 @@ def adjust(
             rich_help_panel=METHOD,
         ),
     ] = False,
+    executor: Workers = THREADS,
     plots: Annotated[bool, typer.Option(help="Draw the plots and the report.", rich_help_panel=OUTPUT)] = True,
     json_: Json = False,
 ) -> None:
-    """Adjust a block: orientation, points, self-calibration, and σ of everything."""
+    """Adjust a block: orientation, points, self-calibration, and σ of everything.
+
+    The folder of divide is adjusted part by part, with --executor on many machines.
+    """
     from aerotri.commands.adjust import run_adjust
 
     names = tuple(check or ())
+    if (block / "parts").is_dir() and not (block / "block.toml").exists():
+        from aerotri.commands.adjust_parts import run_adjust_parts
+
+        others = {
+            "parameters": parameters, "geoid": geoid, "check_free": check_free, "control_prefix": control_prefix,
+            "check": names, "model_part": model_part, "start": start,
+        }  # fmt: skip
+        raise typer.Exit(run_adjust_parts(block, out, robust, executor, json_, **others))
+    if executor != THREADS:
+        raise InputError(f"--executor {executor} for a block in one piece", "divide it first: aerotri divide")
     raise typer.Exit(
         run_adjust(
             block, out, parameters, robust, geoid, plots, json_, check_free, control_prefix, names, model_part, start
         )
     )
+
+
+@app.command(
+    rich_help_panel=ADJUSTMENT, epilog="Example: aerotri divide blocks/frederiksstad_ultracam in_parts --parts 4"
+)
+def divide(
+    block: BlockFolder,
+    out: Annotated[Path, typer.Argument(help="Empty folder to write the parts to.", rich_help_panel=ARGUMENTS)],
+    parts: Annotated[
+        int | None,
+        typer.Option(min=2, help="Number of parts. Default: parts of 2000 photographs.", rich_help_panel=METHOD),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Cut a large block into parts; adjust then computes it part by part, with the same numbers."""
+    from aerotri.commands.divide import run_divide
+
+    run_divide(block, out, parts, json_)
 
 
 @app.command(rich_help_panel=ADJUSTMENT, epilog="Example: aerotri parameters --family dmc --out patterns")

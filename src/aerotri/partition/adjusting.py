@@ -17,6 +17,7 @@ from aerotri.observations import Block
 from aerotri.partition.common import Common, PartFacts
 from aerotri.partition.course import Course, Ended
 from aerotri.partition.part_results import INVERSE, Ending, Written, measure_part, write_part
+from aerotri.partition.part_system import refuse_robust
 from aerotri.partition.part_tasks import PartTask, Setting, prepare_part
 from aerotri.partition.whole import Whole, whole_of
 from aerotri.results.adjusted_block import Outcome
@@ -58,6 +59,8 @@ def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSet
     say : told what is done, and the share of it.
     """
     begun, sources = time.perf_counter(), part_folders(folder)
+    if settings.robust is not None:
+        refuse_robust(settings.robust)
     if len(sources) < 2:
         raise InputError("holds no parts", "divide a block: aerotri divide BLOCK FOLDER --parts N", folder)
     work = out / WORK
@@ -76,7 +79,7 @@ def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSet
         course = Course(
             tasks, common, executor, work, observations - unknowns, unknowns,
             max(part.bytes_needed + BYTES_A_RAY * part.rays for part in facts) + LEAST_BYTES,
-            lambda iteration, sigma0: say(f"iteration {iteration}, σ0 {sigma0:.4g}", min(iteration / limit, 1.0)),
+            lambda iteration, sigma0: say(f"iteration {iteration}: σ0 {sigma0:.4g}", None),
         )  # fmt: skip
         ended = course.minimise(chosen.robust or asked.robust, limit)
         solved = time.perf_counter()

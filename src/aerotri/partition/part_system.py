@@ -18,6 +18,8 @@ from aerotri.conventions import InputError
 from aerotri.observations import Block
 
 IN_ONE_PIECE = "adjust the block in one piece: aerotri adjust of the block that was divided"
+ROBUST = ("off", "huber")
+"""Estimators: the others need steps that look at all rays of a photograph at once [C]."""
 KINDS = ("interior", "additional", "gnss")
 """Kinds of shared parameters that may act in several parts."""
 
@@ -71,6 +73,19 @@ def part_system(block: Block, shared: np.ndarray, origin: np.ndarray) -> tuple[P
     return PartSystem(bare, system.priors, kept, status, tuple(warnings)), state
 
 
+def refuse_robust(name: str) -> None:
+    """Name an estimator that is not for a block in parts.
+
+    Raises
+    ------
+    InputError
+    """
+    if name not in ROBUST:
+        raise InputError(
+            f'robust = "{name}" of a block in parts is not built', 'use "huber", or adjust the block in one piece'
+        )
+
+
 def refuse_what_parts_cannot(block: Block) -> None:
     """Name what needs the whole block at once.
 
@@ -79,6 +94,7 @@ def refuse_what_parts_cannot(block: Block) -> None:
     InputError
     """
     s = block.settings
+    refuse_robust(s.adjustment.robust)
     known = np.isfinite(np.hstack([block.images.centre, block.images.angles])).all(axis=1)
     without = block.images.names[np.flatnonzero(~known)[:1]]
     held = bool((block.control.sigma[~block.control.is_check] == 0.0).any())
@@ -90,8 +106,6 @@ def refuse_what_parts_cannot(block: Block) -> None:
         (len(without) > 0, f"photograph '{''.join(without)}' has no orientation to begin with",
          "give X0, Y0, Z0, omega, phi, kappa of every photograph in images.csv"),
         (s.adjustment.datum != "control", f'datum = "{s.adjustment.datum}" of a block in parts', IN_ONE_PIECE),
-        (s.adjustment.robust == "data-snooping", 'robust = "data-snooping" of a block in parts',
-         'use robust = "danish" or another estimator, or adjust the block in one piece'),
         (chosen, 'additional_parameters = "auto" of a block in parts',
          "choose them on a part, aerotri adjust parts/0000 --parameters auto, and state them in every block.toml"),
         (s.adjustment.parameter_selection != "off", "parameter_selection of a block in parts", IN_ONE_PIECE),

@@ -1,0 +1,184 @@
+"""Blocks too large for one machine: divided into parts, and adjusted exactly, part by part."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from aerotri.conventions import FilePath, InputError
+from aerotri.execution.choice import THREADS, chosen
+from aerotri.public.progress import ProgressLike, stage_report
+
+if TYPE_CHECKING:
+    from aerotri.observations import Block
+    from aerotri.partition.whole import Whole
+    from aerotri.public.table import Table
+
+PHOTOGRAPHS_A_PART = 2000
+"""Photographs of a part where nothing is said [C]: a task takes about 1.5 GB then."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PartsAdjustment:
+    """A block in parts after its adjustment: what `aerotri.adjust_parts` returns.
+
+    Parameters
+    ----------
+    record : the numbers of the whole.
+    folder : with the tables; those of photographs, points and rays stand in parts/NAME.
+    """
+
+    record: Whole
+    folder: Path
+
+    @property
+    def status(self) -> str:
+        """'converged' or 'not converged'."""
+        return self.record.outcome.status
+
+    @property
+    def verdict(self) -> str:
+        """'accepted', 'doubtful' or 'rejected': that of the worst part."""
+        return self.record.outcome.verdict
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why the result is not simply accepted, in sentences that name the part."""
+        return self.record.outcome.reasons
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What else the user should read."""
+        return self.record.outcome.warnings
+
+    @property
+    def sigma0(self) -> float:
+        """σ̂0, dimensionless."""
+        return self.record.outcome.sigma0
+
+    @property
+    def redundancy(self) -> int:
+        """Observations less unknowns."""
+        return self.record.outcome.redundancy
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of the parts."""
+        return self.record.parts
+
+    @property
+    def parameters(self) -> Table:
+        """Shared parameters with σ and correlations, the columns of parameters.csv."""
+        from aerotri.public.tables import parameters_table
+
+        return parameters_table(self.record.record)
+
+    def __repr__(self) -> str:
+        o, r = self.record.outcome, self.record
+        return (
+            f"<aerotri.PartsAdjustment {r.record.block.name!r}: {o.status}, {o.verdict}, σ0 {o.sigma0:.3f}, "
+            f"{len(r.parts)} parts, {r.photographs} photographs>"
+        )
+
+
+def divide(
+    block: Block | FilePath, folder: FilePath, *, parts: int | None = None,
+    tables: Literal["csv", "parquet"] = "parquet", progress: ProgressLike = None,
+) -> Path:  # fmt: skip
+    """Divide a block into parts for `adjust_parts`.
+
+    Every part is a block folder: its points with all their rays, the photographs that see them, its control points and
+    observed positions. Photographs along the cuts stand in several parts; no point does.
+
+    Parameters
+    ----------
+    block : a block, or the folder of one.
+    folder : an empty folder; the parts are written to parts/0000, parts/0001 and so on.
+    parts : how many; as many as have 2000 photographs each where None, two at least.
+    tables : 'csv' or 'parquet'.
+    progress : True for a bar, or a function that takes (stage, share).
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    InputError
+        When the block holds what parts cannot, or cannot be cut.
+    """
+    from aerotri.formats.block.writer import write_block
+    from aerotri.partition.adjusting import PARTS
+    from aerotri.partition.dividing import divide as cut
+    from aerotri.partition.dividing import part_of
+    from aerotri.partition.part_system import refuse_what_parts_cannot
+    from aerotri.public.blocks import as_block
+    from aerotri.public.folders import refuse_foreign_folder
+
+    whole, target = as_block(block), Path(folder)
+    if parts is not None and parts < 2:
+        raise InputError(f"{parts} parts", "a block is divided into two parts or more")
+    refuse_foreign_folder(target)
+    refuse_what_parts_cannot(whole)
+    count = max(2, math.ceil(len(whole.images) / PHOTOGRAPHS_A_PART)) if parts is None else parts
+    with stage_report(progress) as report:
+        report.stage("dividing", None)
+        division = cut(whole, count)
+        for number in range(division.count):
+            report.counted("writing parts", number, division.count)
+            write_block(part_of(whole, division, number), target / PARTS / f"{number:04d}", tables=tables)
+    return target
+
+
+def adjust_parts(
+    folder: FilePath, out: FilePath, *, robust: Literal["off", "huber"] | None = None,
+    max_iterations: int | None = None, executor: str = THREADS, progress: ProgressLike = None,
+) -> PartsAdjustment:  # fmt: skip
+    """Adjust a block in parts: the numbers of `adjust` of the whole, without ever holding it whole.
+
+    Every part is a task that eliminates its points and its own photographs; what is left are the equations of the
+    photographs and parameters that parts share. σ, redundancy numbers and tests are those of the whole block.
+
+    Parameters
+    ----------
+    folder : of `divide`, or made by hand: parts/NAME with a block each.
+    out : folder to write; the tables of a part go to parts/NAME in it.
+    robust : 'huber' lowers the weight of gross errors; as the parts say where None.
+    max_iterations : at most, in each stage of a robust estimator.
+    executor : where the parts are computed: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'.
+    progress : True for a bar, or a function that takes (stage, share).
+
+    Returns
+    -------
+    PartsAdjustment
+        Look at its `verdict` first.
+
+    Raises
+    ------
+    InputError
+        When parts do not belong together, hold what is adjusted in one piece only, or do not determine the block.
+    TasksFailedError
+        When a part could not be computed; it is named.
+    """
+    from aerotri.execution.opening import opened
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.partition.adjusting import PARTS, PartsSettings
+    from aerotri.partition.adjusting import adjust_parts as adjust
+    from aerotri.partition.whole import write_whole
+    from aerotri.public.folders import refuse_foreign_folder
+
+    target = Path(out)
+    refuse_foreign_folder(target, "adjustment.json")
+    chosen(executor)
+    own = ("adjustment.json", "parameters.csv", "control.csv", "check.csv", PARTS)
+    with (
+        stage_report(progress) as report,
+        opened(executor, report.said) as workers,
+        atomic_folder(target, own) as place,
+    ):
+        whole = adjust(Path(folder), place, workers, PartsSettings(robust, max_iterations), report.stage)
+        write_whole(whole, place)
+    return PartsAdjustment(whole, target)
