@@ -10,6 +10,11 @@ from aerotri.simulation import Truth, parse_spec, simulate
 
 ERRING = {"camera": {"ucd": {"preset": "ultracam_d", "errors": {"physical": {"rms_um": 4.0, "seed": 2}}}}}
 """For `small_spec`: a camera that errs by physics."""
+LONG_FLIGHT = {
+    "gsd_m": 0.1, "strips": 3, "images_per_strip": 14, "end_lap": 0.6, "side_lap": 0.4, "heading_deg": 30.0,
+    "attitude_sigma_deg": [1.0, 1.0, 2.0],
+}  # fmt: skip
+"""For `small_spec`: long enough to be cut into parts."""
 
 
 def small_spec(**changes) -> dict:

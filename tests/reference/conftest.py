@@ -15,7 +15,7 @@ from aerotri.formats.block.folder import write_block
 from aerotri.rasters.grids import RasterReader
 from gis_blocks import in_crs, plain_block
 from rendered_photographs import Lists, fly, write_gcp_list, write_positions
-from small_blocks import with_adjustment
+from small_blocks import LONG_FLIGHT, small_block, with_adjustment
 from ten_photographs import ten_photographs
 
 ROLLING = """
@@ -189,6 +189,8 @@ def _written(folder: Path) -> Written:
     stated = run("accuracy", second, "--class-horizontal", 10, out="accuracy")
     sets = run("compare-parameters", folder / "plain", "--set", "none", "--set", "brown:K1", "--folds", "2", out="sets")
     checked = run("crosscheck", second, out="checked")
+    write_block(small_block(1, "brown:K1", flight=LONG_FLIGHT)[0], folder / "long")
+    run("adjust", run("divide", folder / "long", "--parts", 2, out="in_parts"), out="parts_result")
     run("init", folder / "begun")
     run("check", folder / "plain")
     run("explain", "points.csv", "sZ")

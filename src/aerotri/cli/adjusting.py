@@ -100,12 +100,12 @@ def adjust(
     )
 
 
-@app.command(
-    rich_help_panel=ADJUSTMENT, epilog="Example: aerotri divide blocks/frederiksstad_ultracam in_parts --parts 4"
-)
+@app.command(rich_help_panel=ADJUSTMENT, epilog="Example: aerotri divide blocks/frederiksstad_ultracam --parts 4")
 def divide(
     block: BlockFolder,
-    out: Annotated[Path, typer.Argument(help="Empty folder to write the parts to.", rich_help_panel=ARGUMENTS)],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; default NAME_parts here.", rich_help_panel=OUTPUT)
+    ] = None,
     parts: Annotated[
         int | None,
         typer.Option(min=2, help="Number of parts. Default: parts of 2000 photographs.", rich_help_panel=METHOD),

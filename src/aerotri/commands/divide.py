@@ -8,29 +8,30 @@ from aerotri.commands.console import Console
 from aerotri.formats.results.json_text import json_text
 
 
-def run_divide(path: Path, out: Path, parts: int | None, as_json: bool) -> None:
+def run_divide(path: Path, out: Path | None, parts: int | None, as_json: bool) -> None:
     """Divide and write; arguments as on the command line.
 
     Raises
     ------
     InputError
     """
+    from aerotri.commands.adjust import folder_name
     from aerotri.formats.block.folder import read_block, read_photographs
     from aerotri.partition.adjusting import part_folders
     from aerotri.public.parts import divide
 
     console = Console(quiet=as_json)
-    block = read_block(path)
-    divide(block, out, parts=parts, progress=console.stage)
-    counts = {folder.name: len(read_photographs(folder)) for folder in part_folders(out)}
+    block, target = read_block(path), out or Path(f"{folder_name(path)}_parts")
+    divide(block, target, parts=parts, progress=console.stage)
+    counts = {folder.name: len(read_photographs(folder)) for folder in part_folders(target)}
     twice = sum(counts.values()) - len(block.images)
     if as_json:
-        print(json_text({"folder": str(out), "parts": counts, "photographs": len(block.images)}))
+        print(json_text({"folder": str(target), "parts": counts, "photographs": len(block.images)}))
         return
     console.lines(
         [
             f"{len(counts)} parts of {min(counts.values())} to {max(counts.values())} photographs; "
             f"{len(block.images)} photographs stand in them {twice} times more than once",
-            f"Written to {out}: aerotri adjust {out}",
+            f"Written to {target}: aerotri adjust {target}",
         ]
     )

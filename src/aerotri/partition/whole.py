@@ -87,9 +87,11 @@ def whole_of(
         ),
         gnss_ins=None,
     )  # fmt: skip
+    count_points, count_rays = sum(part.points for part in written), sum(part.rays for part in written)
+    note = f"adjusted in {len(names)} parts: {photographs} photographs, {count_points} points, {count_rays} rays"
     record = AdjustedBlock(
         block=block,
-        outcome=replace(outcome, verdict=worst, reasons=tuple(reasons[:MOST_REASONS])),
+        outcome=replace(outcome, verdict=worst, reasons=tuple(reasons[:MOST_REASONS]), notes=(note,)),
         images=ImageResults(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 6, 6)), nothing),
         points=PointResults(adjusted, np.zeros((len(points), 3, 3)), np.zeros(len(points), int), np.zeros(len(points))),
         rays=RayResults(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int8)),
@@ -99,7 +101,7 @@ def whole_of(
         groups=_groups(written),
         blunders=_largest(written),
     )
-    return Whole(record, tuple(names), photographs, sum(p.points for p in written), sum(p.rays for p in written))
+    return Whole(record, tuple(names), photographs, count_points, count_rays)
 
 
 def write_whole(whole: Whole, folder: Path) -> None:
@@ -112,9 +114,8 @@ def write_whole(whole: Whole, folder: Path) -> None:
 
 
 def whole_json(whole: Whole) -> dict[str, Any]:
-    """The content of adjustment.json: that of an adjustment in one piece, with the names of the parts."""
-    counts = {"photographs": whole.photographs, "points": whole.points, "rays": whole.rays}
-    return adjustment_json(whole.record) | {"parts": list(whole.parts), "counts": counts}
+    """The content of adjustment.json, with the keys of an adjustment in one piece."""
+    return adjustment_json(whole.record)
 
 
 def _ground_points(parts: Sequence[GroundPoints], is_check: bool, first: int) -> tuple[Control, GroundPointResults]:

@@ -9,6 +9,14 @@ from aerotri.reference.records import DescribedFile, Item, of_axes
 UNIT = "m, deg for angles"
 
 
+DIVIDE = (
+    Item("folder", "text", "Folder of the parts."),
+    Item("parts", "object", "Number of photographs of every part, by its name."),
+    Item("parts.*", "whole", "Photographs of the part."),
+    Item("photographs", "whole", "Photographs of the block."),
+)
+
+
 def _changes(name: str, text: str) -> tuple[Item, ...]:
     return (
         Item(f"{name}[]", "object", text),
@@ -249,6 +257,7 @@ def printed_contents() -> tuple[DescribedFile, ...]:
     """What is printed as JSON and stands in no file."""
     printed = (
         ("diff", "What changed between two runs.", DIFF),
+        ("divide", "The parts of a block.", DIVIDE),
         ("parameters", "The additional parameters there are.", PARAMETERS),
         ("simulate", "How much was simulated.", SIMULATE),
         ("convert", "What was converted.", CONVERT),
