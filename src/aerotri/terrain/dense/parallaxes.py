@@ -45,7 +45,7 @@ LARGEST_ACROSS_PX, ACROSS_SIGMAS = 1.0, 2.0
 orientation of a drone flight was seen to leave. A window with edges along the base tells little of it."""
 LEAST_CORRELATION = 0.2
 """Correlation of a window below which it counts as not matched; chosen [C]: what is not alike is in σ already, so that
-errors over σ of rendered scenes are as with 0.5; of water five times as much is measured."""
+errors over σ of rendered scenes are as with 0.5; of water twice as much is measured."""
 CROWD_PX, LEAST_ALIKE = 41, 0.42
 """Side of the square about a pixel, and the mean correlation of the windows in it (0 where nothing matched) for the
 pixel to count; chosen [C]: semi-global matching finds matches in noise by themselves whose windows are alike by .6,
