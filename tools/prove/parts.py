@@ -1,0 +1,120 @@
+"""A block in parts against the same block in one piece: largest differences over σ, time and memory.
+
+The block is simulated (UltraCamD, 60/30 %, control at the edge), written, and adjusted by two programs started anew:
+one in one piece, one in parts by a number of processes. Memory is the peak of the largest process. Prints Markdown.
+
+    python tools/prove/parts.py FOLDER --photographs 2282 --parts 4 --processes 2 > tools/results/parts.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+import aerotri
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmark"))
+from adjusting.blocks import plan_of
+
+PARAMETERS = "bluh:1-12,ultracam_d:42-73"
+
+ONE = """
+import sys, json, resource, time, aerotri
+block = aerotri.read_block(sys.argv[1])
+start = time.perf_counter()
+found = aerotri.adjust(block, model_part="off", explain=False)
+seconds = time.perf_counter() - start
+found.save(sys.argv[2], plots=False)
+print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
+"""
+PARTS = """
+import sys, json, resource, time, aerotri
+if __name__ == "__main__":
+    start = time.perf_counter()
+    found = aerotri.adjust_parts(sys.argv[1], sys.argv[2], executor=sys.argv[3])
+    seconds = time.perf_counter() - start
+    of = [resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    print(json.dumps([seconds, *of]))
+"""
+"""Programs that print their time in s and their memory in MB."""
+
+
+def run(folder: Path, text: str, *arguments: object) -> list[float]:
+    """What a program says, run anew from a file."""
+    program = folder / "program.py"
+    program.write_text(text)
+    done = subprocess.run([sys.executable, program, *map(str, arguments)], check=True, capture_output=True, text=True)
+    return json.loads(done.stdout.strip().split("\n")[-1])
+
+
+def rows(path: Path, key: str, columns: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """Columns of a table by the name of the row; rows without values are left out."""
+    with open(path, encoding="utf-8") as file:
+        return {
+            line[key]: np.array([float(line[c]) for c in columns]) for line in csv.DictReader(file) if line[columns[0]]
+        }
+
+
+def differences(one: Path, parts: Path, table: str, key: str, values: tuple[str, ...]) -> tuple[float, float, int]:
+    """Largest difference of values over σ, largest relative difference of σ, and how many rows were compared."""
+    columns = (*values, *(f"s{name}" for name in values))
+    whole = rows(one / table, key, columns)
+    count, k = 0, len(values)
+    worst = [0.0, 0.0]
+    for part in sorted((parts / "parts").iterdir()):
+        for name, found in rows(part / table, key, columns).items():
+            expected = whole[name]
+            worst[0] = max(worst[0], float(np.abs((found - expected)[:k] / expected[k:]).max()))
+            worst[1] = max(worst[1], float(np.abs(found[k:] / expected[k:] - 1.0).max()))
+            count += 1
+    return worst[0], worst[1], count
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--photographs", type=int, default=2282)
+    parser.add_argument("--parts", type=int, default=4)
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--parameters", default=PARAMETERS)
+    options = parser.parse_args()
+    folder = options.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    block = aerotri.with_settings(
+        aerotri.simulate(plan_of(options.photographs), seed=1).block, parameters=options.parameters
+    )
+    print(
+        f"# {len(block.images)} photographs, {len(block.image_points)} rays in one piece and in {options.parts} parts"
+        " (tools/prove/parts.py)\n"
+    )
+    aerotri.convert(block, folder / "block", tables="parquet")
+    start = time.perf_counter()
+    aerotri.divide(block, folder / "in_parts", parts=options.parts)
+    divided = time.perf_counter() - start
+    del block
+    whole = run(folder, ONE, folder / "block", folder / "one")
+    parts = run(folder, PARTS, folder / "in_parts", folder / "parts", f"processes:{options.processes}")
+    print("| adjusted | s | peak memory MB | of a process |\n|---|---|---|---|")
+    print(f"| in one piece, every σ | {whole[0]:.1f} | {whole[1]:.0f} | |")
+    how = f"in {options.parts} parts, {options.processes} processes"
+    print(f"| {how} | {parts[0]:.1f} | {parts[1]:.0f} | {parts[2]:.0f} |")
+    print(f"\nDividing took {divided:.1f} s.\n")
+    print("| | compared | largest difference over σ | largest relative difference of σ |\n|---|---|---|---|")
+    tables = {
+        "projection centres": ("images.csv", "image", ("X0", "Y0", "Z0")),
+        "points": ("points.csv", "point", ("X", "Y", "Z")),
+    }
+    for what, (table, key, values) in tables.items():
+        apart, of_sigma, count = differences(folder / "one", folder / "parts", table, key, values)
+        print(f"| {what} | {count} | {apart:.1e} | {of_sigma:.1e} |")
+
+
+if __name__ == "__main__":
+    main()
