@@ -83,7 +83,7 @@ class Common:
         for part, images, shared in zip(facts, self.of_images, self.of_shared, strict=True):
             self.start[shared], position[images] = part.start, part.position
         self.priors = _together(facts, self.of_shared, len(self.labels))
-        self._pairs, row, col = _pattern(self.of_images, len(self.images))
+        self._pairs, row, col = pattern(self.of_images, len(self.images))
         self.symbolic = Symbolic(len(self.images), row, col, position, len(self.labels))
 
     @property
@@ -164,8 +164,13 @@ def _together(facts: Sequence[PartFacts], columns: list[np.ndarray], count: int)
     )  # fmt: skip
 
 
-def _pattern(of_images: list[np.ndarray], n: int) -> tuple[list[Places], np.ndarray, np.ndarray]:
-    """For every part the places of its pairs of photographs and the pairs; rows and columns of all blocks."""
+def pattern(of_images: list[np.ndarray], n: int) -> tuple[list[Places], np.ndarray, np.ndarray]:
+    """For every part the places of its pairs of photographs and the pairs; rows and columns of all blocks.
+
+    Parameters
+    ----------
+    of_images : rows of the shared photographs of every part among all n.
+    """
     pairs: list[Places] = []
     for images in of_images:
         first, second = np.nonzero(images[:, None] < images[None, :])
