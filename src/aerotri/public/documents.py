@@ -177,45 +177,35 @@ def _version(record: Mapping[str, Any]) -> str:
 
 
 def _time_of(record: Path | None) -> datetime:
-    """When the result was written; now for one that was not."""
+    """When the result was computed; of an older one when it was written; now for one that was not."""
+    from aerotri.results.head import now, time_of
+
     if record is None or not record.is_file():
-        return datetime.now(UTC)
-    return datetime.fromtimestamp(int(record.stat().st_mtime), UTC)
+        return now()
+    return time_of(_read(record).get("computed")) or datetime.fromtimestamp(int(record.stat().st_mtime), UTC)
 
 
-def _project(
-    given: FilePath | None, folder: Path | None, content: Mapping[str, Any]
-) -> tuple[Project, tuple[str, ...]]:
-    """The [project] that was named, or that of the block beside the result; a sentence about where it is from."""
-    from aerotri.observations.project import Project
+def _project(given: FilePath | None, folder: Path | None, content: dict[str, Any]) -> tuple[Project, tuple[str, ...]]:
+    """The [project] that was named, or what the result and what it names say; a sentence about it."""
+    from aerotri.public.projects import project_in, project_of
 
-    for place in [Path(given)] if given is not None else _places(folder, content):
-        toml = next((one for one in (place / "block" / "block.toml", place / "block.toml", place)
-                     if one.is_file() and one.suffix == ".toml"), None)  # fmt: skip
-        if toml is not None:
-            found = _project_of(toml)
-            return found, (f"the head is that of {toml}",) if found.given() else ()
     if given is not None:
-        raise InputError("holds no block.toml", "give a block folder or the result of an adjustment", Path(given))
-    return Project(), ("nothing is known of a project: name its block with --project",)
+        found = project_of(given)
+        return found, (f"the head is that of {given}",) if found.given() else ()
+    beside = project_of(None, *_places(folder, content))
+    found = beside if beside.given() else project_in(content)
+    return found, () if found.given() else ("nothing is known of a project: name its block with --project",)
 
 
 def _places(folder: Path | None, content: Mapping[str, Any]) -> list[Path]:
     """Folders beside a result that may hold its block: of `aerotri run`, and the adjustment that it names."""
-    from aerotri.public.run_steps import RECORD
+    from aerotri.public.run_steps import RECORD, RESULT
 
     if folder is None:
         return []
     around = folder.resolve().parent
     sigma = content.get("sigma")
     named = str(sigma.get("adjustment") or "") if isinstance(sigma, dict) else ""
-    places = [around / "result"] if (around / RECORD).is_file() else []
-    return [*places, around / Path(named).name] if named else places
-
-
-def _project_of(toml: Path) -> Project:
-    from aerotri.formats.block.logo import with_logo
-    from aerotri.formats.block.settings import read_block_toml
-
-    settings = read_block_toml(toml)
-    return with_logo(settings.model.project.project(), settings)
+    places = [around / RESULT] if (around / RECORD).is_file() else []
+    places += [around / Path(named).name] if named else []
+    return [one for one in places if one.is_dir()]

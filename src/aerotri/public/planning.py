@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,7 +13,9 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.observations import Block
 from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.projects import project_of
 from aerotri.public.table import Table
+from aerotri.results.head import Head
 
 if TYPE_CHECKING:
     from aerotri.planning.ground import Ground
@@ -31,10 +33,11 @@ class FlightPlan:
 
     Parameters
     ----------
-    record : what was planned.
+    record : what was planned. head : of page and file.
     """
 
     record: PlanRecord
+    head: Head = field(default_factory=Head)
 
     @property
     def met(self) -> bool | None:
@@ -46,7 +49,7 @@ class FlightPlan:
         """What plan.json holds."""
         from aerotri.planning.plan_json import plan_json
 
-        return plan_json(self.record)
+        return self.head.as_dict() | plan_json(self.record)
 
     @property
     def exposures(self) -> Table:
@@ -104,7 +107,7 @@ class FlightPlan:
         """The page as text."""
         from aerotri.report.pages.plan import plan_html
 
-        return plan_html(self.record)
+        return plan_html(self.record, self.head)
 
     def save(self, out: FilePath) -> Path:
         """Write plan.json, plan.html, plan.gpkg, plan.kml (with a CRS), waypoints.csv, sigma_z.tif and block/.
@@ -173,6 +176,7 @@ def plan_flight(
     tie_probability: float = 0.6,
     image_sigma: float = 0.5,
     most_photographs: int = 1500,
+    project: FilePath | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> FlightPlan:
     """A flight over an area, its accuracy predicted, and control added where it helps most.
@@ -205,6 +209,7 @@ def plan_flight(
     tie_points : image points expected in a photograph. tie_probability : that a photograph that sees a tie point
         measures it. image_sigma : px, σ of an image coordinate.
     most_photographs : a plan of more is refused.
+    project : block, or result of an adjustment, whose [project] stands at the head of page and file.
     progress : is given the name of each step.
 
     Returns
@@ -253,7 +258,7 @@ def plan_flight(
     made = make_plan(
         where, terrain, chosen, options, goal, given, wanted, most_control, *(() if progress is None else (progress,))
     )
-    return FlightPlan(made)
+    return FlightPlan(made, Head(project_of(project), made.area.crs or "local"))
 
 
 def _crs_of(dem: FilePath | None) -> str | None:

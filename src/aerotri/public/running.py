@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,7 @@ from aerotri.public.run_steps import (
     steps_of,
 )
 from aerotri.results.failure import AdjustmentFailedError
+from aerotri.results.head import Head, now
 from aerotri.tie_points.settings import DEFAULTS
 from aerotri.volume.settings import RUN_LAYER, Layer
 
@@ -59,7 +61,7 @@ class Project:
     steps : each with how it ended.
     tied : the photographs tied. adjustment : also where it was rejected. surface : the terrain. volume : over it.
     dense : the surface of all that stands on the ground. orthophoto : over it.
-    seconds : that it took.
+    seconds : that it took. computed : when it began.
     """
 
     folder: Path
@@ -72,6 +74,7 @@ class Project:
     dense: DenseSurface | None = None
     orthophoto: Orthophoto | None = None
     seconds: float = 0.0
+    computed: datetime = field(default_factory=now)
 
     @property
     def block(self) -> Block | None:
@@ -96,9 +99,15 @@ class Project:
         return self.folder / REPORT
 
     @property
+    def head(self) -> Head:
+        """Of page and file: the block's."""
+        block = self.block
+        return Head(computed=self.computed) if block is None else Head(block.project, block.crs, self.computed)
+
+    @property
     def summary(self) -> dict[str, Any]:
         """The content of run.json."""
-        return {"source": str(self.source), "steps": [asdict(step) for step in self.steps],
+        return {**self.head.as_dict(), "source": str(self.source), "steps": [asdict(step) for step in self.steps],
                 "seconds": round(self.seconds, 1), "report": str(self.report)}  # fmt: skip
 
     def __repr__(self) -> str:
@@ -256,7 +265,7 @@ class _Chain:
                 missing[verb] = ending
             project.steps.append(step)
         project.seconds = time.perf_counter() - begun
-        write_report(project.summary, project.folder)
+        write_report(project.summary, project.folder, project.head)
         return project
 
     def _done(self, verb: Verb, step: Step) -> tuple[Step, str]:
@@ -379,7 +388,7 @@ def is_usable(result: Adjustment) -> bool:
     return result.status == "converged" and result.verdict != "rejected"
 
 
-def write_report(content: Mapping[str, Any], folder: Path) -> None:
+def write_report(content: Mapping[str, Any], folder: Path, head: Head) -> None:
     """The record and the page, each whole or not at all."""
     from aerotri.formats.files.atomic import atomic_file
     from aerotri.report.pages.run import run_page
@@ -387,4 +396,4 @@ def write_report(content: Mapping[str, Any], folder: Path) -> None:
     with atomic_file(folder / RECORD) as place:
         write_json(place, content)
     with atomic_file(folder / REPORT) as place:
-        place.write_text(run_page(dict(content), folder), encoding="utf-8")
+        place.write_text(run_page(dict(content), folder, head), encoding="utf-8")

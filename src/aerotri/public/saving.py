@@ -16,6 +16,8 @@ from aerotri.formats.results.solution import write_solution
 from aerotri.image_errors import group_changes
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.results.adjusted_block import head_of
+from aerotri.results.head import Head
 
 if TYPE_CHECKING:
     import numpy as np
@@ -114,20 +116,20 @@ def write_adjustment(
             from aerotri.formats.results.free_check import free_check_json
 
             write_json(folder / "check_free.json", free_check_json(checked))
-        _write_evaluation(found, adjustment.compared, folder)
+        _write_evaluation(found, adjustment.compared, folder, head_of(result))
         write_result(result, folder)
     return result
 
 
-def write_comparison_tables(comparison: ParameterComparison, folder: Path) -> None:
-    """Write compare_parameters.json and compare_parameters.csv into a folder."""
+def write_comparison_tables(comparison: ParameterComparison, folder: Path, head: Head) -> None:
+    """Write compare_parameters.json, with its head, and compare_parameters.csv into a folder."""
     from aerotri.formats.results.parameter_sets import comparison_columns, comparison_json
 
-    write_json(folder / "compare_parameters.json", comparison_json(comparison))
+    write_json(folder / "compare_parameters.json", head.as_dict() | comparison_json(comparison))
     write_csv(folder / "compare_parameters.csv", comparison_columns(comparison))
 
 
-def _write_evaluation(found: Evaluation, compared: ParameterComparison | None, folder: Path) -> None:
+def _write_evaluation(found: Evaluation, compared: ParameterComparison | None, folder: Path, head: Head) -> None:
     """The work list, and where there are any: effects of the parameters, differences between groups, sets compared."""
     from aerotri.formats.results.evaluation import effects_columns, work_columns
     from aerotri.formats.results.parameter_sets import changes_columns, changes_json
@@ -139,7 +141,7 @@ def _write_evaluation(found: Evaluation, compared: ParameterComparison | None, f
         write_json(folder / "parameter_changes.json", changes_json(found.changes))
         write_csv(folder / "parameter_changes.csv", changes_columns(found.changes))
     if compared is not None:
-        write_comparison_tables(compared, folder)
+        write_comparison_tables(compared, folder, head)
 
 
 def _draw(adjustment: Adjustment, found: Evaluation, folder: Path, checked: FreeCheck | None) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import VERSION
+from aerotri.reference.adjust_contents import HEAD
 from aerotri.reference.records import DescribedFile, Item, within
 
 PLACE = "folder of plan"
@@ -57,7 +57,7 @@ ASKED = within(
     Item("self_calibration", "text", "Additional parameters, as in block.toml."),
 )  # fmt: skip
 PLAN = (
-    VERSION,
+    *HEAD,
     Item("area", "object", "Where is flown."),
     Item("area.name", "text", "File of the area."),
     Item("area.crs", "text", "Coordinate system of the plan; local where none is known."),

@@ -12,7 +12,6 @@ from __future__ import annotations
 import dataclasses
 import re
 import time
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +34,7 @@ from aerotri.image_errors import interior_elements, interior_model_sigmas
 from aerotri.observations import Block
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Outcome
+from aerotri.results.head import Head
 from aerotri.results.model_part import ModelPart
 from aerotri.results.ray_correlation import RayCorrelation
 from aerotri.results.rolling_shutter import Motions
@@ -132,9 +132,8 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
     index, coordinates = np.zeros(0, np.int64), np.zeros((0, 3))
     nothing = GroundPointResults(index, coordinates, coordinates, coordinates, coordinates, index)
     return {
-        "aerotri": _version(),
+        **Head(block.project, block.crs, o.computed).as_dict(),
         "block": str(block.name),
-        "project": block.project.as_dict(),
         "status": o.status,
         "verdict": o.verdict,
         "reasons": list(o.reasons),
@@ -338,10 +337,3 @@ def _plain(value: Any) -> Any:
 
 def _finite(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(values), values, np.nan)
-
-
-def _version() -> str:
-    try:
-        return version("aerotri")
-    except PackageNotFoundError:
-        return "unknown"

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.quality import printable
+from aerotri.results.head import Head
 
 RESULT = "result"
 """Folder of the adjustment."""
@@ -29,18 +30,15 @@ PICTURES = (
 """What the page begins with: step, plot and caption."""
 
 
-def run_page(content: dict[str, Any], folder: Path) -> str:
+def run_page(content: dict[str, Any], folder: Path, head: Head) -> str:
     """The page as text; it loads nothing from elsewhere, and what the steps' pages hold cannot run scripts.
 
     Parameters
     ----------
     content : source, steps (name, folder, what, status, reason, seconds, arguments), seconds.
-    folder : where the steps wrote.
+    folder : where the steps wrote. head : of the page.
     """
-    environment = Environment(
-        loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
+    environment = page_environment()
     done = {step["name"]: folder / step["folder"] for step in content["steps"] if step["status"] == "done"}
     shown = _pictures(done)
     steps = [_step(step, folder / step["folder"], set(shown)) for step in content["steps"]]
@@ -49,7 +47,7 @@ def run_page(content: dict[str, Any], folder: Path) -> str:
     return template.render(
         source=printable(content["source"]), seconds=content["seconds"], steps=steps, verdict=_verdict(adjusted),
         results=_results({name: _read(place / f"{name}.json") for name, place in done.items()}),
-        pictures=list(shown.values()),
+        pictures=list(shown.values()), head=page_head(head),
     )  # fmt: skip
 
 
