@@ -192,8 +192,11 @@ def _project(given: FilePath | None, folder: Path | None, content: dict[str, Any
     if given is not None:
         found = project_of(given)
         return found, (f"the head is that of {given}",) if found.given() else ()
-    beside = project_of(None, *_places(folder, content))
-    found = beside if beside.given() else project_in(content)
+    for place in _places(folder, content):
+        beside = project_of(None, place)
+        if beside.given():
+            return beside, (f"the head is that of {place}",)
+    found = project_in(content)
     return found, () if found.given() else ("nothing is known of a project: name its block with --project",)
 
 
