@@ -119,7 +119,7 @@ def test_run_page(result, tmp_path):
 
 
 def test_named_project_must_be_there(tmp_path):
-    with pytest.raises(InputError, match="holds no block.toml"):
+    with pytest.raises(InputError, match=r"holds no block\.toml"):
         project_of(tmp_path)
     (tmp_path / "block.toml").write_text("name = ", encoding="utf-8")
     with pytest.raises(InputError):

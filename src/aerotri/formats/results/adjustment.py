@@ -19,6 +19,7 @@ import numpy as np
 
 from aerotri.adjustment.ray_status import RAY_STATUS, RayStatus
 from aerotri.conventions import MGON_PER_RADIAN
+from aerotri.formats.block.used_settings import used_settings
 from aerotri.formats.results.json_text import number_or_none, write_json
 from aerotri.formats.results.reliability_columns import control_columns, observation_columns, ray_columns
 from aerotri.formats.results.rigs import (
@@ -157,6 +158,7 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
         "gnss_errors": None,
         "photograph_fields": None,
         "ray_correlation": RayCorrelation(reason=NOT_LOOKED_FOR).as_dict(),
+        "settings": [dataclasses.asdict(one) for one in used_settings(block)],
         "notes": list(o.notes),
         "warnings": list(o.warnings),
         "timings_s": {key: float(o.timings_s.get(key, 0.0)) for key in TIMINGS},

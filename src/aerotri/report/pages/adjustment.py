@@ -35,6 +35,7 @@ from aerotri.report.tables import precision as precision_tables
 from aerotri.report.tables import rigs as rig_tables
 from aerotri.report.tables import rolling_shutters as shutter_tables
 from aerotri.report.tables import work as work_tables
+from aerotri.report.tables.settings import settings_table
 from aerotri.results.adjusted_block import AdjustedBlock, head_of
 from aerotri.results.parameter_comparison import ParameterComparison
 from aerotri.statistics.parameter_effects import ParameterEffects
@@ -54,6 +55,7 @@ CONTENTS = (
     ("effects", "What they change"),
     ("residuals", "Residuals"),
     ("work", "Work list"),
+    ("settings", "Settings"),
 )
 
 CAPTIONS = {
@@ -191,6 +193,7 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         "selection": adjusted.block.settings.adjustment.parameter_selection == "on",
         "changes": [_change(change) for change in beside.changes],
         "work_counts": work_tables.work_counts(work),
+        "settings": settings_table(adjusted.block),
         "free": None if beside.free_check is None else _free_check(beside.free_check),
         "crosscheck": None if beside.crosscheck is None else _crosscheck(beside.crosscheck),
     }
