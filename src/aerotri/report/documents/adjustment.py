@@ -120,7 +120,11 @@ def _messages(adjusted: AdjustedBlock, words: Words) -> list[Part]:
 def settings_parts(block: Block, words: Words) -> list[Part]:
     """All settings by their keys of block.toml, defaults included."""
     rows = [
-        (breakable(one.key), breakable(f"{one.text or NO_VALUE} {one.unit}".strip()), words(f"settings.{one.origin}"))
+        (
+            breakable(one.key),
+            breakable(f"{one.text} {one.unit}".strip() if one.text else NO_VALUE),
+            words(f"settings.{one.origin}"),
+        )
         for one in used_settings(block)
     ]
     columns = [words(f"settings.{name}") for name in ("key", "value", "origin")]

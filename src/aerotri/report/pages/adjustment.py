@@ -35,6 +35,7 @@ from aerotri.report.tables import precision as precision_tables
 from aerotri.report.tables import rigs as rig_tables
 from aerotri.report.tables import rolling_shutters as shutter_tables
 from aerotri.report.tables import work as work_tables
+from aerotri.report.tables.cameras_elsewhere import elsewhere_tables
 from aerotri.report.tables.settings import settings_table
 from aerotri.results.adjusted_block import AdjustedBlock, head_of
 from aerotri.results.parameter_comparison import ParameterComparison
@@ -168,6 +169,7 @@ def write_report(
 
 def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside: Findings) -> dict[str, Any]:
     work = work_list(adjusted) if beside.work is None else beside.work
+    elsewhere, elsewhere_notes = elsewhere_tables(adjusted)
     return {
         "name": quality.printable(adjusted.block.name),
         "head": page_head(head_of(adjusted)),
@@ -194,6 +196,8 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         "changes": [_change(change) for change in beside.changes],
         "work_counts": work_tables.work_counts(work),
         "settings": settings_table(adjusted.block),
+        "elsewhere": elsewhere,
+        "elsewhere_notes": elsewhere_notes,
         "free": None if beside.free_check is None else _free_check(beside.free_check),
         "crosscheck": None if beside.crosscheck is None else _crosscheck(beside.crosscheck),
     }
