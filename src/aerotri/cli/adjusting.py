@@ -69,6 +69,14 @@ def adjust(
             rich_help_panel=METHOD,
         ),
     ] = False,
+    photos: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Photographs or their folder: the report shows every mark of a control or check point. May be "
+            "repeated.",
+            rich_help_panel=INPUT,
+        ),
+    ] = None,
     plots: Annotated[bool, typer.Option(help="Draw the plots and the report.", rich_help_panel=OUTPUT)] = True,
     json_: Json = False,
 ) -> None:
@@ -78,7 +86,19 @@ def adjust(
     names = tuple(check or ())
     raise typer.Exit(
         run_adjust(
-            block, out, parameters, robust, geoid, plots, json_, check_free, control_prefix, names, model_part, start
+            block,
+            out,
+            parameters,
+            robust,
+            geoid,
+            plots,
+            json_,
+            check_free,
+            control_prefix,
+            names,
+            model_part,
+            start,
+            tuple(photos or ()),
         )
     )
 

@@ -318,7 +318,8 @@ class _Chain:
 
         (settings, plots), source = self._given("adjust"), self._project.source
         begin = source if is_block(source) else self._project.folder / BLOCK
-        found = adjust_folder(begin, folder, plots=plots, progress=self._progress, **settings)
+        photographs = () if is_block(source) else (source,)
+        found = adjust_folder(begin, folder, plots=plots, photographs=photographs, progress=self._progress, **settings)
         self._project.adjustment = found
         return found
 

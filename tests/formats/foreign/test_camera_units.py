@@ -33,7 +33,7 @@ def values_of(adjusted, program):
 
 
 def seen(adjusted):
-    """(n, 2) ideal positions for c = 1, x right and y down, of the rays used, and (n, 2) px where they were adjusted."""
+    """(n, 2) ideal positions for c = 1, y down, of the rays used, and (n, 2) px where they were adjusted."""
     block, rays = adjusted.block, adjusted.block.image_points
     used = adjusted.rays.status == RayStatus.USED
     rotation = rotation_from_angles(adjusted.images.angles, block.rotation)[rays.image[used]]

@@ -126,6 +126,6 @@ def settings_parts(block: Block, words: Words) -> list[Part]:
             words(f"settings.{one.origin}"),
         )
         for one in used_settings(block)
-    ]
+    ]  # fmt: skip
     columns = [words(f"settings.{name}") for name in ("key", "value", "origin")]
     return [paragraph(words("report.about_settings"), small=True), table(columns, rows, words=3, small=True)]

@@ -24,6 +24,7 @@ from aerotri.diagnosis.free_verdict import in_words
 from aerotri.diagnosis.work_list import WorkList, work_list
 from aerotri.image_errors import Change
 from aerotri.report import quality
+from aerotri.report.mark_pictures import SIZE, MarkPictures
 from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.pages.interactive_plan import interactive_plan
 from aerotri.report.plots.crosscheck import crosscheck_table
@@ -125,6 +126,7 @@ class Findings:
     effects : what leaving parameters out changes at the check points; None where there are none, or it was not asked.
     changes : of the image errors between groups. compared : the sets of additional parameters that were compared.
     lights : what the result is judged by; None: made from the result, as the work list.
+    marks : pictures of the marks of control and check points; None without photographs.
     """
 
     work: WorkList | None = None
@@ -134,6 +136,7 @@ class Findings:
     changes: tuple[Change, ...] = ()
     compared: ParameterComparison | None = None
     lights: Sequence[Finding] | None = None
+    marks: MarkPictures | None = None
 
 
 NOTHING_BESIDE = Findings()
@@ -196,6 +199,8 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         "changes": [_change(change) for change in beside.changes],
         "work_counts": work_tables.work_counts(work),
         "settings": settings_table(adjusted.block),
+        "marks": beside.marks,
+        "mark_size": SIZE,
         "elsewhere": elsewhere,
         "elsewhere_notes": elsewhere_notes,
         "free": None if beside.free_check is None else _free_check(beside.free_check),
