@@ -112,12 +112,10 @@ def test_on_the_page(flown, tmp_path):
     assert 'id="marks"' not in (tmp_path / "bare" / "report.html").read_text(encoding="utf-8")
 
 
-def test_command(flown, tmp_path, capsys):
+def test_command(flown, tmp_path):
     result, folder = flown
     write_block(result.block, tmp_path / "block")
     assert not invoke(["adjust", str(tmp_path / "block"), "--out", str(tmp_path / "out"), "--photos", str(folder)])
     assert 'id="marks"' in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert (
-        invoke(["adjust", str(tmp_path / "block"), "--out", str(tmp_path / "o2"), "--photos", str(tmp_path / "x")]) == 2
-    )
-    assert "is not there" in capsys.readouterr().err
+    with pytest.raises(InputError, match="is not there"):
+        invoke(["adjust", str(tmp_path / "block"), "--out", str(tmp_path / "o2"), "--photos", str(tmp_path / "x")])

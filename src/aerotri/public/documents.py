@@ -123,7 +123,7 @@ def certificate(
         raise InputError("a volume or a change has no calibration", "give the result of an adjustment")
     folder = None if isinstance(result, MeasuredVolume | MeasuredChange) else Path(result)
     is_volume = isinstance(result, MeasuredVolume) if folder is None else (folder / VOLUME).is_file()
-    content, plots = _content_of(result, folder, VOLUME if is_volume else CHANGE)
+    content, plots = _content_of(result, folder, VOLUME if is_volume else CHANGE, options.language)
     made = _time_of(None if folder is None else folder / (VOLUME if is_volume else CHANGE))
     project, notes = _project(options.project, folder, content)
     context = _context(options, made, project, content["dtm"] if is_volume else content["second"], False)
@@ -140,12 +140,16 @@ def _context(options: DocumentOptions, made: datetime, project: Project, name: s
     return Context(Words(options.language), made, project, str(name), of_block)
 
 
-def _content_of(result: Any, folder: Path | None, record: str) -> tuple[dict[str, Any], dict[str, RenderedPlot]]:
-    """Content and plots of a volume or a change."""
+def _content_of(
+    result: Any, folder: Path | None, record: str, language: str
+) -> tuple[dict[str, Any], dict[str, RenderedPlot]]:
+    """Content and plots of a volume or a change; those of a folder have the words that they were drawn with."""
+    from aerotri.report.documents.picture_texts import in_language
     from aerotri.report.plots.rendering import RenderedPlot, render_plots
+    from aerotri.report.plots.volume import plot_budget
 
     if folder is None:
-        return result.summary, render_plots(result.plot.all())
+        return result.summary, render_plots(in_language(result.plot.all(), language))
     content = _read(folder / record)
     needed = "dtm" if record == VOLUME else "volumes"
     if needed not in content:
@@ -157,6 +161,8 @@ def _content_of(result: Any, folder: Path | None, record: str) -> tuple[dict[str
         svg, png = folder / "plots" / f"{name}.svg", folder / "plots" / f"{name}.png"
         if svg.is_file() and png.is_file():
             plots[name] = RenderedPlot(svg.read_bytes(), png.read_bytes())
+    if record == VOLUME and content["sigma"] is not None and plots:
+        plots |= render_plots(in_language({"budget": plot_budget(content)}, language))
     return content, plots
 
 

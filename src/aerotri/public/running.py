@@ -24,6 +24,7 @@ from aerotri.public.run_steps import (
     BUILT_ON,
     DSM,
     DTM,
+    NO_CHECK_POINTS,
     RECORD,
     REPORT,
     RESULT,
@@ -40,6 +41,7 @@ from aerotri.volume.settings import RUN_LAYER, Layer
 
 if TYPE_CHECKING:
     from aerotri.observations import Block
+    from aerotri.public.accuracy import Accuracy
     from aerotri.public.adjustment import Adjustment
     from aerotri.public.dense import DenseSurface
     from aerotri.public.ortho import Orthophoto
@@ -61,6 +63,7 @@ class Project:
     steps : each with how it ended.
     tied : the photographs tied. adjustment : also where it was rejected. surface : the terrain. volume : over it.
     dense : the surface of all that stands on the ground. orthophoto : over it.
+    accuracy : by the check points, None without them.
     seconds : that it took. computed : when it began.
     """
 
@@ -73,6 +76,7 @@ class Project:
     volume: MeasuredVolume | None = None
     dense: DenseSurface | None = None
     orthophoto: Orthophoto | None = None
+    accuracy: Accuracy | None = None
     seconds: float = 0.0
     computed: datetime = field(default_factory=now)
 
@@ -204,7 +208,7 @@ def run(
     ...     block = aerotri.simulate(aerotri.example_flight(), seed=1).save(f"{place}/block")
     ...     project = aerotri.run(block, f"{place}/project", parameters="none", plots=False)
     >>> project.verdict, [step.status for step in project.steps]
-    ('accepted', ['done', 'left out', 'left out', 'left out', 'left out'])
+    ('accepted', ['done', 'done', 'left out', 'left out', 'left out', 'left out'])
     """
     marked, names = not is_missing(control), {"check": tuple(check)}
     from_block = is_block(Path(source))
@@ -222,7 +226,7 @@ def run(
         },
         "terrain": {"interval": interval, "ground_within": boundary, "executor": elsewhere},
         "volume": {"boundary": boundary, "base": base, "layer": layer} if not is_missing(boundary) else {},
-        "dense": {"executor": elsewhere}, "orthophoto": {},
+        "dense": {"executor": elsewhere}, "orthophoto": {}, "accuracy": {},
     }  # fmt: skip
     for verb, more in (further or {}).items():
         settings[verb] |= more
@@ -259,6 +263,8 @@ class _Chain:
             ending = missing.get(BUILT_ON.get(verb, verb), "")
             if not step.status and ending:
                 step = replace(step, status="left out", reason=ending)
+            if not step.status and verb == "accuracy" and not self._has_check_points():
+                step = replace(step, status="left out", reason=NO_CHECK_POINTS)
             if not step.status:
                 step, ending = self._done(verb, step)
             if ending:
@@ -321,6 +327,21 @@ class _Chain:
         photographs = () if is_block(source) else (source,)
         found = adjust_folder(begin, folder, plots=plots, photographs=photographs, progress=self._progress, **settings)
         self._project.adjustment = found
+        return found
+
+    def _has_check_points(self) -> bool:
+        adjusted = self._project.adjustment
+        return adjusted is not None and len(adjusted.adjusted.check) > 0
+
+    def _accuracy(self, folder: Path) -> Accuracy:
+        from aerotri.public.accuracy import ACCURACY_NAMES, accuracy
+        from aerotri.public.folders import refuse_foreign_folder
+
+        settings, _ = self._given("accuracy")
+        refuse_foreign_folder(folder, ACCURACY_NAMES[0])
+        found = accuracy(self._project.adjustment or self._project.folder / RESULT, **settings)
+        found.save(folder)
+        self._project.accuracy = found
         return found
 
     def _terrain(self, folder: Path) -> TerrainModel:

@@ -57,7 +57,7 @@ def adjustment_report(adjusted: AdjustedBlock, context: Context, version: str) -
                 parts.append(paragraph(said, small=True))
     parts.append(paragraph(words("report.about_points"), small=True))
     parts += _messages(adjusted, words)
-    files, pictures = adjustment_figures(adjusted)
+    files, pictures = adjustment_figures(adjusted, words.language)
     parts.append(heading(words("report.pictures")))
     parts += [picture(file, words(f"figure.{name}"), narrow=name != "plan") for name, file in pictures]
     parts += [heading(words("report.settings")), *settings_parts(adjusted.block, words)]

@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import Any
 
 from aerotri.observations.project import Project
-from aerotri.report.documents.parts import Document, Part
+from aerotri.report.documents.parts import Document, Part, signed_together
 from aerotri.report.documents.words import Words, breakable
 from aerotri.report.head import computed_text, head_rows
 from aerotri.results.head import Head
@@ -56,7 +56,7 @@ def document(
         "number": computed_text(words, head),
         "author": breakable(project.company or project.operator), "logo": logo,
         "made": words("head.made", version=__version__), "page": words("head.page", page="{page}", pages="{pages}"),
-        "head": [[word, breakable(text, 4000)] for word, text in rows], "parts": list(parts),
+        "head": [[word, breakable(text, 4000)] for word, text in rows], "parts": signed_together(parts),
     }  # fmt: skip
     return Document(content, files)
 

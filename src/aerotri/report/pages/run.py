@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.conventions import counted
 from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.quality import printable
 from aerotri.results.head import Head
@@ -78,6 +79,8 @@ def _verdict(adjusted: Mapping[str, Any]) -> tuple[str, list[str]]:
 def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
     """What was measured and how sure it is, a line each."""
     found = []
+    if accuracy := of_step.get("accuracy"):
+        found += _accuracy(accuracy)
     if volume := of_step.get("volume"):
         sigma = (volume.get("sigma") or {}).get("sigma_m3")
         parts = [f"{volume['net_m3']:.{_places(sigma)}f} m³"]
@@ -93,6 +96,17 @@ def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
     return found
 
 
+def _accuracy(content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """RMSE at the check points, and what the standard says to them."""
+    known = {"RMSE_H": "in plan", "RMSE_V": "in height", "VVA": "in height in vegetation"}
+    numbers = [f"{name} {100.0 * value:.1f} cm {text}" for name, text in known.items()
+               if (value := content["accuracy"].get(name)) is not None]  # fmt: skip
+    said = {"met": "all that is required is met", "not met": "NOT all that is required is met",
+            "cannot be said": "part of what is required cannot be said"}  # fmt: skip
+    words = f"{', '.join(numbers)}, at {counted(content['check_points'], 'check point')}"
+    return [("Accuracy", f"{words}; ASPRS edition 2: {said[content['met']]}")]
+
+
 def _places(sigma: float | None) -> int:
     """Decimals that show two digits of a σ."""
     return 1 if not sigma else int(np.clip(1 - np.floor(np.log10(sigma)), 0, 6))
@@ -100,7 +114,8 @@ def _places(sigma: float | None) -> int:
 
 def _step(step: dict[str, Any], folder: Path, shown: set[Path]) -> dict[str, Any]:
     done = step["status"] == "done"
-    pages = [place for place in (folder / "report.html", folder / "volume.html") if done and place.is_file()]
+    places = (folder / name for name in ("report.html", "accuracy.html", "volume.html"))
+    pages = [place for place in places if done and place.is_file()]
     page = pages[0].read_text(encoding="utf-8") if pages else ""
     there = sorted((folder / "plots").glob("*.png")) if done and not page else []
     plots = [plot for plot in there if plot not in shown][:LARGEST_PLOTS]
