@@ -125,6 +125,7 @@ def _step(step: dict[str, Any], folder: Path, shown: set[Path]) -> dict[str, Any
         "command": printable("aerotri " + " ".join(step["arguments"]), 1000),
         "figures": _figures(folder) if done else [],
         "page": page,
+        "file": f"{step['folder']}/{pages[0].name}" if pages else "",
         "plots": [(plot.stem.replace("_", " "), _encoded(plot)) for plot in plots],
         "marking": done and (folder / "control_marks" / "marking.html").is_file(),
     }
