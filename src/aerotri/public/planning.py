@@ -85,6 +85,14 @@ class FlightPlan:
         """The block that the flight will bring, free of error; ground points of the map are its check points."""
         return self.record.block
 
+    @property
+    def piles(self) -> Table:
+        """A row a pile: size, m², and σ of its volume to be expected, m³; empty where the area is one polygon."""
+        rows = self.record.piles
+        columns = {"pile": [one.name for one in rows], "area": [one.area for one in rows],
+                   "sigma": [one.sigma for one in rows]}  # fmt: skip
+        return Table.of("piles", columns, {"area": "m²", "sigma": "m³"})
+
     def fly(self, seed: int = 1) -> Block:
         """The block of one simulated flight: image points, control and positions have errors of their σ.
 
@@ -176,6 +184,7 @@ def plan_flight(
     tie_probability: float = 0.6,
     image_sigma: float = 0.5,
     most_photographs: int = 1500,
+    piles: str | FilePath | None = None,
     project: FilePath | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> FlightPlan:
@@ -209,6 +218,7 @@ def plan_flight(
     tie_points : image points expected in a photograph. tie_probability : that a photograph that sees a tie point
         measures it. image_sigma : px, σ of an image coordinate.
     most_photographs : a plan of more is refused.
+    piles : polygons of piles whose volumes are wanted one by one, as `area`; those of the area where it has several.
     project : block, or result of an adjustment, whose [project] stands at the head of page and file.
     progress : is given the name of each step.
 
@@ -229,7 +239,7 @@ def plan_flight(
     >>> plan.met
     True
     """
-    from aerotri.planning.area import read_area
+    from aerotri.planning.area import read_area, with_piles
     from aerotri.planning.cameras import camera_of_plan
     from aerotri.planning.given_control import NONE, read_given_control
     from aerotri.planning.options import PlanOptions, parse_target
@@ -252,6 +262,8 @@ def plan_flight(
         raise InputError("the height of the ground is given by a DEM or by a level", "give one: --dem or --ground")
     chosen = camera_of_plan(os.fspath(camera), self_calibration != "none")
     where = read_area(os.fspath(area), crs or _crs_of(dem))
+    if piles is not None:
+        where = with_piles(where, os.fspath(piles))
     height = gsd * chosen.interior["focal_length_mm"].value / chosen.pixel_mm
     reach = 3.0 * height * max(chosen.half_format_mm) / chosen.interior["focal_length_mm"].value
     terrain = _terrain(dem, ground, where, reach)

@@ -42,7 +42,7 @@ def plan_html(r: PlanRecord, head: Head) -> str:
         name=printable(r.area.name), head=page_head(head), box=_box(r),
         conclusion=_conclusion(r), cards=_cards(r), warnings=[printable(text, 1000) for text in r.warnings],
         sigma=_map(r, r.sigma[:, 2]), shared=_map(r, r.deformation[:, 2]), flight=_flight_table(r),
-        accuracy=_accuracy_table(r), control=_control_table(r), asked=_asked_table(r),
+        accuracy=_accuracy_table(r), control=_control_table(r), asked=_asked_table(r), piles=_piles_table(r),
         mode=f"{100.0 * r.mode_share:.0f}", first=_first(r),
     )  # fmt: skip
 
@@ -98,6 +98,16 @@ def _flight_table(r: PlanRecord) -> Table:
         ("photographs of a place of the area, at least", f"{int(seen.rays.min())}"),
     ]  # fmt: skip
     return _pairs("Flight", rows)
+
+
+def _piles_table(r: PlanRecord) -> Table:
+    piles = r.piles
+    return table(
+        "Single piles", (Column("pile"), [printable(one.name) for one in piles]),
+        (Column("size", "m²", ".0f"), [one.area for one in piles]),
+        (Column("σ of the volume", "m³", ".3g"), [one.sigma for one in piles]),
+        (Column("as a height", "mm", ".2g"), [1e3 * one.sigma / one.area for one in piles]),
+    )  # fmt: skip
 
 
 def _accuracy_table(r: PlanRecord) -> Table:
