@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from types import SimpleNamespace
 
+from aerotri.observations.project import Project
+
 VERBS = {
     "tie_points": "aerotri.public.tying.tie_points", "adjust": "aerotri.public.adjusting.adjust_folder",
     "terrain": "aerotri.public.terrain.terrain", "volume": "aerotri.public.volume.volume",
@@ -33,11 +35,18 @@ class Fakes:
         return [verb for verb, _, _ in self.called]
 
 
+class FakeBlock(str):
+    """A block that is only its name."""
+
+    project = Project()
+    crs = "local"
+
+
 class Saved:
     """What a verb gives that is written by itself."""
 
     notes = ()
-    block = "a block"
+    block = FakeBlock("a block")
 
     def save(self, out, *given, **settings):
         out.mkdir(parents=True, exist_ok=True)
@@ -50,11 +59,11 @@ class Saved:
         return self.html()
 
 
-def adjusted(verdict, status="converged"):
+def adjusted(verdict, status="converged", check=()):
     outcome = SimpleNamespace(verdict=verdict, status=status, reasons=("σ₀ is 522",), message="")
     return SimpleNamespace(
-        verdict=verdict, status=status, block="adjusted", notes=(), reasons=outcome.reasons,
-        adjusted=SimpleNamespace(outcome=outcome), html=lambda: "<p>adjusted</p>",
+        verdict=verdict, status=status, block=FakeBlock("adjusted"), notes=(), reasons=outcome.reasons,
+        adjusted=SimpleNamespace(outcome=outcome, check=check), html=lambda: "<p>adjusted</p>",
     )  # fmt: skip
 
 

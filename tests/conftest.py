@@ -17,6 +17,8 @@ def pytest_configure(config):
     Set in the process that starts the others: OpenBLAS reads it when numpy is loaded, and there pytest loads numba, and
     with it numpy, for `filterwarnings` before any conftest.
     """
+    # one time of computation for all results, so that files of two runs can be compared
+    os.environ.setdefault("SOURCE_DATE_EPOCH", "1767225600")
     if config.getoption("numprocesses", None):
         for setting in ("AEROTRI_THREADS", "OPENBLAS_NUM_THREADS"):
             os.environ.setdefault(setting, "1")

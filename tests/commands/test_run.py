@@ -34,7 +34,7 @@ def test_block_is_adjusted_and_terrain_named(block_folder, tmp_path):
     assert ends_of(out)["adjust"] == ("done", "")
     assert ends_of(out)["dtm"] == ("left out", "it needs photographs, and a block was given")
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert page.count("<iframe sandbox srcdoc=") == 1
+    assert page.count("<iframe sandbox srcdoc=") == 2
     assert "&lt;h2" in page
     assert page.index("<b>Accepted</b>") < page.index("<h2>Steps</h2>")
     assert "<script" not in page
@@ -62,7 +62,8 @@ def test_every_step_is_told(block_folder, tmp_path, capsys):
     assert told[0] == f"── Adjustment: aerotri adjust {block_folder} --out {result} --parameters none --no-plots"
     assert told[1] == "verdict: accepted"
     assert f"Written to {result}" in told
-    assert told[-7] == "──"
+    assert told[-8] == "──"
+    assert any(line.startswith("Accuracy done") for line in told[-7:])
     assert "Terrain left out: it needs photographs, and a block was given" in told
     assert told[-1] == f"Report: {tmp_path / 'out' / 'report.html'}"
 

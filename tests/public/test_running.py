@@ -29,7 +29,13 @@ def test_a_block_is_adjusted(flight, tmp_path):
     told = []
     project = aerotri.run(flight.save(tmp_path / "in"), tmp_path / "out", parameters="brown:K1", plots=False,
                           on_step=lambda step, outcome: told.append((step.name, step.status)))  # fmt: skip
-    assert told == [("adjust", ""), ("adjust", "done")]
+    assert told == [(name, end) for name in ("adjust", "accuracy") for end in ("", "done")]
+    checked = json.loads((tmp_path / "out" / "accuracy" / "accuracy.json").read_text())
+    assert checked["check_points"] == len(project.accuracy.record.points) > 0
+    page = project.report.read_text(encoding="utf-8")
+    assert f"RMSE_H {100.0 * checked['accuracy']['RMSE_H']:.1f} cm in plan" in page
+    assert "that is required is met" in page
+    assert "accuracy by check points" in page
     assert (project.verdict, project.complete) == ("accepted", True)
     assert project.surface is project.volume is project.tied is None
     assert project.adjustment.parameters["name"].tolist() == ["brown.K1"]
@@ -51,7 +57,9 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
     tie, adjust, terrain, volume, dense, ortho = fakes.called
     assert tie[1] == (str(photographs),)
     assert (tie[2]["control"], tie[2]["features"], tie[2]["seed"]) == ("gcp_list.txt", 2000, 4)
-    assert adjust == ("adjust", (str(out / "block"), str(out / "result")), {"parameters": "auto", "plots": True})
+    assert adjust == ("adjust", (str(out / "block"), str(out / "result")), {
+        "parameters": "auto", "plots": True, "photographs": (photographs,),
+    })  # fmt: skip
     assert "camera" not in tie[2]
     stated = {"interval": 5.0, "ground_within": "pile.gpkg"}
     assert terrain == ("terrain", (str(out / "result"), str(photographs)), stated)
@@ -67,10 +75,11 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
         "--features", "2000",
     ]  # fmt: skip
     assert lines[1] == ["adjust", str(out / "block"), "--out", str(out / "result"), "--parameters", "auto"]
-    assert lines[3][:4] == ["volume", str(out / "dtm"), "--adjustment", str(out / "result")]
-    assert lines[3][-7:] == ["--boundary", "pile.gpkg", "--base", "lowest", "--layer", "dtm", "--no-plots"]
-    assert lines[4] == ["dsm", str(out / "result"), str(photographs), "--out", str(out / "dsm")]
-    assert lines[5] == ["ortho", str(out / "result"), str(photographs), str(out / "dsm"), "--out", str(out / "ortho")]
+    assert lines[4][:4] == ["volume", str(out / "dtm"), "--adjustment", str(out / "result")]
+    assert lines[4][-7:] == ["--boundary", "pile.gpkg", "--base", "lowest", "--layer", "dtm", "--no-plots"]
+    assert lines[2] == ["accuracy", str(out / "result"), "--out", str(out / "accuracy")]
+    assert lines[5] == ["dsm", str(out / "result"), str(photographs), "--out", str(out / "dsm")]
+    assert lines[6] == ["ortho", str(out / "result"), str(photographs), str(out / "dsm"), "--out", str(out / "ortho")]
     assert project.block == "adjusted"
     assert None not in (project.volume, project.dense, project.orthophoto)
 
@@ -82,8 +91,8 @@ def test_the_layer_of_the_volume_is_told(fakes, photographs, tmp_path):
     assert fakes.called[-2][2]["ground_within"] == "pile.gpkg"
     assert fakes.called[-1][2]["layer"] == "dtm"
     steps = json.loads((tmp_path / "out" / "run.json").read_text())["steps"]
-    assert steps[2]["arguments"][-2:] == ["--ground-within", "pile.gpkg"]
-    assert steps[3]["arguments"][-2:] == ["--layer", "dtm"]
+    assert steps[3]["arguments"][-2:] == ["--ground-within", "pile.gpkg"]
+    assert steps[4]["arguments"][-2:] == ["--layer", "dtm"]
     aerotri.run(photographs, tmp_path / "other", boundary="pile.gpkg", layer="dsm", dense=False)
     assert fakes.called[-1][2]["layer"] == "dsm"
 
@@ -114,6 +123,7 @@ def test_a_step_that_fails_ends_the_run(fakes, photographs, tmp_path):
     assert ends_of(out) == {
         "tiepoints": ("done", ""),
         "adjust": ("failed", "too little ground — give more"),
+        "accuracy": ("left out", "adjust is missing"),
         "dtm": ("left out", "adjust is missing"),
         "volume": ("left out", "no --boundary was given"),
         "dsm": ("left out", "adjust is missing"),

@@ -73,6 +73,14 @@ def adjust(
         ),
     ] = False,
     executor: Workers = THREADS,
+    photos: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Photographs or their folder: the report shows every mark of a control or check point. May be "
+            "repeated.",
+            rich_help_panel=INPUT,
+        ),
+    ] = None,
     plots: Annotated[bool, typer.Option(help="Draw the plots and the report.", rich_help_panel=OUTPUT)] = True,
     json_: Json = False,
 ) -> None:
@@ -88,14 +96,26 @@ def adjust(
 
         others = {
             "parameters": parameters, "geoid": geoid, "check_free": check_free, "control_prefix": control_prefix,
-            "check": names, "model_part": model_part, "start": start,
+            "check": names, "model_part": model_part, "start": start, "photos": photos,
         }  # fmt: skip
         raise typer.Exit(run_adjust_parts(block, out, robust, executor, json_, **others))
     if executor != THREADS:
         raise InputError(f"--executor {executor} for a block in one piece", "divide it first: aerotri divide")
     raise typer.Exit(
         run_adjust(
-            block, out, parameters, robust, geoid, plots, json_, check_free, control_prefix, names, model_part, start
+            block,
+            out,
+            parameters,
+            robust,
+            geoid,
+            plots,
+            json_,
+            check_free,
+            control_prefix,
+            names,
+            model_part,
+            start,
+            tuple(photos or ()),
         )
     )
 

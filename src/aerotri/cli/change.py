@@ -8,7 +8,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from aerotri.cli.app import app
-from aerotri.cli.options import ARGUMENTS, METHOD, OUTPUT, SIGMAS, TERRAIN, Json
+from aerotri.cli.options import ARGUMENTS, METHOD, OUTPUT, SIGMAS, TERRAIN, Json, ProjectOf
 
 
 @app.command(
@@ -93,6 +93,7 @@ def change(
         Path | None,
         typer.Option(help="Result of the second surface; the same one if they share it.", rich_help_panel=SIGMAS),
     ] = None,
+    project: ProjectOf = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default NAME_change here.", rich_help_panel=OUTPUT)
     ] = None,
@@ -112,10 +113,10 @@ def change(
                 "--area, --noise-length, --first-adjustment, --second-adjustment: of surfaces, and clouds were given",
                 "leave them out",
             )
-        run_cloud_change(first, second, sizes, stable, out, plots, json_)
+        run_cloud_change(first, second, sizes, stable, project, out, plots, json_)
         return
     given = [f"--{name}" for name, value in sizes.items() if value is not None]
     if given:
         raise InputError(f"{', '.join(given)}: of point clouds, and surfaces were given", "give two LAS or LAZ files")
     adjustments = (first_adjustment, second_adjustment)
-    run_change(first, second, stable, cast(Any, align), area, noise_length, adjustments, out, plots, json_)
+    run_change(first, second, stable, cast(Any, align), area, noise_length, adjustments, project, out, plots, json_)

@@ -142,3 +142,11 @@ SurfaceLayer = Annotated[
         rich_help_panel=SURFACE,
     ),
 ]
+ProjectOf = Annotated[
+    Path | None,
+    typer.Option(
+        "--project",
+        help="Block or result whose [project] stands at the head of page and files. Default: that of what is given.",
+        rich_help_panel=OUTPUT,
+    ),
+]

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from aerotri.cli.app import app
-from aerotri.cli.options import ARGUMENTS, CAMERA, CONTROL, METHOD, OUTPUT, PLACE, PLANNING, SIGMAS, Json
+from aerotri.cli.options import ARGUMENTS, CAMERA, CONTROL, METHOD, OUTPUT, PLACE, PLANNING, SIGMAS, Json, ProjectOf
 from aerotri.conventions import InputError
 
 FLIGHT, GROUND = "Flight", "Ground"
@@ -132,6 +132,14 @@ def plan(
         int,
         typer.Option(min=1, help="Largest number of photographs; a plan of more is refused.", rich_help_panel=METHOD),
     ] = 1500,
+    piles: Annotated[
+        str | None,
+        typer.Option(
+            help="Polygons of piles, as AREA: σ of the volume of each. Default: those of AREA where it has several.",
+            rich_help_panel=PLACE,
+        ),
+    ] = None,
+    project: ProjectOf = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default NAME_plan here.", rich_help_panel=OUTPUT)
     ] = None,
@@ -148,7 +156,8 @@ def plan(
         "control": int(control) if control.isascii() and control.isdigit() and len(control) < 9 else control,
         "control_sigma": _pair(control_sigma, "--control-sigma"), "most_control": most_control, "target": target,
         "self_calibration": self_calibration, "tie_points": tie_points, "tie_probability": tie_probability,
-        "image_sigma": image_sigma, "most_photographs": most_photographs,
+        "image_sigma": image_sigma, "most_photographs": most_photographs, "project": project,
+        "piles": piles,
     }  # fmt: skip
     run_plan(area, out, asked, json_)
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from aerotri.cli.app import app, predict
-from aerotri.cli.options import ARGUMENTS, INPUT, METHOD, OUTPUT, TERRAIN, Json, ResultFolder, Workers
+from aerotri.cli.options import ARGUMENTS, INPUT, METHOD, OUTPUT, TERRAIN, Json, ProjectOf, ResultFolder, Workers
 from aerotri.execution.choice import THREADS
 from aerotri.terrain.settings import (
     ALIGNMENT,
@@ -241,12 +241,13 @@ def compare(
         float | None, typer.Option(min=1e-6, help="Cell of the differences, m.", rich_help_panel=METHOD)
     ] = None,
     plots: Annotated[bool, typer.Option(help="Draw map and histogram.", rich_help_panel=OUTPUT)] = True,
+    project: ProjectOf = None,
     json_: Json = False,
 ) -> None:
     """Differences of two surfaces: RMSE, bias, NMAD, LE90, map and histogram."""
     from aerotri.commands.compare import run_compare
 
-    run_compare(test, control, out, cast(Any, method), cast(Any, align), cell, plots, json_)
+    run_compare(test, control, out, cast(Any, method), cast(Any, align), cell, project, plots, json_)
 
 
 @predict.command("picket-interval", epilog="Example: aerotri predict picket-interval --scan-um 28 --scale 7000")

@@ -8,7 +8,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from aerotri.cli.app import app, predict
-from aerotri.cli.options import ARGUMENTS, METHOD, OUTPUT, SIGMAS, SURFACE, TERRAIN, Json, Seed, SurfaceLayer
+from aerotri.cli.options import ARGUMENTS, METHOD, OUTPUT, SIGMAS, SURFACE, TERRAIN, Json, ProjectOf, Seed, SurfaceLayer
 from aerotri.volume.settings import BASE, LAYER, SECTIONS, SIGMA, SectionPlan, SigmaOptions
 from aerotri.volume.settings import METHOD as VOLUME_METHOD
 
@@ -127,6 +127,7 @@ def volume(
     density_sigma: Annotated[
         float, typer.Option(min=0.0, help="σ of the density, t/m³, common to all piles.", rich_help_panel=SIGMAS)
     ] = 0.0,
+    project: ProjectOf = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default NAME_volume here.", rich_help_panel=OUTPUT)
     ] = None,
@@ -138,7 +139,7 @@ def volume(
 
     given = VolumeInput(
         surface, base, boundary, cast(Any, method), adjustment, pickets, base_adjustment, base_pickets,
-        cast(Any, layer), density, density_sigma,
+        cast(Any, layer), density, density_sigma, project,
     )  # fmt: skip
     options = SigmaOptions(
         matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
 from aerotri.formats.results.json_text import json_text
-from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.folders import refuse_foreign_folder, refuse_missing_photographs
 
 if TYPE_CHECKING:
     from aerotri.results.adjusted_block import AdjustedBlock
@@ -29,6 +29,7 @@ def run_adjust(
     check: tuple[str, ...] = (),
     model_part: Any = None,
     start: Any = None,
+    photographs: tuple[Path, ...] = (),
 ) -> int:
     """Exit code of the command: 0 when converged and not rejected, 1 otherwise; arguments as on the command line."""
     console = Console(quiet=as_json)
@@ -47,6 +48,7 @@ def run_adjust(
     read_s = time.perf_counter() - begun
     target = out or Path(f"{folder_name(path)}_result")
     refuse_foreign_folder(target, "adjustment.json")
+    refuse_missing_photographs(photographs)
 
     from aerotri.compiled import compilation_notice
     from aerotri.public.progress import StageReport
@@ -69,7 +71,7 @@ def run_adjust(
         return 1
     checked = free_check(found, progress=console.stage) if check_free else None
     timed = with_read_time(found, read_s).record
-    result = write_adjustment(timed, target, plots, StageReport(console.stage), checked)
+    result = write_adjustment(timed, target, plots, StageReport(console.stage), checked, photographs)
     _tell(result, target, console, as_json, checked)
     return 1 if result.outcome.status != "converged" or result.outcome.verdict == "rejected" else 0
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def run_change(
     first: Path, second: Path, stable: str | None, align: Align, area: str | None, noise_length: float | None,
-    adjustments: tuple[Path | None, Path | None], out: Path | None, plots: bool, as_json: bool,
+    adjustments: tuple[Path | None, Path | None], project: Path | None, out: Path | None, plots: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Measure and write; arguments as on the command line."""
     from aerotri.compiled import compilation_notice
@@ -27,7 +27,7 @@ def run_change(
     console.stage(compilation_notice() or "comparing", None)
     found = change(
         first, second, stable=stable, align=align, area=area, noise_length=noise_length,
-        first_adjustment=adjustments[0], second_adjustment=adjustments[1],
+        first_adjustment=adjustments[0], second_adjustment=adjustments[1], project=project,
     )  # fmt: skip
     found.save(target, plots)
     if as_json:
@@ -37,8 +37,8 @@ def run_change(
 
 
 def run_cloud_change(
-    first: Path, second: Path, sizes: dict[str, float | None], stable: str | None, out: Path | None, plots: bool,
-    as_json: bool,
+    first: Path, second: Path, sizes: dict[str, float | None], stable: str | None, project: Path | None,
+    out: Path | None, plots: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """The same of point clouds; `sizes` as of `aerotri.cloud_change`."""
     from aerotri.public.cloud_change import RECORD, cloud_change
@@ -46,7 +46,7 @@ def run_cloud_change(
     console = Console(quiet=as_json)
     target = out or Path(f"{second.resolve().stem}_change")
     refuse_foreign_folder(target, RECORD)
-    found = cloud_change(first, second, stable=stable, **sizes)
+    found = cloud_change(first, second, stable=stable, project=project, **sizes)
     found.save(target, plots)
     if as_json:
         print(json_text(found.summary))

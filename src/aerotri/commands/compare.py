@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def run_compare(
     test: Path, control: Path, out: Path | None, method: Interpolation, align: Movement, cell: float | None,
-    plots: bool, as_json: bool,
+    project: Path | None, plots: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Compare and write; arguments as on the command line."""
     from aerotri.public.surface_comparison import RECORD, compare
@@ -28,7 +28,7 @@ def run_compare(
     console = Console(quiet=as_json)
     target = out or Path(f"{test.resolve().stem}_comparison")
     refuse_foreign_folder(target, RECORD)
-    found = compare(test, control, method=method, align=align, cell=cell, progress=console.stage)
+    found = compare(test, control, method=method, align=align, cell=cell, project=project, progress=console.stage)
     for note in found.notes:
         console.note(note)
     found.save(target, plots)

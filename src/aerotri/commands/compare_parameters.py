@@ -55,7 +55,7 @@ def _tell(found: ComparedParameters, target: Path, console: Console, as_json: bo
     from aerotri.report.tables.terminal import table_lines
 
     if as_json:
-        content = comparison_json(found.record) | {"choice": found.reason}
+        content = found.head.as_dict() | comparison_json(found.record) | {"choice": found.reason}
         print(json_text(content))
         return
     lines = table_lines(comparison_table(found.record))

@@ -41,9 +41,7 @@ def _name(source: Path) -> str:
 
 def _tell(found: Crosscheck, target: Path, console: Console, as_json: bool) -> None:
     if as_json:
-        from aerotri.crosscheck.outcome_json import crosscheck_json
-
-        print(json_text(crosscheck_json(found.record)))
+        print(json_text(found.content))
         return
     from aerotri.report.plots.crosscheck import crosscheck_table
     from aerotri.report.quality import printable

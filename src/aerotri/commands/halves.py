@@ -21,7 +21,6 @@ def run_halves(result: Path, divisions: Sequence[str], out: Path | None, as_json
     """
     console = Console(quiet=as_json)
     from aerotri.compiled import compilation_notice
-    from aerotri.formats.results.halves import halves_json
     from aerotri.public.halves import HALVES_NAMES, halves
     from aerotri.report.tables.halves import halves_lines
 
@@ -32,7 +31,7 @@ def run_halves(result: Path, divisions: Sequence[str], out: Path | None, as_json
     console.progress("drawing")
     found.save(target)
     if as_json:
-        print(json_text(halves_json(found.record)))
+        print(json_text(found.content))
     else:
         console.lines([*halves_lines(found.record), f"Written to {target}"])
     return 0

@@ -45,4 +45,7 @@ def plan_lines(c: dict[str, Any]) -> list[str]:
             f"target {t['kind']} {t['value']:g} {t['unit']}: {'met' if t['met'] else 'NOT met'} "
             f"({t['predicted']:.3g} {t['unit']})"
         )
+    lines += [
+        f"pile {one['name']}: σ of the volume {one['sigma_m3']:.3g} m³ on {one['area_m2']:.4g} m²" for one in c["piles"]
+    ]
     return [*lines, *(f"note: {text}" for text in c["warnings"])]

@@ -91,6 +91,9 @@ class _Told:
         self._doubt = doubt(folder, found)
         self._print(outcome_lines(found.adjusted, folder))
 
+    def _accuracy(self, found: Any, folder: Path) -> None:
+        self._print([found.summary(), f"Written to {folder}"])
+
     def _dtm(self, surface: Any, folder: Path) -> None:
         from aerotri.commands.dtm import outcome_lines
 

@@ -31,6 +31,7 @@ class VolumeInput:
     layer: Layer = LAYER
     density: float | None = None
     density_sigma: float = 0.0
+    project: Path | None = None
 
     def check(self) -> None:
         """Refuse what does not go together, in the words of the command line.
@@ -74,7 +75,8 @@ def run_volume(
                 base_adjustment=given.base_adjustment, base_pickets=given.base_pickets,
                 matching_sigma_um=s.matching_sigma_um, matching_window=s.matching_window_m, base_sigma=s.base_sigma,
                 boundary_sigma=s.boundary_sigma, boundary_from=s.boundary_from, corrected=s.corrected,
-                density=given.density, density_sigma=given.density_sigma, scratch=room, progress=console.stage,
+                density=given.density, density_sigma=given.density_sigma, project=given.project, scratch=room,
+                progress=console.stage,
             )  # fmt: skip
             if plots:
                 console.progress("plots")

@@ -20,7 +20,6 @@ largest |σ_peer/σ_ours − 1| and `correlation` the largest difference of a co
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from aerotri.crosscheck.comparison import COVARIANCE_LIMIT, LIMIT, VTPV_LIMIT, CrosscheckResult, PeerCheck
@@ -30,7 +29,6 @@ from aerotri.formats.results.json_text import number_or_none
 def crosscheck_json(result: CrosscheckResult) -> dict[str, Any]:
     """The content of crosscheck.json as plain Python values, without NaN."""
     return {
-        "aerotri": _version(),
         "block": str(result.block),
         "verdict": result.verdict,
         "message": result.sentence,
@@ -74,10 +72,3 @@ def _check(check: PeerCheck) -> dict[str, Any]:
         },
         "notes": list(check.notes),
     }
-
-
-def _version() -> str:
-    try:
-        return version("aerotri")
-    except PackageNotFoundError:
-        return "unknown"

@@ -25,6 +25,7 @@ from aerotri.results.accuracy import (
     SuspectError,
 )
 from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.results.head import Head
 
 BLUNDER = 3.0
 """Times the target RMSE of a coordinate, from which an error is a blunder [L: ASPRS edition 2, 7.2]."""
@@ -49,6 +50,7 @@ def accuracy_of(adjusted: AdjustedBlock, vegetated: Collection[str], asked: Aske
         block=str(adjusted.block.name), crs=str(adjusted.block.crs), verdict=adjusted.outcome.verdict,
         points=checked_points(adjusted, vegetated), asked=asked, errors=(),
         control_sigma=control.sigma[~control.is_check], layout=None,
+        head=Head(adjusted.block.project, str(adjusted.block.crs)),
     )  # fmt: skip
     return assessed(record, _ground(adjusted))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +26,14 @@ class Area:
     Parameters
     ----------
     polygon : valid, m. crs : 'EPSG:n', None where it is not known. name : of the file. note : what was done to it.
+    piles : polygons by their names, where there are several.
     """
 
     polygon: BaseGeometry
     crs: str | None
     name: str
     note: str = ""
+    piles: tuple[tuple[str, BaseGeometry], ...] = ()
 
     def cells(self, count: int) -> np.ndarray:
         """(n, 2) m, about `count` places evenly over the area: middles of square cells that lie inside, and places on
@@ -83,7 +85,25 @@ def read_area(source: str, wanted: str | None = None) -> Area:
     if wanted is not None:
         _refuse_degrees(wanted)
     note = boundary.note.replace("the surface has no CRS", "no CRS was asked for")
-    return Area(polygon, target, boundary.name, note)
+    return Area(polygon, target, boundary.name, note, boundary.piles or _parts(polygon))
+
+
+def with_piles(area: Area, source: str) -> Area:
+    """The area with the piles of another source, in its own CRS.
+
+    Raises
+    ------
+    InputError
+        As `read_area`.
+    """
+    found = read_area(source, area.crs)
+    return replace(area, piles=found.piles or ((found.name, found.polygon),))
+
+
+def _parts(polygon: BaseGeometry) -> tuple[tuple[str, BaseGeometry], ...]:
+    """The polygons of a text that holds several, numbered; none of a single one."""
+    parts = shapely.get_parts(polygon).tolist()
+    return tuple((f"{k}", part) for k, part in enumerate(parts, start=1)) if len(parts) > 1 else ()
 
 
 def _own_crs(source: str) -> str | None:

@@ -19,9 +19,11 @@ from aerotri.observations import (
     Settings,
 )
 from aerotri.planning.area import Area
-from aerotri.planning.flight import Flight, photographs_of, rays_to, true_camera
+from aerotri.planning.flight import Flight, photographs_of, rays_seen, true_camera
 from aerotri.planning.ground import Ground
 from aerotri.planning.options import PlanOptions
+from aerotri.planning.piles import pile_places
+from aerotri.planning.sight import in_sight
 from aerotri.simulation.camera_errors import image_error_fields
 from aerotri.simulation.camera_spec import ErrorSpec
 from aerotri.simulation.measuring import Imaging, tie_rays
@@ -45,6 +47,7 @@ class Places:
     ----------
     ground : (g, 3) m, ground points of the map, in the middle of its cells; step : m, size of a cell.
     candidates : (c, 3) m, where control may be. given : (k, 3) m, control given, with names and sigma (k, 3) m.
+    piles : (p, 3) m, places of piles; owner : (p,) the pile of each.
     """
 
     ground: np.ndarray
@@ -53,16 +56,19 @@ class Places:
     given: np.ndarray
     given_names: tuple[str, ...]
     given_sigma: np.ndarray
+    piles: np.ndarray
+    owner: np.ndarray
 
     @property
     def xyz(self) -> np.ndarray:
-        return np.concatenate([self.given, self.candidates, self.ground])
+        return np.concatenate([self.given, self.candidates, self.ground, self.piles])
 
     @property
     def names(self) -> list[str]:
-        """Of control given, candidates P001 … and ground points G0001 …"""
+        """Of control given, candidates P001 …, ground points G0001 … and places of piles V0001 …"""
         candidates = [f"P{k + 1:03d}" for k in range(len(self.candidates))]
-        return [*self.given_names, *candidates, *(f"G{k + 1:04d}" for k in range(len(self.ground)))]
+        return [*self.given_names, *candidates, *(f"G{k + 1:04d}" for k in range(len(self.ground))),
+                *(f"V{k + 1:04d}" for k in range(len(self.piles)))]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +78,7 @@ class Expected:
     Parameters
     ----------
     block : with ground points as check points, and no candidate as control. xyz : (N, 3) m of its points, true.
-    given, candidates, ground : rows of its points.
+    given, candidates, ground, piles : rows of its points. owner : the pile of each of `piles`.
     """
 
     block: Block
@@ -81,6 +87,8 @@ class Expected:
     candidates: np.ndarray
     ground: np.ndarray
     candidate_sigma: np.ndarray
+    piles: np.ndarray
+    owner: np.ndarray
 
     def with_control(self, chosen: np.ndarray) -> Block:
         """The block with some of the candidates (index into them) as control."""
@@ -101,11 +109,13 @@ def places_of(
 ) -> Places:  # fmt: skip
     """Ground points and candidates, so many that most tie points stay where images have them."""
     names, xyz, sigma = given
-    seen = np.bincount(rays_to(flight, camera, xyz).point, minlength=len(xyz)) if len(xyz) else np.zeros(0, int)
+    seen = (
+        np.bincount(rays_seen(flight, camera, xyz, ground).point, minlength=len(xyz)) if len(xyz) else np.zeros(0, int)
+    )
     if (seen < 2).any():
         name = names[int(np.argmax(seen < 2))]
         raise InputError(f"control point '{name}' lies in fewer than two photographs", "leave it out, or move it")
-    mean_rays = len(rays_to(flight, camera, ground.on(area.cells(400)))) / max(len(area.cells(400)), 1)
+    mean_rays = len(rays_seen(flight, camera, ground.on(area.cells(400)), ground)) / max(len(area.cells(400)), 1)
     room = (1.0 - FEWEST_TIES) * options.tie_points * len(flight) / max(mean_rays, 1.0)
     count = int(np.clip(room - CANDIDATES, 30, GROUND_POINTS))
     step = float(np.sqrt(area.polygon.area / count))
@@ -113,7 +123,7 @@ def places_of(
     candidates = _candidates(area, min(CANDIDATES, max(count, 12)))
     return Places(
         ground.on(nodes if len(nodes) else np.array(area.polygon.representative_point().coords)), step,
-        ground.on(candidates), xyz, names, sigma,
+        ground.on(candidates), xyz, names, sigma, *pile_places(area.piles, ground),
     )  # fmt: skip
 
 
@@ -129,7 +139,7 @@ def expected_block(
     places: Places, area: Area, ground: Ground, flight: Flight, camera: Camera, options: PlanOptions
 ) -> Expected:
     """What the flight measures: tie points as they are expected, every chosen place in all photographs that see it."""
-    rays = rays_to(flight, camera, places.xyz)
+    rays = rays_seen(flight, camera, places.xyz, ground)
     left = options.tie_points - len(rays) / len(flight)
     spec = TiePointSpec(
         per_image=max(left, FEWEST_TIES * options.tie_points), probability=options.probability,
@@ -139,6 +149,7 @@ def expected_block(
         spec, _imaging(flight, camera), lambda count: _scattered(flight, camera, ground, options, count),
         lambda: stream(SEED, "measuring"),
     )  # fmt: skip
+    tied = _twice(tied.take(in_sight(ground, flight.centre, ties, tied)), len(ties))
     names = np.array([*places.names, *(f"T{k + 1:06d}" for k in range(len(ties)))])
     xyz = np.concatenate([places.xyz, ties])
     first = len(places.xyz)
@@ -160,13 +171,17 @@ def _numbered(
     number[order] = np.arange(len(order))
     k, c = len(places.given), len(places.candidates)
     count = np.bincount(rays.point, minlength=len(names))
-    own = [number[part][count[part] >= 2] for part in (slice(0, k), slice(k, k + c), slice(k + c, len(places.xyz)))]
+    g = k + c + len(places.ground)
+    parts = (slice(0, k), slice(k, k + c), slice(k + c, g), slice(g, len(places.xyz)))
+    own = [number[part][count[part] >= 2] for part in parts]
+    owner = places.owner[count[parts[3]] >= 2]
     xyz, sigma = xyz[order], options.image_sigma * camera.pixel_mm
-    ground_sigma = np.full((len(own[2]), 3), 0.001)
+    checks = np.concatenate([own[2], own[3]])
+    check_sigma = np.full((len(checks), 3), 0.001)
     control = Control(
-        np.concatenate([own[0], own[2]]), xyz[np.concatenate([own[0], own[2]])],
-        np.concatenate([places.given_sigma.reshape(-1, 3), ground_sigma]),
-        np.arange(len(own[0]) + len(own[2])) >= len(own[0]),
+        np.concatenate([own[0], checks]), xyz[np.concatenate([own[0], checks])],
+        np.concatenate([places.given_sigma.reshape(-1, 3), check_sigma]),
+        np.arange(len(own[0]) + len(checks)) >= len(own[0]),
     )  # fmt: skip
     n = len(flight)
     block = Block(
@@ -178,7 +193,12 @@ def _numbered(
         control=control, gnss_ins=_positions(flight, options), settings=_settings(camera, options),
     )  # fmt: skip
     by_axis = np.array([options.control_sigma[0], options.control_sigma[0], options.control_sigma[1]])
-    return Expected(block, xyz, own[0], own[1], own[2], by_axis)
+    return Expected(block, xyz, own[0], own[1], own[2], by_axis, own[3], owner)
+
+
+def _twice(rays: Rays, points: int) -> Rays:
+    """The rays of points that two photographs see or more."""
+    return rays.take(np.bincount(rays.point, minlength=points)[rays.point] >= 2)
 
 
 def _imaging(flight: Flight, camera: Camera) -> Imaging:

@@ -13,6 +13,7 @@ from aerotri.observations import Camera
 from aerotri.planning.area import Area
 from aerotri.planning.ground import Ground
 from aerotri.planning.options import PlanOptions
+from aerotri.planning.sight import in_sight
 from aerotri.simulation.flight import AXIS_ANGLE, format_along_across_mm
 from aerotri.simulation.projection import Photographs, Rays, TrueCamera, visible_rays
 
@@ -74,10 +75,17 @@ class Flight:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What the flight sees of places of the area: rays (n,), GSD m and overlaps at least and at most."""
+    """What the flight sees of places of the area.
+
+    Parameters
+    ----------
+    places : (n, 3) m. rays : (n,) photographs that see them. framed : (n,) photographs in whose format they lie; the
+        terrain may hide them there. gsd : m, at least and at most. forward, side : overlaps at least.
+    """
 
     places: np.ndarray
     rays: np.ndarray
+    framed: np.ndarray
     gsd: tuple[float, float]
     forward: float
     side: float
@@ -96,8 +104,14 @@ def photographs_of(flight: Flight, camera: Camera) -> Photographs:
 
 
 def rays_to(flight: Flight, camera: Camera, points: np.ndarray, margin_px: float = 20.0) -> Rays:
-    """Rays to (N, 3) m that lie inside the format less a margin."""
+    """Rays to (N, 3) m that lie inside the format less a margin, whatever stands between."""
     return visible_rays(photographs_of(flight, camera), points, [-margin_px * camera.pixel_mm])
+
+
+def rays_seen(flight: Flight, camera: Camera, points: np.ndarray, ground: Ground) -> Rays:
+    """Of these the rays that the terrain does not hide."""
+    rays = rays_to(flight, camera, points)
+    return rays.take(in_sight(ground, flight.centre, points, rays))
 
 
 def plan_strips(area: Area, ground: Ground, camera: Camera, options: PlanOptions) -> tuple[Flight, Seen]:
@@ -114,9 +128,9 @@ def plan_strips(area: Area, ground: Ground, camera: Camera, options: PlanOptions
     for margin in MARGINS:
         flight = _flown(layout.strips(margin), layout, ground, options)
         seen = what_is_seen(flight, layout, camera)
-        if seen.rays.min() >= options.rays:
+        if seen.framed.min() >= options.rays:
             return flight, seen
-    least = 0 if seen is None else int(seen.rays.min())
+    least = 0 if seen is None else int(seen.framed.min())
     raise InputError(
         f"a place of the area lies in {least} photographs, {options.rays} are asked for",
         "raise the forward or the side overlap, or lower --rays",
@@ -125,7 +139,8 @@ def plan_strips(area: Area, ground: Ground, camera: Camera, options: PlanOptions
 
 def what_is_seen(flight: Flight, layout: _Layout, camera: Camera) -> Seen:
     """Rays and GSD at places of the area; overlaps of photographs and strips on the ground there, at least."""
-    rays = rays_to(flight, camera, layout.cells)
+    framed = rays_to(flight, camera, layout.cells)
+    rays = framed.take(in_sight(layout.ground, flight.centre, layout.cells, framed))
     depth = flight.centre[rays.image, 2] - layout.cells[rays.point, 2]
     gsd = camera.pixel_mm / camera.interior["focal_length_mm"].value * depth
     forward = 1.0
@@ -136,16 +151,16 @@ def what_is_seen(flight: Flight, layout: _Layout, camera: Camera) -> Seen:
             if len(below):
                 high = float(layout.cells[below, 2].max())
                 forward = min(forward, 1.0 - base / (layout.along * (flight.centre[own[0], 2] - high)))
-    count = np.bincount(rays.point, minlength=len(layout.cells))
+    count, inside = (np.bincount(one.point, minlength=len(layout.cells)) for one in (rays, framed))
     least, most = (float(gsd.min()), float(gsd.max())) if len(gsd) else (np.nan, np.nan)
-    return Seen(layout.cells, count, (least, most), forward, layout.side_overlap(flight))
+    return Seen(layout.cells, count, inside, (least, most), forward, layout.side_overlap(flight))
 
 
 class _Layout:
     """An area in the axes of its flight: u along the strips, v to their left."""
 
     def __init__(self, area: Area, ground: Ground, camera: Camera, options: PlanOptions, axis: float):
-        self.options, self.axis = options, axis
+        self.options, self.axis, self.ground = options, axis, ground
         self.image_axis = AXIS_ANGLE[camera.flight_axis or "+y"]
         along, across = format_along_across_mm(camera)
         focal = camera.interior["focal_length_mm"].value

@@ -16,6 +16,7 @@ from aerotri.planning.expected_block import Expected, expected_block, places_of
 from aerotri.planning.flight import Flight, Seen, plan_strips
 from aerotri.planning.ground import Ground
 from aerotri.planning.options import PlanOptions, Target
+from aerotri.planning.piles import PileSigma, pile_sigmas
 
 MOST_CONTROL = 30
 """Control points added at most, unless told otherwise [C]."""
@@ -53,7 +54,7 @@ class PlanRecord:
     covariance : (g, 3, 3) m² of a ground point measured in all photographs that see it. own : (g, 3, 3) m², the part
     of its image coordinates. rays : (g,). volume_sigma : m³. added : control in the order of its gain.
     control : (k, 3) m, all of it. mode_share, mode : share of the variance of heights that the largest common
-    deformation has, and its σ (g,) m with sign. unseen : ground points left out.
+    deformation has, and its σ (g,) m with sign. piles : of the area, where it has several polygons.
     """
 
     area: Area
@@ -77,6 +78,7 @@ class PlanRecord:
     mode_share: float
     mode: np.ndarray
     warnings: tuple[str, ...] = ()
+    piles: tuple[PileSigma, ...] = ()
 
     @property
     def sigma(self) -> np.ndarray:
@@ -125,10 +127,12 @@ def make_plan(
     chosen, steps = _chosen(expected, area, options, target, wanted, most)
     say("accuracy")
     block = expected.with_control(np.array(chosen, dtype=np.int64))
-    covariance = joint_covariance(block, expected.xyz, expected.ground)
-    own = intersection_covariance(block, expected.xyz, expected.ground)
+    rows, g = np.concatenate([expected.ground, expected.piles]), len(expected.ground)
+    together = joint_covariance(block, expected.xyz, rows)
+    noise = intersection_covariance(block, expected.xyz, rows)
+    piles = pile_sigmas(area.piles, block.points[expected.piles], expected.owner, together[3 * g :, 3 * g :], noise[g:])
+    covariance, own = together[: 3 * g, : 3 * g], noise[:g]
     joint = joint_of(covariance, own, area.polygon.area)
-    g = len(expected.ground)
     blocks = covariance.reshape(g, 3, g, 3)[np.arange(g), :, np.arange(g), :]
     share, mode = _largest_mode(covariance[2::3, 2::3], own)
     candidates = expected.candidates[chosen]
@@ -142,7 +146,7 @@ def make_plan(
         places.step, blocks, own, np.bincount(block.image_points.point, minlength=len(block.points))[expected.ground],
         float(np.sqrt(max(joint.quality.volume, 0.0))), added, (*given[0], *map(str, names)),
         np.concatenate([expected.xyz[expected.given], expected.xyz[candidates]]), share, mode,
-        _warnings(options, flight, len(places.ground) - g, added, len(given[0])),
+        _warnings(options, flight, seen, len(places.ground) - g, added, len(given[0])), piles,
     )  # fmt: skip
 
 
@@ -196,7 +200,7 @@ def _largest_mode(heights: np.ndarray, own: np.ndarray) -> tuple[float, np.ndarr
 
 
 def _warnings(
-    options: PlanOptions, flight: Flight, unseen: int, added: tuple[AddedControl, ...], given: int
+    options: PlanOptions, flight: Flight, seen: Seen, unseen: int, added: tuple[AddedControl, ...], given: int
 ) -> tuple[str, ...]:
     told = []
     shortest = shortest_interval(flight)
@@ -204,6 +208,12 @@ def _warnings(
         told.append(
             f"photographs follow each other after {shortest:.2f} s, the camera needs {options.interval:g} s: fly at "
             f"{options.speed * shortest / options.interval:.3g} m/s or less"
+        )
+    hidden = seen.rays < np.minimum(seen.framed, options.rays)
+    if hidden.any():
+        told.append(
+            f"the terrain hides {100.0 * float(hidden.mean()):.2g} % of the area: fewer than {options.rays} "
+            f"photographs see it there, {int(seen.rays.min())} at least; add cross strips, or a longer lens"
         )
     if unseen:
         told.append(f"{unseen} ground points lie in fewer than two photographs and have no σ")

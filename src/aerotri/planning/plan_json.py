@@ -46,6 +46,9 @@ def plan_json(r: PlanRecord) -> dict[str, Any]:
             "kind": r.target.kind, "value": r.target.value, "unit": r.target.unit, "predicted": r.judged,
             "met": bool(r.met),
         },
+        "piles": [
+            {"name": one.name, "area_m2": one.area, "sigma_m3": one.sigma, "places": len(one.points)} for one in r.piles
+        ],
         "control": _control_json(r),
         "warnings": list(r.warnings),
     }  # fmt: skip

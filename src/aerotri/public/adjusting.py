@@ -58,6 +58,7 @@ def adjust_folder(
     control_prefix: str = "",
     check: Sequence[str] = (),
     geoid: FilePath | None = None,
+    photographs: Sequence[Path] = (),
     **settings: Any,
 ) -> Adjustment:
     """Read, adjust, and write the result.
@@ -68,6 +69,7 @@ def adjust_folder(
     progress : takes (stage, share).
     plots : draw the plots and the report.
     control_prefix, geoid : see `read_in_metres`. check : names of control points that become check points.
+    photographs : files or folders, of which the report shows the marks of control and check points.
     settings : as of `aerotri.adjust`.
 
     Returns
@@ -88,5 +90,5 @@ def adjust_folder(
     seconds = time.perf_counter() - begun
     refuse_foreign_folder(out, RECORD)
     found = with_read_time(adjust(block, geoid=geoid, progress=progress, **settings), seconds)
-    write_adjustment(found.record, out, plots, StageReport(progress))
+    write_adjustment(found.record, out, plots, StageReport(progress), photographs=photographs)
     return replace(found, notes=(*((note,) if note else ()), *unread_in_words(folder)))

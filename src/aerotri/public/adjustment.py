@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.conventions import FilePath
+from aerotri.public.folders import paths_of
 from aerotri.public.progress import ProgressLike
 
 if TYPE_CHECKING:
@@ -279,7 +281,10 @@ class Adjustment:
 
         return covariance_of(self.record, list(names))
 
-    def save(self, out: FilePath, plots: bool = True, progress: ProgressLike = None) -> Path:
+    def save(
+        self, out: FilePath, plots: bool = True, progress: ProgressLike = None,
+        photographs: FilePath | Sequence[FilePath] = (),
+    ) -> Path:  # fmt: skip
         """Write the tables, adjustment.json, the solution, the block as used and the report into a folder.
 
         Parameters
@@ -287,6 +292,8 @@ class Adjustment:
         out : folder; an older result there is replaced in one step, files of others stay.
         plots : draw the plots and the report; without them it is quicker.
         progress : see `aerotri.adjust`.
+        photographs : files or folders, as they were measured: the report then shows every mark of a control or check
+            point in its photograph.
 
         Returns
         -------
@@ -299,7 +306,7 @@ class Adjustment:
         """
         from aerotri.public.saving import save_adjustment
 
-        return save_adjustment(self.record, Path(out), plots, progress)
+        return save_adjustment(self.record, Path(out), plots, progress, paths_of(photographs))
 
     def summary(self) -> str:
         """The outcome in lines, as the command prints it."""

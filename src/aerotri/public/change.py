@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,9 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.change_epochs import common_system, doubts_of, epoch_of, epochs_of, grid_of, names_of, pair_of
 from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.projects import project_of
 from aerotri.public.table import Table
+from aerotri.results.head import Head
 from aerotri.volume.change.alignment import ALIGNS, Align
 
 if TYPE_CHECKING:
@@ -59,11 +61,13 @@ class MeasuredChange:
     Parameters
     ----------
     record : the numbers, as arrays. summary : content of change.json. areas : polygons of the volumes.
+    head : of page and file.
     """
 
     record: Change
     summary: dict[str, Any]
     areas: tuple[Boundary, ...]
+    head: Head = field(default_factory=Head)
 
     @property
     def difference(self) -> np.ndarray:
@@ -143,6 +147,7 @@ def change(
     noise_length: float | None = None,
     first_adjustment: Adjustment | FilePath | None = None,
     second_adjustment: Adjustment | FilePath | None = None,
+    project: FilePath | None = None,
 ) -> MeasuredChange:
     """What changed between two surfaces, cell by cell against its σ, and the volumes gained and lost.
 
@@ -163,6 +168,8 @@ def change(
         what bends a surface beyond the alignment, and what both have in common: one adjustment, control points,
         values of the camera.
     second_adjustment : of the second; the same one for two surfaces of one adjustment.
+    project : block, or result of an adjustment, whose [project] stands at the head of page and file; that of the
+        adjustments or of the surfaces where None.
 
     Returns
     -------
@@ -225,7 +232,8 @@ def change(
         notes.append("the surfaces are shifted by more than a few cells: bring the second nearer and measure again")
     crs = "" if epsg is None else f"EPSG:{epsg}"
     summary = change_json(found, names_of(epochs), crs, "" if ground is None else ground.name, align, tuple(notes))
-    return MeasuredChange(found, summary, tuple(areas.values()))
+    head = Head(project_of(project, second_adjustment, second, first_adjustment, first), crs)
+    return MeasuredChange(found, head.as_dict() | summary, tuple(areas.values()), head)
 
 
 FARTHEST = 3.0
@@ -278,5 +286,5 @@ def _write(target: Path, found: MeasuredChange, plots: bool) -> None:
             from aerotri.report.pages.change import write_change_page
             from aerotri.report.plots.rendering import save_plots
 
-            write_change_page(found.summary, save_plots(found.plot.all(), folder / "plots"), folder / PAGE)
+            write_change_page(found.summary, save_plots(found.plot.all(), folder / "plots"), folder / PAGE, found.head)
         write_json(folder / RECORD, found.summary)

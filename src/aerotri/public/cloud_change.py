@@ -13,7 +13,9 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.projects import project_of
 from aerotri.public.table import Table
+from aerotri.results.head import Head
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -142,6 +144,7 @@ def cloud_change(
     spacing: float | None = None,
     stable: BaseGeometry | FilePath | None = None,
     registration: float | None = None,
+    project: FilePath | None = None,
 ) -> MeasuredCloudChange:
     """Distances from a point cloud to a later one along its normals (M3C2), each with σ and level of detection.
 
@@ -156,6 +159,8 @@ def cloud_change(
     spacing : m, of the places where distances are wanted; the diameter of the cylinder where None.
     stable : ground that did not change, as in `aerotri.change`. It tells the registration.
     registration : m, error of the position of one cloud to the other, 1 σ; from stable ground, else 0, where None.
+    project : block, or result of an adjustment, whose [project] stands at the head of the file; that of the folders of
+        the clouds where None.
 
     Returns
     -------
@@ -212,9 +217,10 @@ def cloud_change(
         notes.append("nothing is known of how the clouds lie to one another: give --stable or --registration")
     beyond = np.abs(found.distance) > found.level(used)
     known = np.isfinite(found.distance)
-    summary = {
-        "aerotri": _version(), "first": _label(first), "second": _label(second),
-        "crs": "" if epsg is None else f"EPSG:{epsg}", "cylinder_m": scales.cylinder, "normal_m": scales.normal,
+    head = Head(project_of(project, *(one for one in (second, first) if not isinstance(one, np.ndarray))),
+                "" if epsg is None else f"EPSG:{epsg}")  # fmt: skip
+    summary = head.as_dict() | {
+        "first": _label(first), "second": _label(second), "cylinder_m": scales.cylinder, "normal_m": scales.normal,
         "reach_m": scales.reach, "spacing_m": between, "points_first": len(before.xyz),
         "points_second": len(after.xyz), "core_points": len(core), "with_distance": int(known.sum()),
         "sigma_from": "points" if before.covariance is not None else "scatter", "registration_m": float(used),
@@ -276,9 +282,3 @@ def _within(stable: BaseGeometry | FilePath, epsg: int | None, core: np.ndarray)
 
 def _label(given: FilePath | np.ndarray) -> str:
     return "array" if isinstance(given, np.ndarray) else Path(given).name
-
-
-def _version() -> str:
-    from aerotri.version import __version__
-
-    return __version__

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -18,6 +19,7 @@ from aerotri.public.blocks import read
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.table import Table
+from aerotri.results.head import Head
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,12 +40,13 @@ class ComparedParameters:
     Parameters
     ----------
     record : what was found of every set. choice : the set that `auto` would take, '' where none converged.
-    reason : why, in a sentence.
+    reason : why, in a sentence. head : of files.
     """
 
     record: ParameterComparison
     choice: str
     reason: str
+    head: Head = field(default_factory=Head)
 
     @property
     def table(self) -> Table:
@@ -76,7 +79,7 @@ class ComparedParameters:
         refuse_foreign_folder(target, COMPARISON_NAMES[0])
         with atomic_folder(target, own=COMPARISON_NAMES) as folder:
             save_plots({"compare_parameters": self.plot()}, folder)
-            write_comparison_tables(self.record, folder)
+            write_comparison_tables(self.record, folder, self.head)
         return target
 
     def _repr_html_(self) -> str:
@@ -133,10 +136,11 @@ def compare_parameters(
     chosen = with_settings(block, robust=robust)
     with stage_report(progress) as report:
         found = pipeline.compare_parameters(chosen, choices or candidate_sets(chosen), folds, geoid, report.set_of)
+    head = Head(chosen.project, chosen.crs)
     if not any(outcome.converged for outcome in found.outcomes):
-        return ComparedParameters(found, "", "")
+        return ComparedParameters(found, "", "", head)
     best = choose(found)
-    return ComparedParameters(found, ",".join(format_parameters(best.choice)) or "none", best.reason)
+    return ComparedParameters(found, ",".join(format_parameters(best.choice)) or "none", best.reason, head)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +173,14 @@ class Crosscheck:
         columns |= {name: [getattr(d, name) for _, d in rows] for name in ("kind", "count", "max", "rms", "worst")}
         return Table("differences over σ", pa.table(columns))
 
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """The content of crosscheck.json."""
+        from aerotri.crosscheck.outcome_json import crosscheck_json
+
+        block = self.adjusted.block
+        return Head(block.project, block.crs).as_dict() | crosscheck_json(self.record)
+
     def plot(self) -> Figure:
         """Differences of every peer over σ."""
         from aerotri.report.plots.crosscheck import plot_crosscheck
@@ -183,7 +195,6 @@ class Crosscheck:
         InputError
             When the folder holds other files, or cannot be written to.
         """
-        from aerotri.crosscheck.outcome_json import crosscheck_json
         from aerotri.formats.files.atomic import atomic_folder
         from aerotri.formats.results.json_text import write_json
         from aerotri.public.tables import write_rows
@@ -197,7 +208,7 @@ class Crosscheck:
             plots = {**all_plots(self.adjusted), **drawn}
             write_report(self.adjusted, plots, folder / "report.html", Findings(crosscheck=self.record))
             write_rows(self.table, folder / "crosscheck.csv")
-            write_json(folder / "crosscheck.json", crosscheck_json(self.record))
+            write_json(folder / "crosscheck.json", self.content)
         return target
 
     def _repr_html_(self) -> str:

@@ -22,12 +22,14 @@ from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.stated import StatedAdjustment
 from aerotri.public.surfaces import Surface, as_surface
 from aerotri.public.table import Table
+from aerotri.results.head import Head
 
 if TYPE_CHECKING:
     from aerotri.deformation.dem_correction import DemOutcome
     from aerotri.deformation.dem_window import DemModels
     from aerotri.deformation.model_map import ModelMap
     from aerotri.deformation.orientation import Orientation
+    from aerotri.observations import Block
     from aerotri.public.surfaces import SurfaceLike
     from aerotri.public.terrain import TerrainModel
     from aerotri.rasters.grids import RasterReader
@@ -193,7 +195,7 @@ def correct_dem(
         numbers = OneModel(*pair) if pair is not None else _model_map(models, model_table, reader, stack)
         crs_note = numbers.note if isinstance(numbers, PolygonMap) else ""
         models_of_dem = dem_models(record, photographs, numbers.names)
-        content = _correct(models_of_dem, numbers, reader, str(record.result.block.name), spool, report, executor)
+        content = _correct(models_of_dem, numbers, reader, record.result.block, spool, report, executor)
     return CorrectedDem(content, as_surface(dem).path, spool, tuple(text for text in (doubt, crs_note) if text))
 
 
@@ -294,7 +296,7 @@ def _orientation(record: Record, stated: Adjustment | FilePath | None) -> tuple[
 
 
 def _correct(
-    models: DemModels, numbers: ModelMap, reader: Reader, block: str, spool: Spool, report: StageReport, executor: str
+    models: DemModels, numbers: ModelMap, reader: Reader, block: Block, spool: Spool, report: StageReport, executor: str
 ) -> dict[str, Any]:
     """Correct and write the rasters; returns the content of the JSON file."""
     from aerotri.adjustment.parallel import thread_count
@@ -323,7 +325,8 @@ def _correct(
     _refuse_nothing(outcome, models, reader.path)
     write_raster(spool.folder / SIGMA_DZ, outcome.sigma, outcome.sigma_grid, reader.crs, "σ of dZ, m")
     spool.refuse_full()
-    return correction_json(outcome, models, reader.grid, block, reader.path.name)
+    found = correction_json(outcome, models, reader.grid, str(block.name), reader.path.name)
+    return Head(block.project, block.crs).as_dict() | found
 
 
 def _refuse_nothing(outcome: DemOutcome, models: DemModels, dem: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -20,6 +20,7 @@ from aerotri.public.results import open_result
 from aerotri.public.surfaces import Surface
 from aerotri.public.terrain import rows_and_files
 from aerotri.public.tile_folder import fingerprints, open_tiles
+from aerotri.results.head import Head
 from aerotri.terrain.settings import DENSE_DEFAULTS, DenseSettings
 
 if TYPE_CHECKING:
@@ -84,6 +85,7 @@ class DenseSurface:
     adjustment : key of the adjustment it was measured with.
     ground : the ground without objects, None where it was not asked for.
     keeper : what removes the tiles when nobody uses them any more; None where they stay.
+    head : of files.
     """
 
     record: DenseOutcome
@@ -92,6 +94,7 @@ class DenseSurface:
     adjustment: str
     ground: BareGround | None = None
     keeper: Spool | None = None
+    head: Head = field(default_factory=Head)
 
     @cached_property
     def surface(self) -> Surface:
@@ -132,7 +135,8 @@ class DenseSurface:
         """The content of dsm.json: cells, σ and its parts."""
         from aerotri.formats.results.dense import dense_json
 
-        return dense_json(self.record, self.block, self.crs, self.ground) | {"adjustment": self.adjustment}
+        found = dense_json(self.record, self.block, self.crs, self.ground)
+        return self.head.as_dict() | found | {"adjustment": self.adjustment}
 
     @property
     def plot(self) -> DensePlots:
@@ -272,7 +276,7 @@ def measure_dense(
         outcome = measure_surface(record, plan, report.stage, workers)
     ground = bare_ground(outcome, settings.widest_object) if settings.ground else None
     block = record.result.block
-    return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper)
+    return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper, Head(block.project, block.crs))
 
 
 def _surface_parts(o: DenseOutcome) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:

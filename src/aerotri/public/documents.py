@@ -123,7 +123,7 @@ def certificate(
         raise InputError("a volume or a change has no calibration", "give the result of an adjustment")
     folder = None if isinstance(result, MeasuredVolume | MeasuredChange) else Path(result)
     is_volume = isinstance(result, MeasuredVolume) if folder is None else (folder / VOLUME).is_file()
-    content, plots = _content_of(result, folder, VOLUME if is_volume else CHANGE)
+    content, plots = _content_of(result, folder, VOLUME if is_volume else CHANGE, options.language)
     made = _time_of(None if folder is None else folder / (VOLUME if is_volume else CHANGE))
     project, notes = _project(options.project, folder, content)
     context = _context(options, made, project, content["dtm"] if is_volume else content["second"], False)
@@ -140,12 +140,16 @@ def _context(options: DocumentOptions, made: datetime, project: Project, name: s
     return Context(Words(options.language), made, project, str(name), of_block)
 
 
-def _content_of(result: Any, folder: Path | None, record: str) -> tuple[dict[str, Any], dict[str, RenderedPlot]]:
-    """Content and plots of a volume or a change."""
+def _content_of(
+    result: Any, folder: Path | None, record: str, language: str
+) -> tuple[dict[str, Any], dict[str, RenderedPlot]]:
+    """Content and plots of a volume or a change; those of a folder have the words that they were drawn with."""
+    from aerotri.report.documents.picture_texts import in_language
     from aerotri.report.plots.rendering import RenderedPlot, render_plots
+    from aerotri.report.plots.volume import plot_budget
 
     if folder is None:
-        return result.summary, render_plots(result.plot.all())
+        return result.summary, render_plots(in_language(result.plot.all(), language))
     content = _read(folder / record)
     needed = "dtm" if record == VOLUME else "volumes"
     if needed not in content:
@@ -157,6 +161,8 @@ def _content_of(result: Any, folder: Path | None, record: str) -> tuple[dict[str
         svg, png = folder / "plots" / f"{name}.svg", folder / "plots" / f"{name}.png"
         if svg.is_file() and png.is_file():
             plots[name] = RenderedPlot(svg.read_bytes(), png.read_bytes())
+    if record == VOLUME and content["sigma"] is not None and plots:
+        plots |= render_plots(in_language({"budget": plot_budget(content)}, language))
     return content, plots
 
 
@@ -177,45 +183,38 @@ def _version(record: Mapping[str, Any]) -> str:
 
 
 def _time_of(record: Path | None) -> datetime:
-    """When the result was written; now for one that was not."""
+    """When the result was computed; of an older one when it was written; now for one that was not."""
+    from aerotri.results.head import now, time_of
+
     if record is None or not record.is_file():
-        return datetime.now(UTC)
-    return datetime.fromtimestamp(int(record.stat().st_mtime), UTC)
+        return now()
+    return time_of(_read(record).get("computed")) or datetime.fromtimestamp(int(record.stat().st_mtime), UTC)
 
 
-def _project(
-    given: FilePath | None, folder: Path | None, content: Mapping[str, Any]
-) -> tuple[Project, tuple[str, ...]]:
-    """The [project] that was named, or that of the block beside the result; a sentence about where it is from."""
-    from aerotri.observations.project import Project
+def _project(given: FilePath | None, folder: Path | None, content: dict[str, Any]) -> tuple[Project, tuple[str, ...]]:
+    """The [project] that was named, or what the result and what it names say; a sentence about it."""
+    from aerotri.public.projects import project_in, project_of
 
-    for place in [Path(given)] if given is not None else _places(folder, content):
-        toml = next((one for one in (place / "block" / "block.toml", place / "block.toml", place)
-                     if one.is_file() and one.suffix == ".toml"), None)  # fmt: skip
-        if toml is not None:
-            found = _project_of(toml)
-            return found, (f"the head is that of {toml}",) if found.given() else ()
     if given is not None:
-        raise InputError("holds no block.toml", "give a block folder or the result of an adjustment", Path(given))
-    return Project(), ("nothing is known of a project: name its block with --project",)
+        found = project_of(given)
+        return found, (f"the head is that of {given}",) if found.given() else ()
+    for place in _places(folder, content):
+        beside = project_of(None, place)
+        if beside.given():
+            return beside, (f"the head is that of {place}",)
+    found = project_in(content)
+    return found, () if found.given() else ("nothing is known of a project: name its block with --project",)
 
 
 def _places(folder: Path | None, content: Mapping[str, Any]) -> list[Path]:
     """Folders beside a result that may hold its block: of `aerotri run`, and the adjustment that it names."""
-    from aerotri.public.run_steps import RECORD
+    from aerotri.public.run_steps import RECORD, RESULT
 
     if folder is None:
         return []
     around = folder.resolve().parent
     sigma = content.get("sigma")
     named = str(sigma.get("adjustment") or "") if isinstance(sigma, dict) else ""
-    places = [around / "result"] if (around / RECORD).is_file() else []
-    return [*places, around / Path(named).name] if named else places
-
-
-def _project_of(toml: Path) -> Project:
-    from aerotri.formats.block.logo import with_logo
-    from aerotri.formats.block.settings import read_block_toml
-
-    settings = read_block_toml(toml)
-    return with_logo(settings.model.project.project(), settings)
+    places = [around / RESULT] if (around / RECORD).is_file() else []
+    places += [around / Path(named).name] if named else []
+    return [one for one in places if one.is_dir()]

@@ -53,6 +53,18 @@ def refuse_foreign_folder(folder: Path, *own: str) -> None:
         raise InputError(f"'{folder}' holds other files", "choose another --out, or an empty folder")
 
 
+def refuse_missing_photographs(given: Sequence[Path]) -> None:
+    """Photographs, or folders of them, that are not there.
+
+    Raises
+    ------
+    InputError
+    """
+    for path in given:
+        if not path.exists():
+            raise InputError("is not there", "give the photographs, or their folder", path)
+
+
 def paths_of(given: FilePath | Sequence[FilePath]) -> list[Path]:
     """One path or several, as a list."""
     return [Path(given)] if isinstance(given, str | os.PathLike) else [Path(path) for path in given]

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.table import Table
+from aerotri.results.head import Head
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -86,6 +88,14 @@ class Halves:
                 out[f"heights_{one.division}"] = plot_height_differences(one, block, self.adjusted.block.crs)
         return out
 
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """The content of halves.json."""
+        from aerotri.formats.results.halves import halves_json
+
+        block = self.adjusted.block
+        return Head(block.project, block.crs).as_dict() | halves_json(self.record)
+
     def save(self, out: FilePath) -> Path:
         """Write halves.json, the tables and the plots into a folder.
 
@@ -96,7 +106,7 @@ class Halves:
         """
         from aerotri.formats.files.atomic import atomic_folder
         from aerotri.formats.results.adjustment import write_csv
-        from aerotri.formats.results.halves import ground_columns, halves_json, image_columns, point_columns
+        from aerotri.formats.results.halves import ground_columns, image_columns, point_columns
         from aerotri.formats.results.json_text import write_json
         from aerotri.report.plots.overview import save_plots
 
@@ -104,7 +114,7 @@ class Halves:
         refuse_foreign_folder(target, HALVES_NAMES[0])
         with atomic_folder(target, own=HALVES_NAMES) as folder:
             save_plots(self.plots(), folder / "plots")
-            write_json(folder / "halves.json", halves_json(record))
+            write_json(folder / "halves.json", self.content)
             write_csv(folder / "image_cells.csv", image_columns(record.comparisons))
             write_csv(folder / "ground_cells.csv", ground_columns(record.comparisons))
             write_csv(folder / "ground_points.csv", point_columns(record.comparisons, self.adjusted.block.points))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -17,6 +17,7 @@ from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.optional import optional_module
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.results import open_result
+from aerotri.results.head import Head
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,11 +41,13 @@ class ModelDeformation:
     Parameters
     ----------
     record : the numbers as arrays. block : name of the block. notes : what was done with the DEM, in sentences.
+    head : of files.
     """
 
     record: Deformation | BlockDeformation
     block: str
     notes: tuple[str, ...] = ()
+    head: Head = field(default_factory=Head)
 
     @property
     def x(self) -> np.ndarray:
@@ -82,8 +85,8 @@ class ModelDeformation:
         from aerotri.formats.results.deformation import block_deformation_json, deformation_json
 
         if isinstance(self.record, BlockDeformation):
-            return block_deformation_json(self.record, self.block)
-        return deformation_json(self.record, self.block)
+            return self.head.as_dict() | block_deformation_json(self.record, self.block)
+        return self.head.as_dict() | deformation_json(self.record, self.block)
 
     def to_xarray(self) -> Any:
         """An `xarray.Dataset` with dX, dY, dZ and their σ over y and x.
@@ -197,13 +200,15 @@ def deform(
         report.stage("orientation", None)
         models = restitution_of(record, variant)
         refuse_without_errors(models, name)
+        block = record.result.block
+        head = Head(block.project, block.crs)
         report.stage("deformation", None)
         if end_lap is not None:
-            return ModelDeformation(deform_normal_case(record, models, end_lap, spacing, group, gsd), name)
+            return ModelDeformation(deform_normal_case(record, models, end_lap, spacing, group, gsd), name, head=head)
         ground, notes = _ground(record, dem, stack)
         if pair is not None:
-            return ModelDeformation(deform_pair(record, models, pair, ground, spacing), name, notes)
-        return ModelDeformation(_of_block(record, models, ground, spacing, step, report), name, notes)
+            return ModelDeformation(deform_pair(record, models, pair, ground, spacing), name, notes, head)
+        return ModelDeformation(_of_block(record, models, ground, spacing, step, report), name, notes, head)
 
 
 def _of_block(

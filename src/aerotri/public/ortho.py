@@ -19,6 +19,7 @@ from aerotri.public.results import open_result
 from aerotri.public.surfaces import as_surface
 from aerotri.public.terrain import ENDINGS
 from aerotri.public.tile_folder import fingerprints, open_tiles
+from aerotri.results.head import Head
 from aerotri.terrain.ortho.settings import DEFAULTS, OrthoSettings, Sampling
 from aerotri.volume.settings import LAYERS, Layer
 
@@ -228,7 +229,7 @@ def _described(
 
     block = record.result.block
     write_seams(folder / SEAMS, outcome, horizontal_crs(block.crs))
-    summary = ortho_json(outcome, block, name, settings.resampling)
+    summary = Head(block.project, block.crs).as_dict() | ortho_json(outcome, block, name, settings.resampling)
     write_json(folder / RECORD, summary)
     return outcome, summary, tuple(marked_points(outcome, block))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,7 +13,9 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.observations import Block
 from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.projects import project_of
 from aerotri.public.table import Table
+from aerotri.results.head import Head
 
 if TYPE_CHECKING:
     from aerotri.planning.ground import Ground
@@ -31,10 +33,11 @@ class FlightPlan:
 
     Parameters
     ----------
-    record : what was planned.
+    record : what was planned. head : of page and file.
     """
 
     record: PlanRecord
+    head: Head = field(default_factory=Head)
 
     @property
     def met(self) -> bool | None:
@@ -46,7 +49,7 @@ class FlightPlan:
         """What plan.json holds."""
         from aerotri.planning.plan_json import plan_json
 
-        return plan_json(self.record)
+        return self.head.as_dict() | plan_json(self.record)
 
     @property
     def exposures(self) -> Table:
@@ -82,6 +85,14 @@ class FlightPlan:
         """The block that the flight will bring, free of error; ground points of the map are its check points."""
         return self.record.block
 
+    @property
+    def piles(self) -> Table:
+        """A row a pile: size, m², and σ of its volume to be expected, m³; empty where the area is one polygon."""
+        rows = self.record.piles
+        columns = {"pile": [one.name for one in rows], "area": [one.area for one in rows],
+                   "sigma": [one.sigma for one in rows]}  # fmt: skip
+        return Table.of("piles", columns, {"area": "m²", "sigma": "m³"})
+
     def fly(self, seed: int = 1) -> Block:
         """The block of one simulated flight: image points, control and positions have errors of their σ.
 
@@ -104,7 +115,7 @@ class FlightPlan:
         """The page as text."""
         from aerotri.report.pages.plan import plan_html
 
-        return plan_html(self.record)
+        return plan_html(self.record, self.head)
 
     def save(self, out: FilePath) -> Path:
         """Write plan.json, plan.html, plan.gpkg, plan.kml (with a CRS), waypoints.csv, sigma_z.tif and block/.
@@ -173,6 +184,8 @@ def plan_flight(
     tie_probability: float = 0.6,
     image_sigma: float = 0.5,
     most_photographs: int = 1500,
+    piles: str | FilePath | None = None,
+    project: FilePath | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> FlightPlan:
     """A flight over an area, its accuracy predicted, and control added where it helps most.
@@ -205,6 +218,8 @@ def plan_flight(
     tie_points : image points expected in a photograph. tie_probability : that a photograph that sees a tie point
         measures it. image_sigma : px, σ of an image coordinate.
     most_photographs : a plan of more is refused.
+    piles : polygons of piles whose volumes are wanted one by one, as `area`; those of the area where it has several.
+    project : block, or result of an adjustment, whose [project] stands at the head of page and file.
     progress : is given the name of each step.
 
     Returns
@@ -224,7 +239,7 @@ def plan_flight(
     >>> plan.met
     True
     """
-    from aerotri.planning.area import read_area
+    from aerotri.planning.area import read_area, with_piles
     from aerotri.planning.cameras import camera_of_plan
     from aerotri.planning.given_control import NONE, read_given_control
     from aerotri.planning.options import PlanOptions, parse_target
@@ -247,13 +262,15 @@ def plan_flight(
         raise InputError("the height of the ground is given by a DEM or by a level", "give one: --dem or --ground")
     chosen = camera_of_plan(os.fspath(camera), self_calibration != "none")
     where = read_area(os.fspath(area), crs or _crs_of(dem))
+    if piles is not None:
+        where = with_piles(where, os.fspath(piles))
     height = gsd * chosen.interior["focal_length_mm"].value / chosen.pixel_mm
     reach = 3.0 * height * max(chosen.half_format_mm) / chosen.interior["focal_length_mm"].value
     terrain = _terrain(dem, ground, where, reach)
     made = make_plan(
         where, terrain, chosen, options, goal, given, wanted, most_control, *(() if progress is None else (progress,))
     )
-    return FlightPlan(made)
+    return FlightPlan(made, Head(project_of(project), made.area.crs or "local"))
 
 
 def _crs_of(dem: FilePath | None) -> str | None:

@@ -11,10 +11,11 @@ from aerotri.conventions import InputError
 from aerotri.volume.settings import LAYER
 
 RECORD, REPORT = "run.json", "report.html"
-BLOCK, RESULT, DTM, VOLUME, DSM, ORTHO = "block", "result", "dtm", "volume", "dsm", "ortho"
-Verb = Literal["tie_points", "adjust", "terrain", "volume", "dense", "orthophoto"]
+BLOCK, RESULT, ACCURACY, DTM, VOLUME, DSM, ORTHO = "block", "result", "accuracy", "dtm", "volume", "dsm", "ortho"
+Verb = Literal["tie_points", "adjust", "accuracy", "terrain", "volume", "dense", "orthophoto"]
 BUILT_ON: Mapping[Verb, Verb] = {
-    "adjust": "tie_points", "terrain": "adjust", "volume": "terrain", "dense": "adjust", "orthophoto": "dense",
+    "adjust": "tie_points", "accuracy": "adjust", "terrain": "adjust", "volume": "terrain", "dense": "adjust",
+    "orthophoto": "dense",
 }  # fmt: skip
 """The step that each takes up."""
 OPTIONS = {"control": "gcp"}
@@ -22,6 +23,7 @@ OPTIONS = {"control": "gcp"}
 NEEDS_PHOTOGRAPHS = "it needs photographs, and a block was given"
 NO_BOUNDARY = "no --boundary was given"
 NOT_DENSE = "--no-dense was given"
+NO_CHECK_POINTS = "there are no check points"
 
 
 @dataclass(frozen=True)
@@ -67,12 +69,15 @@ def steps_of(
     """
     if not is_block(source) and not source.is_dir():
         raise InputError("is neither a folder of photographs nor a block", "give the folder", source)
-    block, result, dtm, volume, dsm, ortho = (str(out / name) for name in (BLOCK, RESULT, DTM, VOLUME, DSM, ORTHO))
+    block, result, accuracy, dtm, volume, dsm, ortho = (
+        str(out / name) for name in (BLOCK, RESULT, ACCURACY, DTM, VOLUME, DSM, ORTHO)
+    )
     refuse_of_photographs(source, settings)
     begun = str(source) if is_block(source) else block
     steps: dict[Verb, Step] = {
         "tie_points": Step("tiepoints", BLOCK, "Tie points", ("tiepoints", str(source), "--out", block)),
         "adjust": Step("adjust", RESULT, "Adjustment", ("adjust", begun, "--out", result)),
+        "accuracy": Step("accuracy", ACCURACY, "Accuracy", ("accuracy", result, "--out", accuracy)),
         "terrain": Step("dtm", DTM, "Terrain", ("dtm", result, str(source), "--out", dtm)),
         "volume": Step("volume", VOLUME, "Volume", ("volume", dtm, "--adjustment", result, "--out", volume)),
         "dense": Step("dsm", DSM, "Dense surface", ("dsm", result, str(source), "--out", dsm)),

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,7 @@ from aerotri.public.run_steps import (
     BUILT_ON,
     DSM,
     DTM,
+    NO_CHECK_POINTS,
     RECORD,
     REPORT,
     RESULT,
@@ -33,11 +35,13 @@ from aerotri.public.run_steps import (
     steps_of,
 )
 from aerotri.results.failure import AdjustmentFailedError
+from aerotri.results.head import Head, now
 from aerotri.tie_points.settings import DEFAULTS
 from aerotri.volume.settings import RUN_LAYER, Layer
 
 if TYPE_CHECKING:
     from aerotri.observations import Block
+    from aerotri.public.accuracy import Accuracy
     from aerotri.public.adjustment import Adjustment
     from aerotri.public.dense import DenseSurface
     from aerotri.public.ortho import Orthophoto
@@ -59,7 +63,8 @@ class Project:
     steps : each with how it ended.
     tied : the photographs tied. adjustment : also where it was rejected. surface : the terrain. volume : over it.
     dense : the surface of all that stands on the ground. orthophoto : over it.
-    seconds : that it took.
+    accuracy : by the check points, None without them.
+    seconds : that it took. computed : when it began.
     """
 
     folder: Path
@@ -71,7 +76,9 @@ class Project:
     volume: MeasuredVolume | None = None
     dense: DenseSurface | None = None
     orthophoto: Orthophoto | None = None
+    accuracy: Accuracy | None = None
     seconds: float = 0.0
+    computed: datetime = field(default_factory=now)
 
     @property
     def block(self) -> Block | None:
@@ -96,9 +103,15 @@ class Project:
         return self.folder / REPORT
 
     @property
+    def head(self) -> Head:
+        """Of page and file: the block's."""
+        block = self.block
+        return Head(computed=self.computed) if block is None else Head(block.project, block.crs, self.computed)
+
+    @property
     def summary(self) -> dict[str, Any]:
         """The content of run.json."""
-        return {"source": str(self.source), "steps": [asdict(step) for step in self.steps],
+        return {**self.head.as_dict(), "source": str(self.source), "steps": [asdict(step) for step in self.steps],
                 "seconds": round(self.seconds, 1), "report": str(self.report)}  # fmt: skip
 
     def __repr__(self) -> str:
@@ -195,7 +208,7 @@ def run(
     ...     block = aerotri.simulate(aerotri.example_flight(), seed=1).save(f"{place}/block")
     ...     project = aerotri.run(block, f"{place}/project", parameters="none", plots=False)
     >>> project.verdict, [step.status for step in project.steps]
-    ('accepted', ['done', 'left out', 'left out', 'left out', 'left out'])
+    ('accepted', ['done', 'done', 'left out', 'left out', 'left out', 'left out'])
     """
     marked, names = not is_missing(control), {"check": tuple(check)}
     from_block = is_block(Path(source))
@@ -213,7 +226,7 @@ def run(
         },
         "terrain": {"interval": interval, "ground_within": boundary, "executor": elsewhere},
         "volume": {"boundary": boundary, "base": base, "layer": layer} if not is_missing(boundary) else {},
-        "dense": {"executor": elsewhere}, "orthophoto": {},
+        "dense": {"executor": elsewhere}, "orthophoto": {}, "accuracy": {},
     }  # fmt: skip
     for verb, more in (further or {}).items():
         settings[verb] |= more
@@ -250,13 +263,15 @@ class _Chain:
             ending = missing.get(BUILT_ON.get(verb, verb), "")
             if not step.status and ending:
                 step = replace(step, status="left out", reason=ending)
+            if not step.status and verb == "accuracy" and not self._has_check_points():
+                step = replace(step, status="left out", reason=NO_CHECK_POINTS)
             if not step.status:
                 step, ending = self._done(verb, step)
             if ending:
                 missing[verb] = ending
             project.steps.append(step)
         project.seconds = time.perf_counter() - begun
-        write_report(project.summary, project.folder)
+        write_report(project.summary, project.folder, project.head)
         return project
 
     def _done(self, verb: Verb, step: Step) -> tuple[Step, str]:
@@ -309,8 +324,24 @@ class _Chain:
 
         (settings, plots), source = self._given("adjust"), self._project.source
         begin = source if is_block(source) else self._project.folder / BLOCK
-        found = adjust_folder(begin, folder, plots=plots, progress=self._progress, **settings)
+        photographs = () if is_block(source) else (source,)
+        found = adjust_folder(begin, folder, plots=plots, photographs=photographs, progress=self._progress, **settings)
         self._project.adjustment = found
+        return found
+
+    def _has_check_points(self) -> bool:
+        adjusted = self._project.adjustment
+        return adjusted is not None and len(adjusted.adjusted.check) > 0
+
+    def _accuracy(self, folder: Path) -> Accuracy:
+        from aerotri.public.accuracy import ACCURACY_NAMES, accuracy
+        from aerotri.public.folders import refuse_foreign_folder
+
+        settings, _ = self._given("accuracy")
+        refuse_foreign_folder(folder, ACCURACY_NAMES[0])
+        found = accuracy(self._project.adjustment or self._project.folder / RESULT, **settings)
+        found.save(folder)
+        self._project.accuracy = found
         return found
 
     def _terrain(self, folder: Path) -> TerrainModel:
@@ -379,7 +410,7 @@ def is_usable(result: Adjustment) -> bool:
     return result.status == "converged" and result.verdict != "rejected"
 
 
-def write_report(content: Mapping[str, Any], folder: Path) -> None:
+def write_report(content: Mapping[str, Any], folder: Path, head: Head) -> None:
     """The record and the page, each whole or not at all."""
     from aerotri.formats.files.atomic import atomic_file
     from aerotri.report.pages.run import run_page
@@ -387,4 +418,4 @@ def write_report(content: Mapping[str, Any], folder: Path) -> None:
     with atomic_file(folder / RECORD) as place:
         write_json(place, content)
     with atomic_file(folder / REPORT) as place:
-        place.write_text(run_page(dict(content), folder), encoding="utf-8")
+        place.write_text(run_page(dict(content), folder, head), encoding="utf-8")

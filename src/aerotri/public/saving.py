@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,8 +15,10 @@ from aerotri.formats.results.adjustment import write_csv, write_result
 from aerotri.formats.results.json_text import write_json
 from aerotri.formats.results.solution import write_solution
 from aerotri.image_errors import group_changes
-from aerotri.public.folders import refuse_foreign_folder
+from aerotri.public.folders import refuse_foreign_folder, refuse_missing_photographs
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.results.adjusted_block import head_of
+from aerotri.results.head import Head
 
 if TYPE_CHECKING:
     import numpy as np
@@ -69,7 +72,9 @@ def evaluate(adjustment: Adjustment) -> Evaluation:
     return Evaluation(work_list(adjustment.local), effects, findings(adjustment.local), changes)
 
 
-def save_adjustment(record: Adjustment, out: Path, plots: bool, progress: ProgressLike) -> Path:
+def save_adjustment(
+    record: Adjustment, out: Path, plots: bool, progress: ProgressLike, photographs: Sequence[Path] = ()
+) -> Path:
     """As `Adjustment.save`.
 
     Raises
@@ -78,24 +83,31 @@ def save_adjustment(record: Adjustment, out: Path, plots: bool, progress: Progre
         When the folder holds other files, or cannot be written to.
     """
     with stage_report(progress) as report:
-        write_adjustment(record, out, plots, report)
+        write_adjustment(record, out, plots, report, photographs=photographs)
     return out
 
 
 def write_adjustment(
-    adjustment: Adjustment, target: Path, plots: bool, report: StageReport, checked: FreeCheck | None = None
+    adjustment: Adjustment,
+    target: Path,
+    plots: bool,
+    report: StageReport,
+    checked: FreeCheck | None = None,
+    photographs: Sequence[Path] = (),
 ) -> AdjustedBlock:
     """Write everything to a temporary folder, and rename it; gives the result with the time this took.
 
     Parameters
     ----------
     plots : draw the plots and the report. checked : of `--check-free`.
+    photographs : files or folders; the marks of control and check points are cut out of them for the report.
 
     Raises
     ------
     InputError
     """
     refuse_foreign_folder(target, RECORD)
+    refuse_missing_photographs(photographs)
     result, begun = adjustment.result, time.perf_counter()
     with atomic_folder(target, own=RESULT_NAMES) as folder:
         write_block(result.block, folder / "block")
@@ -107,27 +119,27 @@ def write_adjustment(
         if plots:
             report.stage("drawing", None)
             begun = time.perf_counter()
-            _draw(adjustment, found, folder, checked)
+            _draw(adjustment, found, folder, checked, photographs)
             timings["plots"] = time.perf_counter() - begun
         result = replace(result, outcome=replace(result.outcome, timings_s=timings))
         if checked is not None:
             from aerotri.formats.results.free_check import free_check_json
 
             write_json(folder / "check_free.json", free_check_json(checked))
-        _write_evaluation(found, adjustment.compared, folder)
+        _write_evaluation(found, adjustment.compared, folder, head_of(result))
         write_result(result, folder)
     return result
 
 
-def write_comparison_tables(comparison: ParameterComparison, folder: Path) -> None:
-    """Write compare_parameters.json and compare_parameters.csv into a folder."""
+def write_comparison_tables(comparison: ParameterComparison, folder: Path, head: Head) -> None:
+    """Write compare_parameters.json, with its head, and compare_parameters.csv into a folder."""
     from aerotri.formats.results.parameter_sets import comparison_columns, comparison_json
 
-    write_json(folder / "compare_parameters.json", comparison_json(comparison))
+    write_json(folder / "compare_parameters.json", head.as_dict() | comparison_json(comparison))
     write_csv(folder / "compare_parameters.csv", comparison_columns(comparison))
 
 
-def _write_evaluation(found: Evaluation, compared: ParameterComparison | None, folder: Path) -> None:
+def _write_evaluation(found: Evaluation, compared: ParameterComparison | None, folder: Path, head: Head) -> None:
     """The work list, and where there are any: effects of the parameters, differences between groups, sets compared."""
     from aerotri.formats.results.evaluation import effects_columns, work_columns
     from aerotri.formats.results.parameter_sets import changes_columns, changes_json
@@ -139,10 +151,13 @@ def _write_evaluation(found: Evaluation, compared: ParameterComparison | None, f
         write_json(folder / "parameter_changes.json", changes_json(found.changes))
         write_csv(folder / "parameter_changes.csv", changes_columns(found.changes))
     if compared is not None:
-        write_comparison_tables(compared, folder)
+        write_comparison_tables(compared, folder, head)
 
 
-def _draw(adjustment: Adjustment, found: Evaluation, folder: Path, checked: FreeCheck | None) -> None:
+def _draw(
+    adjustment: Adjustment, found: Evaluation, folder: Path, checked: FreeCheck | None, photographs: Sequence[Path]
+) -> None:
+    from aerotri.report.mark_pictures import mark_pictures
     from aerotri.report.pages.adjustment import Findings, write_report
     from aerotri.report.plots.comparison import plot_comparison
     from aerotri.report.plots.overview import all_plots, save_plots
@@ -152,7 +167,7 @@ def _draw(adjustment: Adjustment, found: Evaluation, folder: Path, checked: Free
         figures["compare_parameters"] = plot_comparison(adjustment.compared)
     beside = Findings(
         found.work, checked, effects=found.effects, changes=found.changes, compared=adjustment.compared,
-        lights=found.lights,
+        lights=found.lights, marks=mark_pictures(adjustment.result, photographs) if photographs else None,
     )  # fmt: skip
     write_report(adjustment.result, save_plots(figures, folder / "plots"), folder / "report.html", beside)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -15,8 +15,10 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
+from aerotri.public.projects import project_of
 from aerotri.public.surfaces import Surface, as_surface
 from aerotri.public.table import Table
+from aerotri.results.head import Head
 from aerotri.terrain.settings import ALIGNMENT, ALIGNMENTS, INTERPOLATION, INTERPOLATIONS, Interpolation, Movement
 
 if TYPE_CHECKING:
@@ -42,6 +44,7 @@ class SurfaceComparison:
     test, control : names of the surfaces. method : how both were interpolated.
     crs : 'EPSG:n', None where not known.
     notes : what was done to bring the surfaces to metres, in sentences.
+    head : of files.
     """
 
     record: Comparison
@@ -50,6 +53,7 @@ class SurfaceComparison:
     method: str
     crs: str | None = None
     notes: tuple[str, ...] = ()
+    head: Head = field(default_factory=Head)
 
     @property
     def rmse(self) -> float:
@@ -113,7 +117,8 @@ class SurfaceComparison:
         from aerotri.formats.results.terrain import comparison_json
 
         sure = {"sigma_bias_m": self.bias_sigma, "noise_length_m": self.noise_length}
-        return comparison_json(self.record, self.test, self.control, self.method) | sure
+        found = comparison_json(self.record, self.test, self.control, self.method)
+        return self.head.as_dict() | found | sure
 
     def plot(self) -> Figure:
         """The differences as a map and as a histogram."""
@@ -160,6 +165,7 @@ def compare(
     method: Interpolation = INTERPOLATION,
     align: Movement = ALIGNMENT,
     cell: float | None = None,
+    project: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> SurfaceComparison:
     """Differences of two surfaces, both interpolated to the same places in the same way.
@@ -171,6 +177,8 @@ def compare(
     method : interpolation of both.
     align : move the first onto the second before: not at all, by a shift in X, Y, Z, or turned as well.
     cell : m, of the differences; the larger one of both where None.
+    project : block, or result of an adjustment, whose [project] stands at the head of the file; that of the surfaces
+        where None.
     progress : as of `aerotri.adjust`.
 
     Returns
@@ -211,9 +219,9 @@ def compare(
         )
     epsg = one.epsg or other.epsg
     notes = tuple(source.note for source in (one, other) if source.note)
-    return SurfaceComparison(
-        found, _name(test), _name(control), method, None if epsg is None else f"EPSG:{epsg}", notes
-    )
+    crs = None if epsg is None else f"EPSG:{epsg}"
+    head = Head(project_of(project, test, control), crs or "")
+    return SurfaceComparison(found, _name(test), _name(control), method, crs, notes, head)
 
 
 def _check(method: str, align: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -20,6 +20,7 @@ from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
 from aerotri.public.surfaces import Surface, dataset_of
 from aerotri.public.table import Table
+from aerotri.results.head import Head
 from aerotri.terrain.settings import DEFAULTS, Subset, TerrainSettings
 
 if TYPE_CHECKING:
@@ -77,6 +78,7 @@ class TerrainModel:
     adjustment : key of the adjustment it was measured with.
     notes : what was done with the input before, in sentences.
     ground_within : name of the outline within which all is ground; '' where there is none.
+    head : of files.
     """
 
     record: TerrainOutcome
@@ -85,6 +87,7 @@ class TerrainModel:
     adjustment: str
     notes: tuple[str, ...] = ()
     ground_within: str = ""
+    head: Head = field(default_factory=Head)
 
     @cached_property
     def dsm(self) -> Surface:
@@ -127,7 +130,7 @@ class TerrainModel:
         from aerotri.formats.results.terrain import terrain_json
 
         stated = {"adjustment": self.adjustment, "ground_within": self.ground_within}
-        return terrain_json(self.record, self.block, self.crs) | stated
+        return self.head.as_dict() | terrain_json(self.record, self.block, self.crs) | stated
 
     @property
     def plot(self) -> TerrainPlots:
@@ -303,7 +306,8 @@ def measure_terrain(
             notes = (*notes, outline.note) if outline.note else notes
         with opened(executor, report.said) as workers:
             outcome = make_terrain_model(record, plan, report.stage, Workplace(workers, spool.folder))
-    return TerrainModel(outcome, str(block.name), block.crs, adjustment_key(record), notes, name)
+    head = Head(block.project, block.crs)
+    return TerrainModel(outcome, str(block.name), block.crs, adjustment_key(record), notes, name, head)
 
 
 def terrain_plan(

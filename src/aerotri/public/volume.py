@@ -5,17 +5,20 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.files.spool import Spool
+from aerotri.observations.project import Project
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.public.projects import project_of
 from aerotri.public.stated import StatedAdjustment
 from aerotri.public.volume_result import THICKNESS, MeasuredVolume
 from aerotri.public.volume_sigma import MeasuredSurface, SigmaOfVolumes
+from aerotri.results.head import Head
 from aerotri.volume.settings import (
     BASE,
     BOUNDARIES_FROM,
@@ -67,6 +70,7 @@ def volume(
     corrected: bool = SIGMA.corrected,
     density: float | None = None,
     density_sigma: float = 0.0,
+    project: FilePath | None = None,
     scratch: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> MeasuredVolume:
@@ -99,6 +103,8 @@ def volume(
     corrected : the photographs were corrected for their image errors.
     density : t/m³, of all that is inside the boundary: gives tonnes.
     density_sigma : t/m³, its σ, common to all piles.
+    project : block, or result of an adjustment, whose [project] stands at the head of page and file; that of the
+        adjustment or of the surface where None.
     scratch : folder for the raster of the thickness until it is saved; the temporary one of the system where None.
     progress : as of `aerotri.adjust`.
 
@@ -136,7 +142,8 @@ def volume(
         boundary_from=boundary_from,
     )  # fmt: skip
     known = None if density is None else Density(density, density_sigma)
-    asked = _Asked(top, below, base, boundary, method, SectionPlan(section_spacing, azimuth), options, known)
+    plan, whose = SectionPlan(section_spacing, azimuth), project_of(project, adjustment, surface)
+    asked = _Asked(top, below, base, boundary, method, plan, options, known, whose)
     with stage_report(progress) as report, ExitStack() as stack:
         return _compute(asked, Spool(scratch), stack, report)
 
@@ -153,6 +160,7 @@ class _Asked:
     plan: SectionPlan
     options: SigmaOptions
     density: Density | None = None
+    project: Project = field(default_factory=Project)
 
 
 def is_surface(base: SurfaceLike | float) -> TypeGuard[SurfaceLike]:
@@ -209,12 +217,13 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     crs = "" if reader.epsg is None else f"EPSG:{reader.epsg}"
     measured_with = (top.adjustment.name, top.name_of_points) if top.adjustment else ("", "")
     sources = Sources(reader.path.name, crs, *measured_with)
-    content = volume_json(volumes, base, boundary, sources, sigma, asked.density)
+    head = Head(asked.project, crs)
+    content = head.as_dict() | volume_json(volumes, base, boundary, sources, sigma, asked.density)
     content["piles"] = [pile_json(one, own, asked.density) for one, own in zip(piles, sigmas, strict=True)]
     crs_notes = (reader.note, *(other.note for other in others), boundary.note)
     content["warnings"] = [*(text for text in crs_notes if text), *content["warnings"]]
     profiles = chosen_profiles(reader, base, boundary, volumes.sections)
-    return MeasuredVolume(volumes, boundary, content, thickness, profiles, spool, notes)
+    return MeasuredVolume(volumes, boundary, content, thickness, profiles, spool, notes, head)
 
 
 def _piles(asked: _Asked, base: Base, reader: Reader, boundary: Boundary) -> list[Pile]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -12,6 +12,7 @@ from aerotri.conventions import FilePath, InputError
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.surfaces import Surface
 from aerotri.public.table import Table
+from aerotri.results.head import Head
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -96,7 +97,7 @@ class MeasuredVolume:
     summary : content of volume.json.
     map : the thickness, coarse. profiles : sections to draw.
     spool : holds the raster of the thickness until it is saved.
-    notes : doubts about the adjustments, in sentences.
+    notes : doubts about the adjustments, in sentences. head : of page and file.
     """
 
     record: Volumes
@@ -106,6 +107,7 @@ class MeasuredVolume:
     profiles: list[Profile]
     spool: Spool
     notes: tuple[str, ...] = ()
+    head: Head = field(default_factory=Head)
 
     @property
     def net(self) -> float:
@@ -266,5 +268,6 @@ def _write(target: Path, found: MeasuredVolume, plots: bool) -> None:
             from aerotri.report.pages.volume import write_volume_page
             from aerotri.report.plots.rendering import save_plots
 
-            write_volume_page(found.summary, save_plots(found.plot.all(), folder / "plots"), folder / "volume.html")
+            drawn = save_plots(found.plot.all(), folder / "plots")
+            write_volume_page(found.summary, drawn, folder / "volume.html", found.head)
         write_json(folder / RECORD, found.summary)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import BLOCK, VERSION
+from aerotri.reference.adjust_contents import BLOCK, HEAD
 from aerotri.reference.records import DescribedFile, Item, of_axes, within
 
 PLACE = "folder of accuracy"
@@ -12,9 +12,8 @@ OUTCOMES = {
     "cannot be said": "Something is missing to tell; says names it.",
 }
 ACCURACY = (
-    VERSION,
+    *HEAD,
     BLOCK,
-    Item("crs", "text", "Coordinate system."),
     Item("verdict", "text", "Verdict of the adjustment."),
     Item("standard", "text", "The standard whose requirements are listed."),
     Item("met", "text", "All that is required taken together.", values=OUTCOMES),

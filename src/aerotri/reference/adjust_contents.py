@@ -25,6 +25,16 @@ PROJECT = (
     Item("project.notes", "text", "Notes."),
     Item("project.logo", "text", "Name of the logo in the block folder."),
 )
+CRS = Item("crs", "text", "Coordinate system: local, or EPSG codes; empty where none is stated.")
+HEAD_BESIDE_CRS = (
+    VERSION,
+    Item("computed", "text", "When it was computed: 2026-05-04T12:30:00Z, in UTC."),
+    *PROJECT,
+    Item("crs_name", "text", "Name of the coordinate system; empty for local ones."),
+    Item("height_system", "text", "Name of the system of the heights; empty where none is stated."),
+)
+HEAD = (*HEAD_BESIDE_CRS, CRS)
+"""What the JSON file of every result begins with."""
 STATUS_WORDS = {
     "converged": "the iterations came to an end",
     "not converged": "they did not",
@@ -56,9 +66,8 @@ def _ground_points(name: str, what: str) -> tuple[Item, ...]:
 
 
 ADJUSTMENT = (
-    VERSION,
+    *HEAD,
     BLOCK,
-    *PROJECT,
     Item("status", "text", "How the iterations ended.", values=STATUS_WORDS),
     Item(
         "verdict",
@@ -194,6 +203,16 @@ ADJUSTMENT = (
     *within("rig_movements[]", *movements()),
     *rigidity(),
     *rolling_shutters(),
+    Item("settings[]", "object", "Every setting that was used, by its name in block.toml."),
+    Item("settings[].key", "text", "Name in full, such as camera.NAME.pixel_um."),
+    Item("settings[].value", "anything", "The value; null where it is not in use."),
+    Item("settings[].unit", "text", "Unit; empty where it has none."),
+    Item(
+        "settings[].origin",
+        "text",
+        "Where it comes from.",
+        values={"given": "stated, or chosen by the program", "default": "the default value, stated or not"},
+    ),
     Item("notes[]", "text", "Sentences about what the program chose by itself, and why."),
     Item("warnings[]", "text", "Sentences to read: what was left out, assumed or is weak."),
     Item("timings_s", "object", "Time by stage.", "s"),
@@ -353,6 +372,7 @@ _OF_SET = tuple(
     in ("set", "status", "count", "significant", "effective", "sigma0", "sigma0_um", "aic", "bic", "verdict")
 )
 COMPARE_PARAMETERS = (
+    *HEAD,
     BLOCK,
     Item("folds", "whole", "Parts in which control points were left out and predicted."),
     Item("robust", "text", "Robust estimation used, as adjustment.robust."),

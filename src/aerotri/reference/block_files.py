@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import BLOCK
+from aerotri.reference.adjust_contents import BLOCK, HEAD
 from aerotri.reference.adjust_tables import PLACE as RESULT
 from aerotri.reference.records import DescribedFile, Item, of_axes
 
@@ -146,6 +146,7 @@ PREDICTED = (
     Item("marked_row", "number?", "Row as marked; empty where it is not.", "px"),
 )
 RUN_JSON = (
+    *HEAD,
     Item("source", "text", "What the run began with."),
     Item("steps[]", "object", "The steps in their order."),
     Item("steps[].name", "text", "Command of the step."),

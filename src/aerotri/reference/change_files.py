@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import VERSION
+from aerotri.reference.adjust_contents import HEAD
 from aerotri.reference.records import DescribedFile, Item
 from aerotri.volume.change.alignment import ALIGNS
 from aerotri.volume.change.compute import PARTS
@@ -40,10 +40,9 @@ def _sums(of: str, with_parts: bool) -> list[Item]:
 
 
 CHANGE_JSON = (
-    VERSION,
+    *HEAD,
     Item("first", "text", "The earlier surface."),
     Item("second", "text", "The later surface."),
-    Item("crs", "text", "Coordinate system."),
     Item("cell_m", "number", "Cell of the difference.", "m"),
     Item("cells", "whole", "Cells with heights in both."),
     Item("level_of_detection_sigma", "number", "Standard deviations beyond which a change is told from noise, 95 %."),
@@ -75,10 +74,9 @@ CHANGE_TABLE = (
 
 
 CLOUD_JSON = (
-    VERSION,
+    *HEAD,
     Item("first", "text", "The earlier cloud."),
     Item("second", "text", "The later cloud."),
-    Item("crs", "text", "Coordinate system."),
     Item("cylinder_m", "number", "Diameter of the cylinder whose points are averaged.", "m"),
     Item("normal_m", "number", "Diameter of the ball whose points give a normal.", "m"),
     Item("reach_m", "number", "Largest distance that was sought.", "m"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from aerotri.reference.adjust_contents import HEAD
 from aerotri.reference.records import DescribedFile, Item, of_axes, within
 from aerotri.results.halves import DIVISIONS
 
@@ -23,6 +24,7 @@ TEST = (
     Item("usual_max_z", "number", "What noise alone exceeds in one case of twenty."),
 )
 HALVES = (
+    *HEAD,
     Item("block", "text", "Name of the block."),
     Item("alpha", "number", "Probability below which a test says that the halves differ."),
     Item("robust", "text", "Robust estimator of the result; its final weights stay."),

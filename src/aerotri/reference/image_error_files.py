@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import BLOCK, VERSION
+from aerotri.reference.adjust_contents import BLOCK, HEAD, HEAD_BESIDE_CRS
 from aerotri.reference.records import DescribedFile, Item, of_axes, statistics
 
 DEFORM, DEMCOR, IMGEO, CROSSCHECK = (f"folder of {name}" for name in ("deform", "demcor", "imgeo", "crosscheck"))
@@ -23,7 +23,7 @@ def _seam_names(prefix: str) -> tuple[Item, ...]:
 
 
 DEFORM_JSON = (
-    VERSION,
+    *HEAD_BESIDE_CRS,
     BLOCK,
     Item(
         "kind",
@@ -94,7 +94,7 @@ SEAMS = (
 )
 LOW_HIGH_MEAN = ("min", "max", "mean")
 DEMCOR_JSON = (
-    VERSION,
+    *HEAD,
     BLOCK,
     Item("dem", "text", "File of the DEM before the correction."),
     Item("variant", "text", "How the photographs of the DEM were oriented.", values={**VARIANT, "given": "as stated"}),
@@ -130,7 +130,7 @@ DEMCOR_JSON = (
     Item("timings_s.*", "number", "Time of a stage.", "s"),
 )
 IMGEO_JSON = (
-    VERSION,
+    *HEAD,
     BLOCK,
     Item("sign", "text", "The sign of the image errors, in words."),
     Item("resampling", "text", "Interpolation of the grey values.", values={"bicubic": "", "lanczos": ""}),
@@ -184,7 +184,7 @@ DIFFERENCES = (
     Item("worst", "text", "The unknown that differs most."),
 )
 CROSSCHECK_JSON = (
-    VERSION,
+    *HEAD,
     BLOCK,
     Item(
         "verdict",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import BLOCK, VERSION
+from aerotri.reference.adjust_contents import BLOCK, HEAD
 from aerotri.reference.records import DescribedFile, Item, within
 
 ORTHO = "folder of ortho"
@@ -25,9 +25,8 @@ def _quantiles(name: str, text: str, unit: str, kind: str = "object") -> tuple[I
 
 
 ORTHO_JSON = (
-    VERSION,
+    *HEAD,
     BLOCK,
-    Item("crs", "text", "Coordinate system of the block."),
     Item("surface", "text", "The surface that heights were taken from."),
     Item("cell_m", "number", "Cell of the orthophoto.", "m"),
     Item("columns", "whole", "Cells from west to east."),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import VERSION
+from aerotri.reference.adjust_contents import HEAD
 from aerotri.reference.records import DescribedFile, Item, within
 
 PLACE = "folder of plan"
@@ -57,7 +57,7 @@ ASKED = within(
     Item("self_calibration", "text", "Additional parameters, as in block.toml."),
 )  # fmt: skip
 PLAN = (
-    VERSION,
+    *HEAD,
     Item("area", "object", "Where is flown."),
     Item("area.name", "text", "File of the area."),
     Item("area.crs", "text", "Coordinate system of the plan; local where none is known."),
@@ -80,6 +80,11 @@ PLAN = (
     Item("target.unit", "text", "Its unit."),
     Item("target.predicted", "number", "What is expected, in unit."),
     Item("target.met", "yes/no", "Whether it is met."),
+    Item("piles[]", "object", "The piles, where the area or --piles has polygons of them."),
+    Item("piles[].name", "text", "Name of the pile."),
+    Item("piles[].area_m2", "number", "Size of the pile.", "m²"),
+    Item("piles[].sigma_m3", "number", "σ of its volume to be expected from orientations and control.", "m³"),
+    Item("piles[].places", "whole", "Places of the pile from which it was found."),
     Item("control[]", "object", "One entry a control point: those given, then those added in the order of their gain."),
     *within(
         "control[]",

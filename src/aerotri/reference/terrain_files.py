@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import BLOCK, VERSION
+from aerotri.reference.adjust_contents import BLOCK, HEAD
 from aerotri.reference.image_error_files import MODELS
 from aerotri.reference.records import DescribedFile, Item, of_axes
 from aerotri.terrain.picket_status import TEXTS, PicketStatus
@@ -36,9 +36,8 @@ PICKETS = (
     Item("model", "whole", "Number of the pair of photographs, −1 where all photographs were used."),
 )
 DTM_JSON = (
-    VERSION,
+    *HEAD,
     BLOCK,
-    Item("crs", "text", "Coordinate system."),
     Item("photographs", "whole", "Photographs matched."),
     Item("gsd_m", "number", "Size of a pixel on the ground.", "m"),
     Item("interval_m", "number", "Distance between the points measured (pickets).", "m"),
@@ -66,9 +65,8 @@ DTM_JSON = (
     Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
 )
 DSM_JSON = (
-    VERSION,
+    *HEAD,
     BLOCK,
-    Item("crs", "text", "Coordinate system."),
     Item("photographs", "whole", "Photographs matched."),
     Item("gsd_m", "number", "Size of a pixel on the ground.", "m"),
     Item("cell_m", "number", "Cell of the rasters.", "m"),
@@ -114,7 +112,7 @@ DIFFERENCE = (
     ("max", "number", "Largest difference, without sign.", "m"),
 )
 COMPARE_JSON = (
-    VERSION,
+    *HEAD,
     Item("test", "text", "The surface that is judged."),
     Item("control", "text", "The surface it is held against."),
     Item("method", "text", "Interpolation of both.", values={"linear": "", "spline": ""}),
@@ -184,9 +182,8 @@ def _mass(of: str) -> tuple[Item, ...]:
 
 
 VOLUME_JSON = (
-    VERSION,
+    *HEAD,
     Item("dtm", "text", "File of the surface."),
-    Item("crs", "text", "Coordinate system."),
     Item("base", "object", "The base."),
     Item("base.name", "text", "What it is, in words."),
     Item("base.z0_m", "number", "Of a plane: height at x0, y0.", "m", optional=True),

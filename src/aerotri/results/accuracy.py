@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+
+from aerotri.results.head import Head
 
 Met = Literal["met", "not met", "cannot be said"]
 Weight = Literal["required", "recommended"]
@@ -149,7 +151,7 @@ class AccuracyRecord:
     control_sigma : (m, 3) m, survey error of the control points.
     layout : None where the ground points span no area.
     suspects : errors that stand out. requirements : one after the other. statements : sentences as the standard has
-        them. warnings : what a reader of the numbers has to know.
+        them. warnings : what a reader of the numbers has to know. head : of page and file.
     """
 
     block: str
@@ -164,6 +166,7 @@ class AccuracyRecord:
     requirements: tuple[Requirement, ...] = ()
     statements: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    head: Head = field(default_factory=Head)
 
     @property
     def rmse_h(self) -> float:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from aerotri.functional_model.additional_parameters import Parameter, is_grid
 from aerotri.observations import Block
+from aerotri.results.head import Head, now
 
 if TYPE_CHECKING:
     from aerotri.results.common_shift import CommonShift
@@ -38,7 +40,7 @@ class Outcome:
     observations, unknowns, conditions, redundancy : redundancy = observations − unknowns + conditions.
     warnings : sentences the user should read. notes : sentences about what the program chose by itself.
     verdict : 'accepted', 'doubtful' or 'rejected'; '' before it is judged. reasons : sentences, the gravest first.
-    timings_s : seconds by stage.
+    timings_s : seconds by stage. computed : when.
     """
 
     status: str
@@ -56,6 +58,7 @@ class Outcome:
     verdict: str = ""
     reasons: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    computed: datetime = field(default_factory=now)
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,3 +362,8 @@ class AdjustedBlock:
     ray_correlation: RayCorrelation | None = None
     common_shift: CommonShift | None = None
     photograph_fields: PhotographFields | None = None
+
+
+def head_of(adjusted: AdjustedBlock) -> Head:
+    """The head of pages and files about an adjustment."""
+    return Head(adjusted.block.project, adjusted.block.crs, adjusted.outcome.computed)

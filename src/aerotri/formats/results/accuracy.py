@@ -10,14 +10,13 @@ from aerotri.diagnosis.accuracy_rules import points_for_area, project_area, reac
 from aerotri.diagnosis.accuracy_sentences import STANDARD
 from aerotri.formats.results.json_text import number_or_none
 from aerotri.results.accuracy import AccuracyRecord, CheckedPoints, CoordinateErrors, Layout
-from aerotri.version import __version__
 
 
 def accuracy_json(r: AccuracyRecord) -> dict[str, Any]:
     """Content of accuracy.json; lengths in m, what is not known is null."""
     area = project_area(r)
     return {
-        "aerotri": __version__, "block": r.block, "crs": r.crs, "verdict": r.verdict, "standard": STANDARD,
+        **r.head.as_dict(), "block": r.block, "verdict": r.verdict, "standard": STANDARD,
         "met": r.met,
         "asked": {"horizontal": r.asked.horizontal, "vertical": r.asked.vertical},
         "reached": {"horizontal": number_or_none(reached(r.rmse_h)), "vertical": number_or_none(reached(r.nva))},

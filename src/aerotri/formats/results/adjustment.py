@@ -12,7 +12,6 @@ from __future__ import annotations
 import dataclasses
 import re
 import time
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +19,7 @@ import numpy as np
 
 from aerotri.adjustment.ray_status import RAY_STATUS, RayStatus
 from aerotri.conventions import MGON_PER_RADIAN
+from aerotri.formats.block.used_settings import used_settings
 from aerotri.formats.results.json_text import number_or_none, write_json
 from aerotri.formats.results.reliability_columns import control_columns, observation_columns, ray_columns
 from aerotri.formats.results.rigs import (
@@ -35,6 +35,7 @@ from aerotri.image_errors import interior_elements, interior_model_sigmas
 from aerotri.observations import Block
 from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults, Outcome
+from aerotri.results.head import Head
 from aerotri.results.model_part import ModelPart
 from aerotri.results.ray_correlation import RayCorrelation
 from aerotri.results.rolling_shutter import Motions
@@ -132,9 +133,8 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
     index, coordinates = np.zeros(0, np.int64), np.zeros((0, 3))
     nothing = GroundPointResults(index, coordinates, coordinates, coordinates, coordinates, index)
     return {
-        "aerotri": _version(),
+        **Head(block.project, block.crs, o.computed).as_dict(),
         "block": str(block.name),
-        "project": block.project.as_dict(),
         "status": o.status,
         "verdict": o.verdict,
         "reasons": list(o.reasons),
@@ -158,6 +158,7 @@ def outcome_json(block: Block, outcome: Outcome) -> dict[str, Any]:
         "gnss_errors": None,
         "photograph_fields": None,
         "ray_correlation": RayCorrelation(reason=NOT_LOOKED_FOR).as_dict(),
+        "settings": [dataclasses.asdict(one) for one in used_settings(block)],
         "notes": list(o.notes),
         "warnings": list(o.warnings),
         "timings_s": {key: float(o.timings_s.get(key, 0.0)) for key in TIMINGS},
@@ -338,10 +339,3 @@ def _plain(value: Any) -> Any:
 
 def _finite(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(values), values, np.nan)
-
-
-def _version() -> str:
-    try:
-        return version("aerotri")
-    except PackageNotFoundError:
-        return "unknown"

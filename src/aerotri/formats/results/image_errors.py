@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from aerotri.results.head import Head
+
 if TYPE_CHECKING:
     from aerotri.image_errors.error_exports import NearestLens
     from aerotri.image_errors.error_function import ErrorFunction
@@ -74,7 +76,6 @@ def exports_of(adjusted: AdjustedBlock, errors: Mapping[int, ErrorFunction], res
     errors : of the groups in use, by their number in the block.
     resampling : of the photographs, for the record.
     """
-    from aerotri.formats.results.adjustment import outcome_json
     from aerotri.formats.text.toml_text import toml_of
     from aerotri.image_errors.error_exports import ideal_camera, nearest_opencv
 
@@ -87,9 +88,9 @@ def exports_of(adjusted: AdjustedBlock, errors: Mapping[int, ErrorFunction], res
         records.append(_group_record(function, nearest[k], cameras[k], raster))
         tables.append(_correction_rows(adjusted, function))
     ideal = {cameras[k]: _camera_table(function) for k, function in errors.items()}
-    content = outcome_json(adjusted.block, adjusted.outcome)
     record = {
-        "aerotri": content["aerotri"], "block": content["block"], "sign": SIGN, "resampling": resampling,
+        **Head(adjusted.block.project, adjusted.block.crs).as_dict(), "block": str(adjusted.block.name), "sign": SIGN,
+        "resampling": resampling,
         "groups": records, "photographs": [],
     }  # fmt: skip
     texts = {

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from aerotri.adjustment.ray_status import RayStatus
-from aerotri.formats.block.writer import settings_content
-from aerotri.formats.text.toml_text import value_text
+from aerotri.formats.block.used_settings import used_settings
 from aerotri.observations import Block
 from aerotri.report.documents import accuracy_tables, camera_tables
 from aerotri.report.documents.figures import adjustment_figures
@@ -25,12 +21,10 @@ from aerotri.report.documents.parts import (
     table,
     verdict,
 )
-from aerotri.report.documents.words import Words, breakable
+from aerotri.report.documents.words import NO_VALUE, Words, breakable
 from aerotri.report.quality import asprs_warning
 from aerotri.results.adjusted_block import AdjustedBlock
 
-NOT_SETTINGS = ("name", "crs", "project")
-"""Keys of block.toml that stand in the head."""
 MOST_POINTS = 500
 """Control or check points that are listed; chosen [C]: some ten pages, all are in control.csv and check.csv."""
 
@@ -63,7 +57,7 @@ def adjustment_report(adjusted: AdjustedBlock, context: Context, version: str) -
                 parts.append(paragraph(said, small=True))
     parts.append(paragraph(words("report.about_points"), small=True))
     parts += _messages(adjusted, words)
-    files, pictures = adjustment_figures(adjusted)
+    files, pictures = adjustment_figures(adjusted, words.language)
     parts.append(heading(words("report.pictures")))
     parts += [picture(file, words(f"figure.{name}"), narrow=name != "plan") for name, file in pictures]
     parts += [heading(words("report.settings")), *settings_parts(adjusted.block, words)]
@@ -125,18 +119,13 @@ def _messages(adjusted: AdjustedBlock, words: Words) -> list[Part]:
 
 def settings_parts(block: Block, words: Words) -> list[Part]:
     """All settings by their keys of block.toml, defaults included."""
-    content = {key: value for key, value in settings_content(block).items() if key not in NOT_SETTINGS}
-    rows = [(breakable(key), breakable(text)) for key, text in _flat(content, "")]
-    return [paragraph(words("report.about_settings"), small=True),
-            table([words("settings.key"), words("settings.value")], rows, words=2, small=True)]  # fmt: skip
-
-
-def _flat(content: Mapping[str, Any], before: str) -> list[tuple[str, str]]:
-    """Keys with their tables before them, and values as block.toml writes them."""
-    found: list[tuple[str, str]] = []
-    for key, value in content.items():
-        if isinstance(value, Mapping):
-            found += _flat(value, f"{before}{key}.")
-        else:
-            found.append((f"{before}{key}", value_text(value)))
-    return found
+    rows = [
+        (
+            breakable(one.key),
+            breakable(f"{one.text} {one.unit}".strip() if one.text else NO_VALUE),
+            words(f"settings.{one.origin}"),
+        )
+        for one in used_settings(block)
+    ]  # fmt: skip
+    columns = [words(f"settings.{name}") for name in ("key", "value", "origin")]
+    return [paragraph(words("report.about_settings"), small=True), table(columns, rows, words=3, small=True)]

@@ -25,6 +25,7 @@ from aerotri.report.documents.parts import (
     table,
     verdict,
 )
+from aerotri.report.documents.picture_texts import in_language
 from aerotri.report.documents.words import Words, breakable
 from aerotri.report.plots.rendering import render_plots
 from aerotri.results.adjusted_block import AdjustedBlock
@@ -156,7 +157,8 @@ def _pictures(
         for k, group in enumerate(groups[:MOST_GROUPS])
         for name, figure in camera_figures(adjusted, group).items()
     }
-    files, names = as_files(render_plots({name: figure for name, (_, figure) in figures.items()}))
+    drawn = in_language({name: figure for name, (_, figure) in figures.items()}, words.language)
+    files, names = as_files(render_plots(drawn))
     parts = [picture(names[name], words(f"figure.{caption}"), narrow=True) for name, (caption, _) in figures.items()]
     return [heading(words("calibration.field")), *parts] if parts else [], files
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from matplotlib.figure import Figure
 
 from aerotri.image_errors import ImageGroup, averaged_residuals, field_on_grid, image_groups
+from aerotri.report.documents.picture_texts import in_language
 from aerotri.report.plots.block import plot_block_plan, plot_ground_points
 from aerotri.report.plots.camera import plot_averaged_residuals, plot_systematic_errors
 from aerotri.report.plots.rendering import RenderedPlot, render_plots
@@ -18,14 +19,15 @@ MOST_GROUPS = 4
 """Groups of photographs whose image errors are drawn in the report [C]: about two pages."""
 
 
-def adjustment_figures(adjusted: AdjustedBlock) -> tuple[dict[str, bytes], list[tuple[str, str]]]:
+def adjustment_figures(adjusted: AdjustedBlock, language: str) -> tuple[dict[str, bytes], list[tuple[str, str]]]:
     """Files by name; keys of the captions with their files: plan, differences at ground points, image errors."""
     figures: dict[str, tuple[str, Figure]] = {"plan": ("plan", plot_block_plan(adjusted))}
     if len(adjusted.control) or len(adjusted.check):
         figures["ground"] = ("ground", plot_ground_points(adjusted))
     for number, group in enumerate(image_groups(adjusted.block)[:MOST_GROUPS], start=1):
         figures |= {f"{name}{number}": (name, figure) for name, figure in camera_figures(adjusted, group).items()}
-    files, names = as_files(render_plots({name: figure for name, (_, figure) in figures.items()}))
+    drawn = in_language({name: figure for name, (_, figure) in figures.items()}, language)
+    files, names = as_files(render_plots(drawn))
     return files, [(caption, names[name]) for name, (caption, _) in figures.items()]
 
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from aerotri.coordinates.crs_names import crs_names
 from aerotri.observations.project import Project
-from aerotri.report.documents.parts import Document, Part
+from aerotri.report.documents.parts import Document, Part, signed_together
 from aerotri.report.documents.words import Words, breakable
+from aerotri.report.head import computed_text, head_rows
+from aerotri.results.head import Head
 from aerotri.version import __version__
 
 
@@ -31,19 +32,6 @@ class Context:
     of_block: bool = True
 
 
-def crs_rows(words: Words, crs: str) -> list[tuple[str, str]]:
-    """Coordinate system and system of the heights."""
-    names = crs_names(crs)
-    if crs == "local":
-        return [(words("head.crs"), words("head.local"))]
-    if not names.name:
-        return [(words("head.crs"), breakable(crs) or words("head.not_stated"))]
-    return [
-        (words("head.crs"), f"{names.name} ({names.code})"),
-        (words("head.heights"), names.vertical or words("head.no_heights")),
-    ]
-
-
 def document(
     context: Context, subtitle: str, crs: str, version: str, parts: Sequence[Part], files: dict[str, bytes]
 ) -> Document:
@@ -56,35 +44,21 @@ def document(
     """
     words, project = context.words, context.project
     title = breakable(project.title or context.name)
-    computed = words.date(context.made.strftime("%Y-%m-%d")) + context.made.strftime(" %H:%M UTC")
-    rows = [(words(f"head.{key}"), breakable(text)) for key, text in _stated(project) if text]
-    if project.survey_date:
-        rows.append((words("head.survey_date"), words.date(project.survey_date)))
-    rows += [(words("head.block"), breakable(context.name))] if project.title and context.of_block else []
-    rows += [(words("head.computed"), computed), (words("head.version"), f"aerotri {version}")]
-    rows += crs_rows(words, crs)
-    rows += _notes(words, project)
+    head = Head(project, crs, context.made, version)
+    rows = head_rows(words, head, context.name if project.title and context.of_block else "")
     files = dict(files)
     logo = ""
     if project.logo_content:
         logo = "logo" + project.logo_ending
         files[logo] = project.logo_content
     content: dict[str, Any] = {
-        "language": words.language, "title": title, "subtitle": subtitle, "number": computed,
+        "language": words.language, "title": title, "subtitle": subtitle,
+        "number": computed_text(words, head),
         "author": breakable(project.company or project.operator), "logo": logo,
         "made": words("head.made", version=__version__), "page": words("head.page", page="{page}", pages="{pages}"),
-        "head": [list(row) for row in rows], "parts": list(parts),
+        "head": [[word, breakable(text, 4000)] for word, text in rows], "parts": signed_together(parts),
     }  # fmt: skip
     return Document(content, files)
-
-
-def _stated(project: Project) -> list[tuple[str, str]]:
-    return [("client", project.client), ("company", project.company), ("operator", project.operator)]
-
-
-def _notes(words: Words, project: Project) -> list[tuple[str, str]]:
-    lines = project.notes.splitlines()
-    return [("" if i else words("head.notes"), breakable(line, 4000)) for i, line in enumerate(lines)]
 
 
 def signature_fields(words: Words) -> list[str]:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 Part = dict[str, Any]
+MOST_BOUND, MOST_ROWS = 3, 12
+"""Parts that are kept on the page of a signature, and rows of one of them, at most [C]: a third of a page."""
 
 
 @dataclass(frozen=True)
@@ -68,4 +70,23 @@ def picture(file: str, caption: str, narrow: bool = False) -> Part:
 
 def signature(fields: Sequence[str]) -> Part:
     """Lines to sign on; never apart from one another."""
-    return {"kind": "signature", "fields": list(fields)}
+    return {"kind": "signature", "fields": list(fields), "before": []}
+
+
+def signed_together(parts: Sequence[Part]) -> list[Part]:
+    """The parts with what stands before a signature bound to it: nobody signs a page on which there is nothing else."""
+    found: list[Part] = []
+    for part in parts:
+        if part["kind"] == "signature":
+            before: list[Part] = []
+            while found and len(before) < MOST_BOUND and _is_short(found[-1]):
+                before.insert(0, found.pop())
+            part = part | {"before": before}
+        found.append(part)
+    return found
+
+
+def _is_short(part: Part) -> bool:
+    if part["kind"] in ("pairs", "table"):
+        return len(part["rows"]) <= MOST_ROWS
+    return part["kind"] in ("text", "list") or (part["kind"] == "heading" and not part["new_page"])

@@ -4,30 +4,25 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from aerotri.diagnosis.accuracy_rules import cm, reached
 from aerotri.diagnosis.accuracy_sentences import STANDARD
 from aerotri.report.pages.accuracy_plan import check_plan
+from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.quality import printable
 from aerotri.report.tables.accuracy import MARKS, conclusion, errors_table, points_table
 from aerotri.results.accuracy import AccuracyRecord
-from aerotri.version import __version__
 
 BOXES = {"met": "passed", "not met": "banner", "cannot be said": "warnings"}
 
 
 def accuracy_html(r: AccuracyRecord) -> str:
     """The page as text."""
-    environment = Environment(
-        loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
+    environment = page_environment()
     return environment.get_template("accuracy.html.j2").render(
-        name=printable(r.block), crs=printable(r.crs), standard=STANDARD, box=BOXES[r.met], conclusion=conclusion(r),
+        name=printable(r.block), standard=STANDARD, box=BOXES[r.met], conclusion=conclusion(r),
         cards=_cards(r), warnings=[printable(text, 1000) for text in r.warnings], statements=r.statements,
         rows=[(one, printable(one.found, 500), MARKS[one.met]) for one in r.requirements],
-        errors=errors_table(r), points=points_table(r), version=__version__,
+        errors=errors_table(r), points=points_table(r), head=page_head(r.head),
         plan=None if r.layout is None or not len(r.points) else check_plan(r.points, r.layout),
         vegetated=bool(r.points.vegetated.any()), rejected=r.verdict == "rejected",
     )  # fmt: skip

@@ -10,11 +10,10 @@ import base64
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import PackageLoader
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
@@ -24,8 +23,9 @@ from aerotri.diagnosis import Finding
 from aerotri.diagnosis.free_verdict import in_words
 from aerotri.diagnosis.work_list import WorkList, work_list
 from aerotri.image_errors import Change
-from aerotri.observations.project import Project
 from aerotri.report import quality
+from aerotri.report.mark_pictures import SIZE, MarkPictures
+from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.pages.interactive_plan import interactive_plan
 from aerotri.report.plots.crosscheck import crosscheck_table
 from aerotri.report.plots.rendering import RenderedPlot, render_plots
@@ -36,7 +36,9 @@ from aerotri.report.tables import precision as precision_tables
 from aerotri.report.tables import rigs as rig_tables
 from aerotri.report.tables import rolling_shutters as shutter_tables
 from aerotri.report.tables import work as work_tables
-from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.report.tables.cameras_elsewhere import elsewhere_tables
+from aerotri.report.tables.settings import settings_table
+from aerotri.results.adjusted_block import AdjustedBlock, head_of
 from aerotri.results.parameter_comparison import ParameterComparison
 from aerotri.statistics.parameter_effects import ParameterEffects
 from aerotri.statistics.photograph_residuals import photograph_residuals
@@ -55,6 +57,7 @@ CONTENTS = (
     ("effects", "What they change"),
     ("residuals", "Residuals"),
     ("work", "Work list"),
+    ("settings", "Settings"),
 )
 
 CAPTIONS = {
@@ -109,12 +112,6 @@ CAPTIONS = {
     "rays_per_point": "In how many photographs the points were measured.",
 }
 
-PROJECT_WORDS = {
-    "title": "Project", "client": "Client", "operator": "Operator", "company": "Company",
-    "survey_date": "Date of the survey", "notes": "Notes",
-}  # fmt: skip
-"""What the keys of [project] are called on the page."""
-
 
 @dataclass(frozen=True)
 class Findings:
@@ -129,6 +126,7 @@ class Findings:
     effects : what leaving parameters out changes at the check points; None where there are none, or it was not asked.
     changes : of the image errors between groups. compared : the sets of additional parameters that were compared.
     lights : what the result is judged by; None: made from the result, as the work list.
+    marks : pictures of the marks of control and check points; None without photographs.
     """
 
     work: WorkList | None = None
@@ -138,6 +136,7 @@ class Findings:
     changes: tuple[Change, ...] = ()
     compared: ParameterComparison | None = None
     lights: Sequence[Finding] | None = None
+    marks: MarkPictures | None = None
 
 
 NOTHING_BESIDE = Findings()
@@ -153,10 +152,7 @@ def report_html(
     plots : by the names of `all_plots`, drawn or already rendered (what `save_plots` returned need not be rendered
         twice); those missing are left out.
     """
-    environment = Environment(
-        loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
+    environment = page_environment()
     script = (environment.loader or PackageLoader("aerotri.report")).get_source(environment, "report.js")[0]
     digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
     content = _content(adjusted, render_plots(plots), findings)
@@ -174,34 +170,17 @@ def write_report(
     Path(path).write_text(report_html(adjusted, plots, findings), encoding="utf-8")
 
 
-def _project(project: Project) -> list[tuple[str, str]]:
-    """What `[project]` of block.toml says, with words for it; the lines of the notes stand apart."""
-    lines = project.notes.splitlines()
-    texts = [(PROJECT_WORDS[name], text) for name, text in project.given().items() if name not in ("notes", "logo")]
-    texts += [("" if i else PROJECT_WORDS["notes"], line) for i, line in enumerate(lines)]
-    return [(word, quality.printable(text, 4000)) for word, text in texts]
-
-
-def logo_address(project: Project) -> str:
-    """The logo inside a page, as a data address; '' where there is none."""
-    kind = {".png": "png", ".jpg": "jpeg", ".svg": "svg+xml"}.get(project.logo_ending)
-    if kind is None or not project.logo_content:
-        return ""
-    return f"data:image/{kind};base64,{base64.b64encode(project.logo_content).decode('ascii')}"
-
-
 def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside: Findings) -> dict[str, Any]:
     work = work_list(adjusted) if beside.work is None else beside.work
+    elsewhere, elsewhere_notes = elsewhere_tables(adjusted)
     return {
         "name": quality.printable(adjusted.block.name),
-        "project": _project(adjusted.block.project),
-        "logo": logo_address(adjusted.block.project),
+        "head": page_head(head_of(adjusted)),
         "outcome": adjusted.outcome,
         "reasons": [quality.printable(reason, 1000) for reason in adjusted.outcome.reasons],
         "what_to_do": [
             text.replace("what", "What", 1).replace("`", "") for text in tables.what_to_do(adjusted.outcome)
         ],
-        "version": _version(),
         "cards": _cards(adjusted),
         "findings": diagnosis.findings(adjusted) if beside.lights is None else beside.lights,
         "notes": [quality.printable(text, 1000) for text in adjusted.outcome.notes],
@@ -219,6 +198,11 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         "selection": adjusted.block.settings.adjustment.parameter_selection == "on",
         "changes": [_change(change) for change in beside.changes],
         "work_counts": work_tables.work_counts(work),
+        "settings": settings_table(adjusted.block),
+        "marks": beside.marks,
+        "mark_size": SIZE,
+        "elsewhere": elsewhere,
+        "elsewhere_notes": elsewhere_notes,
         "free": None if beside.free_check is None else _free_check(beside.free_check),
         "crosscheck": None if beside.crosscheck is None else _crosscheck(beside.crosscheck),
     }
@@ -332,10 +316,3 @@ def data_address(plot: RenderedPlot) -> str:
     small = len(plot.svg) <= LARGEST_SVG
     kind, content = ("svg+xml", plot.svg) if small else ("png", plot.png)
     return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
-
-
-def _version() -> str:
-    try:
-        return version("aerotri")
-    except PackageNotFoundError:
-        return "unknown"

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from aerotri.report.pages.adjustment import data_address
+from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.plots.rendering import RenderedPlot
 from aerotri.report.quality import printable, two_digits, with_sigma
+from aerotri.results.head import Head
 
 CAPTION = (
     "Left: difference of the surfaces where it is beyond the level of detection; brown is gained, blue is lost, grey "
@@ -23,18 +23,15 @@ UNKNOWNS = {
 }  # fmt: skip
 
 
-def write_change_page(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot], path: Path) -> None:
+def write_change_page(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot], path: Path, head: Head) -> None:
     """Write the page; content of change.json."""
-    environment = Environment(
-        loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
+    environment = page_environment()
     text = environment.get_template("change.html.j2").render(
-        first=printable(content["first"]), second=printable(content["second"]), crs=content["crs"],
+        first=printable(content["first"]), second=printable(content["second"]),
         cards=_cards(content["volumes"][-1]), warnings=[printable(text, 1000) for text in content["warnings"]],
         sure=_sure(content), rows=[_row(one) for one in content["volumes"]], unknowns=_unknowns(content),
         alignment=_alignment(content), plots=[data_address(plot) for plot in plots.values()], caption=CAPTION,
-        version=content["aerotri"],
+        head=page_head(head),
     )  # fmt: skip
     path.write_text(text, encoding="utf-8")
 

@@ -9,7 +9,7 @@ import base64
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from aerotri.report.pages.head import page_environment
 
 FIRST_PIXEL = 0.5
 """gcp_list.txt counts from the centre of the first pixel."""
@@ -26,10 +26,7 @@ def marking_page(crs: str, points: Mapping[str, tuple[float, float, float]], row
     pieces = [
         {**row, "jpeg": "data:image/jpeg;base64," + base64.b64encode(row["jpeg"]).decode("ascii")} for row in rows
     ]
-    environment = Environment(
-        loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
+    environment = page_environment()
     names = [name for name in points if any(piece["point"] == name for piece in pieces)]
     template = environment.get_template("marking.html.j2")
     return template.render(crs=crs, points=dict(points), names=names, pieces=pieces, first_pixel=FIRST_PIXEL)

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from aerotri.planning.control import SHARE
 from aerotri.planning.plan import PlanRecord, shortest_interval
+from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.quality import printable
 from aerotri.report.tables.adjustment import Column, Table, table
-from aerotri.version import __version__
+from aerotri.results.head import Head
 
 SIZE, MARGIN, CLASSES = 1000.0, 0.04, 6
 """Width of the map in its own units, its margin as a share, and the greys of σ."""
@@ -35,17 +35,14 @@ class PlanMap:
     bar_text: str
 
 
-def plan_html(r: PlanRecord) -> str:
+def plan_html(r: PlanRecord, head: Head) -> str:
     """The page as text."""
-    environment = Environment(
-        loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
+    environment = page_environment()
     return environment.get_template("plan.html.j2").render(
-        name=printable(r.area.name), crs=printable(r.area.crs or "local coordinates"), box=_box(r),
+        name=printable(r.area.name), head=page_head(head), box=_box(r),
         conclusion=_conclusion(r), cards=_cards(r), warnings=[printable(text, 1000) for text in r.warnings],
         sigma=_map(r, r.sigma[:, 2]), shared=_map(r, r.deformation[:, 2]), flight=_flight_table(r),
-        accuracy=_accuracy_table(r), control=_control_table(r), asked=_asked_table(r), version=__version__,
+        accuracy=_accuracy_table(r), control=_control_table(r), asked=_asked_table(r), piles=_piles_table(r),
         mode=f"{100.0 * r.mode_share:.0f}", first=_first(r),
     )  # fmt: skip
 
@@ -101,6 +98,16 @@ def _flight_table(r: PlanRecord) -> Table:
         ("photographs of a place of the area, at least", f"{int(seen.rays.min())}"),
     ]  # fmt: skip
     return _pairs("Flight", rows)
+
+
+def _piles_table(r: PlanRecord) -> Table:
+    piles = r.piles
+    return table(
+        "Single piles", (Column("pile"), [printable(one.name) for one in piles]),
+        (Column("size", "m²", ".0f"), [one.area for one in piles]),
+        (Column("σ of the volume", "m³", ".3g"), [one.sigma for one in piles]),
+        (Column("as a height", "mm", ".2g"), [1e3 * one.sigma / one.area for one in piles]),
+    )  # fmt: skip
 
 
 def _accuracy_table(r: PlanRecord) -> Table:

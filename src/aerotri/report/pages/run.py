@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from aerotri.conventions import counted
+from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.quality import printable
+from aerotri.results.head import Head
 
 RESULT = "result"
 """Folder of the adjustment."""
@@ -29,18 +31,15 @@ PICTURES = (
 """What the page begins with: step, plot and caption."""
 
 
-def run_page(content: dict[str, Any], folder: Path) -> str:
+def run_page(content: dict[str, Any], folder: Path, head: Head) -> str:
     """The page as text; it loads nothing from elsewhere, and what the steps' pages hold cannot run scripts.
 
     Parameters
     ----------
     content : source, steps (name, folder, what, status, reason, seconds, arguments), seconds.
-    folder : where the steps wrote.
+    folder : where the steps wrote. head : of the page.
     """
-    environment = Environment(
-        loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
+    environment = page_environment()
     done = {step["name"]: folder / step["folder"] for step in content["steps"] if step["status"] == "done"}
     shown = _pictures(done)
     steps = [_step(step, folder / step["folder"], set(shown)) for step in content["steps"]]
@@ -49,7 +48,7 @@ def run_page(content: dict[str, Any], folder: Path) -> str:
     return template.render(
         source=printable(content["source"]), seconds=content["seconds"], steps=steps, verdict=_verdict(adjusted),
         results=_results({name: _read(place / f"{name}.json") for name, place in done.items()}),
-        pictures=list(shown.values()),
+        pictures=list(shown.values()), head=page_head(head),
     )  # fmt: skip
 
 
@@ -80,6 +79,8 @@ def _verdict(adjusted: Mapping[str, Any]) -> tuple[str, list[str]]:
 def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
     """What was measured and how sure it is, a line each."""
     found = []
+    if accuracy := of_step.get("accuracy"):
+        found += _accuracy(accuracy)
     if volume := of_step.get("volume"):
         sigma = (volume.get("sigma") or {}).get("sigma_m3")
         parts = [f"{volume['net_m3']:.{_places(sigma)}f} m³"]
@@ -95,6 +96,17 @@ def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
     return found
 
 
+def _accuracy(content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """RMSE at the check points, and what the standard says to them."""
+    known = {"RMSE_H": "in plan", "RMSE_V": "in height", "VVA": "in height in vegetation"}
+    numbers = [f"{name} {100.0 * value:.1f} cm {text}" for name, text in known.items()
+               if (value := content["accuracy"].get(name)) is not None]  # fmt: skip
+    said = {"met": "all that is required is met", "not met": "NOT all that is required is met",
+            "cannot be said": "part of what is required cannot be said"}  # fmt: skip
+    words = f"{', '.join(numbers)}, at {counted(content['check_points'], 'check point')}"
+    return [("Accuracy", f"{words}; ASPRS edition 2: {said[content['met']]}")]
+
+
 def _places(sigma: float | None) -> int:
     """Decimals that show two digits of a σ."""
     return 1 if not sigma else int(np.clip(1 - np.floor(np.log10(sigma)), 0, 6))
@@ -102,7 +114,8 @@ def _places(sigma: float | None) -> int:
 
 def _step(step: dict[str, Any], folder: Path, shown: set[Path]) -> dict[str, Any]:
     done = step["status"] == "done"
-    pages = [place for place in (folder / "report.html", folder / "volume.html") if done and place.is_file()]
+    places = (folder / name for name in ("report.html", "accuracy.html", "volume.html"))
+    pages = [place for place in places if done and place.is_file()]
     page = pages[0].read_text(encoding="utf-8") if pages else ""
     there = sorted((folder / "plots").glob("*.png")) if done and not page else []
     plots = [plot for plot in there if plot not in shown][:LARGEST_PLOTS]
@@ -112,6 +125,7 @@ def _step(step: dict[str, Any], folder: Path, shown: set[Path]) -> dict[str, Any
         "command": printable("aerotri " + " ".join(step["arguments"]), 1000),
         "figures": _figures(folder) if done else [],
         "page": page,
+        "file": f"{step['folder']}/{pages[0].name}" if pages else "",
         "plots": [(plot.stem.replace("_", " "), _encoded(plot)) for plot in plots],
         "marking": done and (folder / "control_marks" / "marking.html").is_file(),
     }

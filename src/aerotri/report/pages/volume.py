@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from aerotri.report.pages.adjustment import data_address
+from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.plots.rendering import RenderedPlot
 from aerotri.report.quality import printable, two_digits, with_sigma
+from aerotri.results.head import Head
 from aerotri.volume.accuracy import MODEL
 
 CAPTIONS = {
@@ -24,30 +24,28 @@ CAPTIONS = {
 }
 
 
-def volume_html(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot]) -> str:
+def volume_html(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot], head: Head) -> str:
     """The page as text.
 
     Parameters
     ----------
     content : of volume.json. plots : by the names of `CAPTIONS`, in the order of the page.
+    head : of the page.
     """
-    environment = Environment(
-        loader=PackageLoader("aerotri.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
+    environment = page_environment()
     return environment.get_template("volume.html.j2").render(
         name=printable(content["dtm"]), base=printable(content["base"]["name"]),
-        boundary=printable(content["boundary"]["name"]), crs=content["crs"], cards=_cards(content),
+        boundary=printable(content["boundary"]["name"]), head=page_head(head), cards=_cards(content),
         warnings=[printable(text, 1000) for text in content["warnings"]], budget=_budget(content),
-        methods=_methods(content), piles=_piles(content), mass=_mass_words(content), version=content["aerotri"],
+        methods=_methods(content), piles=_piles(content), mass=_mass_words(content),
         plots=[{"name": name, "source": data_address(plot), "caption": CAPTIONS[name]}
                for name, plot in plots.items()],
     )  # fmt: skip
 
 
-def write_volume_page(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot], path: Path) -> None:
+def write_volume_page(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot], path: Path, head: Head) -> None:
     """Write the page; arguments as in `volume_html`."""
-    path.write_text(volume_html(content, plots), encoding="utf-8")
+    path.write_text(volume_html(content, plots, head), encoding="utf-8")
 
 
 def _number(value: float) -> str:
