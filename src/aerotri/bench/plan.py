@@ -11,7 +11,11 @@ from aerotri.bench.records import Records
 from aerotri.formats.gis.layers import strips_in
 from aerotri.functional_model.rotation import rotation_from_angles
 from aerotri.observations import Block
+from aerotri.results.adjusted_block import AdjustedBlock
+from aerotri.statistics.precision import plan_ellipses
 
+OF_SPACING = 0.4
+"""Semi-axis of a usual ellipse on the plan, over the distance of the points."""
 LOWEST = -0.05
 """Cosine that a ray falls by at least to meet the ground [C]: flatter ones end beyond any footprint of use."""
 
@@ -38,6 +42,19 @@ def plan_content(records: Records) -> dict[str, Any]:
             "point": block.control.point.tolist(), "xyz": numbers(block.control.xyz - origin, 4),
             "difference": numbers(records.differences, 5),
         },
+    }  # fmt: skip
+
+
+def ellipse_content(adjusted: AdjustedBlock) -> dict[str, Any]:
+    """Error ellipses in plan, one total σ: point, semi-axes in m, azimuth in rad, and by how much to draw them larger."""
+    a, b, azimuth = plan_ellipses(adjusted.points.total_covariance)
+    xy = adjusted.points.xyz[:, :2]
+    rows = np.flatnonzero(np.isfinite(a) & np.isfinite(xy).all(axis=1))
+    area = float(np.prod(np.ptp(xy[rows], axis=0))) if len(rows) else 1.0
+    spacing, middle = np.sqrt(area / max(len(rows), 1)), float(np.median(a[rows])) if len(rows) else 1.0
+    return {
+        "point": rows.tolist(), "a": numbers(a[rows], 6), "b": numbers(b[rows], 6),
+        "azimuth": numbers(azimuth[rows], 4), "k": OF_SPACING * spacing / max(middle, 1e-12),
     }  # fmt: skip
 
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from aerotri.conventions import InputError, px_from_mm
 from aerotri.formats.block.folder import read_block
+from aerotri.formats.block.scanned_film import scan_from_mm
 from aerotri.formats.text.tables import Columns, Table, read_table
-from aerotri.functional_model.interior import scan_positions
 from aerotri.observations import Block
 
 RECORD, RAYS = "adjustment.json", "residuals.parquet"
@@ -139,7 +139,7 @@ def pixels_in(block: Block, image: int, xy: np.ndarray) -> np.ndarray:
     """(k, 2) px, column and row, of (k, 2) mm in one photograph."""
     camera = block.cameras[block.images.camera[image]]
     fit = block.interior_fits.get(image)
-    return px_from_mm(xy, camera.size_px, camera.pixel_mm) if fit is None else scan_positions(fit, xy)
+    return px_from_mm(xy, camera.size_px, camera.pixel_mm) if fit is None else scan_from_mm(fit, xy)
 
 
 class _Rows:

@@ -15,9 +15,10 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from aerotri.bench.session import Bench
+from aerotri.bench.session import RELOAD, Bench
 from aerotri.conventions import InputError
 
+MOST, LONGEST = 10**9, 1000
 STATIC = Path(__file__).parent / "static"
 KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 HOSTS = ("127.0.0.1", "localhost")
@@ -42,16 +43,89 @@ def make_application(bench: Bench, token: str) -> ASGIApp:
     routes = [
         Route("/", _page("index.html")),
         *(Route(f"/{file.name}", _page(file.name)) for file in sorted(STATIC.iterdir()) if file.suffix in KINDS),
-        Route("/data/summary", _told(lambda asked: bench.summary())),
-        Route("/data/state", _told(lambda asked: bench.state())),
-        Route("/data/plan", _told(lambda asked: bench.plan())),
-        Route("/data/rays", _told(lambda asked: bench.rays(
-            max(_whole(asked, "first") or 0, 0), _whole(asked, "image"), _whole(asked, "point"),
-            asked.query_params.get("text", "")[:200]))),
-        Route("/data/point/{row:int}", _told(lambda asked: bench.point(asked.path_params["row"]))),
-        Route("/data/photograph/{row:int}", _told(lambda asked: bench.photograph(asked.path_params["row"]))),
+        *(Route(f"/data/{path}", _told(work)) for path, work in _questions(bench).items()),
+        *(Route(f"/act/{path}", _done(work), methods=["POST"]) for path, work in _actions(bench).items()),
+        Route("/tile/{image:int}/{level:int}/{column:int}/{row:int}", _shown(lambda asked: bench.pictures.tile(
+            *(asked.path_params[name] for name in ("image", "level", "column", "row"))))),
+        Route("/cutout/{image:int}", _shown(lambda asked: bench.cutout(
+            asked.path_params["image"], *(_whole(asked, name) or 0 for name in ("left", "top", "size"))))),
     ]  # fmt: skip
     return _Guard(Starlette(routes=routes), token)
+
+
+def _questions(bench: Bench) -> dict[str, Callable[[Request], Any]]:
+    """What the page asks for, by path."""
+    return {
+        "summary": lambda asked: bench.summary(),
+        "state": lambda asked: bench.state(),
+        "plan": lambda asked: bench.plan(),
+        "ellipses": lambda asked: bench.ellipses(),
+        "edits": lambda asked: bench.edits(),
+        "difference": lambda asked: bench.difference(),
+        "rays": lambda asked: bench.rays(
+            max(_whole(asked, "first") or 0, 0), _whole(asked, "image"), _whole(asked, "point"),
+            asked.query_params.get("text", "")[:200]),
+        "point/{row:int}": lambda asked: bench.point(asked.path_params["row"]),
+        "photograph/{row:int}": lambda asked: bench.photograph(asked.path_params["row"]),
+        "epipolar/{image:int}/{point:int}": lambda asked: bench.epipolar(
+            asked.path_params["image"], asked.path_params["point"]),
+    }  # fmt: skip
+
+
+def _actions(bench: Bench) -> dict[str, Callable[[Given], Any]]:
+    """What the page does, by path."""
+    return {
+        "mark": lambda given: bench.mark(given.row("image"), given.text("point"), given.place(), given.text("reason")),
+        "remove": lambda given: bench.remove(given.row("image"), given.text("point"), given.text("reason")),
+        "switch": lambda given: bench.switch(
+            given.row("image") if given.has("image") else None, given.text("point"), given.text("action"),
+            given.text("reason")),
+        "undo": lambda given: bench.undo(),
+        "adjust": lambda given: bench.adjust(),
+        "stop": lambda given: bench.stop(),
+    }  # fmt: skip
+
+
+class Given:
+    """What the page says with an action, checked piece by piece.
+
+    Parameters
+    ----------
+    content : as read from JSON.
+
+    Raises
+    ------
+    InputError
+        By every method, when the page says something else.
+    """
+
+    def __init__(self, content: Any):
+        self._content: dict[str, Any] = content if isinstance(content, dict) else {}
+
+    def has(self, name: str) -> bool:
+        """Whether it is said."""
+        return self._content.get(name) is not None
+
+    def row(self, name: str) -> int:
+        """A row of a table."""
+        value = self._content.get(name)
+        if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < MOST:
+            raise InputError(f"{name} is no number of a row", RELOAD)
+        return value
+
+    def text(self, name: str) -> str:
+        """A text, '' where none is said."""
+        value = self._content.get(name, "")
+        if not isinstance(value, str) or len(value) > LONGEST:
+            raise InputError(f"{name} is no text of up to {LONGEST} characters", RELOAD)
+        return value
+
+    def place(self) -> tuple[float, float]:
+        """Column and row, px."""
+        found = [self._content.get(name) for name in ("column", "row")]
+        if not all(isinstance(one, int | float) and abs(one) < MOST for one in found):
+            raise InputError("column and row are no numbers", RELOAD)
+        return float(found[0] or 0.0), float(found[1] or 0.0)
 
 
 def new_token() -> str:
@@ -103,6 +177,36 @@ def _told(work: Callable[[Request], Any]) -> Callable[[Request], Any]:
     return answer
 
 
+def _done(work: Callable[[Given], Any]) -> Callable[[Request], Any]:
+    """An action with what the page says; what it gives as JSON."""
+
+    async def answer(asked: Request) -> Response:
+        try:
+            body = await asked.body()
+            given = Given(json.loads(body) if body else {})
+            content = await run_in_threadpool(work, given)
+        except (ValueError, RecursionError):
+            return JSONResponse({"error": f"what the page said is no JSON — {RELOAD}"}, 400, HEADERS)
+        except InputError as error:
+            return JSONResponse({"error": str(error)}, 400, HEADERS)
+        return Response(_packed(content), media_type="application/json", headers=HEADERS)
+
+    return answer
+
+
+def _shown(work: Callable[[Request], bytes]) -> Callable[[Request], Any]:
+    """A picture."""
+
+    async def answer(asked: Request) -> Response:
+        try:
+            content = await run_in_threadpool(work, asked)
+        except InputError as error:
+            return JSONResponse({"error": str(error)}, 404, HEADERS)
+        return Response(content, media_type="image/jpeg", headers=HEADERS | {"Cache-Control": "private, max-age=3600"})
+
+    return answer
+
+
 def _packed(content: Any) -> bytes:
     return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode("utf-8")
 
@@ -112,6 +216,6 @@ def _whole(asked: Request, name: str) -> int | None:
     text = asked.query_params.get(name, "")
     if not text:
         return None
-    if not text.isdecimal() or len(text) > 9:
-        raise InputError(f"{name} = '{text[:30]}' is no number of a row", "load the page again")
+    if not text.removeprefix("-").isdecimal() or len(text) > 9:
+        raise InputError(f"{name} = '{text[:30]}' is no number of a row", RELOAD)
     return int(text)

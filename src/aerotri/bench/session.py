@@ -1,4 +1,4 @@
-"""One bench: the block and its result, what is looked at, and what goes on behind the page."""
+"""One bench: the block and its result, what is looked at, decided, and adjusted behind the page."""
 
 from __future__ import annotations
 
@@ -8,15 +8,25 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.bench.changed import open_changes
+from aerotri.bench.decisions import NAME, Decision, Decisions
+from aerotri.bench.difference import difference_content
+from aerotri.bench.equations import Equations
+from aerotri.bench.job import Job
+from aerotri.bench.pictures import Pictures
 from aerotri.bench.places import Places
-from aerotri.bench.plan import plan_content
+from aerotri.bench.plan import ellipse_content, plan_content
 from aerotri.bench.rays import MOST_ROWS, chosen_rays, order_of_rays, point_content, ray_rows
 from aerotri.bench.records import read_records, records_of_block
 from aerotri.conventions import InputError
 from aerotri.formats.block.folder import read_block
-from aerotri.results.adjustment import Adjustment
+from aerotri.formats.block.journal import MARK, ON, REMOVE
+from aerotri.observations.block import EDIT_ACTIONS
 from aerotri.statistics.outliers import spread
 from aerotri.statistics.reliability import critical_value
+
+LARGEST_CUTOUT = 1024
+RELOAD = "load the page again"
 
 
 class Bench:
@@ -25,112 +35,296 @@ class Bench:
     Parameters
     ----------
     places : the folders. photographs : the folder of the photographs, None where there are none.
+
+    Raises
+    ------
+    InputError
+        When the result or the block is damaged, or the folder has no photographs of the block.
     """
 
     def __init__(self, places: Places, photographs: Path | None = None):
-        self.places, self._folder = places, photographs
+        self.places = places
         self._lock = threading.RLock()
         self.generation = 0
-        self._show(places.result)
+        self._job: Job | None = None
+        self._before: Equations | None = None
+        self.show(places.result)
+        self.pictures = Pictures(self.records.block, photographs)
+        self.decisions = Decisions(places.readable_block)
 
-    def _show(self, result: Path | None) -> None:
+    def show(self, result: Path | None) -> None:
         """Take up a result, or the block alone."""
         records = records_of_block(read_block(self.places.readable_block)) if result is None else read_records(result)
         with self._lock:
             self.result, self.records = result, records
             self.order = order_of_rays(records)
             self.generation += 1
-            self._equations = _Equations(result)
+            self.equations = Equations(result)
 
     def summary(self) -> dict[str, Any]:
         """What the head of the page says."""
-        r = self.records
-        o = r.outcome
+        r, o = self.records, self.records.outcome
         return {
             "name": str(r.block.name), "result": "" if self.result is None else self.result.name,
             "status": o.get("status", "not adjusted"), "verdict": o.get("verdict", ""),
             "reasons": o.get("reasons", []), "sigma0": o.get("sigma0"), "sigma0_um": o.get("sigma0_um"),
-            "limit": spread(r.w) * critical_value(r.block.settings.adjustment.alpha),
-            "counts": r.block.counts, "crs": r.block.crs, "generation": self.generation,
-            "cameras": [
-                {"name": camera.name, "size": list(camera.size_px)} for camera in r.block.cameras
-            ],
-            "camera_of": r.block.images.camera.tolist(), "photographs": self._folder is not None,
+            "limit": spread(r.w) * critical_value(r.block.settings.adjustment.alpha), "counts": r.block.counts,
+            "crs": r.block.crs, "generation": self.generation,
+            "sizes": [list(camera.size_px) for camera in r.block.cameras], "camera": r.block.images.camera.tolist(),
+            "pictures": sorted(self.pictures.paths()),
         }  # fmt: skip
 
     def state(self) -> dict[str, Any]:
         """What goes on: asked for every second."""
-        return {"generation": self.generation, "equations": self._equations.state()}
+        job = None if self._job is None else self._job.state()
+        return {"generation": self.generation, "equations": self.equations.state(), "job": job}
 
     def plan(self) -> dict[str, Any]:
         """See `plan_content`."""
         return plan_content(self.records)
 
+    def ellipses(self) -> dict[str, Any]:
+        """See `ellipse_content`.
+
+        Raises
+        ------
+        InputError
+            When the equations are not there yet.
+        """
+        return ellipse_content(self.equations.get().result)
+
     def rays(self, first: int, image: int | None, point: int | None, text: str) -> dict[str, Any]:
         """A page of the table of rays from row `first` on."""
+        for given, count, what in ((image, len(self.records.block.images), "photograph"),
+                                   (point, len(self.records.block.points), "point")):  # fmt: skip
+            if given is not None:
+                self._row(given, count, what)
         rows = chosen_rays(self.records, self.order, image, point, text)
         return {"count": len(rows), "first": first, "rows": ray_rows(self.records, rows[first : first + MOST_ROWS])}
 
     def point(self, point: int) -> dict[str, Any]:
-        """See `point_content`.
+        """See `point_content`; with where it is expected in all photographs that show it, once that is known.
 
         Raises
         ------
         InputError
         """
-        return point_content(self.records, self._row(point, len(self.records.block.points), "point"))
+        row = self._row(point, len(self.records.block.points), "point")
+        return point_content(self.records, row) | {"expected": self._expected(row)}
 
     def photograph(self, image: int) -> dict[str, Any]:
-        """The rays of a photograph.
+        """The rays of a photograph, and where control points are expected in it, once that is known.
 
         Raises
         ------
         InputError
+        """
+        block = self.records.block
+        row = self._row(image, len(block.images), "photograph")
+        rows = np.flatnonzero(block.image_points.image == row)
+        control, expected = block.control.point, list[Any]()
+        prediction = self.equations.prediction()
+        if prediction is not None and len(control):
+            xyz = np.where(np.isnan(self.records.xyz[control]), block.control.xyz, self.records.xyz[control])
+            px = prediction.pixels(row, xyz)
+            expected = [[int(p), *np.round(at, 3).tolist()] for p, at in zip(control, px, strict=True)
+                        if np.isfinite(at).all()]  # fmt: skip
+        return {
+            "image": row, "name": str(block.images.names[row]), "size": list(self.pictures.size(row)),
+            "has_file": row in self.pictures, "rays": ray_rows(self.records, rows), "expected": expected,
+        }  # fmt: skip
+
+    def cutout(self, image: int, left: int, top: int, size: int) -> bytes:
+        """A square of a photograph in full resolution, as JPEG.
+
+        Raises
+        ------
+        InputError
+        """
+        if not 8 <= size <= LARGEST_CUTOUT:
+            raise InputError(f"a cut-out of {size} pixels cannot be shown", f"8 to {LARGEST_CUTOUT} can")
+        return self.pictures.cutout(self._row(image, len(self.records.block.images), "photograph"), left, top, size)
+
+    def epipolar(self, image: int, point: int) -> dict[str, Any]:
+        """The rays of a point in other photographs as lines in this one.
+
+        Raises
+        ------
+        InputError
+        """
+        prediction, r = self.equations.prediction(), self.records
+        row = self._row(image, len(r.block.images), "photograph")
+        own = self._row(point, len(r.block.points), "point")
+        if prediction is None or not np.isfinite(r.xyz[own]).all():
+            return {"lines": []}
+        rays = ray_rows(r, np.flatnonzero((r.block.image_points.point == own) & (r.block.image_points.image != row)))
+        lines = [
+            {"image": other, "line": np.round(prediction.epipolar(row, other, np.array(px), r.xyz[own]), 2).tolist()}
+            for other, px in zip(rays["image"], rays["px"], strict=True)
+        ]
+        return {"lines": [one for one in lines if len(one["line"]) > 1]}
+
+    def edits(self) -> dict[str, Any]:
+        """The journal, the newest first, and what the shown result does not have of it."""
+        standing = {id(one) for one in self.decisions.standing()}
+        rows = [
+            {"time": one.time, "action": one.action, "image": one.image, "point": one.point, "place": one.place,
+             "before": one.before, "reason": one.reason, "stands": id(one) in standing}
+            for one in reversed(self.decisions.rows)
+        ]  # fmt: skip
+        return {"rows": rows, "changes": open_changes(self.records, self.decisions),
+                "file": str(self.places.block / NAME), "can_undo": bool(standing)}  # fmt: skip
+
+    def mark(self, image: int, point: str, place: tuple[float, float], reason: str = "") -> dict[str, Any]:
+        """Set or move a mark.
+
+        Parameters
+        ----------
+        image : row. point : name, of the block or a new one. place : column and row, px.
+
+        Raises
+        ------
+        InputError
+            When the place is not in the photograph.
         """
         row = self._row(image, len(self.records.block.images), "photograph")
-        rows = np.flatnonzero(self.records.block.image_points.image == row)
-        camera = self.records.block.cameras[self.records.block.images.camera[row]]
-        name = str(self.records.block.images.names[row])
-        return {"image": row, "name": name, "size": list(camera.size_px), "rays": ray_rows(self.records, rows)}
+        size = self.pictures.size(row)
+        if not all(0.0 <= value <= limit for value, limit in zip(place, size, strict=True)):
+            raise InputError("the place is not in the photograph", "click inside of it")
+        name = point.strip()
+        if not name or len(name) > 200 or not name.isprintable():
+            raise InputError("a point needs a name of up to 200 printable characters", "give it one")
+        return self._decide(Decision(MARK, self._image(row), name, place, self._place(row, name), reason))
 
-    def equations(self) -> Adjustment:
-        """The adjustment with its equations.
+    def remove(self, image: int, point: str, reason: str) -> dict[str, Any]:
+        """Take a measurement out.
 
         Raises
         ------
         InputError
-            Where there is none, or none yet.
+            When the point is not measured there.
         """
-        return self._equations.get()
+        row = self._row(image, len(self.records.block.images), "photograph")
+        before = self._place(row, point)
+        if before is None:
+            raise InputError(f"'{point}' is not measured there", RELOAD)
+        return self._decide(Decision(REMOVE, self._image(row), point, None, before, reason))
+
+    def switch(self, image: int | None, point: str, action: str, reason: str) -> dict[str, Any]:
+        """Switch a ray off or on, or change what a control point is used for; with a reason.
+
+        Parameters
+        ----------
+        image : row, None where the point as a whole is meant. action : off, on, check or control.
+
+        Raises
+        ------
+        InputError
+        """
+        block = self.records.block
+        if action not in (*EDIT_ACTIONS, ON):
+            raise InputError(f"'{action[:30]}' is no decision about a ray or a point", RELOAD)
+        if not reason.strip():
+            raise InputError("a decision needs a reason", "say why, in a few words")
+        if action in ("check", "control") and (image is not None or point not in block.points[block.control.point]):
+            raise InputError(f"'{point}' is no control or check point", "choose one of control.csv")
+        name = "" if image is None else self._image(self._row(image, len(block.images), "photograph"))
+        known = point in block.points if image is None else self._place(image, point) is not None
+        if not known:
+            raise InputError(f"'{point}' is not measured there", RELOAD)
+        return self._decide(Decision(action, name, point, reason=reason))
+
+    def undo(self) -> dict[str, Any]:
+        """Take the last decision back."""
+        with self._lock:
+            self.decisions.undo()
+            return self.edits()
+
+    def adjust(self) -> dict[str, Any]:
+        """Adjust the block as it is now, behind the page.
+
+        Raises
+        ------
+        InputError
+            When an adjustment is running already.
+        """
+        with self._lock:
+            if self._job is not None and self._job.is_running:
+                raise InputError("an adjustment is running already", "wait, or stop it")
+            self.places.keep_block()
+            frame = self.equations.frame()
+            geoid = "" if frame is None or frame.geoid is None else str(frame.geoid)
+            self._job = Job(self.places.block, self.places.next_result(), self.result, geoid, self._take)
+        return self.state()
+
+    def stop(self) -> dict[str, Any]:
+        """Stop the adjustment that is running."""
+        if self._job is not None and self._job.is_running:
+            self._job.stop()
+        return self.state()
+
+    def wait(self) -> None:
+        """Wait until the adjustment has ended and the equations are there."""
+        if self._job is not None:
+            self._job.wait()
+        self.equations.wait()
+
+    def difference(self, top: int = 10) -> dict[str, Any]:
+        """What the last adjustment changed; see `difference_content`.
+
+        Raises
+        ------
+        InputError
+            When nothing was adjusted here, or the equations are not there yet.
+        """
+        if self._before is None:
+            raise InputError("nothing was adjusted here yet", "press Adjust again")
+        return difference_content(self._before.get().result, self.equations.get().result, top)
+
+    def _take(self, result: Path) -> None:
+        """Show a new result; the one before is what it is compared with."""
+        before = self.equations if self.result is not None else None
+        self.show(result)
+        self._before = before
+
+    def _decide(self, decision: Decision) -> dict[str, Any]:
+        with self._lock:
+            if self.decisions.folder != self.places.block:
+                self.places.keep_block()
+                self.decisions = Decisions(self.places.block)
+            self.decisions.add(decision)
+            return self.edits()
+
+    def _expected(self, point: int) -> list[Any]:
+        """Photograph, column and row of everywhere that a point should appear."""
+        r, prediction = self.records, self.equations.prediction()
+        xyz = r.xyz[point]
+        given = np.flatnonzero(r.block.control.point == point)
+        if not np.isfinite(xyz).all() and len(given):
+            xyz = r.block.control.xyz[given[0]]
+        if prediction is None or not np.isfinite(xyz).all():
+            return []
+        return [
+            [image, *np.round(prediction.pixels(image, xyz[None])[0], 3).tolist()]
+            for image in prediction.images_of(xyz).tolist()
+        ]
+
+    def _place(self, image: int, point: str) -> tuple[float, float] | None:
+        """Column and row of a mark as it is now; None where the point is not measured."""
+        last = self.decisions.marks().get((self._image(image), point))
+        if last is not None:
+            return last.place
+        block = self.records.block
+        rows = np.flatnonzero((block.image_points.image == image) & (block.points[block.image_points.point] == point))
+        if not len(rows):
+            return None
+        column, row = ray_rows(self.records, rows)["px"][0]
+        return column, row
+
+    def _image(self, row: int) -> str:
+        return str(self.records.block.images.names[row])
 
     def _row(self, number: int, count: int, what: str) -> int:
         if not 0 <= number < count:
-            raise InputError(f"there is no {what} {number}", "load the page again")
+            raise InputError(f"there is no {what} {number}", RELOAD)
         return number
-
-
-class _Equations:
-    """The equations of a result, set up behind the page."""
-
-    def __init__(self, result: Path | None):
-        self._found: Adjustment | None = None
-        self._error = "" if result is not None else "the block is not adjusted"
-        if result is not None:
-            threading.Thread(target=self._open, args=(result,), daemon=True).start()
-
-    def _open(self, result: Path) -> None:
-        from aerotri.opening import open_result
-
-        try:
-            self._found = open_result(result)
-        except InputError as error:
-            self._error = str(error)
-
-    def state(self) -> str:
-        """'ready', 'being set up', or why there are none."""
-        return "ready" if self._found is not None else self._error or "being set up"
-
-    def get(self) -> Adjustment:
-        if self._found is None:
-            raise InputError(f"the equations are not there: {self.state()}", "wait a moment, or adjust again")
-        return self._found
