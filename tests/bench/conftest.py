@@ -31,7 +31,11 @@ def bench(result):
     from aerotri.bench.places import places_of
     from aerotri.bench.session import Bench
 
-    return Bench(places_of(result))
+    made = Bench(places_of(result))
+    made.wait()
+    yield made
+    made.stop()
+    made.wait()
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import os
@@ -161,10 +162,17 @@ def _append(path: Path, row: Decision) -> None:
     """One write of one row, brought to the disk; a file of other columns gets those of a journal first."""
     if _header(path) != COLUMNS:
         _rewrite(path)
-    with path.open("ab") as file:
-        file.write(_line(row.cells()))
-        file.flush()
-        os.fsync(file.fileno())
+    before = path.stat().st_size
+    try:
+        with path.open("ab") as file:
+            file.write(_line(row.cells()))
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError:
+        # a full disk may have taken a part of the row
+        with contextlib.suppress(OSError):
+            os.truncate(path, before)
+        raise
 
 
 def _header(path: Path) -> tuple[str, ...]:

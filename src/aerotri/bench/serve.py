@@ -32,7 +32,7 @@ def serve(bench: Bench, port: int, browser: bool, tell: Callable[[str], None]) -
         When the port is taken.
     """
     token = new_token()
-    with _listening(port) as listener:
+    with listening(port) as listener:
         url = f"http://{ADDRESS}:{listener.getsockname()[1]}/{token}/"
         settings = uvicorn.Config(make_application(bench, token), log_level="error", access_log=False, lifespan="off")
         server = uvicorn.Server(settings)
@@ -57,7 +57,18 @@ def _ending(server: uvicorn.Server) -> Callable[[int, FrameType | None], None]:
     return end
 
 
-def _listening(port: int) -> socket.socket:
+def listening(port: int) -> socket.socket:
+    """A socket on this machine alone.
+
+    Parameters
+    ----------
+    port : 0 for any that is free.
+
+    Raises
+    ------
+    InputError
+        When the port is taken.
+    """
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

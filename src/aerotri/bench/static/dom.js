@@ -5,7 +5,7 @@ export function make(tag, properties = {}, ...children) {
   for (const [name, value] of Object.entries(properties)) {
     if (name === "class") element.className = value;
     else if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (name in element) element[name] = value;
+    else if (name in element && name !== "list") element[name] = value;
     else element.setAttribute(name, value);
   }
   element.append(...children.map(child => child ?? ""));
