@@ -128,3 +128,20 @@ def test_adjusted_again_the_difference_is_that_of_the_mark(client, bench):
     assert (bench.records.sigma[point] > before).any()
     client.post("act/undo")
     assert [one["kind"] for one in client.get("data/edits").json()["changes"]] == ["on"]
+
+
+def test_mark_taken_back_after_the_adjustment_is_open_again(client, bench):
+    image, point, _ = moved(client)
+    client.post("act/adjust")
+    bench.wait()
+    assert client.get("data/edits").json()["changes"] == []
+    said = client.post("act/undo").json()
+    assert [(one["kind"], one["image"], one["point"]) for one in said["changes"]] == [("moved", image, point)]
+    before = bench.records.block.image_points.xy.copy()
+    client.post("act/adjust")
+    bench.wait()
+    rays = bench.records.block.image_points
+    row = np.flatnonzero((rays.image == image) & (rays.point == point))
+    pixel = bench.records.block.cameras[0].pixel_mm
+    change = bench.records.block.image_points.xy[row] - before[row]
+    assert change[0] == pytest.approx([-1.5 * pixel, -2.0 * pixel], abs=0.001 * pixel)

@@ -47,8 +47,7 @@ def test_worst_ray_is_found_its_mark_moved_adjusted_compared_and_taken_back(page
     sizes = [float(text) for text in texts(p, "#rays tbody td.size")]
     assert sizes == sorted(sizes, reverse=True)
     p.click("#rays tbody tr:first-child")
-    p.wait_for_function("bench.photo.content !== undefined && bench.chosen.point !== null")
-    assert p.evaluate("bench.names.points[bench.chosen.point]") == worst[4]
+    p.wait_for_selector(f"body[data-shown='{worst[3]} {worst[4]}']")
     p.uncheck("#photo-bar label:has-text('snap') input")
     # the mark stands in the middle: it is taken by the mouse and let go elsewhere
     box = p.locator("#photo").bounding_box()

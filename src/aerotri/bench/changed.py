@@ -22,7 +22,7 @@ def open_changes(records: Records, decisions: Decisions) -> list[dict[str, Any]]
     `kind` (moved, new, removed, off, on, check or control), `px` of a mark, and `reason`.
     """
     rows = _Rows(records)
-    found = [_mark(rows, one) for one in decisions.marks().values()]
+    found = [_mark(rows, one) for one in decisions.places().values()]
     found += [*_switches(rows, decisions)]
     return [one for one in found if one is not None]
 

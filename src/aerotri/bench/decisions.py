@@ -84,6 +84,18 @@ class Decisions:
         """The last mark, or removal of one, of every photograph and point."""
         return {(one.image, one.point): one for one in self.standing() if one.action in (MARK, REMOVE)}
 
+    def places(self) -> Mapping[tuple[str, str], Decision]:
+        """Where every measurement that was ever touched is now, as a mark; as a removal where it is not measured.
+
+        Where all about it was taken back, it is where it was before the first mark.
+        """
+        touched: dict[tuple[str, str], Decision] = {}
+        for one in self._rows:
+            if one.action in (MARK, REMOVE) and (one.image, one.point) not in touched:
+                action = REMOVE if one.before is None else MARK
+                touched[one.image, one.point] = Decision(action, one.image, one.point, one.before)
+        return touched | dict(self.marks())
+
     def switches(self) -> Mapping[tuple[str, str], Decision]:
         """The last decision about every ray and point, photograph '' where the point is meant; those that are on."""
         last = {(one.image, one.point): one for one in self.standing() if one.action not in (MARK, REMOVE)}

@@ -311,7 +311,7 @@ class Bench:
 
     def _place(self, image: int, point: str) -> tuple[float, float] | None:
         """Column and row of a mark as it is now; None where the point is not measured."""
-        last = self.decisions.marks().get((self._image(image), point))
+        last = self.decisions.places().get((self._image(image), point))
         if last is not None:
             return last.place
         block = self.records.block

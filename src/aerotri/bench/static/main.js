@@ -158,6 +158,7 @@ class Bench {
     await this.photo.open(image, point);
     this.photo.bar();
     await this.showTab();
+    document.body.dataset.shown = `${this.names.images[image]} ${this.names.points[point]}`;
   }
 
   async setMark(image, point, at, snap) {
