@@ -9,9 +9,9 @@ import jsonschema
 import pytest
 
 from aerotri.adjustment.ray_status import RAY_STATUS
+from aerotri.formats.block.journal import ACTIONS
 from aerotri.formats.block.settings_model import BlockModel
 from aerotri.formats.block.writer import TABLE_NAMES
-from aerotri.formats.block.journal import ACTIONS
 from aerotri.observations.block import CONSTRAINT_KINDS
 from aerotri.reference.adjust_tables import RESIDUALS
 from aerotri.reference.block_keys import block_keys, block_tables, plan_keys, plan_tables, prior_keys

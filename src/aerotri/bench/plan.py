@@ -46,7 +46,7 @@ def plan_content(records: Records) -> dict[str, Any]:
 
 
 def ellipse_content(adjusted: AdjustedBlock) -> dict[str, Any]:
-    """Error ellipses in plan, one total σ: point, semi-axes in m, azimuth in rad, and by how much to draw them larger."""
+    """Error ellipses in plan, one total σ: point, semi-axes in m, azimuth in rad, and how much larger to draw them."""
     a, b, azimuth = plan_ellipses(adjusted.points.total_covariance)
     xy = adjusted.points.xyz[:, :2]
     rows = np.flatnonzero(np.isfinite(a) & np.isfinite(xy).all(axis=1))

@@ -75,7 +75,8 @@ def _questions(bench: Bench) -> dict[str, Callable[[Request], Any]]:
 def _actions(bench: Bench) -> dict[str, Callable[[Given], Any]]:
     """What the page does, by path."""
     return {
-        "mark": lambda given: bench.mark(given.row("image"), given.text("point"), given.place(), given.text("reason")),
+        "mark": lambda given: bench.mark(
+            given.row("image"), given.text("point"), given.place(), given.text("reason"), given.is_set("snap")),
         "remove": lambda given: bench.remove(given.row("image"), given.text("point"), given.text("reason")),
         "switch": lambda given: bench.switch(
             given.row("image") if given.has("image") else None, given.text("point"), given.text("action"),
@@ -105,6 +106,10 @@ class Given:
     def has(self, name: str) -> bool:
         """Whether it is said."""
         return self._content.get(name) is not None
+
+    def is_set(self, name: str) -> bool:
+        """Whether it is said to be so."""
+        return self._content.get(name) is True
 
     def row(self, name: str) -> int:
         """A row of a table."""

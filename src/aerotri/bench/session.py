@@ -18,6 +18,7 @@ from aerotri.bench.places import Places
 from aerotri.bench.plan import ellipse_content, plan_content
 from aerotri.bench.rays import MOST_ROWS, chosen_rays, order_of_rays, point_content, ray_rows
 from aerotri.bench.records import read_records, records_of_block
+from aerotri.bench.snap import snapped
 from aerotri.conventions import InputError
 from aerotri.formats.block.folder import read_block
 from aerotri.formats.block.journal import MARK, ON, REMOVE
@@ -175,12 +176,15 @@ class Bench:
         return {"rows": rows, "changes": open_changes(self.records, self.decisions),
                 "file": str(self.places.block / NAME), "can_undo": bool(standing)}  # fmt: skip
 
-    def mark(self, image: int, point: str, place: tuple[float, float], reason: str = "") -> dict[str, Any]:
-        """Set or move a mark.
+    def mark(
+        self, image: int, point: str, place: tuple[float, float], reason: str = "", snap: bool = False
+    ) -> dict[str, Any]:
+        """Set or move a mark; `snapped` says in words where it was brought to.
 
         Parameters
         ----------
         image : row. point : name, of the block or a new one. place : column and row, px.
+        snap : whether a target or the other photographs of the point say more exactly where it is.
 
         Raises
         ------
@@ -194,7 +198,14 @@ class Bench:
         name = point.strip()
         if not name or len(name) > 200 or not name.isprintable():
             raise InputError("a point needs a name of up to 200 printable characters", "give it one")
-        return self._decide(Decision(MARK, self._image(row), name, place, self._place(row, name), reason))
+        how = ""
+        if snap and row in self.pictures:
+            found = snapped(self.pictures, row, place, self._others(name), self.equations.prediction(), self._xyz(name))
+            place, how = found.place, found.how
+        said = " ".join(filter(None, (reason, how)))
+        return self._decide(Decision(MARK, self._image(row), name, place, self._place(row, name), said)) | {
+            "snapped": how
+        }
 
     def remove(self, image: int, point: str, reason: str) -> dict[str, Any]:
         """Take a measurement out.
@@ -297,17 +308,40 @@ class Bench:
 
     def _expected(self, point: int) -> list[Any]:
         """Photograph, column and row of everywhere that a point should appear."""
-        r, prediction = self.records, self.equations.prediction()
-        xyz = r.xyz[point]
-        given = np.flatnonzero(r.block.control.point == point)
-        if not np.isfinite(xyz).all() and len(given):
-            xyz = r.block.control.xyz[given[0]]
-        if prediction is None or not np.isfinite(xyz).all():
+        prediction, xyz = self.equations.prediction(), self._xyz(str(self.records.block.points[point]))
+        if prediction is None or xyz is None or not np.isfinite(xyz).all():
             return []
         return [
             [image, *np.round(prediction.pixels(image, xyz[None])[0], 3).tolist()]
             for image in prediction.images_of(xyz).tolist()
         ]
+
+    def _xyz(self, point: str) -> np.ndarray | None:
+        """(3,) m of a point, as it is adjusted, or given; None where neither."""
+        r = self.records
+        rows = np.flatnonzero(r.block.points == point)
+        if not len(rows):
+            return None
+        given = np.flatnonzero(r.block.control.point == rows[0])
+        if not np.isfinite(r.xyz[rows[0]]).all() and len(given):
+            return r.block.control.xyz[given[0]]
+        return r.xyz[rows[0]]
+
+    def _others(self, point: str) -> list[tuple[int, np.ndarray]]:
+        """Photographs and places (2,) px where a point is measured now, the smallest |w| first."""
+        block, found = self.records.block, dict[int, np.ndarray]()
+        rows = np.flatnonzero(block.points[block.image_points.point] == point)
+        rows = rows[np.argsort(np.nan_to_num(self.records.size[rows], nan=np.inf))]
+        rays = ray_rows(self.records, rows)
+        for image, px in zip(rays["image"], rays["px"], strict=True):
+            found[image] = np.array(px)
+        row = {name: k for k, name in enumerate(block.images.names.tolist())}
+        for (image, name), one in self.decisions.places().items():
+            if name == point and image in row:
+                found.pop(row[image], None)
+                if one.place is not None:
+                    found[row[image]] = np.array(one.place)
+        return list(found.items())
 
     def _place(self, image: int, point: str) -> tuple[float, float] | None:
         """Column and row of a mark as it is now; None where the point is not measured."""

@@ -26,7 +26,7 @@ def view(
     ] = None,
     port: Annotated[
         int,
-        typer.Option(min=0, max=65535, help="Port on this machine. 0: any that is free.", rich_help_panel=OUTPUT),
+        typer.Option(min=0, max=65535, help="Number of the port on this machine; 0: any that is free.", rich_help_panel=OUTPUT),
     ] = 0,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.", rich_help_panel=OUTPUT)

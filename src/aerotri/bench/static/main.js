@@ -162,15 +162,18 @@ class Bench {
   }
 
   async setMark(image, point, at, snap) {
-    const place = { image, point, column: at[0], row: at[1] };
-    this.decided(await tell("act/mark", place));
+    const found = await tell("act/mark", { image, point, column: at[0], row: at[1], snap });
+    this.note(snap ? (found.snapped ? `Mark of ${point}: ${found.snapped}` : `Mark of ${point}: where you clicked, no target and no match there`) : "");
+    await this.decided(found);
   }
 
-  async removeMark(image, point, reason) { this.decided(await tell("act/remove", { image, point, reason })); }
+  note(text) { document.getElementById("photo-hint").textContent = text; }
 
-  async switch(image, point, action, reason) { this.decided(await tell("act/switch", { image, point, action, reason })); }
+  async removeMark(image, point, reason) { await this.decided(await tell("act/remove", { image, point, reason })); }
 
-  async undo() { this.decided(await tell("act/undo")); }
+  async switch(image, point, action, reason) { await this.decided(await tell("act/switch", { image, point, action, reason })); }
+
+  async undo() { await this.decided(await tell("act/undo")); }
 
   async decided(edits) {
     this.takeEdits(edits);
