@@ -105,6 +105,29 @@ def test_point_chosen_in_the_plan_is_that_under_the_mouse(page):
     assert p.locator(".cutouts figure").count() >= p.evaluate("bench.pointContent.rays.ray.length")
 
 
+def test_next_mark_leads_to_its_place_and_space_is_drawn(page, bench):
+    p = page.page
+    p.wait_for_selector("body[data-equations=ready]")
+    p.click("#tab-next")
+    p.wait_for_selector("#next tbody tr")
+    less = [float(text.split()[0]) for text in texts(p, "#next tbody td:last-child")]
+    assert less == sorted(less, reverse=True)
+    point, photograph = texts(p, "#next tbody tr:first-child td")[:2]
+    p.click("#next tbody tr:first-child")
+    p.wait_for_selector(f"body[data-shown='{photograph} {point.removesuffix(' (control)')}']")
+    assert not p.is_disabled("#set-mark")
+    p.click("#set-mark")
+    box = p.locator("#photo").bounding_box()
+    p.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    p.wait_for_selector("body[data-changes='1']")
+    assert bench.decisions.rows[-1].image == photograph
+    p.click("#tab-space")
+    p.wait_for_selector("#space")
+    drawn = """() => { const c = document.getElementById('space'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+        let n = 0; for (let k = 3; k < d.length; k += 4) if (d[k]) n++; return n; }"""
+    assert p.evaluate(drawn) > 1000
+
+
 def test_wrong_token_is_refused(page, chromium):
     other = Watched(chromium)
     answer = other.page.goto(page.address.rsplit("/", 2)[0] + "/wrong/")

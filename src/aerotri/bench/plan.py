@@ -22,7 +22,7 @@ LOWEST = -0.05
 
 def plan_content(records: Records) -> dict[str, Any]:
     """The plan as lists, by rows of photographs and points; coordinates from `origin` on, m."""
-    block, origin = records.block, _origin(records)
+    block, origin = records.block, plan_origin(records)
     roles = np.zeros(len(block.points), dtype=int)
     roles[block.control.point] = np.where(block.control.is_check, 2, 1)
     return {
@@ -89,7 +89,7 @@ def ground_heights(records: Records) -> np.ndarray:
     return out
 
 
-def _origin(records: Records) -> np.ndarray:
+def plan_origin(records: Records) -> np.ndarray:
     """(3,) m, whole numbers near the middle of the block, so that few digits are sent."""
     every = np.concatenate([records.xyz, records.centre])
     known = every[np.isfinite(every).all(axis=1)]

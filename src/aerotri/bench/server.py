@@ -47,6 +47,7 @@ def make_application(bench: Bench, token: str) -> ASGIApp:
         *(Route(f"/act/{path}", _done(work), methods=["POST"]) for path, work in _actions(bench).items()),
         Route("/tile/{image:int}/{level:int}/{column:int}/{row:int}", _shown(lambda asked: bench.pictures.tile(
             *(asked.path_params[name] for name in ("image", "level", "column", "row"))))),
+        Route("/layer/{number:int}", _shown(lambda asked: bench.layer(asked.path_params["number"]))),
         Route("/cutout/{image:int}", _shown(lambda asked: bench.cutout(
             asked.path_params["image"], *(_whole(asked, name) or 0 for name in ("left", "top", "size"))))),
     ]  # fmt: skip
@@ -61,6 +62,8 @@ def _questions(bench: Bench) -> dict[str, Callable[[Request], Any]]:
         "plan": lambda asked: bench.plan(),
         "ellipses": lambda asked: bench.ellipses(),
         "edits": lambda asked: bench.edits(),
+        "next": lambda asked: bench.next(),
+        "layers": lambda asked: bench.layers(),
         "difference": lambda asked: bench.difference(),
         "rays": lambda asked: bench.rays(
             max(_whole(asked, "first") or 0, 0), _whole(asked, "image"), _whole(asked, "point"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,11 @@ from aerotri.bench.decisions import NAME, Decision, Decisions
 from aerotri.bench.difference import difference_content
 from aerotri.bench.equations import Equations
 from aerotri.bench.job import Job
+from aerotri.bench.layers import layer_picture, layers_beside, open_layer
+from aerotri.bench.next_mark import NextMark, next_marks
 from aerotri.bench.pictures import Pictures
 from aerotri.bench.places import Places
-from aerotri.bench.plan import ellipse_content, plan_content
+from aerotri.bench.plan import ellipse_content, plan_content, plan_origin
 from aerotri.bench.rays import MOST_ROWS, chosen_rays, order_of_rays, point_content, ray_rows
 from aerotri.bench.records import read_records, records_of_block
 from aerotri.bench.snap import snapped
@@ -23,10 +26,11 @@ from aerotri.conventions import InputError
 from aerotri.formats.block.folder import read_block
 from aerotri.formats.block.journal import MARK, ON, REMOVE
 from aerotri.observations.block import EDIT_ACTIONS
+from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.outliers import spread
 from aerotri.statistics.reliability import critical_value
 
-LARGEST_CUTOUT = 1024
+LARGEST_CUTOUT, MOST_NEXT = 1024, 20
 RELOAD = "load the page again"
 
 
@@ -36,6 +40,7 @@ class Bench:
     Parameters
     ----------
     places : the folders. photographs : the folder of the photographs, None where there are none.
+    below : rasters to be drawn below the plan, beside those of `aerotri run`.
 
     Raises
     ------
@@ -43,15 +48,17 @@ class Bench:
         When the result or the block is damaged, or the folder has no photographs of the block.
     """
 
-    def __init__(self, places: Places, photographs: Path | None = None):
+    def __init__(self, places: Places, photographs: Path | None = None, below: Sequence[Path] = ()):
         self.places = places
         self._lock = threading.RLock()
         self.generation = 0
         self._job: Job | None = None
         self._before: Equations | None = None
+        self._next: tuple[Adjustment, list[NextMark]] | None = None
         self.show(places.result)
         self.pictures = Pictures(self.records.block, photographs)
         self.decisions = Decisions(places.readable_block)
+        self._layers = [open_layer(path) for path in (*below, *layers_beside(places.result))]
 
     def show(self, result: Path | None) -> None:
         """Take up a result, or the block alone."""
@@ -146,6 +153,23 @@ class Bench:
             raise InputError(f"a cut-out of {size} pixels cannot be shown", f"8 to {LARGEST_CUTOUT} can")
         return self.pictures.cutout(self._row(image, len(self.records.block.images), "photograph"), left, top, size)
 
+    def layers(self) -> dict[str, Any]:
+        """Surfaces and orthophotos to be drawn below the plan: name and bounds, from the origin of the plan."""
+        origin = plan_origin(self.records)[:2].tolist() * 2
+        return {"layers": [
+            {"name": one.path.name, "bounds": [value - zero for value, zero in zip(one.bounds, origin, strict=True)]}
+            for one in self._layers
+        ]}  # fmt: skip
+
+    def layer(self, number: int) -> bytes:
+        """The picture of a layer, as JPEG.
+
+        Raises
+        ------
+        InputError
+        """
+        return layer_picture(self._layers[self._row(number, len(self._layers), "layer")])
+
     def epipolar(self, image: int, point: int) -> dict[str, Any]:
         """The rays of a point in other photographs as lines in this one.
 
@@ -164,6 +188,26 @@ class Bench:
             for other, px in zip(rays["image"], rays["px"], strict=True)
         ]
         return {"lines": [one for one in lines if len(one["line"]) > 1]}
+
+    def next(self) -> dict[str, Any]:
+        """Which mark next: see `next_marks`; those that were set meanwhile are left out.
+
+        Raises
+        ------
+        InputError
+            When the equations are not there yet.
+        """
+        adjustment, prediction = self.equations.get(), self.equations.prediction()
+        if prediction is None:
+            raise InputError("the equations are not there", "wait a moment")
+        if self._next is None or self._next[0] is not adjustment:
+            self._next = (adjustment, next_marks(adjustment, prediction))
+        names, touched = adjustment.result.block.points, self.decisions.places()
+        return {"marks": [
+            {"image": one.image, "point": one.point, "place": list(one.place), "is_control": one.is_control,
+             "before": one.before, "after": one.after}
+            for one in self._next[1] if (self._image(one.image), str(names[one.point])) not in touched
+        ][:MOST_NEXT]}  # fmt: skip
 
     def edits(self) -> dict[str, Any]:
         """The journal, the newest first, and what the shown result does not have of it."""

@@ -90,7 +90,7 @@ def _matched(
 
 
 def _affine(prediction: Prediction | None, image: int, other: int, xyz: np.ndarray | None) -> np.ndarray:
-    """(2, 2) offsets in one photograph per offset in the other, on level ground about the point; unity where unknown."""
+    """(2, 2) offsets in one photograph per offset in the other, on level ground about it; unity where unknown."""
     if prediction is None or xyz is None or not np.isfinite(xyz).all():
         return np.eye(2)
     around = xyz + STEP_M * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])

@@ -24,9 +24,19 @@ def view(
         typer.Option(help="Folder of the photographs. Without it marks are shown on an empty format.",
                      rich_help_panel=INPUT),
     ] = None,
+    below: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Surface or orthophoto to be drawn below the plan, GeoTIFF. May be repeated. Those of `aerotri run` "
+            "are found beside its result.",
+            rich_help_panel=INPUT,
+        ),
+    ] = None,
     port: Annotated[
         int,
-        typer.Option(min=0, max=65535, help="Number of the port on this machine; 0: any that is free.", rich_help_panel=OUTPUT),
+        typer.Option(
+            min=0, max=65535, help="Number of the port on this machine; 0: any that is free.", rich_help_panel=OUTPUT
+        ),
     ] = 0,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.", rich_help_panel=OUTPUT)
@@ -35,4 +45,4 @@ def view(
     """The bench: plan, photographs and rays of a result in the browser; marks moved, rays switched, adjusted again."""
     from aerotri.commands.view import run_view
 
-    run_view(path, photos, port, browser)
+    run_view(path, photos, tuple(below or ()), port, browser)

@@ -10,7 +10,7 @@ from aerotri.public.optional import optional_module
 EXTRA = "pip install 'aerotri[view]' installs all that the bench needs"
 
 
-def run_view(path: Path, photographs: Path | None, port: int, browser: bool) -> None:
+def run_view(path: Path, photographs: Path | None, below: tuple[Path, ...], port: int, browser: bool) -> None:
     """Serve the bench until it is interrupted; arguments as on the command line.
 
     Raises
@@ -25,7 +25,7 @@ def run_view(path: Path, photographs: Path | None, port: int, browser: bool) -> 
     from aerotri.bench.session import Bench
 
     console = Console()
-    bench = Bench(places_of(path), photographs)
+    bench = Bench(places_of(path), photographs, below)
 
     def tell(address: str) -> None:
         shown = "the block alone" if bench.result is None else str(bench.result)

@@ -160,7 +160,7 @@ def measured(model: StereoModel, points: np.ndarray) -> np.ndarray:
 
 
 def measured_in(model: StereoModel, k: int, points: np.ndarray) -> np.ndarray:
-    """(n, 2) mm, where the erring camera k shows true points (n, 3) m; the row that is measured says when it is exposed."""
+    """(n, 2) mm, where camera k shows true points (n, 3) m; the row that is measured says when it is exposed."""
     errors = model.errors[k]
     xy = errors.measured(ideal(model, k, points))
     for _ in range(0 if model.true.scans is None else ROW_STEPS):

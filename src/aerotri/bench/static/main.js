@@ -5,7 +5,8 @@ import { button, fixed, guarded, say } from "./dom.js";
 import { Photo } from "./photo.js";
 import { Plan } from "./plan.js";
 import { PointSheet } from "./point.js";
-import { DifferenceSheet, EditSheet } from "./sheets.js";
+import { SpaceSheet } from "./space.js";
+import { DifferenceSheet, EditSheet, NextSheet } from "./sheets.js";
 import { RayTable } from "./table.js";
 
 const LOOK_MS = 1000;
@@ -20,13 +21,14 @@ class Bench {
     this.photo = new Photo(this);
     this.tabs = {
       rays: ["Rays", new RayTable(this)], point: ["Point", new PointSheet(this)], edits: ["Decisions", new EditSheet(this)],
-      difference: ["Difference", new DifferenceSheet(this)],
+      difference: ["Difference", new DifferenceSheet(this)], next: ["Which mark next", new NextSheet(this)], space: ["3-D", new SpaceSheet(this)],
     };
     this.tab = "rays";
   }
 
   async open() {
     await this.load();
+    this.plan.takeLayers((await ask("data/layers")).layers);
     this.plan.fit();
     await this.showTab();
     document.body.dataset.ready = "yes";

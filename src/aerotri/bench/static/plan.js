@@ -83,7 +83,28 @@ export class Plan {
     this.drawChosen(pen);
   }
 
-  under() {}
+  // Surfaces and orthophotos: a picture each, asked for when it is to be seen.
+  takeLayers(layers) {
+    this.layers = layers.map((layer, k) => ({ ...layer, number: k, shown: false, picture: null }));
+    this.more = this.layers.map(layer => checkbox(layer.name, false, on => {
+      layer.shown = on;
+      if (!layer.picture) {
+        layer.picture = new Image();
+        layer.picture.onload = () => this.surface.redraw();
+        layer.picture.src = `layer/${layer.number}`;
+      }
+      this.surface.redraw();
+    }));
+    this.bar();
+  }
+
+  under(pen) {
+    for (const layer of this.layers || []) {
+      if (!layer.shown || !layer.picture.complete || !layer.picture.naturalWidth) continue;
+      const [left, bottom, right, top] = layer.bounds, [x, y] = this.surface.screen(left, top), [u, v] = this.surface.screen(right, bottom);
+      pen.drawImage(layer.picture, x, y, u - x, v - y);
+    }
+  }
 
   outline(pen, corners) {
     if (corners[0][0] === null) return;
