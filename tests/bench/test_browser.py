@@ -123,7 +123,8 @@ def test_next_mark_leads_to_its_place_and_space_is_drawn(page, bench):
     assert bench.decisions.rows[-1].image == photograph
     p.click("#tab-space")
     p.wait_for_selector("#space")
-    drawn = """() => { const c = document.getElementById('space'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+    drawn = """() => { const c = document.getElementById('space');
+        const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
         let n = 0; for (let k = 3; k < d.length; k += 4) if (d[k]) n++; return n; }"""
     assert p.evaluate(drawn) > 1000
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerotri.bench.pictures import as_jpeg
 from aerotri.conventions import InputError
-from aerotri.rasters.mosaics import bounds_of, read_mosaic
+from aerotri.rasters.mosaics import bounds_of, read_heights, read_mosaic
 
 LONGEST_PX = 3000
 """Longest side of the picture [C]: more than a screen shows."""
@@ -63,7 +63,7 @@ def layer_picture(layer: Layer) -> bytes:
     left, bottom, right, top = layer.bounds
     cell = (right - left) / values.shape[2], (top - bottom) / values.shape[1]
     if values.dtype.kind == "f":
-        return as_jpeg(_shaded(values[0], cell))
+        return as_jpeg(_shaded(read_heights(layer.path, LONGEST_PX), cell))
     if values.dtype != np.uint8:
         raise InputError("has neither heights nor colours of 8 bits", "give a surface or an orthophoto", layer.path)
     has_mask = len(values) in (2, 4)
@@ -75,8 +75,7 @@ def layer_picture(layer: Layer) -> bytes:
 
 def _shaded(heights: np.ndarray, cell: tuple[float, float]) -> np.ndarray:
     """(rows, columns, 3) light on a slope, tinted by height."""
-    known = np.isfinite(heights) & (np.abs(heights) < 1e6) & (heights != 0.0)
-    z = np.where(known, heights, np.nan).astype(float)
+    z, known = heights, np.isfinite(heights)
     by_row, by_column = np.gradient(z, cell[1], cell[0])
     normal = np.stack([-by_column, by_row, np.ones_like(z)]) / np.sqrt(1.0 + by_row**2 + by_column**2)
     light = np.clip(np.einsum("i,ijk->jk", SUN, normal), 0.0, 1.0)

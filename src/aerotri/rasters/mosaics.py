@@ -120,6 +120,21 @@ def read_mosaic(path: Path, window: tuple[int, int, int, int] | None = None, lon
             return file.read(out_shape=(file.count, max(int(file.height / less), 1), max(int(file.width / less), 1)))
 
 
+def read_heights(path: Path, longest: int) -> np.ndarray:
+    """(rows, columns) float of the first band, NaN where nothing is known.
+
+    Parameters
+    ----------
+    longest : cells of the longer side at most, from the overviews.
+    """
+    import rasterio
+
+    with rasterio.open(path) as file:
+        less = max(1.0, max(file.height, file.width) / longest)
+        shape = max(int(file.height / less), 1), max(int(file.width / less), 1)
+        return file.read(1, out_shape=shape, masked=True).astype(float).filled(np.nan)
+
+
 def bounds_of(path: Path) -> tuple[float, float, float, float]:
     """Outer edges of a raster of any bands: left, bottom, right, top.
 
