@@ -6,7 +6,7 @@ import contextlib
 import csv
 import io
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -201,11 +201,11 @@ def _rewrite(path: Path) -> None:
     old = path.read_bytes().splitlines() if path.is_file() else []
     comments = b"".join(line + b"\n" for line in old if line.lstrip().startswith(b"#"))
     with atomic_file(path) as place:
-        lines = (_line(cells) for cells in (list(COLUMNS), *(row.cells() for row in rows)))
+        lines = (_line(cells) for cells in (COLUMNS, *(row.cells() for row in rows)))
         place.write_bytes(comments + b"".join(lines))
 
 
-def _line(cells: list[str]) -> bytes:
+def _line(cells: Sequence[str]) -> bytes:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(plain_row(cells))
     return text.getvalue().encode("utf-8")

@@ -12,7 +12,9 @@ def numbers(values: np.ndarray, digits: int) -> list[Any]:
     rounded = np.round(np.asarray(values, dtype=float), digits)
     if np.isfinite(rounded).all():
         return rounded.tolist()
-    return np.where(np.isfinite(rounded), rounded.astype(object), None).tolist()
+    out = rounded.astype(object)
+    out[~np.isfinite(rounded)] = None
+    return out.tolist()
 
 
 def number(value: float, digits: int) -> float | None:

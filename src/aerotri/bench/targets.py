@@ -112,7 +112,7 @@ def _window(piece: np.ndarray, centre: np.ndarray, half: int) -> np.ndarray | No
 def _half_shift(window: np.ndarray) -> tuple[np.ndarray, float] | None:
     """(2,) column and row by which the centre lies off the middle, half the shift to the window turned; and its σ."""
     turned = window[::-1, ::-1]
-    by_row, by_column = np.gradient(0.5 * (window + turned))
+    by_row, by_column = (np.asarray(part) for part in np.gradient(0.5 * (window + turned)))
     inner = (slice(1, -1), slice(1, -1))
     a = np.column_stack([by_column[inner].ravel(), by_row[inner].ravel()])
     difference = (window - turned)[inner].ravel()
