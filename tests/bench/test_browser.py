@@ -201,6 +201,7 @@ def test_ten_thousand_points_stay_fluid(chromium, large_block):
     assert milliseconds < 100.0, "a busy machine takes several times the usual 10 ms"
 
 
+@pytest.mark.slow
 def test_581_photographs_are_open_in_three_seconds(chromium, shared_data, documented_result):
     """From the start of the program's work to the page; the equations follow behind it."""
     begun = time.perf_counter()

@@ -52,8 +52,8 @@ class Bench:
         self.places = places
         self._lock = threading.RLock()
         self.generation = 0
-        self._job: Job | None = None
         self._before: Equations | None = None
+        self._job: Job | None = None
         self._next: tuple[Adjustment, list[NextMark]] | None = None
         self.show(places.result)
         self.pictures = Pictures(self.records.block, photographs)
@@ -79,7 +79,7 @@ class Bench:
             "limit": spread(r.w) * critical_value(r.block.settings.adjustment.alpha), "counts": r.block.counts,
             "crs": r.block.crs, "generation": self.generation,
             "sizes": [list(camera.size_px) for camera in r.block.cameras], "camera": r.block.images.camera.tolist(),
-            "pictures": sorted(self.pictures.paths()),
+            "compared": self._before is not None, "pictures": sorted(self.pictures.paths()),
         }  # fmt: skip
 
     def state(self) -> dict[str, Any]:
@@ -339,8 +339,9 @@ class Bench:
     def _take(self, result: Path) -> None:
         """Show a new result; the one before is what it is compared with."""
         before = self.equations if self.result is not None else None
-        self.show(result)
-        self._before = before
+        with self._lock:
+            self._before = before
+            self.show(result)
 
     def _decide(self, decision: Decision) -> dict[str, Any]:
         with self._lock:

@@ -135,6 +135,8 @@ class Bench {
   async choosePoint(point) {
     this.chosen.point = point;
     await this.loadPoint();
+    const shown = [...this.imagesOfPoint, ...(this.pointContent?.expected || []).map(one => one[0])];
+    if (this.chosen.image === null && shown.length) { await this.chooseRay(shown[0], point); return; }
     await this.photo.epipolar();
     this.photo.bar();
     await this.showTab();
@@ -205,10 +207,12 @@ class Bench {
 
   // Another result is there: everything is asked for again, what is looked at stays.
   async renew() {
+    const first = !this.summary.sigma0;
     await this.load();
+    if (first) this.plan.fit();
     await this.loadPoint();
     if (this.chosen.image !== null) await this.reopen();
-    await this.showTab(this.summary.sigma0 && this.job ? "difference" : this.tab);
+    await this.showTab(this.summary.compared ? "difference" : this.tab);
   }
 
   async reopen() {

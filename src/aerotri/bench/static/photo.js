@@ -60,7 +60,7 @@ export class Photo {
 
   bar() {
     const set = (name, words, title) => checkbox(words, this.show[name], guarded(async on => { this.show[name] = on; if (name === "epipolar") await this.epipolar(); this.surface.redraw(); }), title);
-    const tune = (name, words) => slider(words, -1, 1, Math.log10(this[name]), value => { this[name] = 10 ** value; this.surface.redraw(); });
+    const tune = (name, words) => slider(words, -1, 1, Math.log10(this[name]), value => { this[name] = 10 ** value; this.surface.redraw(); }, "Of the photograph; cut-outs follow when they are drawn anew");
     const names = this.bench.names ? Object.fromEntries(this.bench.names.images.map((name, k) => [k, name])) : {};
     const image = this.content ? String(this.content.image) : "";
     const turn = by => () => this.bench.chooseImage((+image + by + this.bench.names.images.length) % this.bench.names.images.length);
@@ -112,7 +112,7 @@ export class Photo {
     pen.fillStyle = "#565c63";
     pen.fillRect(x, y, this.content.size[0] * s.scale, this.content.size[1] * s.scale);
     if (this.tiles) {
-      pen.filter = this.brightness === 1 && this.contrast === 1 ? "none" : `brightness(${this.brightness}) contrast(${this.contrast})`;
+      pen.filter = this.filter();
       this.tiles.draw(pen, s);
       pen.filter = "none";
     }
@@ -121,6 +121,10 @@ export class Photo {
     if (this.show.marks) this.drawRays(pen);
     this.drawChanges(pen);
     this.drawChosen(pen);
+  }
+
+  filter() {
+    return this.brightness === 1 && this.contrast === 1 ? "none" : `brightness(${this.brightness}) contrast(${this.contrast})`;
   }
 
   drawExpected(pen) {

@@ -74,7 +74,9 @@ export class PointSheet {
     const draw = picture => {
       const pen = canvas.getContext("2d"), at = px => [(px[0] - left) * times, (px[1] - top) * times];
       pen.imageSmoothingEnabled = false;
+      pen.filter = this.bench.photo.filter();
       if (picture) pen.drawImage(picture, 0, 0, 2 * SHOWN, 2 * SHOWN);
+      pen.filter = "none";
       if (place.expected) ring(pen, ...at(place.expected), 12, "#53d0ff", 2);
       if (place.px) cross(pen, ...at(place.px), 24, place.changed ? "#ffb000" : colourOfW(place.size), 2.5);
     };
