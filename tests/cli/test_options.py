@@ -17,7 +17,9 @@ from aerotri.cli import app
 from aerotri.cli.app import invoke
 from aerotri.conventions import InputError
 
-WITHOUT_TARGET = {"init", "check", "diff", "explain", "predict volume", "predict attitude", "predict picket-interval"}
+WITHOUT_TARGET = {
+    "view", "init", "check", "diff", "explain", "predict volume", "predict attitude", "predict picket-interval",
+}  # fmt: skip
 """Commands that print what they find; the folder of init is what it is about."""
 UNIT = re.compile(
     r"\b(m|mm|cm|km²|µm|t/m³|pixels|degrees|per cent|[Ss]hare|0 to 1|a number|grey values|1 over this number)\b"

@@ -9,9 +9,10 @@ import jsonschema
 import pytest
 
 from aerotri.adjustment.ray_status import RAY_STATUS
+from aerotri.formats.block.journal import ACTIONS
 from aerotri.formats.block.settings_model import BlockModel
 from aerotri.formats.block.writer import TABLE_NAMES
-from aerotri.observations.block import CONSTRAINT_KINDS, EDIT_ACTIONS
+from aerotri.observations.block import CONSTRAINT_KINDS
 from aerotri.reference.adjust_tables import RESIDUALS
 from aerotri.reference.block_keys import block_keys, block_tables, plan_keys, plan_tables, prior_keys
 from aerotri.reference.block_tables import READERS, block_table_files
@@ -95,7 +96,7 @@ def test_tables_of_a_block_are_those_that_are_read():
 
 def test_words_are_those_of_the_program():
     words = {one.label: {item.name: set(item.values) for item in one.items} for one in described_files()}
-    assert words["edits.csv (block folder)"]["action"] == set(EDIT_ACTIONS)
+    assert words["edits.csv (block folder)"]["action"] == set(ACTIONS)
     assert words["constraints.csv (block folder)"]["kind"] == set(CONSTRAINT_KINDS)
     assert words["pickets.parquet (folder of dtm)"]["status"] == {status.text for status in PicketStatus}
     assert set(next(item for item in RESIDUALS if item.name == "status").values) == set(RAY_STATUS)

@@ -151,7 +151,9 @@ def test_points_without_marks_are_predicted_only(files, tied, tmp_path):
     )  # fmt: skip
     shutil.copytree(tied / "tie_point_cache", tmp_path / "out" / "tie_point_cache")
     run_tiepoints(files[0] / "photographs", tmp_path / "out", given, True)
-    assert len(read_block(tmp_path / "out").control) == 0
+    made = read_block(tmp_path / "out")
+    assert len(made.control) == len(block.control)
+    assert not np.isin(made.image_points.point, made.control.point).any()
     with (tmp_path / "out" / "control_marks" / "predicted.csv").open() as file:
         assert sum(1 for _ in file) > 20
 
@@ -310,3 +312,24 @@ def test_the_same_from_python(files, tied, tmp_path, capsys):
     told, kept = (json.loads(text) for text in (capsys.readouterr().out, (folder / "tiepoints.json").read_text()))
     assert told["rays"] == kept["rays"]
     assert told["marking_page"] == str(tied / "control_marks" / "marking.html")
+
+
+def test_control_that_nobody_marked_is_in_the_block_to_be_marked(files, tied, tmp_path):
+    """With its σ; it changes nothing of the rest, and its names are told."""
+    import aerotri
+
+    lines = (files[0] / "gcp_list.txt").read_text().splitlines()
+    points = {line.split()[-1]: line.split()[:3] for line in lines[1:]}
+    table = ["name,X,Y,Z", *(",".join([name, *place]) for name, place in points.items())]
+    (tmp_path / "control.csv").write_text("\n".join(table) + "\n")
+    found = aerotri.tie_points(
+        files[0] / "photographs", control=tmp_path / "control.csv", focal_length_mm=6.0, pixel_um=12.0,
+        control_sigma_m=(0.02, 0.02, 0.03), points=300, features=2000, cache=tied / "tie_point_cache",
+    )  # fmt: skip
+    block = found.block
+    assert set(found.unmarked) == set(points)
+    assert set(block.points[block.control.point].tolist()) == set(points)
+    assert not np.isin(block.image_points.point, block.control.point).any()
+    assert found.points.shape == (len(block.points), 3)
+    again = read_block(found.save(tmp_path / "block"))
+    assert len(again.control) == len(points)

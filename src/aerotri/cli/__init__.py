@@ -27,6 +27,7 @@ from aerotri.cli import (
     planning,
     run,
     terrain,
+    viewing,
     volumes,
 )
 from aerotri.cli.app import app
@@ -35,7 +36,7 @@ from aerotri.execution.work import NO_SPACE, TasksFailedError
 
 __all__ = [
     "adjusting", "app", "blocks", "change", "converting", "explaining", "exporting", "image_errors", "main", "ortho",
-    "planning", "run", "terrain", "volumes",
+    "planning", "run", "terrain", "viewing", "volumes",
 ]  # fmt: skip
 
 FAILED, BAD_INPUT, BUG = 1, 2, 3

@@ -10,6 +10,7 @@ import typer
 from aerotri.cli.app import app
 from aerotri.cli.options import (
     ARGUMENTS,
+    CONTROL,
     FIRST,
     METHOD,
     OUTPUT,
@@ -87,12 +88,20 @@ def run(
         bool,
         typer.Option("--go-on", help="Go on after an adjustment that was rejected.", rich_help_panel=METHOD),
     ] = False,
+    unmarked: Annotated[
+        str,
+        typer.Option(
+            help="Where control points are marked in no photograph: stop after the tie points, or continue. Default: "
+            "stop in a terminal, continue elsewhere.",
+            rich_help_panel=CONTROL,
+        ),
+    ] = "",
     json_: Json = False,
 ) -> None:
     """Everything: photographs to tie points, adjustment, terrain, volume and orthophoto, with one report."""
     from aerotri.commands.convert import three_values
     from aerotri.commands.dtm import metres_or_auto
-    from aerotri.commands.run import run_all
+    from aerotri.commands.run import run_all, stop_or_continue
 
     settings = {
         "control": gcp, "check": check or (), "control_prefix": control_prefix,
@@ -101,6 +110,7 @@ def run(
         "geoid": geoid, "seed": seed, "parameters": parameters,
         "interval": metres_or_auto(interval) if interval else None,
         "boundary": boundary, "base": base, "layer": layer, "dense": dense, "plots": plots, "go_on": go_on,
+        "unmarked": stop_or_continue(unmarked),
         "executor": executor,
     }  # fmt: skip
     raise typer.Exit(run_all(source, out, settings, json_))

@@ -48,7 +48,7 @@ class Console:
 
     def __init__(self, quiet: bool = False):
         self._quiet = quiet
-        self._moving = _is_terminal() and not quiet
+        self._moving = is_terminal() and not quiet
         self._shown = False
         self._begun = self._said = time.monotonic()
         self._stage, self._tenth, self._left = "", 0, TimeLeft()
@@ -183,7 +183,8 @@ class OldForm:
             Console().note(f"{self.said} is the old form; write {self.today}")
 
 
-def _is_terminal() -> bool:
+def is_terminal() -> bool:
+    """Whether somebody reads along."""
     return sys.stderr is not None and sys.stderr.isatty()
 
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.commands.console import Console
+from aerotri.commands.console import Console, is_terminal
+from aerotri.conventions import InputError
 from aerotri.formats.results.json_text import json_text
+
+MOST_NAMED = 10
 
 if TYPE_CHECKING:
     from aerotri.public.adjustment import Adjustment
@@ -35,7 +40,19 @@ def run_all(source: Path, out: Path, settings: Mapping[str, Any], as_json: bool)
         print(json_text(project.summary, None))
     else:
         console.lines(_lines(project))
-    return 0 if project.complete else 1
+    return 0 if project.complete and not project.unmarked else 1
+
+
+def stop_or_continue(stated: str) -> str:
+    """What to do where control points are marked nowhere: as stated, else stop where somebody sits before a terminal.
+
+    Raises
+    ------
+    InputError
+    """
+    if stated not in ("", "stop", "continue"):
+        raise InputError(f"--unmarked {stated} is not possible", "use stop or continue")
+    return stated or ("stop" if is_terminal() and sys.stdin is not None and sys.stdin.isatty() else "continue")
 
 
 class _Told:
@@ -122,4 +139,21 @@ def _lines(project: Project) -> list[str]:
     for step in project.steps:
         ending = f": {step.reason}" if step.reason else f", {step.seconds:.0f} s, {project.folder / step.folder}"
         lines.append(f"{step.what} {step.status}{ending}")
-    return [*lines, f"Report: {project.report}"]
+    return [*lines, f"Report: {project.report}", *_how_to_go_on(project)]
+
+
+def _how_to_go_on(project: Project) -> list[str]:
+    """What to do where the run stopped for control that nobody marked."""
+    from aerotri.public.run_steps import BLOCK
+    from aerotri.report.quality import printable
+
+    if not project.unmarked:
+        return []
+    names = ", ".join(printable(name) for name in project.unmarked[:MOST_NAMED])
+    more = f" and {len(project.unmarked) - MOST_NAMED} more" if len(project.unmarked) > MOST_NAMED else ""
+    block, photographs = shlex.quote(str(project.folder / BLOCK)), shlex.quote(str(project.source))
+    return [
+        f"Stopped: marked in no photograph: {names}{more}.",
+        f"Mark them:    aerotri view {block} --photos {photographs}",
+        "Then go on:   the same command with --unmarked continue",
+    ]

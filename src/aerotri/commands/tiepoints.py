@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -75,8 +76,8 @@ def outcome_lines(content: dict[str, Any], out: Path) -> list[str]:
         f"{content['median_residual_px']:.2f} px (median); {content['seconds']:.0f} s",
     ]
     if content["marking_page"]:
-        done = "more of them can be marked" if content["control"] + content["check"] else "mark them"
-        said.append(f"control points in the photographs: {done} in {content['marking_page']}")
+        bench = f"aerotri view {shlex.quote(str(out))} --photos PHOTOS"
+        said.append(f"control points are marked on the bench ({bench}), or in {content['marking_page']}")
     if content["left_out"]:
         said.append(f"could not be tied and left out: {', '.join(content['left_out'])}")
     return [*said, f"Written to {out}"]

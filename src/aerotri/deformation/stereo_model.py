@@ -156,11 +156,11 @@ def deform_points(model: StereoModel, points: np.ndarray) -> PointDeformation:
 
 def measured(model: StereoModel, points: np.ndarray) -> np.ndarray:
     """(2, n, 2) mm, where the erring camera shows true points (n, 3) m."""
-    return np.stack([_measured(model, k, points) for k in range(len(model.errors))])
+    return np.stack([measured_in(model, k, points) for k in range(len(model.errors))])
 
 
-def _measured(model: StereoModel, k: int, points: np.ndarray) -> np.ndarray:
-    """(n, 2) mm in photograph k; the row that is measured says when it is exposed."""
+def measured_in(model: StereoModel, k: int, points: np.ndarray) -> np.ndarray:
+    """(n, 2) mm, where camera k shows true points (n, 3) m; the row that is measured says when it is exposed."""
     errors = model.errors[k]
     xy = errors.measured(ideal(model, k, points))
     for _ in range(0 if model.true.scans is None else ROW_STEPS):

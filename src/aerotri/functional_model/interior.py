@@ -142,6 +142,28 @@ def mm_from_scan(fit: FiducialFit, column_row: np.ndarray) -> np.ndarray:
     return _transform(fit.kind, fit.parameters, _reduced(np.asarray(column_row, float), fit.origin_px, fit.scale_px))
 
 
+def scan_positions(fit: FiducialFit, xy: np.ndarray) -> np.ndarray:
+    """Where image coordinates lie in the scan.
+
+    Parameters
+    ----------
+    xy : (n, 2) mm in the frame of the calibrated marks.
+
+    Returns
+    -------
+    (n, 2) px.
+    """
+    if fit.kind == "similarity":
+        a0, b0, a1, b1 = fit.parameters
+        forward = np.array([[a1, -b1, a0], [b1, a1, b0], [0.0, 0.0, 1.0]])
+    else:
+        a0, a1, a2, b0, b1, b2 = fit.parameters[:6]
+        last = fit.parameters[6:] if fit.kind == "projective" else np.zeros(2)
+        forward = np.array([[a1, a2, a0], [b1, b2, b0], [*last, 1.0]])
+    back = np.column_stack([xy, np.ones(len(xy))]) @ np.linalg.inv(forward).T
+    return back[:, :2] / back[:, 2:] * fit.scale_px * [1.0, -1.0] + fit.origin_px
+
+
 def measurement_sigma(fit: FiducialFit, column_row: np.ndarray, sigma_px: np.ndarray | float) -> np.ndarray:
     """σ of image coordinates from the σ of their measurement alone: what weighs a ray.
 

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.deformation.absorbed import AbsorptionFailedError
@@ -50,6 +50,10 @@ if TYPE_CHECKING:
     from aerotri.public.volume_result import MeasuredVolume
 
 OnStep = Callable[[Step, object], None]
+Unmarked = Literal["stop", "continue"]
+EDITS = "edits.csv"
+NOT_MARKED = "found control points that are marked in no photograph"
+MARKED_SINCE = "the block of an earlier run was marked since: it is taken up as it is"
 
 
 @dataclass(eq=False, repr=False)
@@ -65,6 +69,7 @@ class Project:
     dense : the surface of all that stands on the ground. orthophoto : over it.
     accuracy : by the check points, None without them.
     seconds : that it took. computed : when it began.
+    unmarked : control points that are marked in no photograph, where the run stopped for them.
     """
 
     folder: Path
@@ -79,6 +84,7 @@ class Project:
     accuracy: Accuracy | None = None
     seconds: float = 0.0
     computed: datetime = field(default_factory=now)
+    unmarked: tuple[str, ...] = ()
 
     @property
     def block(self) -> Block | None:
@@ -153,6 +159,7 @@ def run(
     dense: bool = True,
     plots: bool = True,
     go_on: bool = False,
+    unmarked: Unmarked = "continue",
     further: Mapping[Verb, Mapping[str, Any]] | None = None,
     executor: str = THREADS,
     on_step: OnStep | None = None,
@@ -185,6 +192,8 @@ def run(
     dense : the dense surface and the orthophoto as well.
     plots : draw the plots of the adjustment.
     go_on : go on after an adjustment that was rejected.
+    unmarked : where control points are marked in no photograph, 'stop' after the tie points, or 'continue'. A block of
+        an earlier run in `out` that was marked since is taken up with 'continue'.
     further : more settings of a step by the name of its verb, {'terrain': {'window': 21}}.
     executor : where terrain and dense surface are measured: 'threads', 'processes:N', 'dask:ADDRESS' or
         'dask:local:N'.
@@ -236,7 +245,10 @@ def run(
         steps = steps_of(place, target, settings, dense)
         with opened(executor, report.said):
             pass  # a scheduler that does not answer is told now, not after hours
-        return _Chain(Project(target, place), steps, settings, go_on, on_step, report).run()
+        if unmarked == "continue" and not from_block and (target / BLOCK / EDITS).is_file():
+            steps["tie_points"] = replace(steps["tie_points"], status="left out", reason=MARKED_SINCE)
+        project = Project(target, place)
+        return _Chain(project, steps, settings, go_on, on_step, report, unmarked == "stop").run()
 
 
 class _Chain:
@@ -245,12 +257,14 @@ class _Chain:
     Parameters
     ----------
     project : to be filled. steps : what there is to do. settings : of every verb.
+    stop : whether to stop where control points are marked nowhere.
     """
 
     def __init__(
         self, project: Project, steps: Mapping[Verb, Step], settings: Mapping[Verb, Mapping[str, Any]], go_on: bool,
-        on_step: OnStep | None, report: StageReport,
+        on_step: OnStep | None, report: StageReport, stop: bool = False,
     ):  # fmt: skip
+        self._stop = stop
         self._project, self._steps, self._settings, self._go_on = project, steps, settings, go_on
         self._tell: OnStep = on_step or (lambda step, outcome: None)
         self._progress: Progress = report.stage
@@ -297,6 +311,9 @@ class _Chain:
             o = outcome.adjusted.outcome
             ending = "" if self._go_on else "is rejected; --go-on builds on it all the same"
             step = replace(step, status="failed", reason=f"{o.verdict}: {next(iter(o.reasons), o.message)}")
+        if verb == "tie_points" and step.status == "done" and self._stop:
+            self._project.unmarked = outcome.unmarked
+            ending = NOT_MARKED if outcome.unmarked else ""
         step = replace(step, seconds=round(time.perf_counter() - begun, 1))
         self._tell(step, outcome)
         return step, f"{step.name} {ending}" if ending else ""

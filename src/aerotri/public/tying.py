@@ -60,6 +60,13 @@ class TiedPhotographs:
         return self.record.left_out
 
     @property
+    def unmarked(self) -> tuple[str, ...]:
+        """Names of the control points that are marked in no photograph."""
+        from aerotri.tie_points.given import unmarked_points
+
+        return unmarked_points(self.given.control)
+
+    @property
     def messages(self) -> tuple[str, ...]:
         """What was matched, assumed or left out, in sentences."""
         return self.record.messages

@@ -120,6 +120,44 @@ def read_mosaic(path: Path, window: tuple[int, int, int, int] | None = None, lon
             return file.read(out_shape=(file.count, max(int(file.height / less), 1), max(int(file.width / less), 1)))
 
 
+def read_heights(path: Path, longest: int) -> np.ndarray:
+    """(rows, columns) float of the first band, NaN where nothing is known.
+
+    Parameters
+    ----------
+    longest : cells of the longer side at most, from the overviews.
+    """
+    import rasterio
+
+    with rasterio.open(path) as file:
+        less = max(1.0, max(file.height, file.width) / longest)
+        shape = max(int(file.height / less), 1), max(int(file.width / less), 1)
+        return file.read(1, out_shape=shape, masked=True).astype(float).filled(np.nan)
+
+
+def bounds_of(path: Path) -> tuple[float, float, float, float]:
+    """Outer edges of a raster of any bands: left, bottom, right, top.
+
+    Raises
+    ------
+    InputError
+        When it is no raster, or no north-up one.
+    """
+    import rasterio
+    from rasterio.errors import NotGeoreferencedWarning, RasterioError
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            with rasterio.open(path) as file:
+                t, bounds = file.transform, file.bounds
+    except (RasterioError, OSError) as error:
+        raise InputError(f"cannot be read: {error}", "give a GeoTIFF", path) from None
+    if t.is_identity or t.b or t.d or t.a <= 0.0 or t.e >= 0.0:
+        raise InputError("is turned, mirrored or without georeference", "give a north-up GeoTIFF", path)
+    return float(bounds.left), float(bounds.bottom), float(bounds.right), float(bounds.top)
+
+
 def outlines_of(numbers: np.ndarray, grid: Grid) -> dict[int, list[dict[str, Any]]]:
     """Polygons (GeoJSON) around the cells of every number from 0 on."""
     from rasterio import Affine

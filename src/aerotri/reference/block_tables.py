@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from aerotri.formats.block.extras import CONSTRAINT_COLUMNS, EDIT_COLUMNS
+from aerotri.formats.block.extras import CONSTRAINT_COLUMNS
 from aerotri.formats.block.folder import IMAGE_COLUMNS
+from aerotri.formats.block.journal import EDIT_COLUMNS
 from aerotri.formats.block.points import CONTROL_COLUMNS, GNSS_COLUMNS, IMAGE_POINT_COLUMNS
 from aerotri.formats.block.scanned_film import FIDUCIAL_COLUMNS
 from aerotri.formats.text.tables import Columns
@@ -80,8 +81,17 @@ EDITS = (
             "of a tie point",
             "check": "make a control point a check point",
             "control": "make a check point a control point",
+            "on": "take back off, check or control of the same measurement or point",
+            "mark": "measure the point in the photograph at column and row, whatever image_points says",
+            "remove": "take the measurement out of image_points",
+            "undo": "take back the last row that still stands; image and point stay empty",
         },
     ),
+    Item("time", "text?", "When it was decided, UTC. With this column later rows overrule earlier ones."),
+    Item("column", "number?", "Of a mark: column in the photograph; 0 is the left edge of the left pixel.", "px"),
+    Item("row", "number?", "Of a mark: row in the photograph; 0 is the upper edge of the upper pixel.", "px"),
+    Item("old_column", "number?", "Column before, for the record.", "px"),
+    Item("old_row", "number?", "Row before, for the record.", "px"),
     Item("reason", "text?", "Why, for the record."),
 )
 CONSTRAINTS = (

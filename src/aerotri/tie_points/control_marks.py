@@ -111,7 +111,8 @@ def _marked(block: Block, given: PointList, point: np.ndarray, image: np.ndarray
 
 def _half_size(block: Block, xyz: np.ndarray) -> int:
     """Two standard deviations of the positions, in pixels, where no control holds the block."""
-    held = int((~block.control.is_check).sum()) >= 3
+    measured = np.isin(block.control.point, block.image_points.point)
+    held = int((measured & ~block.control.is_check).sum()) >= 3
     if held or block.gnss_ins is None or not len(xyz):
         return HALF_SIZE_PX
     camera = block.cameras[0]

@@ -128,6 +128,29 @@ def complete(reading: Reading, given: Given, crs: str, positions: PositionList |
     return _with_datum(reading)
 
 
+def with_unmarked_control(reading: Reading, given: Given) -> Reading:
+    """The block with control points that nobody has marked, so that they can be marked in it.
+
+    Without σ they stay outside, as without marks nothing has asked for it.
+    """
+    control = given.control
+    if control is None or (control.rays is not None and len(control.rays.image)):
+        return reading
+    known = np.isfinite(control.xyz)
+    if given.stated.control_sigma_m is None and not np.isfinite(control.sigma[known]).all():
+        return reading
+    return with_check_points(with_control(reading, control, given.stated, may_be_unmeasured=True), given.check)
+
+
+def unmarked_points(control: PointList | None) -> tuple[str, ...]:
+    """Names of the control points that are marked in no photograph."""
+    if control is None:
+        return ()
+    rays = control.rays
+    marked = set() if rays is None else set(rays.points[rays.point].tolist())
+    return tuple(str(name) for name in control.points.tolist() if name not in marked)
+
+
 def _with_datum(reading: Reading) -> Reading:
     """Without positions and control the datum is minimal."""
     block, settings = reading.block, reading.block.settings

@@ -14,7 +14,15 @@ from aerotri.formats.assembly.reprojection import reproject
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Settings
 from aerotri.observations.block import GnssSettings
 from aerotri.tie_points.features import FeatureOptions, Features, features_of
-from aerotri.tie_points.given import Given, approximate_places, complete, crs_of, is_observed, positions_in
+from aerotri.tie_points.given import (
+    Given,
+    approximate_places,
+    complete,
+    crs_of,
+    is_observed,
+    positions_in,
+    with_unmarked_control,
+)
 from aerotri.tie_points.matching import MatchOptions, match_all, neighbours
 from aerotri.tie_points.orientation import Oriented, Progress, in_frame, orient, with_start_values
 from aerotri.tie_points.photographs import LENS, PhotographSet
@@ -90,9 +98,11 @@ def tie_photographs(
     frame = oriented.frame
     found = reproject(*in_frame(reading.block, frame))
     block, sigma_px = _with_sigma_of_ties(reading.block, found.residual_px, len(tracks))
+    points = found.points if frame is None else frame.from_local(found.points)
+    reading = with_unmarked_control(replace(reading, block=block, points=points), given)
     return TiedBlock(
-        block=block,
-        points=found.points if frame is None else frame.from_local(found.points),
+        block=reading.block,
+        points=points if reading.points is None else reading.points,
         median_px=found.median_px,
         pairs=pairs,
         left_out=tuple(photographs.names[~keep].tolist()),

@@ -17,8 +17,12 @@ from aerotri.observations.names import in_words, prefix_of, quoted
 HEIGHTS = ("crs", "ellipsoidal")
 
 
-def with_control(reading: Reading, given: PointList, stated: Statements) -> Reading:
+def with_control(reading: Reading, given: PointList, stated: Statements, may_be_unmeasured: bool = False) -> Reading:
     """Control points, beside those there are.
+
+    Parameters
+    ----------
+    may_be_unmeasured : whether a list of which no point is measured will do.
 
     Raises
     ------
@@ -31,7 +35,7 @@ def with_control(reading: Reading, given: PointList, stated: Statements) -> Read
     names = np.array([stated.control_prefix + name for name in given.points.tolist()], dtype=str)
     place = {name: i for i, name in enumerate(block.points.tolist())}
     measured = np.array([name in place for name in names.tolist()], bool)
-    if len(block.image_points) and not measured.any():
+    if len(block.image_points) and not measured.any() and not may_be_unmeasured:
         others = block.points.astype(str).tolist()
         prefix = prefix_of(given.points.astype(str).tolist(), others)
         remedy = "use the same names"
@@ -39,7 +43,7 @@ def with_control(reading: Reading, given: PointList, stated: Statements) -> Read
             remedy = f"state what stands before them: --control-prefix {quoted(prefix)}"
         raise InputError(f"none of its points is measured: {in_words(names.tolist(), others)}", remedy, given.path)
     messages = [*reading.messages, *given.messages]
-    if not measured.all() and len(block.image_points):
+    if not measured.all() and measured.any() and len(block.image_points):
         others = np.setdiff1d(block.points, names[measured]).astype(str).tolist()
         missing = in_words(names[~measured].tolist(), others)
         messages.append(

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import counted
+from aerotri.formats.block.journal import Journal
 from aerotri.formats.text.csv_text import is_blank
 from aerotri.formats.text.table_checks import image_index, refuse_duplicates, sigma_columns
 from aerotri.formats.text.tables import Columns, Table, read_table
 from aerotri.observations import Control, ImagePoints, Images
-from aerotri.observations.block import CONSTRAINT_KINDS, EDIT_ACTIONS, Constraints, Edits
+from aerotri.observations.block import CONSTRAINT_KINDS, Constraints, Edits
 
-EDIT_COLUMNS = Columns(text=("image", "point", "action"), optional_text=("reason",))
 CONSTRAINT_COLUMNS = Columns(text=("kind", "points"), numbers=("sigma",), optional_numbers=("value",))
 POINTS_NEEDED = {"vertical": 2, "horizontal": 2, "height_difference": 2, "distance": 2, "plane": 4, "line": 3}
 """Points that each kind of constraint takes at least: three make any plane and two any line, so that one more is needed
@@ -22,55 +22,55 @@ EXACTLY_TWO = ("height_difference", "distance")
 """Kinds between two points, which have a value."""
 
 
-def read_edits(
-    path: Path | None, images: Images, points: np.ndarray, rays: ImagePoints, control: Control
+def edits_of(
+    journal: Journal | None, images: Images, points: np.ndarray, rays: ImagePoints, control: Control
 ) -> Edits | None:
-    """The operator's decisions; None where there are none.
+    """The operator's decisions in the end; None where there are none.
 
     Parameters
     ----------
     points : (N,) str, the names of all points.
-    rays, control : what the decisions may refer to.
+    rays, control : what the decisions may refer to, marks set and removed.
 
     Raises
     ------
     InputError
-        With the line: an unknown action, photograph or point, a ray that was not measured, a role given to what is no
-        control point, the same decision twice.
+        With the line: an unknown photograph or point, a ray that was not measured, a role given to what is no control
+        point, the same decision twice in a table that is no journal.
     """
-    if path is None or is_blank(path):
+    if journal is None or not journal.decisions:
         return None
-    table = read_table(path, EDIT_COLUMNS)
-    if not table.length:
-        return None
-    table.require("point", "action")
-    action = table.text["action"].rows()
-    _refuse(table, ~np.isin(action, EDIT_ACTIONS), "action", f"an action is {', '.join(EDIT_ACTIONS[:-1])} or control")
-    named = table.text["image"].rows() != ""
-    image = np.where(named, image_index(table, images, may_be_empty=True), -1)
-    point = _point_index(table, points)
-    role = np.flatnonzero(named & (action != "off"))
-    if len(role):
-        row = int(role[0])
-        raise table.error(
-            row,
-            f"action {action[row]} with a photograph",
-            "leave image empty: the point has this role in all photographs",
-        )
-    stray = np.flatnonzero((action != "off") & ~np.isin(point, control.point))
-    if len(stray):
-        row = int(stray[0])
+    table, rows = journal.table, np.array(journal.decisions)
+    action = journal.actions[rows]
+    named = table.text["image"].rows()[rows] != ""
+    image = np.where(named, image_index(table, images, may_be_empty=True)[rows], -1)
+    point = _point_index(table, points)[rows]
+    for k in np.flatnonzero(named & (action != "off"))[:1].tolist():
+        remedy = "leave image empty: the point has this role in all photographs"
+        raise table.error(int(rows[k]), f"action {action[k]} with a photograph", remedy)
+    for k in np.flatnonzero((action != "off") & ~np.isin(point, control.point))[:1].tolist():
         remedy = "only points of control.csv can become control or check points"
-        raise table.error(row, f"point '{table.cell('point', row)}' is not a control or check point", remedy)
+        what = f"point '{table.cell('point', int(rows[k]))}' is not a control or check point"
+        raise table.error(int(rows[k]), what, remedy)
     measured = rays.image * np.int64(len(points)) + rays.point
-    missing = np.flatnonzero(named & ~np.isin(image * np.int64(len(points)) + point, measured))
-    if len(missing):
-        row = int(missing[0])
+    missing = named & ~np.isin(image * np.int64(len(points)) + point, measured)
+    if journal.is_journal:
+        # what was switched off may have been removed later
+        rows, image, point, action = (part[~missing] for part in (rows, image, point, action))
+    elif missing.any():
+        row = int(rows[np.flatnonzero(missing)[0]])
         where = f"point '{table.cell('point', row)}' is not measured in photograph '{table.cell('image', row)}'"
         raise table.error(row, where, "write both names as in image_points, or remove the row")
-    refuse_duplicates(table, (image + 1) * len(points) + point, lambda row: _about(table, row))
+    if not journal.is_journal:
+        _refuse_twice(table, image, point, rows, len(points))
     reason = table.text["reason"].rows() if "reason" in table.text else np.full(table.length, "")
-    return Edits(image, point, action, reason)
+    return Edits(image, point, action, reason[rows]) if len(rows) else None
+
+
+def _refuse_twice(table: Table, image: np.ndarray, point: np.ndarray, rows: np.ndarray, count: int) -> None:
+    keys = -1 - np.arange(table.length, dtype=np.int64)
+    keys[rows] = (image + 1) * count + point
+    refuse_duplicates(table, keys, lambda row: _about(table, row))
 
 
 def _about(table: Table, row: int) -> str:
@@ -90,7 +90,7 @@ def _point_index(table: Table, points: np.ndarray) -> np.ndarray:
     known = {name: i for i, name in enumerate(points.tolist())}
     column = table.text["point"]
     index = np.array([known.get(name, -1) for name in column.names.to_pylist()], dtype=np.int64)[column.index]
-    unknown = np.flatnonzero(index < 0)
+    unknown = np.flatnonzero((index < 0) & (table.text["point"].rows() != ""))
     if len(unknown):
         row = int(unknown[0])
         message = f"there is no point '{table.cell('point', row)}'"

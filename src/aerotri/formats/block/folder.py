@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerotri.conventions import RADIANS_PER, FilePath, InputError
-from aerotri.formats.block.extras import read_constraints, read_edits
+from aerotri.formats.block.extras import edits_of, read_constraints
+from aerotri.formats.block.journal import read_journal, with_marks
 from aerotri.formats.block.logo import with_logo
 from aerotri.formats.block.points import read_control, read_gnss_ins, read_image_points
 from aerotri.formats.block.scanned_film import read_fiducials
@@ -76,19 +77,23 @@ def read_block(path: FilePath, rays_needed: bool = True, images_needed: bool = T
     table = _required_table(folder, "image_points")
     rays = read_image_points(table, images, cameras, settings, fits, may_be_empty=not rays_needed)
     control, names = read_control(_table_file(folder, "control"), rays.point_names, settings)
-    points = as_str_array(names)
+    default = settings.settings(rays.image_sigma_um)
+    journal = read_journal(_table_file(folder, "edits"))
+    image_points, points = with_marks(
+        rays.image_points, as_str_array(names), control, journal, images, cameras, fits, default.image_sigma_um * 1e-3
+    )
     block = Block(
         name=folder.resolve().name if model.name is None else model.name,
         cameras=cameras,
         images=images,
         points=points,
-        image_points=rays.image_points,
+        image_points=image_points,
         control=control,
         gnss_ins=read_gnss_ins(_table_file(folder, "gnss_ins"), images, radians),
-        settings=settings.settings(rays.image_sigma_um),
+        settings=default,
         crs=model.crs,
         rotation=model.rotation,
-        edits=read_edits(_table_file(folder, "edits"), images, points, rays.image_points, control),
+        edits=edits_of(journal, images, points, image_points, control),
         fiducials=fiducials,
         constraints=read_constraints(_table_file(folder, "constraints"), points),
         interior_fits=fits,

@@ -8,8 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from aerotri.formats.block.extras import CONSTRAINT_COLUMNS, EDIT_COLUMNS
+from aerotri.formats.block.extras import CONSTRAINT_COLUMNS
 from aerotri.formats.block.folder import IMAGE_COLUMNS
+from aerotri.formats.block.journal import EDIT_COLUMNS
 from aerotri.formats.block.points import CONTROL_COLUMNS, GNSS_COLUMNS, IMAGE_POINT_COLUMNS
 from aerotri.formats.block.scanned_film import FIDUCIAL_COLUMNS
 from aerotri.formats.block.writer import OWN_ENTRIES

@@ -18,6 +18,7 @@ from aerotri.diagnosis.work_list import WorkList
 from aerotri.formats.gis.styles import STYLES, qml
 from aerotri.formats.results.adjustment import image_columns, point_columns, residual_table
 from aerotri.formats.results.evaluation import work_columns
+from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.statistics.outliers import judge_rays
 from aerotri.statistics.precision import plan_ellipses
@@ -57,7 +58,7 @@ def strip_layer(adjusted: AdjustedBlock) -> Layer:
     import shapely
 
     lines, rows = [], []
-    for name, named, members in _strips(adjusted):
+    for name, named, members in strips_in(adjusted.block, adjusted.images.centre):
         centre = adjusted.images.centre[members]
         lines.append(shapely.LineString(centre))
         ends, names = centre[-1] - centre[0], adjusted.block.images.names[members]
@@ -70,9 +71,13 @@ def strip_layer(adjusted: AdjustedBlock) -> Layer:
     return Layer("strips", "LINESTRING", lines, columns, True, "Strips, through the projection centres")
 
 
-def _strips(adjusted: AdjustedBlock) -> Iterator[tuple[str, bool, np.ndarray]]:
-    """Name, whether it was given, and photographs in their order, one an exposure, of every strip of two or more."""
-    block, centre = adjusted.block, adjusted.images.centre
+def strips_in(block: Block, centre: np.ndarray) -> Iterator[tuple[str, bool, np.ndarray]]:
+    """Name, whether it was given, and photographs in their order, one an exposure, of every strip of two or more.
+
+    Parameters
+    ----------
+    centre : (n, 3) m, the projection centres.
+    """
     known = np.flatnonzero(np.isfinite(centre).all(axis=1))
     if not len(known):
         return

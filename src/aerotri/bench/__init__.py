@@ -1,0 +1,1 @@
+"""The bench: a result looked at and mended in the browser, on this machine alone."""

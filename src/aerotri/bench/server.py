@@ -1,0 +1,229 @@
+"""The pages of the bench: bound to this machine, behind a random token in the address."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from aerotri.bench.session import RELOAD, Bench
+from aerotri.conventions import InputError
+
+MOST, LONGEST = 10**9, 1000
+STATIC = Path(__file__).parent / "static"
+KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
+HOSTS = ("127.0.0.1", "localhost")
+"""Names under which this machine is asked; others come from elsewhere, by a name that leads here."""
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "img-src 'self' blob: data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
+"""The page may load nothing from elsewhere, and nobody may frame it."""
+
+
+def make_application(bench: Bench, token: str) -> ASGIApp:
+    """The pages of a bench.
+
+    Parameters
+    ----------
+    token : first part of every path; whoever does not know it is refused with 403.
+    """
+    routes = [
+        Route("/", _page("index.html")),
+        *(Route(f"/{file.name}", _page(file.name)) for file in sorted(STATIC.iterdir()) if file.suffix in KINDS),
+        *(Route(f"/data/{path}", _told(work)) for path, work in _questions(bench).items()),
+        *(Route(f"/act/{path}", _done(work), methods=["POST"]) for path, work in _actions(bench).items()),
+        Route("/tile/{image:int}/{level:int}/{column:int}/{row:int}", _shown(lambda asked: bench.pictures.tile(
+            *(asked.path_params[name] for name in ("image", "level", "column", "row"))))),
+        Route("/layer/{number:int}", _shown(lambda asked: bench.layer(asked.path_params["number"]))),
+        Route("/cutout/{image:int}", _shown(lambda asked: bench.cutout(
+            asked.path_params["image"], *(_whole(asked, name) or 0 for name in ("left", "top", "size"))))),
+    ]  # fmt: skip
+    return _Guard(Starlette(routes=routes), token)
+
+
+def _questions(bench: Bench) -> dict[str, Callable[[Request], Any]]:
+    """What the page asks for, by path."""
+    return {
+        "summary": lambda asked: bench.summary(),
+        "state": lambda asked: bench.state(),
+        "plan": lambda asked: bench.plan(),
+        "ellipses": lambda asked: bench.ellipses(),
+        "edits": lambda asked: bench.edits(),
+        "next": lambda asked: bench.next(),
+        "layers": lambda asked: bench.layers(),
+        "difference": lambda asked: bench.difference(),
+        "rays": lambda asked: bench.rays(
+            max(_whole(asked, "first") or 0, 0), _whole(asked, "image"), _whole(asked, "point"),
+            asked.query_params.get("text", "")[:200]),
+        "point/{row:int}": lambda asked: bench.point(asked.path_params["row"]),
+        "photograph/{row:int}": lambda asked: bench.photograph(asked.path_params["row"]),
+        "epipolar/{image:int}/{point:int}": lambda asked: bench.epipolar(
+            asked.path_params["image"], asked.path_params["point"]),
+    }  # fmt: skip
+
+
+def _actions(bench: Bench) -> dict[str, Callable[[Given], Any]]:
+    """What the page does, by path."""
+    return {
+        "mark": lambda given: bench.mark(
+            given.row("image"), given.text("point"), given.place(), given.text("reason"), given.is_set("snap")),
+        "remove": lambda given: bench.remove(given.row("image"), given.text("point"), given.text("reason")),
+        "switch": lambda given: bench.switch(
+            given.row("image") if given.has("image") else None, given.text("point"), given.text("action"),
+            given.text("reason")),
+        "undo": lambda given: bench.undo(),
+        "adjust": lambda given: bench.adjust(),
+        "stop": lambda given: bench.stop(),
+    }  # fmt: skip
+
+
+class Given:
+    """What the page says with an action, checked piece by piece.
+
+    Parameters
+    ----------
+    content : as read from JSON.
+
+    Raises
+    ------
+    InputError
+        By every method, when the page says something else.
+    """
+
+    def __init__(self, content: Any):
+        self._content: dict[str, Any] = content if isinstance(content, dict) else {}
+
+    def has(self, name: str) -> bool:
+        """Whether it is said."""
+        return self._content.get(name) is not None
+
+    def is_set(self, name: str) -> bool:
+        """Whether it is said to be so."""
+        return self._content.get(name) is True
+
+    def row(self, name: str) -> int:
+        """A row of a table."""
+        value = self._content.get(name)
+        if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < MOST:
+            raise InputError(f"{name} is no number of a row", RELOAD)
+        return value
+
+    def text(self, name: str) -> str:
+        """A text, '' where none is said."""
+        value = self._content.get(name, "")
+        if not isinstance(value, str) or len(value) > LONGEST:
+            raise InputError(f"{name} is no text of up to {LONGEST} characters", RELOAD)
+        return value
+
+    def place(self) -> tuple[float, float]:
+        """Column and row, px."""
+        found = [self._content.get(name) for name in ("column", "row")]
+        if not all(isinstance(one, int | float) and abs(one) < MOST for one in found):
+            raise InputError("column and row are no numbers", RELOAD)
+        return float(found[0] or 0.0), float(found[1] or 0.0)
+
+
+def new_token() -> str:
+    """A token that nobody guesses."""
+    return secrets.token_urlsafe(24)
+
+
+class _Guard:
+    """Lets through who knows the token and asks this machine by its own name."""
+
+    def __init__(self, inner: ASGIApp, token: str):
+        self._inner, self._token = inner, token
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await self._inner(scope, receive, send)
+            return
+        if scope["type"] != "http":
+            return
+        _, given, rest = (*scope["path"].split("/", 2), "", "")[:3]
+        host = Request(scope).headers.get("host", "").rsplit(":", 1)[0]
+        known = secrets.compare_digest(given.encode(), self._token.encode())
+        if not known or host not in HOSTS:
+            await PlainTextResponse("The address is not that of the bench.", 403, HEADERS)(scope, receive, send)
+            return
+        await self._inner({**scope, "path": f"/{rest}", "raw_path": f"/{rest}".encode()}, receive, send)
+
+
+def _page(name: str) -> Callable[[Request], Response]:
+    """A file of the page."""
+
+    def answer(asked: Request) -> Response:
+        file = STATIC / name
+        return Response(file.read_bytes(), media_type=KINDS[file.suffix], headers=HEADERS)
+
+    return answer
+
+
+def _told(work: Callable[[Request], Any]) -> Callable[[Request], Any]:
+    """What a piece of work gives as JSON; bad input in words, with 400."""
+
+    async def answer(asked: Request) -> Response:
+        try:
+            content = await run_in_threadpool(work, asked)
+        except InputError as error:
+            return JSONResponse({"error": str(error)}, 400, HEADERS)
+        return Response(_packed(content), media_type="application/json", headers=HEADERS)
+
+    return answer
+
+
+def _done(work: Callable[[Given], Any]) -> Callable[[Request], Any]:
+    """An action with what the page says; what it gives as JSON."""
+
+    async def answer(asked: Request) -> Response:
+        try:
+            body = await asked.body()
+            given = Given(json.loads(body) if body else {})
+            content = await run_in_threadpool(work, given)
+        except (ValueError, RecursionError):
+            return JSONResponse({"error": f"what the page said is no JSON — {RELOAD}"}, 400, HEADERS)
+        except InputError as error:
+            return JSONResponse({"error": str(error)}, 400, HEADERS)
+        return Response(_packed(content), media_type="application/json", headers=HEADERS)
+
+    return answer
+
+
+def _shown(work: Callable[[Request], bytes]) -> Callable[[Request], Any]:
+    """A picture."""
+
+    async def answer(asked: Request) -> Response:
+        try:
+            content = await run_in_threadpool(work, asked)
+        except InputError as error:
+            return JSONResponse({"error": str(error)}, 404, HEADERS)
+        return Response(content, media_type="image/jpeg", headers=HEADERS | {"Cache-Control": "private, max-age=3600"})
+
+    return answer
+
+
+def _packed(content: Any) -> bytes:
+    return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode("utf-8")
+
+
+def _whole(asked: Request, name: str) -> int | None:
+    """A whole number of the question; None where it is not asked."""
+    text = asked.query_params.get(name, "")
+    if not text:
+        return None
+    if not text.removeprefix("-").isdecimal() or len(text) > 9:
+        raise InputError(f"{name} = '{text[:30]}' is no number of a row", RELOAD)
+    return int(text)
