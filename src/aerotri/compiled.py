@@ -13,7 +13,13 @@ from typing import Any
 from numba import njit
 from numba.core.cpu import CPUTargetOptions
 
-OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+from aerotri.kernel_cache import SharedCache
+
+OPTIONS: dict[str, Any] = {
+    "nogil": True, "error_model": "numpy", "fastmath": {"contract"},
+    # nothing here is handed to C, and the entry for it takes a tenth of the compilation
+    "no_cfunc_wrapper": True,
+}  # fmt: skip
 
 _state: dict[str, Any] = {"cached": True, "example": None, "said": False}
 
@@ -33,11 +39,15 @@ def leaf_kernel(function: Callable[..., Any]) -> Any:
 
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    compiled = njit(**options)(function)
+    if compiled is function:  # NUMBA_DISABLE_JIT
+        return compiled
     try:
-        compiled = njit(cache=True, **options)(function)
+        # where numba puts its own cache for cache=True
+        compiled._cache = SharedCache(function)
     except RuntimeError:  # numba found no writable place
         _state["cached"] = False
-        return njit(**options)(function)
+        return compiled
     _state["example"] = compiled
     return compiled
 

@@ -44,11 +44,11 @@ def main() -> None:
     """Run the command with an empty and with a filled folder, print both and what was compiled."""
     arguments = _arguments()
     if arguments.child:
-        raise SystemExit(_child(arguments.child, arguments.command))
+        raise SystemExit(_child(arguments.child, arguments.record, arguments.command))
     first, second = [], []
     for _ in range(arguments.repeats):
         with tempfile.TemporaryDirectory(prefix="aerotri_first_run_") as folder:
-            first.append(_measured(Path(folder), arguments.command))
+            first.append(_measured(Path(folder), arguments.command, arguments.record))
             second.append(_measured(Path(folder), arguments.command))
     text = _table(arguments.command, first, second, arguments.most)
     print(text)
@@ -64,6 +64,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--repeats", type=int, default=1, help="pairs of runs, of which the median counts")
     parser.add_argument("--most", type=int, default=30, help="kernels that the table names (default 30)")
     parser.add_argument("--out", type=Path, help="folder for first_run.md and first_run.json")
+    parser.add_argument("--record", type=Path, help="file to write with the kernels that the command calls, in order")
     parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("command", nargs=argparse.REMAINDER, help="of aerotri, with its arguments")
     arguments = parser.parse_args()
@@ -72,13 +73,14 @@ def _arguments() -> argparse.Namespace:
     return arguments
 
 
-def _measured(folder: Path, command: list[str]) -> Run:
+def _measured(folder: Path, command: list[str], record: Path | None = None) -> Run:
     """The command in a process of its own; `folder` keeps the compiled kernels."""
     told, results = folder / "told.json", folder / "results"
     shutil.rmtree(results, ignore_errors=True)
     out = ["--out", str(results)] if command[0] == "adjust" and "--out" not in command else []
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "kernels")}
-    line = [sys.executable, __file__, "--child", str(told), *command, *out]
+    recorded = ["--record", str(record)] if record else []
+    line = [sys.executable, __file__, "--child", str(told), *recorded, *command, *out]
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     done = subprocess.run(line, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     clock, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -88,11 +90,11 @@ def _measured(folder: Path, command: list[str]) -> Run:
     return Run(clock, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, kernels)
 
 
-def _child(told: Path, command: list[str]) -> int:
+def _child(told: Path, record: Path | None, command: list[str]) -> int:
     """The command itself, with every compilation written down."""
     from numba.core import event
 
-    listener = _listener(event, told)
+    listener = _listener(event, told, record)
     told.write_text("[]")
     event.register("numba:compile", listener)
     from aerotri.cli import main as aerotri
@@ -102,13 +104,16 @@ def _child(told: Path, command: list[str]) -> int:
     return 0
 
 
-def _listener(event: Any, told: Path) -> Any:
+def _listener(event: Any, told: Path, record: Path | None) -> Any:
+    from aerotri.execution.first_run import as_listed
+
     class Listener(event.Listener):
         """Own seconds of every kernel; compilation of what it calls happens within its own."""
 
         def __init__(self) -> None:
             self._open: list[list[float]] = []
             self._own: dict[str, list[float]] = {}
+            self._called: list[tuple[str, tuple[Any, ...]]] = []
 
         def on_start(self, event: Any) -> None:
             self._open.append([time.thread_time(), 0.0])
@@ -119,12 +124,16 @@ def _listener(event: Any, told: Path) -> Any:
             if self._open:
                 self._open[-1][1] += whole
             function = event.data["dispatcher"].py_func
+            if function.__module__.startswith("aerotri."):
+                self._called.append((f"{function.__module__}:{function.__name__}", event.data["args"]))
             name = f"{function.__module__.removeprefix('aerotri.')}.{function.__name__}"
             self._own.setdefault(name, []).append(whole - within)
             if not self._open:
                 # now, for a command may end its process without a word
                 rows = [(name, len(times), sum(times)) for name, times in self._own.items()]
                 told.write_text(json.dumps(sorted(rows, key=lambda row: -row[2])))
+                if record:
+                    record.write_text(as_listed(self._called), encoding="utf-8")
 
     return Listener()
 

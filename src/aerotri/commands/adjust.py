@@ -38,6 +38,9 @@ def run_adjust(
     from aerotri.public.adjusting import read_in_metres, with_read_time
     from aerotri.public.checking import free_check, refuse_free_datum
 
+    from aerotri.execution.first_run import compile_ahead
+
+    compile_ahead()
     block, note = read_in_metres(path, control_prefix, geoid)
     block = block_with_check_points(block, check, control_prefix)
     for text in (*((note,) if note else ()), *unread_in_words(path)):
