@@ -21,7 +21,7 @@ OPTIONS: dict[str, Any] = {
     "no_cfunc_wrapper": True,
 }  # fmt: skip
 
-_state: dict[str, Any] = {"cached": True, "example": None, "said": False}
+_state: dict[str, Any] = {"cached": True, "example": None, "said": False, "ahead": False}
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -39,7 +39,7 @@ def leaf_kernel(function: Callable[..., Any]) -> Any:
 
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    compiled = njit(**options)(function)
+    compiled: Any = njit(**options)(function)
     if compiled is function:  # NUMBA_DISABLE_JIT
         return compiled
     try:
@@ -57,6 +57,11 @@ def inlined(function: Callable[..., Any]) -> Any:
     return njit(**OPTIONS, inline="always")(function)
 
 
+def compiled_ahead() -> None:
+    """Say that other processes compile for this one; what they have kept already makes it no later run."""
+    _state["ahead"] = True
+
+
 def compilation_notice() -> str:
     """A sentence for the user when kernels have to be compiled in this run; '' when they come from the cache.
 
@@ -69,7 +74,12 @@ def compilation_notice() -> str:
         notice = (
             "compiling kernels; there is no writable place to keep them (set NUMBA_CACHE_DIR), so every run does this"
         )
-    elif _state["example"] is not None and not any(Path(_state["example"].stats.cache_path).glob("*.nbi")):
-        notice = "compiling kernels, in this first run only (about 20 s)"
+    elif _state["ahead"] or _keeps_nothing(_state["example"]):
+        notice = "compiling kernels, in this first run only (10 to 30 s)"
     _state["said"] = bool(notice)
     return notice
+
+
+def _keeps_nothing(kernel: Any) -> bool:
+    """Whether the folder for a kernel and its neighbours is still empty."""
+    return kernel is not None and not any(Path(kernel.stats.cache_path).glob("*.nbi"))

@@ -16,7 +16,7 @@ from typing import Any
 from numba.core.caching import FunctionCache
 
 PATIENCE_S = 60.0
-"""For another process to compile a kernel; chosen [C]: ten times what the longest one takes. Then it is compiled here."""
+"""For another process to compile a kernel, before it is compiled here; chosen [C]: ten times what the longest takes."""
 LOOK_S = 0.02
 """Between two looks whether the lock is free."""
 

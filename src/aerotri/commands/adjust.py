@@ -33,14 +33,14 @@ def run_adjust(
     """Exit code of the command: 0 when converged and not rejected, 1 otherwise; arguments as on the command line."""
     console = Console(quiet=as_json)
     begun = time.perf_counter()
+    from aerotri.execution.first_run import compile_ahead
+
+    compile_ahead()
     from aerotri.formats.assembly.assemble_control import block_with_check_points
     from aerotri.formats.block.unread import unread_in_words
     from aerotri.public.adjusting import read_in_metres, with_read_time
     from aerotri.public.checking import free_check, refuse_free_datum
 
-    from aerotri.execution.first_run import compile_ahead
-
-    compile_ahead()
     block, note = read_in_metres(path, control_prefix, geoid)
     block = block_with_check_points(block, check, control_prefix)
     for text in (*((note,) if note else ()), *unread_in_words(path)):

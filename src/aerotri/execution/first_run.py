@@ -19,6 +19,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from aerotri.compiled import compiled_ahead
 from aerotri.execution.elsewhere import ONE_THREAD
 from aerotri.execution.threads import thread_count
 
@@ -41,7 +42,7 @@ def compile_ahead() -> int:
         return 0
     folder = tempfile.TemporaryDirectory(prefix="aerotri_first_run_", ignore_cleanup_errors=True)
     _held.append(folder)
-    line = [sys.executable, "-m", __name__, folder.name]
+    line = [sys.executable, "-m", __name__, folder.name, str(LISTED)]
     for _ in range(count):
         with suppress(OSError):
             # the line to their input, never written to, closes with this process however it ends
@@ -54,10 +55,11 @@ def compile_ahead() -> int:
                     env={**os.environ, **ONE_THREAD},
                 )
             )
+    compiled_ahead()
     return count
 
 
-def listed_kernels(path: Path = LISTED) -> list[tuple[str, tuple[Any, ...]]]:
+def listed_kernels(path: Path) -> list[tuple[str, tuple[Any, ...]]]:
     """Names of kernels, 'module:function', and the numba types of their arguments."""
     content = json.loads(path.read_text(encoding="utf-8"))
     types: list[Any] = []
@@ -87,9 +89,10 @@ def _number(one: Any, types: dict[str, int]) -> int:
     if isinstance(one, nb.Array):
         stated: list[Any] = ["array", str(one.dtype), one.ndim, one.layout, not one.mutable, one.aligned]
     elif isinstance(one, nb.BaseTuple):
+        parts: Any = one
         of: Any = getattr(one, "instance_class", None)
         name = f"{of.__module__}:{of.__qualname__}" if of else ""
-        stated = ["tuple", name, *(_number(part, types) for part in one)]
+        stated = ["tuple", name, *(_number(part, types) for part in parts)]
     elif isinstance(one, nb.IntegerLiteral):
         stated = ["literal", one.literal_value]
     elif isinstance(one, nb.Number | nb.Boolean):
@@ -125,10 +128,10 @@ def _is_first_run() -> bool:
     return place is not None and not any(Path(place).glob(f"*.{name.partition(':')[2]}-*.nbi"))
 
 
-def _compile_from_the_end(folder: Path) -> None:
+def _compile_from_the_end(folder: Path, listed: Path) -> None:
     """Kernels that no other process has begun: those that most others call, then the last one first."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    kernels = [(name, _found(name), arguments) for name, arguments in listed_kernels()]
+    kernels = [(name, _found(name), arguments) for name, arguments in listed_kernels(listed)]
     callers = [sum(_calls(other, kernel) for _, other, _ in kernels) for _, kernel, _ in kernels]
     order = sorted(range(len(kernels)), key=lambda k: (-callers[k], -k))
     for k in order:
@@ -154,4 +157,4 @@ def _end_with_parent() -> None:
 _held: list[Any] = []
 
 if __name__ == "__main__":
-    _compile_from_the_end(Path(sys.argv[1]))
+    _compile_from_the_end(Path(sys.argv[1]), Path(sys.argv[2]))
