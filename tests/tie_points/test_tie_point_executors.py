@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import killed_searches
 import pytest
@@ -25,6 +26,8 @@ def made(files, tmp_path):
         out = tmp_path / name
         run_tiepoints(files[0] / "photographs", out, options(files, executor=executor), True)
         found = {path.relative_to(out): path.read_bytes() for path in out.rglob("*") if path.is_file()}
+        # the sums of all files, those with seconds among them
+        found.pop(Path(".aerotri-files"))
         for path in list(found):
             if path.name == "tiepoints.json":
                 found[path] = json.loads(found[path])
@@ -58,8 +61,8 @@ def test_workers_killed_in_mid_run_change_nothing(executor, made, tmp_path, monk
 
 
 @pytest.mark.parametrize(("what", "replaced", "message"), [
-    ("find_features_of", killed_searches.no_features, r"1 of 6 photographs .*: features of \S+ \(RuntimeError: no luck"),
-    ("match_with_others", killed_searches.no_matches, r"1 of \d photographs .*: pairs of \S+ \(RuntimeError: no luck"),
+    ("find_features_of", killed_searches.no_features, r"1 of 6 photographs .*: features of \S+ \(RuntimeError: no"),
+    ("match_with_others", killed_searches.no_matches, r"1 of \d photographs .*: pairs of \S+ \(RuntimeError: no"),
 ])  # fmt: skip
 def test_a_photograph_that_always_fails_is_named_and_the_others_are_kept(
     what, replaced, message, made, tmp_path, monkeypatch
