@@ -13,7 +13,7 @@ from aerotri import compiled
 def new_process(monkeypatch, tmp_path):
     """The state of a process that begins with an empty cache."""
     example = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path)))
-    state = {"cached": True, "example": example, "said": False}
+    state = {"cached": True, "example": example, "said": False, "ahead": False}
     monkeypatch.setattr(compiled, "_state", state)
     return state
 
@@ -33,3 +33,9 @@ def test_without_a_place_for_the_cache_it_is_said_once(new_process):
     new_process["cached"] = False
     assert "NUMBA_CACHE_DIR" in compiled.compilation_notice()
     assert compiled.compilation_notice() == ""
+
+
+def test_kernels_that_others_have_just_kept_are_of_this_run(new_process, tmp_path):
+    (tmp_path / "kernel.nbi").touch()
+    compiled.compiled_ahead()
+    assert "first run only" in compiled.compilation_notice()

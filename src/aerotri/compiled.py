@@ -13,9 +13,15 @@ from typing import Any
 from numba import njit
 from numba.core.cpu import CPUTargetOptions
 
-OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+from aerotri.kernel_cache import SharedCache
 
-_state: dict[str, Any] = {"cached": True, "example": None, "said": False}
+OPTIONS: dict[str, Any] = {
+    "nogil": True, "error_model": "numpy", "fastmath": {"contract"},
+    # nothing here is handed to C, and the entry for it takes a tenth of the compilation
+    "no_cfunc_wrapper": True,
+}  # fmt: skip
+
+_state: dict[str, Any] = {"cached": True, "example": None, "said": False, "ahead": False}
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -33,11 +39,15 @@ def leaf_kernel(function: Callable[..., Any]) -> Any:
 
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    compiled: Any = njit(**options)(function)
+    if compiled is function:  # NUMBA_DISABLE_JIT
+        return compiled
     try:
-        compiled = njit(cache=True, **options)(function)
+        # where numba puts its own cache for cache=True
+        compiled._cache = SharedCache(function)
     except RuntimeError:  # numba found no writable place
         _state["cached"] = False
-        return njit(**options)(function)
+        return compiled
     _state["example"] = compiled
     return compiled
 
@@ -45,6 +55,11 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
 def inlined(function: Callable[..., Any]) -> Any:
     """A small kernel put into its callers."""
     return njit(**OPTIONS, inline="always")(function)
+
+
+def compiled_ahead() -> None:
+    """Say that other processes compile for this one; what they have kept already makes it no later run."""
+    _state["ahead"] = True
 
 
 def compilation_notice() -> str:
@@ -59,7 +74,12 @@ def compilation_notice() -> str:
         notice = (
             "compiling kernels; there is no writable place to keep them (set NUMBA_CACHE_DIR), so every run does this"
         )
-    elif _state["example"] is not None and not any(Path(_state["example"].stats.cache_path).glob("*.nbi")):
-        notice = "compiling kernels, in this first run only (about 20 s)"
+    elif _state["ahead"] or _keeps_nothing(_state["example"]):
+        notice = "compiling kernels, in this first run only (10 to 30 s)"
     _state["said"] = bool(notice)
     return notice
+
+
+def _keeps_nothing(kernel: Any) -> bool:
+    """Whether the folder for a kernel and its neighbours is still empty."""
+    return kernel is not None and not any(Path(kernel.stats.cache_path).glob("*.nbi"))

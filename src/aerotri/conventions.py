@@ -16,14 +16,18 @@ Systematic image error
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
+if TYPE_CHECKING:
+    # the command line shows its help without it, in half of the time
+    import numpy as np
 
-RADIANS_PER = {"deg": np.pi / 180.0, "gon": np.pi / 200.0, "rad": 1.0}
+RADIANS_PER = {"deg": math.pi / 180.0, "gon": math.pi / 200.0, "rad": 1.0}
 """Radians of one unit of an angle, by the name of the unit in files: 360° and 400 gon are 2π."""
-MGON_PER_RADIAN = 200.0e3 / np.pi
+MGON_PER_RADIAN = 200.0e3 / math.pi
 """Milligon of one radian: 200 gon are π."""
 EARTH_RADIUS_M = 6371000.0
 """m, the mean radius of the earth [L: 6371.0 km]; radii of curvature of the ellipsoid differ from it by less than
@@ -100,6 +104,8 @@ def mm_from_px(column_row: np.ndarray, size_px: tuple[int, int], pixel_mm: float
     -------
     (n, 2) mm.
     """
+    import numpy as np
+
     column_row = np.asarray(column_row, dtype=float)
     half = np.array(size_px, dtype=float) / 2.0
     return (column_row - half) * np.array([pixel_mm, -pixel_mm])
@@ -107,5 +113,7 @@ def mm_from_px(column_row: np.ndarray, size_px: tuple[int, int], pixel_mm: float
 
 def px_from_mm(xy_mm: np.ndarray, size_px: tuple[int, int], pixel_mm: float) -> np.ndarray:
     """Pixel positions (column, row) of image coordinates in mm; the inverse of `mm_from_px`."""
+    import numpy as np
+
     half = np.array(size_px, dtype=float) / 2.0
     return np.asarray(xy_mm, dtype=float) / np.array([pixel_mm, -pixel_mm]) + half

@@ -85,7 +85,8 @@ def test_a_run_that_was_ended_goes_on(made, tmp_path, monkeypatch):
     make = importlib.import_module("aerotri.terrain.ortho.make")
     monkeypatch.setattr(make, "TILE", 64)
     given = result, here / "block" / "photographs", here / "surface.tif"
-    tiles, whole = tmp_path / "tiles", make.make_tile
+    work = importlib.import_module("aerotri.terrain.ortho.tile_work")
+    tiles, whole = tmp_path / "tiles", work.make_tile
     wanted = aerotri.orthophoto(*given, tmp_path / "one", cell=0.5, plots=False)
     done = []
 
@@ -95,11 +96,11 @@ def test_a_run_that_was_ended_goes_on(made, tmp_path, monkeypatch):
         done.append(arguments)
         return whole(*arguments)
 
-    monkeypatch.setattr(make, "make_tile", ending)
+    monkeypatch.setattr(work, "make_tile", ending)
     with pytest.raises(KeyboardInterrupt):
         aerotri.orthophoto(*given, tmp_path / "two", cell=0.5, plots=False, tiles=tiles)
     assert not (tmp_path / "two").exists()
-    monkeypatch.setattr(make, "make_tile", whole)
+    monkeypatch.setattr(work, "make_tile", whole)
     kept = sorted(tiles.glob("ortho_*.npz"))
     assert 3 <= len(kept) <= 5
     kept[0].write_bytes(kept[0].read_bytes()[:100])
@@ -120,7 +121,8 @@ def test_a_run_that_was_ended_goes_on(made, tmp_path, monkeypatch):
 KILLED = """
 import importlib, os, signal
 make = importlib.import_module("aerotri.terrain.ortho.make")
-make.TILE, whole, done = 64, make.make_tile, []
+work = importlib.import_module("aerotri.terrain.ortho.tile_work")
+make.TILE, whole, done = 64, work.make_tile, []
 
 def killed(*arguments):
     if len(done) == 5:
@@ -128,7 +130,7 @@ def killed(*arguments):
     done.append(arguments)
     return whole(*arguments)
 
-make.make_tile = killed
+work.make_tile = killed
 from aerotri.cli import main
 main()
 """

@@ -177,14 +177,15 @@ def test_names_cannot_run_anything(fakes, tmp_path):
 def test_the_executor_is_passed_on_and_told(fakes, photographs, tmp_path):
     out = tmp_path / "out"
     aerotri.run(photographs, out, executor="processes:2")
-    _, _, terrain, dense, ortho = fakes.called
-    assert terrain[2]["executor"] == dense[2]["executor"] == "processes:2"
+    ties, adjusted, terrain, dense, ortho = fakes.called
+    assert all(step[2]["executor"] == "processes:2" for step in (ties, terrain, dense, ortho))
+    assert "executor" not in adjusted[2]
     assert terrain[2]["scratch"].parent == out
     assert not [path for path in out.iterdir() if path.name.startswith(".")]
-    assert "executor" not in ortho[2]
     lines = {s["name"]: s["arguments"] for s in json.loads((out / "run.json").read_text())["steps"]}
-    assert lines["dsm"][-2:] == lines["dtm"][-2:] == ["--executor", "processes:2"]
-    assert "--executor" not in lines["ortho"]
+    for name in ("tiepoints", "dtm", "dsm", "ortho"):
+        assert lines[name][-2:] == ["--executor", "processes:2"], name
+    assert "--executor" not in lines["adjust"]
     with pytest.raises(InputError, match="'thread' is no executor"):
         aerotri.run(photographs, out, executor="thread")
 

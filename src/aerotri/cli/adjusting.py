@@ -195,11 +195,12 @@ def halves(
         Path | None, typer.Option(help="Folder to write; default NAME_halves here.", rich_help_panel=OUTPUT)
     ] = None,
     json_: Json = False,
+    executor: Workers = THREADS,
 ) -> None:
     """Adjust two halves of the photographs apart and compare them: model errors, found without control."""
     from aerotri.commands.halves import run_halves
 
-    raise typer.Exit(run_halves(result, divisions or (), out, json_))
+    raise typer.Exit(run_halves(result, divisions or (), out, json_, executor))
 
 
 @app.command(

@@ -38,7 +38,9 @@ from aerotri.cli.options import (
     StatedFocalLength,
     StatedPixelSize,
     SystemOfPhotographs,
+    Workers,
 )
+from aerotri.execution.choice import THREADS
 from aerotri.tie_points.settings import DEFAULTS, LEAST
 
 
@@ -254,6 +256,7 @@ def tiepoints(
     seed: Seed = DEFAULTS.seed,
     overwrite: Overwrite = False,
     json_: Json = False,
+    executor: Workers = THREADS,
 ) -> None:
     """From photographs to a block: tie points, first orientation, control."""
     from aerotri.commands.tiepoints import TiePointOptions, run_tiepoints
@@ -279,6 +282,7 @@ def tiepoints(
         feature_size_px=feature_size,
         neighbours=neighbours,
         seed=seed,
+        executor=executor,
     )
     run_tiepoints(photographs, out, options, json_, overwrite)
 

@@ -8,7 +8,8 @@ from typing import Annotated, Any, cast
 import typer
 
 from aerotri.cli.app import app
-from aerotri.cli.options import ARGUMENTS, INPUT, METHOD, OUTPUT, TERRAIN, Json, ResultFolder, SurfaceLayer
+from aerotri.cli.options import ARGUMENTS, INPUT, METHOD, OUTPUT, TERRAIN, Json, ResultFolder, SurfaceLayer, Workers
+from aerotri.execution.choice import THREADS
 from aerotri.terrain.ortho.settings import DEFAULTS, OrthoSettings
 from aerotri.terrain.settings import LARGEST_EDGE
 
@@ -81,9 +82,10 @@ def ortho(
         bool, typer.Option(help="Draw the orthophoto and the points in it.", rich_help_panel=OUTPUT)
     ] = True,
     json_: Json = False,
+    executor: Workers = THREADS,
 ) -> None:  # fmt: skip
     """True orthophoto: every cell of the ground from the photograph that sees it best, with σ of positions."""
     from aerotri.commands.ortho import run_ortho
 
     settings = OrthoSettings(cell, area, edge, cast(Any, resampling), balance, seams, ideal, fill)
-    raise typer.Exit(run_ortho(result, photographs, surface, layer, out, settings, plots, json_))
+    raise typer.Exit(run_ortho(result, photographs, surface, layer, out, settings, plots, json_, executor))

@@ -34,6 +34,9 @@ def run_adjust(
     """Exit code of the command: 0 when converged and not rejected, 1 otherwise; arguments as on the command line."""
     console = Console(quiet=as_json)
     begun = time.perf_counter()
+    from aerotri.execution.first_run import compile_ahead
+
+    compile_ahead()
     from aerotri.formats.assembly.assemble_control import block_with_check_points
     from aerotri.formats.block.unread import unread_in_words
     from aerotri.public.adjusting import read_in_metres, with_read_time

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
+from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.results.json_text import json_text
 from aerotri.terrain.ortho.settings import OrthoSettings
 from aerotri.volume.settings import LAYERS
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 def run_ortho(
     source: Path, photographs: list[Path], surface: Path, layer: str, out: Path | None, settings: OrthoSettings,
-    plots: bool, as_json: bool,
+    plots: bool, as_json: bool, executor: str = THREADS,
 ) -> int:  # fmt: skip
     """Exit code of the command; arguments as on the command line."""
     from aerotri.public.adjustment import Adjustment
@@ -29,6 +30,7 @@ def run_ortho(
 
     console = Console(quiet=as_json)
     settings.check()
+    chosen(executor)
     target = out or Path(f"{source.resolve().name.removesuffix('_result')}_ortho")
     refuse_foreign_folder(target, RECORD)
     if layer not in LAYERS:
@@ -36,7 +38,7 @@ def run_ortho(
     ground = as_surface(surface, layer)
     result = Adjustment(reopened(source, console))
     tiles = tiles_beside(target)
-    found = make_ortho(result, photographs, ground, target, settings, plots, tiles, console.stage)
+    found = make_ortho(result, photographs, ground, target, settings, plots, tiles, console.stage, executor)
     remove_tiles(tiles)
     if as_json:
         print(json_text(found.summary))

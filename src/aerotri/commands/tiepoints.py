@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from aerotri.commands.console import Console
+from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.assembly.assemble import Statements
 from aerotri.formats.assembly.camera_spec import CameraSpec
 from aerotri.formats.results.json_text import json_text
@@ -30,6 +31,7 @@ class TiePointOptions:
     feature_size_px: int = DEFAULTS.feature_size
     neighbours: int = DEFAULTS.neighbours
     seed: int = DEFAULTS.seed
+    executor: str = THREADS
 
 
 def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bool, overwrite: bool = False) -> None:
@@ -44,6 +46,7 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
     from aerotri.tie_points.photographs_to_block import CACHE
 
     console, o, stated = Console(quiet=as_json), options, options.stated
+    chosen(o.executor)
     refuse_other_content(out, overwrite)
     with held(out):
         tied = tie_points(
@@ -54,7 +57,7 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
             mark_sigma_px=o.mark_sigma_px, positions_sigma_m=stated.positions_sigma_m,
             orientation_sigma_m=stated.orientation_sigma_m, orientation_sigma_deg=stated.orientation_sigma_deg,
             points=o.points, features=o.features, feature_size=o.feature_size_px, neighbours=o.neighbours, seed=o.seed,
-            cache=out / CACHE, progress=console.stage,
+            cache=out / CACHE, executor=o.executor, progress=console.stage,
         )  # fmt: skip
         tied.save(out, overwrite=overwrite, progress=console.stage)
     content = tied.summary(out)

@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.execution.choice import THREADS
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.table import Table
+from aerotri.public.workplaces import workplace
 from aerotri.results.head import Head
 
 if TYPE_CHECKING:
@@ -138,6 +140,8 @@ def halves(
     divisions: Sequence[str] | None = None,
     *,
     alpha: float | None = None,
+    executor: str = THREADS,
+    scratch: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> Halves:
     """Divide the photographs of a block into two halves, adjust them apart and compare them.
@@ -153,6 +157,9 @@ def halves(
     divisions : 'photographs' (alternate photographs of each strip), 'strips' (alternate strips), 'directions' (of
         flight), 'time' (first and second half of the flight); all where None.
     alpha : probability below which differences are no noise; that of the block where None.
+    executor : where the halves are adjusted, a task a division: 'threads', 'processes:N', 'dask:ADDRESS' or
+        'dask:local:N'.
+    scratch : folder for what other processes read, one that all of them have; a temporary one where None.
     progress : as of `aerotri.adjust`.
 
     Returns
@@ -162,7 +169,9 @@ def halves(
     Raises
     ------
     InputError
-        When the folder holds no result, or a division does not exist.
+        When the folder holds no result, a division does not exist, or the executor is none or cannot be reached.
+    TasksFailedError
+        When divisions could not be computed elsewhere; the message names them.
 
     Examples
     --------
@@ -180,10 +189,10 @@ def halves(
     unknown = [name for name in chosen if name not in DIVISIONS]
     if unknown or not chosen:
         raise InputError(f"'{unknown[0] if unknown else ''}' is no division", f"use {', '.join(DIVISIONS)}")
-    with stage_report(progress) as report:
+    with stage_report(progress) as report, workplace(executor, scratch, report.said) as at:
         if not isinstance(result, Adjustment):
             report.stage("reading", None)
             result = open_result(result)
         if result.status != "converged":
             raise InputError(f"the adjustment ended '{result.status}'", "give the result of a converged one")
-        return Halves(compare_halves(result.record, chosen, alpha, report.stage), result.adjusted)
+        return Halves(compare_halves(result.record, chosen, alpha, report.stage, at), result.adjusted)

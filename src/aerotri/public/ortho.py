@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.execution.choice import THREADS, chosen
+from aerotri.execution.opening import opened
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
@@ -134,6 +136,7 @@ def orthophoto(
     layer: Layer = LAYER,
     plots: bool = True,
     tiles: FilePath | None = None,
+    executor: str = THREADS,
     progress: ProgressLike = None,
 ) -> Orthophoto:
     """Make a true orthophoto: every cell of the ground from the photograph that sees it best.
@@ -156,6 +159,7 @@ def orthophoto(
     plots : draw the orthophoto and the points in it.
     tiles : folder for the tiles of the orthophoto; a run that was ended goes on with those it finds there. None: they
         are not kept.
+    executor : where the tiles are made: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'.
     progress : as of `aerotri.adjust`.
 
     Returns
@@ -167,7 +171,9 @@ def orthophoto(
     ------
     InputError
         For a setting that makes no sense, photographs or a surface that do not fit the block, or a folder with other
-        files.
+        files; and when the executor is none or cannot be reached.
+    TasksFailedError
+        When an executor could not make tiles; the message names them.
 
     Examples
     --------
@@ -181,34 +187,38 @@ def orthophoto(
         raise InputError(f"there is no layer '{layer}'", f"choose one of {', '.join(LAYERS)}")
     kept = None if tiles is None else Path(tiles)
     ground = as_surface(surface, layer)
-    return make_ortho(result, paths_of(photographs), ground, Path(out), settings, plots, kept, progress)
+    return make_ortho(result, paths_of(photographs), ground, Path(out), settings, plots, kept, progress, executor)
 
 
 def make_ortho(
     result: Adjustment | FilePath, photographs: Sequence[Path], surface: SurfaceLike, out: Path,
     settings: OrthoSettings, plots: bool = True, tiles: Path | None = None, progress: ProgressLike = None,
+    executor: str = THREADS,
 ) -> Orthophoto:  # fmt: skip
     """As `orthophoto`, with the settings in one record.
 
     Raises
     ------
-    InputError
+    InputError, TasksFailedError
     """
-    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.formats.files.atomic import atomic_folder, room_beside
     from aerotri.rasters.grids import horizontal_crs
     from aerotri.terrain.ortho.make import make_orthophoto
 
     settings.check()
+    in_threads = chosen(executor).kind == "threads"
     refuse_foreign_folder(out, RECORD)
     record = (result if isinstance(result, Adjustment) else open_result(result)).record
-    chosen = _photographs(record, photographs)
+    taken = _photographs(record, photographs)
     ground = as_surface(surface, LAYER)
     if tiles is not None:
-        open_tiles(tiles, _stated(record, chosen[1], ground, settings))
+        open_tiles(tiles, _stated(record, taken[1], ground, settings))
     with ExitStack() as stack, stage_report(progress) as report:
         heights, sigma, notes = _opened(ground, horizontal_crs(record.result.block.crs), stack)
         folder = stack.enter_context(atomic_folder(out, own=OWN_NAMES))
-        made = make_orthophoto(record, chosen, (heights, sigma), settings, folder, report.stage, tiles)
+        workers = None if in_threads else stack.enter_context(opened(executor, report.said))
+        room = tiles if in_threads or tiles is not None else stack.enter_context(room_beside(out))
+        made = make_orthophoto(record, taken, (heights, sigma), settings, folder, report.stage, room, workers)
         outcome, summary, points = _described(record, made, ground.label, settings, folder)
         if plots:
             from aerotri.report.plots.rendering import save_plots

@@ -195,8 +195,8 @@ def run(
     unmarked : where control points are marked in no photograph, 'stop' after the tie points, or 'continue'. A block of
         an earlier run in `out` that was marked since is taken up with 'continue'.
     further : more settings of a step by the name of its verb, {'terrain': {'window': 21}}.
-    executor : where terrain and dense surface are measured: 'threads', 'processes:N', 'dask:ADDRESS' or
-        'dask:local:N'.
+    executor : where tie points, terrain, dense surface and orthophoto are made: 'threads', 'processes:N',
+        'dask:ADDRESS' or 'dask:local:N'.
     on_step : takes each step when it begins, with None, and when it ended, with what it gave or why it failed.
     progress : see `aerotri.adjust`.
 
@@ -226,7 +226,7 @@ def run(
         "tie_points": {
             "control": control, "control_sigma_m": control_sigma_m, "control_prefix": control_prefix if marked else "",
             "positions": positions, "camera": camera, "focal_length_mm": focal_length_mm, "pixel_um": pixel_um,
-            "crs": crs, "geoid": geoid, "seed": seed, **({} if from_block else names),
+            "crs": crs, "geoid": geoid, "seed": seed, "executor": elsewhere, **({} if from_block else names),
         },
         "adjust": {
             "parameters": parameters or (None if from_block else "auto"), "geoid": geoid,
@@ -235,7 +235,7 @@ def run(
         },
         "terrain": {"interval": interval, "ground_within": boundary, "executor": elsewhere},
         "volume": {"boundary": boundary, "base": base, "layer": layer} if not is_missing(boundary) else {},
-        "dense": {"executor": elsewhere}, "orthophoto": {}, "accuracy": {},
+        "dense": {"executor": elsewhere}, "orthophoto": {"executor": elsewhere}, "accuracy": {},
     }  # fmt: skip
     for verb, more in (further or {}).items():
         settings[verb] |= more

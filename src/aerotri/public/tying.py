@@ -11,14 +11,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import FilePath
+from aerotri.execution.choice import THREADS
 from aerotri.public.blocks import Sigmas, text_of_path
 from aerotri.public.folders import refuse_foreign_entries, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.public.workplaces import workplace
 from aerotri.tie_points.settings import DEFAULTS, TiePointSettings
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from aerotri.execution.work import Workplace
     from aerotri.formats.assembly.camera_spec import CameraSpec
     from aerotri.observations import Block
     from aerotri.tie_points.given import Given
@@ -163,6 +166,7 @@ def tie_points(
     neighbours: int = DEFAULTS.neighbours,
     seed: int = DEFAULTS.seed,
     cache: FilePath | None = None,
+    executor: str = THREADS,
     progress: ProgressLike = None,
 ) -> TiedPhotographs:
     """From photographs to a block: tie points, first orientation, control.
@@ -192,6 +196,8 @@ def tie_points(
     neighbours : photographs that each is compared with, the nearest.
     seed : the same seed gives the same block.
     cache : folder to keep features and matches in for another time; a temporary one where None.
+    executor : where features and matches are found: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'. Other
+        machines have to see the photographs and `cache` under the same names.
     progress : see `aerotri.adjust`.
 
     Returns
@@ -201,7 +207,10 @@ def tie_points(
     Raises
     ------
     InputError
-        When a file is damaged or contradictory, a camera is not known, or no photographs have points in common.
+        When a file is damaged or contradictory, a camera is not known, or no photographs have points in common; and
+        when the executor is none or cannot be reached.
+    TasksFailedError
+        When features or matches could not be found elsewhere; the message names the photographs.
 
     Examples
     --------
@@ -229,12 +238,13 @@ def tie_points(
     options = Options(found, MatchOptions(neighbours=neighbours, seed=seed), points)
     with stage_report(progress) as report, ExitStack() as stack:
         keep = Path(stack.enter_context(tempfile.TemporaryDirectory()) if cache is None else cache)
-        return _tied(Path(photographs), files, spec, mark_sigma_px, options, keep, report, begun)
+        at = stack.enter_context(workplace(executor, keep, report.said))
+        return _tied(Path(photographs), files, spec, mark_sigma_px, options, keep, report, begun, at)
 
 
 def _tied(
     folder: Path, files: GivenFiles, camera: CameraSpec, mark_sigma_px: float, options: Options, cache: Path,
-    report: StageReport, begun: float,
+    report: StageReport, begun: float, at: Workplace | None,
 ) -> TiedPhotographs:  # fmt: skip
     from aerotri.compiled import compilation_notice
     from aerotri.tie_points.photographs import find_photographs
@@ -244,7 +254,7 @@ def _tied(
     photographs = find_photographs(folder, stated_camera(camera))
     given = read_given(files, mark_sigma_px)
     report.stage(compilation_notice() or "features of photographs", None)
-    tied = tie_photographs(photographs, given, options, cache, report.counted)
+    tied = tie_photographs(photographs, given, options, cache, report.counted, at)
     return TiedPhotographs(tied, photographs, given, time.perf_counter() - begun)
 
 

@@ -120,30 +120,53 @@ def match_all(
     found, done = [], 0
     for first in sorted({i for i, _ in pairs}):
         seconds = [j for i, j in pairs if i == first]
-        kept = cache / f"{names[first]}.npz"
-        keys = {j: _key(features[first], features[j], cameras[first], cameras[j], options) for j in seconds}
-        known = _kept(kept, {keys[j]: (len(features[first].xy), len(features[j].xy)) for j in seconds})
-
-        def one(
-            j: int, first: int = first, known: dict[str, np.ndarray] = known, keys: dict[int, str] = keys
-        ) -> np.ndarray:
-            old = known.get(keys[j])
-            return _match(features[first], features[j], (cameras[first], cameras[j]), options) if old is None else old
-
-        with ThreadPoolExecutor(thread_count()) as pool:
-            results = []
-            for result in pool.map(one, seconds):
-                results.append(result)
-                done += 1
-                report(done, len(pairs))
-        if any(keys[j] not in known for j in seconds):
-            _keep(kept, {keys[j]: result for j, result in zip(seconds, results, strict=True)})
+        matches = matches_of(
+            (first, seconds), features, cameras, options, cache / f"{names[first]}.npz",
+            lambda number, done=done: report(done + number, len(pairs)),
+        )  # fmt: skip
+        done += len(seconds)
         found += [
             PairMatches(first, j, result)
-            for j, result in zip(seconds, results, strict=True)
+            for j, result in zip(seconds, matches, strict=True)
             if len(result) >= options.fewest
         ]
     return found
+
+
+def matches_of(
+    photographs: tuple[int, Sequence[int]],
+    features: Mapping[int, Features] | Sequence[Features],
+    cameras: Sequence[Camera],
+    options: MatchOptions,
+    kept: Path,
+    report: Callable[[int], None] = lambda done: None,
+) -> list[np.ndarray]:
+    """(m, 2) verified matches of a photograph with each of some others, from a file where they are there already.
+
+    Parameters
+    ----------
+    photographs : the first, and the others. features, cameras : by photograph. kept : the file.
+    report : called with the number of pairs that are done.
+    """
+    from threadpoolctl import threadpool_limits
+
+    first, seconds = photographs
+    keys = {j: _key(features[first], features[j], cameras[first], cameras[j], options) for j in seconds}
+    known = _kept(kept, {keys[j]: (len(features[first].xy), len(features[j].xy)) for j in seconds})
+
+    def one(j: int) -> np.ndarray:
+        old = known.get(keys[j])
+        return _match(features[first], features[j], (cameras[first], cameras[j]), options) if old is None else old
+
+    out: list[np.ndarray] = []
+    # threads within threads would wait for one another
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(thread_count()) as pool:
+        for result in pool.map(one, seconds):
+            out.append(result)
+            report(len(out))
+    if any(key not in known for key in keys.values()):
+        _keep(kept, {keys[j]: result for j, result in zip(seconds, out, strict=True)})
+    return out
 
 
 def _match(one: Features, other: Features, cameras: tuple[Camera, Camera], options: MatchOptions) -> np.ndarray:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from aerotri.conventions import InputError, mm_from_px
+from aerotri.execution.work import Workplace
 from aerotri.formats.assembly import assemble
 from aerotri.formats.assembly.parts import PositionList, Reading, no_sigma
 from aerotri.formats.assembly.reprojection import reproject
@@ -27,10 +29,13 @@ from aerotri.tie_points.matching import MatchOptions, match_all, neighbours
 from aerotri.tie_points.orientation import Oriented, Progress, in_frame, orient, with_start_values
 from aerotri.tie_points.photographs import LENS, PhotographSet
 from aerotri.tie_points.settings import DEFAULTS
+from aerotri.tie_points.tasks import features_elsewhere, matches_elsewhere
 from aerotri.tie_points.tracks import Tracks, join_matches, thin
 from aerotri.tie_points.verification import rays_that_meet
 
 CACHE = "tie_point_cache"
+FEATURES, PAIRS = "features of photographs", "matching pairs"
+"""Stages, as a user reads them."""
 ITERATIONS = 300
 """Iterations that the written settings allow, ten times the default; chosen [C]: start values of a first orientation
 are bent, and Huber's weights settle slowly."""
@@ -67,7 +72,12 @@ class TiedBlock:
 
 
 def tie_photographs(
-    photographs: PhotographSet, given: Given, options: Options, cache: Path, progress: Progress
+    photographs: PhotographSet,
+    given: Given,
+    options: Options,
+    cache: Path,
+    progress: Progress,
+    at: Workplace | None = None,
 ) -> TiedBlock:
     """From photographs to a block.
 
@@ -77,18 +87,21 @@ def tie_photographs(
     Parameters
     ----------
     cache : folder of features and matches, which are taken from there where they are the same.
+    at : other processes that find features and matches; the threads of this one where None.
 
     Raises
     ------
     InputError
+    TasksFailedError
+        When other processes could not find features or matches.
     """
     crs = crs_of(photographs, given)
     positions, said = positions_in(photographs, given, crs)
     _refuse_bad_lists(photographs, given, crs, positions)
-    features = _features(photographs, options.features, cache, progress)
+    features = _features(photographs, options.features, cache, progress, at)
     order = _order_of(features)
     tracks, oriented, pairs = _oriented_tracks(
-        photographs.in_order(order), [features[k] for k in order], given, crs, positions, options, cache, progress
+        photographs.in_order(order), [features[k] for k in order], given, crs, positions, options, cache, progress, at
     )
     tracks, oriented = tracks.with_images(order), oriented.in_order(np.argsort(order), photographs.cameras)
     keep = np.bincount(tracks.image, minlength=len(photographs)) > 0
@@ -121,11 +134,11 @@ def _order_of(features: list[Features]) -> np.ndarray:
 
 def _oriented_tracks(
     photographs: PhotographSet, features: list[Features], given: Given, crs: str, positions: PositionList | None,
-    options: Options, cache: Path, progress: Progress,
+    options: Options, cache: Path, progress: Progress, at: Workplace | None,
 ) -> tuple[Tracks, Oriented, tuple[int, int]]:  # fmt: skip
     """Tracks whose rays meet, the orientation, and how many pairs were matched and are tied."""
     places = approximate_places(photographs, positions, given)
-    tracks, pairs = _tracks(photographs, features, places, options, cache, progress)
+    tracks, pairs = _tracks(photographs, features, places, options, cache, progress, at)
     size = np.array([photographs.cameras[c].size_px for c in photographs.camera], dtype=float)
     tracks = thin(tracks, _xy(tracks, features), size, MORE_TRACKS * options.points)
     bare = _bare_block(photographs, photographs.cameras, tracks, features)
@@ -148,11 +161,16 @@ def _refuse_bad_lists(photographs: PhotographSet, given: Given, crs: str, positi
         assemble.with_orientations(reading, given.orientation, given.stated)
 
 
-def _features(photographs: PhotographSet, options: FeatureOptions, cache: Path, progress: Progress) -> list[Features]:
+def _features(
+    photographs: PhotographSet, options: FeatureOptions, cache: Path, progress: Progress, at: Workplace | None
+) -> list[Features]:
+    if at is not None:
+        features_elsewhere(photographs, options, cache / "features", at, _counted(progress, FEATURES, len(photographs)))
     found = []
     for number, path in enumerate(photographs.paths, 1):
         found.append(features_of(path, options, cache / "features"))
-        progress("features of photographs", number, len(photographs))
+        if at is None:
+            progress(FEATURES, number, len(photographs))
     return found
 
 
@@ -163,12 +181,18 @@ def _tracks(
     options: Options,
     cache: Path,
     progress: Progress,
+    at: Workplace | None,
 ) -> tuple[Tracks, tuple[int, int]]:
     pairs = neighbours(places, options.matches.neighbours)
+    if at is not None:
+        matches_elsewhere(
+            photographs, pairs, (options.features, options.matches), (cache / "features", cache / "matches"), at,
+            _counted(progress, PAIRS, len(pairs)),
+        )  # fmt: skip
     cameras = [photographs.cameras[c] for c in photographs.camera]
     matched = match_all(
         features, cameras, photographs.names, pairs, options.matches, cache / "matches",
-        lambda done, count: progress("matching pairs", done, count),
+        lambda done, count: progress(PAIRS, done, count) if at is None else None,
     )  # fmt: skip
     if not matched:
         raise InputError(
@@ -177,6 +201,10 @@ def _tracks(
         )
     tracks = join_matches(matched, np.array([len(f) for f in features]))
     return tracks, (len(pairs), len(matched))
+
+
+def _counted(progress: Progress, stage: str, count: int) -> Callable[[float], None]:
+    return lambda share: progress(stage, round(share * count), count)
 
 
 def _xy(tracks: Tracks, features: list[Features]) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from threading import Lock
+from typing import Any
 
 import numpy as np
 
@@ -45,6 +46,10 @@ class GroundSurface:
     low: np.ndarray
     high: np.ndarray
     lock: Lock
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Another process has a lock of its own."""
+        return _unlocked, (self.reader, self.low, self.high)
 
     @property
     def grid(self) -> Grid:
@@ -89,6 +94,10 @@ class GroundSurface:
         far = min(float(away[hiding].max(initial=0.0)) + SCAN, (float(self.high.max()) - lowest) * tangent / cell)
         free = (np.sqrt(MOST_AROUND) - max(rows, columns)) / 2.0
         return max(int(min(far, free)), 0) + 2
+
+
+def _unlocked(reader: RasterReader | BridgedReader, low: np.ndarray, high: np.ndarray) -> GroundSurface:
+    return GroundSurface(reader, low, high, Lock())
 
 
 def ground_surface(reader: RasterReader | BridgedReader) -> GroundSurface:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.execution.work import Executor
 from aerotri.memory import refuse_beyond_memory
 from aerotri.rasters.bridging import BridgedReader
 from aerotri.rasters.grids import Grid, RasterReader, RasterWriter, cache_limited, horizontal_crs
@@ -30,6 +31,7 @@ from aerotri.terrain.ortho.pixels import PixelStore
 from aerotri.terrain.ortho.seams import Choice, choose
 from aerotri.terrain.ortho.settings import OrthoSettings
 from aerotri.terrain.ortho.tile_files import OrthoTiles
+from aerotri.terrain.ortho.tile_work import OrthoWork, Place, do_tiles, kept_tile
 from aerotri.terrain.ortho.tiles import Sources, Tile, make_tile
 from aerotri.terrain.photographs import Photographs, photographs_of
 from aerotri.terrain.pickets import footprint
@@ -81,6 +83,7 @@ def make_orthophoto(
     folder: Path,
     report: Report,
     tiles: Path | None = None,
+    executor: Executor | None = None,
 ) -> OrthoOutcome:
     """Make an orthophoto and write its rasters.
 
@@ -88,11 +91,13 @@ def make_orthophoto(
     ----------
     chosen : photographs of the block, and their files. surface : its heights, and their σ where it has them; in
         metres and in the CRS of the block. folder : to write to. tiles : where tiles are kept, those that are there are
-        taken up; None: not.
+        taken up; None: not. executor : other processes that make the tiles, kept in `tiles`; None: threads.
 
     Raises
     ------
     InputError
+    TasksFailedError
+        When an executor could not make tiles.
     """
     photographs = photographs_of(calibration, *chosen, settings.ideal)
     cameras = calibration.local.block.cameras
@@ -116,7 +121,7 @@ def make_orthophoto(
         )  # fmt: skip
         crs = horizontal_crs(calibration.result.block.crs)
         kept = None if tiles is None else OrthoTiles(tiles)
-        cells, counts = _written(sources, grid, folder, crs, kept, report)
+        cells, counts = _written(sources, grid, folder, crs, kept, report, executor)
     with RasterWriter(folder / SIGMAS, candidates.grid, crs=crs, options=COMPRESSED) as writer:
         writer.describe("σ of X and Y, m")
         writer.write(0, 0, accuracy.total.astype(np.float32))
@@ -181,30 +186,36 @@ def _candidates(
 
 
 def _written(
-    sources: Sources, grid: Grid, folder: Path, crs: str | None, kept: OrthoTiles | None, report: Report
+    sources: Sources,
+    grid: Grid,
+    folder: Path,
+    crs: str | None,
+    kept: OrthoTiles | None,
+    report: Report,
+    executor: Executor | None,
 ) -> tuple[np.ndarray, tuple[int, int, int, int]]:
     """Write all tiles; cells of every photograph; cells with heights, hidden ones, those over bridged holes, and tiles
     that an earlier run had made."""
     cells, heights, hidden, bridges, resumed = np.zeros(len(sources.photographs), np.int64), 0, 0, 0, 0
     bands = (*(f"band {b + 1}" for b in range(sources.pixels.bands)), "mask")
 
-    def one(place: tuple[int, int, Grid]) -> tuple[bool, Tile | None]:
-        row, column, own = place
+    def one(place: Place) -> tuple[bool, Tile | None]:
         if kept is None:
-            return False, make_tile(sources, row, column, own)
-        was_there, tile = kept.read(row, column, (own.rows, own.columns))
-        if not was_there:
-            tile = make_tile(sources, row, column, own)
-            kept.write(row, column, tile)
-        return was_there, tile
+            return False, make_tile(sources, *place)
+        return kept_tile(OrthoWork(sources, kept), place)
 
+    places, begin, before = list(tiles_of(grid, TILE)), 0.0, 0
+    if executor is not None and kept is not None:
+        begin = 0.8
+        before = do_tiles(OrthoWork(sources, kept), places, executor, lambda done: report("cells", begin * done))
     layers = (PHOTOGRAPH_BAND, *([BRIDGED_BAND] if isinstance(sources.surface.reader, BridgedReader) else []))
     with (
         write_mosaic(folder / IMAGE, grid, bands, sources.pixels.dtype.name, crs, True) as image,
         write_mosaic(folder / NUMBERS, grid, layers, "int32", crs, False) as numbers,
     ):
-        places = list(tiles_of(grid, TILE))
-        for was_there, tile in results_in_threads(one, places, lambda done: report("cells", 0.95 * done)):
+        for was_there, tile in results_in_threads(
+            one, places, lambda done: report("cells", begin + (0.95 - begin) * done)
+        ):
             resumed += was_there
             if tile is None:
                 continue
@@ -214,7 +225,7 @@ def _written(
             heights, hidden = heights + tile.heights, hidden + tile.hidden
             bridges += 0 if tile.bridged is None else int((tile.bridged & (tile.number >= 0)).sum())
         report("overviews", 0.95)
-    return cells, (heights, hidden, bridges, resumed)
+    return cells, (heights, hidden, bridges, before if begin else resumed)
 
 
 def _numbers_of(tile: Tile) -> np.ndarray:

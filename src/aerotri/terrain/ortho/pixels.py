@@ -6,6 +6,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 import numpy as np
 
@@ -38,12 +39,30 @@ class PixelStore:
 
     def __init__(self, paths: Sequence[Path], sizes: Sequence[tuple[int, int]]):
         self._paths, self._sizes = paths, sizes
-        self._kept: OrderedDict[int, np.ndarray] = OrderedDict()
-        self._lock, self._bytes = Lock(), 0
-        self._locks = [Lock() for _ in paths]
+        self._keep_none()
         self.bands, self.dtype, self._white = self._kind()
         pixels = sum(columns * rows for columns, rows in sizes)
         self._all_fit = pixels * self.bands * self.dtype.itemsize <= CACHE_BYTES
+
+    def _keep_none(self) -> None:
+        self._kept: OrderedDict[int, np.ndarray] = OrderedDict()
+        self._lock, self._bytes = Lock(), 0
+        self._locks = [Lock() for _ in self._paths]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Another process reads the photographs itself; of which kind they are it is told."""
+        own = ("_sizes", "bands", "dtype", "_white", "_all_fit")
+        return {name: self.__dict__[name] for name in own} | {"_paths": [path.absolute() for path in self._paths]}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._keep_none()
+
+    @property
+    def most_bytes(self) -> int:
+        """Bytes of photographs that are kept at most."""
+        pixels = sum(columns * rows for columns, rows in self._sizes)
+        return min(CACHE_BYTES + LARGEST_HELD, pixels * self.bands * self.dtype.itemsize)
 
     def _kind(self) -> tuple[int, np.dtype, float]:
         first: tuple[int, np.dtype] | None = None

@@ -1,0 +1,93 @@
+"""A cache of compiled kernels in which processes that run beside one another compile every kernel once.
+
+Numba's own cache lets each of them compile for itself whatever is not there yet. Here the first one holds a lock while
+it compiles, and the others wait and read what it wrote. The lock is one of the operating system: it ends with the
+process that holds it, however that ends.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import FunctionCache
+
+PATIENCE_S = 60.0
+"""For another process to compile a kernel, before it is compiled here; chosen [C]: ten times what the longest takes."""
+LOOK_S = 0.02
+"""Between two looks whether the lock is free."""
+
+
+class SharedCache(FunctionCache):
+    """Numba's cache on disk for one function; numba calls it under its own lock, for one thread at a time."""
+
+    def __init__(self, function: Any):
+        super().__init__(function)
+        self._lock: int | None = None
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What is compiled for the types; None where this process is to compile it, and holds the lock for it."""
+        found = super().load_overload(sig, target_context)
+        if found is not None or self._lock is not None:
+            return found
+        self._lock = _locked(self._lock_path())
+        # another process may have written it before it let go
+        found = super().load_overload(sig, target_context)
+        if found is not None:
+            self._let_go()
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled, and let others go on."""
+        try:
+            super().save_overload(sig, data)
+        finally:
+            self._let_go()
+
+    def _lock_path(self) -> Path:
+        return Path(self._cache_path) / f"{self._impl.filename_base}.lock"
+
+    def _let_go(self) -> None:
+        lock, self._lock = self._lock, None
+        if lock is not None:
+            # closing it is what lets others in
+            with suppress(OSError):
+                os.close(lock)
+
+
+def _locked(path: Path) -> int | None:
+    """The file, locked for this process; None where that cannot be, or another process holds it for too long."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError:
+        return None
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        try:
+            _lock_now(file)
+            return file
+        except BlockingIOError:
+            time.sleep(LOOK_S)
+        except OSError:
+            break
+    os.close(file)
+    return None
+
+
+def _lock_now(file: int) -> None:
+    """Lock the file, or raise BlockingIOError where another process holds it."""
+    if os.name == "nt":
+        import msvcrt
+
+        try:
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)  # pyright: ignore[reportAttributeAccessIssue]
+        except PermissionError as error:
+            raise BlockingIOError from error
+    else:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,0 +1,88 @@
+"""Kernels are compiled once by several processes, and a process that is gone stops nobody."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from aerotri import kernel_cache
+
+KERNELS = """
+from aerotri.compiled import kernel
+
+@kernel
+def twice(x):
+    return 2.0 * x
+"""
+CALL = "import here; print('begins', flush=True); print(here.twice(4.0), sum(here.twice.stats.cache_misses.values()))"
+HOLD = "import sys, time; from pathlib import Path; from aerotri.kernel_cache import _locked; " \
+       "print(_locked(Path(sys.argv[1])) is not None, flush=True); time.sleep(600)"  # fmt: skip
+
+
+@pytest.fixture
+def environment(tmp_path, monkeypatch):
+    """A module with a kernel, and an empty folder for what is compiled."""
+    (tmp_path / "here.py").write_text(KERNELS)
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    return {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept"), "PYTHONPATH": path}
+
+
+def begun(environment, *line) -> subprocess.Popen:
+    """A process of Python that has printed its first line."""
+    process = subprocess.Popen([sys.executable, "-c", *line], env=environment, stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline().strip() in ("begins", "True")
+    return process
+
+
+def lock_of(environment, tmp_path):
+    """The lock of the kernel, after a first call; what that call compiled is taken away again."""
+    assert begun(environment, CALL).communicate(timeout=120)[0].split() == ["8.0", "1"]
+    (lock,) = (tmp_path / "kept").rglob("*.lock")
+    for file in lock.parent.glob("here.twice*.nb*"):
+        file.unlink()
+    return lock
+
+
+def test_the_second_process_waits_and_reads(environment, tmp_path):
+    """It neither compiles beside the first one nor goes on before it."""
+    holder = begun(environment, HOLD, str(lock_of(environment, tmp_path)))
+    both = [begun(environment, CALL) for _ in range(2)]
+    time.sleep(1.0)
+    assert [one.poll() for one in both] == [None, None]
+    holder.kill()
+    holder.wait()
+    said = sorted(one.communicate(timeout=120)[0].split() for one in both)
+    assert said == [["8.0", "0"], ["8.0", "1"]]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such signal")
+def test_the_lock_of_a_killed_process_is_free(environment, tmp_path):
+    lock = lock_of(environment, tmp_path)
+    holder = begun(environment, HOLD, str(lock))
+    holder.send_signal(signal.SIGKILL)
+    holder.wait()
+    started = time.monotonic()
+    assert begun(environment, CALL).communicate(timeout=120)[0].split() == ["8.0", "1"]
+    assert time.monotonic() - started < kernel_cache.PATIENCE_S
+
+
+def test_patience_ends(tmp_path, monkeypatch):
+    """A process that holds the lock and does nothing does not stop others for good."""
+    monkeypatch.setattr(kernel_cache, "PATIENCE_S", 0.2)
+    held = kernel_cache._locked(tmp_path / "a.lock")
+    assert held is not None
+    assert kernel_cache._locked(tmp_path / "a.lock") is None
+    os.close(held)
+    again = kernel_cache._locked(tmp_path / "a.lock")
+    assert again is not None
+    os.close(again)
+
+
+def test_a_folder_that_cannot_be_written_stops_nothing(tmp_path):
+    (tmp_path / "file").touch()
+    assert kernel_cache._locked(tmp_path / "file" / "a.lock") is None
