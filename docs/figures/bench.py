@@ -41,6 +41,10 @@ def photographed(address: str, picture: Path) -> None:
         page.wait_for_selector("body[data-equations=ready]", timeout=120_000)
         page.click("#rays tbody tr:first-child")
         page.click("#tab-point")
+        # the ground of the simulated photographs is dark
+        page.evaluate("Object.assign(bench.photo, {brightness: 2.5, contrast: 1.3})")
+        page.evaluate("bench.photo.bar(); bench.photo.surface.redraw()")
+        page.evaluate("bench.showTab()")
         page.wait_for_timeout(3000)
         page.screenshot(path=str(picture))
         browser.close()

@@ -59,6 +59,15 @@ def test_row_torn_by_a_kill_is_taken_off_and_the_others_stay(tmp_path, cut):
     assert [one.point for one in Decisions(tmp_path).rows][-1] == "p3"
 
 
+def test_two_pages_on_one_block_see_each_other(tmp_path):
+    first, second = Decisions(tmp_path), Decisions(tmp_path)
+    first.add(Decision(MARK, "a", "p1", (1.0, 1.0)))
+    second.add(Decision(MARK, "a", "p2", (1.0, 1.0)))
+    assert first.undo().point == "p2"
+    assert second.undo().point == "p1"
+    assert [one.action for one in Decisions(tmp_path).rows] == [MARK, MARK, UNDO, UNDO]
+
+
 def test_table_of_a_person_becomes_a_journal_and_keeps_what_it_says(tmp_path):
     (tmp_path / NAME).write_text("# my notes\nimage,point,action,reason\na,p2,off,blurred\n,p1,check,\n")
     decisions = Decisions(tmp_path)

@@ -70,6 +70,7 @@ class Decisions:
         if self._path.with_suffix(".parquet").exists():
             raise InputError("cannot be added to", f"write it as {NAME}", self._path.with_suffix(".parquet"))
         self._rows = _read(self._path)
+        self._size = _size(self._path)
 
     @property
     def rows(self) -> tuple[Decision, ...]:
@@ -109,6 +110,9 @@ class Decisions:
         InputError
             When it cannot be written, or there is nothing to take back.
         """
+        if _size(self._path) != self._size:
+            # somebody else has added to it: another page, or a person with an editor
+            self._rows = _read(self._path)
         if decision.action not in ACTIONS:
             raise InputError(f"'{decision.action[:30]}' is no action", f"known are {', '.join(ACTIONS)}")
         if decision.action == UNDO and not self.standing():
@@ -123,13 +127,14 @@ class Decisions:
                 f"cannot be written: {error.strerror}", "check permissions and space", self._path
             ) from None
         self._rows.append(row)
+        self._size = _size(self._path)
         return row
 
     def undo(self) -> Decision:
         """Take back the last row that stands; gives that row."""
-        standing = self.standing()
         self.add(Decision(UNDO))
-        return standing[-1]
+        taken = standing_rows([one.action for one in self._rows[:-1]]) or []
+        return self._rows[taken[-1]]
 
 
 def _read(path: Path) -> list[Decision]:
@@ -185,6 +190,10 @@ def _append(path: Path, row: Decision) -> None:
         with contextlib.suppress(OSError):
             os.truncate(path, before)
         raise
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size if path.is_file() else 0
 
 
 def _header(path: Path) -> tuple[str, ...]:

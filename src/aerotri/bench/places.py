@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from aerotri.bench.records import RECORD
 from aerotri.conventions import InputError
 from aerotri.formats.files.atomic import atomic_folder
 
+RUN = "run.json"
 BLOCK, RESULT, OF_BENCH, OF_RESULT = "block", "result_", "_bench", "_result"
 REMEDY = "give the folder of a block, or the folder that `aerotri adjust` wrote"
 
@@ -76,6 +78,21 @@ def places_of(path: Path) -> Places:
         beside = folder.with_name(folder.name + OF_RESULT)
         return Places(folder, _last(bench) or (beside if (beside / RECORD).is_file() else None), bench)
     raise InputError("holds neither a result nor a block", REMEDY, path)
+
+
+def photographs_beside(path: Path) -> Path | None:
+    """The photographs of the project of `aerotri run` that a block or a result belongs to; None where it has none."""
+    record = path.resolve().parent / RUN
+    if not record.is_file():
+        return None
+    try:
+        content = json.loads(record.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError, OSError):
+        return None
+    source = content.get("source") if isinstance(content, dict) else None
+    if not isinstance(source, str) or not Path(source).is_dir() or (Path(source) / "block.toml").is_file():
+        return None
+    return Path(source)
 
 
 def _results(bench: Path) -> list[Path]:

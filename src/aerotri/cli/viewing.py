@@ -21,8 +21,11 @@ def view(
     ],
     photos: Annotated[
         Path | None,
-        typer.Option(help="Folder of the photographs. Without it marks are shown on an empty format.",
-                     rich_help_panel=INPUT),
+        typer.Option(
+            help="Folder of the photographs. Those of `aerotri run` are found by themselves. Without any, marks are "
+            "shown on an empty format.",
+            rich_help_panel=INPUT,
+        ),
     ] = None,
     below: Annotated[
         list[Path] | None,
@@ -41,7 +44,7 @@ def view(
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.", rich_help_panel=OUTPUT)
     ] = True,
-) -> None:  # fmt: skip
+) -> None:
     """The bench: plan, photographs and rays of a result in the browser; marks moved, rays switched, adjusted again."""
     from aerotri.commands.view import run_view
 

@@ -20,15 +20,18 @@ def run_view(path: Path, photographs: Path | None, below: tuple[Path, ...], port
     """
     for name in ("starlette", "uvicorn"):
         optional_module(name, EXTRA)
-    from aerotri.bench.places import places_of
+    from aerotri.bench.places import photographs_beside, places_of
     from aerotri.bench.serve import serve
     from aerotri.bench.session import Bench
 
     console = Console()
-    bench = Bench(places_of(path), photographs, below)
+    bench = Bench(places_of(path), photographs or photographs_beside(path), below)
 
     def tell(address: str) -> None:
         shown = "the block alone" if bench.result is None else str(bench.result)
         console.lines([f"Bench of {shown}: {address}", "Ctrl-C ends it; everything is saved at once."])
 
-    serve(bench, port, browser, tell)
+    try:
+        serve(bench, port, browser, tell)
+    finally:
+        bench.stop()

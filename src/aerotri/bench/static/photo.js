@@ -13,7 +13,7 @@ const NEAR_PX = 9, CLOSE = 2;
 export class Photo {
   constructor(bench) {
     this.bench = bench;
-    this.times = 30;
+    this.times = 10;
     this.brightness = 1;
     this.contrast = 1;
     this.show = { marks: true, residuals: true, predicted: true, names: false, epipolar: true, snap: true };
@@ -143,15 +143,12 @@ export class Photo {
     rays.px.forEach((px, k) => {
       const [x, y] = s.screen(...px), colour = rays.status[k] === "used" ? colourOfW(rays.size[k]) : "#b0b0b0", v = rays.v[k];
       if (x < -20 || y < -20 || x > s.width + 20 || y > s.height + 20 || hidden.has(rays.point[k])) return;
-      if (this.show.residuals && v[0] !== null) line(pen, [[x, y], [x + v[0] * this.times * this.perPixel(), y + v[1] * this.times * this.perPixel()]], colour, 1.2);
+      if (this.show.residuals && v[0] !== null) line(pen, [[x, y], s.screen(px[0] + v[0] * this.times, px[1] + v[1] * this.times)], colour, 1.2);
       cross(pen, x, y, 6, colour);
       if (this.show.predicted && v[0] !== null && s.scale > 4) ring(pen, ...s.screen(px[0] + v[0], px[1] + v[1]), 4, PREDICTED, 1);
       if (this.show.names) label(pen, this.bench.names.points[rays.point[k]], x + 8, y - 6, colour);
     });
   }
-
-  // Screen pixels that a residual of one pixel is drawn as, before times k: as the photograph when it is large.
-  perPixel() { return Math.max(this.surface.scale, 0.12) / Math.max(1, this.surface.scale * 4); }
 
   drawChanges(pen) {
     for (const one of this.changes()) {
