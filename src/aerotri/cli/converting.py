@@ -34,6 +34,7 @@ from aerotri.cli.options import (
     PhotographPositions,
     PixelSize,
     PositionsSigma,
+    ProjectOf,
     Seed,
     StatedFocalLength,
     StatedPixelSize,
@@ -252,6 +253,7 @@ def tiepoints(
         ),
     ] = DEFAULTS.neighbours,
     seed: Seed = DEFAULTS.seed,
+    project: ProjectOf = None,
     overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:
@@ -279,6 +281,7 @@ def tiepoints(
         feature_size_px=feature_size,
         neighbours=neighbours,
         seed=seed,
+        project=project,
     )
     run_tiepoints(photographs, out, options, json_, overwrite)
 

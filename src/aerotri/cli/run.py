@@ -24,6 +24,7 @@ from aerotri.cli.options import (
     MarkedControl,
     PhotographPositions,
     PixelSize,
+    ProjectOf,
     Seed,
     SurfaceLayer,
     SystemOfPhotographs,
@@ -87,6 +88,7 @@ def run(
         bool,
         typer.Option("--go-on", help="Go on after an adjustment that was rejected.", rich_help_panel=METHOD),
     ] = False,
+    project: ProjectOf = None,
     json_: Json = False,
 ) -> None:
     """Everything: photographs to tie points, adjustment, terrain, volume and orthophoto, with one report."""
@@ -101,6 +103,6 @@ def run(
         "geoid": geoid, "seed": seed, "parameters": parameters,
         "interval": metres_or_auto(interval) if interval else None,
         "boundary": boundary, "base": base, "layer": layer, "dense": dense, "plots": plots, "go_on": go_on,
-        "executor": executor,
+        "executor": executor, "project": project,
     }  # fmt: skip
     raise typer.Exit(run_all(source, out, settings, json_))

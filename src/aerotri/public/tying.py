@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ from aerotri.conventions import FilePath
 from aerotri.public.blocks import Sigmas, text_of_path
 from aerotri.public.folders import refuse_foreign_entries, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.public.projects import project_of
 from aerotri.tie_points.settings import DEFAULTS, TiePointSettings
 
 if TYPE_CHECKING:
@@ -155,6 +156,7 @@ def tie_points(
     feature_size: int = DEFAULTS.feature_size,
     neighbours: int = DEFAULTS.neighbours,
     seed: int = DEFAULTS.seed,
+    project: FilePath | None = None,
     cache: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> TiedPhotographs:
@@ -184,6 +186,7 @@ def tie_points(
     feature_size : features are sought in photographs of this size, pixels.
     neighbours : photographs that each is compared with, the nearest.
     seed : the same seed gives the same block.
+    project : block, result of an adjustment, or TOML file with a table [project], which the block then has.
     cache : folder to keep features and matches in for another time; a temporary one where None.
     progress : see `aerotri.adjust`.
 
@@ -220,9 +223,13 @@ def tie_points(
     spec = CameraSpec(camera, "", None, pixel_um, focal_length_mm, None, free_interior)
     found = FeatureOptions(features, feature_size)
     options = Options(found, MatchOptions(neighbours=neighbours, seed=seed), points)
+    whose = None if project is None else project_of(project)
     with stage_report(progress) as report, ExitStack() as stack:
         keep = Path(stack.enter_context(tempfile.TemporaryDirectory()) if cache is None else cache)
-        return _tied(Path(photographs), files, spec, mark_sigma_px, options, keep, report, begun)
+        tied = _tied(Path(photographs), files, spec, mark_sigma_px, options, keep, report, begun)
+    if whose is None:
+        return tied
+    return replace(tied, record=replace(tied.record, block=replace(tied.record.block, project=whose)))
 
 
 def _tied(
