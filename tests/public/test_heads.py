@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -138,3 +138,46 @@ def test_time_is_written_and_read_again():
 def test_system_of_heights():
     content = Head(crs="EPSG:25832+7837").as_dict()
     assert (content["crs_name"], content["height_system"]) == ("ETRS89 / UTM zone 32N", "DHHN2016 height")
+
+
+def test_a_file_with_a_project_alone(tmp_path):
+    """For runs of photographs, which have no block.toml yet."""
+    (tmp_path / "logo.png").write_bytes(picture())
+    file = tmp_path / "project.toml"
+    file.write_text('[project]\ntitle = "Quarry"\nlogo = "logo.png"\n', encoding="utf-8")
+    found = project_of(file)
+    assert (found.title, found.logo_content) == ("Quarry", picture())
+    file.write_text('[project]\ntitel = "Quarry"\n', encoding="utf-8")
+    with pytest.raises(InputError, match=r"unknown key 'project.titel'.*did you mean 'title'"):
+        project_of(file)
+    file.write_text('[project]\nlogo = "other.png"\n', encoding="utf-8")
+    with pytest.raises(InputError, match="is missing") as told:
+        project_of(file)
+    assert told.value.line == 2
+    (tmp_path / "block").mkdir()
+    (tmp_path / "block" / "block.toml").write_text("")
+    with pytest.raises(InputError, match="--project: for photographs only"):
+        aerotri.run(tmp_path / "block", tmp_path / "out", project=file)
+
+
+def test_photographs_get_a_project(tmp_path, monkeypatch):
+    """The block that is written has it, with the picture; all later steps take it from there."""
+    from types import SimpleNamespace
+
+    from aerotri.formats.block.folder import read_block, write_block
+    from aerotri.public import tying
+
+    block, _ = small_block(5, "none")
+
+    @dataclass(frozen=True)
+    class Tied:
+        block: object
+
+    record = tying.TiedPhotographs(Tied(block), SimpleNamespace(), SimpleNamespace(), 0.0)
+    monkeypatch.setattr(tying, "_tied", lambda *given: record)
+    (tmp_path / "logo.png").write_bytes(picture())
+    (tmp_path / "p.toml").write_text('[project]\ntitle = "Quarry"\nlogo = "logo.png"\n', encoding="utf-8")
+    assert aerotri.tie_points(tmp_path).block.project == Project()
+    found = aerotri.tie_points(tmp_path, project=tmp_path / "p.toml")
+    write_block(found.block, tmp_path / "block")
+    assert read_block(tmp_path / "block").project == Project("Quarry", logo="logo.png", logo_content=picture())

@@ -34,6 +34,7 @@ from aerotri.cli.options import (
     PhotographPositions,
     PixelSize,
     PositionsSigma,
+    ProjectOf,
     Seed,
     StatedFocalLength,
     StatedPixelSize,
@@ -254,6 +255,7 @@ def tiepoints(
         ),
     ] = DEFAULTS.neighbours,
     seed: Seed = DEFAULTS.seed,
+    project: ProjectOf = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     executor: Workers = THREADS,
@@ -283,6 +285,7 @@ def tiepoints(
         neighbours=neighbours,
         seed=seed,
         executor=executor,
+        project=project,
     )
     run_tiepoints(photographs, out, options, json_, overwrite)
 

@@ -146,7 +146,7 @@ ProjectOf = Annotated[
     Path | None,
     typer.Option(
         "--project",
-        help="Block or result whose [project] stands at the head of page and files. Default: that of what is given.",
+        help="Block, result or TOML file whose [project] stands at the head of pages. Default: that of what is given.",
         rich_help_panel=OUTPUT,
     ),
 ]

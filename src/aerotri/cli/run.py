@@ -25,6 +25,7 @@ from aerotri.cli.options import (
     MarkedControl,
     PhotographPositions,
     PixelSize,
+    ProjectOf,
     Seed,
     SurfaceLayer,
     SystemOfPhotographs,
@@ -96,6 +97,7 @@ def run(
             rich_help_panel=CONTROL,
         ),
     ] = "",
+    project: ProjectOf = None,
     json_: Json = False,
 ) -> None:
     """Everything: photographs to tie points, adjustment, terrain, volume and orthophoto, with one report."""
@@ -111,6 +113,6 @@ def run(
         "interval": metres_or_auto(interval) if interval else None,
         "boundary": boundary, "base": base, "layer": layer, "dense": dense, "plots": plots, "go_on": go_on,
         "unmarked": stop_or_continue(unmarked),
-        "executor": executor,
+        "executor": executor, "project": project,
     }  # fmt: skip
     raise typer.Exit(run_all(source, out, settings, json_))

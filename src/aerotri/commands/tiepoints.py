@@ -32,6 +32,7 @@ class TiePointOptions:
     neighbours: int = DEFAULTS.neighbours
     seed: int = DEFAULTS.seed
     executor: str = THREADS
+    project: Path | None = None
 
 
 def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bool, overwrite: bool = False) -> None:
@@ -57,7 +58,7 @@ def run_tiepoints(folder: Path, out: Path, options: TiePointOptions, as_json: bo
             mark_sigma_px=o.mark_sigma_px, positions_sigma_m=stated.positions_sigma_m,
             orientation_sigma_m=stated.orientation_sigma_m, orientation_sigma_deg=stated.orientation_sigma_deg,
             points=o.points, features=o.features, feature_size=o.feature_size_px, neighbours=o.neighbours, seed=o.seed,
-            cache=out / CACHE, executor=o.executor, progress=console.stage,
+            project=o.project, cache=out / CACHE, executor=o.executor, progress=console.stage,
         )  # fmt: skip
         tied.save(out, overwrite=overwrite, progress=console.stage)
     content = tied.summary(out)

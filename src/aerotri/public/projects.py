@@ -23,7 +23,8 @@ def project_of(named: FilePath | None, *sources: object) -> Project:
 
     Parameters
     ----------
-    named : block folder, block.toml or result of an adjustment; None: looked for.
+    named : block folder, block.toml, a TOML file with the table [project] alone, or result of an adjustment; None:
+        looked for.
     sources : what the result was computed from, the nearest first: a result, its folder or a file in it, a block;
         others say nothing.
 
@@ -113,7 +114,10 @@ def _read(path: Path) -> dict[str, Any]:
 
 def _of_toml(toml: Path) -> Project:
     from aerotri.formats.block.logo import with_logo
-    from aerotri.formats.block.settings import read_block_toml
+    from aerotri.formats.block.settings import read_block_toml, read_project_toml
 
+    alone = read_project_toml(toml)
+    if alone is not None:
+        return with_logo(alone.project, alone)
     settings = read_block_toml(toml)
     return with_logo(settings.model.project.project(), settings)

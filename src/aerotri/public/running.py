@@ -162,6 +162,7 @@ def run(
     unmarked: Unmarked = "continue",
     further: Mapping[Verb, Mapping[str, Any]] | None = None,
     executor: str = THREADS,
+    project: FilePath | None = None,
     on_step: OnStep | None = None,
     progress: ProgressLike = None,
 ) -> Project:
@@ -197,6 +198,7 @@ def run(
     further : more settings of a step by the name of its verb, {'terrain': {'window': 21}}.
     executor : where tie points, terrain, dense surface and orthophoto are made: 'threads', 'processes:N',
         'dask:ADDRESS' or 'dask:local:N'.
+        project : of photographs: block, result or TOML file whose [project] stands at the head of all pages.
     on_step : takes each step when it begins, with None, and when it ended, with what it gave or why it failed.
     progress : see `aerotri.adjust`.
 
@@ -226,7 +228,8 @@ def run(
         "tie_points": {
             "control": control, "control_sigma_m": control_sigma_m, "control_prefix": control_prefix if marked else "",
             "positions": positions, "camera": camera, "focal_length_mm": focal_length_mm, "pixel_um": pixel_um,
-            "crs": crs, "geoid": geoid, "seed": seed, "executor": elsewhere, **({} if from_block else names),
+            "crs": crs, "geoid": geoid, "seed": seed, "executor": elsewhere, "project": project,
+            **({} if from_block else names),
         },
         "adjust": {
             "parameters": parameters or (None if from_block else "auto"), "geoid": geoid,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from aerotri.execution.choice import THREADS
 from aerotri.public.blocks import Sigmas, text_of_path
 from aerotri.public.folders import refuse_foreign_entries, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
+from aerotri.public.projects import project_of
 from aerotri.public.workplaces import workplace
 from aerotri.tie_points.settings import DEFAULTS, TiePointSettings
 
@@ -165,6 +166,7 @@ def tie_points(
     feature_size: int = DEFAULTS.feature_size,
     neighbours: int = DEFAULTS.neighbours,
     seed: int = DEFAULTS.seed,
+    project: FilePath | None = None,
     cache: FilePath | None = None,
     executor: str = THREADS,
     progress: ProgressLike = None,
@@ -195,6 +197,7 @@ def tie_points(
     feature_size : features are sought in photographs of this size, pixels.
     neighbours : photographs that each is compared with, the nearest.
     seed : the same seed gives the same block.
+    project : block, result of an adjustment, or TOML file with a table [project], which the block then has.
     cache : folder to keep features and matches in for another time; a temporary one where None.
     executor : where features and matches are found: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'. Other
         machines have to see the photographs and `cache` under the same names.
@@ -236,10 +239,14 @@ def tie_points(
     spec = CameraSpec(camera, "", None, pixel_um, focal_length_mm, None, free_interior)
     found = FeatureOptions(features, feature_size)
     options = Options(found, MatchOptions(neighbours=neighbours, seed=seed), points)
+    whose = None if project is None else project_of(project)
     with stage_report(progress) as report, ExitStack() as stack:
         keep = Path(stack.enter_context(tempfile.TemporaryDirectory()) if cache is None else cache)
         at = stack.enter_context(workplace(executor, keep, report.said))
-        return _tied(Path(photographs), files, spec, mark_sigma_px, options, keep, report, begun, at)
+        tied = _tied(Path(photographs), files, spec, mark_sigma_px, options, keep, report, begun, at)
+    if whose is None:
+        return tied
+    return replace(tied, record=replace(tied.record, block=replace(tied.record.block, project=whose)))
 
 
 def _tied(

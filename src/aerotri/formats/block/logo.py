@@ -6,13 +6,10 @@ import io
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from aerotri.conventions import InputError
 from aerotri.observations.project import Project
-
-if TYPE_CHECKING:
-    from aerotri.formats.block.settings import BlockToml
 
 ENDINGS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".svg": "SVG"}
 LARGEST = 5 << 20
@@ -22,7 +19,16 @@ KEY = ("project", "logo")
 REMEDY = "give the name of a PNG, JPEG or SVG file inside the block folder"
 
 
-def with_logo(project: Project, settings: BlockToml) -> Project:
+class SettingsFile(Protocol):
+    """A TOML file that tells at which line a key stands."""
+
+    @property
+    def path(self) -> Path: ...
+
+    def error(self, key: tuple[str, ...], message: str, remedy: str) -> InputError: ...
+
+
+def with_logo(project: Project, settings: SettingsFile) -> Project:
     """The project with the content of its logo.
 
     Parameters

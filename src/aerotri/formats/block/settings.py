@@ -5,13 +5,14 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
 from aerotri.conventions import InputError
-from aerotri.formats.block.settings_model import BlockModel, CameraModel, CamerasModel, PriorModel
+from aerotri.formats.block.settings_model import BlockModel, CameraModel, CamerasModel, PriorModel, ProjectFileModel
 from aerotri.formats.text.csv_text import BLANKS
 from aerotri.formats.text.tables import CONTROL_CHARACTERS, SMALLEST_POSITIVE
 from aerotri.formats.text.toml_text import line_of_key, read_toml
@@ -27,6 +28,7 @@ from aerotri.observations import (
     Rig,
     Settings,
 )
+from aerotri.observations.project import Project
 
 ORIENTATION_ELEMENTS = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
 REASONS = {
@@ -179,6 +181,36 @@ def read_cameras_toml(path: Path) -> tuple[Camera, ...]:
         return InputError(message, remedy, path, line_of_key(text, key))
 
     return _camera_records(model.camera, error_at)
+
+
+@dataclass(frozen=True)
+class ProjectToml:
+    """A TOML file whose only table is [project]. path : of the file. project : what it says. text : its text."""
+
+    path: Path
+    project: Project
+    text: str
+
+    def error(self, key: tuple[str, ...], message: str, remedy: str) -> InputError:
+        """An `InputError` at the line of a key."""
+        return InputError(message, remedy, self.path, line_of_key(self.text, key))
+
+
+def read_project_toml(path: Path) -> ProjectToml | None:
+    """The file, where [project] is all that it has; None for others, such as a block.toml.
+
+    Raises
+    ------
+    InputError
+        As `read_block_toml`.
+    """
+    content, text = read_toml(path)
+    if set(content) != {"project"}:
+        return None
+    try:
+        return ProjectToml(path, ProjectFileModel.model_validate(content).project.project(), text)
+    except (ValidationError, OverflowError) as error:
+        raise _as_input_error(error, path, text) from error
 
 
 def _is_no_name(name: str) -> bool:
