@@ -2,6 +2,7 @@
 
 A run depends on its seed alone, so that the numbers are the same wherever it is computed. A run without a result is
 named, after all the others, and the tool ends with exit code 1: a statistic over the rest would be another one.
+Measures nothing itself: it uses the executors within the package on purpose, so that tools and commands have the same.
 """
 
 from __future__ import annotations
