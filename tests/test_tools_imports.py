@@ -16,6 +16,7 @@ INSIDE = {
     "benchmark/adjusting/factors.py": "times one factorisation of the normal equations beside other libraries",
     "benchmark/adjusting/ours.py": "times assembly, factorisation, iterations and cofactors one by one",
     "benchmark/adjusting/peers.py": "gives other solvers the equations of the independent model",
+    "benchmark/benchmark_first_run.py": "writes down what is compiled while a command runs, and the list of kernels",
     "benchmark/benchmark_imgeo.py": "times the resampling kernel beside cv2.remap",
     "benchmark/benchmark_dense.py": "times semi-global matching alone on the same epipolar images",
     "benchmark/benchmark_memory.py": "runs the commands within processes whose memory is read",
@@ -34,6 +35,7 @@ INSIDE = {
     "prove/moving/cases.py": "the strips of a track, as an adjustment finds them",
     "prove/moving/flights.py": "the strips of a track, as an adjustment finds them",
     "prove/metamorphic_photographs.py": "the first orientation in orders that no file gives",
+    "prove/runs_elsewhere.py": "hands runs to the executors of the program",
     "prove/starts.py": "times the start without the adjustment that follows",
     "prove/volume_drawn_boundary.py": "volumes and σ of pickets at stated places, for outlines that move with them",
     "prove/volume_epochs.py": "the adjustment's part of σ alone, of pickets at stated places",
@@ -43,7 +45,7 @@ INSIDE = {
     "reproduce/reproduce_paper_000.py": "the paper's formulas for two photographs, which no command uses",
 }
 """Files of tools/ that may import modules within the package, and what they measure there."""
-COMMANDS = ("benchmark/benchmark_memory.py", "prove/fuzzing/hostile.py", "prove/kill.py")
+COMMANDS = ("benchmark/benchmark_first_run.py", "benchmark/benchmark_memory.py", "prove/fuzzing/hostile.py", "prove/kill.py")
 """Of these, those that test the commands; the others run them as users do, in a process of their own."""
 
 

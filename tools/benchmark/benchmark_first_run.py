@@ -5,8 +5,9 @@ Example
     python tools/benchmark/benchmark_first_run.py adjust blocks/frederiksstad_ultracam
     python tools/benchmark/benchmark_first_run.py --repeats 3 --out build/first_run adjust blocks/frederiksstad_ultracam
 
-The command runs in a process of its own with an empty folder for compiled kernels, and again with the filled one.
-Seconds are of the processor, of the command and of the processes it starts, beside those of the clock.
+Measures a command in a process of its own with an empty folder for compiled kernels, and again with the filled one:
+seconds of the clock, and of the processor in the command itself. Processes that compile ahead for it are not counted
+(AEROTRI_THREADS=1 starts none). It listens to the compiler within the process on purpose.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Run:
-    """One run of the command: seconds of the clock and of the processor, and what was compiled in its own process.
+    """One run of the command: seconds of the clock, of the processor, and what was compiled, in its own process.
 
     Parameters
     ----------

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -19,6 +20,7 @@ from scipy.ndimage import uniform_filter
 from scipy.stats import chi2
 
 import aerotri
+from runs_elsewhere import add_executor, runs_of
 
 SIDE, SIGMA = 200, 0.03
 AT = np.arange(SIDE) + 0.5
@@ -64,12 +66,18 @@ def of_seed(seed: int, window: int, stated: float) -> tuple[dict[str, float], fl
     return errors, 100.0 * float(np.mean(np.abs(found.record.significance[unchanged]) > 1.96))
 
 
+def one(shared: tuple[int, float], seed: int) -> Any:
+    """`of_seed` for cells that share noise, and a stated σ."""
+    return of_seed(seed, *shared)
+
+
 def main() -> None:
     """Run, print, write where asked."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--first", type=int, default=1, help="seed of the first run")
     parser.add_argument("--out", type=Path)
+    add_executor(parser)
     options = parser.parse_args()
     low, high = np.sqrt(chi2.ppf([0.005, 0.995], options.runs) / options.runs)
     lines = ["# Change of a simulated dump", "",
@@ -77,9 +85,10 @@ def main() -> None:
              "",
              "| cells that share noise | stated σ over true | " + " | ".join(["net volume", *UNKNOWNS])
              + " | unchanged cells beyond the level, % |", "|---" * (len(UNKNOWNS) + 4) + "|"]  # fmt: skip
-    for window, share in ((1, 1.0), (5, 1.0), (5, 0.5), (9, 1.0)):
-        seeds = range(options.first, options.first + options.runs)
-        runs = [of_seed(seed, window, share * SIGMA) for seed in seeds]
+    seeds, cases = range(options.first, options.first + options.runs), ((1, 1.0), (5, 1.0), (5, 0.5), (9, 1.0))
+    with runs_of(options) as computed:
+        found = [computed(one, (window, share * SIGMA), seeds) for window, share in cases]
+    for (window, share), runs in zip(cases, found, strict=True):
         rms = [np.sqrt(np.mean([errors[name] ** 2 for errors, _ in runs])) for name in ("net volume", *UNKNOWNS)]
         beyond = np.mean([part for _, part in runs])
         numbers = " | ".join(f"{value:.2f}" for value in rms)

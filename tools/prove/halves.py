@@ -20,6 +20,7 @@ import numpy as np
 from scipy.stats import binom, kstest
 
 import aerotri
+from runs_elsewhere import Runs, add_executor, runs_of
 
 CONTROL = {"sparse": 6.0, "dense": 1.0}
 """Distance of control points in bases."""
@@ -51,18 +52,19 @@ def with_changing_errors(block: aerotri.Block) -> aerotri.Block:
     return replace(block, image_points=replace(block.image_points, xy=block.image_points.xy + error))
 
 
-def compared(distance: float, seed: int, changing: bool) -> Any:
-    """One block simulated, adjusted and divided: what `aerotri.halves` gives."""
+def compared(shared: tuple[float, bool], seed: int) -> Any:
+    """The comparisons of one block simulated, adjusted and divided, as `aerotri.halves` gives them."""
+    distance, changing = shared
     block = aerotri.simulate(flight(distance), seed=seed).block
     result = aerotri.adjust(with_changing_errors(block) if changing else block, parameters="brown:K1+K2", explain=False)
-    return aerotri.halves(result, DIVISIONS)
+    return aerotri.halves(result, DIVISIONS).record.comparisons
 
 
-def calibration(name: str, distance: float, blocks: int) -> list[str]:
+def calibration(name: str, distance: float, blocks: int, runs: Runs) -> list[str]:
     """Rows of the first table."""
     squares, p = defaultdict(list), defaultdict(lambda: defaultdict(list))
-    for seed in range(1, blocks + 1):
-        for one in compared(distance, seed, False).record.comparisons:
+    for comparisons in runs(compared, (distance, False), range(1, blocks + 1)):
+        for one in comparisons:
             if one.points is None:
                 squares[one.division, "not possible"].append(np.nan)
                 continue
@@ -89,11 +91,11 @@ def calibration(name: str, distance: float, blocks: int) -> list[str]:
     return rows
 
 
-def detection(name: str, distance: float, blocks: int) -> list[str]:
+def detection(name: str, distance: float, blocks: int, runs: Runs) -> list[str]:
     """Rows of the second table."""
     found = defaultdict(list)
-    for seed in range(1, blocks + 1):
-        for one in compared(distance, 10_000 + seed, True).record.comparisons:
+    for comparisons in runs(compared, (distance, True), range(10_001, 10_001 + blocks)):
+        for one in comparisons:
             if not one.reason and not one.same_as:
                 found[one.division].append(one.differs)
     return [f"| {name} | {division} | {sum(own)} of {len(own)} |" for division, own in found.items()]
@@ -102,17 +104,23 @@ def detection(name: str, distance: float, blocks: int) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--blocks", type=int, default=200)
+    add_executor(parser)
     options = parser.parse_args()
-    print(f"# Halves adjusted apart, {options.blocks} simulated blocks of each kind (tools/prove/halves.py)\n")
+    with runs_of(options) as runs:
+        _print_tables(options.blocks, runs)
+
+
+def _print_tables(blocks: int, runs: Runs) -> None:
+    print(f"# Halves adjusted apart, {blocks} simulated blocks of each kind (tools/prove/halves.py)\n")
     print(
         "| control | division | mean square of difference/σ of | number | found | expected |\n|---|---|---|---|---|---|"
     )
     for name, distance in CONTROL.items():
-        print("\n".join(calibration(name, distance, options.blocks)))
+        print("\n".join(calibration(name, distance, blocks, runs)))
     print("\nErrors of 2 µm RMS that change sign from strip to strip, tests at 0.1 %:\n")
     print("| control | division | found |\n|---|---|---|")
     for name, distance in CONTROL.items():
-        print("\n".join(detection(name, distance, max(options.blocks // 10, 1))))
+        print("\n".join(detection(name, distance, max(blocks // 10, 1), runs)))
 
 
 if __name__ == "__main__":

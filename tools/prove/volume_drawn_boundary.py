@@ -27,6 +27,7 @@ from aerotri.volume.boundary import boundary_of
 from aerotri.volume.functionals import tin_volume, triangulated
 from aerotri.volume.pickets import pickets_where_seen
 from aerotri.volume.response import respond
+from runs_elsewhere import add_executor, runs_of
 from volume_proof.simulated import MATCHING_UM, SPEC, adjusted_block, measured_pickets
 
 POOR = SPEC | {"control": {"distance_bases": 5.0, "sigma_m": [0.4, 0.4, 0.4]}}
@@ -68,7 +69,7 @@ def volume_of(xyz: np.ndarray, triangles: np.ndarray, outline, stated: str, draw
     return value, functional.gradient
 
 
-def of_seed(seed: int) -> dict[tuple[str, str], tuple[float, float]]:
+def of_seed(shared: None, seed: int) -> dict[tuple[str, str], tuple[float, float]]:
     """Error and σ by setting and base."""
     calibration, truth = adjusted_block(seed, spec=POOR)
     true = heap()
@@ -103,8 +104,10 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=60)
     parser.add_argument("--first", type=int, default=1, help="seed of the first run")
     parser.add_argument("--out", type=Path)
+    add_executor(parser)
     options = parser.parse_args()
-    runs = [of_seed(seed) for seed in range(options.first, options.first + options.runs)]
+    with runs_of(options) as computed:
+        runs = computed(of_seed, None, range(options.first, options.first + options.runs))
     low, high = np.sqrt(chi2.ppf([0.005, 0.995], len(runs)) / len(runs))
     lines = ["# Boundaries known in space and drawn on the surface", "",
              "| boundary | base | runs | RMS error, m³ | stated σ (RMS), m³ | RMS of error / σ | 99 % band |",

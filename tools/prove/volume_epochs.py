@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from aerotri.volume.parts import Part
 from aerotri.volume.pickets import pickets_where_seen
 from aerotri.volume.response import respond
 from aerotri.volume.settings import SigmaOptions
+from runs_elsewhere import add_executor, runs_of
 from volume_monte_carlo import HEADER, row
 from volume_proof.simulated import MATCHING_UM, PARAMETERS, SPEC, boundary, measured_pickets
 from volume_proof.sites import LEVEL, Site, make_site
@@ -77,8 +79,15 @@ def sigma_of(site: Site, part: Part, below: Part | None = None) -> float:
     return volume_sigma(surface, level(LEVEL), boundary(site), part, below, SigmaOptions()).parts["adjustment"]
 
 
-def one(site: Site, seed: int) -> list[tuple[float, float]]:
+@cache
+def hill() -> Site:
+    """The site of all runs."""
+    return make_site("fractal", 14.0, 120.0, 8.0)
+
+
+def one(shared: None, seed: int) -> list[tuple[float, float]]:
     """Error and σ of the cases, m³."""
+    site = hill()
     rng = np.random.default_rng([seed, 99])
     block, truth = free_of_noise(seed)
     errors = [rng.normal(size=block.control.xyz.shape) * CONTROL_SIGMA_M for _ in range(2)]
@@ -102,10 +111,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--out", type=Path)
+    add_executor(parser)
     options = parser.parse_args()
-    site = make_site("fractal", 14.0, 120.0, 8.0)
-    found = np.array([one(site, seed) for seed in range(1, options.runs + 1)])
-    lines = [f"# σ of a difference of two epochs against its scatter, {site.polygon.area:.0f} m²", "",
+    with runs_of(options) as runs:
+        found = np.array(runs(one, None, range(1, options.runs + 1)))
+    lines = [f"# σ of a difference of two epochs against its scatter, {hill().polygon.area:.0f} m²", "",
              *HEADER.replace("source of error", "volume").split("\n")]  # fmt: skip
     lines += [row(name, *found[:, k].T) for k, name in enumerate(CASES)]
     print("\n".join(lines))

@@ -11,11 +11,13 @@ Example: python tools/prove/volume_monte_carlo.py --runs 200 --out results
 from __future__ import annotations
 
 import argparse
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import chi2
 
+from runs_elsewhere import Runs, add_executor, runs_of
 from volume_proof.simulated import ALL, PARTS, Run, run
 from volume_proof.sites import Site, sites
 
@@ -48,15 +50,28 @@ def rows(name: str, runs: list[Run]) -> list[str]:
     return lines
 
 
-def of_site(name: str, site: Site, seeds: range, wanted: str) -> list[str]:
+def one(shared: tuple[str, frozenset[str]], seed: int) -> Run:
+    """A run of a site by its name, with some sources of error on."""
+    name, on = shared
+    return run(made(name), seed, on)
+
+
+@cache
+def made(name: str) -> Site:
+    """A site by its name."""
+    return sites()[name]()
+
+
+def of_site(name: str, seeds: range, wanted: str, runs: Runs) -> list[str]:
     """The table of a site."""
+    site = made(name)
     sources = [(part, frozenset([part])) for part in PARTS] + [("all together", ALL)]
     if name in ONLY_INTERPOLATION:
         wanted = ALONE
     lines = ["", f"## {name[0].upper()}{name[1:]}, {site.polygon.area:.0f} m²", "", *HEADER.split("\n")]
     print("\n".join(lines), flush=True)
     for source, on in [(source, on) for source, on in sources if wanted in ("", source)]:
-        found = rows(source, [run(site, seed, on) for seed in seeds])
+        found = rows(source, runs(one, (name, on), seeds))
         print("\n".join(found), flush=True)
         lines += found
     return lines
@@ -70,12 +85,14 @@ def main() -> None:
     parser.add_argument("--site", default="", help="only those whose name begins so")
     parser.add_argument("--source", default="", help="only this source of error")
     parser.add_argument("--out", type=Path)
+    add_executor(parser)
     options = parser.parse_args()
     lines = ["# σ of a volume against its scatter"]
     print(lines[0])
-    for name, make in sites().items():
-        if name.startswith(options.site):
-            lines += of_site(name, make(), range(options.first, options.first + options.runs), options.source)
+    seeds = range(options.first, options.first + options.runs)
+    with runs_of(options) as runs:
+        for name in (name for name in sites() if name.startswith(options.site)):
+            lines += of_site(name, seeds, options.source, runs)
     if options.out is not None:
         options.out.mkdir(parents=True, exist_ok=True)
         (options.out / "volume_monte_carlo.md").write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -24,9 +25,10 @@ from aerotri.rasters.grids import Grid
 from aerotri.rasters.held import HeldRaster
 from aerotri.volume.accuracy import base_variance
 from aerotri.volume.bases import parse_base
-from aerotri.volume.boundary import Boundary, boundary_of
+from aerotri.volume.boundary import boundary_of
 from aerotri.volume.compute import compute_volumes
 from aerotri.volume.settings import SectionPlan, SigmaOptions
+from runs_elsewhere import add_executor, runs_of
 
 COUNT, CELL = 192, 1.0
 HALF = COUNT * CELL / 2.0
@@ -73,8 +75,9 @@ GROUNDS = {
 }  # fmt: skip
 
 
-def of_seed(ground: Callable[[np.random.Generator], np.ndarray], boundary: Boundary, seed: int) -> tuple[float, float]:
-    """Error and σ, m³."""
+def of_seed(shared: tuple[str, str], seed: int) -> tuple[float, float]:
+    """Error and σ, m³, of a ground and an outline by their names."""
+    ground, boundary = GROUNDS[shared[0]], boundary_of(OUTLINES[shared[1]], shared[1])
     below = ground(np.random.default_rng([seed, 3]))
     inside = np.asarray(shapely.contains_xy(boundary.polygon.buffer(-4.0), X, Y))
     pile = HIGH * inside
@@ -91,6 +94,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--first", type=int, default=1, help="seed of the first run")
     parser.add_argument("--out", type=Path)
+    add_executor(parser)
     options = parser.parse_args()
     low, high = np.sqrt(chi2.ppf([0.005, 0.995], options.runs) / options.runs)
     lines = ["# σ of a base that is a spline through the boundary", "",
@@ -98,11 +102,10 @@ def main() -> None:
              "", "| ground | boundary | RMS error, m³ | stated σ (RMS), m³ | RMS of error / σ |",
              "|---|---|---|---|---|"]  # fmt: skip
     print("\n".join(lines), flush=True)
-    for name, ground in GROUNDS.items():
-        for shape, outline in OUTLINES.items():
-            seeds = range(options.first, options.first + options.runs)
-            boundary = boundary_of(outline, shape)
-            error, sigma = np.array([of_seed(ground, boundary, seed) for seed in seeds]).T
+    seeds = range(options.first, options.first + options.runs)
+    with runs_of(options) as runs:
+        for name, shape in product(GROUNDS, OUTLINES):
+            error, sigma = np.array(runs(of_seed, (name, shape), seeds)).T
             rms = [float(np.sqrt(np.mean(values**2))) for values in (error, sigma, error / sigma)]
             lines.append(f"| {name} | {shape} | {rms[0]:.0f} | {rms[1]:.0f} | {rms[2]:.2f} |")
             print(lines[-1], flush=True)
