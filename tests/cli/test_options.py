@@ -31,6 +31,7 @@ DIFFERENT = {
     "camera": "a camera by its name too where a flight is planned",
     "ground": "a table of ground points, or the height of level ground",
     "offset": "a file of Pix4D, or the place of a site",
+    "photos": "several for the pictures of a report, one folder on the bench",
 }
 """Options of one name that differ in what they take, and why."""
 
