@@ -193,12 +193,12 @@ def run(
     dense : the dense surface and the orthophoto as well.
     plots : draw the plots of the adjustment.
     go_on : go on after an adjustment that was rejected.
-    unmarked : where control points are marked in no photograph, 'stop' after the tie points, or 'continue' (None). A block of
-        an earlier run in `out` that was marked since is taken up with 'continue'.
+    unmarked : where control points are marked in no photograph, 'stop' after the tie points, or 'continue' (None). A
+        block of an earlier run in `out` that was marked since is taken up with 'continue'.
     further : more settings of a step by the name of its verb, {'terrain': {'window': 21}}.
     executor : where tie points, terrain, dense surface and orthophoto are made: 'threads', 'processes:N',
         'dask:ADDRESS' or 'dask:local:N'.
-        project : of photographs: block, result or TOML file whose [project] stands at the head of all pages.
+    project : of photographs: block, result or TOML file whose [project] stands at the head of all pages.
     on_step : takes each step when it begins, with None, and when it ended, with what it gave or why it failed.
     progress : see `aerotri.adjust`.
 
@@ -250,8 +250,8 @@ def run(
             pass  # a scheduler that does not answer is told now, not after hours
         if unmarked != "stop" and not from_block and (target / BLOCK / EDITS).is_file():
             steps["tie_points"] = replace(steps["tie_points"], status="left out", reason=MARKED_SINCE)
-        project = Project(target, place)
-        return _Chain(project, steps, settings, go_on, on_step, report, unmarked == "stop").run()
+        begun = Project(target, place)
+        return _Chain(begun, steps, settings, go_on, on_step, report, unmarked == "stop").run()
 
 
 class _Chain:
