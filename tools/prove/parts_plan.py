@@ -2,7 +2,8 @@
 
 Photographs stand on a grid (80/40 %: each has points in common with the four before and behind it, and with those of
 the strips beside it). The cuts, the part in the middle, and the equations of what is shared are those of the program;
-nothing is computed but which numbers there would be. Measured sizes stand in tools/results/parts.md. Prints Markdown.
+nothing is computed but which numbers there would be, so it looks inside the package on purpose. Measured sizes stand in
+tools/results/parts.md. Prints Markdown.
 
     python tools/prove/parts_plan.py > tools/results/parts_plan.md
 """
