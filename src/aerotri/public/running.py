@@ -145,7 +145,7 @@ def run(
     dense: bool = True,
     plots: bool = True,
     go_on: bool = False,
-    unmarked: Unmarked = "continue",
+    unmarked: Unmarked | None = None,
     further: Mapping[Verb, Mapping[str, Any]] | None = None,
     executor: str = THREADS,
     on_step: OnStep | None = None,
@@ -178,8 +178,8 @@ def run(
     dense : the dense surface and the orthophoto as well.
     plots : draw the plots of the adjustment.
     go_on : go on after an adjustment that was rejected.
-    unmarked : where control points are marked in no photograph, 'stop' after the tie points, or 'continue'. A block of
-        an earlier run in `out` that was marked since is taken up with 'continue'.
+    unmarked : where control points are marked in no photograph, 'stop' after the tie points, or 'continue', as where
+        None. A block of an earlier run in `out` that was marked since is taken up, unless 'stop' is given.
     further : more settings of a step by the name of its verb, {'terrain': {'window': 21}}.
     executor : where terrain and dense surface are measured: 'threads', 'processes:N', 'dask:ADDRESS' or
         'dask:local:N'.
@@ -231,7 +231,7 @@ def run(
         steps = steps_of(place, target, settings, dense)
         with opened(executor, report.said):
             pass  # a scheduler that does not answer is told now, not after hours
-        if unmarked == "continue" and not from_block and (target / BLOCK / EDITS).is_file():
+        if unmarked != "stop" and not from_block and (target / BLOCK / EDITS).is_file():
             steps["tie_points"] = replace(steps["tie_points"], status="left out", reason=MARKED_SINCE)
         project = Project(target, place)
         return _Chain(project, steps, settings, go_on, on_step, report, unmarked == "stop").run()
