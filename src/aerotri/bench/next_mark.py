@@ -1,8 +1,8 @@
 """Which mark next: the measurement that lowers the σ of the points most, computed before anybody measures it.
 
-With Q of the unknowns a new ray l = A·(orientation) + B·(point) changes it by Q·aᵀ·(a·Q·aᵀ + σ²)⁻¹·a·Q. A control point
-that is not measured yet brings its given coordinates with it: its Q is that of its σ. Shared parameters are held: what
-a single ray tells of them is little.
+With Q of the unknowns a new ray l = A·(orientation) + B·(point) + C·(interior and additional parameters) changes it by
+Q·aᵀ·(a·Q·aᵀ + σ²)⁻¹·a·Q, a = (A, B, C). A control point that is not measured yet brings its given coordinates with it:
+its Q is that of its σ.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.bench.prediction import Prediction
+from aerotri.deformation.error_parameters import shared_columns
 from aerotri.deformation.model_grid import places_of
 from aerotri.deformation.orientation import calibrated_orientation
 from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.functional_model.rotation import small_rotation_per_angle
+from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.results.adjustment import Adjustment
-from aerotri.statistics.joint_covariance import IMAGE, POINT, Chosen, joint_cofactors
+from aerotri.statistics.joint_covariance import IMAGE, POINT, SHARED, Chosen, joint_cofactors
 
 MOST_BYTES = 300_000_000
 """Of the solutions for all columns; chosen [C]: what a laptop spares."""
@@ -56,7 +58,7 @@ def next_marks(adjustment: Adjustment, prediction: Prediction) -> list[NextMark]
     tried = list(_candidates(adjustment, prediction))
     if not tried:
         return []
-    return sorted(_judged(adjustment, tried), key=lambda one: one.after)
+    return sorted(_judged(adjustment, prediction, tried), key=lambda one: one.after)
 
 
 def _candidates(adjustment: Adjustment, prediction: Prediction) -> Iterator[tuple[int, int, np.ndarray, bool]]:
@@ -89,7 +91,9 @@ def _central(prediction: Prediction, images: list[int], xyz: np.ndarray) -> list
     return [(image, place) for _, image, place in sorted(found, key=lambda one: one[:2])[:PHOTOGRAPHS_OF_POINT]]
 
 
-def _judged(adjustment: Adjustment, tried: list[tuple[int, int, np.ndarray, bool]]) -> Iterator[NextMark]:
+def _judged(
+    adjustment: Adjustment, prediction: Prediction, tried: list[tuple[int, int, np.ndarray, bool]]
+) -> Iterator[NextMark]:
     """Every candidate with what it would do."""
     u = adjustment.system.unknowns
     row_of_image = {int(image): k for k, image in enumerate(u.images)}
@@ -108,21 +112,37 @@ def _judged(adjustment: Adjustment, tried: list[tuple[int, int, np.ndarray, bool
         images += [] if one[0] in images else [one[0]]
         points += [] if one[1] in points or one[1] not in row_of_point else [one[1]]
         kept.append(one)
+    shared = [*_interior_columns(adjustment), *shared_columns(adjustment).tolist()]
     chosen = [Chosen(POINT, row_of_point[p], p, "", (0, 1, 2)) for p in points]
     chosen += [Chosen(IMAGE, row_of_image[k], k, "", tuple(range(6))) for k in images]
+    chosen += [Chosen(SHARED, k, k, "", (0,)) for k in shared]
     factor = adjustment.system.factorise(adjustment.solution.equations)
     q, _ = joint_cofactors(adjustment.system, adjustment.solution.state, factor, adjustment.solution.estimator, chosen)
-    first_point = {p: 3 * k for k, p in enumerate(points)}
-    first_image = {k: 3 * len(points) + 6 * n for n, k in enumerate(images)}
-    sigma0, whole = adjustment.result.outcome.sigma0, _mean_variance(adjustment)
-    count = len(u.points)
+    at = _Places(
+        {p: 3 * k for k, p in enumerate(points)}, {k: 3 * len(points) + 6 * n for n, k in enumerate(images)},
+        3 * len(points) + 6 * len(images),
+    )  # fmt: skip
+    sigma0, whole, count = adjustment.result.outcome.sigma0, _mean_variance(adjustment), len(u.points)
     for image, point, place, is_control in kept:
-        gain = _gain(adjustment, q, image, point, first_image[image], first_point.get(point, -1), 3 * len(sample))
-        own = 0.0 if point in sample else gain[1]
-        less = sigma0**2 * (gain[0] * count / len(sample) + own) / (3.0 * count)
-        after = float(np.sqrt(max(whole - less, 0.0)))
-        at = (float(place[0]), float(place[1]))
-        yield NextMark(image, point, at, is_control, float(np.sqrt(whole)), after)
+        of_all, of_own = _gain(adjustment, prediction, q, at, image, point, place)
+        gain = of_all[: 3 * len(sample)].sum() * count / len(sample) + (0.0 if point in sample else of_own)
+        after = float(np.sqrt(max(whole - sigma0**2 * gain / (3.0 * count), 0.0)))
+        yield NextMark(image, point, (float(place[0]), float(place[1])), is_control, float(np.sqrt(whole)), after)
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where points and photographs begin in Q, and the shared parameters behind them."""
+
+    points: dict[int, int]
+    images: dict[int, int]
+    shared: int
+
+
+def _interior_columns(adjustment: Adjustment) -> list[int]:
+    """The unknown interior elements among the shared unknowns."""
+    names = adjustment.system.unknowns.shared.names
+    return [k for k, name in enumerate(names) if name in INTERIOR_ELEMENTS]
 
 
 def _mean_variance(adjustment: Adjustment) -> float:
@@ -132,26 +152,36 @@ def _mean_variance(adjustment: Adjustment) -> float:
 
 
 def _gain(
-    adjustment: Adjustment, q: np.ndarray, image: int, point: int, at_image: int, at_point: int, sample: int
-) -> tuple[float, float]:
-    """By how much a ray lowers the sum of the cofactors of the sample, and of its own point."""
-    a, b = _partials(adjustment, image, point)
+    adjustment: Adjustment, prediction: Prediction, q: np.ndarray, at: _Places, image: int, point: int,
+    place: np.ndarray,
+) -> tuple[np.ndarray, float]:  # fmt: skip
+    """By how much a ray lowers the cofactor of every unknown of Q, and the sum of those of its own point."""
     block = adjustment.local.block
+    by_image, by_point, by_shared = _partials(adjustment, prediction, image, point, place)
+    a = np.zeros((2, len(q)))
+    a[:, at.images[image] : at.images[image] + 6] = by_image
+    a[:, at.shared :] = by_shared
     noise = np.diag(np.full(2, np.median(block.image_points.sigma)) ** 2)
-    of_image = q[:, at_image : at_image + 6] @ a.T
-    if at_point >= 0:
-        to_all = of_image + q[:, at_point : at_point + 3] @ b.T
-        own = a @ to_all[at_image : at_image + 6] + b @ to_all[at_point : at_point + 3]
-    else:
+    own = at.points.get(point)
+    if own is None:
         control = int(np.flatnonzero(block.control.point == point)[0])
-        to_all = of_image
-        own = a @ to_all[at_image : at_image + 6] + b @ np.diag(block.control.sigma[control] ** 2) @ b.T
-    change = np.einsum("ij,jk,ik->i", to_all, np.linalg.inv(own + noise), to_all)
-    return float(change[:sample].sum()), float(change[at_point : at_point + 3].sum()) if at_point >= 0 else 0.0
+        noise = noise + by_point @ np.diag(block.control.sigma[control] ** 2) @ by_point.T
+    else:
+        a[:, own : own + 3] = by_point
+    to_all = q @ a.T
+    change = np.einsum("ij,jk,ik->i", to_all, np.linalg.inv(a @ to_all + noise), to_all)
+    return change, 0.0 if own is None else float(change[own : own + 3].sum())
 
 
-def _partials(adjustment: Adjustment, image: int, point: int) -> tuple[np.ndarray, np.ndarray]:
-    """(2, 6) by X0, Y0, Z0, ω, φ, κ and (2, 3) by X, Y, Z of a ray, mm, in the frame of the adjustment."""
+def _partials(
+    adjustment: Adjustment, prediction: Prediction, image: int, point: int, place: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Partials of a ray, mm, in the frame of the adjustment.
+
+    Returns
+    -------
+    (2, 6) by X0, Y0, Z0, ω, φ, κ, (2, 3) by X, Y, Z, (2, s) by interior elements and additional parameters.
+    """
     local, orientation = adjustment.local, calibrated_orientation(adjustment).take([image])
     xyz = local.points.xyz[point]
     if not np.isfinite(xyz).all():
@@ -163,4 +193,10 @@ def _partials(adjustment: Adjustment, image: int, point: int) -> tuple[np.ndarra
     rays = linearise(orientation.rotation, orientation.centre, xyz[None], interior, zero, zero, zero, np.zeros((1, 2)))
     per_angle = small_rotation_per_angle(local.images.angles[[image]], local.block.rotation)[0]
     by_angles = rays.by_orientation[0][:, 3:] @ per_angle
-    return np.column_stack([rays.by_orientation[0][:, :3], by_angles]), rays.by_point[0]
+    shared, camera = adjustment.system.unknowns.shared, local.block.cameras[local.block.images.camera[image]]
+    by_interior = np.zeros((2, len(_interior_columns(adjustment))))
+    for n, k in enumerate(_interior_columns(adjustment)):
+        if shared.groups[k] == camera.name:
+            by_interior[:, n] = rays.by_interior[0][:, INTERIOR_ELEMENTS.index(shared.names[k])]
+    by_shared = np.column_stack([by_interior, prediction.by_additional(image, place)])
+    return np.column_stack([rays.by_orientation[0][:, :3], by_angles]), rays.by_point[0], by_shared

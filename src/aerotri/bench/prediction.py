@@ -81,6 +81,11 @@ class Prediction:
         line = self._shown(image, centre + reach[:, None] * along)
         return line[np.isfinite(line).all(axis=1)]
 
+    def by_additional(self, image: int, px: np.ndarray) -> np.ndarray:
+        """(2, p) mm, partials of a position (2,) px by the additional parameters, in the order of `shared_columns`."""
+        xy = millimetres_in(self.block, image, np.asarray(px, dtype=float)[None])
+        return self._restitution.errors[self._restitution.group[image]].partials(xy)[0]
+
     def _shown(self, image: int, local: np.ndarray) -> np.ndarray:
         out, known = np.full((len(local), 2), np.nan), np.flatnonzero(np.isfinite(local).all(axis=1))
         model = pair_model(self._restitution, ("", ""), (image, image))

@@ -193,8 +193,8 @@ def run(
     dense : the dense surface and the orthophoto as well.
     plots : draw the plots of the adjustment.
     go_on : go on after an adjustment that was rejected.
-    unmarked : where control points are marked in no photograph, 'stop' after the tie points, or 'continue' (None). A
-        block of an earlier run in `out` that was marked since is taken up with 'continue'.
+    unmarked : where control points are marked in no photograph, 'stop' after the tie points, or 'continue', as where
+        None. A block of an earlier run in `out` that was marked since is taken up, unless 'stop' is given.
     further : more settings of a step by the name of its verb, {'terrain': {'window': 21}}.
     executor : where tie points, terrain, dense surface and orthophoto are made: 'threads', 'processes:N',
         'dask:ADDRESS' or 'dask:local:N'.

@@ -170,6 +170,9 @@ export class Plan {
       pen.fillStyle = check ? "#fff" : "#ffd84d";
       pen.fill();
       pen.stroke();
+      pen.strokeStyle = "#ffffffd0";
+      pen.lineWidth = 3;
+      pen.strokeText(this.points.name[point], x + 9, y + 4);
       pen.fillStyle = "#111";
       pen.fillText(this.points.name[point], x + 9, y + 4);
     }
