@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -119,3 +120,22 @@ def test_command(flown, tmp_path):
     assert 'id="marks"' in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     with pytest.raises(InputError, match="is not there"):
         invoke(["adjust", str(tmp_path / "block"), "--out", str(tmp_path / "o2"), "--photos", str(tmp_path / "x")])
+
+
+def test_without_control_there_is_no_section(flown):
+    result, folder = flown
+    block = result.block
+    bare = replace(block, control=block.control.empty(), gnss_ins=None)
+    adjusted = replace(result.adjusted, block=bare, control=_none(result.adjusted.control),
+                       check=_none(result.adjusted.check))  # fmt: skip
+    found = mark_pictures(adjusted, [folder])
+    assert found.points == ()
+    assert found.notes == ()
+
+
+def _none(points):
+    nothing = slice(0, 0)
+    return replace(
+        points, point=points.point[nothing], difference=points.difference[nothing], sigma=points.sigma[nothing],
+        r=points.r[nothing], w=points.w[nothing], rays=points.rays[nothing],
+    )  # fmt: skip
