@@ -47,11 +47,8 @@ INSIDE = {
 }
 """Files of tools/ that may import modules within the package, and what they measure there."""
 COMMANDS = (
-    "benchmark/benchmark_first_run.py",
-    "benchmark/benchmark_memory.py",
-    "prove/fuzzing/hostile.py",
-    "prove/kill.py",
-)
+    "benchmark/benchmark_first_run.py", "benchmark/benchmark_memory.py", "prove/fuzzing/hostile.py", "prove/kill.py",
+)  # fmt: skip
 """Of these, those that test the commands; the others run them as users do, in a process of their own."""
 
 

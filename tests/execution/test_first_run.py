@@ -8,6 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+from typer.testing import CliRunner
+
+from aerotri.cli import app
+from aerotri.conventions import InputError
 from aerotri.execution import first_run
 
 BLOCK = Path(__file__).parents[2] / "blocks" / "frederiksstad_ultracam"
@@ -92,3 +97,14 @@ def test_they_end_with_the_command(tmp_path):
     process.stdin.close()
     assert process.wait(30) == 0
     assert len(list((tmp_path / "kept").rglob("*.nbc"))) < len(first_run.listed_kernels(first_run.LISTED))
+
+
+@pytest.mark.parametrize("command", ["adjust", "run"])
+def test_commands_that_adjust_start_them_first(command, monkeypatch, tmp_path):
+    """Before anything is read."""
+    begun = []
+    monkeypatch.setattr(first_run, "compile_ahead", lambda: begun.append(command))
+    words = [command, str(tmp_path / "nothing"), "--out", str(tmp_path / "out")]
+    with pytest.raises(InputError):
+        CliRunner().invoke(app, words, catch_exceptions=False)
+    assert begun == [command]

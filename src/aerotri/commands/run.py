@@ -32,9 +32,11 @@ def run_all(source: Path, out: Path, settings: Mapping[str, Any], as_json: bool)
     InputError
         When there is nothing to begin with, or the first step refuses its input.
     """
+    from aerotri.execution.first_run import compile_ahead
     from aerotri.public.running import run
 
     console = Console()
+    compile_ahead()
     project = run(source, out, **settings, on_step=_Told(console, out, as_json), progress=console.stage)
     if as_json:
         print(json_text(project.summary, None))
