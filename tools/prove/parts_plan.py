@@ -1,4 +1,4 @@
-"""What a block in parts costs, from its pattern alone: memory, files and multiplications, up to a million photographs.
+"""Measures what a block in parts costs by its pattern: memory, files, multiplications, up to a million photographs.
 
 Photographs stand on a grid (80/40 %: each has points in common with the four before and behind it, and with those of
 the strips beside it). The cuts, the part in the middle, and the equations of what is shared are those of the program;
