@@ -17,7 +17,7 @@ from aerotri.kernel_cache import SharedCache
 
 OPTIONS: dict[str, Any] = {
     "nogil": True, "error_model": "numpy", "fastmath": {"contract"},
-    # nothing here is handed to C, and the entry for it takes a tenth of the compilation
+    # nothing here is handed to C: the entry for it would be compiled for nothing
     "no_cfunc_wrapper": True,
 }  # fmt: skip
 

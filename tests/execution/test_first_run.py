@@ -89,6 +89,13 @@ def test_a_single_thread_starts_none(monkeypatch):
     assert first_run.compile_ahead() == 0
 
 
+def test_functions_that_are_not_compiled_start_none(monkeypatch):
+    """NUMBA_DISABLE_JIT, as for a debugger."""
+    monkeypatch.setenv("AEROTRI_THREADS", "3")
+    monkeypatch.setattr(first_run, "_found", lambda name: len)
+    assert first_run.compile_ahead() == 0
+
+
 def test_they_end_with_the_command(tmp_path):
     """A command that has ended, however, leaves nobody behind that compiles."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept")}

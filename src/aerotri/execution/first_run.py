@@ -123,24 +123,23 @@ def _found(name: str) -> Any:
 def _is_first_run() -> bool:
     """Whether the first kernel of the list is to be compiled and can be kept."""
     name = json.loads(LISTED.read_text(encoding="utf-8"))["kernels"][0][0]
-    kernel = _found(name)
-    place = getattr(kernel.stats, "cache_path", None)
+    # without compilation (NUMBA_DISABLE_JIT) it is a function, and has no statistics
+    place = getattr(getattr(_found(name), "stats", None), "cache_path", None)
     return place is not None and not any(Path(place).glob(f"*.{name.partition(':')[2]}-*.nbi"))
 
 
 def _compile_from_the_end(folder: Path, listed: Path) -> None:
     """Kernels that no other process has begun: those that most others call, then the last one first."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    kernels = [(name, _found(name), arguments) for name, arguments in listed_kernels(listed)]
-    callers = [sum(_calls(other, kernel) for _, other, _ in kernels) for _, kernel, _ in kernels]
+    kernels = [(_found(name), arguments) for name, arguments in listed_kernels(listed)]
+    callers = [sum(_calls(other, kernel) for other, _ in kernels) for kernel, _ in kernels]
     order = sorted(range(len(kernels)), key=lambda k: (-callers[k], -k))
     for k in order:
-        name, kernel, arguments = kernels[k]
         try:
-            (folder / name.replace(":", ".")).touch(exist_ok=False)
+            (folder / str(k)).touch(exist_ok=False)
         except FileExistsError:
             continue
-        kernel.compile(arguments)
+        kernels[k][0].compile(kernels[k][1])
 
 
 def _calls(kernel: Any, other: Any) -> bool:
