@@ -74,4 +74,4 @@ def test_results_carry_it(folder, tmp_path):
     assert "&lt;script&gt;alert(1)" in page
     assert "<script>alert(1)" not in page
     assert "<dt>Client</dt><dd>Kieswerk Nörd</dd>" in page
-    assert "<dd class="more">second *line*</dd>" in page
+    assert '<dd class="more">second *line*</dd>' in page
