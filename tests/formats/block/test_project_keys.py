@@ -73,5 +73,5 @@ def test_results_carry_it(folder, tmp_path):
     page = (tmp_path / "result" / "report.html").read_text()
     assert "&lt;script&gt;alert(1)" in page
     assert "<script>alert(1)" not in page
-    assert "<th>Client</th><td>Kieswerk Nörd</td>" in page
-    assert "<th></th><td>second *line*</td>" in page
+    assert "<dt>Client</dt><dd>Kieswerk Nörd</dd>" in page
+    assert '<dd class="more">second *line*</dd>' in page

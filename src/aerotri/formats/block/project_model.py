@@ -61,3 +61,9 @@ class ProjectModel(Section):
     def project(self) -> Project:
         """The record."""
         return Project(**self.model_dump())
+
+
+class ProjectFileModel(Section):
+    """[project] of block.toml in a file of its own."""
+
+    project: ProjectModel = key(..., "Title, client and the like.")

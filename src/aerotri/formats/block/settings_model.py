@@ -449,9 +449,3 @@ class CamerasModel(Section):
     camera: Annotated[dict[str, CameraModel], Field(min_length=1)] = key(
         ..., "The cameras, one table [camera.NAME] each."
     )
-
-
-class ProjectFileModel(Section):
-    """[project] of block.toml in a file of its own."""
-
-    project: ProjectModel = key(..., "Title, client and the like.")
