@@ -47,7 +47,7 @@ ORDER = (
     "simulate", "tiepoints", "adjust", "diff", "deform", "compare-parameters", "parameters", "dtm", "compare", "volume",
     "demcor", "imgeo", "crosscheck", "convert", "init", "check", "predict volume", "predict attitude",
     "predict picket-interval", "explain", "halves", "export", "ortho", "dsm",
-    "change", "accuracy", "plan",
+    "change", "accuracy", "plan", "divide",
 )  # fmt: skip
 """So that each has what it needs; that of run is the one of the README."""
 BEFORE = {"diff": "adjust blocks/frederiksstad_ultracam --parameters none --no-plots --out plain_result"}
@@ -56,7 +56,7 @@ WRITES = {
     "adjust": "frederiksstad_ultracam_result/adjustment.json", "deform": "deformation/deform.json",
     "compare-parameters": "frederiksstad_ultracam_compare/compare_parameters.json", "parameters": "patterns/dmc.png",
     "tiepoints": "drone_block/block.toml", "dtm": "drone_dtm/dsm.tif", "compare": "difference/compare.json",
-    "plan": "plan/plan.json",
+    "plan": "plan/plan.json", "divide": "frederiksstad_ultracam_parts/parts/0003/block.toml",
     "volume": "pile_volume/volume.json", "demcor": "dsm_corrected.tif", "imgeo": "ideal/2_002.tif",
     "crosscheck": "crosscheck/crosscheck.json", "convert": "drone_colmap/images.txt", "init": "gravel_pit/block.toml",
     "halves": "frederiksstad_ultracam_halves/halves.json",

@@ -148,7 +148,7 @@ def test_cells_outside_the_source_are_not_known(tmp_path):
 
 
 def compared(test, control, out):
-    run_compare(test, control, out, "linear", "none", None, False, True)
+    run_compare(test, control, out, "linear", "none", None, None, False, True)
 
 
 def test_compare_counts_in_metres(tmp_path, capsys):

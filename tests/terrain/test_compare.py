@@ -86,7 +86,9 @@ def test_command(tmp_path, capsys):
     sigma = np.full(z.shape, 0.1)
     write_surface(tmp_path / "test.tif", z + 0.25, sigma, GRID, "EPSG:25832", "DSM Z, m")
     write_raster(tmp_path / "control.tif", z, GRID, "EPSG:25832")
-    run_compare(tmp_path / "test.tif", tmp_path / "control.tif", tmp_path / "out", "linear", "none", None, True, True)
+    run_compare(
+        tmp_path / "test.tif", tmp_path / "control.tif", tmp_path / "out", "linear", "none", None, None, True, True
+    )
     printed = json.loads(capsys.readouterr().out)
     assert printed["difference_m"]["bias"] == pytest.approx(0.25, abs=1e-4)
     assert printed["difference_m"]["std"] < 1e-3
@@ -95,9 +97,13 @@ def test_command(tmp_path, capsys):
         assert reader.read(60, 60, 1, 1)[0, 0] == pytest.approx(0.25, abs=1e-4)
     write_raster(tmp_path / "other.tif", z, GRID, "EPSG:25833")
     with pytest.raises(InputError, match="EPSG:25832, the control in EPSG:25833"):
-        run_compare(tmp_path / "test.tif", tmp_path / "other.tif", tmp_path / "o", "linear", "none", None, False, True)
+        run_compare(
+            tmp_path / "test.tif", tmp_path / "other.tif", tmp_path / "o", "linear", "none", None, None, False, True
+        )
     with pytest.raises(InputError, match="holds other files"):
-        run_compare(tmp_path / "test.tif", tmp_path / "control.tif", tmp_path, "linear", "none", None, False, True)
+        run_compare(
+            tmp_path / "test.tif", tmp_path / "control.tif", tmp_path, "linear", "none", None, None, False, True
+        )
 
 
 def test_surface_and_sigma_in_one_file(tmp_path):

@@ -28,6 +28,14 @@ class PartsAdjustment:
     ----------
     record : the numbers of the whole.
     folder : with the tables; those of photographs, points and rays stand in parts/NAME.
+
+    Examples
+    --------
+    See `aerotri.adjust_parts`:
+
+    >>> from aerotri import PartsAdjustment
+    >>> PartsAdjustment.sigma0.__doc__
+    'σ̂0, dimensionless.'
     """
 
     record: Whole
@@ -109,6 +117,16 @@ def divide(
     ------
     InputError
         When the block holds what parts cannot, or cannot be cut.
+
+    Examples
+    --------
+    >>> import aerotri, tempfile
+    >>> plan = aerotri.example_flight()
+    >>> plan["flight"]["images_per_strip"] = 16
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     parts = aerotri.divide(aerotri.simulate(plan, seed=1).block, f"{place}/parts", parts=2) / "parts"
+    ...     [folder.name for folder in sorted(parts.iterdir())]
+    ['0000', '0001']
     """
     from aerotri.formats.block.writer import write_block
     from aerotri.partition.adjusting import PARTS
@@ -162,6 +180,17 @@ def adjust_parts(
         When parts do not belong together, hold what is adjusted in one piece only, or do not determine the block.
     TasksFailedError
         When a part could not be computed; it is named.
+
+    Examples
+    --------
+    >>> import aerotri, tempfile
+    >>> plan = aerotri.example_flight()
+    >>> plan["flight"]["images_per_strip"] = 16
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     parts = aerotri.divide(aerotri.simulate(plan, seed=1).block, f"{place}/parts", parts=2)
+    ...     found = aerotri.adjust_parts(parts, f"{place}/result")
+    >>> found.status, found.parts
+    ('converged', ('0000', '0001'))
     """
     from aerotri.execution.opening import opened
     from aerotri.formats.files.atomic import atomic_folder

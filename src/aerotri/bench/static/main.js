@@ -1,7 +1,7 @@
 // The bench: what is chosen, what was decided, and which part of the page shows it.
 
 import { ask, tell } from "./api.js";
-import { button, fixed, guarded, say } from "./dom.js";
+import { button, fixed, guarded, make, say } from "./dom.js";
 import { Photo } from "./photo.js";
 import { Plan } from "./plan.js";
 import { PointSheet } from "./point.js";
@@ -103,7 +103,10 @@ class Bench {
   async showTab(name = this.tab) {
     this.tab = name;
     this.drawTabs();
-    await this.tabs[name][1].render(document.getElementById("sheet"));
+    // a page of its own: an answer that comes late must not write over another tab
+    const page = make("div", { class: "page" });
+    document.getElementById("sheet").replaceChildren(page);
+    await this.tabs[name][1].render(page);
   }
 
   async wanted(layer) {

@@ -61,7 +61,7 @@ export class PointSheet {
       places.set(one.image, { ...places.get(one.image), ...(one.px ? { px: one.px, changed: true } : one.kind === "removed" ? { px: null, changed: true } : {}) });
     }
     const pictures = new Set(this.bench.summary.pictures);
-    const larger = by => () => { this.size = Math.min(Math.max(Math.round(this.size * by), 16), 512); this.render(document.getElementById("sheet")); };
+    const larger = by => () => { this.size = Math.min(Math.max(Math.round(this.size * by), 16), 512); this.render(document.querySelector("#sheet .page")); };
     const shown = [...places.entries()].filter(([, place]) => place.px || place.expected);
     return make("div", {}, make("div", { class: "tools" }, button("−", larger(1.5), "more of the photograph"), button("+", larger(1 / 1.5), "less of the photograph"),
       make("span", {}, pictures.size ? `${shown.length} photographs show the point. A click in a cut-out sets the mark there.` : "No photographs: start with --photos DIR to see them.")),
