@@ -66,13 +66,12 @@ class Ended:
 
     Parameters
     ----------
-    status : 'converged' or 'not converged'. costs : at the start and after every iteration of the last stage.
+    status : 'converged' or 'not converged'.
     """
 
     status: str
     place: Place
     iterations: int
-    costs: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,14 +161,13 @@ class Course:
     def _descend(self, start: At, name: str, tolerance: float, max_iterations: int) -> Ended:
         """Gauss-Newton with the estimator of one stage."""
         place = self._reweighted(self._reduced(replace(start, tag=self._next_tag())), name)
-        costs, last_decrement, damping, scales = [place.cost], np.inf, Damping(), 0
+        last_decrement, damping, scales = np.inf, Damping(), 0
         for _ in range(max_iterations):
             self._iteration += 1
             before = place
             place, decrement, damping = self._improved(place, damping)
             if place is before:
-                return Ended("not converged", place, self._iteration, tuple(costs))
-            costs.append(place.cost)
+                return Ended("not converged", place, self._iteration)
             if self._report is not None:
                 self._report(self._iteration, math.sqrt(place.cost / max(self.redundancy, 1)))
             settled = damping.value == 0.0 and self._settled(before, place, decrement, last_decrement, name, tolerance)
@@ -178,8 +176,8 @@ class Course:
             if fresh is not place:
                 place, settled, scales = fresh, False, scales + 1
             if settled:
-                return Ended("converged", place, self._iteration, tuple(costs))
-        return Ended("not converged", place, self._iteration, tuple(costs))
+                return Ended("converged", place, self._iteration)
+        return Ended("not converged", place, self._iteration)
 
     def _improved(self, place: Place, damping: Damping) -> tuple[Place, float, Damping]:
         """The place that a step leads to, damped until it improves; the place itself where none does."""

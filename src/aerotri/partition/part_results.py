@@ -73,7 +73,7 @@ class Written:
     ----------
     verdict : 'accepted', 'doubtful' or 'rejected'. reasons : sentences.
     control, check : its ground points. groups : of its observations. blunders : suspected gross errors.
-    points, rays, left_out : how many.
+    points, rays : how many; rays that were used.
     """
 
     verdict: str
@@ -84,7 +84,6 @@ class Written:
     blunders: tuple[Blunder, ...]
     points: int
     rays: int
-    left_out: int
 
 
 def measure_part(at: At, task: PartTask) -> Measured:
@@ -114,10 +113,9 @@ def write_part(ending: Ending, task: PartTask) -> Written:
     verdict = judge(found)
     found = replace(found, outcome=replace(outcome, verdict=verdict.level, reasons=verdict.reasons))
     write_result(found, ending.folder / task.name)
-    used = int(np.sum(found.rays.status == RayStatus.USED))
     return Written(
         verdict.level, verdict.reasons, _ground_points(found, found.control), _ground_points(found, found.check),
-        found.groups, found.blunders, len(found.block.points), used, len(found.rays.status) - used,
+        found.groups, found.blunders, len(found.block.points), int(np.sum(found.rays.status == RayStatus.USED)),
     )  # fmt: skip
 
 

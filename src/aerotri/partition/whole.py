@@ -65,7 +65,7 @@ def whole_of(
     """
     control, of_control = _ground_points([part.control for part in written], is_check=False, first=0)
     check, of_check = _ground_points([part.check for part in written], is_check=True, first=len(control.point))
-    points = np.concatenate([p.names for part in written for p in (part.control,)] + [p.check.names for p in written])
+    points = np.concatenate([p.control.names for p in written] + [p.check.names for p in written])
     adjusted = np.concatenate([p.control.adjusted for p in written] + [p.check.adjusted for p in written])
     worst = max((part.verdict for part in written), key=GRADES.index)
     reasons = [f"part {name}: {said}" for name, part in zip(names, written, strict=True) for said in part.reasons]
