@@ -41,17 +41,22 @@ def make_application(bench: Bench, token: str) -> ASGIApp:
     token : first part of every path; whoever does not know it is refused with 403.
     """
     routes = [
-        Route("/", _page("index.html")),
-        *(Route(f"/{file.name}", _page(file.name)) for file in sorted(STATIC.iterdir()) if file.suffix in KINDS),
-        *(Route(f"/data/{path}", _told(work)) for path, work in _questions(bench).items()),
-        *(Route(f"/act/{path}", _done(work), methods=["POST"]) for path, work in _actions(bench).items()),
+        Route("/", page_file("index.html")),
+        *files_of_page(),
+        *(Route(f"/data/{path}", told(work)) for path, work in _questions(bench).items()),
+        *(Route(f"/act/{path}", done(work), methods=["POST"]) for path, work in _actions(bench).items()),
         Route("/tile/{image:int}/{level:int}/{column:int}/{row:int}", _shown(lambda asked: bench.pictures.tile(
             *(asked.path_params[name] for name in ("image", "level", "column", "row"))))),
         Route("/layer/{number:int}", _shown(lambda asked: bench.layer(asked.path_params["number"]))),
         Route("/cutout/{image:int}", _shown(lambda asked: bench.cutout(
             asked.path_params["image"], *(_whole(asked, name) or 0 for name in ("left", "top", "size"))))),
     ]  # fmt: skip
-    return _Guard(Starlette(routes=routes), token)
+    return Guard(Starlette(routes=routes), token)
+
+
+def files_of_page() -> list[Route]:
+    """The files that pages load."""
+    return [Route(f"/{file.name}", page_file(file.name)) for file in sorted(STATIC.iterdir()) if file.suffix in KINDS]
 
 
 def _questions(bench: Bench) -> dict[str, Callable[[Request], Any]]:
@@ -128,6 +133,15 @@ class Given:
             raise InputError(f"{name} is no text of up to {LONGEST} characters", RELOAD)
         return value
 
+    def texts(self, name: str) -> dict[str, str]:
+        """Texts by their names."""
+        value = self._content.get(name)
+        if not isinstance(value, dict) or not all(
+            isinstance(one, str) and len(one) <= LONGEST for one in value.values()
+        ):
+            raise InputError(f"{name} holds no texts", RELOAD)
+        return {str(key): text for key, text in value.items()}
+
     def place(self) -> tuple[float, float]:
         """Column and row, px."""
         found = [self._content.get(name) for name in ("column", "row")]
@@ -141,7 +155,7 @@ def new_token() -> str:
     return secrets.token_urlsafe(24)
 
 
-class _Guard:
+class Guard:
     """Lets through who knows the token and asks this machine by its own name."""
 
     def __init__(self, inner: ASGIApp, token: str):
@@ -162,7 +176,7 @@ class _Guard:
         await self._inner({**scope, "path": f"/{rest}", "raw_path": f"/{rest}".encode()}, receive, send)
 
 
-def _page(name: str) -> Callable[[Request], Response]:
+def page_file(name: str) -> Callable[[Request], Response]:
     """A file of the page."""
 
     def answer(asked: Request) -> Response:
@@ -172,7 +186,7 @@ def _page(name: str) -> Callable[[Request], Response]:
     return answer
 
 
-def _told(work: Callable[[Request], Any]) -> Callable[[Request], Any]:
+def told(work: Callable[[Request], Any]) -> Callable[[Request], Any]:
     """What a piece of work gives as JSON; bad input in words, with 400."""
 
     async def answer(asked: Request) -> Response:
@@ -185,7 +199,7 @@ def _told(work: Callable[[Request], Any]) -> Callable[[Request], Any]:
     return answer
 
 
-def _done(work: Callable[[Given], Any]) -> Callable[[Request], Any]:
+def done(work: Callable[[Given], Any]) -> Callable[[Request], Any]:
     """An action with what the page says; what it gives as JSON."""
 
     async def answer(asked: Request) -> Response:

@@ -309,7 +309,9 @@ class Bench:
             self.places.keep_block()
             frame = self.equations.frame()
             geoid = "" if frame is None or frame.geoid is None else str(frame.geoid)
-            self._job = Job(self.places.block, self.places.next_result(), self.result, geoid, self._take)
+            out = self.places.next_result()
+            words = [str(self.places.block), str(out), "" if self.result is None else str(self.result), geoid]
+            self._job = Job("aerotri.bench.worker", words, out, self._take)
         return self.state()
 
     def stop(self) -> dict[str, Any]:
