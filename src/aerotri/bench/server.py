@@ -69,6 +69,7 @@ def _questions(bench: Bench) -> dict[str, Callable[[Request], Any]]:
         "edits": lambda asked: bench.edits(),
         "next": lambda asked: bench.next(),
         "layers": lambda asked: bench.layers(),
+        "targets/{image:int}": lambda asked: bench.targets(asked.path_params["image"]),
         "difference": lambda asked: bench.difference(),
         "rays": lambda asked: bench.rays(
             max(_whole(asked, "first") or 0, 0), _whole(asked, "image"), _whole(asked, "point"),
@@ -89,6 +90,9 @@ def _actions(bench: Bench) -> dict[str, Callable[[Given], Any]]:
         "switch": lambda given: bench.switch(
             given.row("image") if given.has("image") else None, given.text("point"), given.text("action"),
             given.text("reason")),
+        "mark_targets": lambda given: bench.mark_targets(given.row("image")),
+        "give": lambda given: bench.give(
+            given.text("point"), given.text("action"), given.numbers("given", 6), given.text("reason")),
         "undo": lambda given: bench.undo(),
         "adjust": lambda given: bench.adjust(),
         "stop": lambda given: bench.stop(),
@@ -141,6 +145,14 @@ class Given:
         ):
             raise InputError(f"{name} holds no texts", RELOAD)
         return {str(key): text for key, text in value.items()}
+
+    def numbers(self, name: str, count: int) -> tuple[float, ...]:
+        """So many numbers."""
+        value = self._content.get(name)
+        found = value if isinstance(value, list) and len(value) == count else [None]
+        if not all(isinstance(one, int | float) and abs(one) < MOST for one in found):
+            raise InputError(f"{name} are not {count} numbers", "fill in every field, with a point such as 0.02")
+        return tuple(float(one or 0.0) for one in found)
 
     def place(self) -> tuple[float, float]:
         """Column and row, px."""
