@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.bench.coded_targets import find_coded
 from aerotri.bench.matching import HALF_PX, Match, match, sampled_window
 from aerotri.bench.pictures import Pictures, corner_of
 from aerotri.bench.prediction import Prediction
@@ -27,11 +28,12 @@ class Snapped:
 
     Parameters
     ----------
-    place : column and row, px. how : in words, '' where it stays.
+    place : column and row, px. how : in words, '' where it stays. number : that a coded target has; None without.
     """
 
     place: tuple[float, float]
     how: str
+    number: int | None = None
 
 
 def snapped(
@@ -54,6 +56,10 @@ def snapped(
     left, top = corner_of(place, PIECE_PX)
     piece = pictures.grey(image, left, top, PIECE_PX)
     near = np.array(place) - (left, top)
+    coded = next((one for one in find_coded(piece) if one.covers(near)), None)
+    if coded is not None:
+        at = (float(coded.place[0]) + left, float(coded.place[1]) + top)
+        return Snapped(at, f"coded target {coded.number} ({coded.family}), σ {coded.sigma_px:.2f} px", coded.number)
     target = find_target(piece, (float(near[0]), float(near[1])), TARGET_REACH_PX)
     if target is not None:
         at = (target.place[0] + left, target.place[1] + top)
