@@ -1,8 +1,8 @@
 """A block simulated part by part: as large as one likes, never held whole.
 
 Photographs, their start values and positions, the ground and the control points are those that `simulate` makes of the
-same plan and seed. Tie points are drawn for every part by itself, from random numbers of its own: the ground is cut into
-cells, and a point belongs, with all its rays, to the part on whose cell it lies.
+same plan and seed. Tie points are drawn for every part by itself, from random numbers of its own: the ground is cut
+into cells, and a point belongs, with all its rays, to the part on whose cell it lies.
 """
 
 from __future__ import annotations
