@@ -157,6 +157,7 @@ def _written(folder: Path) -> Written:
     (folder / "tiny.toml").write_text(TINY)
     tiny = run("simulate", folder / "tiny.toml", "--render", "--seed", "3", out="tiny")
     result = run("adjust", tiny, "--no-plots", out="result")
+    run("simulate", folder / "tiny.toml", "--parts", 2, out="tiny_parts")
     (folder / "rigged.toml").write_text(RIGGED)
     rigged = run("simulate", folder / "rigged.toml", "--seed", "3", out="rigged")
     of_rig = run("adjust", rigged, "--no-plots", out="rig_result")

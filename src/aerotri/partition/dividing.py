@@ -81,14 +81,10 @@ def part_of(block: Block, division: Division, number: int) -> Block:
             gnss, image=row[gnss.image[taken]], xyz=gnss.xyz[taken], sigma=gnss.sigma[taken], time=gnss.time[taken],
             angles=gnss.angles[taken], angles_sigma=gnss.angles_sigma[taken],
         )  # fmt: skip
-    of = block.images
     return replace(
         block,
         name=f"{block.name} part {number}",
-        images=replace(
-            of, names=of.names[images], camera=of.camera[images], strip=of.strip[images], centre=of.centre[images],
-            angles=of.angles[images], columns={name: column[images] for name, column in of.columns.items()},
-        ),
+        images=block.images.take(images),
         points=block.points[points],
         image_points=replace(
             rays, image=row[rays.image[own_rays]], point=point_row[rays.point[own_rays]], xy=rays.xy[own_rays],
