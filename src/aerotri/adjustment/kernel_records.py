@@ -49,10 +49,10 @@ class Table(NamedTuple):
 
     Parameters
     ----------
-    lens_columns : (L, 15) or (L, 24), as `linearise_ray` needs, shared parameter of every interior element, −1 where it
-        is none.
+    lens_columns : (L, 0), (L, 15) or (L, 24), as `linearise_ray` needs, shared parameter of every interior element, −1
+        where it is none.
     eo_free : (n, 6) 1 or 0.
-    turn : (n, 3, 3) basis of the small rotations.
+    turn : (n, 3, 3) basis of the small rotations; (0, 3, 3) where it is the identity for all.
     kept : (P,) first shared parameter of a point that is not eliminated, −1 otherwise.
     """
 

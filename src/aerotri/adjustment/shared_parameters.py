@@ -105,9 +105,11 @@ class LensTable:
 
     @property
     def used_columns(self) -> np.ndarray:
-        """(L, 15) or (L, 24), `columns` without those that no camera of the block needs."""
+        """(L, 0), (L, 15) or (L, 24), `columns` without those that no camera of the block needs."""
         needed = self.base[:, USUAL:-1].any() or (self.columns[:, USUAL:] >= 0).any()
-        return self.columns if needed else np.ascontiguousarray(self.columns[:, :USUAL])
+        if needed:
+            return self.columns
+        return np.ascontiguousarray(self.columns[:, : USUAL if (self.columns >= 0).any() else 0])
 
 
 def group_of_images(block: Block) -> np.ndarray:
