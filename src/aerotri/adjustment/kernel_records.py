@@ -220,7 +220,7 @@ class Pattern(NamedTuple):
 
 
 class Coupling(NamedTuple):
-    """Of one point: H over its photographs (q, 6, 3) and shared parameters (s, 3), and Q_pp (3, 3)."""
+    """Of one point: H transposed over its photographs (q, 3, 6), H over shared parameters (s, 3), and Q_pp (3, 3)."""
 
     h: np.ndarray
     h_shared: np.ndarray
