@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.adjustment import _pair_kernels
 from aerotri.adjustment.dissection import bisect
+from aerotri.adjustment.photograph_pairs import photograph_pairs
 from aerotri.conventions import InputError
 from aerotri.observations import Block
 
@@ -130,11 +130,8 @@ def _rays_by_point(block: Block) -> tuple[np.ndarray, np.ndarray]:
 
 def _neighbours(image: np.ndarray, start: np.ndarray, n: int) -> np.ndarray:
     """(e, 2) pairs of photographs that share a point, each once."""
-    counts = np.diff(start)
-    codes = np.empty(int(np.sum(counts * (counts - 1) // 2)), dtype=np.int64)
-    _pair_kernels.enumerate_pairs(start, image, n, codes)
-    codes = np.unique(codes)
-    return np.column_stack([codes // n, codes % n])
+    pairs = photograph_pairs(start, image, n)
+    return np.column_stack([pairs.first, pairs.second])
 
 
 def _with_points(block: Block, image: np.ndarray, start: np.ndarray, of_image: np.ndarray, count: int) -> Division:
