@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from aerotri.quantiles import chi_square_exceedance, chi_square_quantile, f_exceedance, normal_quantile, student_quantile
+from aerotri.quantiles import (
+    chi_square_exceedance,
+    chi_square_quantile,
+    f_exceedance,
+    normal_quantile,
+    student_quantile,
+)
 
 
 @pytest.mark.parametrize("p", [1e-6, 0.0005, 0.3, 0.8, 0.9995])
