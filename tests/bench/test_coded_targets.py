@@ -78,8 +78,7 @@ VIEWS = [(0.0, 0.0), (0.5, 0.3), (2.1, 0.7), (-1.2, 0.9)]
 
 
 @pytest.mark.parametrize(("family", "dictionary", "bits", "number"), SQUARES)
-@pytest.mark.parametrize(("turn", "tilt"), VIEWS)
-@pytest.mark.parametrize("half", [26.0, 50.0])
+@pytest.mark.parametrize(("turn", "tilt", "half"), [(*VIEWS[0], 26.0), (*VIEWS[2], 26.0), (*VIEWS[3], 50.0)])
 def test_square_is_read_where_it_is(family, dictionary, bits, number, turn, tilt, half):
     centre = np.array([80.37, 78.81])
     piece = photographed(square(dictionary, bits, number), perspective(centre, half, turn, tilt), 4.0, number)
@@ -90,8 +89,7 @@ def test_square_is_read_where_it_is(family, dictionary, bits, number, turn, tilt
 
 
 @pytest.mark.parametrize(("bits", "number"), [(12, 1), (12, 60), (12, 146), (14, 300)])
-@pytest.mark.parametrize(("turn", "tilt"), VIEWS)
-@pytest.mark.parametrize("half", [24.0, 50.0])
+@pytest.mark.parametrize(("turn", "tilt", "half"), [(*VIEWS[0], 24.0), (*VIEWS[1], 50.0), (*VIEWS[3], 24.0)])
 @pytest.mark.parametrize("inverted", [False, True])
 def test_ring_is_read_where_it_is(bits, number, turn, tilt, half, inverted):
     centre = np.array([79.12, 80.66])
@@ -118,7 +116,7 @@ def test_no_ring_is_read_as_another(bits):
     assert read > len(codes) / 2
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("smooth", [1.0, 2.5, 5.0])
 def test_texture_has_no_number(seed, smooth):
     rng = np.random.default_rng(seed)

@@ -19,8 +19,10 @@ from aerotri.bench.next_mark import NextMark, next_marks
 from aerotri.bench.pictures import Pictures
 from aerotri.bench.places import Places
 from aerotri.bench.plan import ellipse_content, plan_content, plan_origin
+from aerotri.bench.prediction import Prediction
 from aerotri.bench.rays import MOST_ROWS, chosen_rays, order_of_rays, point_content, ray_rows
 from aerotri.bench.records import read_records, records_of_block
+from aerotri.bench.rough_prediction import RoughPrediction, rough_prediction
 from aerotri.bench.snap import snapped
 from aerotri.bench.target_search import point_of_number, targets_of_photograph
 from aerotri.conventions import InputError
@@ -69,6 +71,7 @@ class Bench:
             self.order = order_of_rays(records)
             self.generation += 1
             self.equations = Equations(result)
+            self._rough = rough_prediction(records.block) if result is None else None
 
     def summary(self) -> dict[str, Any]:
         """What the head of the page says."""
@@ -80,7 +83,8 @@ class Bench:
             "limit": spread(r.w) * critical_value(r.block.settings.adjustment.alpha), "counts": r.block.counts,
             "crs": r.block.crs, "generation": self.generation,
             "sizes": [list(camera.size_px) for camera in r.block.cameras], "camera": r.block.images.camera.tolist(),
-            "compared": self._before is not None, "pictures": sorted(self.pictures.paths()),
+            "is_rough": self._rough is not None, "compared": self._before is not None,
+            "pictures": sorted(self.pictures.paths()),
         }  # fmt: skip
 
     def state(self) -> dict[str, Any]:
@@ -132,7 +136,7 @@ class Bench:
         row = self._row(image, len(block.images), "photograph")
         rows = np.flatnonzero(block.image_points.image == row)
         control, expected = block.control.point, list[Any]()
-        prediction = self.equations.prediction()
+        prediction = self._prediction()
         if prediction is not None and len(control):
             xyz = np.where(np.isnan(self.records.xyz[control]), block.control.xyz, self.records.xyz[control])
             px = prediction.pixels(row, xyz)
@@ -244,7 +248,7 @@ class Bench:
             raise InputError("the place is not in the photograph", "click inside of it")
         name, how, number = _name(point), "", None
         if snap and row in self.pictures:
-            found = snapped(self.pictures, row, place, self._others(name), self.equations.prediction(), self._xyz(name))
+            found = snapped(self.pictures, row, place, self._others(name), self._prediction(), self._xyz(name))
             place, how, number = found.place, found.how, found.number
         said = " ".join(filter(None, (reason, how)))
         decided = self._decide(Decision(MARK, self._image(row), name, place, self._place(row, name), said))
@@ -411,9 +415,13 @@ class Bench:
             self.decisions.add(decision)
             return self.edits()
 
+    def _prediction(self) -> Prediction | RoughPrediction | None:
+        """Where points appear: by the adjustment, before the first one by what is given; None where neither is."""
+        return self.equations.prediction() or self._rough
+
     def _expected(self, point: int) -> list[Any]:
         """Photograph, column and row of everywhere that a point should appear."""
-        prediction, xyz = self.equations.prediction(), self._xyz(str(self.records.block.points[point]))
+        prediction, xyz = self._prediction(), self._xyz(str(self.records.block.points[point]))
         if prediction is None or xyz is None or not np.isfinite(xyz).all():
             return []
         return [

@@ -11,6 +11,7 @@ from aerotri.bench.coded_targets import find_coded
 from aerotri.bench.matching import HALF_PX, Match, match, sampled_window
 from aerotri.bench.pictures import Pictures, corner_of
 from aerotri.bench.prediction import Prediction
+from aerotri.bench.rough_prediction import RoughPrediction
 from aerotri.bench.targets import find_target
 from aerotri.conventions import counted
 
@@ -38,7 +39,7 @@ class Snapped:
 
 def snapped(
     pictures: Pictures, image: int, place: tuple[float, float], others: Sequence[tuple[int, np.ndarray]],
-    prediction: Prediction | None, xyz: np.ndarray | None,
+    prediction: Prediction | RoughPrediction | None, xyz: np.ndarray | None,
 ) -> Snapped:  # fmt: skip
     """The place of a mark; the one given where there is neither a target nor a match.
 
@@ -95,7 +96,9 @@ def _matched(
     return None if template is None else match(piece, near, template, affine, MATCH_REACH_PX)
 
 
-def _affine(prediction: Prediction | None, image: int, other: int, xyz: np.ndarray | None) -> np.ndarray:
+def _affine(
+    prediction: Prediction | RoughPrediction | None, image: int, other: int, xyz: np.ndarray | None
+) -> np.ndarray:
     """(2, 2) offsets in one photograph per offset in the other, on level ground about it; unity where unknown."""
     if prediction is None or xyz is None or not np.isfinite(xyz).all():
         return np.eye(2)

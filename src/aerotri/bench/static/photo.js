@@ -77,7 +77,7 @@ export class Photo {
       choice("", { "": "photograph", ...names }, image, guarded(value => value === "" ? null : this.bench.chooseImage(+value))),
       ...(this.content ? [button("◂", turn(-1), "photograph before"), button("▸", turn(1), "next photograph")] : []),
       mark, find, ...this.targetButtons(), set("snap", "snap", "A mark is moved to where the other photographs of the point, or a target, say it is"),
-      set("marks", "marks"), set("predicted", "predicted"), set("residuals", "residuals"),
+      set("marks", "marks"), set("predicted", this.bench.summary && this.bench.summary.is_rough ? "predicted (roughly)" : "predicted", "Where points should appear; before the first adjustment by start values, or by positions and attitudes of GNSS and INS"), set("residuals", "residuals"),
       slider("×k", 0, 3, Math.log10(this.times), value => { this.times = 10 ** value; this.surface.redraw(); }, "How much larger residuals are drawn"),
       set("epipolar", "epipolar lines", "Rays of the chosen point in other photographs"), set("names", "names"),
       tune("brightness", "brightness"), tune("contrast", "contrast"),
