@@ -135,7 +135,8 @@ class JointFiles(WorkFiles):
 
     def inverse(self, border: int) -> DenseFront:
         """The inverse over the front."""
-        return DenseFront(*(self.array(f"{INVERSE}_{part}") for part in ("top", "low", "rest")), border)
+        top, low, rest = (self.array(f"{INVERSE}_{part}") for part in ("top", "low", "rest"))
+        return DenseFront(top, low, rest, border)
 
     def drop_inverse(self) -> None:
         self.drop(*(f"{INVERSE}_{part}" for part in ("top", "low", "rest")))
