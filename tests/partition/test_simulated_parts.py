@@ -85,7 +85,7 @@ def test_the_same_seed_gives_the_same_parts(folder, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"towers": {"per_image": 1, "height_m": [5.0, 10.0]}}, "towers in a block simulated in parts"),
+        ({"towers": {"per_image": 1, "height_m": 10.0}}, "towers in a block simulated in parts"),
         ({"tie_points": {"per_image": 80, "sigma_um": 1.2, "distribution": "nodes"}}, "the distribution 'nodes'"),
         ({"start_values": {"kind": "none"}}, "has no orientation to begin with"),
     ],
