@@ -8,6 +8,7 @@ a `Factor` is therefore valid until the next one of the same `Symbolic`.
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -432,13 +433,15 @@ class Factor:
             self._inverse_front(k, own, out.corner if above is None else above.parts)
             self._gather(k, own.parts, out, by_image, by_border)
 
+        room = threading.local()
+
         def down_a_branch(b: int) -> None:
+            of_depth = room.__dict__.setdefault("of_depth", dict[int, Buffers]())
             branch = s.schedule.branches[b]
-            of_depth = {depth: Buffers() for depth in {s.fronts[k].depth for k in branch}}
             for k in reversed(branch):
-                front = s.fronts[k]
-                above = of_depth.get(front.depth - 1)
-                invert(k, of_depth[front.depth], trunk[front.parent] if above is None else above)
+                depth = s.fronts[k].depth
+                above = trunk[s.fronts[k].parent] if k == branch[-1] else of_depth[depth - 1]
+                invert(k, of_depth.setdefault(depth, Buffers()), above)
 
         s.schedule.down_the_trunk(lambda k: invert(k, trunk[k], trunk.get(s.fronts[k].parent)))
         s.schedule.over_branches(down_a_branch)
@@ -500,7 +503,7 @@ class Buffers:
     def matrix(self, name: str, rows: int, columns: int) -> np.ndarray:
         """An uninitialised Fortran-ordered matrix."""
         if name not in self._memory or len(self._memory[name]) < rows * columns:
-            self._memory[name] = np.zeros(rows * columns)
+            self._memory[name] = np.empty(rows * columns)
         return self._memory[name][: rows * columns].reshape(rows, columns, order="F")
 
 
