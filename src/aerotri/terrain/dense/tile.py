@@ -38,6 +38,8 @@ pairs in a row cannot match, water or what trees hide, a third will not."""
 SMALLEST_PATCH, PATCH_STEP_PX = 50, 2.0
 """Cells of a patch of surface below which it is taken for chance, and the step, in pixels of parallax, that bounds it;
 chosen [C]: five by ten cells, the size of a window of the matching and its neighbours."""
+MARGIN_CELLS = 8
+"""By which a tile is measured beyond its edge, where steps and patches that reach into it are looked for."""
 MOST_LAGS = 12
 """Cells up to which the noise of neighbouring cells is looked at for what they share."""
 FEWEST_MISFITS = 500
@@ -90,6 +92,8 @@ def measure_tile(
         When a photograph cannot be read.
     """
     nodes, low_z, high_z = heights.within(grid)
+    inside = grid
+    grid = grid.window(-MARGIN_CELLS, -MARGIN_CELLS, grid.rows + 2 * MARGIN_CELLS, grid.columns + 2 * MARGIN_CELLS)
     z = 0.5 * (low_z + high_z)
     middle = np.array([*nodes.mean(axis=0), float(np.median(z))])
     reach = 0.5 * float(np.hypot(grid.columns * grid.cell_x, grid.rows * grid.cell_y)) + float(np.ptp([low_z, high_z]))
@@ -100,7 +104,7 @@ def measure_tile(
     matched = [m for pair in chosen_pairs(candidates, options.pairs) if (m := work.match(pair)) is not None]
     if options.refine and matched:
         matched += _fill_holes(work, candidates, matched, nodes)
-    shape = grid.rows, grid.columns
+    shape = inside.rows, inside.columns
     if not matched:
         empty = np.full(shape, np.nan)
         return TileSurface(
@@ -117,7 +121,9 @@ def measure_tile(
     numbers = np.array([[p.left, p.right] for p in used])
     tolerance = AGREEING_PX * metres_per_pixel(place, used, options.level)
     fused = _fused(place, used, layers, middle[2], tolerance)
-    return TileSurface(*fused, numbers, np.array([m.across for m in matched]), _shared_cells(layers))
+    *maps, factor = fused
+    m = MARGIN_CELLS
+    return TileSurface(*(a[m:-m, m:-m].copy() for a in maps), factor, numbers, np.array([m.across for m in matched]), _shared_cells(layers))
 
 
 @dataclass(frozen=True, eq=False)
