@@ -217,7 +217,7 @@ def semi_global_surface(result: aerotri.Adjustment, photographs: Path) -> DenseS
     def theirs(images, refine: bool = True) -> Parallaxes:
         value = semi_global(images)
         sigma = np.where(np.isfinite(value), np.float32(0.3), np.float32(np.nan))
-        return Parallaxes(value, sigma, np.zeros_like(value), 0.0, 1.0)
+        return Parallaxes(value, sigma, 0.0, 1.0)
 
     tile.parallaxes_of = theirs
     try:
