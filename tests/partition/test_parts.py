@@ -192,11 +192,14 @@ def test_files_are_the_same_wherever_parts_are_computed(divided, tmp_path):
 def test_a_worker_killed_in_mid_run_changes_nothing(divided, tmp_path, monkeypatch):
     """Of every kind of task one is killed, in the same run."""
     aerotri.adjust_parts(divided, tmp_path / "threads")
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    monkeypatch.setenv(killed_parts.MARKS, str(marks))
     for name, function in killed_parts.KILLED.items():
         place = next(module for module in (course, joints, adjusting) if hasattr(module, name))
         monkeypatch.setattr(place, name, function)
     aerotri.adjust_parts(divided, tmp_path / "killed_result", executor="processes:2")
-    assert all((tmp_path / f"killed_{name}").exists() for name in killed_parts.KILLED)
+    assert {path.name for path in marks.iterdir()} == set(killed_parts.KILLED)
     assert tables_of(tmp_path / "killed_result") == tables_of(tmp_path / "threads")
 
 
