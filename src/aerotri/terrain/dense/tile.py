@@ -87,7 +87,7 @@ def measure_tile(
         When a photograph cannot be read.
     """
     nodes, low_z, high_z = heights.within(grid)
-    shape = grid.rows, grid.columns
+    inside, shape = grid, (grid.rows, grid.columns)
     cell_px = grid.cell_x / (float(np.median(photographs.gsd)) * 2**options.level)
     spare = int(np.ceil(MARGIN_PX / cell_px))
     grid = grid.window(-spare, -spare, grid.rows + 2 * spare, grid.columns + 2 * spare)
@@ -100,7 +100,7 @@ def measure_tile(
     work = _TileMatching(place, store, grid, options.level, options.refine, (ground, low, high))
     matched = [m for pair in chosen_pairs(candidates, options.pairs) if (m := work.match(pair)) is not None]
     if options.refine and matched:
-        matched += _fill_holes(work, candidates, matched, nodes)
+        matched += _fill_holes(work, candidates, matched, nodes, inside)
     if not matched:
         empty = np.full(shape, np.nan)
         return TileSurface(
@@ -155,19 +155,22 @@ class _TileMatching:
 
 
 def _fill_holes(
-    work: _TileMatching, candidates: list[Candidate], matched: list[_Matched], nodes: np.ndarray
+    work: _TileMatching, candidates: list[Candidate], matched: list[_Matched], nodes: np.ndarray, inside: Grid
 ) -> list[_Matched]:
     """More pairs, one after the other, where cells have no height that other photographs may show.
 
     Parameters
     ----------
-    nodes : (n, 2) m, X and Y of the places at which the candidates were looked at.
+    nodes : (n, 2) m, X and Y of the places at which the candidates were looked at. inside : the tile without what it
+        is measured beyond its edge: holes there are another tile's.
     """
+    spare = (work.grid.rows - inside.rows) // 2
+    own = slice(spare, spare + inside.rows), slice(spare, spare + inside.columns)
     more: list[_Matched] = []
     tried = [m.pair for m in matched]
-    holes = np.all([np.isnan(m.layer[0]) for m in matched], axis=0)
+    holes = np.all([np.isnan(m.layer[0][own]) for m in matched], axis=0)
     while len(tried) < kernels.MOST_PAIRS:
-        found = pair_for_holes(candidates, tried, _holes_at(holes, work.grid, nodes))
+        found = pair_for_holes(candidates, tried, _holes_at(holes, inside, nodes))
         if found is None:
             break
         pair, hoped = found
@@ -175,7 +178,7 @@ def _fill_holes(
         one = work.match(pair)
         if one is None:
             continue
-        left = holes & np.isnan(one.layer[0])
+        left = holes & np.isnan(one.layer[0][own])
         filled = float((holes & ~left).mean())
         if filled > 0.0:
             more.append(one)
