@@ -50,6 +50,8 @@ def of_model_part(adjusted: AdjustedBlock) -> list[Finding]:
         return [Finding(name, value, text, said, "attention")]
     if part.counts:
         growth = 100.0 * (max(part.ratio_plan, part.ratio_height) - 1.0)
-        says = f"more than noise explains. The total σ contain it; of half the points they are {growth:.0f} % larger at most"
+        says = (
+            f"more than noise explains. The total σ contain it. They are {growth:.0f} % larger (median of the points)"
+        )
         return [Finding(name, value, text, says, "note")]
     return [Finding(name, value, text, "the noise explains them", "good")]
