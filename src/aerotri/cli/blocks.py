@@ -103,7 +103,7 @@ def simulate(
         int | None,
         typer.Option(
             min=2,
-            help="Write a block in so many parts, never holding it whole; adjust computes it part by part.",
+            help="Number of parts in which the block is written, never held whole; adjust computes it part by part.",
             rich_help_panel=METHOD,
         ),
     ] = None,
