@@ -5,6 +5,9 @@ one in one piece, one in parts by a number of processes. Memory is the peak of t
 step changes nothing that matters, and not at the same place: the numbers are compared once more where both go on until
 only rounding is left. Prints Markdown.
 
+Measures where an adjustment ends with another stopping rule, which no command has: it looks within the package on
+purpose.
+
     python tools/prove/parts.py FOLDER --photographs 2282 --parts 4 --processes 2 > tools/results/parts.md
 """
 

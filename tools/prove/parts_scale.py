@@ -4,6 +4,8 @@ UltraCamD, 60/30 %, positions of the projection centres, Brown's parameters, 40 
 memory is that of this program and its processes together (proportional set size), looked at every second; the files are
 those that parts and joints exchange. What the tree lets expect stands beside. Prints Markdown.
 
+Measures the fronts of the tree beside the memory, which no command prints: it looks within the package on purpose.
+
     python tools/prove/parts_scale.py FOLDER --photographs 250000 --parts 250 > tools/results/parts_scale.md
 """
 
