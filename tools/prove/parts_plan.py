@@ -3,7 +3,7 @@
 Photographs stand on a grid (80/40 %: each has points in common with the four before and behind it, and with those of
 the strips beside it). The cuts, the part in the middle, and the tree over the parts are those of the program; nothing
 is computed but which numbers there would be, so it looks inside the package on purpose. Measured sizes stand in
-tools/results/parts.md and parts_scale.md. Prints Markdown.
+tools/results/parts.md and docs/validation/speed.md. Prints Markdown.
 
     python tools/prove/parts_plan.py > tools/results/parts_plan.md
 """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.bench.json_record import read_record
 from aerotri.bench.plain import numbers
 from aerotri.conventions import InputError
 from aerotri.formats.text.tables import Columns, read_table
@@ -46,8 +46,8 @@ def read_flight(folder: Path) -> FlightRecord:
     InputError
         Where a file is missing or damaged.
     """
-    outcome = _json(folder / RECORD)
-    request = _json(folder / REQUEST) if (folder / REQUEST).is_file() else {}
+    outcome = read_record(folder / RECORD, "a plan", REMEDY)
+    request = read_record(folder / REQUEST, "a plan", REMEDY) if (folder / REQUEST).is_file() else {}
     return FlightRecord(folder, outcome, request)
 
 
@@ -127,13 +127,3 @@ def _waypoints(path: Path) -> Any:
     table = read_table(path, COLUMNS)
     table.require("image", "strip", "X", "Y", "Z", "height_above_ground_m", "heading_deg")
     return table
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, OSError, RecursionError) as error:
-        raise InputError(f"cannot be read: {error}", REMEDY, path) from None
-    if not isinstance(content, dict):
-        raise InputError("is no record of a plan", REMEDY, path)
-    return content
