@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem, RightSide
 from aerotri.adjustment.robust import LEAST_SQUARES
-from aerotri.adjustment.steps import COST_TOLERANCE, Place, Trial, place_at
+from aerotri.adjustment.steps import COST_TOLERANCE, Place, Trial, assembled, place_at
 from aerotri.adjustment.stopping import is_negligible
 
 SLOWEST_CONTRACTION = 1e-2
@@ -57,7 +57,7 @@ def follow(system: NormalSystem, first: Trial, redundancy: int, most: int, say: 
         if settled:
             break
     if not costs:
-        return Followed(first.place, first.decrement)
+        return Followed(assembled(system, first.place), first.decrement)
     if settled and isinstance(side, NormalEquations):
         return Followed(Place(state, side, LEAST_SQUARES), decrement, tuple(costs), True)
     return Followed(place_at(system, state, LEAST_SQUARES), decrement, tuple(costs), settled)

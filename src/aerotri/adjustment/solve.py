@@ -21,7 +21,16 @@ from aerotri.adjustment.parallel import blas_threads
 from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for
 from aerotri.adjustment.secants import Secants
 from aerotri.adjustment.sparse_cholesky import Factor
-from aerotri.adjustment.steps import Place, Trial, lengthened, place_at, stretched, take_step, until_better
+from aerotri.adjustment.steps import (
+    Place,
+    Trial,
+    assembled,
+    lengthened,
+    place_at,
+    stretched,
+    take_step,
+    until_better,
+)
 from aerotri.adjustment.stopping import (
     BENT_STEP_TOLERANCE,
     EARLY_STEP_TOLERANCE,
@@ -36,8 +45,8 @@ otherwise alternate for ever."""
 
 Report = Callable[[int, float, float], None]
 Inspect = Callable[[NormalSystem, State, NormalEquations, Estimator, int, bool], bool]
-"""Asked before the first step (iteration 0) and after every one, whether to stop; the last argument tells that a pivot
-has nearly vanished."""
+"""Asked before the first step (iteration 0) and after every one whose equations are assembled, whether to stop; the
+last argument tells that a pivot has nearly vanished."""
 INTERRUPTED = "interrupted"
 
 
@@ -181,8 +190,11 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
         settled = is_plain and is_settled(at, step, redundancy, stage.robust_tolerance, last_decrement)
         last_decrement = step.decrement if is_plain else np.inf
         damping = damping.lowered(step.gain_ratio(at.equations), secants is not None)
-        at = step.place
-        course.add(at.equations.cost, damping.value)
+        course.add(step.equations.cost, damping.value)
+        if is_plain and not (stage.is_robust or settled) and step.is_within_scatter:
+            at, last_decrement, settled = _followed(system, step, redundancy, last_iteration, course)
+        else:
+            at = assembled(system, step.place)
         may_change = at.estimator.is_robust and scale_changes < MAX_SCALE_CHANGES
         fresh = _reweighted(system, at, stage.name, redundancy) if may_change else at
         if fresh is not at:
@@ -192,10 +204,6 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
             return replace(course.ended("converged", at), step_tolerance=stage.step_tolerance)
         if _is_stopped(system, at, options, course.iteration - stage.done):
             return course.ended(INTERRUPTED, at)
-        if is_plain and not stage.is_robust and step.is_within_scatter:
-            at, last_decrement, settled = _followed(system, step, redundancy, last_iteration, course)
-            if settled:
-                return course.ended("converged", at)
     return course.ended("not converged", at)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerotri.adjustment.damping import LAST_DAMPING, Damping
-from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem, RightSide
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.secants import Secants
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
@@ -43,26 +43,33 @@ lengthened by: beyond a contraction of .8 the ratio of two steps is too uncertai
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
-    """Where the adjustment stands: the state, the undamped equations there, and the estimator of their weights."""
+class Visited:
+    """Where a step leads: the state, the right side of the undamped equations there, the estimator of their weights."""
 
     state: State
-    equations: NormalEquations
+    equations: RightSide
     estimator: Estimator
+
+
+@dataclass(frozen=True, eq=False)
+class Place(Visited):
+    """Where the adjustment stands: as `Visited`, with the whole equations."""
+
+    equations: NormalEquations
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
     """A step that was tried: the place it leads to, the decrement it promised, and what it was solved with."""
 
-    place: Place
+    place: Visited
     decrement: float
     factor: Factor
     move: Step
     points_settled: bool = False
 
     @property
-    def equations(self) -> NormalEquations:
+    def equations(self) -> RightSide:
         return self.place.equations
 
     @property
@@ -79,16 +86,16 @@ class Trial:
         """(6·n + s,) the step of photographs and shared parameters."""
         return np.concatenate([self.move.images.ravel(), self.move.shared])
 
-    def improves(self, before: NormalEquations) -> bool:
+    def improves(self, before: RightSide) -> bool:
         """Whether the cost is no higher; at the minimum it stands still within rounding."""
         return bool(np.isfinite(self.equations.cost)) and self.equations.cost <= before.cost * (1.0 + COST_TOLERANCE)
 
-    def keeps_promise(self, before: NormalEquations) -> bool:
+    def keeps_promise(self, before: RightSide) -> bool:
         """Whether it gains at least a share of what photographs and shared parameters promised, within rounding."""
         gain, promised = before.cost - self.equations.cost, float(self.reduced @ before.right)
         return self.improves(before) and gain >= LEAST_GAIN * promised - COST_TOLERANCE * before.cost
 
-    def gain_ratio(self, before: NormalEquations) -> float:
+    def gain_ratio(self, before: RightSide) -> float:
         """The gain over the gain promised, 1 at most."""
         return min((before.cost - self.equations.cost) / max(self.decrement, 1e-300), 1.0)
 
@@ -157,6 +164,11 @@ def place_at(system: NormalSystem, state: State, estimator: Estimator) -> Place:
     return Place(state, system.assemble(state, 0.0, estimator), estimator)
 
 
+def assembled(system: NormalSystem, visited: Visited) -> Place:
+    """The place with its whole equations, assembled where they are not."""
+    return visited if isinstance(visited, Place) else place_at(system, visited.state, visited.estimator)
+
+
 def _tried(system: NormalSystem, at: Place, factor: Factor, damping: float, secants: Secants | None) -> Trial | None:
     """The step by this factor; with secants an undamped one heeds them, and the points are led to their minimum."""
     right = at.equations.right
@@ -168,6 +180,11 @@ def _tried(system: NormalSystem, at: Place, factor: Factor, damping: float, seca
     there = system.unknowns.advance(at.state, move)
     if secants is not None:
         there = system.settle_points(there, at.estimator)
+    # a step with the same factor follows: it needs no matrix
+    chord = secants is None and damping == 0.0 and not at.estimator.is_robust
+    if chord and abs(decrement) <= at.equations.cost - decrement and factor.smallest_pivot >= SUSPECT_PIVOT:
+        side = system.right_side(there, at.estimator)
+        return Trial(Visited(there, side, at.estimator), decrement, factor, move)
     return Trial(place_at(system, there, at.estimator), decrement, factor, move, secants is not None)
 
 
