@@ -56,7 +56,7 @@ def of_depths(adjusted: AdjustedBlock) -> list[Finding]:
 
 
 def of_turns(adjusted: AdjustedBlock) -> list[Finding]:
-    """Photographs turned far from the angles given: doubtful only, for the result may be right all the same."""
+    """Photographs turned far from their start values: doubtful only, for the result may be right all the same."""
     order = adjusted.block.rotation
     given = rotation_from_angles(adjusted.block.images.angles, order)
     found = rotation_from_angles(adjusted.images.angles, order)
@@ -67,13 +67,13 @@ def of_turns(adjusted: AdjustedBlock) -> list[Finding]:
         return []
     value = f"{len(turned)} of {int(np.isfinite(turn).sum())}"
     angle, names = float(np.median(turn[turned])), some(adjusted.block.images.names[turned])
-    reason = f"{value} photographs were turned by about {angle:.0f}° from the angles given ({names})"
+    reason = f"{value} photographs were turned by about {angle:.0f}° from their start values ({names})"
     expected = f"by less than {TURNED_DEG:.0f}°"
-    return doubt("photographs turned from the angles given", value, expected, "doubtful", reason)
+    return doubt("photographs turned from their start values", value, expected, "doubtful", reason)
 
 
 def of_ways(adjusted: AdjustedBlock) -> list[Finding]:
-    """Photographs moved far from the position given; doubtful only, as in `of_turns`."""
+    """Photographs moved far from their start values; doubtful only, as in `of_turns`."""
     way = np.linalg.norm(adjusted.images.centre - adjusted.block.images.centre, axis=1)
     usual = usual_distance(adjusted)
     moved = np.flatnonzero(way > MOVED * usual)
@@ -82,8 +82,8 @@ def of_ways(adjusted: AdjustedBlock) -> list[Finding]:
     value = f"{len(moved)} of {int(np.isfinite(way).sum())}"
     names = some(adjusted.block.images.names[moved])
     reason = (
-        f"{value} photographs were moved by up to {way[moved].max():.3g} m from the position given, {usual:.3g} m from "
+        f"{value} photographs were moved by up to {way[moved].max():.3g} m from their start values, {usual:.3g} m from "
         f"the ground ({names})"
     )
     expected = f"by less than {MOVED * usual:.3g} m"
-    return doubt("photographs moved from the position given", value, expected, "doubtful", reason)
+    return doubt("photographs moved from their start values", value, expected, "doubtful", reason)
