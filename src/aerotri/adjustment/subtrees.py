@@ -19,8 +19,9 @@ T = TypeVar("T")
 TRUNK = 3
 """Levels of the tree that are worked on one by one [C]: the up to eight subtrees below keep two to eight threads about
 equally busy, though the halves of a cut differ."""
-SMALL_TREE = 2e7
-"""Multiplications in the whole tree below which no threads are begun: a millisecond of work."""
+SMALL_TREE = 1e9
+"""Multiplications in the whole tree below which no threads are begun: some forty milliseconds of work. With fewer, threads
+cost what they gain."""
 
 
 @dataclass(frozen=True, eq=False)
