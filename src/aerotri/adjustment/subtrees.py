@@ -20,8 +20,8 @@ TRUNK = 3
 """Levels of the tree that are worked on one by one [C]: the up to eight subtrees below keep two to eight threads about
 equally busy, though the halves of a cut differ."""
 SMALL_TREE = 1e9
-"""Multiplications in the whole tree below which no threads are begun: some forty milliseconds of work. With fewer, threads
-cost what they gain."""
+"""Multiplications in the whole tree below which no threads are begun: some forty milliseconds of work, of which
+threads gain less than they cost."""
 
 
 @dataclass(frozen=True, eq=False)
