@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from aerotri.adjustment.parallel import thread_count
 from aerotri.conventions import InputError, mm_from_px
 from aerotri.execution.work import Workplace
 from aerotri.formats.assembly import assemble
 from aerotri.formats.assembly.parts import PositionList, Reading, no_sigma
 from aerotri.formats.assembly.reprojection import reproject
+from aerotri.memory import fitting
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Settings
 from aerotri.observations.block import GnssSettings
 from aerotri.tie_points.features import FeatureOptions, Features, features_of
@@ -29,7 +32,7 @@ from aerotri.tie_points.matching import MatchOptions, match_all, neighbours
 from aerotri.tie_points.orientation import Oriented, Progress, in_frame, orient, with_start_values
 from aerotri.tie_points.photographs import LENS, PhotographSet
 from aerotri.tie_points.settings import DEFAULTS
-from aerotri.tie_points.tasks import features_elsewhere, matches_elsewhere
+from aerotri.tie_points.tasks import bytes_of_search, features_elsewhere, matches_elsewhere
 from aerotri.tie_points.tracks import Tracks, join_matches, thin
 from aerotri.tie_points.verification import rays_that_meet
 
@@ -40,7 +43,10 @@ ITERATIONS = 300
 """Iterations that the written settings allow, ten times the default; chosen [C]: start values of a first orientation
 are bent, and Huber's weights settle slowly."""
 MORE_TRACKS = 2
-"""Tracks given to the first orientation over those wanted in the end: some do not stand it."""
+"""Tracks compared with the first orientation over those wanted in the end: some do not stand it."""
+ORIENTING = 500
+"""Points of a photograph that the first orientation is found from [C]: with four times as many it takes more than twice
+as long, and positions fit it as well."""
 
 
 @dataclass(frozen=True)
@@ -142,9 +148,17 @@ def _oriented_tracks(
     size = np.array([photographs.cameras[c].size_px for c in photographs.camera], dtype=float)
     tracks = thin(tracks, _xy(tracks, features), size, MORE_TRACKS * options.points)
     bare = _bare_block(photographs, photographs.cameras, tracks, features)
-    oriented = orient(bare, given, crs, positions, options.matches.seed, progress)
+    few = _with_few_points(bare, tracks, _xy(tracks, features), size)
+    oriented = orient(few, given, crs, positions, options.matches.seed, progress)
     tracks = tracks.chosen(rays_that_meet(oriented.block_of(bare), oriented.centre, oriented.rotation))
     return thin(tracks, _xy(tracks, features), size, options.points), oriented, pairs
+
+
+def _with_few_points(bare: Block, tracks: Tracks, xy: np.ndarray, size: np.ndarray) -> Block:
+    """The block with as many of its points as a first orientation needs, evenly spread, under the names they have."""
+    few = thin(Tracks(tracks.start, tracks.image, np.arange(len(xy))), xy, size, ORIENTING).feature
+    rays = bare.image_points
+    return replace(bare, image_points=ImagePoints(rays.image[few], rays.point[few], rays.xy[few], rays.sigma[few]))
 
 
 def _refuse_bad_lists(photographs: PhotographSet, given: Given, crs: str, positions: PositionList | None) -> None:
@@ -166,11 +180,18 @@ def _features(
 ) -> list[Features]:
     if at is not None:
         features_elsewhere(photographs, options, cache / "features", at, _counted(progress, FEATURES, len(photographs)))
-    found = []
-    for number, path in enumerate(photographs.paths, 1):
-        found.append(features_of(path, options, cache / "features"))
-        if at is None:
-            progress(FEATURES, number, len(photographs))
+    found: list[Features] = []
+    each = max(bytes_of_search(camera, options) for camera in photographs.cameras)
+    threads = int(max(1.0, min(thread_count(), fitting(each))))
+
+    def of(path: Path) -> Features:
+        return features_of(path, options, cache / "features")
+
+    with ThreadPoolExecutor(threads) as pool:
+        for features in pool.map(of, photographs.paths):
+            found.append(features)
+            if at is None:
+                progress(FEATURES, len(found), len(photographs))
     return found
 
 
