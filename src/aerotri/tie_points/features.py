@@ -2,7 +2,8 @@
 
 Positions are found in the whole photograph, or, where it is larger than wanted, in a reduced one. OpenCV counts pixels
 from the centre of the first one, which is 0.5 here; its own shift by a quarter of a pixel, from doubling the
-photograph, is switched off (``enable_precise_upscale``).
+photograph, is switched off (``enable_precise_upscale``). The image is doubled only where its pixels as they are hold
+too few features (`detection`).
 """
 
 from __future__ import annotations
@@ -204,7 +205,8 @@ def _key(path: Path, options: FeatureOptions) -> str:
     import cv2
 
     state = path.stat()
-    told = (path.name, state.st_size, state.st_mtime_ns, options, CONTRAST_THRESHOLD, CELLS, STRETCH, cv2.__version__)
+    sought = (options, CONTRAST_THRESHOLD, ENOUGH, CELLS, STRETCH, cv2.__version__)
+    told = (path.name, state.st_size, state.st_mtime_ns, *sought)
     return hashlib.sha256(repr(told).encode()).hexdigest()
 
 

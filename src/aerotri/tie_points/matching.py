@@ -2,7 +2,8 @@
 
 [L] Descriptors are compared as RootSIFT (Arandjelović and Zisserman 2012); a match has to be the best in both
 directions, and clearly better than the second best in both (Lowe 2004). What one epipolar geometry or one homography
-explains is kept (COLMAP's two-view estimation).
+explains is kept (COLMAP's two-view estimation). The largest features of two photographs are compared first, all with
+all; where these fit one geometry, the others are compared only with those near where it puts them.
 """
 
 from __future__ import annotations
@@ -269,7 +270,7 @@ def _clear(two: np.ndarray, ratio: float) -> np.ndarray:
 
 def _key(one: Features, other: Features, first: Camera, second: Camera, options: MatchOptions) -> str:
     geometry = [(camera.focal_length_mm / camera.pixel_mm, camera.principal_point_mm) for camera in (first, second)]
-    settings = (options.ratio, options.tolerance_px, options.fewest, options.seed)
+    settings = (options.ratio, options.tolerance_px, options.fewest, options.seed, FIRST_LOOK, CELLS, ROOM, NEAR)
     return "k" + hashlib.sha256(repr((one.key, other.key, geometry, settings)).encode()).hexdigest()
 
 
