@@ -35,6 +35,8 @@ INSIDE = {
     "prove/moving/cases.py": "the strips of a track, as an adjustment finds them",
     "prove/moving/flights.py": "the strips of a track, as an adjustment finds them",
     "prove/metamorphic_photographs.py": "the first orientation in orders that no file gives",
+    "prove/parts.py": "lets an adjustment go on until only rounding is left",
+    "prove/parts_scale.py": "the fronts that the tree lets expect, beside the memory that is measured",
     "prove/parts_plan.py": "the plan of a factor and the cuts of a block, without any numbers",
     "prove/runs_elsewhere.py": "hands runs to the executors of the program",
     "prove/starts.py": "times the start without the adjustment that follows",

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from aerotri.public.parts import PartsAdjustment as PartsAdjustment
     from aerotri.public.parts import adjust_parts as adjust_parts
     from aerotri.public.parts import divide as divide
+    from aerotri.public.parts import simulate_parts as simulate_parts
     from aerotri.public.planning import plan_flight as plan_flight
     from aerotri.public.results import adjust as adjust
     from aerotri.public.results import open_result as open_result
@@ -92,6 +93,7 @@ _PLACES = {
     "adjust": "aerotri.public.results",
     "adjust_parts": "aerotri.public.parts",
     "divide": "aerotri.public.parts",
+    "simulate_parts": "aerotri.public.parts",
     "convert": "aerotri.public.converting",
     "example_flight": "aerotri.public.simulating",
     "export": "aerotri.public.exporting",
@@ -161,6 +163,7 @@ __all__ = [
     "read_block",
     "run",
     "simulate",
+    "simulate_parts",
     "terrain",
     "tie_points",
     "volume",

@@ -10,15 +10,26 @@ from __future__ import annotations
 import os
 import time
 from contextlib import suppress
+from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 PATIENCE_S = 60.0
 """For another process to compile a kernel, before it is compiled here; chosen [C]: ten times what the longest takes."""
 LOOK_S = 0.02
 """Between two looks whether the lock is free."""
+
+
+@cache
+def _kernels_as_written() -> str:
+    """A digest of all files of kernels and of the options they are compiled with."""
+    package, digest = Path(__file__).parent, sha256()
+    for path in [package / "compiled.py", *sorted(package.rglob("_*kernels.py"))]:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 class SharedCache(FunctionCache):
@@ -27,6 +38,9 @@ class SharedCache(FunctionCache):
     def __init__(self, function: Any):
         super().__init__(function)
         self._lock: int | None = None
+        # numba looks at the function's own file; kernels of other files stand in its code as well
+        stamp = self._impl.locator.get_source_stamp(), _kernels_as_written()
+        self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What is compiled for the types; None where this process is to compile it, and holds the lock for it."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import chdtrc, chndtrinc, fdtrc, gammaincinv, ndtri, stdtr
+from scipy.special import chdtrc, chndtrinc, fdtrc, gammaincinv, ndtri, stdtr, stdtrit
 
 
 def normal_quantile(probability: float) -> float:
@@ -30,6 +30,11 @@ def f_exceedance(value: float, freedom: float, freedom_below: float) -> float:
 def student_exceedance(value: float, freedom: float) -> float:
     """P(t ≥ value) for Student's t of `freedom` degrees of freedom."""
     return float(stdtr(freedom, -value))
+
+
+def student_quantile(probability: float, freedom: float) -> float:
+    """x with P(t ≤ x) = probability for Student's t of `freedom` degrees of freedom."""
+    return float(stdtrit(freedom, probability))
 
 
 def noncentrality(freedom: float, alpha: float, power: float) -> float:

@@ -19,17 +19,26 @@ def served(bench) -> Iterator[str]:
     import uvicorn
 
     from aerotri.bench.serve import ADDRESS, listening
-    from aerotri.bench.server import make_application, new_token
+    from aerotri.bench.server import new_token
 
     token = new_token()
     with listening(0) as listener:
-        settings = uvicorn.Config(make_application(bench, token), log_level="error", lifespan="off")
+        settings = uvicorn.Config(_pages(bench, token), log_level="error", lifespan="off")
         server = uvicorn.Server(settings)
         thread = threading.Thread(target=server.run, args=([listener],), daemon=True)
         thread.start()
         yield f"http://{ADDRESS}:{listener.getsockname()[1]}/{token}/"
         server.should_exit = True
         thread.join(10)
+
+
+def _pages(bench, token: str):
+    """Those of a result, or of a plan."""
+    from aerotri.bench.flight_bench import FlightBench
+    from aerotri.bench.flight_pages import make_flight_application
+    from aerotri.bench.server import make_application
+
+    return (make_flight_application if isinstance(bench, FlightBench) else make_application)(bench, token)
 
 
 @contextmanager

@@ -129,6 +129,33 @@ def test_next_mark_leads_to_its_place_and_space_is_drawn(page, bench):
     assert p.evaluate(drawn) > 1000
 
 
+def test_new_control_point_is_made_by_marks_in_two_photographs_and_taken_back(page, bench):
+    p = page.page
+    p.click("#tab-fresh")
+    p.fill("#new-name", HOSTILE[0])
+    p.select_option("#sheet select", "new_control")
+    p.click("#new-begin")
+    p.wait_for_selector("#message:not([hidden])")
+    assert "no number" in p.inner_text("#message")
+    for k, value in enumerate(("100.5", "200.25", "30", "0.02", "0.02", "0.03")):
+        p.fill(f"#new-{k}", value)
+    p.click("#new-begin")
+    p.wait_for_selector("body[data-changes='1']")
+    for k in (0, 1):
+        p.select_option("#photo-bar select", str(k))
+        p.wait_for_function(f"bench.photo.content && bench.photo.content.image === {k}")
+        p.click("#set-mark")
+        box = p.locator("#photo").bounding_box()
+        p.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        p.wait_for_selector(f"body[data-changes='{k + 2}']")
+    assert "2 marks" in p.inner_text("#new-marks")
+    assert [one.action for one in bench.decisions.rows] == ["new_control", "mark", "mark"]
+    assert bench.decisions.rows[0].given == (100.5, 200.25, 30.0, 0.02, 0.02, 0.03)
+    for left in (2, 1, 0):
+        p.click("#undo")
+        p.wait_for_selector(f"body[data-changes='{left}']")
+
+
 def test_wrong_token_is_refused(page, chromium):
     other = Watched(chromium)
     answer = other.page.goto(page.address.rsplit("/", 2)[0] + "/wrong/")

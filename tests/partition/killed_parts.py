@@ -2,20 +2,32 @@
 
 import os
 import signal
+from functools import partial
+from pathlib import Path
 
-from aerotri.partition.part_tasks import move_part
+from aerotri.partition.joint_tasks import follow, invert, join
+from aerotri.partition.part_results import measure_part, write_part
+from aerotri.partition.part_tasks import evaluate_part, move_part, prepare_part, reduce_part
+
+MARKS = "AEROTRI_TEST_KILLED"
+"""Names the folder in which a task that kills its process leaves its name, for all processes."""
 
 
-def killed_once(move, task):
-    """The first part of all kills its process when it follows a solution for the first time, a file half written."""
-    begun = task.work.parent.parent.parent / "killed"
+def killed_once(function, shared, task):
+    """The first task of all kills its process the first time, a file half written."""
+    begun = Path(os.environ[MARKS]) / function.__name__
     try:
         begun.touch(exist_ok=False)
     except FileExistsError:
-        return move_part(move, task)
+        return function(shared, task)
+    task.work.mkdir(exist_ok=True)
     (task.work / "state_1.half.part").write_bytes(b"half")
     os.kill(os.getpid(), signal.SIGKILL)
     return None
+
+
+OF_PARTS = (prepare_part, reduce_part, move_part, evaluate_part, measure_part, write_part)
+KILLED = {function.__name__: partial(killed_once, function) for function in (*OF_PARTS, join, follow, invert)}
 
 
 def never(move, task):

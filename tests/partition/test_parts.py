@@ -15,9 +15,10 @@ from aerotri.adjustment.solve import SolveOptions
 from aerotri.diagnosis import judge
 from aerotri.execution.work import TasksFailedError
 from aerotri.formats.block.folder import read_block, write_block
-from aerotri.partition import course
+from aerotri.partition import adjusting, course, joints
 from aerotri.partition.adjusting import part_folders
 from aerotri.partition.dividing import SHARED, divide, part_of
+from aerotri.partition.tree import tree_over
 from aerotri.statistics.summarise import count_observations, summarise
 from small_blocks import LONG_FLIGHT, small_block, with_adjustment
 
@@ -66,7 +67,7 @@ def test_a_division_keeps_points_whole_and_shares_photographs():
         assert measured == {tuple(xy) for xy in rays.xy[of_point]}
 
 
-@pytest.mark.parametrize("parts", [2, 4])
+@pytest.mark.parametrize("parts", [2, 7])
 def test_numbers_are_those_of_one_piece(parts, tmp_path):
     block = flown()
     whole = in_one_piece(block)
@@ -142,6 +143,33 @@ def test_errors_over_sigma_are_normal(tmp_path):
     assert np.abs(np.sqrt(np.mean(np.square(normed), axis=0)) - 1.0).max() < 0.2
 
 
+def grown(columns, rows):
+    """Parts on a grid whose neighbours, also across a corner, share a photograph; where they lie."""
+    corners = [(i, j) for i in range(columns + 1) for j in range(rows + 1)]
+    number = {corner: k for k, corner in enumerate(corners)}
+    parts = [(i, j) for i in range(columns) for j in range(rows)]
+    images = [np.array(sorted(number[i + a, j + b] for a in (0, 1) for b in (0, 1))) for i, j in parts]
+    return images, np.array(parts, dtype=float), len(corners)
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(2, 1), (5, 3), (8, 8)])
+def test_every_shared_photograph_is_eliminated_once_and_when_all_who_see_it_have_met(columns, rows):
+    images, middle, n = grown(columns, rows)
+    tree = tree_over(images, middle, n)
+    assert sorted(tree.rank) == list(range(n))
+    own = np.concatenate([joint.images[: joint.own] for joint in tree.joints])
+    assert np.array_equal(own, np.arange(n))
+    assert not len(tree.joints[-1].rows)
+    assert len(tree.joints) == len(images) - 1
+    parents = tree.parents()
+    for node, above in enumerate(parents[:-1]):
+        left = tree.of_parts[node] if node < len(images) else tree.joints[node - len(images)].rows
+        assert np.array_equal(tree.joints[above].images[tree.place(node, above)], left)
+    assert sorted(k for level in tree.upwards() for k in level) == list(range(len(tree.joints)))
+    if columns == rows == 8:
+        assert max(len(joint.images) for joint in tree.joints) <= 3 * 9
+
+
 @pytest.fixture
 def divided(tmp_path):
     return aerotri.divide(flown(), tmp_path / "parts", parts=3)
@@ -162,9 +190,16 @@ def test_files_are_the_same_wherever_parts_are_computed(divided, tmp_path):
 
 
 def test_a_worker_killed_in_mid_run_changes_nothing(divided, tmp_path, monkeypatch):
+    """Of every kind of task one is killed, in the same run."""
     aerotri.adjust_parts(divided, tmp_path / "threads")
-    monkeypatch.setattr(course, "move_part", killed_parts.killed_once)
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    monkeypatch.setenv(killed_parts.MARKS, str(marks))
+    for name, function in killed_parts.KILLED.items():
+        place = next(module for module in (course, joints, adjusting) if hasattr(module, name))
+        monkeypatch.setattr(place, name, function)
     aerotri.adjust_parts(divided, tmp_path / "killed_result", executor="processes:2")
+    assert {path.name for path in marks.iterdir()} == set(killed_parts.KILLED)
     assert tables_of(tmp_path / "killed_result") == tables_of(tmp_path / "threads")
 
 

@@ -102,6 +102,13 @@ sigma_m = [0.05, 0.05, 0.05]
 additional_parameters = ["bluh:1-2"]
 """
 """Three photographs in a strip, small enough to be rendered in a second."""
+WITH_START = """
+[start_values]
+kind = "perturbed"
+position_sigma_m = 1.0
+angle_sigma_deg = 0.01
+"""
+"""Parts need orientations to begin with."""
 
 
 @dataclass(frozen=True)
@@ -157,6 +164,8 @@ def _written(folder: Path) -> Written:
     (folder / "tiny.toml").write_text(TINY)
     tiny = run("simulate", folder / "tiny.toml", "--render", "--seed", "3", out="tiny")
     result = run("adjust", tiny, "--no-plots", out="result")
+    (folder / "tiny_parts.toml").write_text(TINY + WITH_START)
+    run("simulate", folder / "tiny_parts.toml", "--parts", 2, out="tiny_parts")
     (folder / "rigged.toml").write_text(RIGGED)
     rigged = run("simulate", folder / "rigged.toml", "--seed", "3", out="rigged")
     of_rig = run("adjust", rigged, "--no-plots", out="rig_result")

@@ -15,6 +15,7 @@ from aerotri.rasters.images import create_image
 from aerotri.terrain.dense import _mesh_kernels as kernels
 from aerotri.terrain.dense import parallaxes
 from aerotri.terrain.dense._resampling_kernels import resample
+from aerotri.terrain.dense.cell_sigma import CellScale, cell_sigma, contradiction, roughness, step
 from aerotri.terrain.dense.colours import Colours
 from aerotri.terrain.dense.epipolar import EpipolarGeometry, EpipolarImages, epipolar_geometry
 from aerotri.terrain.dense.grey_store import GreyStore
@@ -24,7 +25,6 @@ from aerotri.terrain.dense.pairs import Candidate, Pair, chosen_pairs, noise_cor
 from aerotri.terrain.dense.parallaxes import parallaxes_of
 from aerotri.terrain.dense.place import place_at
 from aerotri.terrain.dense.points import normals
-from aerotri.terrain.dense.tile import step_sigma
 from aerotri.terrain.pickets import Area
 
 
@@ -202,18 +202,41 @@ def test_the_pairs_that_agree_make_the_height():
     assert count == 0
 
 
-def test_beside_a_step_sigma_has_a_share_of_it():
+SCALE = CellScale(2, 1.0)
+
+
+def test_steps_are_found_at_the_cells_beside_them():
     z = np.full((20, 30), 100.0) + 0.3 * np.arange(30)  # a slope is no step
     z[:, 15:] += 8.0
-    found = step_sigma(z, 1.0)
-    assert (found[:, [14, 15]] > 3.0).all()
-    assert (found[:, :14] == 0.0).all()
-    assert (found[:, 16:] == 0.0).all()
-    z[:, 13:15] = np.nan
-    found = step_sigma(z, 1.0)
-    assert (found[:, [12, 15]] > 3.0).all()
-    assert (found[:, :12] == 0.0).all()
-    assert (step_sigma(z, 20.0) == 0.0).all()
+    noise = np.full(z.shape, 0.05)
+    found = step(z, noise, SCALE)
+    assert (found[:, [14, 15]] > 6.0).all()
+    assert (found[:, 6:10] == 0.0).all()
+    assert (found[:, 20:24] == 0.0).all()
+    z[:, 13:15] = np.nan  # hidden by a hole
+    assert (step(z, noise, SCALE)[:, [12, 15]] > 2.0).all()
+    assert (step(z, noise, CellScale(2, 20.0)) == 0.0).all()
+    assert (step(z, np.full(z.shape, 3.0), SCALE) == 0.0).all()
+
+
+@pytest.mark.parametrize("lag", [1, 2, 4])
+def test_roughness_is_the_noise_of_heights_on_a_plane(lag):
+    rows, columns = np.mgrid[0:200, 0:200]
+    z = 50.0 + 0.4 * columns - 0.2 * rows + np.random.default_rng(1).normal(scale=0.3, size=rows.shape)
+    z[50:60, 20:90] = np.nan
+    found = roughness(z, lag)
+    assert np.sqrt(np.mean(found[70:190, 10:190] ** 2)) == pytest.approx(0.3, rel=0.03)
+    assert np.isfinite(found).all()
+
+
+def test_a_pair_far_from_the_surface_contradicts_it():
+    z = np.array([[10.0, 10.0, np.nan]])
+    heights = np.array([[[10.1, 10.0, np.nan]], [[9.9, 18.0, np.nan]]])
+    found = contradiction(z, heights, np.full(heights.shape, 0.1), SCALE)
+    np.testing.assert_allclose(found, [[0.0, 8.0, 0.0]])
+    noise = np.full(z.shape, 0.07)
+    sigma = cell_sigma(z, noise, heights, np.full(heights.shape, 0.1), SCALE)
+    assert sigma[0, 1] > 1.0 > sigma[0, 0]
 
 
 def test_pairs_that_share_a_photograph_share_its_noise(hill):

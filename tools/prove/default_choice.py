@@ -13,10 +13,13 @@ Example: python tools/prove/default_choice.py --blocks 200 > tools/results/defau
 from __future__ import annotations
 
 import argparse
+import json
 import os
 from collections import Counter, defaultdict
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -173,6 +176,17 @@ def run(job: tuple[int, str, str]) -> dict[str, Found | str]:
     return {spec: adjusted(block, spec) for spec in (SETS if job[1] != KNOWN else ("auto", "bluh:1-12"))}
 
 
+def kept(folder: Path, job: tuple[int, str, str]) -> dict[str, Found | str]:
+    """As `run`; what an earlier run has left in the folder is read."""
+    file = folder / f"{job[0]}.json"
+    if not file.is_file():
+        found = {spec: one if isinstance(one, str) else asdict(one) for spec, one in run(job).items()}
+        file.with_suffix(".part").write_text(json.dumps(found))
+        file.with_suffix(".part").rename(file)
+    read = json.loads(file.read_text())
+    return {spec: one if isinstance(one, str) else Found(**one) for spec, one in read.items()}
+
+
 def cell(values: list[float]) -> str:
     """Mean and standard error."""
     return f"{np.mean(values):.2f} ± {np.std(values, ddof=1) / np.sqrt(len(values)):.2f}" if len(values) > 1 else "–"
@@ -190,12 +204,17 @@ def main() -> None:
     parser.add_argument("--blocks", type=int, default=200, help="blocks with errors that no set contains")
     parser.add_argument("--known", type=int, default=24, help="blocks whose errors are a known set")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--keep", type=Path, help="folder for the outcomes, from which a later run goes on")
     options = parser.parse_args()
+    work = run
+    if options.keep is not None:
+        options.keep.mkdir(parents=True, exist_ok=True)
+        work = partial(kept, options.keep)
     layouts = list(LAYOUTS)
     jobs = [(s, KINDS[s % 6], layouts[s // 6 % 4]) for s in range(1, options.blocks + 1)]
     known = [(1000 + s, KNOWN, layouts[s % 4]) for s in range(options.known)]
     with ProcessPoolExecutor(options.processes) as pool:
-        outcomes = list(pool.map(run, jobs + known))
+        outcomes = list(pool.map(work, jobs + known))
     of_unknown, of_known = outcomes[: len(jobs)], outcomes[len(jobs) :]
     print(f"# Default parameters, {len(jobs)} simulated blocks (tools/prove/default_choice.py)\n")
     print("Mean of (error/σ)² at check points and its standard error; 1 is right. RMS of heights in cm.\n")

@@ -214,9 +214,7 @@ def surfaces(result: aerotri.Adjustment, photographs: Path, matcher: Matcher):
 
     def alone(images, refine: bool = True) -> Parallaxes:
         value = matcher(images)
-        return Parallaxes(
-            value, np.where(np.isfinite(value), np.float32(0.3), np.float32(np.nan)), np.zeros_like(value), 0.0, 1.0
-        )
+        return Parallaxes(value, np.where(np.isfinite(value), np.float32(0.3), np.float32(np.nan)), 0.0, 1.0)
 
     tile.parallaxes_of = alone
     try:

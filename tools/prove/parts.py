@@ -1,7 +1,12 @@
 """A block in parts against the same block in one piece: largest differences over σ, time and memory.
 
-The block is simulated (UltraCamD, 60/30 %, control at the edge), written, and adjusted by two programs started anew:
-one in one piece, one in parts by a number of processes. Memory is the peak of the largest process. Prints Markdown.
+The block is simulated (UltraCamD, 80/40 %, control at the edge), written, and adjusted by two programs started anew:
+one in one piece, one in parts by a number of processes. Memory is the peak of the largest process. Both end where a
+step changes nothing that matters, and not at the same place: the numbers are compared once more where both go on until
+only rounding is left. Prints Markdown.
+
+Measures where an adjustment ends with another stopping rule, which no command has: it looks within the package on
+purpose.
 
     python tools/prove/parts.py FOLDER --photographs 2282 --parts 4 --processes 2 > tools/results/parts.md
 """
@@ -25,6 +30,13 @@ from adjusting.blocks import plan_of
 
 PARAMETERS = "bluh:1-12,ultracam_d:42-73"
 
+TIGHT = """
+from aerotri.adjustment import adjusted_positions, stopping
+stopping.STEP_TOLERANCE, stopping.ROUNDING = 1e-7, 0.0
+adjusted_positions.MOST_ROUNDS, adjusted_positions.STANDING = 20, 1e-10
+adjusted_positions.MOST_STEPS, adjusted_positions.SETTLED = 30, 1e-12
+"""
+"""Goes before a program, and is run in its processes too: ends where only rounding is left."""
 ONE = """
 import sys, json, resource, time, aerotri
 block = aerotri.read_block(sys.argv[1])
@@ -99,21 +111,32 @@ def main() -> None:
     aerotri.divide(block, folder / "in_parts", parts=options.parts)
     divided = time.perf_counter() - start
     del block
+    how = f"processes:{options.processes}"
     whole = run(folder, ONE, folder / "block", folder / "one")
-    parts = run(folder, PARTS, folder / "in_parts", folder / "parts", f"processes:{options.processes}")
+    parts = run(folder, PARTS, folder / "in_parts", folder / "parts", how)
     print("| adjusted | s | peak memory MB | of a process |\n|---|---|---|---|")
     print(f"| in one piece, every σ | {whole[0]:.1f} | {whole[1]:.0f} | |")
-    how = f"in {options.parts} parts, {options.processes} processes"
-    print(f"| {how} | {parts[0]:.1f} | {parts[1]:.0f} | {parts[2]:.0f} |")
+    how_many = f"in {options.parts} parts, {options.processes} processes"
+    print(f"| {how_many} | {parts[0]:.1f} | {parts[1]:.0f} | {parts[2]:.0f} |")
     print(f"\nDividing took {divided:.1f} s.\n")
-    print("| | compared | largest difference over σ | largest relative difference of σ |\n|---|---|---|---|")
+    print("| ends | | compared | largest difference over σ | largest relative difference of σ |")
+    print("|---|---|---|---|---|", flush=True)
+    say(folder, "as always", "")
+    run(folder, TIGHT + ONE, folder / "block", folder / "one_tight")
+    run(folder, TIGHT + PARTS, folder / "in_parts", folder / "parts_tight", how)
+    say(folder, "where only rounding is left", "_tight")
+
+
+def say(folder: Path, ends: str, suffix: str) -> None:
+    """Rows of the comparison of two results."""
     tables = {
         "projection centres": ("images.csv", "image", ("X0", "Y0", "Z0")),
         "points": ("points.csv", "point", ("X", "Y", "Z")),
     }
     for what, (table, key, values) in tables.items():
-        apart, of_sigma, count = differences(folder / "one", folder / "parts", table, key, values)
-        print(f"| {what} | {count} | {apart:.1e} | {of_sigma:.1e} |")
+        one, parts = folder / f"one{suffix}", folder / f"parts{suffix}"
+        apart, of_sigma, count = differences(one, parts, table, key, values)
+        print(f"| {ends} | {what} | {count} | {apart:.1e} | {of_sigma:.1e} |", flush=True)
 
 
 if __name__ == "__main__":

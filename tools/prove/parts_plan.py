@@ -1,9 +1,9 @@
 """Measures what a block in parts costs by its pattern: memory, files, multiplications, up to a million photographs.
 
 Photographs stand on a grid (80/40 %: each has points in common with the four before and behind it, and with those of
-the strips beside it). The cuts, the part in the middle, and the equations of what is shared are those of the program;
-nothing is computed but which numbers there would be, so it looks inside the package on purpose. Measured sizes stand in
-tools/results/parts.md. Prints Markdown.
+the strips beside it). The cuts, the part in the middle, and the tree over the parts are those of the program; nothing
+is computed but which numbers there would be, so it looks inside the package on purpose. Measured sizes stand in
+tools/results/parts.md and docs/validation/speed.md. Prints Markdown.
 
     python tools/prove/parts_plan.py > tools/results/parts_plan.md
 """
@@ -16,18 +16,21 @@ import numpy as np
 
 from aerotri.adjustment.dissection import bisect
 from aerotri.adjustment.sparse_cholesky import Symbolic
-from aerotri.partition.common import pattern
+from aerotri.partition.tree import Joint, PartsTree, tree_over
 
-ALONG, ACROSS, B, PARAMETERS = 4, 1, 6, 44
-"""Neighbours in the strip and strips beside that a photograph has points in common with; unknowns of a photograph;
-shared parameters."""
-OF_A_PART = 2000
+ACROSS, B, PARAMETERS = 1, 6, 44
+"""Strips beside that a photograph has points in common with; unknowns of a photograph; shared parameters."""
 MULTIPLICATIONS_A_SECOND = 10e9
 """Of one core, taken for the times; of the machine that the measured sizes were run on."""
 HEAD = (
-    "photographs", "parts", "shared photographs of a part", "of all", "factor of a part GB", "files of an iteration GB",
-    "memory of what is shared GB", "multiplications of the parts 10¹²", "of what is shared 10¹²",
-    "minutes of one core, parts", "what is shared",
+    "photographs", "parts", "shared photographs of a part", "of all", "factor of a part GB",
+    "largest front of a joint GB", "its task GB", "files of an iteration GB", "of them joints",
+    "multiplications of the parts 10¹²", "of the joints 10¹²", "minutes of one core, parts", "joints",
+    "joints one above the other",
+)  # fmt: skip
+OF_LEVELS = (
+    "joints above", "joints", "own photographs of the largest", "photographs that stay", "front GB", "files GB",
+    "multiplications 10¹²",
 )  # fmt: skip
 
 
@@ -42,14 +45,24 @@ class Planned(Symbolic):
         self.entries, self.updates = entries, sum(largest.values())
 
 
-def grid(photographs: int) -> tuple[np.ndarray, np.ndarray]:
+class JointCost:
+    """Numbers of a joint: of its front, of what it keeps in files, and its multiplications."""
+
+    def __init__(self, joint: Joint):
+        c, r = B * joint.own, B * len(joint.rows) + PARAMETERS
+        self.front, self.files = c * c + r * c + r * r, c * c + r * c + r * r
+        self.flops = c**3 / 3 + c * c * r + c * r * r
+        self.own, self.rows = joint.own, len(joint.rows)
+
+
+def grid(photographs: int, along_reach: int) -> tuple[np.ndarray, np.ndarray]:
     """(n, 2) places, a base along and two and a half across; (e, 2) pairs with common points."""
     strips = max(3, round(0.63 * photographs**0.5))
     length = photographs // strips
     number = np.arange(strips * length).reshape(strips, length)
     edges = []
     for across in range(ACROSS + 1):
-        for along in range(-ALONG if across else 1, ALONG + 1):
+        for along in range(-along_reach if across else 1, along_reach + 1):
             first, last = max(0, -along), length - max(0, along)
             one = number[: strips - across, first:last].ravel()
             other = number[across:, first + along : last + along].ravel()
@@ -73,30 +86,35 @@ def cut(place: np.ndarray, edges: np.ndarray, parts: int) -> np.ndarray:
     return of
 
 
-def row(photographs: int) -> str:
-    """One size."""
-    place, edges = grid(photographs)
-    n, parts = len(place), max(2, round(photographs / OF_A_PART))
+def planned_block(photographs: int, of_a_part: int, along_reach: int) -> tuple[str, PartsTree]:
+    """The row of one size, and its tree."""
+    place, edges = grid(photographs, along_reach)
+    n, parts = len(place), max(2, round(photographs / of_a_part))
     of = cut(place, edges, parts)
     both = np.concatenate([edges, edges[:, ::-1]])
     touch = both[(of[both[:, 0]] >= 0) & (of[both[:, 1]] < 0)]
     codes = np.unique(of[touch[:, 0]] * n + touch[:, 1])
     shared = [codes[codes // n == k] % n for k in range(parts)]
-    middle = int(np.argmin([np.abs(place[of == k].mean(axis=0) - place.mean(axis=0)).sum() for k in range(parts)]))
+    means = np.array([place[of == k].mean(axis=0) for k in range(parts)])
+    middle = int(np.argmin(np.abs(means - place.mean(axis=0)).sum(axis=1)))
     here = np.sort(np.concatenate([np.flatnonzero(of == middle), shared[middle]]))
     own = planned(place, edges, here, np.flatnonzero(of[here] < 0))
     kept = np.unique(np.concatenate(shared))
-    _, first, second = pattern([np.searchsorted(kept, one) for one in shared], len(kept))
-    root = Planned(len(kept), first, second, place[kept], PARAMETERS)
-    left = [8.0 * (B * len(one) + PARAMETERS) ** 2 for one in shared]
-    of_root = 8.0 * (root.entries + root.updates + 36 * len(first)) / 1e9
+    tree = tree_over([np.searchsorted(kept, one) for one in shared], means, len(kept))
+    joints = [JointCost(joint) for joint in tree.joints]
+    left = sum(8.0 * (B * len(one) + PARAMETERS) ** 2 for one in shared)
+    of_joints = sum(8.0 * joint.files for joint in joints)
+    largest, flops = max(joint.front for joint in joints), sum(joint.flops for joint in joints)
+    in_a_row = sum(max(joints[k].flops for k in level) for level in tree.upwards())
+    minute = 60.0 * MULTIPLICATIONS_A_SECOND
     numbers = (
         f"{n}", f"{parts}", f"{np.mean([len(one) for one in shared]):.0f}", f"{len(kept)}",
-        f"{8.0 * (own.entries + own.updates) / 1e9:.2f}", f"{(sum(left) + 8.0 * own.entries * parts) / 1e9:.1f}",
-        f"{of_root:.1f}", f"{own.flops * parts / 1e12:.2f}", f"{root.flops / 1e12:.2f}",
-        f"{own.flops * parts / MULTIPLICATIONS_A_SECOND / 60:.1f}", f"{root.flops / MULTIPLICATIONS_A_SECOND / 60:.1f}",
+        f"{8.0 * (own.entries + own.updates) / 1e9:.2f}", f"{8.0 * largest / 1e9:.2f}", f"{16.0 * largest / 1e9:.2f}",
+        f"{(left + 8.0 * own.entries * parts + of_joints) / 1e9:.1f}", f"{of_joints / 1e9:.1f}",
+        f"{own.flops * parts / 1e12:.2f}", f"{flops / 1e12:.2f}", f"{own.flops * parts / minute:.1f}",
+        f"{flops / minute:.1f}", f"{in_a_row / minute:.1f}",
     )  # fmt: skip
-    return "| " + " | ".join(numbers) + " |"
+    return "| " + " | ".join(numbers) + " |", tree
 
 
 def planned(place: np.ndarray, edges: np.ndarray, here: np.ndarray, last: np.ndarray) -> Planned:
@@ -108,14 +126,35 @@ def planned(place: np.ndarray, edges: np.ndarray, here: np.ndarray, last: np.nda
     return Planned(len(here), own_row, own_column, place[here], PARAMETERS, last)
 
 
+def say_levels(tree: PartsTree) -> None:
+    """A row for every level of a tree, from the root down."""
+    print("| " + " | ".join(OF_LEVELS) + " |")
+    print("|" + "---|" * len(OF_LEVELS))
+    for depth, level in enumerate(tree.downwards()):
+        joints = [JointCost(tree.joints[k]) for k in level]
+        largest = max(joints, key=lambda joint: joint.front)
+        print(
+            f"| {depth} | {len(joints)} | {largest.own} | {largest.rows} | {8.0 * largest.front / 1e9:.3f} | "
+            f"{8.0 * sum(joint.files for joint in joints) / 1e9:.1f} | {sum(j.flops for j in joints) / 1e12:.2f} |"
+        )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", type=int, nargs="*", default=[10_000, 60_000, 250_000, 1_000_000])
-    print("# Blocks in parts of some 2000 photographs, from their pattern (tools/prove/parts_plan.py)\n")
+    parser.add_argument("--of-a-part", type=int, default=2000, help="photographs")
+    parser.add_argument("--along", type=int, default=4, help="neighbours in the strip with common points: 2 of 60 %%")
+    asked = parser.parse_args()
+    print(f"# Blocks in parts of some {asked.of_a_part} photographs, from their pattern (tools/prove/parts_plan.py)\n")
     print("| " + " | ".join(HEAD) + " |")
     print("|" + "---|" * len(HEAD))
-    for size in parser.parse_args().sizes:
-        print(row(size), flush=True)
+    tree = None
+    for size in asked.sizes:
+        row, tree = planned_block(size, asked.of_a_part, asked.along)
+        print(row, flush=True)
+    if tree is not None:
+        print("\nThe joints of the largest, level by level from the root:\n")
+        say_levels(tree)
 
 
 if __name__ == "__main__":

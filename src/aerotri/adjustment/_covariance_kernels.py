@@ -9,7 +9,7 @@ import numpy as np
 
 from aerotri.adjustment._point_kernels import E, linearise_point, reduce_point
 from aerotri.adjustment.kernel_records import Coupling, Elimination, Pattern
-from aerotri.compiled import kernel, leaf_kernel
+from aerotri.compiled import inlined, kernel, leaf_kernel
 
 
 @leaf_kernel
@@ -20,6 +20,42 @@ def solve_lower_transposed(lower, rhs):
             for c in range(a + 1, 3):
                 rhs[a, t] -= lower[c, a] * rhs[c, t]
             rhs[a, t] /= lower[a, a]
+
+
+@inlined
+def add_row(out, row, factor):
+    """out += factor·row, (6,). Written out: the arrays might overlap for all the compiler knows."""
+    v0, v1, v2 = out[0] + factor * row[0], out[1] + factor * row[1], out[2] + factor * row[2]
+    v3, v4, v5 = out[3] + factor * row[3], out[4] + factor * row[4], out[5] + factor * row[5]
+    out[0], out[1], out[2], out[3], out[4], out[5] = v0, v1, v2, v3, v4, v5
+
+
+@inlined
+def set_products(h, block, g):
+    """h := g·block, h and g (3, 6), block (6, 6) symmetric."""
+    for b in range(3):
+        factor, row = g[b, 0], block[0]
+        h[b, 0], h[b, 1], h[b, 2] = factor * row[0], factor * row[1], factor * row[2]
+        h[b, 3], h[b, 4], h[b, 5] = factor * row[3], factor * row[4], factor * row[5]
+        for a in range(1, E):
+            add_row(h[b], block[a], g[b, a])
+
+
+@inlined
+def add_products(h, h_other, block, g, g_other):
+    """h += g_other·blockᵀ and h_other += g·block; (3, 6) all but block (6, 6)."""
+    for a in range(E):
+        row = block[a]
+        r0, r1, r2, r3, r4, r5 = row[0], row[1], row[2], row[3], row[4], row[5]
+        for b in range(3):
+            x = g_other[b]
+            h[b, a] += (r0 * x[0] + r1 * x[1] + r2 * x[2]) + (r3 * x[3] + r4 * x[4] + r5 * x[5])
+    for b in range(3):
+        x, out = g[b], h_other[b]
+        x0, x1, x2, x3, x4, x5 = x[0], x[1], x[2], x[3], x[4], x[5]
+        for a in range(E):
+            low = x0 * block[0, a] + x1 * block[1, a] + x2 * block[2, a]
+            out[a] += low + x3 * block[3, a] + x4 * block[4, a] + x5 * block[5, a]
 
 
 @kernel
@@ -51,7 +87,7 @@ def point_cofactors(first, last, problem, inverse, cofactor, redundancy, work):
 @kernel
 def coupling_scratch(work):
     """Room for what `couple_point` fills in."""
-    return Coupling(np.empty((work.by_eo.shape[0], E, 3)), np.empty((len(work.union), 3)), np.empty((3, 3)))
+    return Coupling(np.empty((work.by_eo.shape[0], 3, E)), np.empty((len(work.union), 3)), np.empty((3, 3)))
 
 
 @leaf_kernel
@@ -77,7 +113,7 @@ def couple_point(p, pattern, inverse, n_union, lower, work, coupling):
             value = q_pp[a, b]
             for q in range(n_rays):
                 for t in range(E):
-                    value += couple[q, a, t] * h[q, t, b]
+                    value += couple[q, a, t] * h[q, b, t]
             for t in range(n_union):
                 value += couple_shared[a, t] * h_shared[t, b]
             q_pp[a, b] = value
@@ -103,8 +139,8 @@ def row_cofactor(q, row, other, i, inverse, work, coupling):
             inner += border[i, union[columns[q, t]], a] * by_sh[q, other, t]
             mirrored += border[i, union[columns[q, t]], a] * by_sh[q, row, t]
         for b in range(3):
-            inner -= h[q, a, b] * b_p[b]
-            mirrored -= h[q, a, b] * a_p[b]
+            inner -= h[q, b, a] * b_p[b]
+            mirrored -= h[q, b, a] * a_p[b]
         explained += by_eo[q, row, a] * inner + by_eo[q, other, a] * mirrored
     for t in range(n_columns[q]):
         column = columns[q, t]
@@ -146,32 +182,19 @@ def _coupled_cofactors(p, n_union, pattern, inverse, work, coupling):
             h_shared[t, b] = value
     for q in range(n_rays):
         i = image[first_ray + q]
-        for a in range(E):
-            for b in range(3):
-                value = 0.0
-                for c in range(E):
-                    value += blocks[i, a, c] * g[q, b, c]
-                h[q, a, b] = value
+        set_products(h[q], blocks[i], g[q])
         for t in range(n_union):
             row = border[i, union[t]]
             for b in range(3):
                 value = 0.0
                 for a in range(E):
-                    h[q, a, b] += row[a] * g_shared[b, t]
                     value += row[a] * g[q, b, a]
                 h_shared[t, b] += value
+                add_row(h[q, b], row, g_shared[b, t])
     for q in range(n_rays):
         for other in range(q + 1, n_rays):
-            block = blocks[pair_block[pair]]
+            add_products(h[q], h[other], blocks[pair_block[pair]], g[q], g[other])
             pair += 1
-            for a in range(E):
-                for b in range(3):
-                    value, mirrored = 0.0, 0.0
-                    for c in range(E):
-                        value += block[a, c] * g[other, b, c]
-                        mirrored += block[c, a] * g[q, b, c]
-                    h[q, a, b] += value
-                    h[other, a, b] += mirrored
 
 
 @kernel

@@ -14,16 +14,28 @@ from aerotri.compiled import inlined, kernel
 
 
 @inlined
-def add_rank_two(block, e):
-    """block += eᵀ·e, e (2, 6). Written out: the compiler cannot know that the arrays do not overlap."""
+def add_own_block(block, e, c):
+    """block += eᵀ·e − cᵀ·c, e (2, 6), c (3, 6). Written out: the arrays might overlap for all the compiler knows."""
     x0, x1, x2, x3, x4, x5 = e[0, 0], e[0, 1], e[0, 2], e[0, 3], e[0, 4], e[0, 5]
     y0, y1, y2, y3, y4, y5 = e[1, 0], e[1, 1], e[1, 2], e[1, 3], e[1, 4], e[1, 5]
+    subtract_rank_three(block, c, c)
     for a in range(E):
         x, y = e[0, a], e[1, a]
         row = block[a]
         v0, v1, v2 = row[0] + x * x0 + y * y0, row[1] + x * x1 + y * y1, row[2] + x * x2 + y * y2
         v3, v4, v5 = row[3] + x * x3 + y * y3, row[4] + x * x4 + y * y4, row[5] + x * x5 + y * y5
         row[0], row[1], row[2], row[3], row[4], row[5] = v0, v1, v2, v3, v4, v5
+
+
+@inlined
+def add_own_side(right, squares, e, c, whitened, y):
+    """right += eᵀ·whitened − cᵀ·y and squares += the squared columns of e; right, squares (6,), e (2, 6), c (3, 6)."""
+    w0, w1, y0, y1, y2 = whitened[0], whitened[1], y[0], y[1], y[2]
+    for a in range(E):
+        e0, e1 = e[0, a], e[1, a]
+        side = right[a] + e0 * w0 + e1 * w1 - c[0, a] * y0 - c[1, a] * y1 - c[2, a] * y2
+        square = squares[a] + e0 * e0 + e1 * e1
+        right[a], squares[a] = side, square
 
 
 @inlined
@@ -101,13 +113,8 @@ def assemble(first, last, problem, offsets, sums, work):
         pair = pair_start[p]
         for q in range(n_rays):
             i = image[start[p] + q] - first_image
-            own, e0, e1 = diagonal[i], by_eo[q, 0], by_eo[q, 1]
-            c0, c1, c2 = couple[q, 0], couple[q, 1], couple[q, 2]
-            for a in range(E):
-                right[i, a] += e0[a] * whitened[q, 0] + e1[a] * whitened[q, 1] - c0[a] * y0 - c1[a] * y1 - c2[a] * y2
-                squares[i, a] += e0[a] * e0[a] + e1[a] * e1[a]
-            add_rank_two(own, by_eo[q])
-            subtract_rank_three(own, couple[q], couple[q])
+            add_own_block(diagonal[i], by_eo[q], couple[q])
+            add_own_side(right[i], squares[i], by_eo[q], couple[q], whitened[q], misclosure)
             if n_union:
                 add_own_border(border[i], union, columns[q], n_columns[q], by_eo[q], by_sh[q])
                 subtract_border(border[i], union, n_union, couple[q], couple_shared)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.adjustment._intersection_kernels import smallest_eigenvalue
-from aerotri.adjustment._robust_kernels import robust_factor
+from aerotri.adjustment._robust_kernels import NONE, robust_factor
 from aerotri.adjustment.kernel_records import Work
 from aerotri.compiled import inlined, kernel, leaf_kernel
 from aerotri.functional_model._kernels import INTERIOR, linearise_ray
@@ -42,6 +42,29 @@ def scratch(max_rays, max_columns, n_shared):
     )
 
 
+@inlined
+def turn_row(by_eo, turn):
+    """Partials (6,) by small rotations about other axes; turn (3, 3)."""
+    d0, d1, d2 = by_eo[3], by_eo[4], by_eo[5]
+    t0 = d0 * turn[0, 0] + d1 * turn[1, 0] + d2 * turn[2, 0]
+    t1 = d0 * turn[0, 1] + d1 * turn[1, 1] + d2 * turn[2, 1]
+    t2 = d0 * turn[0, 2] + d1 * turn[1, 2] + d2 * turn[2, 2]
+    by_eo[3], by_eo[4], by_eo[5] = t0, t1, t2
+
+
+@inlined
+def whiten_row(by_eo, by_pt, f, eo_free, point_free):
+    """One row's partials times f, 0 where a value is held; by_eo and eo_free (6,), by_pt and point_free (3,).
+
+    Written out: the compiler cannot know that the arrays do not overlap.
+    """
+    e0, e1, e2 = by_eo[0] * f * eo_free[0], by_eo[1] * f * eo_free[1], by_eo[2] * f * eo_free[2]
+    e3, e4, e5 = by_eo[3] * f * eo_free[3], by_eo[4] * f * eo_free[4], by_eo[5] * f * eo_free[5]
+    p0, p1, p2 = by_pt[0] * f * point_free[0], by_pt[1] * f * point_free[1], by_pt[2] * f * point_free[2]
+    by_eo[0], by_eo[1], by_eo[2], by_eo[3], by_eo[4], by_eo[5] = e0, e1, e2, e3, e4, e5
+    by_pt[0], by_pt[1], by_pt[2] = p0, p1, p2
+
+
 @leaf_kernel
 def linearise_point(p, rays, table, values, points, weighting, work):
     """Whitened partials and misclosures of the rays of point p into `work`; its residuals and weights out.
@@ -60,7 +83,7 @@ def linearise_point(p, rays, table, values, points, weighting, work):
     rate, readout, velocity, spin, scan_columns = (
         scans.rate, scans.readout, scans.velocity, scans.spin, scans.columns,
     )  # fmt: skip
-    n_scans, used = rate.shape[0], lens_columns.shape[1]
+    n_scans, used, turns = rate.shape[0], lens_columns.shape[1], turn.shape[0] > 0
     rotation, centre, interior, shared = values.rotation, values.centre, values.interior, values.shared
     lens_row = rays.lens_row
     cost, n_union = 0.0, 0
@@ -103,19 +126,20 @@ def linearise_point(p, rays, table, values, points, weighting, work):
         n_columns[q] = n
         residual[ray, 0], residual[ray, 1] = xy[ray, 0] - prediction[0], xy[ray, 1] - prediction[1]
         ex, ey = residual[ray, 0] * inv_sigma[ray, 0], residual[ray, 1] * inv_sigma[ray, 1]
-        factor, ray_cost = robust_factor(np.sqrt(ex * ex + ey * ey), estimator, limit)
+        factor, root = 1.0, 1.0
+        if estimator == NONE:
+            cost += ex * ex + ey * ey
+        else:
+            factor, ray_cost = robust_factor(np.sqrt(ex * ex + ey * ey), estimator, limit)
+            root = np.sqrt(factor)
+            cost += ray_cost
         weight[ray] = factor
-        cost += ray_cost
+        whitened[q, 0], whitened[q, 1] = ex * root, ey * root
         for row in range(2):
-            f = inv_sigma[ray, row] * np.sqrt(factor)
-            whitened[q, row] = residual[ray, row] * f
-            for t in range(3):
-                by_eo[q, row, t] *= f * eo_free[i, t]
-                by_pt[q, row, t] *= f * point_free[p, t]
-            d0, d1, d2 = by_eo[q, row, 3], by_eo[q, row, 4], by_eo[q, row, 5]
-            for t in range(3):
-                turned = d0 * turn[i, 0, t] + d1 * turn[i, 1, t] + d2 * turn[i, 2, t]
-                by_eo[q, row, 3 + t] = turned * f * eo_free[i, 3 + t]
+            f = inv_sigma[ray, row] * root
+            if turns:
+                turn_row(by_eo[q, row], turn[i])
+            whiten_row(by_eo[q, row], by_pt[q, row], f, eo_free[i], point_free[p])
             for t in range(n):
                 by_sh[q, row, t] *= f
         for t in range(n):
@@ -194,6 +218,14 @@ def solve_transposed(lower, d):
         d[a] /= lower[a, a]
 
 
+@inlined
+def combine_rows(row, e, x, y):
+    """row := x·e[0] + y·e[1]; row (6,), e (2, 6)."""
+    v0, v1, v2 = x * e[0, 0] + y * e[1, 0], x * e[0, 1] + y * e[1, 1], x * e[0, 2] + y * e[1, 2]
+    v3, v4, v5 = x * e[0, 3] + y * e[1, 3], x * e[0, 4] + y * e[1, 4], x * e[0, 5] + y * e[1, 5]
+    row[0], row[1], row[2], row[3], row[4], row[5] = v0, v1, v2, v3, v4, v5
+
+
 @leaf_kernel
 def reduce_point(p, n_rays, n_union, points, damping, work, elimination):
     """Eliminate point p: `point_normals`, and the couplings L⁻¹·N_pe and L⁻¹·N_ps into `work`."""
@@ -204,25 +236,21 @@ def reduce_point(p, n_rays, n_union, points, damping, work, elimination):
     for t in range(n_union):
         for a in range(3):
             couple_shared[a, t] = 0.0
+    l10, l20, l21 = lower[1, 0], lower[2, 0], lower[2, 1]
+    i0, i1, i2 = 1.0 / lower[0, 0], 1.0 / lower[1, 1], 1.0 / lower[2, 2]
     for q in range(n_rays):
-        for a in range(3):
-            p0, p1 = by_pt[q, 0, a], by_pt[q, 1, a]
-            for t in range(E):
-                couple[q, a, t] = p0 * by_eo[q, 0, t] + p1 * by_eo[q, 1, t]
-            for t in range(n_columns[q]):
-                couple_shared[a, columns[q, t]] += p0 * by_sh[q, 0, t] + p1 * by_sh[q, 1, t]
-        for a in range(3):
-            for c in range(a):
-                for t in range(E):
-                    couple[q, a, t] -= lower[a, c] * couple[q, c, t]
-            inverse = 1.0 / lower[a, a]
-            for t in range(E):
-                couple[q, a, t] *= inverse
-    for t in range(n_union):
-        for a in range(3):
-            for c in range(a):
-                couple_shared[a, t] -= lower[a, c] * couple_shared[c, t]
-            couple_shared[a, t] /= lower[a, a]
+        x0, x1, x2 = by_pt[q, 0, 0] * i0, by_pt[q, 0, 1], by_pt[q, 0, 2]
+        y0, y1, y2 = by_pt[q, 1, 0] * i0, by_pt[q, 1, 1], by_pt[q, 1, 2]
+        x1, y1 = (x1 - l10 * x0) * i1, (y1 - l10 * y0) * i1
+        x2, y2 = (x2 - l20 * x0 - l21 * x1) * i2, (y2 - l20 * y0 - l21 * y1) * i2
+        combine_rows(couple[q, 0], by_eo[q], x0, y0)
+        combine_rows(couple[q, 1], by_eo[q], x1, y1)
+        combine_rows(couple[q, 2], by_eo[q], x2, y2)
+        for t in range(n_columns[q]):
+            column, s0, s1 = columns[q, t], by_sh[q, 0, t], by_sh[q, 1, t]
+            c0, c1, c2 = couple_shared[0, column], couple_shared[1, column], couple_shared[2, column]
+            c0, c1, c2 = c0 + x0 * s0 + y0 * s1, c1 + x1 * s0 + y1 * s1, c2 + x2 * s0 + y2 * s1
+            couple_shared[0, column], couple_shared[1, column], couple_shared[2, column] = c0, c1, c2
     return cost, ok
 
 

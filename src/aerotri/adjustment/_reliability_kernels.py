@@ -116,7 +116,7 @@ def row_changes(place, inverse, datum, work, coupling, change):
         for a in range(3):
             value += q_pp[b, a] * a_p[a]
         for a in range(E):
-            value -= h[q, a, b] * a_r[a]
+            value -= h[q, b, a] * a_r[a]
         for t in range(n):
             value -= h_shared[columns[q, t], b] * a_s[t]
         change[b] = value
@@ -125,7 +125,7 @@ def row_changes(place, inverse, datum, work, coupling, change):
         for b in range(E):
             value += blocks[i, a, b] * a_r[b]
         for b in range(3):
-            value -= h[q, a, b] * a_p[b]
+            value -= h[q, b, a] * a_p[b]
         for t in range(n):
             value += border[i, union[columns[q, t]], a] * a_s[t]
         change[3 + a] = value

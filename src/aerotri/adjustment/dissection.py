@@ -104,21 +104,17 @@ def bisect(
     best = None
     centred = position[members] - position[members].mean(axis=0)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
+    of_node = np.empty(len(side_of), dtype=np.int64)
     for axis in axes:
-        along = centred @ axis
-        rank = np.argsort(along, kind="stable")
+        rank = np.argsort(centred @ axis, kind="stable")
+        of_node[members[rank]] = np.arange(len(members))
+        farthest, nearest = _reach(of_node[edges], len(members))
         for share in CUTS:
             half = max(1, min(len(members) - 1, round(share * len(members))))
-            side_of[members[rank[:half]]] = 0
-            side_of[members[rank[half:]]] = 1
-            crossing = edges[side_of[edges[:, 0]] != side_of[edges[:, 1]]]
-            first = np.where(side_of[crossing[:, 0]] == 0, crossing[:, 0], crossing[:, 1])
-            second = np.where(side_of[crossing[:, 0]] == 0, crossing[:, 1], crossing[:, 0])
-            for candidate in (np.unique(first), np.unique(second)):
-                larger_rest = max(half, len(members) - half)
-                cost = len(candidate) + 0.05 * larger_rest
+            for separator in (np.flatnonzero(farthest[:half] >= half), half + np.flatnonzero(nearest[half:] < half)):
+                cost = len(separator) + 0.05 * max(half, len(members) - half)
                 if best is None or cost < best[0]:
-                    best = (cost, rank, half, candidate)
+                    best = (cost, rank, half, np.sort(members[rank[separator]]))
     if best is None or len(best[3]) > 0.6 * len(members):
         return None
     _, rank, half, separator = best
@@ -128,6 +124,15 @@ def bisect(
     halves = [members[side_of[members] == s] for s in (0, 1)]
     if not len(halves[0]) or not len(halves[1]):
         return None
-    both = side_of[edges]
-    inner = [edges[(both == s).all(axis=1)] for s in (0, 1)]
+    first, second = side_of[edges[:, 0]], side_of[edges[:, 1]]
+    inner = [edges[(first == s) & (second == s)] for s in (0, 1)]
     return (halves[0], inner[0]), (halves[1], inner[1]), separator
+
+
+def _reach(edges: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) largest and (n,) smallest node that each of n nodes is tied to by edges (e, 2), or itself."""
+    farthest, nearest = np.arange(n), np.arange(n)
+    low, high = np.minimum(edges[:, 0], edges[:, 1]), np.maximum(edges[:, 0], edges[:, 1])
+    np.maximum.at(farthest, low, high)
+    np.minimum.at(nearest, high, low)
+    return farthest, nearest

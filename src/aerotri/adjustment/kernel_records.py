@@ -49,10 +49,10 @@ class Table(NamedTuple):
 
     Parameters
     ----------
-    lens_columns : (L, 15) or (L, 24), as `linearise_ray` needs, shared parameter of every interior element, −1 where it
-        is none.
+    lens_columns : (L, 0), (L, 15) or (L, 24), as `linearise_ray` needs, shared parameter of every interior element, −1
+        where it is none.
     eo_free : (n, 6) 1 or 0.
-    turn : (n, 3, 3) basis of the small rotations.
+    turn : (n, 3, 3) basis of the small rotations; (0, 3, 3) where it is the identity for all.
     kept : (P,) first shared parameter of a point that is not eliminated, −1 otherwise.
     """
 
@@ -220,7 +220,7 @@ class Pattern(NamedTuple):
 
 
 class Coupling(NamedTuple):
-    """Of one point: H over its photographs (q, 6, 3) and shared parameters (s, 3), and Q_pp (3, 3)."""
+    """Of one point: H transposed over its photographs (q, 3, 6), H over shared parameters (s, 3), and Q_pp (3, 3)."""
 
     h: np.ndarray
     h_shared: np.ndarray

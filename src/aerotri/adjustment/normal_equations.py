@@ -139,7 +139,12 @@ class NormalSystem:
         return Problem(
             rays=u.rays.arrays(),
             pairs=Pairs(u.pair_start, u.pair_block),
-            table=Table(u.lens.used_columns, u.eo_free.astype(float), u.turn(state), u.kept),
+            table=Table(
+                u.lens.used_columns,
+                u.eo_free.astype(float),
+                u.turn(state) if u.by_angles.any() else np.empty((0, 3, 3)),
+                u.kept,
+            ),
             values=Values(
                 np.ascontiguousarray(state.rotation), state.centre, u.interior(state), state.shared, u.scans(state)
             ),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from functools import cache
 from itertools import pairwise
 from typing import TypeVar
@@ -32,13 +32,16 @@ SMALL_WORK = 5e9
 
 
 @cache
-def _blas() -> ThreadpoolController:
-    return ThreadpoolController()
+def _blas() -> tuple[ThreadpoolController, int]:
+    """BLAS, and the threads that it takes by itself."""
+    controller = ThreadpoolController().select(user_api="blas")
+    return controller, max((library["num_threads"] for library in controller.info()), default=1)
 
 
 def blas_threads(multiplications: float) -> AbstractContextManager[object]:
-    """A context in which BLAS takes one thread for work of fewer than SMALL_WORK multiplications."""
-    return nullcontext() if multiplications >= SMALL_WORK else _blas().limit(limits=1, user_api="blas")
+    """A context in which BLAS takes one thread for fewer than SMALL_WORK multiplications, for more all it had."""
+    controller, most = _blas()
+    return controller.limit(limits=most if multiplications >= SMALL_WORK else 1, user_api="blas")
 
 
 def chunk_bounds(work: np.ndarray, chunks: int = CHUNKS) -> list[tuple[int, int]]:

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.linalg.blas import dtrsm  # pyright: ignore[reportAttributeAccessIssue]
 
 from aerotri.adjustment.kernel_records import Inverse
-from aerotri.adjustment.parallel import blas_threads
 from aerotri.adjustment.sparse_cholesky import (
     BorderedMatrix,
     Buffers,
@@ -115,12 +114,13 @@ class PartialFactor(Factor):
         border = slice(len(self._root) - self._symbolic.n_border, None)
         return self._root[border, border]
 
-    def _inverse_front(self, k: int, buffers: list[Buffers], corner: np.ndarray) -> Parts:
+    def _inverse_front(self, k: int, buffers: Buffers, above: Parts | np.ndarray) -> None:
         s, root = self._symbolic, self._root
         if k < len(s.fronts) - 1 or root is None:
-            return super()._inverse_front(k, buffers, corner)
+            super()._inverse_front(k, buffers, above)
+            return
         own = len(root) - s.n_border
-        return (
+        buffers.parts = (
             np.asfortranarray(root[:own, :own]),
             np.asfortranarray(root[own:, :own]),
             np.asfortranarray(root[own:, own:]),
@@ -139,12 +139,15 @@ def eliminate_inner(symbolic: Symbolic, matrix: BorderedMatrix) -> tuple[Partial
     scale = _scale_of(symbolic, matrix)
     n = symbolic.n
     by_image = np.ascontiguousarray(scale[: B * n].reshape(n, B)[symbolic.rank])
-    by_border, smallest = scale[B * n :], 1.0
-    with blas_threads(symbolic.flops):
-        for k in range(len(symbolic.fronts) - 1):
-            top, low, rest = symbolic.assemble_front(k, matrix, by_image, by_border)
-            smallest = min(smallest, eliminate(top, low, rest))
-        top, low, rest = symbolic.assemble_front(len(symbolic.fronts) - 1, matrix, by_image, by_border)
+    by_border = scale[B * n :]
+    root = len(symbolic.fronts) - 1
+
+    def up(k: int) -> float:
+        parts = symbolic.assemble_front(k, matrix, by_image, by_border)
+        return eliminate(*parts) if k < root else 1.0
+
+    smallest = min(symbolic.schedule.upwards(up))
+    (top, low), rest = symbolic.panel(root), symbolic.update(root)
     own = len(top)
     left = np.empty((own + len(low), own + len(low)))
     lower = np.tril(top)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from aerotri.adjustment.joint_prior import JointPrior
+from aerotri.adjustment.parallel import run_chunks
 from aerotri.conventions import InputError
 from aerotri.functional_model._kernels import USUAL
 from aerotri.functional_model.additional_parameters import (
@@ -104,9 +105,11 @@ class LensTable:
 
     @property
     def used_columns(self) -> np.ndarray:
-        """(L, 15) or (L, 24), `columns` without those that no camera of the block needs."""
+        """(L, 0), (L, 15) or (L, 24), `columns` without those that no camera of the block needs."""
         needed = self.base[:, USUAL:-1].any() or (self.columns[:, USUAL:] >= 0).any()
-        return self.columns if needed else np.ascontiguousarray(self.columns[:, :USUAL])
+        if needed:
+            return self.columns
+        return np.ascontiguousarray(self.columns[:, : USUAL if (self.columns >= 0).any() else 0])
 
 
 def group_of_images(block: Block) -> np.ndarray:
@@ -226,6 +229,10 @@ class HeldParameters:
         return errors
 
 
+RAYS_AT_ONCE = 16_384
+"""Rays at which linear parameters are evaluated together [C]: their numbers stay in the processor's cache."""
+
+
 @dataclass(frozen=True, eq=False)
 class LinearParameters:
     """The linear additional parameters of a block.
@@ -245,13 +252,17 @@ class LinearParameters:
 
     def columns(self, xy: np.ndarray) -> LinearColumns:
         """The columns at positions (m, 2) mm of the rays."""
-        parts = [_family_columns(family.sets, family.of_ray, xy) for family in self.families]
-        if not parts:
-            return LinearColumns(np.zeros((len(xy), 0), np.int64), np.zeros((len(xy), 2, 0)))
-        return LinearColumns(
-            np.ascontiguousarray(np.concatenate([p.index for p in parts], axis=1)),
-            np.ascontiguousarray(np.concatenate([p.value for p in parts], axis=2)),
-        )
+        widths = [_width(family.sets) for family in self.families]
+        index, value = np.zeros((len(xy), sum(widths)), np.int64), np.zeros((len(xy), 2, sum(widths)))
+        begins = range(0, len(xy), RAYS_AT_ONCE)
+
+        def fill(k: int) -> None:
+            rays = slice(begins[k], begins[k] + RAYS_AT_ONCE)
+            for family, end in zip(self.families, np.cumsum(widths).tolist(), strict=True):
+                _fill_columns(family.sets, family.of_ray[rays], xy[rays], index[rays, :end], value[rays, :, :end])
+
+        run_chunks(fill, len(begins), len(xy))
+        return LinearColumns(index, value)
 
 
 def linear_parameters(block: Block, images: np.ndarray, ray_image: np.ndarray, shared: SharedList) -> LinearParameters:
@@ -358,14 +369,26 @@ def random_field(block: Block, nodes: ParameterSet, group: str, first: int) -> R
     return RandomField(slice(first, first + len(nodes.items)), nodes.items, nodes.camera, group, held)
 
 
-def _family_columns(sets: dict[int, tuple[ParameterSet, int]], of_ray: np.ndarray, xy: np.ndarray) -> LinearColumns:
-    """Columns of one family; `sets` by the numbers in `of_ray` (m,), each with its first column in the shared list."""
-    pieces = {key: chosen.terms(*xy[of_ray == key].T) for key, (chosen, _) in sets.items()}
-    width = max(piece.index.shape[1] for piece in pieces.values())
-    index, value = np.zeros((len(xy), width), np.int64), np.zeros((len(xy), 2, width))
-    for key, piece in pieces.items():
-        rays = np.flatnonzero(of_ray == key)
-        k = piece.index.shape[1]
-        index[rays[:, None], np.arange(k)] = piece.index + sets[key][1]
-        value[rays[:, None, None], np.arange(2)[:, None], np.arange(k)] = piece.value
-    return LinearColumns(index, value)
+def _width(sets: dict[int, tuple[ParameterSet, int]]) -> int:
+    """Most columns of a family at a ray."""
+    none = np.zeros(0)
+    return max(chosen.terms(none, none).index.shape[1] for chosen, _ in sets.values())
+
+
+def _fill_columns(
+    sets: dict[int, tuple[ParameterSet, int]], of_ray: np.ndarray, xy: np.ndarray, index: np.ndarray, value: np.ndarray
+) -> None:
+    """One family at the rays, into the last columns of index (m, ·) and value (m, 2, ·).
+
+    Parameters
+    ----------
+    sets : by the numbers in `of_ray` (m,), each with its first column in the shared list.
+    """
+    width = _width(sets)
+    index, value = index[:, index.shape[1] - width :], value[:, :, value.shape[2] - width :]
+    for key, (chosen, first) in sets.items():
+        own = of_ray == key
+        rays = slice(None) if own.all() else own
+        terms = chosen.terms(*xy[rays].T)
+        k = terms.index.shape[1]
+        index[rays, :k], value[rays, :, :k] = terms.index + first, terms.value

@@ -17,6 +17,7 @@ from aerotri.adjustment.chord_steps import follow
 from aerotri.adjustment.damping import Damping
 from aerotri.adjustment.defects import checked_factor, is_suspect
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.parallel import blas_threads
 from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for
 from aerotri.adjustment.secants import Secants
 from aerotri.adjustment.sparse_cholesky import Factor
@@ -145,12 +146,14 @@ def minimise(system: NormalSystem, state: State, redundancy: int, options: Solve
     """
     *early, last = STAGES[options.robust]
     done = 0
-    for name in early:
-        solution = _descend(system, state, redundancy, options, Stage(name, done, EARLY_STEP_TOLERANCE))
-        if solution.defects or solution.status == INTERRUPTED:
-            return solution
-        state, done = solution.state, solution.iterations
-    return _descend(system, state, redundancy, options, Stage(last, done, options.step_tolerance))
+    # threads of BLAS wait for work in a loop, after every scalar product: they would take a processor from the kernels
+    with blas_threads(0.0):
+        for name in early:
+            solution = _descend(system, state, redundancy, options, Stage(name, done, EARLY_STEP_TOLERANCE))
+            if solution.defects or solution.status == INTERRUPTED:
+                return solution
+            state, done = solution.state, solution.iterations
+        return _descend(system, state, redundancy, options, Stage(last, done, options.step_tolerance))
 
 
 def _descend(system: NormalSystem, state: State, redundancy: int, options: SolveOptions, stage: Stage) -> Solution:
@@ -244,6 +247,8 @@ def _is_stopped(system: NormalSystem, at: Place, options: SolveOptions, iteratio
 
 def _reweighted(system: NormalSystem, at: Place, name: str, redundancy: int) -> Place:
     """The place with the estimator that its residuals ask for; itself where the estimator stands."""
+    if name == "off" and not at.estimator.is_robust:
+        return at
     share = redundancy / max(redundancy + system.unknowns.count, 1)
     fresh = estimator_for(name, system.residual_lengths(at.equations), share)
     return at if fresh.is_near(at.estimator) else place_at(system, at.state, fresh)

@@ -8,18 +8,20 @@ a `Factor` is therefore valid until the next one of the same `Symbolic`.
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg.blas import dgemm, dsymm, dsyrk, dtrsm  # pyright: ignore[reportAttributeAccessIssue]
-from scipy.linalg.lapack import dpotrf, dpotri  # pyright: ignore[reportAttributeAccessIssue]
+from scipy.linalg.blas import dtrsm  # pyright: ignore[reportAttributeAccessIssue]
 
 from aerotri.adjustment import _factor_kernels as _kernels
+from aerotri.adjustment import dense as lapack
 from aerotri.adjustment.dissection import Tree, dissect
 from aerotri.adjustment.kernel_records import Front, FrontBlocks, Inverse, MatrixBlocks
 from aerotri.adjustment.parallel import blas_threads, refuse_more_than_there_is
+from aerotri.adjustment.subtrees import schedule
 
 B = 6
 """Unknowns of a photograph."""
@@ -100,6 +102,7 @@ class Symbolic:
         for k, front in enumerate(self.fronts):
             if front.parent >= 0:
                 self._children[front.parent].append(k)
+        self.schedule = schedule(self.tree.parent, self.tree.depth, np.array([_work(front) for front in self.fronts]))
         self.times_factorised = 0
         self._allocate()
 
@@ -125,11 +128,7 @@ class Symbolic:
     @cached_property
     def flops(self) -> float:
         """Multiplications of one factorisation."""
-        total = 0.0
-        for front in self.fronts:
-            c, r = B * front.n_own, len(front.scalar_rows)
-            total += c**3 / 3 + c * c * r + c * r * r
-        return total
+        return float(self.schedule.work.sum())
 
     def _fronts(self, tree: Tree) -> list[_Front]:
         low = np.minimum(self.rank[self.block_row], self.rank[self.block_col])
@@ -175,37 +174,46 @@ class Symbolic:
         return replace(front, place=np.searchsorted(local, front.rows))
 
     def _allocate(self) -> None:
-        """Panels of the factor, and one stack of update matrices for even and one for odd depths."""
-        offset, spans = 0, []
-        tops = [0, 0]
-        peaks = [0, 0]
-        live: dict[int, int] = {}
-        updates = []
-        for k, front in enumerate(self.fronts):
-            c, r = B * front.n_own, len(front.scalar_rows)
-            spans.append((offset, offset + c * c, offset + c * c + r * c))
-            offset += c * c + r * c
-            side = front.depth % 2
-            for child in [j for j in live if self.fronts[j].parent == k]:
-                tops[1 - side] -= live.pop(child)
-            updates.append(tops[side])
-            live[k] = r * r
-            tops[side] += r * r
-            peaks[side] = max(peaks[side], tops[side])
-        self._spans, self._updates = spans, updates
-        self.bytes_needed = 8 * (offset + sum(peaks) + self._inverse_entries())
+        """Panels of the factor, and room for the update matrices: of every branch two stacks, of the trunk all."""
+        sizes = [(B * front.n_own, len(front.scalar_rows)) for front in self.fronts]
+        ends = np.cumsum([0, *(c * c + r * c for c, r in sizes)]).tolist()
+        self._spans = [(begin, begin + c * c, end) for begin, end, (c, _) in zip(ends, ends[1:], sizes, strict=False)]
+        self._updates, room = [(0, 0)] * len(sizes), [0]
+        for level in self.schedule.trunk:
+            for k in level:
+                self._updates[k] = 0, room[0]
+                room[0] += sizes[k][1] ** 2
+        for branch in self.schedule.branches:
+            self._stack_updates(branch, room)
+        self.bytes_needed = 8 * (ends[-1] + sum(room) + self._inverse_entries())
         refuse_more_than_there_is(self.bytes_needed, f"the normal equations of {self.n} photographs")
-        self._panels = np.empty(offset)
-        self._stacks = [np.empty(peaks[0]), np.empty(peaks[1])]
+        self._panels = np.empty(ends[-1])
+        self._stacks = [np.empty(size) for size in room]
         self.corner_factor = np.empty((self.n_border, self.n_border), order="F")
 
+    def _stack_updates(self, branch: range, room: list[int]) -> None:
+        """Places of a branch's update matrices on two stacks, for even and odd depths; their sizes go into `room`."""
+        tops, peaks, live = [0, 0], [0, 0], dict[int, int]()
+        for k in branch:
+            side, size = self.fronts[k].depth % 2, len(self.fronts[k].scalar_rows) ** 2
+            for child in self._children[k]:
+                tops[1 - side] -= live.pop(child)
+            self._updates[k] = len(room) + side, tops[side]
+            live[k] = size
+            tops[side] += size
+            peaks[side] = max(peaks[side], tops[side])
+        room += peaks
+
     def _inverse_entries(self) -> int:
-        """Numbers that the inverse on the pattern holds at once: its blocks, and a front for each depth of the tree."""
-        largest: dict[int, int] = {}
-        for front in self.fronts:
-            c, r = B * front.n_own, len(front.scalar_rows)
-            largest[front.depth] = max(largest.get(front.depth, 0), c * c + 2 * r * c + r * r)
-        return sum(largest.values()) + len(self.block_row) * B * B + self.size * self.n_border
+        """Numbers that the inverse on the pattern holds at most: its blocks, the trunk, a front a depth below."""
+        total = len(self.block_row) * B * B + self.size * self.n_border
+        for part in [(k,) for level in self.schedule.trunk for k in level] + list(self.schedule.branches):
+            largest: dict[int, int] = {}
+            for front in (self.fronts[k] for k in part):
+                size = B * front.n_own + len(front.scalar_rows)
+                largest[front.depth] = max(largest.get(front.depth, 0), size * size)
+            total += sum(largest.values())
+        return total
 
     def panel(self, k: int) -> tuple[np.ndarray, np.ndarray]:
         """L of supernode k: its own triangle and the rows below, Fortran order."""
@@ -224,8 +232,8 @@ class Symbolic:
     def update(self, k: int) -> np.ndarray:
         """Update matrix of supernode k on its stack, Fortran order."""
         r = len(self.fronts[k].scalar_rows)
-        begin = self._updates[k]
-        return self._stacks[self.fronts[k].depth % 2][begin : begin + r * r].reshape(r, r, order="F")
+        room, begin = self._updates[k]
+        return self._stacks[room][begin : begin + r * r].reshape(r, r, order="F")
 
     def factorise(self, matrix: BorderedMatrix) -> Factor:
         """Cholesky factor of the matrix, scaled to a unit diagonal first.
@@ -241,24 +249,20 @@ class Symbolic:
         by_border = scale[B * self.n :]
         corner = self.corner_factor
         corner[:] = matrix.corner * by_border[:, None] * by_border[None, :]
-        with blas_threads(self.flops):
-            smallest = self._factorise_fronts(matrix, by_image, by_border, corner)
-            if self.n_border:
+        smallest = min(
+            self.schedule.upwards(lambda k: self._factorise_front(k, matrix, by_image, by_border)), default=1.0
+        )
+        if self.n_border:
+            for k in (k for k, front in enumerate(self.fronts) if front.parent < 0):
+                corner += self.update(k)
+            with blas_threads(self.n_border**3 / 3):
                 smallest = min(smallest, _factor_triangle(corner))
         return Factor(self, scale, smallest)
 
-    def _factorise_fronts(
-        self, matrix: BorderedMatrix, by_image: np.ndarray, by_border: np.ndarray, corner: np.ndarray
-    ) -> float:
-        """All fronts from the leaves up, what they leave of the border added to `corner`; the smallest pivot."""
-        smallest = 1.0
-        for k, front in enumerate(self.fronts):
-            top, low, rest = self.assemble_front(k, matrix, by_image, by_border)
-            if front.n_own:
-                smallest = min(smallest, eliminate(top, low, rest))
-            if front.parent < 0 and self.n_border:
-                corner += rest
-        return smallest
+    def _factorise_front(self, k: int, matrix: BorderedMatrix, by_image: np.ndarray, by_border: np.ndarray) -> float:
+        """Supernode k, those below being done; the smallest pivot."""
+        parts = self.assemble_front(k, matrix, by_image, by_border)
+        return eliminate(*parts) if self.fronts[k].n_own else 1.0
 
     def assemble_front(
         self, k: int, matrix: BorderedMatrix, by_image: np.ndarray, by_border: np.ndarray
@@ -298,11 +302,17 @@ class Symbolic:
         return 1.0 / np.sqrt(diagonal)
 
 
+def _work(front: _Front) -> float:
+    """Multiplications that a front takes."""
+    c, r = B * front.n_own, len(front.scalar_rows)
+    return c**3 / 3 + c * c * r + c * r * r
+
+
 def _factor_triangle(a: np.ndarray) -> float:
     """Lower Cholesky in place; the smallest pivot."""
-    _, info = dpotrf(a, lower=1, clean=0, overwrite_a=1)
+    found = lapack.cholesky(a)
     pivots = np.diagonal(a)
-    if info != 0 or not np.isfinite(pivots).all() or (pivots * pivots).min() < PIVOT_LIMIT:
+    if not found or not np.isfinite(pivots).all() or (pivots * pivots).min() < PIVOT_LIMIT:
         raise NotPositiveDefiniteError
     return float((pivots * pivots).min())
 
@@ -310,9 +320,8 @@ def _factor_triangle(a: np.ndarray) -> float:
 def eliminate(top: np.ndarray, low: np.ndarray, rest: np.ndarray) -> float:
     """One front: L11 = chol(top), L21 = low·L11⁻ᵀ, rest −= L21·L21ᵀ, all in place."""
     smallest = _factor_triangle(top)
-    if low.shape[0]:
-        dtrsm(1.0, top, low, side=1, lower=1, trans_a=1, overwrite_b=1)
-        dsyrk(-1.0, low, beta=1.0, c=rest, lower=1, overwrite_c=1)
+    lapack.solve_from_right(top, low, transposed=True)
+    lapack.subtract_square(low, rest)
     return smallest
 
 
@@ -399,7 +408,7 @@ class Factor:
         if not self._symbolic.n_border:
             return np.zeros((0, 0))
         by_border = self._scale[B * self._symbolic.n :]
-        inverse = _symmetric_from_lower(dpotri(self._symbolic.corner_factor, lower=1)[0])
+        inverse = _symmetric_from_lower(_inverted(self._symbolic.corner_factor))
         return inverse * by_border[:, None] * by_border[None, :]
 
     def columns(self, indices: np.ndarray) -> np.ndarray:
@@ -410,10 +419,6 @@ class Factor:
 
     def inverse_on_pattern(self) -> Inverse:
         """The inverse on the pattern of the matrix, by the Takahashi recursion from the root down."""
-        with blas_threads(self._symbolic.flops):
-            return self._inverse_on_pattern()
-
-    def _inverse_on_pattern(self) -> Inverse:
         s = self._symbolic
         out = Inverse(
             np.zeros((len(s.block_row), B, B)), np.zeros((s.n, s.n_border, B)), np.zeros((s.n_border, s.n_border))
@@ -422,60 +427,74 @@ class Factor:
             out.corner[:] = self._corner_inverse()
         by_image = np.ascontiguousarray(self._scale[: B * s.n].reshape(s.n, B)[s.rank])
         by_border = self._scale[B * s.n :]
-        buffers = [Buffers() for _ in range(max((front.depth for front in s.fronts), default=0) + 1)]
-        for k in range(len(s.fronts) - 1, -1, -1):
-            front = s.fronts[k]
-            top, low, _ = parts = self._inverse_front(k, buffers, out.corner)
-            own = s.tree.order[front.first : front.first + front.n_own]
-            _kernels.gather_blocks(
-                front.blocks, Front(len(top), len(low), _flat(top), _flat(low)),
-                MatrixBlocks(out.blocks, s.block_row, s.block_col, by_image),
-            )  # fmt: skip
-            _kernels.gather_border(own, _flat(low), len(low), by_image, by_border, out.border)
-            buffers[front.depth].parts = parts
+        trunk = {k: Buffers() for level in s.schedule.trunk for k in level}
+
+        def invert(k: int, own: Buffers, above: Buffers | None) -> None:
+            self._inverse_front(k, own, out.corner if above is None else above.parts)
+            self._gather(k, own.parts, out, by_image, by_border)
+
+        room = threading.local()
+
+        def down_a_branch(b: int) -> None:
+            of_depth = room.__dict__.setdefault("of_depth", dict[int, Buffers]())
+            branch = s.schedule.branches[b]
+            for k in reversed(branch):
+                depth = s.fronts[k].depth
+                above = trunk[s.fronts[k].parent] if k == branch[-1] else of_depth[depth - 1]
+                invert(k, of_depth.setdefault(depth, Buffers()), above)
+
+        s.schedule.down_the_trunk(lambda k: invert(k, trunk[k], trunk.get(s.fronts[k].parent)))
+        s.schedule.over_branches(down_a_branch)
         out.corner[:] *= by_border[:, None] * by_border[None, :]
         return out
 
+    def _gather(self, k: int, parts: Parts, out: Inverse, by_image: np.ndarray, by_border: np.ndarray) -> None:
+        """What belongs into the inverse of supernode k, scaled back."""
+        s, (top, low, _) = self._of, parts
+        front = s.fronts[k]
+        own = s.tree.order[front.first : front.first + front.n_own]
+        _kernels.gather_blocks(
+            front.blocks, Front(len(top), len(low), _flat(top), _flat(low)),
+            MatrixBlocks(out.blocks, s.block_row, s.block_col, by_image),
+        )  # fmt: skip
+        _kernels.gather_border(own, _flat(low), len(low), by_image, by_border, out.border)
+
     def _corner_inverse(self) -> np.ndarray:
         """(s, s) the scaled inverse over the border."""
-        return _symmetric_from_lower(dpotri(self._symbolic.corner_factor, lower=1)[0])
+        return _symmetric_from_lower(_inverted(self._symbolic.corner_factor))
 
-    def _inverse_front(self, k: int, buffers: list[Buffers], corner: np.ndarray) -> Parts:
+    def _inverse_front(self, k: int, buffers: Buffers, above: Parts | np.ndarray) -> None:
         """Lower triangle of the inverse over the front's own columns and its rows, in the three parts of a front.
 
-        Z_RR comes from the parent, Z_RC = −Z_RR·Y and Z_CC = L11⁻ᵀ·L11⁻¹ − Yᵀ·Z_RC with Y = L21·L11⁻¹.
+        Z_RR comes from the parent, of a root from the border; Z_RC = −Z_RR·Y and Z_CC = L11⁻ᵀ·L11⁻¹ − Yᵀ·Z_RC with
+        Y = L21·L11⁻¹.
         """
         s = self._symbolic
-        front, own_buffers = s.fronts[k], buffers[s.fronts[k].depth]
+        front = s.fronts[k]
         top, low = s.panel(k)
         c, r = len(top), len(low)
-        rest = own_buffers.matrix("rest", r, r)
-        if front.parent >= 0:
-            above = buffers[front.depth - 1].parts
+        rest = buffers.matrix("rest", r, r)
+        if isinstance(above, np.ndarray):
+            rest[:] = above
+        else:
             flat_above = (_flat(part) for part in above)
             _kernels.extract_lower(
                 *flat_above, s.fronts[front.parent].n_own, front.place, s.n_border, _flat(rest)
             )  # fmt: skip
-        else:
-            rest[:] = corner
-        own, rows = own_buffers.matrix("own", c, c), own_buffers.matrix("rows", r, c)
-        if c:
-            own[:] = top
-            own, _ = dpotri(own, lower=1, overwrite_c=1)
-        if c and r:
-            y = own_buffers.matrix("y", r, c)
-            y[:] = low
-            dtrsm(1.0, top, y, side=1, lower=1, overwrite_b=1)
-            dsymm(-1.0, rest, y, c=rows, lower=1, overwrite_c=1)
-            dgemm(-1.0, y, rows, beta=1.0, c=own, trans_a=1, overwrite_c=1)
-        return own, rows, rest
+        own, rows, y = buffers.matrix("own", c, c), buffers.matrix("rows", r, c), buffers.matrix("y", r, c)
+        own[:], y[:] = top, low
+        lapack.inverse_of_cholesky(own)
+        lapack.solve_from_right(top, y, transposed=False)
+        lapack.minus_product(rest, y, rows)
+        lapack.subtract_transposed_product(y, rows, own)
+        buffers.parts = own, rows, rest
 
 
 Parts = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class Buffers:
-    """Work space of one depth of the tree, grown as needed; only one front of a depth is alive at a time."""
+    """Work space of one supernode at a time, grown as needed, and its three parts."""
 
     def __init__(self):
         self._memory: dict[str, np.ndarray] = {}
@@ -484,13 +503,20 @@ class Buffers:
     def matrix(self, name: str, rows: int, columns: int) -> np.ndarray:
         """An uninitialised Fortran-ordered matrix."""
         if name not in self._memory or len(self._memory[name]) < rows * columns:
-            self._memory[name] = np.zeros(rows * columns)
+            self._memory[name] = np.empty(rows * columns)
         return self._memory[name][: rows * columns].reshape(rows, columns, order="F")
 
 
 def _flat(a: np.ndarray) -> np.ndarray:
     """A Fortran-ordered matrix as its elements in memory order."""
     return a.reshape(-1, order="F")
+
+
+def _inverted(lower: np.ndarray) -> np.ndarray:
+    """(L·Lᵀ)⁻¹, the lower half."""
+    inverse = lower.copy(order="F")
+    lapack.inverse_of_cholesky(inverse)
+    return inverse
 
 
 def _symmetric_from_lower(a: np.ndarray) -> np.ndarray:

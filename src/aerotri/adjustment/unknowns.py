@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.adjustment import _pair_kernels
 from aerotri.adjustment.kernel_records import RayArrays, Scans
 from aerotri.adjustment.photograph_fields import add_photograph_fields
+from aerotri.adjustment.photograph_pairs import photograph_pairs
 from aerotri.adjustment.rig_ties import Ties
 from aerotri.adjustment.rigging import Chain, Mountings, OnRigs, Rigging, photographs_on_rigs, with_leads
 from aerotri.adjustment.scanning import NONE, Scanning, scanning_of
@@ -338,16 +338,16 @@ def _sort_rays(block: Block, active: np.ndarray, centre: np.ndarray):
     rows = np.flatnonzero(active)
     images = with_leads(block, np.unique(block.image_points.image[rows]), centre)
     ray_image = np.searchsorted(images, block.image_points.image[rows])
-    points, ray_point = np.unique(block.image_points.point[rows], return_inverse=True)
-    first_image = np.full(len(points), len(images))
-    np.minimum.at(first_image, ray_point, ray_image)
-    order_of_points = np.lexsort((np.arange(len(points)), first_image))
-    rank = np.empty(len(points), dtype=np.int64)
-    rank[order_of_points] = np.arange(len(points))
-    order = np.lexsort((ray_image, rank[ray_point]))
-    counts = np.bincount(rank[ray_point], minlength=len(points))
-    row_start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    return rows[order], images, points[order_of_points], ray_image[order].astype(np.int64), row_start
+    counts = np.bincount(block.image_points.point[rows], minlength=len(block.points))
+    points = np.flatnonzero(counts)
+    first_image = np.full(len(block.points), len(images))
+    np.minimum.at(first_image, block.image_points.point[rows], ray_image)
+    points = points[np.argsort(first_image[points], kind="stable")]
+    rank = np.empty(len(block.points), dtype=np.int64)
+    rank[points] = np.arange(len(points))
+    order = np.argsort(rank[block.image_points.point[rows]] * len(images) + ray_image, kind="stable")
+    row_start = np.concatenate([[0], np.cumsum(counts[points])]).astype(np.int64)
+    return rows[order], images, points, ray_image[order].astype(np.int64), row_start
 
 
 def _ties(on_rigs: OnRigs, block: np.ndarray) -> Ties:
@@ -363,14 +363,10 @@ def _pattern(n: int, row_start: np.ndarray, ray_image: np.ndarray, tied: np.ndar
     """
     counts = np.diff(row_start)
     pair_start = np.concatenate([[0], np.cumsum(counts * (counts - 1) // 2)]).astype(np.int64)
-    codes = np.empty(pair_start[-1], dtype=np.int64)
-    _pair_kernels.enumerate_pairs(row_start, ray_image, n, codes)
-    codes = np.concatenate([codes, tied.min(axis=1, initial=n) * n + tied.max(axis=1, initial=0)])
-    unique, place = np.unique(codes, return_inverse=True)
-    pair_block, tie_block = place[: pair_start[-1]], place[pair_start[-1] :]
-    block_row = np.concatenate([np.arange(n), unique // n])
-    block_col = np.concatenate([np.arange(n), unique % n])
-    return pair_start, (pair_block + n).astype(np.int64), block_row, block_col, (tie_block + n).astype(np.int64)
+    pairs = photograph_pairs(row_start, ray_image, n, tied)
+    block_row = np.concatenate([np.arange(n), pairs.first])
+    block_col = np.concatenate([np.arange(n), pairs.second])
+    return pair_start, pairs.of_rays + n, block_row, block_col, pairs.of_ties + n
 
 
 def _control_priors(block: Block, points: np.ndarray, origin: np.ndarray):

@@ -11,6 +11,7 @@ from aerotri.bench.decisions import Decision, Decisions
 from aerotri.bench.records import Records, pixels_of_rays
 from aerotri.formats.block.journal import MARK
 
+SAME_M = 1e-4
 SAME_PX = 0.001
 """A mark nearer than this is where it was."""
 
@@ -19,11 +20,11 @@ def open_changes(records: Records, decisions: Decisions) -> list[dict[str, Any]]
     """Marks and switches that the shown result does not have yet.
 
     Each with `image` (row, None where the point is meant), `point` (row, None where it is new), `name` of the point,
-    `kind` (moved, new, removed, off, on, check or control), `px` of a mark, and `reason`.
+    `kind` (moved, new, removed, off, on, check, control, new_control or new_check), `px` of a mark, and `reason`.
     """
     rows = _Rows(records)
     found = [_mark(rows, one) for one in decisions.places().values()]
-    found += [*_switches(rows, decisions)]
+    found += [*_switches(rows, decisions), *_given(rows, decisions)]
     return [one for one in found if one is not None]
 
 
@@ -67,6 +68,17 @@ def _switches(rows: _Rows, decisions: Decisions) -> list[dict[str, Any]]:
     now, then = decisions.switches(), _switches_of_result(rows)
     found = [rows.told(one, one.action) for key, one in now.items() if then.get(key) != one.action]
     return found + [rows.told(Decision("on", image, point), "on") for image, point in then if (image, point) not in now]
+
+
+def _given(rows: _Rows, decisions: Decisions) -> list[dict[str, Any]]:
+    """New control and check points that the result does not have with these coordinates."""
+    control = rows.block.control
+    there = dict(zip(rows.block.points[control.point].tolist(), control.xyz, strict=True))
+    return [
+        rows.told(one, one.action)
+        for name, one in decisions.given().items()
+        if name not in there or not np.allclose(there[name], (one.given or ())[:3], rtol=0.0, atol=SAME_M)
+    ]
 
 
 def _switches_of_result(rows: _Rows) -> Mapping[tuple[str, str], str]:

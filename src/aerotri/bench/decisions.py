@@ -7,20 +7,22 @@ import csv
 import io
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from aerotri.conventions import InputError
-from aerotri.formats.block.journal import ACTIONS, EDIT_COLUMNS, MARK, ON, REMOVE, UNDO, standing_rows
+from aerotri.formats.block.journal import ACTIONS, EDIT_COLUMNS, GIVEN, MARK, ON, REMOVE, UNDO, standing_rows
 from aerotri.formats.files.atomic import atomic_file
 from aerotri.formats.text.tables import read_table
 from aerotri.spreadsheet import plain_row
 
 NAME = "edits.csv"
-COLUMNS = ("time", "image", "point", "action", "column", "row", "old_column", "old_row", "reason")
+COLUMNS = ("time", "image", "point", "action", "column", "row", "old_column", "old_row", "reason",
+           "X", "Y", "Z", "sX", "sY", "sZ")  # fmt: skip
 LONGEST_REASON = 500
+METRE_DIGITS = 5
 DIGITS = 3
 """Of a position in pixels: a thousandth is far below what anybody measures."""
 
@@ -34,6 +36,7 @@ class Decision:
     action : of `formats.block.journal.ACTIONS`. image, point : names, '' where none is meant.
     place, before : column and row, px, of a mark and before it was set; None where there is none.
     time : UTC, ISO 8601. reason : in words.
+    given : m, X, Y, Z and their σ of a new control or check point; None otherwise.
     """
 
     action: str
@@ -43,13 +46,15 @@ class Decision:
     before: tuple[float, float] | None = None
     reason: str = ""
     time: str = ""
+    given: tuple[float, ...] | None = None
 
     def cells(self) -> list[str]:
         """In the order of `COLUMNS`."""
         places = [f"{value:.{DIGITS}f}" for place in (self.place, self.before) for value in place or ()]
         at = places[:2] if self.place else ["", ""]
         old = places[-2:] if self.before else ["", ""]
-        return [self.time, self.image, self.point, self.action, *at, *old, self.reason]
+        given = [f"{value:.{METRE_DIGITS}f}" for value in self.given or ()] or [""] * 6
+        return [self.time, self.image, self.point, self.action, *at, *old, self.reason, *given]
 
 
 class Decisions:
@@ -99,8 +104,12 @@ class Decisions:
 
     def switches(self) -> Mapping[tuple[str, str], Decision]:
         """The last decision about every ray and point, photograph '' where the point is meant; those that are on."""
-        last = {(one.image, one.point): one for one in self.standing() if one.action not in (MARK, REMOVE)}
+        last = {(one.image, one.point): one for one in self.standing() if one.action not in (MARK, REMOVE, *GIVEN)}
         return {key: one for key, one in last.items() if one.action != ON}
+
+    def given(self) -> Mapping[str, Decision]:
+        """The new control and check points by their names."""
+        return {one.point: one for one in self.standing() if one.action in GIVEN}
 
     def add(self, decision: Decision) -> Decision:
         """Write a row; it is on the disk when this returns.
@@ -119,7 +128,7 @@ class Decisions:
             raise InputError("nothing is left to be taken back", "nothing was decided, or all of it was taken back")
         reason = " ".join(decision.reason.split())[:LONGEST_REASON]
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
-        row = Decision(decision.action, decision.image, decision.point, decision.place, decision.before, reason, now)
+        row = replace(decision, reason=reason, time=now)
         try:
             _append(self._path, row)
         except OSError as error:
@@ -149,10 +158,11 @@ def _read(path: Path) -> list[Decision]:
         return str(text[name][row]) if name in text else ""
 
     at, before = table.stack("column", "row"), table.stack("old_column", "old_row")
+    given = table.stack("X", "Y", "Z", "sX", "sY", "sZ")
     return [
         Decision(
             cell("action", row), cell("image", row), cell("point", row), _pair(at[row]), _pair(before[row]),
-            cell("reason", row), cell("time", row),
+            cell("reason", row), cell("time", row), _six(given[row]),
         )
         for row in range(table.length)
     ]  # fmt: skip
@@ -160,6 +170,10 @@ def _read(path: Path) -> list[Decision]:
 
 def _pair(values: Any) -> tuple[float, float] | None:
     return None if values[0] != values[0] else (float(values[0]), float(values[1]))
+
+
+def _six(values: Any) -> tuple[float, ...] | None:
+    return None if values[0] != values[0] else tuple(float(value) for value in values)
 
 
 def _mend(path: Path) -> None:

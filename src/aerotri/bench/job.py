@@ -1,4 +1,4 @@
-"""An adjustment in another process, while the page goes on."""
+"""Work in another process, while the page goes on."""
 
 from __future__ import annotations
 
@@ -7,27 +7,26 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 
 class Job:
-    """One adjustment.
+    """One adjustment, or one plan.
 
     Parameters
     ----------
-    block, out : folders of the block and of the result. before : a result to start from. geoid : grid file, '' if none.
-    done : called with the folder of the result when there is one.
+    module : that does it, as a program. words : its arguments. out : folder of what it writes.
+    done : called with that folder when it is there.
     """
 
-    def __init__(self, block: Path, out: Path, before: Path | None, geoid: str, done: Callable[[Path], None]):
+    def __init__(self, module: str, words: Sequence[str], out: Path, done: Callable[[Path], None]):
         self._out, self._done, self._begun = out, done, time.monotonic()
         self._stage, self._share, self._error, self._stopped = "starting", None, "", False
         self._seconds: float | None = None
-        words = [str(block), str(out), "" if before is None else str(before), geoid]
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "aerotri.bench.worker", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            [sys.executable, "-m", module, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             text=True, encoding="utf-8",
         )  # fmt: skip
         self._thread = threading.Thread(target=self._follow, daemon=True)
@@ -59,7 +58,7 @@ class Job:
             self._take(line)
         code = process.wait()
         if code and not self._error:
-            self._error = "stopped" if self._stopped else said.last() or f"the adjustment ended with {code}"
+            self._error = "stopped" if self._stopped else said.last() or f"the work ended with {code}"
         if not code:
             self._finish()
         self._seconds = time.monotonic() - self._begun

@@ -14,7 +14,7 @@ from aerotri.formats.files.atomic import atomic_folder
 
 RUN = "run.json"
 BLOCK, RESULT, OF_BENCH, OF_RESULT = "block", "result_", "_bench", "_result"
-REMEDY = "give the folder of a block, or the folder that `aerotri adjust` wrote"
+REMEDY = "give the folder of a block, or the folder that `aerotri adjust` or `aerotri plan` wrote"
 
 
 @dataclass(frozen=True)

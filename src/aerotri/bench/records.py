@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.bench.json_record import read_record
 from aerotri.conventions import InputError, px_from_mm
 from aerotri.formats.block.folder import read_block
 from aerotri.formats.block.scanned_film import scan_from_mm
@@ -100,7 +100,7 @@ def read_records(folder: Path) -> Records:
     found = [_Rows(folder / f"{name}.csv", "point", names) for name in ("control", "check")]
     both = [rows.numbers("dX", "dY", "dZ") for rows in found]
     return Records(
-        block=block, outcome=_json(record), centre=images.numbers("X0", "Y0", "Z0"),
+        block=block, outcome=read_record(record, "a result", REMEDY), centre=images.numbers("X0", "Y0", "Z0"),
         angles=np.radians(images.numbers(*ANGLES)), sigma_centre=images.numbers("sX0", "sY0", "sZ0"),
         xyz=points.numbers("X", "Y", "Z"), sigma=points.numbers("sX", "sY", "sZ"),
         largest_w=points.numbers("max_abs_w")[:, 0], v=v, w=w, weight=weight, status=status,
@@ -173,14 +173,3 @@ def _rays(path: Path, block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray,
     columns = table.numbers
     v, w = (np.column_stack([columns[a], columns[b]]) for a, b in (("vx", "vy"), ("wx", "wy")))
     return v, w, columns["weight"], table.text["status"].rows()
-
-
-def _json(path: Path) -> dict[str, Any]:
-    """The record of a result."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, OSError, RecursionError) as error:
-        raise InputError(f"cannot be read: {error}", REMEDY, path) from None
-    if not isinstance(content, dict):
-        raise InputError("is no record of a result", REMEDY, path)
-    return content

@@ -10,21 +10,22 @@ from collections.abc import Callable
 from types import FrameType
 
 import uvicorn
+from starlette.types import ASGIApp
 
-from aerotri.bench.server import make_application, new_token
-from aerotri.bench.session import Bench
+from aerotri.bench.server import new_token
 from aerotri.conventions import InputError
 
 ADDRESS = "127.0.0.1"
 """Only this machine: there is no option for another."""
 
 
-def serve(bench: Bench, port: int, browser: bool, tell: Callable[[str], None]) -> None:
+def serve(make: Callable[[str], ASGIApp], port: int, browser: bool, tell: Callable[[str], None]) -> None:
     """Serve the pages until the program is interrupted.
 
     Parameters
     ----------
-    port : 0 for any that is free. browser : whether to open one. tell : takes the address.
+    make : the pages for a token. port : 0 for any that is free. browser : whether to open one.
+    tell : takes the address.
 
     Raises
     ------
@@ -34,7 +35,7 @@ def serve(bench: Bench, port: int, browser: bool, tell: Callable[[str], None]) -
     token = new_token()
     with listening(port) as listener:
         url = f"http://{ADDRESS}:{listener.getsockname()[1]}/{token}/"
-        settings = uvicorn.Config(make_application(bench, token), log_level="error", access_log=False, lifespan="off")
+        settings = uvicorn.Config(make(token), log_level="error", access_log=False, lifespan="off")
         server = uvicorn.Server(settings)
         thread = threading.Thread(target=server.run, args=([listener],), daemon=True)
         before = {number: signal.signal(number, _ending(server)) for number in (signal.SIGINT, signal.SIGTERM)}

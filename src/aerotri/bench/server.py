@@ -41,17 +41,22 @@ def make_application(bench: Bench, token: str) -> ASGIApp:
     token : first part of every path; whoever does not know it is refused with 403.
     """
     routes = [
-        Route("/", _page("index.html")),
-        *(Route(f"/{file.name}", _page(file.name)) for file in sorted(STATIC.iterdir()) if file.suffix in KINDS),
-        *(Route(f"/data/{path}", _told(work)) for path, work in _questions(bench).items()),
-        *(Route(f"/act/{path}", _done(work), methods=["POST"]) for path, work in _actions(bench).items()),
+        Route("/", page_file("index.html")),
+        *files_of_page(),
+        *(Route(f"/data/{path}", told(work)) for path, work in _questions(bench).items()),
+        *(Route(f"/act/{path}", done(work), methods=["POST"]) for path, work in _actions(bench).items()),
         Route("/tile/{image:int}/{level:int}/{column:int}/{row:int}", _shown(lambda asked: bench.pictures.tile(
             *(asked.path_params[name] for name in ("image", "level", "column", "row"))))),
         Route("/layer/{number:int}", _shown(lambda asked: bench.layer(asked.path_params["number"]))),
         Route("/cutout/{image:int}", _shown(lambda asked: bench.cutout(
             asked.path_params["image"], *(_whole(asked, name) or 0 for name in ("left", "top", "size"))))),
     ]  # fmt: skip
-    return _Guard(Starlette(routes=routes), token)
+    return Guard(Starlette(routes=routes), token)
+
+
+def files_of_page() -> list[Route]:
+    """The files that pages load."""
+    return [Route(f"/{file.name}", page_file(file.name)) for file in sorted(STATIC.iterdir()) if file.suffix in KINDS]
 
 
 def _questions(bench: Bench) -> dict[str, Callable[[Request], Any]]:
@@ -64,6 +69,7 @@ def _questions(bench: Bench) -> dict[str, Callable[[Request], Any]]:
         "edits": lambda asked: bench.edits(),
         "next": lambda asked: bench.next(),
         "layers": lambda asked: bench.layers(),
+        "targets/{image:int}": lambda asked: bench.targets(asked.path_params["image"]),
         "difference": lambda asked: bench.difference(),
         "rays": lambda asked: bench.rays(
             max(_whole(asked, "first") or 0, 0), _whole(asked, "image"), _whole(asked, "point"),
@@ -84,6 +90,9 @@ def _actions(bench: Bench) -> dict[str, Callable[[Given], Any]]:
         "switch": lambda given: bench.switch(
             given.row("image") if given.has("image") else None, given.text("point"), given.text("action"),
             given.text("reason")),
+        "mark_targets": lambda given: bench.mark_targets(given.row("image")),
+        "give": lambda given: bench.give(
+            given.text("point"), given.text("action"), given.numbers("given", 6), given.text("reason")),
         "undo": lambda given: bench.undo(),
         "adjust": lambda given: bench.adjust(),
         "stop": lambda given: bench.stop(),
@@ -128,6 +137,23 @@ class Given:
             raise InputError(f"{name} is no text of up to {LONGEST} characters", RELOAD)
         return value
 
+    def texts(self, name: str) -> dict[str, str]:
+        """Texts by their names."""
+        value = self._content.get(name)
+        if not isinstance(value, dict) or not all(
+            isinstance(one, str) and len(one) <= LONGEST for one in value.values()
+        ):
+            raise InputError(f"{name} holds no texts", RELOAD)
+        return {str(key): text for key, text in value.items()}
+
+    def numbers(self, name: str, count: int) -> tuple[float, ...]:
+        """So many numbers."""
+        value = self._content.get(name)
+        found = value if isinstance(value, list) and len(value) == count else [None]
+        if not all(isinstance(one, int | float) and abs(one) < MOST for one in found):
+            raise InputError(f"{name} are not {count} numbers", "fill in every field, with a point such as 0.02")
+        return tuple(float(one or 0.0) for one in found)
+
     def place(self) -> tuple[float, float]:
         """Column and row, px."""
         found = [self._content.get(name) for name in ("column", "row")]
@@ -141,7 +167,7 @@ def new_token() -> str:
     return secrets.token_urlsafe(24)
 
 
-class _Guard:
+class Guard:
     """Lets through who knows the token and asks this machine by its own name."""
 
     def __init__(self, inner: ASGIApp, token: str):
@@ -162,7 +188,7 @@ class _Guard:
         await self._inner({**scope, "path": f"/{rest}", "raw_path": f"/{rest}".encode()}, receive, send)
 
 
-def _page(name: str) -> Callable[[Request], Response]:
+def page_file(name: str) -> Callable[[Request], Response]:
     """A file of the page."""
 
     def answer(asked: Request) -> Response:
@@ -172,7 +198,7 @@ def _page(name: str) -> Callable[[Request], Response]:
     return answer
 
 
-def _told(work: Callable[[Request], Any]) -> Callable[[Request], Any]:
+def told(work: Callable[[Request], Any]) -> Callable[[Request], Any]:
     """What a piece of work gives as JSON; bad input in words, with 400."""
 
     async def answer(asked: Request) -> Response:
@@ -185,7 +211,7 @@ def _told(work: Callable[[Request], Any]) -> Callable[[Request], Any]:
     return answer
 
 
-def _done(work: Callable[[Given], Any]) -> Callable[[Request], Any]:
+def done(work: Callable[[Given], Any]) -> Callable[[Request], Any]:
     """An action with what the page says; what it gives as JSON."""
 
     async def answer(asked: Request) -> Response:

@@ -19,12 +19,15 @@ from aerotri.bench.next_mark import NextMark, next_marks
 from aerotri.bench.pictures import Pictures
 from aerotri.bench.places import Places
 from aerotri.bench.plan import ellipse_content, plan_content, plan_origin
+from aerotri.bench.prediction import Prediction
 from aerotri.bench.rays import MOST_ROWS, chosen_rays, order_of_rays, point_content, ray_rows
 from aerotri.bench.records import read_records, records_of_block
+from aerotri.bench.rough_prediction import RoughPrediction, rough_prediction
 from aerotri.bench.snap import snapped
+from aerotri.bench.target_search import point_of_number, targets_of_photograph
 from aerotri.conventions import InputError
 from aerotri.formats.block.folder import read_block
-from aerotri.formats.block.journal import MARK, ON, REMOVE
+from aerotri.formats.block.journal import GIVEN, MARK, ON, REMOVE
 from aerotri.observations.block import EDIT_ACTIONS
 from aerotri.results.adjustment import Adjustment
 from aerotri.statistics.outliers import spread
@@ -68,6 +71,7 @@ class Bench:
             self.order = order_of_rays(records)
             self.generation += 1
             self.equations = Equations(result)
+            self._rough = rough_prediction(records.block) if result is None else None
 
     def summary(self) -> dict[str, Any]:
         """What the head of the page says."""
@@ -79,7 +83,8 @@ class Bench:
             "limit": spread(r.w) * critical_value(r.block.settings.adjustment.alpha), "counts": r.block.counts,
             "crs": r.block.crs, "generation": self.generation,
             "sizes": [list(camera.size_px) for camera in r.block.cameras], "camera": r.block.images.camera.tolist(),
-            "compared": self._before is not None, "pictures": sorted(self.pictures.paths()),
+            "is_rough": self._rough is not None, "compared": self._before is not None,
+            "pictures": sorted(self.pictures.paths()),
         }  # fmt: skip
 
     def state(self) -> dict[str, Any]:
@@ -131,7 +136,7 @@ class Bench:
         row = self._row(image, len(block.images), "photograph")
         rows = np.flatnonzero(block.image_points.image == row)
         control, expected = block.control.point, list[Any]()
-        prediction = self.equations.prediction()
+        prediction = self._prediction()
         if prediction is not None and len(control):
             xyz = np.where(np.isnan(self.records.xyz[control]), block.control.xyz, self.records.xyz[control])
             px = prediction.pixels(row, xyz)
@@ -210,7 +215,7 @@ class Bench:
         ][:MOST_NEXT]}  # fmt: skip
 
     def edits(self) -> dict[str, Any]:
-        """The journal, the newest first, and what the shown result does not have of it."""
+        """The journal, the newest first, what the shown result does not have of it, and the new control points."""
         standing = {id(one) for one in self.decisions.standing()}
         rows = [
             {"time": one.time, "action": one.action, "image": one.image, "point": one.point, "place": one.place,
@@ -223,7 +228,9 @@ class Bench:
     def mark(
         self, image: int, point: str, place: tuple[float, float], reason: str = "", snap: bool = False
     ) -> dict[str, Any]:
-        """Set or move a mark; `snapped` says in words where it was brought to.
+        """Set or move a mark; `snapped` says in words where it was brought to, `read` which number a target there has.
+
+        `named` is the control point of that number, '' where there is none.
 
         Parameters
         ----------
@@ -239,17 +246,72 @@ class Bench:
         size = self.pictures.size(row)
         if not all(0.0 <= value <= limit for value, limit in zip(place, size, strict=True)):
             raise InputError("the place is not in the photograph", "click inside of it")
-        name = point.strip()
-        if not name or len(name) > 200 or not name.isprintable():
-            raise InputError("a point needs a name of up to 200 printable characters", "give it one")
-        how = ""
+        name, how, number = _name(point), "", None
         if snap and row in self.pictures:
-            found = snapped(self.pictures, row, place, self._others(name), self.equations.prediction(), self._xyz(name))
-            place, how = found.place, found.how
+            found = snapped(self.pictures, row, place, self._others(name), self._prediction(), self._xyz(name))
+            place, how, number = found.place, found.how, found.number
         said = " ".join(filter(None, (reason, how)))
-        return self._decide(Decision(MARK, self._image(row), name, place, self._place(row, name), said)) | {
-            "snapped": how
-        }
+        decided = self._decide(Decision(MARK, self._image(row), name, place, self._place(row, name), said))
+        return decided | {"snapped": how, "read": number, "named": point_of_number(self._control_names(), number)}
+
+    def targets(self, image: int) -> dict[str, Any]:
+        """The coded targets of a photograph, with the control point that each number names.
+
+        Raises
+        ------
+        InputError
+            When there is no file of the photograph.
+        """
+        row, names = self._row(image, len(self.records.block.images), "photograph"), self._control_names()
+        return {"targets": [
+            {"family": one.family, "number": one.number, "place": np.round(one.place, 3).tolist(),
+             "sigma": round(one.sigma_px, 3), "point": point_of_number(names, one.number)}
+            for one in targets_of_photograph(self.pictures, row)
+        ]}  # fmt: skip
+
+    def mark_targets(self, image: int) -> dict[str, Any]:
+        """Mark every control point whose number a coded target of the photograph has; `marked` names them.
+
+        A number that two targets have is left out.
+
+        Raises
+        ------
+        InputError
+            When there is no file of the photograph.
+        """
+        row, marked = self._row(image, len(self.records.block.images), "photograph"), list[str]()
+        found = [one for one in self.targets(row)["targets"] if one["point"]]
+        points = [one["point"] for one in found]
+        for one in found:
+            column, line = one["place"]
+            if points.count(one["point"]) == 1:
+                before = self._place(row, one["point"])
+                said = f"coded target {one['number']} ({one['family']}), σ {one['sigma']:.2f} px"
+                self._decide(Decision(MARK, self._image(row), one["point"], (column, line), before, said))
+                marked.append(one["point"])
+        return self.edits() | {"marked": marked}
+
+    def give(self, point: str, action: str, given: tuple[float, ...], reason: str = "") -> dict[str, Any]:
+        """Make a point a control or check point.
+
+        Parameters
+        ----------
+        point : its name, of a tie point or a new one. action : new_control or new_check.
+        given : m, X, Y, Z and their σ, in the CRS of the block.
+
+        Raises
+        ------
+        InputError
+            When the point is one already, or a σ is not above 0.
+        """
+        name = _name(point)
+        if action not in GIVEN:
+            raise InputError(f"'{action[:30]}' makes no point", RELOAD)
+        if name in self._control_names() and name not in self.decisions.given():
+            raise InputError(f"'{name}' is a control or check point already", "give the new point another name")
+        if len(given) != 6 or not min(given[3:]) > 0.0:
+            raise InputError("a standard deviation is not above 0", "give σ of X, Y and Z in m")
+        return self._decide(Decision(action, "", name, reason=reason, given=given))
 
     def remove(self, image: int, point: str, reason: str) -> dict[str, Any]:
         """Take a measurement out.
@@ -309,7 +371,9 @@ class Bench:
             self.places.keep_block()
             frame = self.equations.frame()
             geoid = "" if frame is None or frame.geoid is None else str(frame.geoid)
-            self._job = Job(self.places.block, self.places.next_result(), self.result, geoid, self._take)
+            out = self.places.next_result()
+            words = [str(self.places.block), str(out), "" if self.result is None else str(self.result), geoid]
+            self._job = Job("aerotri.bench.worker", words, out, self._take)
         return self.state()
 
     def stop(self) -> dict[str, Any]:
@@ -351,9 +415,13 @@ class Bench:
             self.decisions.add(decision)
             return self.edits()
 
+    def _prediction(self) -> Prediction | RoughPrediction | None:
+        """Where points appear: by the adjustment, before the first one by what is given; None where neither is."""
+        return self.equations.prediction() or self._rough
+
     def _expected(self, point: int) -> list[Any]:
         """Photograph, column and row of everywhere that a point should appear."""
-        prediction, xyz = self.equations.prediction(), self._xyz(str(self.records.block.points[point]))
+        prediction, xyz = self._prediction(), self._xyz(str(self.records.block.points[point]))
         if prediction is None or xyz is None or not np.isfinite(xyz).all():
             return []
         return [
@@ -388,6 +456,11 @@ class Bench:
                     found[row[image]] = np.array(one.place)
         return list(found.items())
 
+    def _control_names(self) -> list[str]:
+        """Names of the control and check points, the new ones too."""
+        block = self.records.block
+        return [*map(str, block.points[block.control.point].tolist()), *self.decisions.given()]
+
     def _place(self, image: int, point: str) -> tuple[float, float] | None:
         """Column and row of a mark as it is now; None where the point is not measured."""
         last = self.decisions.places().get((self._image(image), point))
@@ -407,3 +480,11 @@ class Bench:
         if not 0 <= number < count:
             raise InputError(f"there is no {what} {number}", RELOAD)
         return number
+
+
+def _name(point: str) -> str:
+    """The name of a point as it is kept."""
+    name = point.strip()
+    if not name or len(name) > 200 or not name.isprintable():
+        raise InputError("a point needs a name of up to 200 printable characters", "give it one")
+    return name

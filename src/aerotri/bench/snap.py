@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.bench.coded_targets import find_coded
 from aerotri.bench.matching import HALF_PX, Match, match, sampled_window
 from aerotri.bench.pictures import Pictures, corner_of
 from aerotri.bench.prediction import Prediction
+from aerotri.bench.rough_prediction import RoughPrediction
 from aerotri.bench.targets import find_target
 from aerotri.conventions import counted
 
@@ -27,16 +29,17 @@ class Snapped:
 
     Parameters
     ----------
-    place : column and row, px. how : in words, '' where it stays.
+    place : column and row, px. how : in words, '' where it stays. number : that a coded target has; None without.
     """
 
     place: tuple[float, float]
     how: str
+    number: int | None = None
 
 
 def snapped(
     pictures: Pictures, image: int, place: tuple[float, float], others: Sequence[tuple[int, np.ndarray]],
-    prediction: Prediction | None, xyz: np.ndarray | None,
+    prediction: Prediction | RoughPrediction | None, xyz: np.ndarray | None,
 ) -> Snapped:  # fmt: skip
     """The place of a mark; the one given where there is neither a target nor a match.
 
@@ -54,6 +57,10 @@ def snapped(
     left, top = corner_of(place, PIECE_PX)
     piece = pictures.grey(image, left, top, PIECE_PX)
     near = np.array(place) - (left, top)
+    coded = next((one for one in find_coded(piece) if one.covers(near)), None)
+    if coded is not None:
+        at = (float(coded.place[0]) + left, float(coded.place[1]) + top)
+        return Snapped(at, f"coded target {coded.number} ({coded.family}), σ {coded.sigma_px:.2f} px", coded.number)
     target = find_target(piece, (float(near[0]), float(near[1])), TARGET_REACH_PX)
     if target is not None:
         at = (target.place[0] + left, target.place[1] + top)
@@ -89,7 +96,9 @@ def _matched(
     return None if template is None else match(piece, near, template, affine, MATCH_REACH_PX)
 
 
-def _affine(prediction: Prediction | None, image: int, other: int, xyz: np.ndarray | None) -> np.ndarray:
+def _affine(
+    prediction: Prediction | RoughPrediction | None, image: int, other: int, xyz: np.ndarray | None
+) -> np.ndarray:
     """(2, 2) offsets in one photograph per offset in the other, on level ground about it; unity where unknown."""
     if prediction is None or xyz is None or not np.isfinite(xyz).all():
         return np.eye(2)

@@ -12,6 +12,7 @@ from aerotri.cli.options import (
     ADJUSTMENT,
     ARGUMENTS,
     BLOCKS,
+    METHOD,
     OUTPUT,
     BlockFolder,
     CameraName,
@@ -98,13 +99,26 @@ def simulate(
             min=0.0, max=20000.0, help="σ of the noise rendered, grey values of 65 535.", rich_help_panel=PHOTOGRAPHS
         ),
     ] = 50.0,
+    parts: Annotated[
+        int | None,
+        typer.Option(
+            min=2,
+            help="Number of parts in which the block is written, never held whole; adjust computes it part by part.",
+            rich_help_panel=METHOD,
+        ),
+    ] = None,
     overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:
     """Make a block with known truth from a flight plan, and photographs of it."""
-    from aerotri.commands.simulate import run_simulate
+    from aerotri.commands.simulate import run_simulate, run_simulate_parts
 
     options = None
+    if parts is not None:
+        if render or only or targets or overwrite:
+            raise InputError("--render, --only, --targets and --overwrite are not for parts", "leave out --parts")
+        run_simulate_parts(spec, out, seed, parts, json_)
+        return
     if render:
         from aerotri.simulation.rendering import RenderOptions
 

@@ -16,7 +16,9 @@ def view(
     path: Annotated[
         Path,
         typer.Argument(
-            metavar="source", help="Result folder of `aerotri adjust`, or a block.", rich_help_panel=ARGUMENTS
+            metavar="source",
+            help="Result folder of `aerotri adjust`, a block, or the folder of `aerotri plan`.",
+            rich_help_panel=ARGUMENTS,
         ),
     ],
     photos: Annotated[

@@ -51,6 +51,24 @@ def run_simulate(
     console.lines(_lines(counts, out, rendered))
 
 
+def run_simulate_parts(spec: Path, out: Path, seed: int, parts: int, as_json: bool) -> None:
+    """Simulate and write a block in parts; arguments as on the command line.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.public.parts import simulate_parts
+
+    console = Console(quiet=as_json)
+    counts = simulate_parts(spec, out, parts=parts, seed=seed, progress=console.stage)
+    if as_json:
+        print(json_text(counts, None))
+        return
+    said = _lines(counts, out, 0)
+    console.lines([*said, f"{parts} parts: aerotri adjust {out}"])
+
+
 def _lines(counts: dict[str, Any], out: Path, rendered: int) -> list[str]:
     from aerotri.simulation.photograph_files import PHOTOGRAPHS
     from aerotri.simulation.truth import MARKED_CONTROL

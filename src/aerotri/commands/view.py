@@ -16,15 +16,20 @@ def run_view(path: Path, photographs: Path | None, below: tuple[Path, ...], port
     Raises
     ------
     InputError
-        Where the folder holds neither a result nor a block, the port is taken, or a package is missing.
+        Where the folder holds neither a result, nor a block, nor a plan, the port is taken, or a package is missing.
     """
     for name in ("starlette", "uvicorn"):
         optional_module(name, EXTRA)
+    from aerotri.bench.flight_bench import is_plan
     from aerotri.bench.places import photographs_beside, places_of
     from aerotri.bench.serve import serve
+    from aerotri.bench.server import make_application
     from aerotri.bench.session import Bench
 
     console = Console()
+    if is_plan(path):
+        _serve_plan(path, port, browser, console)
+        return
     bench = Bench(places_of(path), photographs or photographs_beside(path), below)
 
     def tell(address: str) -> None:
@@ -32,6 +37,23 @@ def run_view(path: Path, photographs: Path | None, below: tuple[Path, ...], port
         console.lines([f"Bench of {shown}: {address}", "Ctrl-C ends it; everything is saved at once."])
 
     try:
-        serve(bench, port, browser, tell)
+        serve(lambda token: make_application(bench, token), port, browser, tell)
+    finally:
+        bench.stop()
+
+
+def _serve_plan(path: Path, port: int, browser: bool, console: Console) -> None:
+    """The bench of a planned flight."""
+    from aerotri.bench.flight_bench import FlightBench
+    from aerotri.bench.flight_pages import make_flight_application
+    from aerotri.bench.serve import serve
+
+    bench = FlightBench(path)
+
+    def tell(address: str) -> None:
+        console.lines([f"Bench of the plan {bench.given}: {address}", "Ctrl-C ends it; every plan is kept."])
+
+    try:
+        serve(lambda token: make_flight_application(bench, token), port, browser, tell)
     finally:
         bench.stop()

@@ -46,6 +46,12 @@ def of_model_part(adjusted: AdjustedBlock) -> list[Finding]:
     value = f"{times(test.ratio)} as large as noise explains"
     text = f"about 1; chance makes more with a probability of {100.0 * part.level:.2g} %"
     said = model_part_in_words(part)
-    if not said:
-        return [Finding(name, value, text, "the noise explains them", "good")]
-    return [Finding(name, value, text, said, "attention")]
+    if said:
+        return [Finding(name, value, text, said, "attention")]
+    if part.counts:
+        growth = 100.0 * (max(part.ratio_plan, part.ratio_height) - 1.0)
+        says = (
+            f"more than noise explains. The total σ contain it. They are {growth:.0f} % larger (median of the points)"
+        )
+        return [Finding(name, value, text, says, "note")]
+    return [Finding(name, value, text, "the noise explains them", "good")]

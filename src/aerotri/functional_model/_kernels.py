@@ -101,7 +101,8 @@ def predict_ray(rotation, centre, point, interior, x, y, prediction):
 def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orientation, by_point, by_interior, used):
     """As `predict_ray`, with the partials; they share their intermediates.
 
-    used : USUAL where the further elements are 0 and no partial by them is asked for, else INTERIOR.
+    used : USUAL where the further elements are 0 and no partial by them is asked for, 0 where none by any interior
+        element is, else INTERIOR.
 
     The outputs are those of `RayPartials`, one by one: a record made for every ray costs a tenth of the linearisation.
     """
@@ -163,13 +164,12 @@ def linearise_ray(rotation, centre, point, interior, x, y, prediction, by_orient
         by_point[1, axis] = lens_ba * by_a + lens_bb * by_b
     for row in range(2):
         g0, g1, g2 = by_point[row, 0], by_point[row, 1], by_point[row, 2]
-        by_orientation[row, 0] = -g0
-        by_orientation[row, 1] = -g1
-        by_orientation[row, 2] = -g2
-        by_orientation[row, 3] = g1 * dz - g2 * dy
-        by_orientation[row, 4] = g2 * dx - g0 * dz
-        by_orientation[row, 5] = g0 * dy - g1 * dx
+        by_orientation[row, 0], by_orientation[row, 1], by_orientation[row, 2] = -g0, -g1, -g2
+        t0, t1, t2 = g1 * dz - g2 * dy, g2 * dx - g0 * dz, g0 * dy - g1 * dx
+        by_orientation[row, 3], by_orientation[row, 4], by_orientation[row, 5] = t0, t1, t2
 
+    if used == 0:
+        return
     mixed = xb * yb * rho_slope + 2.0 * (big_p1 * yb + big_p2 * xb)
     by_interior[0, 0], by_interior[1, 0] = a_lens, b_lens
     by_interior[0, 1] = 1.0 + rho + xb * xb * rho_slope + 6.0 * big_p1 * xb + 2.0 * big_p2 * yb + b1

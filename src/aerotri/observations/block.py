@@ -114,6 +114,13 @@ class Images:
     def __len__(self) -> int:
         return len(self.names)
 
+    def take(self, rows: np.ndarray) -> Images:
+        """Those of some rows."""
+        columns = {name: column[rows] for name, column in self.columns.items()}
+        return Images(
+            self.names[rows], self.camera[rows], self.strip[rows], self.centre[rows], self.angles[rows], columns
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class ImagePoints:

@@ -16,7 +16,8 @@ from aerotri.formats.block.folder import read_block, read_photographs
 from aerotri.observations import Block
 from aerotri.partition.common import Common, PartFacts
 from aerotri.partition.course import Course, Ended
-from aerotri.partition.part_results import INVERSE, Ending, Written, measure_part, write_part
+from aerotri.partition.joints import LEAST_BYTES, Joints
+from aerotri.partition.part_results import Ending, Written, measure_part, write_part
 from aerotri.partition.part_system import refuse_robust
 from aerotri.partition.part_tasks import PartTask, Setting, prepare_part
 from aerotri.partition.whole import Whole, whole_of
@@ -25,8 +26,8 @@ from aerotri.statistics.summarise import parameters_of
 
 PARTS, WORK = "parts", "work"
 """Folders: of the parts in a block and in a result; of what the tasks exchange, while they run."""
-BYTES_A_RAY, LEAST_BYTES = 3000, 500_000_000
-"""Memory of a task beside its factor [C]: tables, partials and pairs of a ray; program and libraries."""
+BYTES_A_RAY = 3000
+"""Memory of a part's task beside its factor [C]: tables, partials and pairs of a ray."""
 Say = Callable[[str, float | None], None]
 
 
@@ -66,18 +67,18 @@ def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSet
     work = out / WORK
     try:
         names, origin = _shared_photographs(sources)
-        tasks = [PartTask(p.name, p.resolve(), (work / p.name).resolve(), np.zeros(0, np.int64)) for p in sources]
+        tasks = [PartTask(p.name, p.resolve(), (work / p.name).resolve()) for p in sources]
         say("reading the parts", None)
         facts = executor.run(_reading(Setting(names, origin), tasks, work))
         first = read_block(sources[0], rays_needed=False)
         common = _common_of(facts, tasks)
-        tasks = [replace(task, shared=common.of_shared[k]) for k, task in enumerate(tasks)]
+        joints = Joints(common, tasks, executor, work)
         observations = sum(part.observations for part in facts) + common.priors.count
         unknowns = sum(part.unknowns for part in facts) + 6 * len(common.images) + len(common.labels)
         asked, chosen = first.settings.adjustment, settings
         limit = asked.max_iterations if chosen.max_iterations is None else chosen.max_iterations
         course = Course(
-            tasks, common, executor, work, observations - unknowns, unknowns,
+            joints, common, executor, work, observations - unknowns, unknowns,
             max(part.bytes_needed + BYTES_A_RAY * part.rays for part in facts) + LEAST_BYTES,
             lambda iteration, sigma0: say(f"iteration {iteration}: σ0 {sigma0:.4g}", None),
         )  # fmt: skip
@@ -101,9 +102,8 @@ def _with_sigma(
 ) -> Whole:
     """Inverse, tables of the parts, and what they say together."""
     place, common = ended.place, course.common
-    inverse = course.solved(place).factor.inverse_on_pattern()
-    for number, task in enumerate(course.tasks):
-        task.files.keep_array(INVERSE, common.inverse_of(number, inverse))
+    corner = course.solved(place)
+    course.joints.invert(place.at.tag)
     measured = course.run(measure_part, place.at)
     vtpv = sum(part.vtpv for part in measured) + common.cost_of_priors(place.at.shared)
     freedom = observations - unknowns - sum(part.turned_down for part in measured)
@@ -117,7 +117,7 @@ def _with_sigma(
         observations=observations, unknowns=unknowns, conditions=0, redundancy=observations - unknowns,
     )  # fmt: skip
     written: list[Written] = course.run(write_part, Ending(place.at, outcome, (out / PARTS).resolve()))
-    parameters = parameters_of(common.labels, place.at.shared, inverse.corner, common.weighted, sigma0)
+    parameters = parameters_of(common.labels, place.at.shared, corner.inverse, common.weighted, sigma0)
     return whole_of(first, outcome, parameters, [task.name for task in course.tasks], written, photographs)
 
 

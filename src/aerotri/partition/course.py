@@ -1,13 +1,13 @@
 """The adjustment of a block in parts: Gauss-Newton as in one piece, its equations gathered from the parts.
 
 In every iteration each part is one task: it follows the solution of what is shared to its own photographs and points,
-and eliminates them again at the new state. Here the shared photographs and parameters are solved for.
+and eliminates them again at the new state. What parts share is solved for by the joints of their tree.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ import numpy as np
 from aerotri.adjustment.adjusted_positions import MOST_ROUNDS, STANDING
 from aerotri.adjustment.damping import LAST_DAMPING, Damping
 from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for
-from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
+from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.adjustment.steps import COST_TOLERANCE
 from aerotri.adjustment.stopping import (
     EARLY_STEP_TOLERANCE,
@@ -27,7 +27,8 @@ from aerotri.adjustment.stopping import (
 )
 from aerotri.conventions import InputError
 from aerotri.execution.work import Executor, Work
-from aerotri.partition.common import Common, Left
+from aerotri.partition.common import Common
+from aerotri.partition.joints import Corner, Joints
 from aerotri.partition.part_tasks import (
     At,
     Move,
@@ -37,7 +38,6 @@ from aerotri.partition.part_tasks import (
     move_part,
     reduce_part,
     refuse_fault,
-    solution_for,
 )
 
 MOST_SCALES = 20
@@ -74,35 +74,21 @@ class Ended:
     iterations: int
 
 
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """A solution of what is shared.
-
-    Parameters
-    ----------
-    x : (6·n + s,). decrement : of the whole step.
-    """
-
-    x: np.ndarray
-    decrement: float
-    factor: Factor
-
-
 class Course:
     """Iterations over the parts of a block.
 
     Parameters
     ----------
-    tasks : of the parts. common : what they share. executor : where tasks run. folder : for what tasks share.
+    joints : over the parts. common : what they share. executor : where tasks run. folder : for what tasks share.
     redundancy : of the whole. unknowns : how many there are. bytes_each : memory of a task.
     report : called after every iteration with its number and σ0.
     """
 
     def __init__(
-        self, tasks: Sequence[PartTask], common: Common, executor: Executor, folder: Path, redundancy: int,
-        unknowns: int, bytes_each: int, report: Report | None = None,
+        self, joints: Joints, common: Common, executor: Executor, folder: Path, redundancy: int, unknowns: int,
+        bytes_each: int, report: Report | None = None,
     ):  # fmt: skip
-        self.tasks, self.common, self.redundancy = list(tasks), common, redundancy
+        self.joints, self.tasks, self.common, self.redundancy = joints, joints.parts, common, redundancy
         self._executor, self._folder, self._bytes = executor, folder, bytes_each
         self._share = redundancy / max(redundancy + unknowns, 1)
         self._report, self._tags, self._states, self._iteration = report, 0, 0, 0
@@ -128,27 +114,21 @@ class Course:
             ended = self._through_stages(replace(at, estimator=LEAST_SQUARES), robust, max_iterations)
         return ended
 
-    def solved(self, place: Place) -> Solved:
-        """The solution of what is shared at a place.
+    def solved(self, place: Place) -> Corner:
+        """The solution of the shared parameters at a place.
 
         Raises
         ------
         InputError
             When the observations do not determine it.
         """
-        matrix, right = self.common.empty()
-        for number, task in enumerate(self.tasks):
-            self.common.add(number, Left(*task.files.left(place.at.tag)), matrix, right)
-        self.common.add_priors(matrix, right, place.at.shared, place.at.damping)
         try:
-            factor = self.common.symbolic.factorise(matrix)
+            return self.joints.solved(place.at.tag, place.at.shared, place.at.damping)
         except NotPositiveDefiniteError as error:
             raise InputError(
                 "the observations do not determine the block",
                 "add control or positions of projection centres; adjust a part alone to see what it lacks",
             ) from error
-        x = factor.solve(right)
-        return Solved(x, float(right @ x) + place.decrement, factor)
 
     def _through_stages(self, start: At, robust: str, max_iterations: int) -> Ended:
         *early, last = STAGES[robust]
@@ -184,17 +164,20 @@ class Course:
         while True:
             damped = place if damping.value == 0.0 else self._reduced(self._again(place.at, damping.value))
             solved = self.solved(damped)
+            decrement = solved.decrement + damped.decrement
             there = self._moved(damped, solved)
             if damped is not place:
                 self._drop(damped.at)
             if there.cost <= place.cost * (1.0 + COST_TOLERANCE):
                 self._drop(place.at)
-                ratio = min((place.cost - there.cost) / max(solved.decrement, 1e-300), 1.0)
-                return there, solved.decrement, damping.lowered(ratio, heeds_curvature=False)
+                for task in self.tasks:
+                    task.files.drop(f"state_{place.at.state}")
+                ratio = min((place.cost - there.cost) / max(decrement, 1e-300), 1.0)
+                return there, decrement, damping.lowered(ratio, heeds_curvature=False)
             self._drop(there.at)
             damping = damping.raised()
             if damping.value > LAST_DAMPING:
-                return place, solved.decrement, damping
+                return place, decrement, damping
 
     def _settled(
         self, before: Place, after: Place, decrement: float, last_decrement: float, name: str, tolerance: float
@@ -211,11 +194,10 @@ class Course:
         """The equations of all parts there."""
         return self._place(at, self.run(reduce_part, at))
 
-    def _moved(self, place: Place, solved: Solved) -> Place:
+    def _moved(self, place: Place, solved: Corner) -> Place:
         """Where a solution leads all parts."""
-        for number, task in enumerate(self.tasks):
-            solution_for(task, solved.x[self.common.columns(number)])
-        shared = place.at.shared + solved.x[6 * len(self.common.images) :]
+        self.joints.follow(place.at.tag)
+        shared = place.at.shared + solved.step
         at = replace(place.at, state=self._next_state(), shared=shared, damping=0.0, tag=self._next_tag())
         return self._place(at, self.run(move_part, Move(place.at, at)), may_fail=True)
 
@@ -251,8 +233,9 @@ class Course:
         return replace(at, damping=damping, tag=self._next_tag())
 
     def _drop(self, at: At) -> None:
+        self.joints.drop(at.tag)
         for task in self.tasks:
-            task.files.drop_left(at.tag)
+            task.files.drop_place(at.tag)
 
     def _next_state(self) -> int:
         self._states += 1

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerotri.adjustment import _pair_kernels
 from aerotri.adjustment.dissection import bisect
+from aerotri.adjustment.photograph_pairs import photograph_pairs
 from aerotri.conventions import InputError
 from aerotri.observations import Block
 
@@ -81,14 +81,10 @@ def part_of(block: Block, division: Division, number: int) -> Block:
             gnss, image=row[gnss.image[taken]], xyz=gnss.xyz[taken], sigma=gnss.sigma[taken], time=gnss.time[taken],
             angles=gnss.angles[taken], angles_sigma=gnss.angles_sigma[taken],
         )  # fmt: skip
-    of = block.images
     return replace(
         block,
         name=f"{block.name} part {number}",
-        images=replace(
-            of, names=of.names[images], camera=of.camera[images], strip=of.strip[images], centre=of.centre[images],
-            angles=of.angles[images], columns={name: column[images] for name, column in of.columns.items()},
-        ),
+        images=block.images.take(images),
         points=block.points[points],
         image_points=replace(
             rays, image=row[rays.image[own_rays]], point=point_row[rays.point[own_rays]], xy=rays.xy[own_rays],
@@ -134,11 +130,8 @@ def _rays_by_point(block: Block) -> tuple[np.ndarray, np.ndarray]:
 
 def _neighbours(image: np.ndarray, start: np.ndarray, n: int) -> np.ndarray:
     """(e, 2) pairs of photographs that share a point, each once."""
-    counts = np.diff(start)
-    codes = np.empty(int(np.sum(counts * (counts - 1) // 2)), dtype=np.int64)
-    _pair_kernels.enumerate_pairs(start, image, n, codes)
-    codes = np.unique(codes)
-    return np.column_stack([codes // n, codes % n])
+    pairs = photograph_pairs(start, image, n)
+    return np.column_stack([pairs.first, pairs.second])
 
 
 def _with_points(block: Block, image: np.ndarray, start: np.ndarray, of_image: np.ndarray, count: int) -> Division:

@@ -1,4 +1,4 @@
-"""What a part keeps on disk between tasks: its system, its states, and what it eliminated. Files appear whole."""
+"""What parts and joints keep on disk between tasks: systems, states, what was eliminated. Files appear whole."""
 
 from __future__ import annotations
 
@@ -12,22 +12,71 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from aerotri.adjustment.dense_front import DenseFront
 from aerotri.adjustment.partial_factor import Eliminated
 from aerotri.adjustment.unknowns import State
 from aerotri.partition.common import Left
 from aerotri.partition.part_system import PartSystem
 
+SOLUTION, INVERSE = "solution", "inverse"
+"""Of a front: the values of all its unknowns; the inverse over them."""
+
 
 @dataclass(frozen=True)
-class PartFiles:
-    """The folder of a part's work.
+class WorkFiles:
+    """A folder of work.
 
     Parameters
     ----------
-    folder : of its own; not that of its observations.
+    folder : of its own; not that of observations.
     """
 
     folder: Path
+
+    def keep_left(self, left: Left, tag: str) -> None:
+        """What is left of the equations."""
+        self.keep_array(f"matrix_{tag}", left.matrix)
+        self._keep(f"left_{tag}", lambda file: np.savez(file, right=left.right, diagonal=left.diagonal))
+
+    def left(self, tag: str) -> Left:
+        with np.load(self.folder / f"left_{tag}") as kept:
+            return Left(self.array(f"matrix_{tag}"), kept["right"], kept["diagonal"])
+
+    def drop_left(self, tag: str) -> None:
+        self.drop(f"matrix_{tag}", f"left_{tag}")
+
+    def keep_object(self, name: str, value: Any) -> None:
+        self._keep(name, lambda file: pickle.dump(value, file, pickle.HIGHEST_PROTOCOL))
+
+    def object(self, name: str) -> Any:
+        with open(self.folder / name, "rb") as file:
+            return pickle.load(file)
+
+    def keep_array(self, name: str, values: np.ndarray) -> None:
+        self._keep(name, lambda file: np.save(file, values))
+
+    def array(self, name: str) -> np.ndarray:
+        return np.load(self.folder / name)
+
+    def drop(self, *names: str) -> None:
+        """Remove what nobody needs any more."""
+        for name in names:
+            (self.folder / name).unlink(missing_ok=True)
+
+    def _keep(self, name: str, write: Callable[[BinaryIO], Any]) -> None:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        part = self.folder / f"{name}.{uuid.uuid4().hex}.part"
+        try:
+            with open(part, "wb") as file:
+                write(file)
+            os.replace(part, self.folder / name)
+        finally:
+            part.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True)
+class PartFiles(WorkFiles):
+    """The folder of a part's work."""
 
     def keep_system(self, part: PartSystem, positions: int) -> None:
         """The system with its parameters evaluated at the image points of a round."""
@@ -47,16 +96,10 @@ class PartFiles:
         with np.load(self.folder / f"state_{number}") as kept:
             return State(kept["centre"], kept["rotation"], kept["points"], shared)
 
-    def keep_left(self, left: Left, numbers: Eliminated, half: np.ndarray, tag: str) -> None:
-        """What is left of the equations, and what leads back from a solution of that."""
-        self._keep(f"panels_{tag}", lambda file: np.save(file, numbers.panels))
+    def keep_eliminated(self, numbers: Eliminated, half: np.ndarray, tag: str) -> None:
+        """What leads back from a solution of what is left."""
+        self.keep_array(f"panels_{tag}", numbers.panels)
         self._keep(f"half_{tag}", lambda file: np.savez(file, half=half, scale=numbers.scale))
-        self._keep(f"left_{tag}", lambda file: np.savez(file, matrix=left.matrix, right=left.right))
-
-    def left(self, tag: str) -> tuple[np.ndarray, np.ndarray]:
-        """Matrix and right side that are left."""
-        with np.load(self.folder / f"left_{tag}") as kept:
-            return kept["matrix"], kept["right"]
 
     def eliminated(self, tag: str) -> tuple[Eliminated, np.ndarray]:
         """The numbers of the factor, and L⁻¹ times the right side."""
@@ -64,32 +107,41 @@ class PartFiles:
         with np.load(self.folder / f"half_{tag}") as kept:
             return Eliminated(panels, kept["scale"]), kept["half"]
 
-    def keep_object(self, name: str, value: Any) -> None:
-        self._keep(name, lambda file: pickle.dump(value, file, pickle.HIGHEST_PROTOCOL))
+    def drop_place(self, tag: str) -> None:
+        """What belongs to the equations at one place."""
+        self.drop_left(tag)
+        self.drop(f"half_{tag}", f"panels_{tag}", f"lengths_{tag}")
 
-    def object(self, name: str) -> Any:
-        return pickle.loads((self.folder / name).read_bytes())
 
-    def keep_array(self, name: str, values: np.ndarray) -> None:
-        self._keep(name, lambda file: np.save(file, values))
+@dataclass(frozen=True)
+class JointFiles(WorkFiles):
+    """The folder of a joint's work."""
 
-    def array(self, name: str) -> np.ndarray:
-        return np.load(self.folder / name)
+    def keep_eliminated(self, front: DenseFront, scale: np.ndarray, half: np.ndarray, tag: str) -> None:
+        """The factor of the own photographs, and L⁻¹ times their right side."""
+        self.keep_array(f"top_{tag}", front.top)
+        self.keep_array(f"low_{tag}", front.low)
+        self._keep(f"half_{tag}", lambda file: np.savez(file, half=half, scale=scale))
 
-    def drop(self, *names: str) -> None:
-        """Remove what nobody needs any more."""
-        for name in names:
-            (self.folder / name).unlink(missing_ok=True)
+    def eliminated(self, border: int, tag: str) -> tuple[DenseFront, np.ndarray, np.ndarray]:
+        """The front without its rest, the scale, L⁻¹ times the right side."""
+        with np.load(self.folder / f"half_{tag}") as kept:
+            front = DenseFront(self.array(f"top_{tag}"), self.array(f"low_{tag}"), np.zeros((0, 0)), border)
+            return front, kept["scale"], kept["half"]
 
-    def drop_left(self, tag: str) -> None:
-        self.drop(f"left_{tag}", f"half_{tag}", f"panels_{tag}", f"lengths_{tag}")
+    def keep_inverse(self, front: DenseFront) -> None:
+        for part, values in zip(("top", "low", "rest"), (front.top, front.low, front.rest), strict=True):
+            self.keep_array(f"{INVERSE}_{part}", values)
 
-    def _keep(self, name: str, write: Callable[[BinaryIO], Any]) -> None:
-        self.folder.mkdir(parents=True, exist_ok=True)
-        part = self.folder / f"{name}.{uuid.uuid4().hex}.part"
-        try:
-            with open(part, "wb") as file:
-                write(file)
-            os.replace(part, self.folder / name)
-        finally:
-            part.unlink(missing_ok=True)
+    def inverse(self, border: int) -> DenseFront:
+        """The inverse over the front."""
+        top, low, rest = (self.array(f"{INVERSE}_{part}") for part in ("top", "low", "rest"))
+        return DenseFront(top, low, rest, border)
+
+    def drop_inverse(self) -> None:
+        self.drop(*(f"{INVERSE}_{part}" for part in ("top", "low", "rest")))
+
+    def drop_place(self, tag: str) -> None:
+        """What belongs to the equations at one place."""
+        self.drop_left(tag)
+        self.drop(f"half_{tag}", f"top_{tag}", f"low_{tag}", f"{SOLUTION}_{tag}")

@@ -18,8 +18,8 @@ from aerotri.statistics.covariance import Cofactors
 from aerotri.statistics.held_control import no_held_tests
 from aerotri.statistics.summarise import record_of, turned_down, weighted_sum
 
-MEASURED, INVERSE = "measured", "inverse"
-"""Files of a part: solution and cofactors; the inverse over what it shares."""
+MEASURED = "measured"
+"""File of a part: solution and cofactors."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def measure_part(at: At, task: PartTask) -> Measured:
     system = part.system
     state = files.state(at.state, at.shared[task.shared])
     numbers, _ = files.eliminated(at.tag)
-    inverse = restored(system.symbolic, numbers).inverse_below(files.array(INVERSE))
+    inverse = restored(system.symbolic, numbers).inverse_below(task.there.inverse())
     points, redundancy = system.point_cofactors(state, inverse, at.estimator)
     n = len(system.unknowns.images)
     q = Cofactors(

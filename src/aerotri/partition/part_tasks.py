@@ -14,6 +14,7 @@ from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.conventions import InputError
 from aerotri.formats.block.folder import read_block
 from aerotri.partition.common import Left, PartFacts
+from aerotri.partition.joint_tasks import Above
 from aerotri.partition.part_files import PartFiles
 from aerotri.partition.part_system import PartSystem, part_system
 from aerotri.statistics.summarise import count_observations
@@ -26,17 +27,28 @@ class PartTask:
     Parameters
     ----------
     name : of the part. source : folder of its observations. work : folder of its work.
-    shared : (s,) its shared parameters among all; empty before they are known.
+    above : where its shared photographs and parameters stand; None before that is known.
     """
 
     name: str
     source: Path
     work: Path
-    shared: np.ndarray
+    above: Above | None = None
 
     @property
     def files(self) -> PartFiles:
         return PartFiles(self.work)
+
+    @property
+    def there(self) -> Above:
+        """Where it stands, once that is known."""
+        assert self.above is not None
+        return self.above
+
+    @property
+    def shared(self) -> np.ndarray:
+        """(s,) its shared parameters among all."""
+        return self.there.shared
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +117,7 @@ def prepare_part(setting: Setting, task: PartTask) -> PartFacts:
     counts, s = count_observations(system), len(u.shared)
     return PartFacts(
         kept=block.images.names[u.images[part.kept]],
-        position=state.centre[part.kept, :2],
+        middle=state.centre[:, :2].mean(axis=0),
         labels=tuple(zip(u.shared.names, u.shared.groups, u.shared.kinds, u.shared.marks, strict=True)),
         start=np.array(u.shared.start, dtype=float),
         priors=part.priors,
@@ -134,7 +146,7 @@ def move_part(move: Move, task: PartTask) -> Reduced:
     part = files.system(start.positions)
     state = files.state(start.state, start.shared[task.shared])
     numbers, half = files.eliminated(start.tag)
-    x = restored(part.system.symbolic, numbers).expand(half, files.array("solution"))
+    x = restored(part.system.symbolic, numbers).expand(half, task.there.solution(start.tag))
     step = part.system.whole_step(state, x, start.damping, start.estimator)
     if step is None:
         return Reduced(np.inf, fault="a step that is no number")
@@ -165,15 +177,13 @@ def _reduced(part: PartSystem, at: At, task: PartTask) -> Reduced:
     except NotPositiveDefiniteError:
         return Reduced(np.inf, fault="its observations do not determine its photographs")
     rest = factor.reduce_side(equations.right)
-    files.keep_left(Left(matrix, rest.right), factor.eliminated(), rest.half, at.tag)
+    of_images = np.diagonal(equations.matrix.blocks[part.kept], axis1=1, axis2=2).ravel()
+    diagonal = np.concatenate([of_images, np.diagonal(equations.matrix.corner)])
+    files.keep_eliminated(factor.eliminated(), rest.half, at.tag)
+    files.keep_left(Left(matrix, rest.right, diagonal), at.tag)
     files.keep_array(f"lengths_{at.tag}", system.residual_lengths(equations))
     of_points = equations.point_decrement
     return Reduced(equations.cost, rest.decrement + of_points, of_points)
-
-
-def solution_for(task: PartTask, x: np.ndarray) -> None:
-    """Leave a part its share (6·k + s,) of the solution."""
-    task.files.keep_array("solution", x)
 
 
 def refuse_fault(tasks: list[PartTask], found: list[Reduced]) -> None:

@@ -115,16 +115,19 @@ def adjust_and_explain(
     sets : as of `adjust_keeping_system`.
     """
 
+    given = with_named_strips(block)
+
     def explained(found: Adjustment | None) -> tuple[str, ...]:
+        # of the block as it was given: start values from wrong measurements would spoil every change that is tried
         say("looking for what explains it")
 
         def again(changed: Block) -> AdjustedBlock:
             return adjust_keeping_system(changed, geoid=geoid, tested=False).result
 
-        return causes(_as_chosen(block, found), found, again, geoid)
+        return causes(_as_chosen(given, found), found, again, geoid)
 
     try:
-        started = with_start(with_named_strips(block), geoid, say)
+        started = with_start(given, geoid, say)
         block = started.block
         found = started.told(adjust_keeping_system(block, report, geoid=geoid, sets=sets))
     except AdjustmentFailedError as error:

@@ -8,6 +8,7 @@ import numpy as np
 
 from aerotri.formats.results.json_text import number_or_none
 from aerotri.planning.plan import PlanRecord, shortest_interval
+from aerotri.simulation.flight import format_along_across_mm
 from aerotri.version import __version__
 
 
@@ -16,13 +17,19 @@ def plan_json(r: PlanRecord) -> dict[str, Any]:
     o = r.options
     return {
         "aerotri": __version__,
-        "area": {"name": r.area.name, "crs": r.area.crs or "local", "size_m2": float(r.area.polygon.area)},
+        "area": {
+            "name": r.area.name,
+            "crs": r.area.crs or "local",
+            "size_m2": float(r.area.polygon.area),
+            "wkt": r.area.polygon.wkt,
+        },
         "ground": r.ground.name,
         "camera": {
             "name": r.camera.name,
             "size_px": list(r.camera.size_px),
             "pixel_um": float(r.camera.pixel_um),
             "focal_length_mm": float(r.camera.interior["focal_length_mm"].value),
+            "format_mm": list(format_along_across_mm(r.camera)),
         },
         "asked": {
             "gsd_m": o.gsd,

@@ -283,8 +283,10 @@ def _write(target: Path, found: MeasuredChange, plots: bool) -> None:
         write_bands(folder / RASTER, bands, c.grid, found.summary["crs"] or None)
         write_rows(found.volumes, folder / TABLE)
         if plots:
+            from aerotri.report.documents.picture_texts import save_translated
             from aerotri.report.pages.change import write_change_page
             from aerotri.report.plots.rendering import save_plots
 
+            save_translated("difference", found.plot.difference, folder / "plots")
             write_change_page(found.summary, save_plots(found.plot.all(), folder / "plots"), folder / PAGE, found.head)
         write_json(folder / RECORD, found.summary)

@@ -143,7 +143,7 @@ def _context(options: DocumentOptions, made: datetime, project: Project, name: s
 def _content_of(
     result: Any, folder: Path | None, record: str, language: str
 ) -> tuple[dict[str, Any], dict[str, RenderedPlot]]:
-    """Content and plots of a volume or a change; those of a folder have the words that they were drawn with."""
+    """Content and plots of a volume or a change; those of a folder in the language where they were drawn in it."""
     from aerotri.report.documents.picture_texts import in_language
     from aerotri.report.plots.rendering import RenderedPlot, render_plots
     from aerotri.report.plots.volume import plot_budget
@@ -158,9 +158,10 @@ def _content_of(
         raise InputError(said, remedy, folder / record)
     plots: dict[str, RenderedPlot] = {}
     for name in ("thickness", "budget", "difference"):
-        svg, png = folder / "plots" / f"{name}.svg", folder / "plots" / f"{name}.png"
-        if svg.is_file() and png.is_file():
-            plots[name] = RenderedPlot(svg.read_bytes(), png.read_bytes())
+        for drawn in (name, f"{name}.{language}"):
+            svg, png = folder / "plots" / f"{drawn}.svg", folder / "plots" / f"{drawn}.png"
+            if svg.is_file() and png.is_file():
+                plots[name] = RenderedPlot(svg.read_bytes(), png.read_bytes())
     if record == VOLUME and content["sigma"] is not None and plots:
         plots |= render_plots(in_language({"budget": plot_budget(content)}, language))
     return content, plots

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.execution.choice import THREADS, chosen
@@ -149,6 +152,64 @@ def divide(
             report.counted("writing parts", number, division.count)
             write_block(part_of(whole, division, number), target / PARTS / f"{number:04d}", tables=tables)
     return target
+
+
+def simulate_parts(
+    plan: FilePath | Mapping[str, Any], folder: FilePath, *, parts: int, seed: int = 1, progress: ProgressLike = None
+) -> dict[str, Any]:
+    """Simulate a block in parts for `adjust_parts`, without ever holding it whole.
+
+    Photographs, start values, observed positions, ground and control are those that `simulate` gives for the same seed.
+    Tie points are drawn for every part by itself: a point belongs to the part on whose ground it lies.
+
+    Parameters
+    ----------
+    plan : file simulation.toml, or its tables as nested dictionaries.
+    folder : an empty folder; the parts are written to parts/0000, parts/0001 and so on, each with its truth/.
+    parts : how many, two at least.
+    seed : the same seed and number of parts give the same parts.
+    progress : True for a bar, or a function that takes (stage, share).
+
+    Returns
+    -------
+    dict
+        How much was measured, as `SimulatedBlock.summary` says it.
+
+    Raises
+    ------
+    InputError
+        For a plan that makes no sense, or holds what parts cannot: rigs, rolling shutters, towers, a georeference.
+
+    Examples
+    --------
+    >>> import aerotri, tempfile
+    >>> plan = aerotri.example_flight()
+    >>> plan["flight"]["images_per_strip"] = 16
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     counts = aerotri.simulate_parts(plan, f"{place}/parts", parts=2)
+    ...     found = aerotri.adjust_parts(f"{place}/parts", f"{place}/result")
+    >>> counts["images"], found.status
+    (32, 'converged')
+    """
+    from aerotri import simulation
+    from aerotri.partition.adjusting import PARTS
+    from aerotri.partition.part_system import refuse_what_parts_cannot
+    from aerotri.public.folders import refuse_foreign_folder
+
+    spec = simulation.parse_spec(plan) if isinstance(plan, Mapping) else simulation.read_spec(plan)
+    target, images, counts = Path(folder), set[str](), np.zeros(4, dtype=np.int64)
+    refuse_foreign_folder(target)
+    with stage_report(progress) as report:
+        report.stage("flight", None)
+        for number, (block, truth) in enumerate(simulation.simulate_parts(spec, seed, parts)):
+            refuse_what_parts_cannot(block)
+            report.counted("simulating parts", number, parts)
+            simulation.write_simulated(target / PARTS / f"{number:04d}", block, truth, tables="parquet")
+            images.update(block.images.names.tolist())
+            is_check = block.control.is_check
+            counts += (len(block.image_points), len(block.points), int((~is_check).sum()), int(is_check.sum()))
+    measured = dict(zip(("image_points", "points", "control", "check"), counts.tolist(), strict=True))
+    return {"block": spec.name, "images": len(images), **measured, "parts": parts}
 
 
 def adjust_parts(

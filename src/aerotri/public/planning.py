@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -21,10 +21,12 @@ if TYPE_CHECKING:
     from aerotri.planning.ground import Ground
     from aerotri.planning.plan import PlanRecord
 
-RECORD = "plan.json"
+RECORD, REQUEST = "plan.json", "request.json"
 PLAN_NAMES = (
-    RECORD, "plan.html", "plan.gpkg", "plan.kml", "waypoints.csv", "sigma_z.tif", "block",
+    RECORD, REQUEST, "plan.html", "plan.gpkg", "plan.kml", "waypoints.csv", "sigma_z.tif", "block",
 )  # fmt: skip
+FILES = ("area", "camera", "dem", "control", "piles", "project")
+"""Arguments of `plan_flight` that may name a file."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,11 +35,12 @@ class FlightPlan:
 
     Parameters
     ----------
-    record : what was planned. head : of page and file.
+    record : what was planned. head : of page and file. request : arguments of `plan_flight` that it was made with.
     """
 
     record: PlanRecord
     head: Head = field(default_factory=Head)
+    request: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     @property
     def met(self) -> bool | None:
@@ -118,7 +121,7 @@ class FlightPlan:
         return plan_html(self.record, self.head)
 
     def save(self, out: FilePath) -> Path:
-        """Write plan.json, plan.html, plan.gpkg, plan.kml (with a CRS), waypoints.csv, sigma_z.tif and block/.
+        """Write page, numbers, GeoPackage, KML (with a CRS), waypoints, the raster of σ, and one flight as a block.
 
         Raises
         ------
@@ -138,6 +141,7 @@ class FlightPlan:
         kml = kml_text(r)
         with atomic_folder(target, own=PLAN_NAMES, gone=() if kml else ("plan.kml",)) as folder:
             write_json(folder / RECORD, self.summary)
+            write_json(folder / REQUEST, dict(self.request))
             (folder / "plan.html").write_text(self.html(), encoding="utf-8")
             write_geopackage(folder / "plan.gpkg", plan_layers(r), r.area.crs)
             if kml is not None:
@@ -239,6 +243,7 @@ def plan_flight(
     >>> plan.met
     True
     """
+    request = _request(locals())
     from aerotri.planning.area import read_area, with_piles
     from aerotri.planning.cameras import camera_of_plan
     from aerotri.planning.given_control import NONE, read_given_control
@@ -270,7 +275,28 @@ def plan_flight(
     made = make_plan(
         where, terrain, chosen, options, goal, given, wanted, most_control, *(() if progress is None else (progress,))
     )
-    return FlightPlan(made, Head(project_of(project), made.area.crs or "local"))
+    return FlightPlan(made, Head(project_of(project), made.area.crs or "local"), request)
+
+
+def _request(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments as JSON knows them, files by their whole path, so that a plan can be made again from elsewhere."""
+    from aerotri.simulation.presets import PRESETS
+
+    kept = {name: value for name, value in given.items() if name != "progress"}
+    for name in FILES:
+        if isinstance(kept[name], str | os.PathLike):
+            text = os.fspath(kept[name])
+            is_file = text not in ("auto", *PRESETS) and _is_there(text)
+            kept[name] = str(Path(text).resolve()) if is_file else text
+    return kept
+
+
+def _is_there(text: str) -> bool:
+    """Whether a text names a file; a polygon as text may be longer than names can be."""
+    try:
+        return Path(text).exists()
+    except (OSError, ValueError):
+        return False
 
 
 def _crs_of(dem: FilePath | None) -> str | None:

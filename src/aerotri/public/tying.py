@@ -17,6 +17,7 @@ from aerotri.public.folders import refuse_foreign_entries, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.projects import project_of
 from aerotri.public.workplaces import workplace
+from aerotri.results.head import Head
 from aerotri.tie_points.settings import DEFAULTS, TiePointSettings
 
 if TYPE_CHECKING:
@@ -86,7 +87,8 @@ class TiedPhotographs:
         from aerotri.tie_points.outcome_json import tie_points_json
 
         page = "" if folder is None or self.given.control is None else str(Path(folder) / MARKS / PAGE)
-        return tie_points_json(self.record, self.seconds) | {"marking_page": page}
+        head = Head(self.block.project, self.block.crs).as_dict()
+        return head | tie_points_json(self.record, self.seconds) | {"marking_page": page}
 
     def save(self, out: FilePath, *, overwrite: bool = False, progress: ProgressLike = None) -> Path:
         """Write the block's folder, tiepoints.json, and a page to mark control points in.

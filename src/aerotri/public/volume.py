@@ -214,7 +214,7 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
         else:
             sigma = finder.of_one(base, boundary)
         notes = finder.doubts
-    crs = "" if reader.epsg is None else f"EPSG:{reader.epsg}"
+    crs = reader.crs_code
     measured_with = (top.adjustment.name, top.name_of_points) if top.adjustment else ("", "")
     sources = Sources(reader.path.name, crs, *measured_with)
     head = Head(asked.project, crs)

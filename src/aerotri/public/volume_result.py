@@ -265,9 +265,11 @@ def _write(target: Path, found: MeasuredVolume, plots: bool) -> None:
         if found.summary["piles"]:
             write_rows(found.piles, folder / "piles.csv")
         if plots:
+            from aerotri.report.documents.picture_texts import save_translated
             from aerotri.report.pages.volume import write_volume_page
             from aerotri.report.plots.rendering import save_plots
 
             drawn = save_plots(found.plot.all(), folder / "plots")
+            save_translated("thickness", found.plot.thickness, folder / "plots")
             write_volume_page(found.summary, drawn, folder / "volume.html", found.head)
         write_json(folder / RECORD, found.summary)

@@ -204,6 +204,19 @@ class RasterReader:
         return code
 
     @property
+    def crs_code(self) -> str:
+        """'EPSG:n', 'EPSG:n+m' where a height system with a code is stated, '' without a code."""
+        code, heights = self.epsg, None
+        if code is None:
+            return ""
+        from pyproj import CRS
+
+        whole = CRS.from_wkt(self.crs.to_wkt())
+        if whole.is_compound:
+            heights = whole.sub_crs_list[1].to_epsg()
+        return f"EPSG:{code}" if heights is None else f"EPSG:{code}+{heights}"
+
+    @property
     def stated_unit(self) -> str:
         """What the file says its values count in, in lower case; '' where it does not."""
         return (self._file.units[self.band - 1] or "").strip().lower()

@@ -38,6 +38,11 @@ class HeldRaster:
         authority, _, code = (self.crs or "").partition(":")
         return int(code) if authority.upper() == "EPSG" and code.isdigit() else None
 
+    @property
+    def crs_code(self) -> str:
+        """'EPSG:n'; '' where it has none."""
+        return "" if self.epsg is None else f"EPSG:{self.epsg}"
+
     def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
         """A window, (rows, columns) float32; NaN where nothing is known and beyond the edges."""
         top, left = max(row, 0), max(column, 0)

@@ -113,8 +113,8 @@ RENDERED = (
     Item("options.target_level", "number", "Grey value of the discs."),
 )
 TIEPOINTS_JSON = (
+    *HEAD,
     BLOCK,
-    Item("crs", "text", "Coordinate system."),
     Item("photographs", "whole", "Photographs in the block."),
     Item("left_out[]", "text", "Photographs that could not be tied."),
     Item("pairs", "object", "Pairs of photographs."),

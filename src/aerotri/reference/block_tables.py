@@ -84,6 +84,8 @@ EDITS = (
             "on": "take back off, check or control of the same measurement or point",
             "mark": "measure the point in the photograph at column and row, whatever image_points says",
             "remove": "take the measurement out of image_points",
+            "new_control": "make the point a control point with X, Y, Z and their σ, as a row of control.csv does",
+            "new_check": "make the point a check point with X, Y, Z and their σ",
             "undo": "take back the last row that still stands; image and point stay empty",
         },
     ),
@@ -92,6 +94,8 @@ EDITS = (
     Item("row", "number?", "Of a mark: row in the photograph; 0 is the upper edge of the upper pixel.", "px"),
     Item("old_column", "number?", "Column before, for the record.", "px"),
     Item("old_row", "number?", "Row before, for the record.", "px"),
+    *(Item(axis, "number?", f"Of a new control or check point: {axis}.", "m") for axis in "XYZ"),
+    *(Item(f"s{axis}", "number?", f"Of a new control or check point: σ of {axis}.", "m") for axis in "XYZ"),
     Item("reason", "text?", "Why, for the record."),
 )
 CONSTRAINTS = (

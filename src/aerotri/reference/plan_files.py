@@ -62,12 +62,14 @@ PLAN = (
     Item("area.name", "text", "File of the area."),
     Item("area.crs", "text", "Coordinate system of the plan; local where none is known."),
     Item("area.size_m2", "number", "Size.", "m²"),
+    Item("area.wkt", "text", "Its polygon as WKT, in the coordinate system of the plan."),
     Item("ground", "text", "Where the heights of the ground come from."),
     Item("camera", "object", "The camera."),
     Item("camera.name", "text", "Its name."),
     Item("camera.size_px[]", "whole", "Columns and rows.", "px"),
     Item("camera.pixel_um", "number", "Size of a pixel.", "µm"),
     Item("camera.focal_length_mm", "number", "Principal distance.", "mm"),
+    Item("camera.format_mm[]", "number", "Format along and across the flight.", "mm"),
     Item("asked", "object", "What was asked for and assumed."),
     *ASKED,
     Item("flight", "object", "The flight."),
@@ -118,6 +120,7 @@ def plan_files() -> tuple[DescribedFile, ...]:
     layers = "Layers area, strips, exposures, footprints and control, the last in the order of its gain."
     return (
         DescribedFile("plan.json", PLACE, "json", "The plan in numbers.", PLAN),
+        DescribedFile("request.json", PLACE, "other", "Arguments of `plan_flight`, from which the bench plans again."),
         DescribedFile("waypoints.csv", PLACE, "table", "Exposures in the order flown.", WAYPOINTS),
         DescribedFile("sigma_z.tif", PLACE, "raster", bands),
         DescribedFile("plan.gpkg", PLACE, "other", layers),

@@ -112,6 +112,7 @@ SIMULATE = (
     Item("control", "whole", "Control points."),
     Item("check", "whole", "Check points."),
     Item("rendered", "whole", "Photographs rendered.", optional=True),
+    Item("parts", "whole", "Parts, of a block simulated in parts.", optional=True),
 )
 INIT = (
     Item("folder", "text", "Folder that was begun."),

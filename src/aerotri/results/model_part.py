@@ -51,7 +51,7 @@ class ModelRoot:
     Parameters
     ----------
     images : (n, 6, k) of centre and rotation unknowns. shared : (s, k). points : (P, 3, k) m, in single precision.
-    noise : σ̂0² where F·Fᵀ contains the noise of the rays, 0 where it does not.
+    noise : σ̂0², widened as F·Fᵀ is, where this contains the noise of the rays, 0 where it does not.
     """
 
     images: np.ndarray

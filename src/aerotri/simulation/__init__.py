@@ -1,5 +1,6 @@
 """From a flight plan to a block with its truth."""
 
+from aerotri.simulation.in_parts import simulate_parts
 from aerotri.simulation.reading import parse_spec, read_spec
 from aerotri.simulation.simulate import simulate, true_image_errors
 from aerotri.simulation.spec import SimulationSpec
@@ -12,6 +13,7 @@ __all__ = [
     "parse_spec",
     "read_spec",
     "simulate",
+    "simulate_parts",
     "true_image_errors",
     "write_simulated",
     "write_truth",

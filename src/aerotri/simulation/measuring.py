@@ -74,6 +74,7 @@ def tie_rays(
     imaging: Imaging,
     candidates: Callable[[int], np.ndarray],
     rng_of: Callable[[], np.random.Generator],
+    photographs: int | None = None,
 ) -> tuple[np.ndarray, Rays]:
     """Tie points and their measured rays, as many as the spec asks for.
 
@@ -84,15 +85,17 @@ def tie_rays(
     ----------
     candidates : (N, 3) m of the first N candidates.
     rng_of : a fresh generator, the same each time.
+    photographs : for how many points are wanted; all that there are where None.
 
     Returns
     -------
     (N, 3) m and rays with noise-free measured positions.
     """
-    wanted_rays = len(imaging.photographs.centre) * spec.per_image
+    count = len(imaging.photographs.centre) if photographs is None else photographs
+    wanted_rays = count * spec.per_image
     refuse_beyond_memory(
         BYTES_OF_RAY * wanted_rays, f"{wanted_rays:.3g} image points",
-        f"lower 'tie_points.per_image' to {fitting(BYTES_OF_RAY) / len(imaging.photographs.centre):.3g}",
+        f"lower 'tie_points.per_image' to {fitting(BYTES_OF_RAY) / max(count, 1):.3g}",
     )  # fmt: skip
     number = int(PILOT_SHARE * wanted_rays / (spec.rays_per_point or 4.0)) + 10
     for _ in range(ROUNDS):

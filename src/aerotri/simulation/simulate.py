@@ -74,7 +74,7 @@ def simulate(spec: SimulationSpec, seed: int) -> tuple[Block, Truth]:
     """
     if seed < 0:
         raise InputError(f"the seed {seed} is negative", "give 0 or more")
-    settings = _settings(spec)
+    settings = settings_of(spec)
     cameras = tuple(true_camera(name, camera) for name, camera in spec.camera.items())
     nominal = tuple(camera.nominal for camera in cameras)
     plan = stream(seed, "flight")
@@ -82,15 +82,15 @@ def simulate(spec: SimulationSpec, seed: int) -> tuple[Block, Truth]:
     planned = tilted(planned, spec)
     flown, lead = with_rigs(planned, spec, stream(seed, "rigs"))
     motion = true_motion(spec, planned, lead, seed)
-    imaging = _imaging(spec, cameras, flown, motion, seed)
+    imaging = imaging_of(spec, cameras, flown, motion, seed)
     terrain = make_terrain(spec.terrain, spec.flight.centre_m, stream(seed, "terrain"))
     scene = _scene(spec, flown, frame, terrain, imaging, seed)
-    image_points, wrong_rays, gross = _observe(spec, scene, imaging, seed)
-    control, wrong_control, blunders = _control(spec.control, scene, seed)
+    image_points, wrong_rays, gross = observe(spec, scene, imaging, seed)
+    control, wrong_control, blunders = control_of(spec.control, scene, seed)
     block = Block(
         name=spec.name,
         cameras=nominal,
-        images=_images(spec, flown, seed),
+        images=images_of(spec, flown, seed),
         points=scene.names,
         image_points=image_points,
         control=control,
@@ -100,7 +100,7 @@ def simulate(spec: SimulationSpec, seed: int) -> tuple[Block, Truth]:
         constraints=None if spec.towers is None else plumb_lines(scene.towers, spec.towers.sigma_m),
         rigs=stated_rigs(spec, stream(seed, "stated rigs")),
     )
-    names, groups, values = _parameters(spec)
+    names, groups, values = parameters_of(spec)
     truth = Truth(
         centre=flown.centre,
         angles=flown.angles,
@@ -109,7 +109,7 @@ def simulate(spec: SimulationSpec, seed: int) -> tuple[Block, Truth]:
         parameter_groups=groups,
         parameter_values=values,
         interior=np.array([(c.focal_length, c.x0, c.y0) for c in cameras]),
-        image_errors=_sampled(imaging),
+        image_errors=sampled(imaging),
         gross_errors=wrong_rays,
         gross_error_mm=gross,
         control_blunders=wrong_control,
@@ -141,7 +141,7 @@ def true_image_errors(spec: SimulationSpec, seed: int) -> dict[tuple[str, str], 
     return image_error_fields(cameras, errors, days, seed)
 
 
-def _imaging(
+def imaging_of(
     spec: SimulationSpec, cameras: tuple[TrueCamera, ...], flown: FlownImages, motion: Motion | None, seed: int
 ) -> Imaging:
     fields = true_image_errors(spec, seed)
@@ -168,16 +168,16 @@ def _scene(
 
     base = (1.0 - spec.control.base_end_lap) * frame.footprint[0]
     layout = lay_out_control(spec.control, frame, base, stream(seed, "control"))
-    layout, signals, signal_rays = _measured_signals(spec, layout, on_ground(layout.xy), imaging)
+    layout, signals, signal_rays = measured_signals(spec, layout, on_ground(layout.xy), imaging)
     towers = build_towers(spec, flown, imaging, on_ground, seed)
     ties, rays = tie_rays(spec.tie_points, imaging, candidates, lambda: stream(seed, "measuring"))
     names = np.array([*layout.names, *towers.names, *(f"T{i + 1:06d}" for i in range(len(ties)))])
     xyz = np.concatenate([signals, towers.xyz, ties])
-    all_rays = _joined([(signal_rays, len(signals)), (towers.rays, len(towers.xyz)), (rays, len(ties))])
-    return _in_order(names, xyz, all_rays, layout.is_check, len(towers.xyz))
+    all_rays = joined([(signal_rays, len(signals)), (towers.rays, len(towers.xyz)), (rays, len(ties))])
+    return in_order(names, xyz, all_rays, layout.is_check, len(towers.xyz))
 
 
-def _joined(parts: list[tuple[Rays, int]]) -> Rays:
+def joined(parts: list[tuple[Rays, int]]) -> Rays:
     """The rays of several lists of points, (rays, number of points) each, numbered through."""
     first = np.cumsum([0, *(count for _, count in parts[:-1])])
     return Rays(
@@ -187,7 +187,7 @@ def _joined(parts: list[tuple[Rays, int]]) -> Rays:
     )
 
 
-def _measured_signals(
+def measured_signals(
     spec: SimulationSpec, layout: ControlPoints, xyz: np.ndarray, imaging: Imaging
 ) -> tuple[ControlPoints, np.ndarray, Rays]:
     """The signalised points in use and their rays: every image that sees one measures it."""
@@ -203,7 +203,7 @@ def _measured_signals(
     return ControlPoints(names, layout.xy[used], check), xyz[used], Rays(rays.image, number[rays.point], rays.xy)
 
 
-def _in_order(names: np.ndarray, xyz: np.ndarray, rays: Rays, is_check: np.ndarray, tower_points: int) -> Scene:
+def in_order(names: np.ndarray, xyz: np.ndarray, rays: Rays, is_check: np.ndarray, tower_points: int) -> Scene:
     """Rays by image, points by their first ray: as a reader of the written block numbers them.
 
     Parameters
@@ -221,10 +221,15 @@ def _in_order(names: np.ndarray, xyz: np.ndarray, rays: Rays, is_check: np.ndarr
     return Scene(names[order], xyz[order], in_order, number[:k], is_check, towers)
 
 
-def _observe(
-    spec: SimulationSpec, scene: Scene, imaging: Imaging, seed: int
+def observe(
+    spec: SimulationSpec, scene: Scene, imaging: Imaging, seed: int, part: tuple[str, ...] = ()
 ) -> tuple[ImagePoints, np.ndarray, np.ndarray]:
-    """Noise and gross errors on the rays; index of the wrong ones, (k, 2) mm of their gross errors."""
+    """Noise and gross errors on the rays; index of the wrong ones, (k, 2) mm of their gross errors.
+
+    Parameters
+    ----------
+    part : name of the part whose random numbers are drawn, nothing of the whole.
+    """
     ties, rays = spec.tie_points, scene.rays
     signal_um = ties.sigma_um if spec.control.image_sigma_um is None else spec.control.image_sigma_um
     stated_um = ties.stated_sigma_um or ties.sigma_um
@@ -232,19 +237,19 @@ def _observe(
     is_signal = np.isin(rays.point, scene.signals)[:, None]
     noise = np.where(is_signal, signal_um, ties.sigma_um) * 1e-3
     sigma = np.repeat(np.where(is_signal, stated_signal_um, stated_um) * 1e-3, 2, axis=1)
-    xy = rays.xy + noise * stream(seed, "image noise").normal(size=(len(rays), 2))
+    xy = rays.xy + noise * stream(seed, "image noise", *part).normal(size=(len(rays), 2))
     wrong, gross = np.zeros(0, np.int64), np.zeros((0, 2))
     if spec.gross_errors is not None:
         tie = np.flatnonzero(~is_signal[:, 0])
         half = np.array([camera.half_format_mm for camera in imaging.cameras])
         half = half[imaging.photographs.camera[rays.image[tie]]]
-        which, gross = gross_errors(spec.gross_errors, xy[tie], sigma[tie], half, stream(seed, "gross errors"))
+        which, gross = gross_errors(spec.gross_errors, xy[tie], sigma[tie], half, stream(seed, "gross errors", *part))
         wrong = tie[which]
         xy[wrong] += gross
     return ImagePoints(rays.image, rays.point, xy, sigma), wrong, gross
 
 
-def _control(spec: ControlSpec, scene: Scene, seed: int) -> tuple[Control, np.ndarray, np.ndarray]:
+def control_of(spec: ControlSpec, scene: Scene, seed: int) -> tuple[Control, np.ndarray, np.ndarray]:
     """Given coordinates with their errors; index of the wrong ones, (b, 3) m of their blunders."""
     check_sigma = spec.sigma_m if spec.check_sigma_m is None else spec.check_sigma_m
     sigma = np.where(scene.is_check[:, None], check_sigma, spec.sigma_m).astype(float)
@@ -264,7 +269,7 @@ def _control(spec: ControlSpec, scene: Scene, seed: int) -> tuple[Control, np.nd
     return Control(scene.signals, xyz, stated, scene.is_check), wrong, errors
 
 
-def _images(spec: SimulationSpec, flown: FlownImages, seed: int) -> Images:
+def images_of(spec: SimulationSpec, flown: FlownImages, seed: int) -> Images:
     start = spec.start_values
     centre, angles = np.full((len(flown), 3), np.nan), np.full((len(flown), 3), np.nan)
     if start.kind == "perturbed":
@@ -279,7 +284,7 @@ def _images(spec: SimulationSpec, flown: FlownImages, seed: int) -> Images:
     return Images(flown.names, flown.camera, flown.strip, centre, angles, columns)
 
 
-def _settings(spec: SimulationSpec) -> Settings:
+def settings_of(spec: SimulationSpec) -> Settings:
     groups = spec.adjustment.parameter_groups
     known = ["camera", "block", "strip", *(["day"] if spec.flight.days else [])]
     if groups not in known:
@@ -298,7 +303,7 @@ def _settings(spec: SimulationSpec) -> Settings:
     )
 
 
-def _parameters(spec: SimulationSpec) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray]:
+def parameters_of(spec: SimulationSpec) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray]:
     """Names, groups and values of the parameters in force: bluh.1, brown.K1, lens.k1, …, the camera as group."""
     rows = []
     for camera, errors in ((name, its.errors) for name, its in spec.camera.items()):
@@ -308,7 +313,7 @@ def _parameters(spec: SimulationSpec) -> tuple[tuple[str, ...], tuple[str, ...],
     return tuple(r[0] for r in rows), tuple(r[1] for r in rows), np.array([r[2] for r in rows], dtype=float)
 
 
-def _sampled(imaging: Imaging) -> tuple[ImageErrorSample, ...]:
+def sampled(imaging: Imaging) -> tuple[ImageErrorSample, ...]:
     """Each different field on a grid; under day '' when the camera has one for all days."""
     samples = []
     for camera in imaging.cameras:

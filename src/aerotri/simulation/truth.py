@@ -6,6 +6,7 @@ import csv
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -72,6 +73,7 @@ def write_simulated(
     truth: Truth,
     gone: Collection[str] = (),
     further: Callable[[Path], None] | None = None,
+    tables: Literal["csv", "parquet"] = "csv",
 ) -> None:
     """Write the block's folder and, under `truth/`, what is behind it; other files stay but for `gone`.
 
@@ -80,6 +82,7 @@ def write_simulated(
     Parameters
     ----------
     further : writes into the folder what belongs to the block besides: `gcp_list.txt` and files in `truth/`.
+    tables : of the block.
     """
     # imported here: those who only simulate need no file formats
     from aerotri.formats.block.folder import write_block
@@ -87,7 +90,7 @@ def write_simulated(
 
     # in one step: a block must never stand beside the truth of another one
     with atomic_folder(folder, own=(*OWN_ENTRIES, TRUTH, MARKED_CONTROL), gone=gone) as place:
-        write_block(block, place, rounded=True)
+        write_block(block, place, tables, rounded=True)
         write_truth(place, block, truth)
         if further is not None:
             further(place)

@@ -9,6 +9,7 @@ import numpy as np
 from aerotri.adjustment.datum import datum_rows, motions_of_images, motions_of_points
 from aerotri.adjustment.kernel_records import Inverse
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.parallel import blas_threads
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.unknowns import State, Unknowns
@@ -71,8 +72,10 @@ def cofactors(system: NormalSystem, state: State, factor: Factor, estimator: Est
 
     An inner datum is reached by the S-transformation; redundancy numbers do not depend on the datum.
     """
-    inverse = factor.inverse_on_pattern()
-    points, redundancy = system.point_cofactors(state, inverse, estimator)
+    # threads of BLAS that wait for work would take a processor from the kernels
+    with blas_threads(0.0):
+        inverse = factor.inverse_on_pattern()
+        points, redundancy = system.point_cofactors(state, inverse, estimator)
     images, border = _without_held(system.unknowns, inverse)
     result = Cofactors(images, inverse.corner, points, border, redundancy, inverse)
     if system.unknowns.block.settings.adjustment.datum == "inner" and system.unknowns.motions.count:

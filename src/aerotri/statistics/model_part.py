@@ -15,6 +15,7 @@ import numpy as np
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
+from aerotri.quantiles import normal_quantile, student_quantile
 from aerotri.results.model_part import ClusterTest, ModelPart, ModelRoot
 from aerotri.statistics.cluster_fields import Field, compare_field
 from aerotri.statistics.cluster_influence import influences, known_part
@@ -24,6 +25,8 @@ from aerotri.statistics.covariance import InnerDatum, orientation_cofactors
 
 FEWEST_PHOTOGRAPHS = 10
 """Photographs from which clusters are looked for [C]."""
+COVERED = 0.95
+"""Probability for which the model part of few clusters is widened [C]: what a surveyor quotes."""
 POINTS_AT_ONCE = 4096
 """Object points whose columns are held in double precision."""
 
@@ -108,25 +111,36 @@ def excess_of_clusters(
     inner : the inner datum of all of them, None where there is none.
     """
     m = len(clusters)
+    widening = of_few(m)
     known = known_part(system, solution, factor, inner=inner)
     noise = [q - part for q, part in zip((q_images, q_shared, q_points), known, strict=True)]
     root = ModelRoot(
         np.empty((*q_images.shape[:2], m)), np.empty((len(q_shared), m)), np.empty((len(q_points), 3, m), np.float32),
-        sigma0**2,
+        widening * sigma0**2,
     )  # fmt: skip
     points = np.zeros_like(q_points)
     # as of a variance of m values about their mean [L]; it makes good for what only one cluster determines
-    freedom = m / (m - 1)
+    freedom = widening * m / (m - 1)
     for c, change in enumerate(influences(system, solution, factor, clusters)):
         columns = tuple(part[..., None] for part in change)
         columns = columns if inner is None else inner.moved(*columns)
         for into, values in zip((root.images, root.shared, root.points), columns, strict=True):
             into[..., c : c + 1] = np.sqrt(freedom) * values
         points += columns[2] @ np.swapaxes(columns[2], 1, 2)
-    images = positive_part(root.images @ np.swapaxes(root.images, 1, 2) - sigma0**2 * noise[0])
-    shared = positive_part((root.shared @ root.shared.T - sigma0**2 * noise[1])[None])[0]
-    points = positive_part(freedom * points - sigma0**2 * noise[2])
+    images = positive_part(root.images @ np.swapaxes(root.images, 1, 2) - root.noise * noise[0])
+    shared = positive_part((root.shared @ root.shared.T - root.noise * noise[1])[None])[0]
+    points = positive_part(freedom * points - root.noise * noise[2])
     return Excess(orientation_cofactors(system.unknowns, solution.state, images), shared, points, root)
+
+
+def of_few(clusters: int) -> float:
+    """What a variance of so many clusters is multiplied with, because it is not well known itself.
+
+    [L] A difference over the σ of m clusters follows Student's t with m − 1 degrees of freedom, not the normal
+    distribution (Bell and McCaffrey 2002). With the ratio of both quantiles ± 1.96 σ holds the truth in 95 % again.
+    """
+    upper = 0.5 + 0.5 * COVERED
+    return (student_quantile(upper, clusters - 1) / normal_quantile(upper)) ** 2
 
 
 def excess_of_root(system: NormalSystem, solution: Solution, root: ModelRoot) -> Excess:

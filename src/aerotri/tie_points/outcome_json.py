@@ -10,7 +10,7 @@ from aerotri.tie_points.photographs_to_block import TiedBlock
 
 
 def tie_points_json(tied: TiedBlock, seconds: float) -> dict[str, Any]:
-    """The content of tiepoints.json but for the page to mark control points in.
+    """The content of tiepoints.json but for its head and the page to mark control points in.
 
     Parameters
     ----------
@@ -22,7 +22,6 @@ def tie_points_json(tied: TiedBlock, seconds: float) -> dict[str, Any]:
     per_image = np.bincount(rays.image[~is_control], minlength=len(block.images))
     return {
         "block": block.name,
-        "crs": block.crs,
         "photographs": len(block.images),
         "left_out": list(tied.left_out),
         "pairs": {"compared": tied.pairs[0], "tied": tied.pairs[1]},

@@ -6,6 +6,7 @@ import { Photo } from "./photo.js";
 import { Plan } from "./plan.js";
 import { PointSheet } from "./point.js";
 import { SpaceSheet } from "./space.js";
+import { NewPointSheet } from "./new_point.js";
 import { DifferenceSheet, EditSheet, NextSheet } from "./sheets.js";
 import { RayTable } from "./table.js";
 
@@ -14,13 +15,14 @@ const LOOK_MS = 1000;
 class Bench {
   constructor() {
     this.chosen = { image: null, point: null };
+    this.newPoint = null;
     this.imagesOfPoint = [];
     this.changes = [];
     this.limit = 3.29;
     this.plan = new Plan(this);
     this.photo = new Photo(this);
     this.tabs = {
-      rays: ["Rays", new RayTable(this)], point: ["Point", new PointSheet(this)], edits: ["Decisions", new EditSheet(this)],
+      rays: ["Rays", new RayTable(this)], point: ["Point", new PointSheet(this)], fresh: ["New point", new NewPointSheet(this)], edits: ["Decisions", new EditSheet(this)],
       difference: ["Difference", new DifferenceSheet(this)], next: ["Which mark next", new NextSheet(this)], space: ["3-D", new SpaceSheet(this)],
     };
     this.tab = "rays";
@@ -135,7 +137,13 @@ class Bench {
     return changed ? changed.kind !== "removed" : found.rays.image.includes(image);
   }
 
+  // What a mark is set for: the new point that is being made, or the chosen one.
+  nameToMark() {
+    return this.newPoint ?? (this.chosen.point === null ? null : this.names.points[this.chosen.point]);
+  }
+
   async choosePoint(point) {
+    this.newPoint = null;
     this.chosen.point = point;
     await this.loadPoint();
     const shown = [...this.imagesOfPoint, ...(this.pointContent?.expected || []).map(one => one[0])];
@@ -160,6 +168,7 @@ class Bench {
   }
 
   async chooseRay(image, point) {
+    this.newPoint = null;
     this.chosen = { image, point };
     await this.loadPoint();
     await this.photo.open(image, point);
@@ -170,6 +179,8 @@ class Bench {
 
   async setMark(image, point, at, snap) {
     const found = await tell("act/mark", { image, point, column: at[0], row: at[1], snap });
+    const other = found.read !== null && found.named && found.named !== point;
+    if (other) say(`The target reads ${found.read}: that is point ${found.named}, not ${point}. Undo takes the mark back.`);
     this.note(snap ? (found.snapped ? `Mark of ${point}: ${found.snapped}` : `Mark of ${point}: where you clicked, no target and no match there`) : "");
     await this.decided(found);
   }
@@ -226,7 +237,7 @@ class Bench {
   key(event) {
     if (event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement) return;
     if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z") { event.preventDefault(); guarded(() => this.undo())(); }
-    else if (event.key === "m" && this.chosen.point !== null && this.photo.content) this.photo.beginSetting();
+    else if (event.key === "m" && this.nameToMark() !== null && this.photo.content) this.photo.beginSetting();
   }
 
   watch() {

@@ -1,13 +1,13 @@
 // A photograph in full resolution with measured and predicted points, residuals, epipolar lines, and marks to move.
 
-import { ask } from "./api.js";
+import { ask, tell } from "./api.js";
 import { button, checkbox, choice, fixed, guarded, make, slider } from "./dom.js";
 import { colourOfW } from "./colours.js";
 import { cross, label, line, ring } from "./marks.js";
 import { Surface } from "./surface.js";
 import { Tiles } from "./tiles.js";
 
-const MOVED = "#ffb000", PREDICTED = "#53d0ff", CHOSEN = "#ffffff", EPIPOLAR = "#7dff7a";
+const MOVED = "#ffb000", PREDICTED = "#53d0ff", CHOSEN = "#ffffff", EPIPOLAR = "#7dff7a", TARGET = "#ff9df5";
 const NEAR_PX = 9, CLOSE = 2;
 
 export class Photo {
@@ -19,6 +19,7 @@ export class Photo {
     this.show = { marks: true, residuals: true, predicted: true, names: false, epipolar: true, snap: true };
     this.setting = false;
     this.lines = [];
+    this.targets = [];
     this.surface = new Surface(document.getElementById("photo"), -1, pen => this.draw(pen));
     this.surface.onclick = guarded(at => this.click(at));
     this.surface.onmove = at => this.hover(at);
@@ -33,6 +34,7 @@ export class Photo {
       this.content = content;
       this.generation = this.bench.generation;
       if (other) {
+        this.targets = [];
         this.tiles = content.has_file ? new Tiles(image, content.size, () => this.surface.redraw()) : null;
         this.surface.fit([0, 0], content.size);
       }
@@ -66,17 +68,58 @@ export class Photo {
     const turn = by => () => this.bench.chooseImage((+image + by + this.bench.names.images.length) % this.bench.names.images.length);
     const mark = button(this.setting ? "Click the point" : "Set mark", () => this.beginSetting(), "Then click on the chosen point in the photograph (key M)");
     mark.id = "set-mark";
-    mark.disabled = !this.content || this.bench.chosen.point === null;
+    const name = this.bench.names ? this.bench.nameToMark() : null;
+    mark.disabled = !this.content || name === null;
+    const find = button("Find coded targets", () => this.findTargets(), "Crosses with a number: squares of ArUco and AprilTag, rings of 12 and 14 bits");
+    find.id = "find-targets";
+    find.disabled = !this.tiles;
     document.getElementById("photo-bar").replaceChildren(
       choice("", { "": "photograph", ...names }, image, guarded(value => value === "" ? null : this.bench.chooseImage(+value))),
       ...(this.content ? [button("◂", turn(-1), "photograph before"), button("▸", turn(1), "next photograph")] : []),
-      mark, set("snap", "snap", "A mark is moved to where the other photographs of the point, or a target, say it is"),
-      set("marks", "marks"), set("predicted", "predicted"), set("residuals", "residuals"),
+      mark, find, ...this.targetButtons(), set("snap", "snap", "A mark is moved to where the other photographs of the point, or a target, say it is"),
+      set("marks", "marks"), set("predicted", this.bench.summary && this.bench.summary.is_rough ? "predicted (roughly)" : "predicted", "Where points should appear; before the first adjustment by start values, or by positions and attitudes of GNSS and INS"), set("residuals", "residuals"),
       slider("×k", 0, 3, Math.log10(this.times), value => { this.times = 10 ** value; this.surface.redraw(); }, "How much larger residuals are drawn"),
       set("epipolar", "epipolar lines", "Rays of the chosen point in other photographs"), set("names", "names"),
       tune("brightness", "brightness"), tune("contrast", "contrast"),
       button("1:1", () => { this.surface.scale = 1; this.surface.redraw(); }),
       button("whole", () => this.content && this.surface.fit([0, 0], this.content.size)));
+  }
+
+  async findTargets() {
+    this.bench.note("Looking for coded targets …");
+    this.targets = (await ask(`data/targets/${this.content.image}`)).targets;
+    const known = this.targets.filter(one => one.point).length;
+    this.bench.note(this.targets.length ? `${this.targets.length} coded targets, ${known} of control points.` : "No coded target was found in this photograph.");
+    document.body.dataset.targets = this.targets.length;
+    this.bar();
+    this.surface.redraw();
+  }
+
+  targetButtons() {
+    const known = this.targets.filter(one => one.point).length;
+    if (!known) return [];
+    const here = button(`Mark ${known} here`, () => this.markTargets([this.content.image]), "Marks the control points whose numbers were read");
+    here.id = "mark-targets";
+    return [here, button("in all photographs", () => this.markTargets(this.bench.summary.pictures), "Looks for coded targets in every photograph and marks their control points")];
+  }
+
+  async markTargets(images) {
+    let count = 0, done = 0;
+    for (const image of images) {
+      const found = await tell("act/mark_targets", { image });
+      count += found.marked.length;
+      done += 1;
+      this.bench.note(`${count} marks, ${done} of ${images.length} photographs`);
+      if (done === images.length) await this.bench.decided(found);
+    }
+  }
+
+  drawTargets(pen) {
+    for (const one of this.targets) {
+      const [x, y] = this.surface.screen(...one.place);
+      line(pen, [[x - 10, y - 10], [x + 10, y - 10], [x + 10, y + 10], [x - 10, y + 10], [x - 10, y - 10]], one.point ? TARGET : "#d0d0d0");
+      label(pen, one.point ? `${one.number} = ${one.point}` : String(one.number), x + 14, y - 12, one.point ? TARGET : "#d0d0d0");
+    }
   }
 
   beginSetting() {
@@ -119,6 +162,7 @@ export class Photo {
     if (this.show.epipolar) for (const one of this.lines) line(pen, one.line.map(at => s.screen(...at)), EPIPOLAR, 1);
     if (this.show.predicted) this.drawExpected(pen);
     if (this.show.marks) this.drawRays(pen);
+    this.drawTargets(pen);
     this.drawChanges(pen);
     this.drawChosen(pen);
   }
@@ -191,7 +235,7 @@ export class Photo {
     if (!this.content) return;
     if (this.setting) {
       this.setting = false;
-      await this.bench.setMark(this.content.image, this.bench.names.points[this.bench.chosen.point], at, this.show.snap);
+      await this.bench.setMark(this.content.image, this.bench.nameToMark(), at, this.show.snap);
       this.bar();
       return;
     }
@@ -203,7 +247,7 @@ export class Photo {
   drag(phase, at) {
     if (!this.content || this.setting) return false;
     const { point } = this.bench.chosen;
-    if (phase === "begin") return point !== null && this.isMarked(point) && this.nearest(at) === point;
+    if (phase === "begin") return this.bench.newPoint === null && point !== null && this.isMarked(point) && this.nearest(at) === point;
     this.dragged = at;
     if (phase === "end") {
       this.dragged = null;

@@ -3,7 +3,7 @@
 import { ask } from "./api.js";
 import { fixed, guarded, make } from "./dom.js";
 
-const KINDS = { moved: "mark moved", new: "mark set", removed: "mark removed", off: "switched off", on: "switched on", check: "used as check point", control: "used as control point" };
+const KINDS = { moved: "mark moved", new: "mark set", removed: "mark removed", off: "switched off", on: "switched on", check: "used as check point", control: "used as control point", new_control: "new control point", new_check: "new check point" };
 
 export class EditSheet {
   constructor(bench) { this.bench = bench; }

@@ -15,7 +15,7 @@ import numpy as np
 
 from aerotri.conventions import RADIANS_PER, FilePath, InputError
 from aerotri.formats.block.extras import edits_of, read_constraints
-from aerotri.formats.block.journal import read_journal, with_marks
+from aerotri.formats.block.journal import read_journal, with_given, with_marks
 from aerotri.formats.block.logo import with_logo
 from aerotri.formats.block.points import read_control, read_gnss_ins, read_image_points
 from aerotri.formats.block.scanned_film import read_fiducials
@@ -76,11 +76,12 @@ def read_block(path: FilePath, rays_needed: bool = True, images_needed: bool = T
         raise settings.error(("image_unit",), message, 'measure in pixels of the scan: image_unit = "px"')
     table = _required_table(folder, "image_points")
     rays = read_image_points(table, images, cameras, settings, fits, may_be_empty=not rays_needed)
-    control, names = read_control(_table_file(folder, "control"), rays.point_names, settings)
+    listed, known = read_control(_table_file(folder, "control"), rays.point_names, settings)
     default = settings.settings(rays.image_sigma_um)
     journal = read_journal(_table_file(folder, "edits"))
+    control, names = with_given(listed, as_str_array(known), journal)
     image_points, points = with_marks(
-        rays.image_points, as_str_array(names), control, journal, images, cameras, fits, default.image_sigma_um * 1e-3
+        rays.image_points, names, control, journal, images, cameras, fits, default.image_sigma_um * 1e-3
     )
     block = Block(
         name=folder.resolve().name if model.name is None else model.name,

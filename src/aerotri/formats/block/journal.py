@@ -21,10 +21,13 @@ from aerotri.observations import Camera, Control, ImagePoints, Images
 from aerotri.observations.block import EDIT_ACTIONS
 
 MARK, REMOVE, ON, UNDO = "mark", "remove", "on", "undo"
-ACTIONS = (*EDIT_ACTIONS, ON, MARK, REMOVE, UNDO)
+NEW_CONTROL, NEW_CHECK = "new_control", "new_check"
+GIVEN = (NEW_CONTROL, NEW_CHECK)
+"""Actions that give a point coordinates, as a row of control.csv does."""
+ACTIONS = (*EDIT_ACTIONS, ON, MARK, REMOVE, *GIVEN, UNDO)
 EDIT_COLUMNS = Columns(
     text=("image", "point", "action"), optional_text=("time", "reason"),
-    optional_numbers=("column", "row", "old_column", "old_row"),
+    optional_numbers=("column", "row", "old_column", "old_row", "X", "Y", "Z", "sX", "sY", "sZ"),
 )  # fmt: skip
 OUTSIDE = 0.05
 """Part of the format by which a mark may lie outside of it, as an image point may."""
@@ -38,6 +41,7 @@ class Journal:
     ----------
     table : as read. actions : (n,) str. is_journal : whether later rows may overrule earlier ones.
     decisions : rows that switch rays and points in the end. marks : rows that set, move or remove marks in the end.
+    given : rows that make control and check points in the end.
     """
 
     table: Table
@@ -45,6 +49,7 @@ class Journal:
     is_journal: bool
     decisions: tuple[int, ...]
     marks: tuple[int, ...]
+    given: tuple[int, ...] = ()
 
 
 def read_journal(path: Path | None) -> Journal | None:
@@ -72,11 +77,13 @@ def read_journal(path: Path | None) -> Journal | None:
         row = int(np.flatnonzero(actions == UNDO)[0])
         raise table.error(row, "undo takes nothing back", "remove the row")
     marks = [row for row in standing if actions[row] in (MARK, REMOVE)]
-    decisions = [row for row in standing if actions[row] not in (MARK, REMOVE)]
+    given = [row for row in standing if actions[row] in GIVEN]
+    decisions = [row for row in standing if actions[row] not in (MARK, REMOVE, *GIVEN)]
     keys = list(zip(images.tolist(), points.tolist(), strict=True))
     if journal:
-        marks, decisions = _last(marks, keys), _last(decisions, keys)
-    return Journal(table, actions, journal, tuple(row for row in decisions if actions[row] != ON), tuple(marks))
+        marks, decisions, given = _last(marks, keys), _last(decisions, keys), _last(given, keys)
+    switches = tuple(row for row in decisions if actions[row] != ON)
+    return Journal(table, actions, journal, switches, tuple(marks), tuple(given))
 
 
 def standing_rows(actions: Sequence[str]) -> list[int] | None:
@@ -96,6 +103,40 @@ def _last(rows: Iterable[int], keys: Sequence[Hashable]) -> list[int]:
     """Of the rows about one thing the last."""
     last: Mapping[Hashable, int] = {keys[row]: row for row in rows}
     return sorted(last.values())
+
+
+def with_given(control: Control, names: np.ndarray, journal: Journal | None) -> tuple[Control, np.ndarray]:
+    """Control and check points with those that the journal makes, and the names of all points.
+
+    Parameters
+    ----------
+    names : (N,) str of all points.
+
+    Raises
+    ------
+    InputError
+        With the line: a coordinate or a standard deviation is missing, or is none.
+    """
+    if journal is None or not journal.given:
+        return control, names
+    table, rows = journal.table, np.array(journal.given)
+    row_of = {name: k for k, name in enumerate(names.tolist())}
+    more: list[str] = []
+    for name in (table.cell("point", row) for row in journal.given):
+        if name not in row_of:
+            row_of[name] = len(row_of)
+            more.append(name)
+    xyz, sigma = table.stack("X", "Y", "Z")[rows], table.stack("sX", "sY", "sZ")[rows]
+    for k in np.flatnonzero(~np.isfinite(xyz).all(axis=1) | ~(sigma >= 0.0).all(axis=1)).tolist():
+        raise table.error(int(rows[k]), "X, Y, Z or their σ are missing", "give all six, in m")
+    point = np.array([row_of[table.cell("point", row)] for row in journal.given], dtype=np.int64)
+    keep = ~np.isin(control.point, point)
+    made = Control(
+        np.concatenate([control.point[keep], point]), np.concatenate([control.xyz[keep], xyz]),
+        np.concatenate([control.sigma[keep], sigma]),
+        np.concatenate([control.is_check[keep], journal.actions[rows] == NEW_CHECK]),
+    )  # fmt: skip
+    return made, np.concatenate([names, np.array(more, dtype=str)]) if more else names
 
 
 def with_marks(

@@ -16,6 +16,9 @@ WIDE = 1.96
 """Standard deviations on either side within which 95 % of normally distributed values lie."""
 PICTURES = ("thickness", "budget")
 
+OWN_BASES = "a base for each of "
+"""Beginning of the name of the bases of piles that have one of their own."""
+
 
 def volume_certificate(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot], context: Context) -> Document:
     """The certificate of a volume.
@@ -100,6 +103,11 @@ def _piles(c: Mapping[str, Any], words: Words) -> Part:
     return table(columns, rows, words=1)
 
 
+def _base_name(c: Mapping[str, Any], words: Words) -> str:
+    name = str(c["base"]["name"])
+    return words("volume.own_bases", number=len(c["piles"])) if name.startswith(OWN_BASES) else words.term("base", name)
+
+
 def _measured(c: Mapping[str, Any], context: Context) -> list[tuple[str, str]]:
     words, base, edge, day = context.words, c["base"], c["boundary"], context.project.survey_date
     plane = ""
@@ -112,7 +120,7 @@ def _measured(c: Mapping[str, Any], context: Context) -> list[tuple[str, str]]:
     rows = [
         (words("volume.surface"), breakable(c["dtm"])),
         (words("volume.epoch"), words.date(day) if day else words("head.not_stated")),
-        (words("volume.base"), words.term("base", base["name"]) + plane),
+        (words("volume.base"), _base_name(c, words) + plane),
         (
             words("volume.boundary"),
             f"{words.term('given', edge['name'])}, {amount(words, edge['area_m2'])} m²",

@@ -46,7 +46,8 @@ def run_page(content: dict[str, Any], folder: Path, head: Head) -> str:
     template = environment.get_template("run.html.j2")
     adjusted = _read(folder / RESULT / "adjustment.json")
     return template.render(
-        source=printable(content["source"]), seconds=content["seconds"], steps=steps, verdict=_verdict(adjusted),
+        source=printable(Path(content["source"]).name or content["source"]),
+        seconds=content["seconds"], steps=steps, verdict=_verdict(adjusted),
         results=_results({name: _read(place / f"{name}.json") for name, place in done.items()}),
         pictures=list(shown.values()), head=page_head(head),
     )  # fmt: skip

@@ -76,19 +76,19 @@ def _place_of_row(rays, i, value, known, x, y, z, per_pixel):
 
 
 @kernel
-def lay_mesh(place, sigma_px, bend_px, per_pixel, value, jump, z, sigma, bend):
+def lay_mesh(place, sigma_px, per_pixel, value, jump, z, sigma):
     """Heights of the cells of a grid from the triangles between neighbouring pixels.
 
     place : (3, rows, columns) column and row of the grid, whole at centres of cells, and height, m.
-    sigma_px, bend_px, value : (rows, columns) px. per_pixel : m of height a px.
+    sigma_px, value : (rows, columns) px. per_pixel : m of height a px.
     jump : px, largest difference of parallax between neighbours of one surface.
-    z, sigma, bend : (rows, columns) m, of the grid, out; NaN before.
+    z, sigma : (rows, columns) m, of the grid, out; NaN before.
     """
-    _lay_rows(place, sigma_px, bend_px, per_pixel, value, jump, np.empty(value.shape[1] - 1, np.bool_), z, sigma, bend)
+    _lay_rows(place, sigma_px, per_pixel, value, jump, np.empty(value.shape[1] - 1, np.bool_), z, sigma)
 
 
 @leaf_kernel
-def _lay_rows(place, sigma_px, bend_px, per_pixel, value, jump, reaches, z, sigma, bend):
+def _lay_rows(place, sigma_px, per_pixel, value, jump, reaches, z, sigma):
     for i in range(value.shape[0] - 1):
         _reach_cells(place[:, i], place[:, i + 1], value[i], value[i + 1], jump, reaches)
         for j in range(value.shape[1] - 1):
@@ -98,7 +98,7 @@ def _lay_rows(place, sigma_px, bend_px, per_pixel, value, jump, reaches, z, sigm
             for i0, j0 in ((i, j), (i + 1, j + 1)):
                 d0 = value[i0, j0]
                 if abs(d0 - d1) <= jump and abs(d0 - d2) <= jump:
-                    _lay_triangle((i0, j0), (i, j + 1), (i + 1, j), place, sigma_px, bend_px, per_pixel, z, sigma, bend)
+                    _lay_triangle((i0, j0), (i, j + 1), (i + 1, j), place, sigma_px, per_pixel, z, sigma)
 
 
 @leaf_kernel
@@ -116,7 +116,7 @@ def _reach_cells(above, below, value_above, value_below, jump, reaches):
 
 
 @leaf_kernel
-def _lay_triangle(p, q, r, place, sigma_px, bend_px, per_pixel, z, sigma, bend):
+def _lay_triangle(p, q, r, place, sigma_px, per_pixel, z, sigma):
     """Heights of the cells whose centres lie in a triangle; the highest surface of one pair counts."""
     ax, ay, bx, by = place[0, p[0], p[1]], place[1, p[0], p[1]], place[0, q[0], q[1]], place[1, q[0], q[1]]
     cx, cy = place[0, r[0], r[1]], place[1, r[0], r[1]]
@@ -140,8 +140,6 @@ def _lay_triangle(p, q, r, place, sigma_px, bend_px, per_pixel, z, sigma, bend):
                     z[i, j] = height
                     of = wa * ma * sigma_px[p[0], p[1]] + wb * mb * sigma_px[q[0], q[1]]
                     sigma[i, j] = of + wc * mc * sigma_px[r[0], r[1]]
-                    of = wa * ma * bend_px[p[0], p[1]] + wb * mb * bend_px[q[0], q[1]]
-                    bend[i, j] = of + wc * mc * bend_px[r[0], r[1]]
 
 
 @kernel

@@ -67,13 +67,12 @@ class Parallaxes:
 
     Parameters
     ----------
-    value, sigma : (rows, columns) px. bend : (rows, columns) px, RMS by which they leave their mean over a window.
+    value, sigma : (rows, columns) px.
     across : px, median shift across the base. factor : of the formal σ, as the shifts across the base have it.
     """
 
     value: np.ndarray
     sigma: np.ndarray
-    bend: np.ndarray
     across: float
     factor: float
 
@@ -91,9 +90,7 @@ def parallaxes_of(images: EpipolarImages, refine: bool = True) -> Parallaxes:
     if not refine:
         known = value > INVALID / 2
         nothing = np.full(value.shape, np.nan, np.float32)
-        return Parallaxes(
-            np.where(known, value, nothing), np.where(known, np.float32(0.3), nothing), np.zeros_like(value), 0.0, 1.0
-        )
+        return Parallaxes(np.where(known, value, nothing), np.where(known, np.float32(0.3), nothing), 0.0, 1.0)
     return _refined(images, value)
 
 
@@ -142,9 +139,8 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
     sigma = np.sqrt(factor**2 * variance / np.maximum(share, 0.1) ** 2 + LEAST_SIGMA_PX**2)
     known &= sigma < LARGEST_SIGMA_PX
     nothing = np.float32(np.nan)
-    bend = _bend(value, known)
     return Parallaxes(
-        np.where(known, value, nothing), np.where(known, sigma, nothing).astype(np.float32), bend, middle, factor
+        np.where(known, value, nothing), np.where(known, sigma, nothing).astype(np.float32), middle, factor
     )
 
 
@@ -173,14 +169,3 @@ def _noise(across: np.ndarray, variance: np.ndarray, known: np.ndarray) -> tuple
     middle = float(np.median(v))
     scaled = np.abs(v - middle) / np.sqrt(variance.ravel()[at])
     return middle, max(float(np.median(scaled)) * SIGMA_PER_MAD, 1.0)
-
-
-def _bend(value: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """(rows, columns) px, RMS by which the parallaxes of a window leave the mean about them."""
-    size = WINDOW_PX, WINDOW_PX
-    weight = cv2.boxFilter(known.astype(np.float32), -1, size)
-    filled = np.where(known, value, 0.0).astype(np.float32)
-    mean = cv2.boxFilter(filled, -1, size) / np.maximum(weight, 1e-6)
-    off = np.where(known, value - mean, 0.0).astype(np.float32)
-    square = cv2.boxFilter(off * off, -1, size) / np.maximum(weight, 1e-6)
-    return np.sqrt(np.maximum(square, 0.0)).astype(np.float32)

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
 
 from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.rasters.grids import Grid
 from aerotri.terrain.dense import _mesh_kernels as kernels
+from aerotri.terrain.dense.cell_sigma import CellScale, cell_sigma
 from aerotri.terrain.dense.epipolar import EpipolarGeometry, epipolar_geometry, epipolar_images
 from aerotri.terrain.dense.grey_store import GreyStore
 from aerotri.terrain.dense.height_range import HeightRange
@@ -26,18 +26,15 @@ AGREEING_SIGMAS = 4.0
 """σ of a difference within which heights of two pairs agree."""
 AGREEING_PX = 1.0
 """Besides, in pixels of parallax: what two pairs see of rough ground differs by that much."""
-BEND_SHARE = 0.35
-"""Share of the bend of the ground within a window that stays in the heights as an error; chosen [C]: with it the errors
-of rendered scenes over their σ have a standard deviation near 1 (tools/prove/dense_surface.py)."""
-STEP_SHARE, ACROSS_CELLS = 0.45, 7
-"""Share of a step that is σ of the cells beside it, and side of the square in which it is looked for beside a hole;
-chosen [C]: of rendered houses a quarter of these cells has the height of the other side, an RMS of half the step."""
 LEAST_FILLED = 0.1
 """Of the holes that one more pair shows, the share that it has to fill for another to be tried; chosen [C]: what two
 pairs in a row cannot match, water or what trees hide, a third will not."""
 SMALLEST_PATCH, PATCH_STEP_PX = 50, 2.0
 """Cells of a patch of surface below which it is taken for chance, and the step, in pixels of parallax, that bounds it;
 chosen [C]: five by ten cells, the size of a window of the matching and its neighbours."""
+MARGIN_PX = 16.0
+"""By which a tile is measured beyond its edge, where steps and patches that reach into it are looked for; less than
+what epipolar images have besides."""
 MOST_LAGS = 12
 """Cells up to which the noise of neighbouring cells is looked at for what they share."""
 FEWEST_MISFITS = 500
@@ -90,6 +87,10 @@ def measure_tile(
         When a photograph cannot be read.
     """
     nodes, low_z, high_z = heights.within(grid)
+    inside, shape = grid, (grid.rows, grid.columns)
+    cell_px = grid.cell_x / (float(np.median(photographs.gsd)) * 2**options.level)
+    spare = int(np.ceil(MARGIN_PX / cell_px))
+    grid = grid.window(-spare, -spare, grid.rows + 2 * spare, grid.columns + 2 * spare)
     z = 0.5 * (low_z + high_z)
     middle = np.array([*nodes.mean(axis=0), float(np.median(z))])
     reach = 0.5 * float(np.hypot(grid.columns * grid.cell_x, grid.rows * grid.cell_y)) + float(np.ptp([low_z, high_z]))
@@ -99,8 +100,7 @@ def measure_tile(
     work = _TileMatching(place, store, grid, options.level, options.refine, (ground, low, high))
     matched = [m for pair in chosen_pairs(candidates, options.pairs) if (m := work.match(pair)) is not None]
     if options.refine and matched:
-        matched += _fill_holes(work, candidates, matched, nodes)
-    shape = grid.rows, grid.columns
+        matched += _fill_holes(work, candidates, matched, nodes, inside)
     if not matched:
         empty = np.full(shape, np.nan)
         return TileSurface(
@@ -115,17 +115,19 @@ def measure_tile(
         )
     used, layers = [m.pair for m in matched], [m.layer for m in matched]
     numbers = np.array([[p.left, p.right] for p in used])
-    tolerance = AGREEING_PX * metres_per_pixel(place, used, options.level)
-    fused = _fused(place, used, layers, middle[2], tolerance)
-    return TileSurface(*fused, numbers, np.array([m.across for m in matched]), _shared_cells(layers))
+    scale = CellScale.of(cell_px, metres_per_pixel(place, used, options.level))
+    *maps, factor = _fused(place, used, layers, middle[2], scale)
+    z, sigma, count, shown_by = (a[spare:-spare, spare:-spare].copy() for a in maps)
+    across = np.array([m.across for m in matched])
+    return TileSurface(z, sigma, count, shown_by, factor, numbers, across, _shared_cells(layers))
 
 
 @dataclass(frozen=True, eq=False)
 class _Matched:
-    """A pair, its heights above the place, their σ and bend, (rows, columns) m, and its shift across the base, px."""
+    """A pair, its heights above the place and their σ, (rows, columns) m, and its shift across the base, px."""
 
     pair: Pair
-    layer: tuple[np.ndarray, np.ndarray, np.ndarray]
+    layer: tuple[np.ndarray, np.ndarray]
     across: float
 
 
@@ -153,19 +155,22 @@ class _TileMatching:
 
 
 def _fill_holes(
-    work: _TileMatching, candidates: list[Candidate], matched: list[_Matched], nodes: np.ndarray
+    work: _TileMatching, candidates: list[Candidate], matched: list[_Matched], nodes: np.ndarray, inside: Grid
 ) -> list[_Matched]:
     """More pairs, one after the other, where cells have no height that other photographs may show.
 
     Parameters
     ----------
-    nodes : (n, 2) m, X and Y of the places at which the candidates were looked at.
+    nodes : (n, 2) m, X and Y of the places at which the candidates were looked at. inside : the tile without what it
+        is measured beyond its edge: holes there are another tile's.
     """
+    spare = (work.grid.rows - inside.rows) // 2
+    own = slice(spare, spare + inside.rows), slice(spare, spare + inside.columns)
     more: list[_Matched] = []
     tried = [m.pair for m in matched]
-    holes = np.all([np.isnan(m.layer[0]) for m in matched], axis=0)
+    holes = np.all([np.isnan(m.layer[0][own]) for m in matched], axis=0)
     while len(tried) < kernels.MOST_PAIRS:
-        found = pair_for_holes(candidates, tried, _holes_at(holes, work.grid, nodes))
+        found = pair_for_holes(candidates, tried, _holes_at(holes, inside, nodes))
         if found is None:
             break
         pair, hoped = found
@@ -173,7 +178,7 @@ def _fill_holes(
         one = work.match(pair)
         if one is None:
             continue
-        left = holes & np.isnan(one.layer[0])
+        left = holes & np.isnan(one.layer[0][own])
         filled = float((holes & ~left).mean())
         if filled > 0.0:
             more.append(one)
@@ -197,10 +202,8 @@ def _holes_at(holes: np.ndarray, grid: Grid, nodes: np.ndarray) -> np.ndarray:
     return out
 
 
-def _heights(
-    place: Place, g: EpipolarGeometry, found: Parallaxes, grid: Grid
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Heights above the place, σ and bend, (rows, columns) m, of the cells as one pair sees them."""
+def _heights(place: Place, g: EpipolarGeometry, found: Parallaxes, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Heights above the place and σ, (rows, columns) m, of the cells as one pair sees them."""
     rays = kernels.Rays(
         g.f, g.base, g.first, g.known, np.ascontiguousarray(g.centre), np.ascontiguousarray(g.rotation),
         np.ascontiguousarray(place.to_crs), place.reach,
@@ -213,9 +216,9 @@ def _heights(
         place_of[axis] -= start
         place_of[axis] *= sign / grid.cell_x
         place_of[axis] -= 0.5
-    z, sigma, bend = (np.full((grid.rows, grid.columns), np.nan) for _ in range(3))
-    kernels.lay_mesh(place_of, found.sigma, found.bend, per_pixel, found.value, LARGEST_JUMP_PX, z, sigma, bend)
-    return z, sigma, bend
+    z, sigma = (np.full((grid.rows, grid.columns), np.nan) for _ in range(2))
+    kernels.lay_mesh(place_of, found.sigma, per_pixel, found.value, LARGEST_JUMP_PX, z, sigma)
+    return z, sigma
 
 
 def metres_per_pixel(place: Place, pairs: list[Pair], level: int) -> float:
@@ -229,9 +232,9 @@ def metres_per_pixel(place: Place, pairs: list[Pair], level: int) -> float:
 
 
 def _fused(
-    place: Place, pairs: list[Pair], layers: list[tuple[np.ndarray, ...]], height: float, tolerance: float
+    place: Place, pairs: list[Pair], layers: list[tuple[np.ndarray, np.ndarray]], height: float, scale: CellScale
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
-    heights, sigmas, bends = (np.stack(part) for part in zip(*layers, strict=True))
+    heights, sigmas = (np.stack(part) for part in zip(*layers, strict=True))
     correlation = noise_correlation(place, pairs)
     photographs = sorted({k for p in pairs for k in (p.left, p.right)}, key=lambda k: _off_nadir(place, k))
     bit = {k: 1 << n for n, k in enumerate(photographs)}
@@ -239,37 +242,13 @@ def _fused(
     shape = heights.shape[1:]
     z, sigma, misfit = (np.full(shape, np.nan) for _ in range(3))
     members = np.zeros(shape, np.int64)
+    tolerance = AGREEING_PX * scale.pixel
     kernels.fuse(heights, sigmas, correlation, used, AGREEING_SIGMAS, tolerance, z, sigma, members, misfit)
     factor = _factor(misfit)
     patched = _without_patches(z, PATCH_STEP_PX * tolerance)
     z[~patched], sigma[~patched], members[~patched] = np.nan, np.nan, 0
-    known = np.isfinite(heights)
-    bend = BEND_SHARE * np.where(known, bends, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    bend = np.hypot(bend, step_sigma(z, tolerance))
-    return z + height, np.hypot(sigma * factor, bend), *_seen_by(members, np.array(photographs)), factor
-
-
-def step_sigma(z: np.ndarray, least: float) -> np.ndarray:
-    """(rows, columns) m, σ of which side of a step in the surface a cell beside it belongs to; 0 elsewhere.
-
-    Parameters
-    ----------
-    z : (rows, columns) m, NaN where not known. least : m, of a step from cell to cell; beside a hole it may be hidden
-        and is looked for across, where it is twice as much.
-    """
-    known = np.isfinite(z)
-    beside_hole = np.asarray(binary_dilation(~known, np.ones((3, 3), bool)), bool)
-    near, across = (_largest_change(z, known, side) for side in (3, ACROSS_CELLS))
-    step = np.where(near > least, near, np.where(beside_hole & (across > 2.0 * least), across, 0.0))
-    return np.where(known, STEP_SHARE * step, 0.0)
-
-
-def _largest_change(z: np.ndarray, known: np.ndarray, side: int) -> np.ndarray:
-    """(rows, columns) m, from a cell to the lowest or highest of a square about it."""
-    low = minimum_filter(np.where(known, z, np.inf), side, mode="nearest")
-    high = maximum_filter(np.where(known, z, -np.inf), side, mode="nearest")
-    with np.errstate(invalid="ignore"):
-        return np.nan_to_num(np.maximum(high - z, z - low), nan=0.0)
+    sigma = cell_sigma(z, sigma * factor, heights, sigmas, scale)
+    return z + height, sigma, *_seen_by(members, np.array(photographs)), factor
 
 
 def _off_nadir(place: Place, k: int) -> float:
@@ -309,7 +288,7 @@ def _factor(misfit: np.ndarray) -> float:
     return float(np.clip(np.sqrt(np.median(told)) * SIGMA_PER_MAD, 1.0, LARGEST_FACTOR))
 
 
-def _shared_cells(layers: list[tuple[np.ndarray, ...]]) -> float:
+def _shared_cells(layers: list[tuple[np.ndarray, np.ndarray]]) -> float:
     """Side of the square of cells that have one noise: from how differences of two pairs are alike at neighbours.
 
     The noise of a sum over many cells is that of cells for themselves times the sum of the correlations over all lags,
@@ -319,7 +298,7 @@ def _shared_cells(layers: list[tuple[np.ndarray, ...]]) -> float:
         return np.nan
     both = {(n, m): int(np.isfinite(layers[n][0] + layers[m][0]).sum()) for m in range(len(layers)) for n in range(m)}
     n, m = max(both, key=lambda pair: both[pair])
-    (one, s1, _), (other, s2, _) = layers[n], layers[m]
+    (one, s1), (other, s2) = layers[n], layers[m]
     difference = (one - other) / np.hypot(s1, s2)
     known = np.isfinite(difference) & (np.abs(difference) < AGREEING_SIGMAS)
     if known.sum() < FEWEST_MISFITS:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import Formatter
+
+from aerotri.report.documents.words import languages
+from aerotri.report.plots.rendering import save_plots
 
 POINT = re.compile(r"(?<=[0-9])\.(?=[0-9])")
 MARKS = {"name": "\ue000", "other": "\ue001"}
@@ -42,6 +46,18 @@ def in_language(figures: Mapping[str, Figure], language: str) -> dict[str, Figur
         for figure in figures.values():
             _translate(figure, language)
     return dict(figures)
+
+
+def save_translated(name: str, draw: Callable[[], Figure], folder: Path) -> None:
+    """Write `<name>.<language>.svg` and `.png` of a figure, for a document that is made of the folder later.
+
+    Parameters
+    ----------
+    draw : makes the figure anew, for every language but English.
+    """
+    for language in languages():
+        if language != "en":
+            save_plots({f"{name}.{language}": in_language({name: draw()}, language)[name]}, folder)
 
 
 def picture_line(line: str, language: str) -> str | None:
