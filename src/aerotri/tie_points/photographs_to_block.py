@@ -33,7 +33,8 @@ from aerotri.tie_points.orientation import Oriented, Progress, in_frame, orient,
 from aerotri.tie_points.photographs import LENS, PhotographSet
 from aerotri.tie_points.settings import DEFAULTS
 from aerotri.tie_points.tasks import bytes_of_search, features_elsewhere, matches_elsewhere
-from aerotri.tie_points.tracks import Tracks, join_matches, thin
+from aerotri.tie_points.tracks import Measured, Tracks, join_matches, thin
+from aerotri.tie_points.transfer import View, measured_by_windows
 from aerotri.tie_points.verification import rays_that_meet
 
 CACHE = "tie_point_cache"
@@ -106,12 +107,12 @@ def tie_photographs(
     _refuse_bad_lists(photographs, given, crs, positions)
     features = _features(photographs, options.features, cache, progress, at)
     order = _order_of(features)
-    tracks, oriented, pairs = _oriented_tracks(
+    tracks, measured, oriented, pairs = _oriented_tracks(
         photographs.in_order(order), [features[k] for k in order], given, crs, positions, options, cache, progress, at
     )
     tracks, oriented = tracks.with_images(order), oriented.in_order(np.argsort(order), photographs.cameras)
     keep = np.bincount(tracks.image, minlength=len(photographs)) > 0
-    block = _bare_block(photographs, oriented.cameras, tracks, features, keep)
+    block = _bare_block(photographs, oriented.cameras, tracks, measured.of(tracks), keep)
     reading = complete(replace(Reading(block), messages=said), given, crs, positions)
     reading = with_start_values(reading, oriented.kept(keep))
     frame = oriented.frame
@@ -141,17 +142,38 @@ def _order_of(features: list[Features]) -> np.ndarray:
 def _oriented_tracks(
     photographs: PhotographSet, features: list[Features], given: Given, crs: str, positions: PositionList | None,
     options: Options, cache: Path, progress: Progress, at: Workplace | None,
-) -> tuple[Tracks, Oriented, tuple[int, int]]:  # fmt: skip
-    """Tracks whose rays meet, the orientation, and how many pairs were matched and are tied."""
+) -> tuple[Tracks, Measured, Oriented, tuple[int, int]]:  # fmt: skip
+    """Tracks whose rays meet, their places, the orientation, and how many pairs were matched and are tied."""
     places = approximate_places(photographs, positions, given)
     tracks, pairs = _tracks(photographs, features, places, options, cache, progress, at)
     size = np.array([photographs.cameras[c].size_px for c in photographs.camera], dtype=float)
-    tracks = thin(tracks, _xy(tracks, features), size, MORE_TRACKS * options.points)
-    bare = _bare_block(photographs, photographs.cameras, tracks, features)
-    few = _with_few_points(bare, tracks, _xy(tracks, features), size)
+    tracks, measured = _measured(tracks, features)
+    tracks = thin(tracks, measured.of(tracks)[0], size, MORE_TRACKS * options.points)
+    bare = _bare_block(photographs, photographs.cameras, tracks, measured.of(tracks))
+    few = _with_few_points(bare, tracks, measured.of(tracks)[0], size)
     oriented = orient(few, given, crs, positions, options.matches.seed, progress)
-    tracks = tracks.chosen(rays_that_meet(oriented.block_of(bare), oriented.centre, oriented.rotation))
-    return thin(tracks, _xy(tracks, features), size, options.points), oriented, pairs
+    meeting = rays_that_meet(oriented.block_of(bare), oriented.centre, oriented.rotation)
+    tracks, measured = _by_windows(photographs, tracks.chosen(meeting), measured, oriented)
+    return thin(tracks, measured.of(tracks)[0], size, options.points), measured, oriented, pairs
+
+
+def _by_windows(
+    photographs: PhotographSet, tracks: Tracks, measured: Measured, oriented: Oriented
+) -> tuple[Tracks, Measured]:
+    """Tracks measured by windows, of which the rays meet."""
+    block = _bare_block(photographs, oriented.cameras, tracks, measured.of(tracks))
+    points = reproject(block, oriented.centre, oriented.rotation).points
+    view = View(oriented.centre, oriented.rotation, oriented.cameras, photographs.camera, photographs.paths)
+    tracks, measured = measured_by_windows(view, tracks, measured, points)
+    block = _bare_block(photographs, oriented.cameras, tracks, measured.of(tracks))
+    return tracks.chosen(rays_that_meet(block, oriented.centre, oriented.rotation)), measured
+
+
+def _measured(tracks: Tracks, features: list[Features]) -> tuple[Tracks, Measured]:
+    """The tracks and the positions of their features, ray by ray."""
+    sigma = np.array([one.sigma_px for one in features])
+    found = Measured(_xy(tracks, features), sigma[tracks.image])
+    return Tracks(tracks.start, tracks.image, np.arange(len(tracks.image))), found
 
 
 def _with_few_points(bare: Block, tracks: Tracks, xy: np.ndarray, size: np.ndarray) -> Block:
@@ -169,7 +191,12 @@ def _refuse_bad_lists(photographs: PhotographSet, given: Given, crs: str, positi
     InputError
     """
     nothing = np.zeros(0, np.int64)
-    bare = _bare_block(photographs, photographs.cameras, Tracks(np.zeros(1, np.int64), nothing, nothing), [])
+    bare = _bare_block(
+        photographs,
+        photographs.cameras,
+        Tracks(np.zeros(1, np.int64), nothing, nothing),
+        (np.zeros((0, 2)), np.zeros(0)),
+    )
     reading = complete(Reading(bare), given, crs, positions)
     if given.orientation is not None and not is_observed(given.stated):
         assemble.with_orientations(reading, given.orientation, given.stated)
@@ -238,19 +265,19 @@ def _bare_block(
     photographs: PhotographSet,
     cameras: tuple[Camera, ...],
     tracks: Tracks,
-    features: list[Features],
+    measured: tuple[np.ndarray, np.ndarray],
     keep: np.ndarray | None = None,
 ) -> Block:
     """Cameras, photographs and tie points; `keep` (n,) bool, the photographs of the block."""
     keep = np.ones(len(photographs), bool) if keep is None else keep
-    xy_px = _xy(tracks, features) if len(tracks) else np.zeros((0, 2))
+    xy_px, sigma_px = measured
     of_camera = photographs.camera[tracks.image]
     xy = np.empty_like(xy_px)
     for number, camera in enumerate(cameras):
         own = of_camera == number
         xy[own] = mm_from_px(xy_px[own], camera.size_px, camera.pixel_mm)
     pixel = np.array([camera.pixel_mm for camera in cameras])
-    sigma = np.array([features[i].sigma_px for i in tracks.image.tolist()]) * pixel[of_camera]
+    sigma = sigma_px * pixel[of_camera]
     index = np.cumsum(keep) - 1
     count = int(keep.sum())
     width = len(str(len(tracks)))
