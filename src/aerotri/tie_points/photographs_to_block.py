@@ -38,7 +38,7 @@ from aerotri.tie_points.transfer import View, measured_by_windows
 from aerotri.tie_points.verification import rays_that_meet
 
 CACHE = "tie_point_cache"
-FEATURES, PAIRS = "features of photographs", "matching pairs"
+FEATURES, PAIRS, WINDOWS = "features of photographs", "matching pairs", "measuring by windows"
 """Stages, as a user reads them."""
 ITERATIONS = 300
 """Iterations that the written settings allow, ten times the default; chosen [C]: start values of a first orientation
@@ -153,18 +153,20 @@ def _oriented_tracks(
     few = _with_few_points(bare, tracks, measured.of(tracks)[0], size)
     oriented = orient(few, given, crs, positions, options.matches.seed, progress)
     meeting = rays_that_meet(oriented.block_of(bare), oriented.centre, oriented.rotation)
-    tracks, measured = _by_windows(photographs, tracks.chosen(meeting), measured, oriented)
+    tracks, measured = _by_windows(photographs, tracks.chosen(meeting), measured, oriented, progress)
     return thin(tracks, measured.of(tracks)[0], size, options.points), measured, oriented, pairs
 
 
 def _by_windows(
-    photographs: PhotographSet, tracks: Tracks, measured: Measured, oriented: Oriented
+    photographs: PhotographSet, tracks: Tracks, measured: Measured, oriented: Oriented, progress: Progress
 ) -> tuple[Tracks, Measured]:
     """Tracks measured by windows, of which the rays meet."""
     block = _bare_block(photographs, oriented.cameras, tracks, measured.of(tracks))
     points = reproject(block, oriented.centre, oriented.rotation).points
     view = View(oriented.centre, oriented.rotation, oriented.cameras, photographs.camera, photographs.paths)
-    tracks, measured = measured_by_windows(view, tracks, measured, points)
+    tracks, measured = measured_by_windows(
+        view, tracks, measured, points, lambda done: progress(WINDOWS, done, len(photographs))
+    )
     block = _bare_block(photographs, oriented.cameras, tracks, measured.of(tracks))
     return tracks.chosen(rays_that_meet(block, oriented.centre, oriented.rotation)), measured
 

@@ -9,7 +9,7 @@ photographs with a feature of it and in those without. Points whose windows are 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -103,31 +103,42 @@ class References:
     windows: np.ndarray
 
 
-def measured_by_windows(view: View, tracks: Tracks, measured: Measured, points: np.ndarray) -> tuple[Tracks, Measured]:
+def measured_by_windows(
+    view: View, tracks: Tracks, measured: Measured, points: np.ndarray, report: Callable[[int], None]
+) -> tuple[Tracks, Measured]:
     """Tracks with their rays measured by windows, and with more rays.
 
     Parameters
     ----------
     tracks, measured : of features. points : (t, 3) m, where their rays meet; NaN where not known.
+    report : called with the photographs that are done.
     """
-    xy, sigma = measured.of(tracks)
-    greys = _Greys(view)
+    greys, (xy, _) = _Greys(view), measured.of(tracks)
     with ThreadPoolExecutor(thread_count()) as pool:
         chosen = _references(view, tracks, xy, points)
         list(pool.map(lambda number: _read_windows(view, number, chosen, greys), range(len(view))))
-        seen = _with_points_in_common(tracks, len(view))
-        parts = list(
-            pool.map(lambda k: _found_in(view, k, (tracks, xy), chosen, (seen[:, k], greys)), range(len(view)))
-        )
-    image = np.repeat(np.arange(len(view)), [len(point) for point, _ in parts])
-    point, found = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+        common = _with_points_in_common(tracks, len(view))
+        found: list[tuple[np.ndarray, np.ndarray]] = []
+        for part in pool.map(
+            lambda number: _found_in(view, number, (tracks, xy), chosen, (common[:, number], greys)), range(len(view))
+        ):
+            found.append(part)
+            report(len(found))
+    return _joined(tracks, measured, found)
+
+
+def _joined(tracks: Tracks, measured: Measured, found: list[tuple[np.ndarray, np.ndarray]]) -> tuple[Tracks, Measured]:
+    """Tracks of the windows found in every photograph; of points with fewer than two, those of the features."""
+    image = np.repeat(np.arange(len(found)), [len(point) for point, _ in found])
+    point, place = (np.concatenate([part[k] for part in found]) for k in (0, 1))
     held = np.bincount(point, minlength=len(tracks)) > 1
     own, other = held[point], ~held[tracks.of_ray]
+    xy, sigma = measured.of(tracks)
     return tracks_of(
         np.concatenate([point[own], tracks.of_ray[other]]),
         np.concatenate([image[own], tracks.image[other]]),
         Measured(
-            np.concatenate([found[own], xy[other]]),
+            np.concatenate([place[own], xy[other]]),
             np.concatenate([np.full(int(own.sum()), SIGMA_PX), sigma[other]]),
         ),
     )
