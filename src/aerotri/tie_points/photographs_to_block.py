@@ -29,6 +29,7 @@ from aerotri.tie_points.given import (
     with_unmarked_control,
 )
 from aerotri.tie_points.matching import MatchOptions, match_all, neighbours
+from aerotri.tie_points.misfit import with_sigma_of_ties
 from aerotri.tie_points.orientation import Oriented, Progress, in_frame, orient, with_start_values
 from aerotri.tie_points.photographs import LENS, PhotographSet
 from aerotri.tie_points.settings import DEFAULTS
@@ -117,7 +118,7 @@ def tie_photographs(
     reading = with_start_values(reading, oriented.kept(keep))
     frame = oriented.frame
     found = reproject(*in_frame(reading.block, frame))
-    block, sigma_px = _with_sigma_of_ties(reading.block, found.residual_px, len(tracks))
+    block, sigma_px = with_sigma_of_ties(reading.block, found.offset_px, len(tracks))
     points = found.points if frame is None else frame.from_local(found.points)
     reading = with_unmarked_control(replace(reading, block=block, points=points), given)
     return TiedBlock(
@@ -304,28 +305,3 @@ def _settings(cameras: tuple[Camera, ...], sigma_um: float) -> Settings:
         gnss=GnssSettings(shift="off"),
         image_sigma_um=sigma_um,
     )
-
-
-def _with_sigma_of_ties(block: Block, residual_px: np.ndarray, ties: int) -> tuple[Block, float]:
-    """The block with the standard deviation of a coordinate that the misfit of its tie points shows.
-
-    Of a point with k rays, residuals have 2k − 3 redundant coordinates of 2k; half of two-dimensional errors are less
-    than √(2 ln 2) σ [L]. Ratios between the rays stay.
-
-    Parameters
-    ----------
-    residual_px : (m,). ties : the first so many points are tie points.
-    """
-    rays = block.image_points
-    own = (rays.point < ties) & np.isfinite(residual_px)
-    length = np.bincount(rays.point, minlength=len(block.points))[rays.point[own]]
-    pixel = np.array([camera.pixel_mm for camera in block.cameras])[block.images.camera[rays.image]]
-    relative = residual_px[own] * pixel[own] / rays.sigma[own].mean(axis=1) / np.sqrt(1.0 - 3.0 / (2.0 * length))
-    factor = float(np.median(relative)) / np.sqrt(2.0 * np.log(2.0))
-    if not factor > 0.0:
-        factor = 1.0
-    sigma = np.where((rays.point < ties)[:, None], factor * rays.sigma, rays.sigma)
-    common = float(np.median(sigma[own])) if own.any() else float(np.median(sigma))
-    settings = replace(block.settings, image_sigma_um=1e3 * common)
-    found = replace(block, image_points=replace(rays, sigma=sigma), settings=settings)
-    return found, common / block.cameras[0].pixel_mm
