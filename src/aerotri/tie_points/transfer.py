@@ -114,14 +114,19 @@ def measured_by_windows(
     report : called with the photographs that are done.
     """
     greys, (xy, _) = _Greys(view), measured.of(tracks)
+    chosen = _references(view, tracks, xy, points)
+    common = _with_points_in_common(tracks, len(view))
+
+    def read(number: int) -> None:
+        _read_windows(view, number, chosen, greys)
+
+    def find(number: int) -> tuple[np.ndarray, np.ndarray]:
+        return _found_in(view, number, (tracks, xy), chosen, (common[:, number], greys))
+
+    found: list[tuple[np.ndarray, np.ndarray]] = []
     with ThreadPoolExecutor(thread_count()) as pool:
-        chosen = _references(view, tracks, xy, points)
-        list(pool.map(lambda number: _read_windows(view, number, chosen, greys), range(len(view))))
-        common = _with_points_in_common(tracks, len(view))
-        found: list[tuple[np.ndarray, np.ndarray]] = []
-        for part in pool.map(
-            lambda number: _found_in(view, number, (tracks, xy), chosen, (common[:, number], greys)), range(len(view))
-        ):
+        list(pool.map(read, range(len(view))))
+        for part in pool.map(find, range(len(view))):
             found.append(part)
             report(len(found))
     return _joined(tracks, measured, found)
