@@ -8,25 +8,29 @@ from aerotri.compiled import kernel
 
 
 @kernel
-def two_best(similarity, first_row, row_best, row_two, column_best, column_two):
+def two_best(similarity, rows, columns, row_best, row_two, column_best, column_two):
     """The two largest similarities of every row and, over all calls, of every column, and where the largest lies.
 
-    similarity (a, n2) of rows first_row …; row_best (n1,) and column_best (n2,) int64; row_two (n1, 2) and
-    column_two (n2, 2) float32, the largest and the second largest, to begin with −1.
+    similarity (a, b) of rows (a,) and columns (b,) of all (n1,) and (n2,); row_best (n1,) and column_best (n2,) int64;
+    row_two (n1, 2) and column_two (n2, 2) float32, the largest and the second largest, to begin with −1.
     """
-    for i in range(similarity.shape[0]):
-        row = first_row + i
+    for i in range(len(rows)):
+        row = rows[i]
         one, two, at = np.float32(-1.0), np.float32(-1.0), -1
-        for j in range(similarity.shape[1]):
+        for j in range(len(columns)):
             s = similarity[i, j]
-            if s > one:
-                two, one, at = one, s, j
-            elif s > two:
-                two = s
-            if s > column_two[j, 0]:
-                column_two[j, 1], column_two[j, 0], column_best[j] = column_two[j, 0], s, row
-            elif s > column_two[j, 1]:
-                column_two[j, 1] = s
+            if s > two:
+                if s > one:
+                    two, one, at = one, s, columns[j]
+                else:
+                    two = s
+            column = columns[j]
+            if s > column_two[column, 1]:
+                if s > column_two[column, 0]:
+                    column_two[column, 1], column_two[column, 0] = column_two[column, 0], s
+                    column_best[column] = row
+                else:
+                    column_two[column, 1] = s
         row_best[row], row_two[row, 0], row_two[row, 1] = at, one, two
 
 

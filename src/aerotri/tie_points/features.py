@@ -2,7 +2,8 @@
 
 Positions are found in the whole photograph, or, where it is larger than wanted, in a reduced one. OpenCV counts pixels
 from the centre of the first one, which is 0.5 here; its own shift by a quarter of a pixel, from doubling the
-photograph, is switched off (``enable_precise_upscale``).
+photograph, is switched off (``enable_precise_upscale``). The image is doubled only where its pixels as they are hold
+too few features (`detection`).
 """
 
 from __future__ import annotations
@@ -10,21 +11,26 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.files.atomic import atomic_file
+from aerotri.tie_points.detection import EDGE_THRESHOLD, LAYERS, SIGMA, keypoints_of, scale_space, with_directions
 from aerotri.tie_points.settings import DEFAULTS
 
 FIRST_PIXEL = 0.5
 """Pixels from the corner of the first pixel, where images begin here, to its centre, where OpenCV counts from."""
-CONTRAST_THRESHOLD, EDGE_THRESHOLD, LAYERS, SIGMA = 0.015, 10.0, 3, 1.6
-"""Lowe's values but for the contrast, which is lower: dark ground has features too, and `_spread` chooses."""
+CONTRAST_THRESHOLD = 0.015
+"""Below Lowe's: dark ground has features too, and `_spread` chooses."""
+ENOUGH = 0.5
+"""Share of the features wanted from which those of the pixels as they are will do; else the image is doubled."""
 CELLS = 16
 """The long side of a photograph is divided into this many cells, each with its share of the features."""
 STRETCH = (0.1, 99.9)
 """Percentiles of grey values of more than 8 bits that become black and white."""
+JPEG = (".jpg", ".jpeg")
 SAMPLE_STEP = 4
 """Every so many-th row and column that percentiles of grey values are taken from; chosen [C]: a sixteenth of millions
 of pixels gives the same percentiles."""
@@ -98,22 +104,40 @@ def find_features(grey: np.ndarray, options: FeatureOptions, key: str = "") -> F
     size = round(columns * scale), round(rows * scale)
     if scale < 1.0:
         grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
-    sift = cv2.SIFT.create(0, LAYERS, CONTRAST_THRESHOLD, EDGE_THRESHOLD, SIGMA, True)
-    points, descriptors = sift.detectAndCompute(grey, None)
-    if not points:
-        return Features(np.zeros((0, 2), np.float32), np.zeros((0, 128), np.uint8), options.sigma_px / scale, key)
-    xy = np.array([point.pt for point in points]) + FIRST_PIXEL
-    keep = _spread(xy, np.array([point.size for point in points]), size, options.count)
+    xy, descriptors = _in_pixels(grey, options.count) or _in_doubled(grey, options.count)
     back = np.array([columns, rows]) / np.array(size)
-    return Features(
-        (xy[keep] * back).astype(np.float32),
-        np.clip(np.rint(descriptors[keep]), 0, 255).astype(np.uint8),
-        options.sigma_px / scale,
-        key,
-    )
+    descriptors = np.clip(np.rint(descriptors), 0, 255).astype(np.uint8)
+    return Features((xy * back).astype(np.float32), descriptors, options.sigma_px / scale, key)
 
 
-def _spread(xy: np.ndarray, extent: np.ndarray, size: tuple[int, int], count: int) -> np.ndarray:
+def _in_pixels(grey: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """Features, up to `count`, and their descriptors, from the pixels as they are; None where there are too few."""
+    octaves = scale_space(grey)
+    found = keypoints_of(octaves, CONTRAST_THRESHOLD * 255.0 / LAYERS)
+    keep = _spread(found.xy, found.size, grey.shape[::-1], count)
+    if len(keep) < ENOUGH * count:
+        return None
+    points, descriptors = _sift().compute(grey, with_directions(octaves, found.chosen(keep)))
+    return np.array([point.pt for point in points]) + FIRST_PIXEL, descriptors
+
+
+def _in_doubled(grey: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Features, up to `count`, and their descriptors, from the image with doubled sides."""
+    points, descriptors = _sift().detectAndCompute(grey, None)
+    if not points:
+        return np.zeros((0, 2)), np.zeros((0, 128))
+    xy = np.array([point.pt for point in points]) + FIRST_PIXEL
+    keep = _spread(xy, np.array([point.size for point in points]), grey.shape[::-1], count)
+    return xy[keep], descriptors[keep]
+
+
+def _sift() -> Any:
+    import cv2
+
+    return cv2.SIFT.create(0, LAYERS, CONTRAST_THRESHOLD, EDGE_THRESHOLD, SIGMA, True)
+
+
+def _spread(xy: np.ndarray, extent: np.ndarray, size: tuple[int, ...], count: int) -> np.ndarray:
     """Rows of the features to keep: one at a place, and the largest of every cell before the second largest.
 
     Large features are found again: of as many in foliage, three times more than of those with the strongest contrast.
@@ -140,11 +164,23 @@ def grey_8bit(path: Path) -> np.ndarray:
     """
     from aerotri.rasters.images import open_photograph
 
+    grey = _luminance_of_jpeg(path) if path.suffix.lower() in JPEG else None
+    if grey is not None:
+        return grey
     with open_photograph(path) as photograph:
         pixels = photograph.read(0, photograph.rows)
         whole = photograph.dtype == np.uint8
     grey = pixels[0] if len(pixels) < 3 else _luminance(pixels)
     return grey if whole else _stretched(grey, path)
+
+
+def _luminance_of_jpeg(path: Path) -> np.ndarray | None:
+    """The grey values that a JPEG holds beside its colours, as they stand in the file; None where it is damaged."""
+    import cv2
+
+    coded = np.fromfile(path, np.uint8)
+    grey = cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION) if len(coded) else None
+    return None if grey is None or grey.ndim != 2 else grey
 
 
 def _luminance(pixels: np.ndarray) -> np.ndarray:
@@ -169,7 +205,8 @@ def _key(path: Path, options: FeatureOptions) -> str:
     import cv2
 
     state = path.stat()
-    told = (path.name, state.st_size, state.st_mtime_ns, options, CONTRAST_THRESHOLD, CELLS, STRETCH, cv2.__version__)
+    sought = (options, CONTRAST_THRESHOLD, ENOUGH, CELLS, STRETCH, cv2.__version__)
+    told = (path.name, state.st_size, state.st_mtime_ns, *sought)
     return hashlib.sha256(repr(told).encode()).hexdigest()
 
 

@@ -161,7 +161,6 @@ def map_parts(block: Block, seed: int, partners: int, tolerance_px: float = 4.0)
         found.max_num_models = MOST_PARTS
         found.min_model_size = SMALLEST_PART
         found.init_num_trials = FIRST_PAIRS
-        found.ba_global_frames_ratio = found.ba_global_points_ratio = GROWTH
         return found
 
     return _mapped_parts(block, options, partners, lambda done: None)
@@ -233,6 +232,7 @@ def _mapping_options(block: Block, seed: int, angle_deg: float, tolerance_px: fl
     mapper.init_min_tri_angle = angle_deg
     mapper.init_max_error = mapper.filter_max_reproj_error = tolerance_px
     mapper.abs_pose_max_error = 3.0 * tolerance_px
+    options.ba_global_frames_ratio = options.ba_global_points_ratio = GROWTH
     triangulation.merge_max_reproj_error = triangulation.complete_max_reproj_error = tolerance_px
     return options
 

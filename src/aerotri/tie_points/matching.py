@@ -2,13 +2,14 @@
 
 [L] Descriptors are compared as RootSIFT (Arandjelović and Zisserman 2012); a match has to be the best in both
 directions, and clearly better than the second best in both (Lowe 2004). What one epipolar geometry or one homography
-explains is kept (COLMAP's two-view estimation).
+explains is kept (COLMAP's two-view estimation). The largest features of two photographs are compared first, all with
+all; where these fit one geometry, the others are compared only with those near where it puts them.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +31,12 @@ FIRST_LOOK, FEWEST_AT_FIRST = 2000, 6
 """Pairs whose first features, so many of each, have fewer matches than this are taken as apart (Wu 2013)."""
 SAME_DISTANCE = 1e-6
 """Relative difference of two distances below which rounding decides which is the longer."""
+CELLS, ROOM, NEAR = 8, 2.0, 0.2
+"""Cells along the longer side of a photograph whose features are compared at a time; room around where they should be,
+in distances of sure matches, and in cells."""
 Report = Callable[[int, int], None]
+Windows = Iterable[tuple[np.ndarray, np.ndarray]]
+"""Rows of one photograph, and of the other, that are compared with each other."""
 
 
 @dataclass(frozen=True)
@@ -173,30 +179,82 @@ def _match(one: Features, other: Features, cameras: tuple[Camera, Camera], optio
     look = mutual_matches(one.descriptors[:FIRST_LOOK], other.descriptors[:FIRST_LOOK], options.ratio)
     if len(look) < FEWEST_AT_FIRST:
         return np.zeros((0, 2), np.int64)
-    candidates = mutual_matches(one.descriptors, other.descriptors, options.ratio)
-    if len(candidates) < options.fewest:
+    sure = _verified(one, other, cameras, look, options)
+    if len(sure):
+        windows = windows_of((one.xy, other.xy), sure)
+        candidates = mutual_matches(one.descriptors, other.descriptors, options.ratio, windows)
+    else:
+        candidates = mutual_matches(one.descriptors, other.descriptors, options.ratio)
+    return _verified(one, other, cameras, candidates, options)
+
+
+def _verified(
+    one: Features, other: Features, cameras: tuple[Camera, Camera], matches: np.ndarray, options: MatchOptions
+) -> np.ndarray:
+    """The matches (m, 2) that one geometry explains, none where they are too few."""
+    if len(matches) < options.fewest:
         return np.zeros((0, 2), np.int64)
     tolerance = options.tolerance_px * 2.0 * max(one.sigma_px, other.sigma_px)
-    inliers = two_view_inliers(
-        (pinhole(cameras[0]), pinhole(cameras[1])),
-        (one.xy[candidates[:, 0]], other.xy[candidates[:, 1]]),
-        tolerance,
-        options.fewest,
-        options.seed,
-    )
-    return candidates[inliers]
+    xy = one.xy[matches[:, 0]], other.xy[matches[:, 1]]
+    pinholes = pinhole(cameras[0]), pinhole(cameras[1])
+    return matches[two_view_inliers(pinholes, xy, tolerance, options.fewest, options.seed)]
 
 
-def mutual_matches(one: np.ndarray, other: np.ndarray, ratio: float) -> np.ndarray:
-    """(m, 2) rows of descriptors (n1, 128) and (n2, 128) that are each other's best and pass the ratio test."""
+def mutual_matches(one: np.ndarray, other: np.ndarray, ratio: float, windows: Windows | None = None) -> np.ndarray:
+    """(m, 2) rows of descriptors (n1, 128) and (n2, 128) that are each other's best and pass the ratio test.
+
+    Parameters
+    ----------
+    windows : rows of the first and those of the second that may be their partners; all with all where None.
+    """
     a, b = _root(one), _root(other)
     best, two = np.full(len(a), -1, np.int64), np.full((len(a), 2), -1.0, np.float32)
     column_best, column_two = np.full(len(b), -1, np.int64), np.full((len(b), 2), -1.0, np.float32)
-    for first in range(0, len(a), ROWS):
-        _kernels.two_best(a[first : first + ROWS] @ b.T, first, best, two, column_best, column_two)
+    for rows, columns in _all_with_all(len(a), len(b)) if windows is None else windows:
+        similarity = a[rows] @ (b.T if len(columns) == len(b) else b[columns].T)
+        _kernels.two_best(similarity, rows, columns, best, two, column_best, column_two)
     rows = np.flatnonzero(_clear(two, ratio) & (best >= 0))
     rows = rows[_clear(column_two, ratio)[best[rows]] & (column_best[best[rows]] == rows)]
     return np.column_stack([rows, best[rows]])
+
+
+def _all_with_all(rows: int, columns: int) -> Windows:
+    every = np.arange(columns)
+    return ((np.arange(first, min(first + ROWS, rows)), every) for first in range(0, rows, ROWS))
+
+
+def windows_of(xy: tuple[np.ndarray, np.ndarray], sure: np.ndarray) -> Windows:
+    """Where partners may be, from matches that are sure: cell by cell of the first photograph.
+
+    A plane carries the cell over; around it there is room for twice what sure matches lie off that plane, for ground
+    may be higher or lower than where it was matched.
+
+    Parameters
+    ----------
+    xy : (n1, 2) and (n2, 2) px of the features. sure : (m, 2) rows of matches.
+    """
+    plane = fitted_plane(xy[0][sure[:, 0]], xy[1][sure[:, 1]])
+    off = np.abs(carried(plane, xy[0][sure[:, 0]]) - xy[1][sure[:, 1]]).max(axis=0)
+    size = xy[0].max() / CELLS
+    room = ROOM * off + NEAR * size
+    there = carried(plane, xy[0])
+    cell = (xy[0] / size).astype(np.int64) @ np.array([1, CELLS + 1])
+    order = np.argsort(cell, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(cell[order])) + 1):
+        low, high = there[rows].min(axis=0) - room, there[rows].max(axis=0) + room
+        columns = np.flatnonzero(((xy[1] >= low) & (xy[1] <= high)).all(axis=1))
+        if len(columns) > 1:
+            yield rows, columns
+
+
+def fitted_plane(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(3, 3) the affine transformation of (m, 2) px to (m, 2) px by least squares."""
+    design = np.column_stack([one, np.ones(len(one))]).astype(float)
+    return np.linalg.lstsq(design, other.astype(float), rcond=None)[0]
+
+
+def carried(plane: np.ndarray, xy: np.ndarray) -> np.ndarray:
+    return xy @ plane[:2] + plane[2]
 
 
 def _root(descriptors: np.ndarray) -> np.ndarray:
@@ -212,7 +270,7 @@ def _clear(two: np.ndarray, ratio: float) -> np.ndarray:
 
 def _key(one: Features, other: Features, first: Camera, second: Camera, options: MatchOptions) -> str:
     geometry = [(camera.focal_length_mm / camera.pixel_mm, camera.principal_point_mm) for camera in (first, second)]
-    settings = (options.ratio, options.tolerance_px, options.fewest, options.seed)
+    settings = (options.ratio, options.tolerance_px, options.fewest, options.seed, FIRST_LOOK, CELLS, ROOM, NEAR)
     return "k" + hashlib.sha256(repr((one.key, other.key, geometry, settings)).encode()).hexdigest()
 
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from aerotri.adjustment.parallel import thread_count
 from aerotri.conventions import InputError, mm_from_px
 from aerotri.execution.work import Workplace
 from aerotri.formats.assembly import assemble
 from aerotri.formats.assembly.parts import PositionList, Reading, no_sigma
 from aerotri.formats.assembly.reprojection import reproject
+from aerotri.memory import fitting
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Settings
 from aerotri.observations.block import GnssSettings
 from aerotri.tie_points.features import FeatureOptions, Features, features_of
@@ -26,21 +29,26 @@ from aerotri.tie_points.given import (
     with_unmarked_control,
 )
 from aerotri.tie_points.matching import MatchOptions, match_all, neighbours
+from aerotri.tie_points.misfit import with_sigma_of_ties
 from aerotri.tie_points.orientation import Oriented, Progress, in_frame, orient, with_start_values
 from aerotri.tie_points.photographs import LENS, PhotographSet
 from aerotri.tie_points.settings import DEFAULTS
-from aerotri.tie_points.tasks import features_elsewhere, matches_elsewhere
-from aerotri.tie_points.tracks import Tracks, join_matches, thin
+from aerotri.tie_points.tasks import bytes_of_search, features_elsewhere, matches_elsewhere
+from aerotri.tie_points.tracks import Measured, Tracks, join_matches, thin
+from aerotri.tie_points.transfer import View, measured_by_windows
 from aerotri.tie_points.verification import rays_that_meet
 
 CACHE = "tie_point_cache"
-FEATURES, PAIRS = "features of photographs", "matching pairs"
+FEATURES, PAIRS, WINDOWS = "features of photographs", "matching pairs", "measuring by windows"
 """Stages, as a user reads them."""
 ITERATIONS = 300
 """Iterations that the written settings allow, ten times the default; chosen [C]: start values of a first orientation
 are bent, and Huber's weights settle slowly."""
 MORE_TRACKS = 2
-"""Tracks given to the first orientation over those wanted in the end: some do not stand it."""
+"""Tracks compared with the first orientation over those wanted in the end: some do not stand it."""
+ORIENTING = 500
+"""Points of a photograph that the first orientation is found from [C]: with four times as many it takes more than twice
+as long, and positions fit it as well."""
 
 
 @dataclass(frozen=True)
@@ -100,17 +108,17 @@ def tie_photographs(
     _refuse_bad_lists(photographs, given, crs, positions)
     features = _features(photographs, options.features, cache, progress, at)
     order = _order_of(features)
-    tracks, oriented, pairs = _oriented_tracks(
+    tracks, measured, oriented, pairs = _oriented_tracks(
         photographs.in_order(order), [features[k] for k in order], given, crs, positions, options, cache, progress, at
     )
     tracks, oriented = tracks.with_images(order), oriented.in_order(np.argsort(order), photographs.cameras)
     keep = np.bincount(tracks.image, minlength=len(photographs)) > 0
-    block = _bare_block(photographs, oriented.cameras, tracks, features, keep)
+    block = _bare_block(photographs, oriented.cameras, tracks, measured.of(tracks), keep)
     reading = complete(replace(Reading(block), messages=said), given, crs, positions)
     reading = with_start_values(reading, oriented.kept(keep))
     frame = oriented.frame
     found = reproject(*in_frame(reading.block, frame))
-    block, sigma_px = _with_sigma_of_ties(reading.block, found.residual_px, len(tracks))
+    block, sigma_px = with_sigma_of_ties(reading.block, found.offset_px, len(tracks))
     points = found.points if frame is None else frame.from_local(found.points)
     reading = with_unmarked_control(replace(reading, block=block, points=points), given)
     return TiedBlock(
@@ -135,16 +143,47 @@ def _order_of(features: list[Features]) -> np.ndarray:
 def _oriented_tracks(
     photographs: PhotographSet, features: list[Features], given: Given, crs: str, positions: PositionList | None,
     options: Options, cache: Path, progress: Progress, at: Workplace | None,
-) -> tuple[Tracks, Oriented, tuple[int, int]]:  # fmt: skip
-    """Tracks whose rays meet, the orientation, and how many pairs were matched and are tied."""
+) -> tuple[Tracks, Measured, Oriented, tuple[int, int]]:  # fmt: skip
+    """Tracks whose rays meet, their places, the orientation, and how many pairs were matched and are tied."""
     places = approximate_places(photographs, positions, given)
     tracks, pairs = _tracks(photographs, features, places, options, cache, progress, at)
     size = np.array([photographs.cameras[c].size_px for c in photographs.camera], dtype=float)
-    tracks = thin(tracks, _xy(tracks, features), size, MORE_TRACKS * options.points)
-    bare = _bare_block(photographs, photographs.cameras, tracks, features)
-    oriented = orient(bare, given, crs, positions, options.matches.seed, progress)
-    tracks = tracks.chosen(rays_that_meet(oriented.block_of(bare), oriented.centre, oriented.rotation))
-    return thin(tracks, _xy(tracks, features), size, options.points), oriented, pairs
+    tracks, measured = _measured(tracks, features)
+    tracks = thin(tracks, measured.of(tracks)[0], size, MORE_TRACKS * options.points)
+    bare = _bare_block(photographs, photographs.cameras, tracks, measured.of(tracks))
+    few = _with_few_points(bare, tracks, measured.of(tracks)[0], size)
+    oriented = orient(few, given, crs, positions, options.matches.seed, progress)
+    meeting = rays_that_meet(oriented.block_of(bare), oriented.centre, oriented.rotation)
+    tracks, measured = _by_windows(photographs, tracks.chosen(meeting), measured, oriented, progress)
+    return thin(tracks, measured.of(tracks)[0], size, options.points), measured, oriented, pairs
+
+
+def _by_windows(
+    photographs: PhotographSet, tracks: Tracks, measured: Measured, oriented: Oriented, progress: Progress
+) -> tuple[Tracks, Measured]:
+    """Tracks measured by windows, of which the rays meet."""
+    block = _bare_block(photographs, oriented.cameras, tracks, measured.of(tracks))
+    points = reproject(block, oriented.centre, oriented.rotation).points
+    view = View(oriented.centre, oriented.rotation, oriented.cameras, photographs.camera, photographs.paths)
+    tracks, measured = measured_by_windows(
+        view, tracks, measured, points, lambda done: progress(WINDOWS, done, len(photographs))
+    )
+    block = _bare_block(photographs, oriented.cameras, tracks, measured.of(tracks))
+    return tracks.chosen(rays_that_meet(block, oriented.centre, oriented.rotation)), measured
+
+
+def _measured(tracks: Tracks, features: list[Features]) -> tuple[Tracks, Measured]:
+    """The tracks and the positions of their features, ray by ray."""
+    sigma = np.array([one.sigma_px for one in features])
+    found = Measured(_xy(tracks, features), sigma[tracks.image])
+    return Tracks(tracks.start, tracks.image, np.arange(len(tracks.image))), found
+
+
+def _with_few_points(bare: Block, tracks: Tracks, xy: np.ndarray, size: np.ndarray) -> Block:
+    """The block with as many of its points as a first orientation needs, evenly spread, under the names they have."""
+    few = thin(Tracks(tracks.start, tracks.image, np.arange(len(xy))), xy, size, ORIENTING).feature
+    rays = bare.image_points
+    return replace(bare, image_points=ImagePoints(rays.image[few], rays.point[few], rays.xy[few], rays.sigma[few]))
 
 
 def _refuse_bad_lists(photographs: PhotographSet, given: Given, crs: str, positions: PositionList | None) -> None:
@@ -155,7 +194,12 @@ def _refuse_bad_lists(photographs: PhotographSet, given: Given, crs: str, positi
     InputError
     """
     nothing = np.zeros(0, np.int64)
-    bare = _bare_block(photographs, photographs.cameras, Tracks(np.zeros(1, np.int64), nothing, nothing), [])
+    bare = _bare_block(
+        photographs,
+        photographs.cameras,
+        Tracks(np.zeros(1, np.int64), nothing, nothing),
+        (np.zeros((0, 2)), np.zeros(0)),
+    )
     reading = complete(Reading(bare), given, crs, positions)
     if given.orientation is not None and not is_observed(given.stated):
         assemble.with_orientations(reading, given.orientation, given.stated)
@@ -166,11 +210,18 @@ def _features(
 ) -> list[Features]:
     if at is not None:
         features_elsewhere(photographs, options, cache / "features", at, _counted(progress, FEATURES, len(photographs)))
-    found = []
-    for number, path in enumerate(photographs.paths, 1):
-        found.append(features_of(path, options, cache / "features"))
-        if at is None:
-            progress(FEATURES, number, len(photographs))
+    found: list[Features] = []
+    each = max(bytes_of_search(camera, options) for camera in photographs.cameras)
+    threads = int(max(1.0, min(thread_count(), fitting(each))))
+
+    def of(path: Path) -> Features:
+        return features_of(path, options, cache / "features")
+
+    with ThreadPoolExecutor(threads) as pool:
+        for features in pool.map(of, photographs.paths):
+            found.append(features)
+            if at is None:
+                progress(FEATURES, len(found), len(photographs))
     return found
 
 
@@ -217,19 +268,19 @@ def _bare_block(
     photographs: PhotographSet,
     cameras: tuple[Camera, ...],
     tracks: Tracks,
-    features: list[Features],
+    measured: tuple[np.ndarray, np.ndarray],
     keep: np.ndarray | None = None,
 ) -> Block:
     """Cameras, photographs and tie points; `keep` (n,) bool, the photographs of the block."""
     keep = np.ones(len(photographs), bool) if keep is None else keep
-    xy_px = _xy(tracks, features) if len(tracks) else np.zeros((0, 2))
+    xy_px, sigma_px = measured
     of_camera = photographs.camera[tracks.image]
     xy = np.empty_like(xy_px)
     for number, camera in enumerate(cameras):
         own = of_camera == number
         xy[own] = mm_from_px(xy_px[own], camera.size_px, camera.pixel_mm)
     pixel = np.array([camera.pixel_mm for camera in cameras])
-    sigma = np.array([features[i].sigma_px for i in tracks.image.tolist()]) * pixel[of_camera]
+    sigma = sigma_px * pixel[of_camera]
     index = np.cumsum(keep) - 1
     count = int(keep.sum())
     width = len(str(len(tracks)))
@@ -254,28 +305,3 @@ def _settings(cameras: tuple[Camera, ...], sigma_um: float) -> Settings:
         gnss=GnssSettings(shift="off"),
         image_sigma_um=sigma_um,
     )
-
-
-def _with_sigma_of_ties(block: Block, residual_px: np.ndarray, ties: int) -> tuple[Block, float]:
-    """The block with the standard deviation of a coordinate that the misfit of its tie points shows.
-
-    Of a point with k rays, residuals have 2k − 3 redundant coordinates of 2k; half of two-dimensional errors are less
-    than √(2 ln 2) σ [L]. Ratios between the rays stay.
-
-    Parameters
-    ----------
-    residual_px : (m,). ties : the first so many points are tie points.
-    """
-    rays = block.image_points
-    own = (rays.point < ties) & np.isfinite(residual_px)
-    length = np.bincount(rays.point, minlength=len(block.points))[rays.point[own]]
-    pixel = np.array([camera.pixel_mm for camera in block.cameras])[block.images.camera[rays.image]]
-    relative = residual_px[own] * pixel[own] / rays.sigma[own].mean(axis=1) / np.sqrt(1.0 - 3.0 / (2.0 * length))
-    factor = float(np.median(relative)) / np.sqrt(2.0 * np.log(2.0))
-    if not factor > 0.0:
-        factor = 1.0
-    sigma = np.where((rays.point < ties)[:, None], factor * rays.sigma, rays.sigma)
-    common = float(np.median(sigma[own])) if own.any() else float(np.median(sigma))
-    settings = replace(block.settings, image_sigma_um=1e3 * common)
-    found = replace(block, image_points=replace(rays, sigma=sigma), settings=settings)
-    return found, common / block.cameras[0].pixel_mm

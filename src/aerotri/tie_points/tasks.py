@@ -75,7 +75,7 @@ def features_elsewhere(
     work = Work(
         find_features_of, FeatureWork(options, cache.absolute()), [path.absolute() for path in photographs.paths],
         [f"features of {name}" for name in photographs.names.tolist()], "photographs", at.folder,
-        max(_bytes_of(camera, options) for camera in photographs.cameras), AGAIN,
+        BYTES_OF_PROCESS + max(bytes_of_search(camera, options) for camera in photographs.cameras), AGAIN,
     )  # fmt: skip
     at.executor.run(work, report)
 
@@ -108,8 +108,8 @@ def matches_elsewhere(
     at.executor.run(work, report)
 
 
-def _bytes_of(camera: Camera, options: FeatureOptions) -> int:
+def bytes_of_search(camera: Camera, options: FeatureOptions) -> int:
+    """Memory that the search for features in a photograph takes."""
     columns, rows = camera.size_px
     scale = min(1.0, options.longest_px / max(columns, rows))
-    pixels = columns * rows
-    return int(BYTES_OF_PROCESS + pixels * (BYTES_OF_PIXEL + BYTES_OF_SOUGHT_PIXEL * scale**2))
+    return int(columns * rows * (BYTES_OF_PIXEL + BYTES_OF_SOUGHT_PIXEL * scale**2))

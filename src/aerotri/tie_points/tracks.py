@@ -54,6 +54,31 @@ class Tracks:
         return Tracks(_starts(counts[counts > 1]), self.image[rays], self.feature[rays])
 
 
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Positions that the features of tracks are rows of: (f, 2) px, and a-priori standard deviations (f,) in px."""
+
+    xy: np.ndarray
+    sigma_px: np.ndarray
+
+    def of(self, tracks: Tracks) -> tuple[np.ndarray, np.ndarray]:
+        """(m, 2) px and (m,) px of the rays."""
+        return self.xy[tracks.feature], self.sigma_px[tracks.feature]
+
+
+def tracks_of(track: np.ndarray, image: np.ndarray, measured: Measured) -> tuple[Tracks, Measured]:
+    """Tracks of rays in any order, and the positions in the order of their rays.
+
+    Parameters
+    ----------
+    track, image : (m,) of every ray. measured : m positions.
+    """
+    order = np.lexsort((image, track))
+    counts = np.bincount(track)
+    tracks = Tracks(_starts(counts[counts > 0]), image[order], np.arange(len(image)))
+    return tracks, Measured(measured.xy[order], measured.sigma_px[order])
+
+
 def _starts(counts: np.ndarray) -> np.ndarray:
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
 

@@ -31,10 +31,12 @@ class Reprojection:
     ----------
     points : (N, 3) m, NaN where rays do not meet.
     residual_px : (m,) distance of measured and predicted position in pixels, NaN where there is no point.
+    offset_px : (m, 2) measured less predicted position in x and y, pixels; NaN likewise, and behind the photograph.
     """
 
     points: np.ndarray
     residual_px: np.ndarray
+    offset_px: np.ndarray
 
     @property
     def count(self) -> int:
@@ -78,7 +80,7 @@ def reproject(block: Block, centre: np.ndarray, rotation: np.ndarray) -> Reproje
     known = np.asarray(np.isfinite(centre).all(axis=1) & np.isfinite(rotation).all(axis=(1, 2)))
     residual = np.full(len(rays), np.nan)
     if not known.any() or not len(rays):
-        return Reprojection(np.full((len(block.points), 3), np.nan), residual)
+        return Reprojection(np.full((len(block.points), 3), np.nan), residual, np.full((len(rays), 2), np.nan))
     origin = centre[known].mean(axis=0)
     use = np.flatnonzero(known[rays.image])
     image, point = rays.image[use], rays.point[use]
@@ -88,10 +90,13 @@ def reproject(block: Block, centre: np.ndarray, rotation: np.ndarray) -> Reproje
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         off = tangent[use] + u[:, :2] / u[:, 2:]
     scale = np.array([camera.focal_length_mm / camera.pixel_mm for camera in block.cameras])
-    found = np.linalg.norm(off, axis=1) * scale[block.images.camera[image]]
+    off *= scale[block.images.camera[image]][:, None]
+    found = np.linalg.norm(off, axis=1)
     # a point behind the camera fits no image
     residual[use] = np.where(u[:, 2] < 0.0, found, np.where(np.isnan(u[:, 2]), np.nan, np.inf))
-    return Reprojection(points + origin, residual)
+    offset = np.full((len(rays), 2), np.nan)
+    offset[use] = np.where(u[:, 2:] < 0.0, off, np.nan)
+    return Reprojection(points + origin, residual, offset)
 
 
 def _intersected(

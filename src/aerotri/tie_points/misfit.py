@@ -1,0 +1,59 @@
+"""The standard deviation of tie points, from how they fit one another at their start values."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from aerotri.observations import Block
+
+POWERS = tuple((i, j) for i in range(4) for j in range(4 - i))
+"""Of x and y, up to the third together: what errors of an orientation and of a lens do within a photograph."""
+FEWEST = 10 * len(POWERS)
+"""Rays of a photograph from which so many unknowns can be taken off without much effect on the rest [C]."""
+
+
+def with_sigma_of_ties(block: Block, offset_px: np.ndarray, ties: int) -> tuple[Block, float]:
+    """The block with the standard deviation of a coordinate that the misfit of its tie points shows, and it in px.
+
+    Of a point with k rays, residuals have 2k − 3 redundant coordinates of 2k; half of two-dimensional errors are less
+    than √(2 ln 2) σ [L]. What is smooth within a photograph is taken off before: a first orientation is not exact.
+    Ratios between the rays stay.
+
+    Parameters
+    ----------
+    offset_px : (m, 2) measured less predicted. ties : the first so many points are tie points.
+    """
+    rays = block.image_points
+    own = (rays.point < ties) & np.isfinite(offset_px).all(axis=1)
+    length = np.bincount(rays.point, minlength=len(block.points))[rays.point[own]]
+    pixel = np.array([camera.pixel_mm for camera in block.cameras])[block.images.camera[rays.image]]
+    rest = np.linalg.norm(without_smooth_part(offset_px[own], rays.xy[own], rays.image[own]), axis=1)
+    relative = rest * pixel[own] / rays.sigma[own].mean(axis=1) / np.sqrt(1.0 - 3.0 / (2.0 * length))
+    factor = float(np.median(relative)) / np.sqrt(2.0 * np.log(2.0)) if own.any() else 0.0
+    if not factor > 0.0:
+        factor = 1.0
+    sigma = np.where((rays.point < ties)[:, None], factor * rays.sigma, rays.sigma)
+    common = float(np.median(sigma[own])) if own.any() else float(np.median(sigma))
+    settings = replace(block.settings, image_sigma_um=1e3 * common)
+    found = replace(block, image_points=replace(rays, sigma=sigma), settings=settings)
+    return found, common / block.cameras[0].pixel_mm
+
+
+def without_smooth_part(offset: np.ndarray, xy: np.ndarray, image: np.ndarray) -> np.ndarray:
+    """(m, 2) offsets less a polynomial of every photograph with rays enough.
+
+    Parameters
+    ----------
+    offset, xy : (m, 2), where the offsets are. image : (m,).
+    """
+    rest = offset.copy()
+    for number in np.unique(image).tolist():
+        own = np.flatnonzero(image == number)
+        if len(own) < FEWEST:
+            continue
+        x, y = (xy[own] / np.abs(xy[own]).max()).T
+        design = np.column_stack([x**i * y**j for i, j in POWERS])
+        rest[own] -= design @ np.linalg.lstsq(design, offset[own], rcond=None)[0]
+    return rest

@@ -1,0 +1,27 @@
+"""σ of tie points from their misfit, whatever a first orientation that is not exact adds to it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from aerotri.tie_points.misfit import FEWEST, without_smooth_part
+
+
+@pytest.mark.parametrize("bent_px", [0.0, 3.0])
+def test_smooth_offsets_are_taken_off(bent_px):
+    """A turn, a shift and a lens of some pixels, of two photographs; their noise stays, less what ten unknowns take."""
+    rng = np.random.default_rng(2)
+    xy, image = rng.uniform(-6.0, 6.0, (800, 2)), np.repeat([0, 3], 400)
+    noise = rng.normal(0.0, 0.2, (800, 2))
+    x, y = (xy / 6.0).T
+    smooth = bent_px * np.column_stack([0.3 + y + x * (x**2 + y**2), -x * (1.0 - 2.0 * (image == 3)) + 0.4 * y**2])
+    rest = without_smooth_part(smooth + noise, xy, image)
+    np.testing.assert_allclose(rest, without_smooth_part(noise, xy, image), atol=1e-10)
+    assert np.std(rest) / np.std(noise) == pytest.approx(np.sqrt(1.0 - 10.0 / 400.0), abs=0.01)
+
+
+def test_of_few_rays_nothing_is_taken_off():
+    rng = np.random.default_rng(2)
+    offset, xy = rng.normal(0.0, 1.0, (FEWEST - 1, 2)), rng.normal(0.0, 1.0, (FEWEST - 1, 2))
+    np.testing.assert_array_equal(without_smooth_part(offset, xy, np.zeros(FEWEST - 1, int)), offset)
