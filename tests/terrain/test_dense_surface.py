@@ -202,6 +202,23 @@ def test_the_pairs_that_agree_make_the_height():
     assert count == 0
 
 
+@pytest.mark.parametrize("missing", [(0, 0), (0, 1), (1, 0), (1, 1)])
+def test_three_known_pixels_of_four_are_a_triangle(missing):
+    """Whichever is not known, or lies on another surface: cells on the side of the three have a height, no others."""
+    at = 8.0 * np.arange(2)
+    place = np.stack([*np.meshgrid(at, at), np.full((2, 2), 50.0)])
+    away = np.abs(np.indices((9, 9)) - 8 * np.array(missing)[:, None, None]).sum(axis=0)
+    for other in (np.nan, 5.0):
+        value = np.zeros((2, 2), np.float32)
+        value[missing] = other
+        place[2][missing] = 90.0
+        z, sigma = np.full((2, 9, 9), np.nan)
+        kernels.lay_mesh(place, np.full((2, 2), 0.1, np.float32), np.ones((2, 2)), value, 1.5, z, sigma)
+        np.testing.assert_array_equal(np.isfinite(z), away >= 8)
+        assert z[away >= 8] == pytest.approx(50.0)
+        assert sigma[away >= 8] == pytest.approx(0.1)
+
+
 SCALE = CellScale(2, 1.0)
 
 

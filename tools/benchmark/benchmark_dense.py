@@ -1,10 +1,10 @@
 """How long a dense surface takes, beside OpenCV's StereoSGBM alone on the same epipolar images in the same run.
 
 Vertical photographs over flat ground, 8 bits: every photograph is a part of one random texture. With `--relief` they
-are rendered over hills instead, 16 bits, which takes some time. The surface is measured with `aerotri.dense_surface`; the time spent in StereoSGBM, of all levels, is taken in the same run. A small
-surface is made before, so that nothing is compiled in the time that counts. Peak memory is that of the whole
-process; another one makes the photographs. Measures times inside the package, so it looks there
-on purpose.
+are rendered over hills instead, 16 bits, which takes some time. The surface is measured with `aerotri.dense_surface`;
+the time spent in StereoSGBM, of all levels, is taken in the same run, summed over the threads. A small surface is made
+before, so that nothing is compiled in the time that counts. Peak memory is that of the whole process; another one makes
+the photographs. Measures times inside the package, so it looks there on purpose.
 
 Example
 -------

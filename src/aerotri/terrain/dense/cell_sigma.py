@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.ndimage import maximum_filter, minimum_filter
 
 NOISE_SHARE, ROUGH_SHARE = 0.81, 0.65
 """Of the σ of the matching, and of the scatter of heights about their neighbours, that are σ of a cell; chosen [C]: the
@@ -89,7 +88,7 @@ def step(z: np.ndarray, noise: np.ndarray, scale: CellScale) -> np.ndarray:
     around = 4 * scale.lag + 1
     off -= _sum(off, around) / np.maximum(_sum(known.astype(np.float32), around), 1.0)
     near, far = (_range(off, known, side) for side in (2 * ((scale.lag + 1) // 2) + 1, 2 * scale.lag + 1))
-    beside_hole = minimum_filter(known, 2 * scale.lag + 1) == 0
+    beside_hole = cv2.erode(known.view(np.uint8), _square(2 * scale.lag + 1)) == 0
     least = STEP_SIGMAS * noise
     found = np.where((near > scale.pixel) & (near > least), near, 0.0)
     hidden = beside_hole & (far > 0.5 * scale.pixel) & (far > least)
@@ -98,9 +97,11 @@ def step(z: np.ndarray, noise: np.ndarray, scale: CellScale) -> np.ndarray:
 
 def contradiction(z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: CellScale) -> np.ndarray:
     """(rows, columns) m, distance of the farthest height of a pair that does not agree; 0 where all do."""
-    off = np.abs(heights - z)
-    contradicts = off > scale.pixel + CONTRADICTED_SIGMAS * sigmas
-    return np.where(contradicts, off, 0.0).max(axis=0)
+    found = np.zeros(z.shape)
+    for height, sigma in zip(heights, sigmas, strict=True):
+        off = np.abs(height - z)
+        np.maximum(found, off, out=found, where=off > scale.pixel + CONTRADICTED_SIGMAS * sigma)
+    return found
 
 
 def _sum(values: np.ndarray, side: int) -> np.ndarray:
@@ -109,5 +110,9 @@ def _sum(values: np.ndarray, side: int) -> np.ndarray:
 
 def _range(values: np.ndarray, known: np.ndarray, side: int) -> np.ndarray:
     """(rows, columns) from the lowest to the highest of a square."""
-    low = minimum_filter(np.where(known, values, UNKNOWN), side, mode="nearest")
-    return maximum_filter(np.where(known, values, -UNKNOWN), side, mode="nearest") - low
+    low = cv2.erode(np.where(known, values, np.float32(UNKNOWN)), _square(side))
+    return cv2.dilate(np.where(known, values, np.float32(-UNKNOWN)), _square(side)) - low
+
+
+def _square(side: int) -> np.ndarray:
+    return np.ones((side, side), np.uint8)
