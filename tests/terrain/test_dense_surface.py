@@ -15,7 +15,16 @@ from aerotri.rasters.images import create_image
 from aerotri.terrain.dense import _mesh_kernels as kernels
 from aerotri.terrain.dense import parallaxes
 from aerotri.terrain.dense._resampling_kernels import resample
-from aerotri.terrain.dense.cell_sigma import CellScale, cell_sigma, contradiction, roughness, step
+from aerotri.terrain.dense.cell_sigma import (
+    FAR_SHARE,
+    HIDDEN_SHARE,
+    STEP_SHARE,
+    CellScale,
+    cell_sigma,
+    outermost,
+    roughness,
+    step_sigma,
+)
 from aerotri.terrain.dense.colours import Colours
 from aerotri.terrain.dense.epipolar import EpipolarGeometry, EpipolarImages, epipolar_geometry
 from aerotri.terrain.dense.grey_store import GreyStore
@@ -202,21 +211,50 @@ def test_the_pairs_that_agree_make_the_height():
     assert count == 0
 
 
+@pytest.mark.parametrize("missing", [(0, 0), (0, 1), (1, 0), (1, 1)])
+def test_three_known_pixels_of_four_are_a_triangle(missing):
+    """Whichever is not known, or lies on another surface: cells on the side of the three have a height, no others."""
+    at = 8.0 * np.arange(2)
+    place = np.stack([*np.meshgrid(at, at), np.full((2, 2), 50.0)])
+    away = np.abs(np.indices((9, 9)) - 8 * np.array(missing)[:, None, None]).sum(axis=0)
+    for other in (np.nan, 5.0):
+        value = np.zeros((2, 2), np.float32)
+        value[missing] = other
+        place[2][missing] = 90.0
+        z, sigma = np.full((2, 9, 9), np.nan)
+        kernels.lay_mesh(place, np.full((2, 2), 0.1, np.float32), np.ones((2, 2)), value, 1.5, z, sigma)
+        np.testing.assert_array_equal(np.isfinite(z), away >= 8)
+        assert z[away >= 8] == pytest.approx(50.0)
+        assert sigma[away >= 8] == pytest.approx(0.1)
+
+
 SCALE = CellScale(2, 1.0)
 
 
-def test_steps_are_found_at_the_cells_beside_them():
+def by_step(z, noise, scale=SCALE, heights=None):
+    """σ beside steps of a surface, by itself or with heights of pairs."""
+    pairs = z[None] if heights is None else heights
+    return step_sigma(z, noise, *outermost(z, pairs, np.full(pairs.shape, 0.05), scale), scale)
+
+
+def test_sigma_beside_a_step_is_a_share_of_it():
     z = np.full((20, 30), 100.0) + 0.3 * np.arange(30)  # a slope is no step
     z[:, 15:] += 8.0
     noise = np.full(z.shape, 0.05)
-    found = step(z, noise, SCALE)
-    assert (found[:, [14, 15]] > 6.0).all()
+    found = by_step(z, noise)
+    assert (found[:, [14, 15]] > 6.0 * STEP_SHARE).all()
+    assert (found[:, [13, 16]] > 6.0 * FAR_SHARE).all()
+    assert (found[:, [13, 16]] < found[:, [14, 15]] / 3.0).all()
     assert (found[:, 6:10] == 0.0).all()
     assert (found[:, 20:24] == 0.0).all()
-    z[:, 13:15] = np.nan  # hidden by a hole
-    assert (step(z, noise, SCALE)[:, [12, 15]] > 2.0).all()
-    assert (step(z, noise, CellScale(2, 20.0)) == 0.0).all()
-    assert (step(z, np.full(z.shape, 3.0), SCALE) == 0.0).all()
+    assert (by_step(z, noise, CellScale(2, 20.0)) == 0.0).all()
+    assert (by_step(z, np.full(z.shape, 3.0)) == 0.0).all()
+    z[:, 13:15] = np.nan  # hidden by a hole, farther than looked for: what is seen is how heights leave their mean
+    assert (by_step(z, noise)[:, [12, 15]] > 2.0 * HIDDEN_SHARE).all()
+    # what one pair saw in the hole is a step as well
+    pair = np.full(z.shape, np.nan)
+    pair[:, 13] = 130.0
+    assert (by_step(z, noise, heights=pair[None])[:, 12] > 20.0 * STEP_SHARE).all()
 
 
 @pytest.mark.parametrize("lag", [1, 2, 4])
@@ -224,19 +262,24 @@ def test_roughness_is_the_noise_of_heights_on_a_plane(lag):
     rows, columns = np.mgrid[0:200, 0:200]
     z = 50.0 + 0.4 * columns - 0.2 * rows + np.random.default_rng(1).normal(scale=0.3, size=rows.shape)
     z[50:60, 20:90] = np.nan
-    found = roughness(z, lag)
+    z[:, 100:] += 30.0  # a step is no roughness
+    found = roughness(z, lag, np.full(z.shape, 5.0))
     assert np.sqrt(np.mean(found[70:190, 10:190] ** 2)) == pytest.approx(0.3, rel=0.03)
     assert np.isfinite(found).all()
 
 
 def test_a_pair_far_from_the_surface_contradicts_it():
     z = np.array([[10.0, 10.0, np.nan]])
-    heights = np.array([[[10.1, 10.0, np.nan]], [[9.9, 18.0, np.nan]]])
-    found = contradiction(z, heights, np.full(heights.shape, 0.1), SCALE)
-    np.testing.assert_allclose(found, [[0.0, 8.0, 0.0]])
-    noise = np.full(z.shape, 0.07)
-    sigma = cell_sigma(z, noise, heights, np.full(heights.shape, 0.1), SCALE)
-    assert sigma[0, 1] > 1.0 > sigma[0, 0]
+    heights = np.array([[[10.1, 10.0, np.nan]], [[9.9, 18.0, 12.0]]])
+    sigmas = np.full(heights.shape, 0.1)
+    highest, lowest = outermost(z, heights, sigmas, SCALE)
+    np.testing.assert_allclose(highest, [[10.0, 18.0, 12.0]])
+    np.testing.assert_allclose(lowest, [[10.0, 10.0, 12.0]])
+    far = np.repeat(np.repeat(z, 20, axis=1), 20, axis=0)
+    pairs = np.repeat(np.repeat(heights, 20, axis=2), 20, axis=1)
+    sigma = cell_sigma(far, np.full(far.shape, 0.07), pairs, np.full(pairs.shape, 0.1), SCALE)
+    assert (sigma[:, 25:35] > 1.0).all()
+    assert (sigma[:, :15] < 0.1).all()
 
 
 def test_pairs_that_share_a_photograph_share_its_noise(hill):

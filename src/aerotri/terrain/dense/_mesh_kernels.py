@@ -94,11 +94,17 @@ def _lay_rows(place, sigma_px, per_pixel, value, jump, reaches, z, sigma):
         for j in range(value.shape[1] - 1):
             if not reaches[j]:
                 continue
-            d1, d2 = value[i, j + 1], value[i + 1, j]
-            for i0, j0 in ((i, j), (i + 1, j + 1)):
-                d0 = value[i0, j0]
-                if abs(d0 - d1) <= jump and abs(d0 - d2) <= jump:
-                    _lay_triangle((i0, j0), (i, j + 1), (i + 1, j), place, sigma_px, per_pixel, z, sigma)
+            # four pixels are cut along a diagonal of one surface: where one of them is not known, or lies on another
+            # surface, the other three are a triangle
+            a, b = (i, j + 1), (i + 1, j)
+            p, q = (i, j), (i + 1, j + 1)
+            if not abs(value[a] - value[b]) <= jump:
+                a, b, p, q = p, q, a, b
+            d1, d2 = value[a], value[b]
+            for corner in (p, q):
+                d0 = value[corner]
+                if abs(d0 - d1) <= jump and abs(d0 - d2) <= jump and abs(d1 - d2) <= jump:
+                    _lay_triangle(corner, a, b, place, sigma_px, per_pixel, z, sigma)
 
 
 @leaf_kernel
@@ -109,10 +115,11 @@ def _reach_cells(above, below, value_above, value_below, jump, reaches):
         columns = np.floor(max(max(a, b), max(c, d))) >= np.ceil(min(min(a, b), min(c, d)))
         a, b, c, d = above[1, j], above[1, j + 1], below[1, j], below[1, j + 1]
         rows = np.floor(max(max(a, b), max(c, d))) >= np.ceil(min(min(a, b), min(c, d)))
-        corner = value_above[j] + value_below[j + 1]
-        one_surface = abs(value_above[j + 1] - value_below[j]) <= jump
+        all_four = (value_above[j] + value_above[j + 1]) + (value_below[j] + value_below[j + 1])
+        one = abs(value_above[j + 1] - value_below[j]) <= jump
+        other = abs(value_above[j] - value_below[j + 1]) <= jump
         # where one corner is not known the triangle of the others is looked at
-        reaches[j] = ((columns & rows) | (corner != corner)) & one_surface
+        reaches[j] = ((columns & rows) | (all_four != all_four)) & (one | other)
 
 
 @leaf_kernel

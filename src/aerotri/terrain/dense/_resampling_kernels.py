@@ -58,6 +58,15 @@ def resample(pixels, x, y, known, out):
 
 
 @kernel
+def within(x, y, low, high, known):
+    """Whether places (column x, row y) lie between (column, row) low and high: (rows, columns) out."""
+    for i in range(known.shape[0]):
+        for j in range(known.shape[1]):
+            a, b = x[i, j], y[i, j]
+            known[i, j] = a >= low[0] and a <= high[0] and b >= low[1] and b <= high[1]
+
+
+@kernel
 def align(right, value, across, known, left, out):
     """The right epipolar image where the left one's pixels have their parallaxes; the left one's where not known.
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.ndimage import maximum_filter, minimum_filter
 
 NOISE_SHARE, ROUGH_SHARE = 0.81, 0.65
 """Of the σ of the matching, and of the scatter of heights about their neighbours, that are σ of a cell; chosen [C]: the
@@ -18,13 +17,14 @@ two that make errors of rendered scenes most likely, on smooth, noisy and rough 
 (tools/prove/dense_surface.py)."""
 LAG_PX = 4.0
 """From a cell to the neighbours with which its height is compared: more than half of a window of the matching."""
-STEP_SHARE = 0.2
-"""Of a step that is σ of the cells beside it, besides what they are rough by; chosen [C] with the other two."""
+STEP_SHARE, FAR_SHARE, HIDDEN_SHARE = 0.27, 0.05, 0.15
+"""Of a step that is σ of the cells next to it, of those twice as far off, and of those where a hole may hide it; chosen
+[C]: that share of steps in rendered scenes is the root mean square error beside them (tools/prove/dense_surface.py)."""
 STEP_SIGMAS = 6.0
 """σ of the noise that a step is larger than: the range of some twenty cells reaches five."""
-CONTRADICTED_SHARE, CONTRADICTED_SIGMAS = 0.25, 4.0
-"""Of the distance to the height of a pair that contradicts, and σ of that pair from which on it does; chosen [C]."""
-UNKNOWN = 1e9
+CONTRADICTED_SIGMAS = 4.0
+"""σ of a pair from which on its height contradicts the surface."""
+UNKNOWN = np.float32(1e9)
 
 
 @dataclass(frozen=True)
@@ -50,15 +50,18 @@ def cell_sigma(
     z, noise : (rows, columns) m, heights, NaN where there is none, and their σ by the matching.
     heights, sigmas : (pairs, rows, columns) m of which they were fused.
     """
-    of_noise = np.hypot(NOISE_SHARE * noise, ROUGH_SHARE * roughness(z, scale.lag))
-    of_place = np.hypot(
-        STEP_SHARE * step(z, noise, scale), CONTRADICTED_SHARE * contradiction(z, heights, sigmas, scale)
-    )
-    return np.hypot(of_noise, of_place)
+    rough = roughness(z, scale.lag, np.maximum(scale.pixel, np.sqrt(6.0) * STEP_SIGMAS * noise))
+    beside = step_sigma(z, noise, *outermost(z, heights, sigmas, scale), scale)
+    return np.sqrt((NOISE_SHARE * noise) ** 2 + (ROUGH_SHARE * rough) ** 2 + beside**2)
 
 
-def roughness(z: np.ndarray, lag: int) -> np.ndarray:
-    """(rows, columns) m, σ of a height as second differences over `lag` cells have it, in a square of 3 × 3 cells."""
+def roughness(z: np.ndarray, lag: int, step: np.ndarray) -> np.ndarray:
+    """(rows, columns) m, σ of a height as second differences over `lag` cells have it, in a square of 3 × 3 cells.
+
+    Parameters
+    ----------
+    step : (rows, columns) m, second differences beyond which are steps: they do not count.
+    """
     square, count = (np.zeros(z.shape, np.float32) for _ in range(2))
     for axis in (0, 1):
         if z.shape[axis] <= 2 * lag:
@@ -68,46 +71,65 @@ def roughness(z: np.ndarray, lag: int) -> np.ndarray:
             for part in (slice(None, -2 * lag), slice(lag, -lag), slice(2 * lag, None))
         )
         second = low - 2.0 * middle + high
-        known = np.isfinite(second)
         inside = tuple(slice(lag, -lag) if a == axis else slice(None) for a in (0, 1))
+        told = np.abs(second) <= step[inside]
         # the variance of a second difference is six times that of a height
-        square[inside] += np.where(known, second * second / 6.0, 0.0)
-        count[inside] += known
+        square[inside] += np.where(told, second * second / 6.0, 0.0)
+        count[inside] += told
     return np.sqrt(np.maximum(_sum(square, 3), 0.0) / np.maximum(_sum(count, 3), 1.0))
 
 
-def step(z: np.ndarray, noise: np.ndarray, scale: CellScale) -> np.ndarray:
-    """(rows, columns) m, the step in the surface that a cell lies beside; 0 elsewhere.
+def outermost(
+    z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: CellScale
+) -> tuple[np.ndarray, np.ndarray]:
+    """Highest and lowest (rows, columns) m of a cell: its height, and those of pairs that contradict it or stand alone.
 
-    A step is more than a pixel of parallax. It is looked for in what heights leave their mean by, so that a slope is
-    none. Beside a hole it may be hidden: there half a pixel counts, and it is looked for farther off.
+    −`UNKNOWN` and `UNKNOWN` where there is none.
+    """
+    known = np.isfinite(z)
+    highest, lowest = np.where(known, z, -UNKNOWN), np.where(known, z, UNKNOWN)
+    for height, sigma in zip(heights, sigmas, strict=True):
+        agrees = np.abs(height - z) <= scale.pixel + CONTRADICTED_SIGMAS * sigma
+        other = np.isfinite(height) & ~agrees
+        np.maximum(highest, height, out=highest, where=other)
+        np.minimum(lowest, height, out=lowest, where=other)
+    return highest, lowest
+
+
+def step_sigma(
+    z: np.ndarray, noise: np.ndarray, highest: np.ndarray, lowest: np.ndarray, scale: CellScale
+) -> np.ndarray:
+    """(rows, columns) m, σ of a cell by the step that it lies beside; 0 where there is none.
+
+    A step is more than a pixel of parallax, from the lowest to the highest that any pair saw about a cell. It is looked
+    for in what heights leave their mean by, so that a slope is none. Beside a hole half a pixel counts.
     """
     known = np.isfinite(z)
     if not known.any():
         return np.zeros(z.shape)
-    off = np.where(known, z - np.nanmedian(z), 0.0).astype(np.float32)
+    middle = np.nanmedian(z)
     around = 4 * scale.lag + 1
-    off -= _sum(off, around) / np.maximum(_sum(known.astype(np.float32), around), 1.0)
-    near, far = (_range(off, known, side) for side in (2 * ((scale.lag + 1) // 2) + 1, 2 * scale.lag + 1))
-    beside_hole = minimum_filter(known, 2 * scale.lag + 1) == 0
+    mean = _sum(np.where(known, z - middle, 0.0).astype(np.float32), around)
+    mean = mean / np.maximum(_sum(known.astype(np.float32), around), 1.0) + middle
+    # what is not known stays far beyond all heights
+    high, low = (np.where(np.abs(a) < UNKNOWN, a - mean, a).astype(np.float32) for a in (highest, lowest))
+    near, far = (_range(high, low, side) for side in (2 * ((scale.lag + 1) // 2) + 1, 2 * scale.lag + 1))
+    hidden = cv2.erode(known.view(np.uint8), _square(2 * scale.lag + 1)) == 0
     least = STEP_SIGMAS * noise
-    found = np.where((near > scale.pixel) & (near > least), near, 0.0)
-    hidden = beside_hole & (far > 0.5 * scale.pixel) & (far > least)
-    return np.where(known, np.maximum(found, np.where(hidden, far, 0.0)), 0.0)
-
-
-def contradiction(z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: CellScale) -> np.ndarray:
-    """(rows, columns) m, distance of the farthest height of a pair that does not agree; 0 where all do."""
-    off = np.abs(heights - z)
-    contradicts = off > scale.pixel + CONTRADICTED_SIGMAS * sigmas
-    return np.where(contradicts, off, 0.0).max(axis=0)
+    next_to = np.where((near > scale.pixel) & (near > least), STEP_SHARE * near, 0.0)
+    off = np.where(hidden, HIDDEN_SHARE, FAR_SHARE) * far
+    is_step = (far > np.where(hidden, 0.5, 1.0) * scale.pixel) & (far > least)
+    return np.where(known, np.maximum(next_to, np.where(is_step, off, 0.0)), 0.0)
 
 
 def _sum(values: np.ndarray, side: int) -> np.ndarray:
     return cv2.boxFilter(values, -1, (side, side), normalize=False, borderType=cv2.BORDER_CONSTANT)
 
 
-def _range(values: np.ndarray, known: np.ndarray, side: int) -> np.ndarray:
+def _range(high: np.ndarray, low: np.ndarray, side: int) -> np.ndarray:
     """(rows, columns) from the lowest to the highest of a square."""
-    low = minimum_filter(np.where(known, values, UNKNOWN), side, mode="nearest")
-    return maximum_filter(np.where(known, values, -UNKNOWN), side, mode="nearest") - low
+    return cv2.dilate(high, _square(side)) - cv2.erode(low, _square(side))
+
+
+def _square(side: int) -> np.ndarray:
+    return np.ones((side, side), np.uint8)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import NearestNDInterpolator
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from aerotri.terrain.dense._resampling_kernels import resample
+from aerotri.terrain.dense._resampling_kernels import resample, within
 from aerotri.terrain.dense.grey_store import GreyStore
 from aerotri.terrain.dense.place import Place
 
@@ -217,10 +217,9 @@ def _resampled(
     place_of = whole[s : s + rows, s : s + columns]
     edge = place.view.edge * np.array([pixels.shape[1], pixels.shape[0]])
     x, y = place_of[:, :, 0], place_of[:, :, 1]
-    known = (
-        (x >= edge[0] + 1.0) & (x <= pixels.shape[1] - 2.0 - edge[0])
-        & (y >= edge[1] + 1.0) & (y <= pixels.shape[0] - 2.0 - edge[1])
-    )  # fmt: skip
+    known = np.empty((rows, columns), np.bool_)
+    last = pixels.shape[1] - 2.0 - edge[0], pixels.shape[0] - 2.0 - edge[1]
+    within(x, y, (edge[0] + 1.0, edge[1] + 1.0), last, known)
     out = np.empty((rows, columns), np.float32)
     resample(pixels, x, y, known, out)
     return out, known

@@ -49,7 +49,12 @@ class GreyStore:
     @property
     def most_bytes(self) -> int:
         """Bytes that are kept at most."""
-        return min(self._most, sum(columns * rows for columns, rows in self._sizes))
+        return min(self._most, self._whole)
+
+    @property
+    def _whole(self) -> int:
+        """Bytes of all photographs, with the levels of each that are smaller."""
+        return sum(columns * rows * 4 // 3 for columns, rows in self._sizes)
 
     def level(self, k: int, level: int) -> np.ndarray:
         """(rows, columns) uint8 of photograph k; its pixels are means of 2^level × 2^level.
@@ -60,12 +65,23 @@ class GreyStore:
         """
         with self._lock:
             if (k, level) not in self._kept:
-                self._keep((k, level), reduced(read_grey(self._paths[k], self._sizes[k]), level))
-                self.reads += 1
+                self._keep((k, level), reduced(self._pixels(k), level))
             self._kept.move_to_end((k, level))
             return self._kept[k, level]
 
+    def _pixels(self, k: int) -> np.ndarray:
+        """A photograph in full; kept for its other levels where there is room for all, so that each is read once."""
+        if (k, 0) in self._kept:
+            return self._kept[k, 0]
+        self.reads += 1
+        pixels = read_grey(self._paths[k], self._sizes[k])
+        if self._whole <= self._most:
+            self._keep((k, 0), pixels)
+        return pixels
+
     def _keep(self, key: tuple[int, int], pixels: np.ndarray) -> None:
+        if key in self._kept:
+            return
         self._kept[key] = pixels
         self._bytes += pixels.nbytes
         while self._bytes > self._most and len(self._kept) > 1:

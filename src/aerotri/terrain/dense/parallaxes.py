@@ -118,30 +118,37 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
     aligned = np.empty(value.shape, np.float32)
     start = value.copy()
     shape = value.shape
-    shift, across, variance, of_across, correlation = (np.full(shape, np.nan, np.float32) for _ in range(5))
+    shift, across, variance, of_across, correlation, room = (np.empty(shape, np.float32) for _ in range(6))
     middle, factor = 0.0, 1.0
     for _ in range(ROUNDS):
         value = _smoothed(value, known)
         align(right, value, middle, known, left, aligned)
         level = np.float32(aligned.mean())
         shift_windows(left, aligned, level, known, shift, across, variance, of_across, correlation)
-        known = known & (np.abs(shift) < LARGEST_SHIFT_PX)
-        value = np.where(known, value + shift, INVALID).astype(np.float32)
+        known &= np.abs(shift, out=room) < LARGEST_SHIFT_PX
+        value += shift
+        value[~known] = INVALID
         left_across, factor = _noise(across, of_across, known)
         middle += left_across
-    known &= (
-        (np.abs(value - start) < LARGEST_SHIFT_PX) & (correlation > LEAST_CORRELATION)
-        & (across**2 < LARGEST_ACROSS_PX**2 + (ACROSS_SIGMAS * factor) ** 2 * of_across)
-    )  # fmt: skip
+    # arrays of the size of the images are filled again rather than made anew, which takes a third less time
+    known &= np.abs(np.subtract(value, start, out=room), out=room) < LARGEST_SHIFT_PX
+    known &= correlation > LEAST_CORRELATION
+    of_across *= (ACROSS_SIGMAS * factor) ** 2
+    of_across += LARGEST_ACROSS_PX**2
+    known &= np.square(across, out=across) < of_across
     known &= _alike_about(correlation, known, images.left_known) > LEAST_ALIKE
     # where a pixel of the window is not known both images are the same: it tells nothing and hides noise
     share = cv2.boxFilter((start > INVALID / 2).astype(np.float32), -1, (WINDOW_PX, WINDOW_PX))
-    sigma = np.sqrt(factor**2 * variance / np.maximum(share, 0.1) ** 2 + LEAST_SIGMA_PX**2)
+    np.square(np.maximum(share, 0.1, out=share), out=share)
+    variance *= factor**2
+    variance /= share
+    variance += LEAST_SIGMA_PX**2
+    sigma = np.sqrt(variance, out=variance)
     known &= sigma < LARGEST_SIGMA_PX
     nothing = np.float32(np.nan)
-    return Parallaxes(
-        np.where(known, value, nothing), np.where(known, sigma, nothing).astype(np.float32), middle, factor
-    )
+    value[~known] = nothing
+    sigma[~known] = nothing
+    return Parallaxes(value, sigma, middle, factor)
 
 
 def _alike_about(correlation: np.ndarray, known: np.ndarray, seen: np.ndarray) -> np.ndarray:

@@ -25,6 +25,8 @@ CUT = 3.0
 ROUNDS = 20
 SMOOTH = 5
 """Cells a side of the squares whose means give slopes."""
+LEAST_SPREAD = 0.05
+"""Of a cell, by which the mean place of a square has to move from one cell to the next for a slope to be known."""
 FEWEST = 100
 """Stable cells at least."""
 
@@ -69,18 +71,28 @@ def design_of(names: tuple[str, ...], grid: Grid, z: np.ndarray, middle: np.ndar
 
 
 def slopes_of(grid: Grid, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, columns) m/m along X and Y, of means of cells; NaN where not known."""
-    down, along = np.gradient(_smoothed(z), grid.cell_y, grid.cell_x)
-    return along, -down
+    """(rows, columns) m/m along X and Y, of means of squares of cells; NaN where z is, or too few are around.
 
-
-def _smoothed(z: np.ndarray) -> np.ndarray:
-    """Means of squares of cells, of those that are known: noise in slopes would make every shift too small."""
+    [D] Beside holes and at the edge the mean of a square is not that of its middle. Its change from cell to cell is
+    therefore set against those of the mean place of its cells: of a plane the slopes are right everywhere.
+    """
     known = np.isfinite(z)
-    share = uniform_filter(known.astype(float), SMOOTH, mode="nearest")
-    total = uniform_filter(np.where(known, z, 0.0), SMOOTH, mode="nearest")
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(known, total / share, np.nan)
+    if not known.any():
+        return np.full(z.shape, np.nan), np.full(z.shape, np.nan)
+    row, column = np.indices(z.shape)
+    means = (_means(values, known) for values in (z - np.median(z[known]), column * grid.cell_x, -row * grid.cell_y))
+    (z_down, z_along), (x_down, x_along), (y_down, y_along) = (np.gradient(mean) for mean in means)
+    area = x_along * y_down - x_down * y_along
+    told = known & (np.abs(area) > LEAST_SPREAD * grid.cell_x * grid.cell_y)
+    share = 1.0 / np.where(told, area, np.nan)
+    return share * (z_along * y_down - z_down * y_along), share * (z_down * x_along - z_along * x_down)
+
+
+def _means(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Of squares of cells, of those that are known: noise in slopes would make every shift too small; NaN of none."""
+    share = uniform_filter(known.astype(float), SMOOTH, mode="constant")
+    total = uniform_filter(np.where(known, values, 0.0), SMOOTH, mode="constant")
+    return np.where(share > 0.5 / SMOOTH**2, total / np.maximum(share, 0.5 / SMOOTH**2), np.nan)
 
 
 def align(
