@@ -2,12 +2,12 @@
 
     python tools/prove/quarry.py FOLDER [--out tools/results]
 
-A pit, 7 m deep with a floor of some 60 m, and three piles on it. Each epoch has 15 rendered photographs of
+A floor of some 60 m between banks of 6 m, and three piles on it. Each epoch has 15 rendered photographs of
 1600 × 1200 pixels, 5 cm a pixel, by a lens that bends and a wrong interior orientation, with the GNSS of a drone in
 EXIF; six control and three check points are marked in them with 0.1 px. Between the epochs the first pile stays, the
 second is half taken away, and the third grows. `aerotri run` makes everything from the photographs and the list of
 control points; `aerotri volume` weighs the piles, `aerotri change` compares the epochs on the ground around the piles.
-The truth of a pile is what stands on the floor of the pit inside its outline. Also made: certificates of the volume and
+The truth of a pile is what stands on the floor inside its outline. Also made: certificates of the volume and
 of the change, English and German.
 With --out quarry.md is written there. The last answer stands in tools/results/quarry.md.
 """
@@ -22,6 +22,7 @@ import sys
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -30,8 +31,8 @@ from pyproj import Transformer
 import aerotri
 
 CRS, ORIGIN = "EPSG:32632", (680000.0, 5330000.0, 520.0)
-DEPTH, STEP, REACH = 7.0, 6.0, 42.0
-"""m, of the pit: hollows as wide as their distance add up to a level floor with walls of 25°."""
+BANKS, BANK = 8, (48.0, 6.0, 10.0)
+"""Around the floor of the quarry: number, and distance from its middle, height and radius, m."""
 PLACES = {"north": (4.0, 15.0), "west": (-14.0, -8.0), "east": (13.0, -9.0)}
 HEIGHTS = {1: {"north": 3.6, "west": 4.2, "east": 2.6}, 2: {"north": 3.6, "west": 2.1, "east": 3.5}}
 """m, by epoch; a pile of 3.5 m rises with 32° at most."""
@@ -64,23 +65,20 @@ notes = "Simulated flight: the truth is known."
 DATES = {1: "2026-05-04", 2: "2026-06-08"}
 
 
-def pit() -> list[list[float]]:
-    """The hollows that make the pit."""
-    at = np.arange(-REACH, REACH + 0.5 * STEP, STEP)
-    return [[x, y, -DEPTH / (2.0 * np.pi), STEP] for x in at.tolist() for y in at.tolist()]
-
-
-def gravel() -> list[list[float]]:
-    """Humps and hollows of a few centimetres, the same in both epochs."""
+def site() -> list[list[float]]:
+    """The banks around the floor, and humps and hollows of a few centimetres on it, the same in both epochs."""
+    distance, height, radius = BANK
+    turn = 2.0 * np.pi * np.arange(BANKS) / BANKS
+    banks = [[distance * x, distance * y, height, radius] for x, y in zip(np.cos(turn), np.sin(turn), strict=True)]
     rng = np.random.default_rng(7)
-    xy, height, radius = rng.uniform(-60, 60, (150, 2)), rng.normal(0.0, 0.06, 150), rng.uniform(1.5, 4.0, 150)
-    return np.column_stack([xy, height, radius]).tolist()
+    xy, size, width = rng.uniform(-36, 36, (60, 2)), rng.normal(0.0, 0.06, 60), rng.uniform(1.5, 4.0, 60)
+    return [*banks, *np.column_stack([xy, size, width]).tolist()]
 
 
-def plan(epoch: int | None) -> dict:
-    """The plan of an epoch; of the empty pit where None."""
+def plan(epoch: int | None) -> dict[str, Any]:
+    """The plan of an epoch; of the empty quarry where None."""
     piles = [] if epoch is None else [[*PLACES[name], h, RADIUS] for name, h in HEIGHTS[epoch].items()]
-    return SPEC | {"terrain": {"kind": "flat", "hills": [*pit(), *gravel(), *piles]}}
+    return SPEC | {"terrain": {"kind": "flat", "hills": [*site(), *piles]}}
 
 
 def outline(name: str) -> shapely.Polygon:
@@ -91,7 +89,7 @@ def outline(name: str) -> shapely.Polygon:
 
 
 def stable() -> shapely.Geometry:
-    """The floor of the pit, away from the piles."""
+    """The floor of the quarry, away from the piles."""
     middle = shapely.Point(*ORIGIN[:2])
     return shapely.difference(middle.buffer(30.0), shapely.union_all([outline(name).buffer(2.0) for name in PLACES]))
 
@@ -117,7 +115,7 @@ def command(*words: object) -> None:
     subprocess.run([sys.executable, "-m", "aerotri.cli", *map(str, words)], check=True)
 
 
-def measured(folder: Path, epoch: int) -> tuple[dict, float]:
+def measured(folder: Path, epoch: int) -> tuple[dict[str, Any], float]:
     """volume.json of an epoch from its photographs, and the seconds of `aerotri run`."""
     flight = aerotri.simulate(plan(epoch), seed=epoch)
     flown = flight.save(folder / f"flown_{epoch}", photographs=True)
@@ -172,14 +170,14 @@ def row(words: Sequence[str], truth: float, value: float, sigma: float) -> str:
     return "| " + " | ".join([*words, *numbers]) + " |"
 
 
-def volume_rows(epoch: int, content: dict, truth: dict[str, float]) -> Iterable[str]:
+def volume_rows(epoch: int, content: dict[str, Any], truth: dict[str, float]) -> Iterable[str]:
     """Every pile and all together."""
     for one in content["piles"]:
         yield row([str(epoch), one["name"]], truth[one["name"]], one["net_m3"], one["sigma_m3"])
     yield row([str(epoch), "all together"], sum(truth.values()), content["net_m3"], content["sigma"]["sigma_m3"])
 
 
-def change_rows(content: dict, truth: dict[int, dict[str, float]]) -> Iterable[str]:
+def change_rows(content: dict[str, Any], truth: dict[int, dict[str, float]]) -> Iterable[str]:
     """Net change of every pile and all together."""
     for one in content["volumes"]:
         names = [one["name"]] if one["name"] in PLACES else list(PLACES)

@@ -83,7 +83,7 @@ def _hatch(axes: Axes, lost: np.ndarray, extent: tuple[float, float, float, floa
     if not whole.any() or whole.all():
         return
     left, right, bottom, top = extent
-    rows, columns = whole.shape
+    rows, columns = lost.shape
     x = left + (np.arange(columns) + 0.5) * (right - left) / columns
     y = top - (np.arange(rows) + 0.5) * (top - bottom) / rows
     drawn = axes.contourf(x, y, whole.astype(float), levels=[0.5, 1.5], colors="none", hatches=[HATCH])
