@@ -61,10 +61,15 @@ def test_worst_ray_is_found_its_mark_moved_adjusted_compared_and_taken_back(page
     p.wait_for_selector("body[data-changes='1']")
     after = p.evaluate("bench.photo.placeOf(bench.chosen.point)")
     assert np.subtract(after, before) == pytest.approx([12 / scale, 6 / scale], abs=0.6 / scale)
+    p.wait_for_selector("body[data-equations=ready]", timeout=60_000)
+    p.check("#plan-bar label:has-text('ellipses') input")
+    p.wait_for_function("bench.plan.ellipses")
     p.click("#adjust")
     p.wait_for_selector("body[data-generation='2']", timeout=120_000)
     p.wait_for_selector("body[data-equations=ready]", timeout=60_000)
     p.wait_for_selector("#verdicts", timeout=30_000)
+    # those of the new result come by themselves
+    p.wait_for_function("bench.plan.ellipses", timeout=30_000)
     assert "result_001" in p.inner_text("#outcome")
     assert p.evaluate("document.body.dataset.changes") == "0"
     p.click("#undo")
