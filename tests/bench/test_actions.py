@@ -53,7 +53,7 @@ def test_bench_opened_again_knows_the_decisions(client, bench, result):
     _, _, said = moved(client)
     bench.wait()
     again = Bench(places_of(result))
-    assert again.edits()["changes"] == said["changes"]
+    assert again.measuring.edits()["changes"] == said["changes"]
     again.wait()
 
 

@@ -61,17 +61,22 @@ def test_worst_ray_is_found_its_mark_moved_adjusted_compared_and_taken_back(page
     p.wait_for_selector("body[data-changes='1']")
     after = p.evaluate("bench.photo.placeOf(bench.chosen.point)")
     assert np.subtract(after, before) == pytest.approx([12 / scale, 6 / scale], abs=0.6 / scale)
+    p.wait_for_selector("body[data-equations=ready]", timeout=60_000)
+    p.check("#plan-bar label:has-text('ellipses') input")
+    p.wait_for_function("bench.plan.ellipses")
     p.click("#adjust")
     p.wait_for_selector("body[data-generation='2']", timeout=120_000)
     p.wait_for_selector("body[data-equations=ready]", timeout=60_000)
     p.wait_for_selector("#verdicts", timeout=30_000)
+    # those of the new result come by themselves
+    p.wait_for_function("bench.plan.ellipses", timeout=30_000)
     assert "result_001" in p.inner_text("#outcome")
     assert p.evaluate("document.body.dataset.changes") == "0"
     p.click("#undo")
     p.wait_for_selector("body[data-changes='1']")
     p.click("#tab-edits")
     assert "mark moved" in p.inner_text("#sheet")
-    assert len(bench.decisions.rows) == 2
+    assert len(bench.measuring.decisions.rows) == 2
 
 
 def test_ray_is_switched_off_with_a_reason(page):
@@ -105,6 +110,25 @@ def test_point_chosen_in_the_plan_is_that_under_the_mouse(page):
     assert p.locator(".cutouts figure").count() >= p.evaluate("bench.pointContent.rays.ray.length")
 
 
+def test_legend_says_what_the_colours_of_the_points_mean(page):
+    p = page.page
+    assert "largest |w|" in p.inner_text("#legend b")
+    assert texts(p, "#legend span")[0] == "below 1"
+    p.select_option("#plan-bar select", "sigma")
+    assert "σ in space" in p.inner_text("#legend b")
+    steps = texts(p, "#legend span")
+    assert len(steps) == 6
+    assert all(text.split()[-1] in ("mm", "cm", "m") for text in steps[:-1])
+    p.uncheck("#plan-bar label:has-text('points') input")
+    assert p.is_hidden("#legend")
+
+
+def test_lengths_of_scale_bars_are_round_and_in_fitting_units(page):
+    said = page.page.evaluate("""async () => { const { roundLength, metres } = await import('./legend.js');
+        return [[730, 5], [0.0371, 2], [199, 1]].map(([most]) => metres(roundLength(most))); }""")
+    assert said == ["500 m", "2 cm", "100 m"]
+
+
 def test_next_mark_leads_to_its_place_and_space_is_drawn(page, bench):
     p = page.page
     p.wait_for_selector("body[data-equations=ready]")
@@ -120,7 +144,7 @@ def test_next_mark_leads_to_its_place_and_space_is_drawn(page, bench):
     box = p.locator("#photo").bounding_box()
     p.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     p.wait_for_selector("body[data-changes='1']")
-    assert bench.decisions.rows[-1].image == photograph
+    assert bench.measuring.decisions.rows[-1].image == photograph
     p.click("#tab-space")
     p.wait_for_selector("#space")
     drawn = """() => { const c = document.getElementById('space');
@@ -149,8 +173,8 @@ def test_new_control_point_is_made_by_marks_in_two_photographs_and_taken_back(pa
         p.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         p.wait_for_selector(f"body[data-changes='{k + 2}']")
     assert "2 marks" in p.inner_text("#new-marks")
-    assert [one.action for one in bench.decisions.rows] == ["new_control", "mark", "mark"]
-    assert bench.decisions.rows[0].given == (100.5, 200.25, 30.0, 0.02, 0.02, 0.03)
+    assert [one.action for one in bench.measuring.decisions.rows] == ["new_control", "mark", "mark"]
+    assert bench.measuring.decisions.rows[0].given == (100.5, 200.25, 30.0, 0.02, 0.02, 0.03)
     for left in (2, 1, 0):
         p.click("#undo")
         p.wait_for_selector(f"body[data-changes='{left}']")
@@ -215,7 +239,8 @@ def test_ten_thousand_points_stay_fluid(chromium, large_block):
     # places of the points without an adjustment: what is tested is the drawing
     rng = np.random.default_rng(1)
     xyz = np.column_stack([rng.uniform(-2000, 2000, (count, 2)), np.zeros(count)])
-    bench.records = replace(bench.records, xyz=xyz, largest_w=rng.uniform(0, 6, count))
+    records = replace(bench.records, xyz=xyz, largest_w=rng.uniform(0, 6, count))
+    bench.shown = replace(bench.shown, records=records)
     with served(bench) as address:
         watched = Watched(chromium)
         watched.open(address)

@@ -43,12 +43,12 @@ def test_marks_off_by_two_pixels_are_matched_back(bench):
         image, px = rays["image"][0], np.array(rays["px"][0])
         if (px < 30).any() or (px > np.array([400, 300]) - 30).any():
             continue
-        said = bench.mark(image, str(block.points[point]), tuple(px + [1.5, -1.3]), "", snap=True)
+        said = bench.measuring.mark(image, str(block.points[point]), tuple(px + [1.5, -1.3]), "", snap=True)
         if not said["snapped"].startswith("matched"):
             left += 1
             continue
         errors.append(np.array(said["rows"][0]["place"]) - px)
-        bench.undo()
+        bench.measuring.undo()
     assert len(errors) > 3 * left
     assert np.median(np.hypot(*np.array(errors).T)) < 0.35
 

@@ -59,12 +59,12 @@ PLACES = {3: (900, 860), 8: (1800, 1200), 400: (2600, 700)}
 
 
 def test_targets_are_found_and_their_points_marked(bench):
-    found = {one["number"]: one for one in bench.targets(0)["targets"]}
+    found = {one["number"]: one for one in bench.measuring.targets(0)["targets"]}
     assert set(found) == set(PLACES)
     for number, place in PLACES.items():
         assert found[number]["place"] == pytest.approx(place, abs=0.1)
     assert (found[3]["point"], found[8]["point"], found[400]["point"]) == ("K03", "K08" if has_k08(bench) else "", "")
-    said = bench.mark_targets(0)
+    said = bench.measuring.mark_targets(0)
     assert said["marked"] == [found[n]["point"] for n in found if found[n]["point"]]
     row = said["rows"][0]
     assert row["action"] == "mark"
@@ -77,7 +77,7 @@ def has_k08(bench) -> bool:
 
 def test_mark_on_a_target_of_another_number_tells(bench):
     column, row = PLACES[3]
-    said = bench.mark(0, "K01", (column + 12.0, row - 9.0), "", snap=True)
+    said = bench.measuring.mark(0, "K01", (column + 12.0, row - 9.0), "", snap=True)
     assert (said["read"], said["named"]) == (3, "K03")
     assert said["snapped"].startswith("coded target 3 (AprilTag 36h11)")
     assert said["rows"][0]["place"] == pytest.approx((column, row), abs=0.1)

@@ -15,6 +15,7 @@ from aerotri.diagnosis.accuracy import (
     smallest_rectangle,
     suspect_errors,
 )
+from aerotri.diagnosis.accuracy_inspire import inspire_accuracy
 from aerotri.diagnosis.accuracy_rules import class_text, points_for_area, reached
 from aerotri.results.accuracy import AccuracyRecord, Asked, CheckedPoints
 
@@ -65,6 +66,20 @@ def test_survey_error_is_included(fit, with_survey):
     assert round(100.0 * r.nva, 2) == with_survey
     assert r.rmse_h == pytest.approx(np.hypot(r.errors[0].rmse, r.errors[1].rmse))
     assert r.rmse_3d**2 == pytest.approx(r.rmse_h**2 + r.nva**2)
+
+
+def test_measures_of_inspire_and_the_data_they_are_recommended_for():
+    """Table 11 of D2.8.II.1: heights a third, plan a sixth of the spacing; a sixth of the interval; E/10 000."""
+    signs = np.where(np.arange(30) % 2, 1.0, -1.0)
+    sizes = np.array([0.03, 0.04, 0.12])
+    found = inspire_accuracy(record(points(signs[:, None] * sizes, survey=0.0)))
+    assert (found.rmse_x, found.rmse_y, found.rmse_z) == pytest.approx(tuple(sizes))
+    assert found.rmse_p == pytest.approx(0.05)
+    assert (found.spacing, found.interval, found.scale) == pytest.approx((0.36, 0.72, 500.0))
+    flat = inspire_accuracy(record(points(signs[:, None] * [0.03, 0.04, 0.01], survey=0.0)))
+    assert flat.spacing == pytest.approx(0.30)
+    without = inspire_accuracy(record(points(np.zeros((0, 3)))))
+    assert np.isnan([without.rmse_p, without.spacing, without.interval, without.scale]).all()
 
 
 @pytest.mark.parametrize(

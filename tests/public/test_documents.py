@@ -114,6 +114,18 @@ def test_calibration(result, tmp_path):
     assert f"{100.0 * r:.0f}".replace("-", "−").replace("−0", "0") in text
 
 
+def test_calibration_of_a_camera_that_was_held(tmp_path):
+    """Its principal distance stands in the table alone, as value and as given; it is said to be no calibration."""
+    block, _ = small_block(5)
+    camera = block.cameras[0]
+    assert all(one.fixed for one in camera.interior.values())
+    aerotri.export(aerotri.adjust(block, explain=False), tmp_path, "pdf", document="calibration")
+    text = text_of(tmp_path / "calibration.pdf")
+    assert text.count(f"{camera.interior['focal_length_mm'].value:.4f}") == 2
+    assert "This is no calibration" in text
+    assert "Parameters held" not in text
+
+
 @pytest.fixture(scope="module")
 def measured(result, tmp_path_factory):
     """Folders of a volume of three piles and of a change of one of them, beside the result."""

@@ -59,6 +59,7 @@ def head_in(page: str) -> None:
         "Date of computation",
     ):
         assert word in page, word
+    assert f"<h1>{SHOWN}</h1>" in page
     assert HOSTILE not in page
     assert 'class="logo" src="data:image/png;base64,' in page
     assert "Content-Security-Policy" not in page or "img-src data:" in page

@@ -35,7 +35,7 @@ def test_a_block_is_adjusted(flight, tmp_path):
     page = project.report.read_text(encoding="utf-8")
     assert f"RMSE_H {100.0 * checked['accuracy']['RMSE_H']:.1f} cm in plan" in page
     assert "that is required is met" in page
-    assert "accuracy by check points" in page
+    assert "Accuracy by check points" in page
     assert (project.verdict, project.complete) == ("accepted", True)
     assert project.surface is project.volume is project.tied is None
     assert project.adjustment.parameters["name"].tolist() == ["brown.K1"]

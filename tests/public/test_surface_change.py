@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+import rasterio
 import shapely
 from scipy.ndimage import uniform_filter
 
@@ -153,3 +154,38 @@ def test_surfaces_that_do_not_meet():
     away = aerotri.Surface.of_array(first.z, left=1e4, top=0.0, cell=1.0)
     with pytest.raises(InputError, match="do not meet"):
         aerotri.change(first, away)
+
+
+def in_systems(folder, *systems):
+    """Files of two surfaces in these systems, '' for none."""
+    for k, (one, system) in enumerate(zip(epochs(3), systems, strict=False)):
+        aerotri.Surface.of_array(
+            one.z, left=0.0, top=SIDE, cell=1.0, sigma=one.sigma, crs=system or None, name=f"epoch_{k}"
+        ).save(folder / f"epoch_{k}.tif")
+    return folder / "epoch_0.tif", folder / "epoch_1.tif"
+
+
+def test_system_of_heights_stands_in_the_head(tmp_path):
+    found = aerotri.change(*in_systems(tmp_path, "EPSG:25832+7837", "EPSG:25832+7837"), align="none")
+    head = found.summary
+    assert (head["crs"], head["crs_name"]) == ("EPSG:25832+7837", "ETRS89 / UTM zone 32N")
+    assert head["height_system"] == "DHHN2016 height"
+    assert not any("system" in text for text in found.warnings)
+    found.save(tmp_path / "change", plots=False)
+    with rasterio.open(tmp_path / "change" / "change.tif") as file:
+        assert file.crs.to_epsg() == 25832, "a difference is no height"
+
+
+def test_system_of_heights_that_one_surface_states_alone_is_told(tmp_path):
+    found = aerotri.change(*in_systems(tmp_path, "EPSG:25832+7837", "EPSG:25832"), align="none")
+    assert found.summary["height_system"] == "DHHN2016 height"
+    assert any("epoch_1.tif does not say in which system its heights are" in text for text in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("systems", "said"),
+    [(("EPSG:25832", "EPSG:25833"), "in EPSG:25833"), (("EPSG:25832+7837", "EPSG:25832+5783"), "heights of epoch_1")],
+)
+def test_surfaces_in_two_systems_are_refused(tmp_path, systems, said):
+    with pytest.raises(InputError, match=said):
+        aerotri.change(*in_systems(tmp_path, *systems), align="none")

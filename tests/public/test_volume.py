@@ -157,3 +157,17 @@ def test_shown_and_drawn(cone, measured):
 def test_what_makes_no_sense(cone, options, match):
     with pytest.raises(InputError, match=match):
         aerotri.volume(cone, **({"boundary": PILE} | options))
+
+
+@pytest.mark.parametrize(("below", "both"), [(0.0, False), (0.01, False), (0.9, True), (4.0, True), (400.0, False)])
+def test_scale_of_the_map_shows_the_sides_that_count(below, both):
+    """A step of 2 m up and of `below` down; a hundredth of the larger one is no side of its own."""
+    z = np.full((40, 40), 100.0)
+    z[:20], z[20:30] = 102.0, 100.0 - below
+    surface = aerotri.Surface.of_array(z, left=0.0, top=40.0, cell=1.0)
+    figure = aerotri.volume(surface, base=100.0).plot.thickness()
+    low, high = figure.axes[1].get_ylim()
+    legend = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert ("surface on the base" in legend) is both
+    assert bool(low < 0.0 < high) is both
+    assert bool(high > 0.0) is (below < 400.0)

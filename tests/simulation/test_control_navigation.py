@@ -191,6 +191,18 @@ def test_a_hill_holds_its_volume():
     assert terrain.height(np.array([[1020.0, 1990.0]])) == pytest.approx(30.0)
 
 
+def test_hills_stand_on_any_ground_and_lie_within_its_reach():
+    hills = ((20.0, -10.0, 30.0, 50.0), (-100.0, 40.0, -8.0, 30.0))
+    spec = TerrainSpec(kind="flat", height_m=5.0, hills=hills)
+    terrain = make_terrain(spec, (1000.0, 2000.0), np.random.default_rng(1))
+    x, y = np.meshgrid(np.arange(600.0, 1440.0, 4.0), np.arange(1590.0, 2390.0, 4.0))
+    z = terrain.height(np.stack([x.ravel(), y.ravel()], axis=1)) - 5.0
+    assert z.sum() * 16.0 == pytest.approx(2.0 * np.pi * (50.0**2 * 30.0 - 30.0**2 * 8.0), rel=1e-6)
+    low, high = terrain.reach
+    assert low <= 5.0 + z.min() < 5.0 + z.max() <= high
+    assert terrain.height(np.array([[900.0, 2040.0]]))[0] < 5.0
+
+
 def test_errors_that_stay_have_their_size_and_time():
     """Correlation ρ = exp(−Δt/τ) from exposure to exposure, σ throughout, and a new beginning every day."""
     n = 4000

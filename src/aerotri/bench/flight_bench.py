@@ -11,7 +11,7 @@ from typing import Any
 
 from aerotri.bench.flight_plan import RECORD, FlightRecord, flight_content, read_flight
 from aerotri.bench.flight_request import changed_request, texts_of
-from aerotri.bench.job import Job
+from aerotri.bench.job import Jobs
 from aerotri.conventions import InputError
 
 OF_BENCH, OF_PLAN, PLAN = "_bench", "_plan", "plan_"
@@ -59,7 +59,7 @@ class FlightBench:
             self.given.parent if is_own else self.given.with_name(self.given.name.removesuffix(OF_PLAN) + OF_BENCH)
         )
         self._lock = threading.RLock()
-        self._job: Job | None = None
+        self._jobs = Jobs("a plan is being made already")
         self._before: FlightRecord | None = None
         self.generation = 0
         self.show(self.given)
@@ -91,7 +91,7 @@ class FlightBench:
 
     def state(self) -> dict[str, Any]:
         """What goes on: asked for every second."""
-        return {"generation": self.generation, "job": None if self._job is None else self._job.state()}
+        return {"generation": self.generation, "job": self._jobs.state()}
 
     def plans(self) -> list[Path]:
         """The plan that was given, and those of the bench, the oldest first."""
@@ -122,27 +122,24 @@ class FlightBench:
             When a value is not possible, the folder does not say how it was planned, or planning is going on.
         """
         with self._lock:
-            if self._job is not None and self._job.is_running:
-                raise InputError("a plan is being made already", "wait, or stop it")
+            self._jobs.refuse_second()
             if not self.record.request:
                 raise InputError("the folder does not say how it was planned", "run aerotri plan again")
             request = changed_request(self.record.request, given)
             self.bench.mkdir(exist_ok=True)
             out = self.bench / f"{PLAN}{1 + max((_number(one) for one in self.bench.glob(PLAN + '*')), default=0):03d}"
             words = [json.dumps(request), str(out)]
-            self._job = Job("aerotri.bench.flight_worker", words, out, self.show)
+            self._jobs.start("aerotri.bench.flight_worker", words, out, self.show)
         return self.state()
 
     def stop(self) -> dict[str, Any]:
         """Stop the planning that is going on."""
-        if self._job is not None and self._job.is_running:
-            self._job.stop()
+        self._jobs.stop()
         return self.state()
 
     def wait(self) -> None:
         """Wait until the planning has ended."""
-        if self._job is not None:
-            self._job.wait()
+        self._jobs.wait()
 
     def _numbers(self) -> list[dict[str, Any]]:
         rows = [

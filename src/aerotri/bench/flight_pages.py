@@ -11,7 +11,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from aerotri.bench.flight_bench import FlightBench
-from aerotri.bench.server import Given, Guard, done, files_of_page, page_file, told
+from aerotri.bench.server import Given, Guard, done, files_of_page, page, told
 
 
 def make_flight_application(bench: FlightBench, token: str) -> ASGIApp:
@@ -32,7 +32,7 @@ def make_flight_application(bench: FlightBench, token: str) -> ASGIApp:
         "stop": lambda given: bench.stop(),
     }
     routes = [
-        Route("/", page_file("flight.html")),
+        Route("/", page("flight.html", "flight.js", "flight")),
         *files_of_page(),
         *(Route(f"/data/{path}", told(work)) for path, work in questions.items()),
         *(Route(f"/act/{path}", done(work), methods=["POST"]) for path, work in actions.items()),

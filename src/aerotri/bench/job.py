@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from aerotri.conventions import InputError
+
 
 class Job:
     """One adjustment, or one plan.
@@ -79,6 +81,54 @@ class Job:
             self._error = content["error"]
         else:
             self._stage, self._share = content["stage"], content["share"]
+
+
+class Jobs:
+    """Jobs, of which one runs at a time.
+
+    Parameters
+    ----------
+    busy : what is said to the second one.
+    """
+
+    def __init__(self, busy: str):
+        self._busy = busy
+        self._last: Job | None = None
+
+    def state(self) -> dict[str, Any] | None:
+        """Of the last one; None where there was none."""
+        return None if self._last is None else self._last.state()
+
+    def refuse_second(self) -> None:
+        """Refuse, where one is running.
+
+        Raises
+        ------
+        InputError
+        """
+        if self._last is not None and self._last.is_running:
+            raise InputError(self._busy, "wait, or stop it")
+
+    def start(self, module: str, words: Sequence[str], out: Path, done: Callable[[Path], None]) -> None:
+        """See `Job`.
+
+        Raises
+        ------
+        InputError
+            When one is running.
+        """
+        self.refuse_second()
+        self._last = Job(module, words, out, done)
+
+    def stop(self) -> None:
+        """End the one that is running."""
+        if self._last is not None and self._last.is_running:
+            self._last.stop()
+
+    def wait(self) -> None:
+        """Wait until the last one has ended and its result was taken up."""
+        if self._last is not None:
+            self._last.wait()
 
 
 class _Drained:

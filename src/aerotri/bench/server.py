@@ -6,6 +6,7 @@ import json
 import secrets
 from collections.abc import Callable
 from pathlib import Path
+from string import Template
 from typing import Any
 
 from starlette.applications import Starlette
@@ -15,12 +16,13 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from aerotri.bench.session import RELOAD, Bench
+from aerotri.bench.session import Bench
+from aerotri.bench.shown import RELOAD
 from aerotri.conventions import InputError
 
 MOST, LONGEST = 10**9, 1000
 STATIC = Path(__file__).parent / "static"
-KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
+KINDS = {".js": "text/javascript", ".css": "text/css"}
 HOSTS = ("127.0.0.1", "localhost")
 """Names under which this machine is asked; others come from elsewhere, by a name that leads here."""
 HEADERS = {
@@ -41,7 +43,7 @@ def make_application(bench: Bench, token: str) -> ASGIApp:
     token : first part of every path; whoever does not know it is refused with 403.
     """
     routes = [
-        Route("/", page_file("index.html")),
+        Route("/", page("index.html", "main.js", "result")),
         *files_of_page(),
         *(Route(f"/data/{path}", told(work)) for path, work in _questions(bench).items()),
         *(Route(f"/act/{path}", done(work), methods=["POST"]) for path, work in _actions(bench).items()),
@@ -66,10 +68,10 @@ def _questions(bench: Bench) -> dict[str, Callable[[Request], Any]]:
         "state": lambda asked: bench.state(),
         "plan": lambda asked: bench.plan(),
         "ellipses": lambda asked: bench.ellipses(),
-        "edits": lambda asked: bench.edits(),
+        "edits": lambda asked: bench.measuring.edits(),
         "next": lambda asked: bench.next(),
         "layers": lambda asked: bench.layers(),
-        "targets/{image:int}": lambda asked: bench.targets(asked.path_params["image"]),
+        "targets/{image:int}": lambda asked: bench.measuring.targets(asked.path_params["image"]),
         "difference": lambda asked: bench.difference(),
         "rays": lambda asked: bench.rays(
             max(_whole(asked, "first") or 0, 0), _whole(asked, "image"), _whole(asked, "point"),
@@ -84,16 +86,16 @@ def _questions(bench: Bench) -> dict[str, Callable[[Request], Any]]:
 def _actions(bench: Bench) -> dict[str, Callable[[Given], Any]]:
     """What the page does, by path."""
     return {
-        "mark": lambda given: bench.mark(
+        "mark": lambda given: bench.measuring.mark(
             given.row("image"), given.text("point"), given.place(), given.text("reason"), given.is_set("snap")),
-        "remove": lambda given: bench.remove(given.row("image"), given.text("point"), given.text("reason")),
-        "switch": lambda given: bench.switch(
+        "remove": lambda given: bench.measuring.remove(given.row("image"), given.text("point"), given.text("reason")),
+        "switch": lambda given: bench.measuring.switch(
             given.row("image") if given.has("image") else None, given.text("point"), given.text("action"),
             given.text("reason")),
-        "mark_targets": lambda given: bench.mark_targets(given.row("image")),
-        "give": lambda given: bench.give(
+        "mark_targets": lambda given: bench.measuring.mark_targets(given.row("image")),
+        "give": lambda given: bench.measuring.give(
             given.text("point"), given.text("action"), given.numbers("given", 6), given.text("reason")),
-        "undo": lambda given: bench.undo(),
+        "undo": lambda given: bench.measuring.undo(),
         "adjust": lambda given: bench.adjust(),
         "stop": lambda given: bench.stop(),
     }  # fmt: skip
@@ -186,6 +188,22 @@ class Guard:
             await PlainTextResponse("The address is not that of the bench.", 403, HEADERS)(scope, receive, send)
             return
         await self._inner({**scope, "path": f"/{rest}", "raw_path": f"/{rest}".encode()}, receive, send)
+
+
+def page(main: str, script: str, kind: str) -> Callable[[Request], Response]:
+    """A page of the bench: the frame that all have, with its own part.
+
+    Parameters
+    ----------
+    main : file of its own part. script : file that fills it. kind : class of the page in the styles.
+    """
+
+    def answer(asked: Request) -> Response:
+        frame = Template((STATIC / "page.html").read_text(encoding="utf-8"))
+        text = frame.substitute(script=script, kind=kind, main=(STATIC / main).read_text(encoding="utf-8"))
+        return Response(text, media_type="text/html", headers=HEADERS)
+
+    return answer
 
 
 def page_file(name: str) -> Callable[[Request], Response]:

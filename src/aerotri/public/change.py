@@ -13,7 +13,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
-from aerotri.public.change_epochs import common_system, doubts_of, epoch_of, epochs_of, grid_of, names_of, pair_of
+from aerotri.public.change_epochs import (
+    common_system,
+    doubts_of,
+    epoch_of,
+    epochs_of,
+    grid_of,
+    names_of,
+    pair_of,
+    plan_code,
+)
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.projects import project_of
 from aerotri.public.table import Table
@@ -202,11 +211,13 @@ def change(
         raise InputError(f"a noise length of {noise_length:g} m is not possible", "give metres")
     with ExitStack() as stack:
         epochs = epochs_of((first, second), (first_adjustment, second_adjustment))
-        epsg = common_system(epochs)
+        crs, of_heights = common_system(epochs)
+        epsg = plan_code(crs)
         grid = grid_of(epochs)
         same = epochs[0].key != "" and epochs[0].key == epochs[1].key
         (before, of_before), (after, of_after) = (epoch_of(one, grid, stack, noise_length, same) for one in epochs)
-        notes = [text for text in (of_before, of_after) if text and stable is None]
+        notes = [of_heights] if of_heights else []
+        notes += [text for text in (of_before, of_after) if text and stable is None]
         ground = None if stable is None else _boundary_of(stable, epsg)
         areas = _areas(area, grid, epsg)
         held = None if ground is None else ground.coverage(grid) > STABLE_PART
@@ -230,7 +241,6 @@ def change(
     by = dict(zip(found.alignment.names, found.alignment.values.tolist(), strict=True))
     if max(abs(by.get("dX", 0.0)), abs(by.get("dY", 0.0))) > FARTHEST * grid.cell_x:
         notes.append("the surfaces are shifted by more than a few cells: bring the second nearer and measure again")
-    crs = "" if epsg is None else f"EPSG:{epsg}"
     summary = change_json(found, names_of(epochs), crs, "" if ground is None else ground.name, align, tuple(notes))
     head = Head(project_of(project, second_adjustment, second, first_adjustment, first), crs)
     return MeasuredChange(found, head.as_dict() | summary, tuple(areas.values()), head)
@@ -280,7 +290,8 @@ def _write(target: Path, found: MeasuredChange, plots: bool) -> None:
     bands = {"difference second − first, m": c.difference, "σ of the difference, m": c.sigma,
              "difference over σ": c.significance}  # fmt: skip
     with atomic_folder(target, own=OWN_NAMES) as folder:
-        write_bands(folder / RASTER, bands, c.grid, found.summary["crs"] or None)
+        # differences are no heights: their raster has the system of the plan alone
+        write_bands(folder / RASTER, bands, c.grid, found.summary["crs"].partition("+")[0] or None)
         write_rows(found.volumes, folder / TABLE)
         if plots:
             from aerotri.report.documents.picture_texts import save_translated

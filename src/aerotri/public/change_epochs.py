@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -135,21 +136,48 @@ def names_of(epochs: Epochs) -> tuple[str, str]:
     return labels[0], labels[1]
 
 
-def common_system(epochs: Epochs) -> int | None:
-    """EPSG code that both are in, None where neither says it.
+def plan_code(crs: str) -> int | None:
+    """EPSG code of the plan of 'EPSG:n' or 'EPSG:n+m'; None of ''."""
+    return int(crs.partition("+")[0].removeprefix("EPSG:")) if crs else None
+
+
+def common_system(epochs: Epochs) -> tuple[str, str]:
+    """The system that both are in, and what the user should know of it.
+
+    Returns
+    -------
+    'EPSG:n', with '+m' where a system of the heights is stated, '' where neither surface says it; a sentence or ''.
 
     Raises
     ------
     InputError
+        For surfaces in two systems.
     """
-    codes: list[int | None] = []
+    codes: list[str] = []
     for one in epochs:
         with one.surface.reader() as reader:
-            codes.append(reader.epsg)
-    if None not in codes and codes[0] != codes[1]:
-        message = f"{epochs[1].surface.label} is in EPSG:{codes[1]}, {epochs[0].surface.label} in EPSG:{codes[0]}"
-        raise InputError(message, "bring them into one CRS")
-    return codes[0] if codes[0] is not None else codes[1]
+            codes.append(reader.crs_code)
+    return system_of_both(codes, [one.surface.label for one in epochs])
+
+
+def system_of_both(codes: Sequence[str], labels: Sequence[str]) -> tuple[str, str]:
+    """As `common_system`, of the codes 'EPSG:n', 'EPSG:n+m' or '' of two epochs with their names.
+
+    Raises
+    ------
+    InputError
+        For two systems.
+    """
+    plan, heights = zip(*((code.partition("+")[0], code.partition("+")[2]) for code in codes), strict=True)
+    if all(plan) and plan[0] != plan[1]:
+        raise InputError(f"{labels[1]} is in {plan[1]}, {labels[0]} in {plan[0]}", "bring them into one CRS")
+    if all(heights) and heights[0] != heights[1]:
+        message = f"heights of {labels[1]} are in EPSG:{heights[1]}, of {labels[0]} in EPSG:{heights[0]}"
+        raise InputError(message, "bring them into one system of heights")
+    system = max(codes, key=lambda code: (bool(code), "+" in code))
+    silent = [label for label, own in zip(labels, heights, strict=True) if not own]
+    note = f"{silent[0]} does not say in which system its heights are" if len(silent) == 1 else ""
+    return system, note
 
 
 def grid_of(epochs: Epochs) -> Grid:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.public.change_epochs import plan_code, system_of_both
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.projects import project_of
 from aerotri.public.table import Table
@@ -189,8 +190,7 @@ def cloud_change(
     from aerotri.volume.change.clouds import Cloud, Scales, cloud_distances, core_points, registration_of
 
     (before, of_before), (after, of_after) = (_opened(one) for one in (first, second))
-    if None not in (of_before, of_after) and of_before != of_after:
-        raise InputError(f"the clouds are in EPSG:{of_before} and EPSG:{of_after}", "bring them into one CRS")
+    crs, of_heights = system_of_both((of_before, of_after), (_label(first), _label(second)))
     width = _default_width(before.xyz) if cylinder is None else cylinder
     scales = Scales(
         width, NORMAL_TIMES * width if normal is None else normal, REACH_TIMES * width if reach is None else reach
@@ -199,7 +199,7 @@ def cloud_change(
     _check((("cylinder", width), ("normal", scales.normal), ("reach", scales.reach), ("spacing", between)))
     if registration is not None and not 0.0 <= registration < 1e6:
         raise InputError(f"a registration of {registration:g} m is not possible", "give metres")
-    notes = []
+    notes = [of_heights] if of_heights else []
     if (before.covariance is None) != (after.covariance is None):
         notes.append("one of the clouds has no σ of its points: the scatter of the points is taken for both")
         before, after = Cloud(before.xyz, None), Cloud(after.xyz, None)
@@ -207,8 +207,7 @@ def cloud_change(
     found = cloud_distances(before, after, core, scales)
     if not np.isfinite(found.distance).any():
         raise InputError("the two clouds do not meet", "check the CRS of both, or give a larger --cylinder and --reach")
-    epsg = of_before if of_before is not None else of_after
-    held = None if stable is None else _within(stable, epsg, core)
+    held = None if stable is None else _within(stable, plan_code(crs), core)
     shift, excess = (np.nan, np.nan) if held is None else registration_of(found, held)
     if held is not None and not np.isfinite(excess):
         raise InputError("no place with a distance lies on the stable ground", "give other ground, or check its CRS")
@@ -217,8 +216,7 @@ def cloud_change(
         notes.append("nothing is known of how the clouds lie to one another: give --stable or --registration")
     beyond = np.abs(found.distance) > found.level(used)
     known = np.isfinite(found.distance)
-    head = Head(project_of(project, *(one for one in (second, first) if not isinstance(one, np.ndarray))),
-                "" if epsg is None else f"EPSG:{epsg}")  # fmt: skip
+    head = Head(project_of(project, *(one for one in (second, first) if not isinstance(one, np.ndarray))), crs)
     summary = head.as_dict() | {
         "first": _label(first), "second": _label(second), "cylinder_m": scales.cylinder, "normal_m": scales.normal,
         "reach_m": scales.reach, "spacing_m": between, "points_first": len(before.xyz),
@@ -236,23 +234,23 @@ def is_cloud(path: Any) -> bool:
     return isinstance(path, str | os.PathLike) and Path(path).suffix.lower() in CLOUDS
 
 
-def _opened(given: FilePath | np.ndarray) -> tuple[Any, int | None]:
+def _opened(given: FilePath | np.ndarray) -> tuple[Any, str]:
     from aerotri.formats.results.point_cloud import read_precise_cloud
     from aerotri.memory import refuse_beyond_memory
     from aerotri.volume.change.clouds import FEWEST, Cloud
 
     if isinstance(given, np.ndarray):
-        xyz, covariance, epsg = np.asarray(given, dtype=float), None, None
+        xyz, covariance, crs = np.asarray(given, dtype=float), None, ""
         if xyz.ndim != 2 or xyz.shape[1] != 3 or not np.isfinite(xyz).all():
             raise InputError("a cloud is no array (n, 3) of numbers", "give X, Y, Z of every point")
     else:
         if not is_cloud(given):
             raise InputError("is no point cloud", "give a LAS or LAZ file", Path(given))
-        xyz, covariance, epsg = read_precise_cloud(Path(given))
+        xyz, covariance, crs = read_precise_cloud(Path(given))
     if len(xyz) < FEWEST:
         raise InputError(f"{_label(given)} has {len(xyz)} points", "give a cloud of more points")
     refuse_beyond_memory(float(BYTES_OF_POINT) * len(xyz), f"{len(xyz)} points", "cut out the part that is needed")
-    return Cloud(xyz, covariance), epsg
+    return Cloud(xyz, covariance), crs
 
 
 def _default_width(xyz: np.ndarray) -> float:

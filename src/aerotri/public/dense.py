@@ -99,7 +99,7 @@ class DenseSurface:
     @cached_property
     def surface(self) -> Surface:
         """The heights and their σ, as `aerotri.compare` and `aerotri.volume` take them, held in memory."""
-        from aerotri.rasters.grids import horizontal_crs
+        from aerotri.rasters.grids import crs_of_heights
         from aerotri.terrain.surface import Surface as Heights
 
         grid = self.record.grid
@@ -107,7 +107,7 @@ class DenseSurface:
         for row, column, heights, total in _surface_parts(self.record):
             place = np.s_[row : row + heights.shape[0], column : column + heights.shape[1]]
             z[place], sigma[place] = heights, total
-        return Surface(Heights(grid, z, sigma), horizontal_crs(self.crs), SURFACE)
+        return Surface(Heights(grid, z, sigma), crs_of_heights(self.crs), SURFACE)
 
     @cached_property
     def dtm(self) -> Surface:
@@ -118,7 +118,7 @@ class DenseSurface:
         InputError
             When the surface was measured without ground=True.
         """
-        from aerotri.rasters.grids import horizontal_crs
+        from aerotri.rasters.grids import crs_of_heights
         from aerotri.terrain.surface import Surface as Heights
 
         if self.ground is None:
@@ -128,7 +128,7 @@ class DenseSurface:
         for row, column, heights, total in _ground_parts(self.record, self.ground):
             place = np.s_[row : row + heights.shape[0], column : column + heights.shape[1]]
             z[place], sigma[place] = heights, total
-        return Surface(Heights(grid, z, sigma), horizontal_crs(self.crs), GROUND)
+        return Surface(Heights(grid, z, sigma), crs_of_heights(self.crs), GROUND)
 
     @cached_property
     def summary(self) -> dict[str, Any]:

@@ -218,9 +218,9 @@ def compare(
             one.heights, other.heights, grid, method, align, lambda k, n: report.counted("comparing", k, n)
         )
     epsg = one.epsg or other.epsg
-    notes = tuple(source.note for source in (one, other) if source.note)
+    notes = tuple(source.note for source in (one, other) if source.note) + _of_heights(one, other)
     crs = None if epsg is None else f"EPSG:{epsg}"
-    head = Head(project_of(project, test, control), crs or "")
+    head = Head(project_of(project, test, control), max(one.crs, other.crs, key=len))
     return SurfaceComparison(found, _name(test), _name(control), method, crs, notes, head)
 
 
@@ -228,6 +228,16 @@ def _check(method: str, align: str) -> None:
     for name, value, known in (("method", method, INTERPOLATIONS), ("alignment", align, ALIGNMENTS)):
         if value not in known:
             raise InputError(f"there is no {name} '{value}'", f"choose one of {', '.join(known)}")
+
+
+def _of_heights(test: HeightSource, control: HeightSource) -> tuple[str, ...]:
+    """What the user should know of the systems of the heights."""
+    own, other = (source.crs.partition("+")[2] for source in (test, control))
+    if not own or not other or own == other:
+        return ()
+    return (
+        f"heights of the test surface are in EPSG:{own}, of the control in EPSG:{other}: this is in the differences",
+    )
 
 
 def _name(surface: SurfaceLike) -> str:
@@ -240,7 +250,9 @@ def _sources(test: SurfaceLike, control: SurfaceLike, stack: ExitStack) -> tuple
 
     both = (test, control)
     files = [_file(one) for one in both]
-    held = [as_surface(one).crs for one, path in zip(both, files, strict=True) if path is None]
+    held = [
+        (as_surface(one).crs or "").partition("+")[0] for one, path in zip(both, files, strict=True) if path is None
+    ]
     crs = next(filter(None, held), None) or common_crs(*(path for path in files if path is not None))
     found = [
         heights_of_raster(stack.enter_context(as_surface(one).reader())) if path is None

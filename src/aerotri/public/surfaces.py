@@ -213,7 +213,7 @@ class Surface:
         if isinstance(self.source, Heights):
             return self.crs
         with self.reader() as reader:
-            return None if reader.epsg is None else f"EPSG:{reader.epsg}"
+            return reader.crs_code or None
 
     def __repr__(self) -> str:
         return f"<aerotri.Surface {self.label!r}, {'in memory' if self.path is None else self.path}>"

@@ -170,9 +170,9 @@ class TerrainModel:
 
     @property
     def _crs_of_rasters(self) -> str | None:
-        from aerotri.rasters.grids import horizontal_crs
+        from aerotri.rasters.grids import crs_of_heights
 
-        return horizontal_crs(self.crs)
+        return crs_of_heights(self.crs)
 
     def __repr__(self) -> str:
         p = self.summary["pickets"]

@@ -108,7 +108,7 @@ class TrueBlock:
         InputError
             For a cell or an area without size, or too many cells.
         """
-        from aerotri.rasters.grids import horizontal_crs
+        from aerotri.rasters.grids import crs_of_heights
 
         xy = self.truth.points[:, :2]
         left, bottom, right, top = area if area is not None else (*xy.min(axis=0), *xy.max(axis=0))
@@ -120,5 +120,5 @@ class TrueBlock:
             raise InputError(f"{rows} × {columns} cells are too many", "take a larger cell, or a smaller area")
         x, y = left + cell * (np.arange(columns) + 0.5), top - cell * (np.arange(rows) + 0.5)
         z = self.heights(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)).reshape(rows, columns)
-        return Surface.of_array(z, left=float(left), top=float(top), cell=cell, crs=horizontal_crs(self.block.crs),
+        return Surface.of_array(z, left=float(left), top=float(top), cell=cell, crs=crs_of_heights(self.block.crs),
                                 name="true surface")  # fmt: skip

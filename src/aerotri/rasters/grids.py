@@ -33,6 +33,8 @@ TILE = 512
 files."""
 SIGMA = "σ"
 """The description of a band of σ begins with it."""
+COMPOUND = ("COMPD_CS", "COMPOUNDCRS")
+"""Beginnings of the WKT of a CRS with a system of heights."""
 DAMAGED = "write the file anew, it is damaged"
 KEPT_OPTIONS = ("compress", "predictor")
 
@@ -191,17 +193,18 @@ class RasterReader:
         if self.crs is None:
             return None
         with _told(self.path, "has a CRS that cannot be read", "write the file anew"):
-            code = self.crs.to_epsg()
-        if code is None:
-            from pyproj import CRS
-            from pyproj.exceptions import CRSError
+            text = self.crs.to_wkt()
+            # some pairs of plan and heights have a code of their own, EPSG:5555: that of the plan is asked for
+            if not text.startswith(COMPOUND):
+                return self.crs.to_epsg()
+        from pyproj import CRS
+        from pyproj.exceptions import CRSError
 
-            try:
-                whole = CRS.from_wkt(self.crs.to_wkt())
-            except CRSError:
-                return None
-            code = whole.sub_crs_list[0].to_epsg() if whole.is_compound else None
-        return code
+        try:
+            whole = CRS.from_wkt(text)
+        except CRSError:
+            return None
+        return whole.sub_crs_list[0].to_epsg() if whole.is_compound else None
 
     @property
     def crs_code(self) -> str:

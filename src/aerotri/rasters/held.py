@@ -34,14 +34,16 @@ class HeldRaster:
 
     @property
     def epsg(self) -> int | None:
-        """Code of the CRS, None where it has none."""
-        authority, _, code = (self.crs or "").partition(":")
+        """Code of the CRS, of its plan where it has a height system too; None where it has none."""
+        authority, _, codes = (self.crs or "").partition(":")
+        code = codes.partition("+")[0]
         return int(code) if authority.upper() == "EPSG" and code.isdigit() else None
 
     @property
     def crs_code(self) -> str:
-        """'EPSG:n'; '' where it has none."""
-        return "" if self.epsg is None else f"EPSG:{self.epsg}"
+        """'EPSG:n', 'EPSG:n+m' where a height system is stated; '' without a code."""
+        heights = (self.crs or "").partition("+")[2]
+        return "" if self.epsg is None else f"EPSG:{self.epsg}" + (f"+{heights}" if heights.isdigit() else "")
 
     def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
         """A window, (rows, columns) float32; NaN where nothing is known and beyond the edges."""

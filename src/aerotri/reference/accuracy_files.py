@@ -28,6 +28,17 @@ ACCURACY = (
     Item("accuracy.RMSE_V", "number?", "In height outside vegetation (NVA).", "m"),
     Item("accuracy.VVA", "number?", "In height within vegetation; null where no check point stands there.", "m"),
     Item("accuracy.RMSE_3D", "number?", "In plan and height: √(RMSE_H² + RMSE_V²).", "m"),
+    Item("inspire", "object", "The same in the measures of INSPIRE, and the data they are recommended for."),
+    *within(
+        "inspire",
+        Item("RMSEP", "number?", "Root mean square error of planimetry, measure 47.", "m"),
+        Item("RMSE_x", "number?", "Root mean square error in X, adapted from measure 39.", "m"),
+        Item("RMSE_y", "number?", "Root mean square error in Y, adapted from measure 39.", "m"),
+        Item("RMSE_z", "number?", "Root mean square error of heights outside vegetation, measure 39.", "m"),
+        Item("grid_spacing", "number?", "Of the finest elevation grid.", "m"),
+        Item("contour_interval", "number?", "Of the closest contour lines.", "m"),
+        Item("scale_denominator", "number?", "Of the largest scale of vector data."),
+    ),
     Item("coordinates[]", "object", "X, Y, Z outside vegetation, and Z within it."),
     *within(
         "coordinates[]",

@@ -85,6 +85,7 @@ class FlightSpec(Table):
 class TerrainSpec(Table):
     """The ground; `height_m` is its mean level. A hill may stand on undulating ground too.
 
+    `hills` are more of them, on any ground: X and Y from the middle of the block, height (negative: a pit), radius, m.
     `houses` have flat roofs: middle X and Y from the middle of the block, size along X and along Y, height, m.
     """
 
@@ -95,6 +96,9 @@ class TerrainSpec(Table):
     hill_height_m: Number = key(0.0, "Height of a hill; it may stand on any ground.", "m")
     hill_radius_m: Positive = key(100.0, "Radius of the hill.", "m")
     hill_centre_m: tuple[Number, Number] = key((0.0, 0.0), "X and Y of the hill.", "m")
+    hills: tuple[tuple[Number, Number, Number, Positive], ...] = key(
+        (), "More hills: X, Y from the middle of the block, height (negative: a pit), radius.", "m"
+    )
     houses: tuple[tuple[Number, Number, Positive, Positive, Positive], ...] = key(
         (), "Houses: X, Y from the middle of the block, size along X and Y, height.", "m"
     )

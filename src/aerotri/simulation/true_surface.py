@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aerotri.rasters.grids import Grid, RasterWriter, horizontal_crs
+from aerotri.rasters.grids import Grid, RasterWriter, crs_of_heights
 from aerotri.simulation.placing import Placement
 from aerotri.simulation.terrain import Terrain
 
@@ -35,7 +35,7 @@ def write_true_surface(path: Path, terrain: Terrain, points: np.ndarray, gsd_m: 
     heights = np.empty((grid.rows, grid.columns))
     for row, northing in enumerate(y.tolist()):
         heights[row] = true_heights(terrain, np.column_stack([x, np.full(len(x), northing)]), place)
-    crs = None if place is None else horizontal_crs(place.crs)
+    crs = None if place is None else crs_of_heights(place.crs)
     with RasterWriter(path, grid, np.float32, crs, options=STORED) as writer:
         writer.describe("true height, m")
         writer.write(0, 0, heights.astype(np.float32))

@@ -13,6 +13,7 @@ import shapely
 
 import aerotri
 from aerotri.formats.block.folder import write_block
+from aerotri.formats.gis.layers import spacing_of
 from aerotri.formats.gis.styles import STYLES
 from aerotri.reference.export_files import layers as described_layers
 from aerotri.vectors.geopackage import read_geopackage
@@ -192,6 +193,19 @@ def test_styles(written, layers):
             count = database.execute(f'SELECT count(*) FROM "{name}" WHERE {" OR ".join(filters) or 1}').fetchone()[0]
             left_out = sum(row.get("status") == "set aside" for row in layers[name])
             assert count == len(layers[name]) - left_out
+
+
+def test_photographs_are_named_where_the_map_has_room(layers, result):
+    """15 mm between neighbours of an even spread."""
+    rows = {row["f_table_name"]: row["styleQML"] for row in layers["layer_styles"]}
+    shown = {name: ElementTree.fromstring(text).find("labeling/settings/rendering") for name, text in rows.items()}
+    centre = result.adjusted.images.centre[:, :2]
+    spacing = np.sqrt(np.prod(np.ptp(centre, axis=0)) / len(centre))
+    assert float(shown["projection_centres"].get("scaleMax")) == pytest.approx(spacing / 0.015, rel=1e-3)
+    assert shown["control_vectors"].get("scaleVisibility") is None
+    line = [shapely.Point(x, 0.0) for x in (0.0, 10.0, 20.0, 30.0)]
+    assert spacing_of([*line, None]) == pytest.approx(7.5)
+    assert spacing_of(line[:1]) is None
 
 
 def test_every_column_is_described_with_its_unit(written, layers):

@@ -23,6 +23,7 @@ from aerotri.report.documents.parts import (
 )  # fmt: skip
 from aerotri.report.documents.picture_texts import in_language, picture_line
 from aerotri.report.plots.block import plot_block_plan, plot_ground_points
+from aerotri.report.plots.canvas import axes_at, new_figure, write_name
 from aerotri.report.plots.rendering import render_plots
 from synthetic import make_adjusted_block
 
@@ -78,6 +79,15 @@ def test_names_stay():
     assert picture_line("a.b less c.d", "de") == "a.b weniger c.d"
     assert picture_line("something else", "de") is None
     assert picture_line("control", "en") is None
+
+
+def test_names_on_a_map_stay():
+    """A pile that is called as one of our words."""
+    figure = new_figure(3.0, "Change", "")
+    write_name(axes_at(figure, 1.0, 0.5, 2.0, 1.5), (0.5, 0.5), "control")
+    said = [text.get_text() for text in in_language({"map": figure}, "de")["map"].findobj(Text)]
+    assert "control" in said
+    assert "Änderung" in said
 
 
 def test_ticks_have_a_comma():

@@ -112,7 +112,7 @@ class Bench {
   }
 
   async wanted(layer) {
-    if (layer === "ellipses" && !this.plan.ellipses) {
+    if (layer === "ellipses" && !this.plan.ellipses && !this.waiting) {
       await guarded(async () => { this.plan.ellipses = await ask("data/ellipses"); })();
       this.plan.surface.redraw();
     }
@@ -215,7 +215,7 @@ class Bench {
     if (Boolean(was && was.running) !== Boolean(job && job.running)) this.actions();
     if (was && was.running && job && !job.running && job.error) say(job.error);
     if (state.generation !== this.generation) await this.renew();
-    if (this.waiting && state.equations !== "being set up") { this.waiting = false; await this.loadPoint(); await this.showTab(); if (this.chosen.image !== null) await this.reopen(); }
+    if (this.waiting && state.equations !== "being set up") { this.waiting = false; await this.loadPoint(); await this.showTab(); if (this.chosen.image !== null) await this.reopen(); if (this.plan.show.ellipses) await this.wanted("ellipses"); }
     if (state.equations === "being set up") this.waiting = true;
   }
 

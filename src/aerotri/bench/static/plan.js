@@ -2,6 +2,7 @@
 
 import { checkbox, choice, slider, make, fixed } from "./dom.js";
 import { STEPS, UNKNOWN, sixths, stepOf, limitsOfW } from "./colours.js";
+import { drawBars, showColours } from "./legend.js";
 import { Surface } from "./surface.js";
 
 export class Plan {
@@ -56,19 +57,20 @@ export class Plan {
   }
 
   bar() {
-    const set = (name, words, title) => checkbox(words, this.show[name], on => { this.show[name] = on; this.surface.redraw(); if (on) this.bench.wanted(name); }, title);
+    const set = (name, words, title) => checkbox(words, this.show[name], on => { this.show[name] = on; showColours(this); this.surface.redraw(); if (on) this.bench.wanted(name); }, title);
     const scale = (name, title) => slider("×k", -1.5, 1.5, 0, value => { this.factor[name] = 10 ** value; this.surface.redraw(); }, title);
     this.factor = this.factor || { vectors: 1, ellipses: 1 };
     document.getElementById("plan-bar").replaceChildren(
       make("span", { class: "title" }, "Plan"),
       set("footprints", "footprints", "Photographs on the mean height of their points"), set("strips", "strips"),
       set("points", "points"),
-      choice("by", { w: "|w|", sigma: "σ" }, this.by, by => { this.by = by; this.sort(); this.surface.redraw(); }),
+      choice("by", { w: "|w|", sigma: "σ" }, this.by, by => { this.by = by; this.sort(); showColours(this); this.surface.redraw(); }),
       set("control", "control"), set("vectors", "differences", "Adjusted − given of control and check points, drawn larger"),
       scale("vectors", "How much larger differences are drawn"),
       set("ellipses", "ellipses", "Error ellipses of the points in plan, drawn larger"), scale("ellipses", "How much larger ellipses are drawn"),
       make("button", { type: "button", onclick: () => this.fit() }, "whole block"),
       ...(this.more || []));
+    showColours(this);
   }
 
   draw(pen) {
@@ -81,6 +83,7 @@ export class Plan {
     if (this.show.control) this.drawControl(pen);
     if (this.show.vectors) this.drawVectors(pen);
     this.drawChosen(pen);
+    drawBars(pen, this);
   }
 
   // Surfaces and orthophotos: a picture each, asked for when it is to be seen.

@@ -3,6 +3,8 @@
 import { ask } from "./api.js";
 import { fixed, guarded, make } from "./dom.js";
 
+// What a row of edits.csv says, in words.
+const ACTIONS = { mark: "mark set", remove: "mark removed", off: "switched off", on: "switched on", check: "used as check point", control: "used as control point", new_control: "new control point", new_check: "new check point", undo: "taken back" };
 const KINDS = { moved: "mark moved", new: "mark set", removed: "mark removed", off: "switched off", on: "switched on", check: "used as check point", control: "used as control point", new_control: "new control point", new_check: "new check point" };
 
 export class EditSheet {
@@ -12,7 +14,7 @@ export class EditSheet {
     const { rows, file, changes } = this.bench.edits;
     const pair = place => place ? `${fixed(place[0], 2)}, ${fixed(place[1], 2)}` : "";
     const body = rows.map(one => make("tr", { class: one.stands ? "" : "off" },
-      ...[one.time.replace("T", " ").slice(0, 19), one.action, one.image, one.point, pair(one.place), pair(one.before), one.reason].map(text => make("td", {}, text))));
+      ...[one.time.replace("T", " ").slice(0, 19), ACTIONS[one.action] ?? one.action, one.image, one.point, pair(one.place), pair(one.before), one.reason].map(text => make("td", {}, text))));
     const heads = ["time (UTC)", "what", "photograph", "point", "column, row", "before", "reason"];
     const open = changes.map(one => make("li", {}, `${KINDS[one.kind]}: ${one.name}${one.image === null ? "" : ` in ${this.bench.names.images[one.image]}`}${one.reason ? ` (${one.reason})` : ""}`));
     sheet.replaceChildren(

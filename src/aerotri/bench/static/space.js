@@ -15,7 +15,7 @@ export class SpaceSheet {
   }
 
   render(sheet) {
-    sheet.replaceChildren(this.canvas);
+    sheet.replaceChildren(this.canvas, make("p", { class: "hint" }, "Points in the colours of the plan, projection centres dark, rays of the chosen point blue. Drag turns, the wheel scales. Heights are not exaggerated."));
     this.draw();
   }
 
@@ -59,6 +59,23 @@ export class SpaceSheet {
     pen.fillStyle = "#3b4a5c";
     for (const c of centre) if (c[0] !== null) { const [x, y] = at(...c); pen.fillRect(x - 2, y - 2, 4, 4); }
     this.rays(pen, at, xyz, centre);
+    this.axes(pen, height);
+  }
+
+  // East, north and up, as long as one another, in the lower left corner.
+  axes(pen, height) {
+    const cos = Math.cos(this.turn), sin = Math.sin(this.turn), ct = Math.cos(this.tilt), st = Math.sin(this.tilt), x = 60, y = height - 70;
+    const ends = { E: [cos, -sin * st], N: [-sin, -cos * st], up: [0, -ct] };
+    pen.strokeStyle = pen.fillStyle = "#111";
+    pen.lineWidth = 1.5;
+    pen.font = "12px system-ui, sans-serif";
+    for (const [name, [u, v]] of Object.entries(ends)) {
+      pen.beginPath();
+      pen.moveTo(x, y);
+      pen.lineTo(x + 36 * u, y + 36 * v);
+      pen.stroke();
+      pen.fillText(name, x + 46 * u - 5, y + 46 * v + 4);
+    }
   }
 
   rays(pen, at, xyz, centre) {

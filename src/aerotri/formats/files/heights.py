@@ -30,6 +30,7 @@ class HeightSource:
     ----------
     heights : to be asked. area : (2, 2) m, lower left and upper right corner of what it covers.
     cell : m, its typical cell. epsg : code of its CRS, None where not known.
+    crs : 'EPSG:n', 'EPSG:n+m' where a system of the heights is stated, '' where not known.
     note : what was done to bring it to metres, '' for nothing.
     """
 
@@ -38,6 +39,7 @@ class HeightSource:
     cell: float
     epsg: int | None = None
     note: str = ""
+    crs: str = ""
 
 
 def file_of_surface(path: Path) -> Path:
@@ -106,11 +108,11 @@ def heights_of_raster(reader: MetricReader | HeldRaster) -> HeightSource:
     if g.rows * g.columns > LARGEST_HELD:
         left, bottom, right, top = g.bounds
         area = np.array([[left, bottom], [right, top]])
-        return HeightSource(FileHeights(reader), area, g.cell_x, reader.epsg, reader.note)
-    z, epsg = reader.read(0, 0, g.rows, g.columns).astype(float), reader.epsg
+        return HeightSource(FileHeights(reader), area, g.cell_x, reader.epsg, reader.note, reader.crs_code)
+    z = reader.read(0, 0, g.rows, g.columns).astype(float)
     known_rows, known_columns = np.isfinite(z).any(axis=1), np.isfinite(z).any(axis=0)
     if not known_rows.any():
         raise InputError("has no data", "give a raster with heights", reader.path)
     rows, columns = np.flatnonzero(known_rows)[[0, -1]], np.flatnonzero(known_columns)[[0, -1]]
     area = np.array([[g.x(columns[0]), g.y(rows[1])], [g.x(columns[1]), g.y(rows[0])]], dtype=float)
-    return HeightSource(RasterHeights(g, z), area, g.cell_x, epsg, reader.note)
+    return HeightSource(RasterHeights(g, z), area, g.cell_x, reader.epsg, reader.note, reader.crs_code)

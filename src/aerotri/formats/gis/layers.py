@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -189,7 +190,23 @@ def _several(xyz: np.ndarray) -> object:
 
 def with_texts(layers: Sequence[Layer], fields: Mapping[str, Mapping[str, str]]) -> list[Layer]:
     """Layers with what their columns are, by the names of layer and column, and their styles."""
-    return [
-        replace(layer, fields=fields[layer.name], style=qml(STYLES[layer.name]) if layer.name in STYLES else "")
-        for layer in layers
-    ]
+    return [replace(layer, fields=fields[layer.name], style=_style_of(layer)) for layer in layers]
+
+
+def _style_of(layer: Layer) -> str:
+    """Its style for QGIS, '' for a layer without one; photographs are named where the map has room for their names."""
+    if layer.name not in STYLES:
+        return ""
+    return qml(STYLES[layer.name], spacing_of(layer.geometries) if layer.name == "projection_centres" else None)
+
+
+def spacing_of(places: Sequence[Any] | np.ndarray) -> float | None:
+    """m between neighbours of evenly spread places; None for fewer than two."""
+    import shapely
+
+    known = [place for place in places if place is not None]
+    if len(known) < 2:
+        return None
+    left, bottom, right, top = shapely.total_bounds(known)
+    wide, tall = float(right - left), float(top - bottom)
+    return max(float(np.sqrt(wide * tall / len(known))), max(wide, tall) / len(known)) or None

@@ -112,8 +112,17 @@ STYLES = {
 """The style of every layer by its name."""
 
 
-def qml(style: Style) -> str:
-    """A style as QGIS reads it from the table layer_styles."""
+LABEL_MM = 15.0
+"""Between things that are named, on the screen or on paper [C]: the name of a photograph is about as long."""
+
+
+def qml(style: Style, spacing: float | None = None) -> str:
+    """A style as QGIS reads it from the table layer_styles.
+
+    Parameters
+    ----------
+    spacing : m between the features, which are named on maps where it is `LABEL_MM` or more; None: on every map.
+    """
     rules = "".join(
         f'<rule key="{number}" symbol="{number}" label="{escape(rule.label)}"{_filter(rule)}/>'
         for number, rule in enumerate(style.rules)
@@ -125,7 +134,7 @@ def qml(style: Style) -> str:
         f'{HEAD}<qgis version="3.22" styleCategories="Symbology|Labeling" labelsEnabled="{int(bool(style.label))}">'
         f'<renderer-v2 type="RuleRenderer" symbollevels="0" enableorderby="0" forceraster="0">'
         f'<rules key="all">{rules}</rules><symbols>{symbols}</symbols></renderer-v2>'
-        f"{_labels(style.label, shape)}<layerGeometryType>{kind}</layerGeometryType></qgis>"
+        f"{_labels(style.label, shape, spacing)}<layerGeometryType>{kind}</layerGeometryType></qgis>"
     )
 
 
@@ -178,13 +187,14 @@ def _head(name: str, properties: Mapping[str, str]) -> str:
     return _layer("MarkerLine", {"placement": "lastvertex", "placements": "LastVertex", "rotate": "1"}, below=symbol)
 
 
-def _labels(column: str, shape: str) -> str:
+def _labels(column: str, shape: str, spacing: float | None) -> str:
     if not column:
         return ""
+    limit = "" if spacing is None else f' scaleVisibility="1" scaleMin="0" scaleMax="{1e3 * spacing / LABEL_MM:.0f}"'
     return (
         f'<labeling type="simple"><settings><text-style fieldName="{escape(column)}" isExpression="0" fontSize="7"'
         f' fontSizeUnit="Point" textColor="{BLACK}" textOpacity="1"><text-buffer bufferDraw="1" bufferSize="0.6"'
         f' bufferSizeUnits="MM" bufferColor="{WHITE}" bufferOpacity="1"/></text-style>'
         f'<placement placement="{LABELS[shape]}" dist="0.8" distUnits="MM" priority="5"/>'
-        '<rendering drawLabels="1" displayAll="0" obstacle="1"/></settings></labeling>'
+        '<rendering drawLabels="1" displayAll="0" obstacle="1"' + limit + "/></settings></labeling>"
     )

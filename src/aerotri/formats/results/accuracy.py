@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from aerotri.diagnosis.accuracy_inspire import inspire_accuracy
 from aerotri.diagnosis.accuracy_rules import points_for_area, project_area, reached
 from aerotri.diagnosis.accuracy_sentences import STANDARD
 from aerotri.formats.results.json_text import number_or_none
@@ -24,6 +25,7 @@ def accuracy_json(r: AccuracyRecord) -> dict[str, Any]:
             "RMSE_H": number_or_none(r.rmse_h), "RMSE_V": number_or_none(r.nva), "VVA": number_or_none(r.vva),
             "RMSE_3D": number_or_none(r.rmse_3d),
         },
+        "inspire": _inspire(r),
         "coordinates": [_coordinate(one) for one in r.errors],
         "check_points": len(r.points), "control_points": len(r.control_sigma),
         "project_area_km2": None if area is None else area / 1e6,
@@ -40,6 +42,15 @@ def accuracy_json(r: AccuracyRecord) -> dict[str, Any]:
         ],
         "points": _points(r.points),
     }  # fmt: skip
+
+
+def _inspire(r: AccuracyRecord) -> dict[str, Any]:
+    one = inspire_accuracy(r)
+    numbers = {
+        "RMSEP": one.rmse_p, "RMSE_x": one.rmse_x, "RMSE_y": one.rmse_y, "RMSE_z": one.rmse_z,
+        "grid_spacing": one.spacing, "contour_interval": one.interval, "scale_denominator": one.scale,
+    }  # fmt: skip
+    return {name: number_or_none(value) for name, value in numbers.items()}
 
 
 def _coordinate(one: CoordinateErrors) -> dict[str, Any]:

@@ -126,8 +126,10 @@ def read_point_cloud(path: Path, parallel: bool = True) -> tuple[np.ndarray, np.
     return xyz, classes
 
 
-def read_precise_cloud(path: Path) -> tuple[np.ndarray, np.ndarray | None, int | None]:
-    """Points (n, 3) m of a LAS or LAZ file, their covariances (n, 6) m² and the code of their CRS; None where unknown.
+def read_precise_cloud(path: Path) -> tuple[np.ndarray, np.ndarray | None, str]:
+    """Points (n, 3) m of a LAS or LAZ file, their covariances (n, 6) m², None where unknown, and their CRS.
+
+    The CRS is 'EPSG:n', 'EPSG:n+m' where a height system is stated, '' without a code.
 
     Covariances XX, YY, ZZ, XY, XZ, YZ are those of `SURFACE_FIELDS`; with `sigma_x` to `sigma_z` alone the rest is 0.
 
@@ -147,7 +149,9 @@ def read_precise_cloud(path: Path) -> tuple[np.ndarray, np.ndarray | None, int |
         crs = cloud.header.parse_crs()
     except Exception as error:  # as above
         raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
-    system = None if crs is None else (crs.sub_crs_list[0] if crs.is_compound else crs).to_epsg()
+    systems = [] if crs is None else [one.to_epsg() for one in (crs.sub_crs_list if crs.is_compound else [crs])]
+    known = [str(code) for code in systems if code is not None] if systems and systems[0] is not None else []
+    system = f"EPSG:{'+'.join(known)}" if known else ""
     if not {"sigma_x", "sigma_y", "sigma_z"} <= there:
         return xyz, None, system
     covariance = np.column_stack([*(column**2 for column in columns[:3]), *columns[3:]])

@@ -8,8 +8,9 @@ from datetime import date
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.image_errors import ImageGroup, image_groups
+from aerotri.image_errors import ImageGroup, image_groups, interior_elements
 from aerotri.observations import Camera
+from aerotri.observations.block import INTERIOR_ELEMENTS
 from aerotri.report.documents import camera_tables
 from aerotri.report.documents.figures import as_files, camera_figures
 from aerotri.report.documents.head import Context, document, signature_fields
@@ -87,9 +88,7 @@ def _of_camera(
                              [breakable(text) for text in o.reasons]))  # fmt: skip
     parts += [heading(words("calibration.interior")), camera_tables.interior_table(adjusted, [camera], words)]
     parts.append(paragraph(words("calibration.about_interior"), small=True))
-    held = camera_tables.held_rows(camera, words)
-    parts.append(heading(words("calibration.held")))
-    parts.append(pairs(held) if held else paragraph(words("calibration.nothing_held")))
+    parts += _held(adjusted, camera, bool(np.any(own & (p.kinds != "interior"))), words)
     parts += [heading(words("calibration.validity")), pairs(_validity(adjusted, groups, context))]
     parts += [heading(words("calibration.next")), paragraph(_next(context)),
               entries([words(f"calibration.next_{k}") for k in (1, 2, 3)]),
@@ -105,6 +104,22 @@ def _of_camera(
         parts.append(paragraph(words("calibration.no_parameters")))
     pictures, files = _pictures(adjusted, groups, words, number)
     return [*parts, *pictures, *_correlations(adjusted, camera, rows, words)], files
+
+
+def _held(adjusted: AdjustedBlock, camera: Camera, has_parameters: bool, words: Words) -> list[Part]:
+    """What was held beside the elements that the table of the interior orientation calls held.
+
+    Parameters
+    ----------
+    has_parameters : whether any additional parameter was determined.
+    """
+    determined = int((interior_elements(adjusted, camera)[1] > 0.0).sum())
+    if not determined and not has_parameters:
+        return [paragraph(words("calibration.nothing_determined"))]
+    held = camera_tables.held_rows(camera, words)
+    if held:
+        return [heading(words("calibration.held")), pairs(held)]
+    return [paragraph(words("calibration.nothing_held"))] if determined == len(INTERIOR_ELEMENTS) else []
 
 
 def _validity(adjusted: AdjustedBlock, groups: Sequence[ImageGroup], context: Context) -> list[tuple[str, str]]:

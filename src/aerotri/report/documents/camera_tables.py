@@ -70,9 +70,8 @@ def parameter_table(adjusted: AdjustedBlock, rows: np.ndarray, words: Words) -> 
 
 
 def held_rows(camera: Camera, words: Words) -> list[tuple[str, str]]:
-    """What of the camera was stated and held, with its value."""
-    rows = [(SYMBOLS[key], f"{words.number(one.value, 4)} mm") for key, one in camera.interior.items()
-            if one.fixed and key in SYMBOLS]  # fmt: skip
+    """Parameters beside the interior orientation that were stated and held, with their values."""
+    rows: list[tuple[str, str]] = []
     for family, held in (("brown", camera.brown), ("lens", camera.lens), ("", camera.parameters)):
         for name, one in held.items():
             if one.fixed and one.value != 0.0:

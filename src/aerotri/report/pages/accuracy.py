@@ -9,7 +9,14 @@ from aerotri.diagnosis.accuracy_sentences import STANDARD
 from aerotri.report.pages.accuracy_plan import check_plan
 from aerotri.report.pages.head import page_environment, page_head
 from aerotri.report.quality import printable
-from aerotri.report.tables.accuracy import MARKS, conclusion, errors_table, points_table
+from aerotri.report.tables.accuracy import (
+    MARKS,
+    conclusion,
+    errors_table,
+    inspire_table,
+    inspire_words,
+    points_table,
+)
 from aerotri.results.accuracy import AccuracyRecord
 
 BOXES = {"met": "passed", "not met": "banner", "cannot be said": "warnings"}
@@ -22,7 +29,8 @@ def accuracy_html(r: AccuracyRecord) -> str:
         name=printable(r.block), standard=STANDARD, box=BOXES[r.met], conclusion=conclusion(r),
         cards=_cards(r), warnings=[printable(text, 1000) for text in r.warnings], statements=r.statements,
         rows=[(one, printable(one.found, 500), MARKS[one.met]) for one in r.requirements],
-        errors=errors_table(r), points=points_table(r), head=page_head(r.head),
+        errors=errors_table(r), inspire=inspire_table(r), inspire_words=inspire_words(r),
+        points=points_table(r), head=page_head(r.head),
         plan=None if r.layout is None or not len(r.points) else check_plan(r.points, r.layout),
         vegetated=bool(r.points.vegetated.any()), rejected=r.verdict == "rejected",
     )  # fmt: skip

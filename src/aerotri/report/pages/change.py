@@ -13,8 +13,8 @@ from aerotri.report.quality import printable, two_digits, with_sigma
 from aerotri.results.head import Head
 
 CAPTION = (
-    "Left: difference of the surfaces where it is beyond the level of detection; brown is gained, blue is lost, grey "
-    "cannot be told from noise. Right: σ of the difference."
+    "Left: difference of the surfaces where it is beyond the level of detection; brown is gained, blue (hatched) is "
+    "lost, grey cannot be told from noise. Right: σ of the difference."
 )
 PARTS = {"adjustment": "adjustments", "model": "model part of the adjustments"}
 UNKNOWNS = {

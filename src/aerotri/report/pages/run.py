@@ -83,10 +83,10 @@ def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
     if accuracy := of_step.get("accuracy"):
         found += _accuracy(accuracy)
     if volume := of_step.get("volume"):
-        sigma = (volume.get("sigma") or {}).get("sigma_m3")
-        parts = [f"{volume['net_m3']:.{_places(sigma)}f} m³"]
-        parts += [f" ± {sigma:.{_places(sigma)}f} m³ (1 σ)"] if sigma else [", without σ"]
-        found.append(("Volume, net", "".join(parts)))
+        piles = volume.get("piles") or []
+        found += [(f"Volume of {printable(str(one['name']))}, net", _net(one, one["sigma_m3"])) for one in piles]
+        name = "Volume of all piles, net" if piles else "Volume, net"
+        found.append((name, _net(volume, (volume.get("sigma") or {}).get("sigma_m3"))))
     if surface := of_step.get("dsm"):
         sigma = surface["sigma_Z_m"]["median"]
         found.append(("Dense surface", f"cells of {surface['cell_m']:.3g} m; σ of heights {sigma:.3f} m (median)"))
@@ -95,6 +95,12 @@ def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
         text = f"cells of {image['cell_m']:g} m; σ of positions {total['median']:.3f} m (median), 95 % below "
         found.append(("Orthophoto", f"{text}{total['q95']:.3f} m"))
     return found
+
+
+def _net(volume: Mapping[str, Any], sigma: float | None) -> str:
+    """A volume with its σ."""
+    text = f"{volume['net_m3']:.{_places(sigma)}f} m³"
+    return f"{text} ± {sigma:.{_places(sigma)}f} m³ (1 σ)" if sigma else f"{text}, without σ"
 
 
 def _accuracy(content: Mapping[str, Any]) -> list[tuple[str, str]]:

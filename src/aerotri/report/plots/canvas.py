@@ -17,6 +17,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.quiver import Quiver
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
 
@@ -104,6 +105,23 @@ def axes_at(figure: Figure, left: float, bottom: float, width: float, height: fl
 def plain(name: object, longest: int = 40) -> str:
     """A name as text that is drawn as it stands: no formula between dollars, no line breaks, not endless."""
     return printable(name, longest).replace("$", r"\$")
+
+
+OWN_NAME = "a name of the user"
+"""Label of texts that stay as they are in every language."""
+
+
+def write_name(axes: Axes, place: tuple[float, float], name: object) -> None:
+    """A name of the user on a map, with a light edge so that it can be read over any tone.
+
+    Parameters
+    ----------
+    place : X and Y of its middle.
+    """
+    edge = [withStroke(linewidth=2.5, foreground="white")]
+    axes.text(
+        *place, plain(name, 24), ha="center", va="center", fontsize=8.5, zorder=6, path_effects=edge, label=OWN_NAME
+    )
 
 
 def nice_number(value: float) -> float:

@@ -48,5 +48,5 @@ def plot_distances(found: CloudDistances, content: Mapping[str, Any]) -> Figure:
         if k == 0:
             axes.scatter(*found.core[known & ~beyond, :2].T, s=size, c=QUIET, marker="s", lw=0)
         image = axes.scatter(*found.core[rows, :2].T, s=size, c=values[rows], marker="s", lw=0, **style)
-        finish_map(figure, axes, image, label, (left, bottom, right, top), k == 0)
+        finish_map(figure, axes, image, label, (left, bottom, right, top), k == 0, content["crs"])
     return figure

@@ -25,6 +25,7 @@ from aerotri.report.plots.canvas import (
     new_figure,
     plain,
     styled,
+    write_name,
 )
 from aerotri.report.quality import two_digits, with_sigma
 from aerotri.volume.accuracy import MODEL
@@ -36,7 +37,10 @@ from aerotri.volume.thickness import ThicknessMap
 HIGHEST = 6.4
 """Inches that a map is high at most: with its title it fits a printed page."""
 CUT, FILL = "#7a2e0e", "#0b3d6b"
-# light in the middle and equally dark at both ends: in black and white the bold zero line tells the sides apart
+ONE_SIDED = 0.02
+"""Share of the largest height from which both cut and fill are shown [C]: with less the other is noise at the edge."""
+ZERO_LINE = (0, (1, 1.2))
+# light in the middle and equally dark at both ends: in black and white the zero line tells the sides apart
 COLOURS = LinearSegmentedColormap.from_list("cut_and_fill", [FILL, "#8fb4d6", "#ffffff", "#dfa684", CUT])
 WORDS = {
     "adjustment": "adjustment (orientation, self-calibration; all heights correlated)",
@@ -71,28 +75,32 @@ def plot_thickness(found: ThicknessMap, boundary: Boundary, volumes: Volumes, co
     figure = new_figure(height + 1.95, "Cut and fill", subtitle)
     axes = axes_at(figure, 0.95, 0.95, width, height)
     finite = found.thickness[np.isfinite(found.thickness)]
-    size = max(float(np.abs(np.percentile(finite, [0.5, 99.5])).max()), 1e-6)
+    low, high = (float(value) for value in np.percentile(finite, [0.5, 99.5]))
+    size = max(-low, high, 1e-6)
+    has_both = min(-low, high) > ONE_SIDED * size
     norm = TwoSlopeNorm(0.0, -size, size)
     extent = found.grid.bounds
     image = axes.imshow(found.thickness, cmap=COLOURS, norm=norm, interpolation="nearest", aspect="auto",
                         extent=(extent[0], extent[2], extent[1], extent[3]), zorder=1)  # fmt: skip
-    if finite.min() < 0.0 < finite.max() and min(found.thickness.shape) > 1:
+    if has_both and min(found.thickness.shape) > 1:
         x, y = found.grid.x(np.arange(found.grid.columns)), found.grid.y(np.arange(found.grid.rows))
-        axes.contour(x, y, found.thickness, levels=[0.0], colors=INK, linewidths=1.0, zorder=2)
+        axes.contour(x, y, found.thickness, levels=[0.0], colors=INK, linewidths=1.2, linestyles=[ZERO_LINE], zorder=2)
     axes.add_collection(LineCollection(boundary.rings, colors=INK, linewidths=1.4, linestyles="-", zorder=3))
     _section_marks(axes, volumes.sections, boundary)
+    for name, polygon in boundary.piles:
+        write_name(axes, (polygon.representative_point().x, polygon.bounds[3] - 0.5 * margin), name)
     axes.set_xlim(left - margin, right + margin)
     axes.set_ylim(bottom - margin, top + margin)
     _coordinates(axes, width, height, content["crs"])
     scale = axes_at(figure, 0.95 + width + 0.15, 0.95, 0.16, height)
     bar = figure.colorbar(image, cax=scale)
     bar.set_label("surface − base [m]")
-    scale.set_ylim(0.0 if finite.min() >= 0.0 else -size, 0.0 if finite.max() <= 0.0 else size)
+    scale.set_ylim(-size if has_both or high < -low else 0.0, size if has_both or high >= -low else 0.0)
     scale.yaxis.set_major_formatter(FuncFormatter(coordinate_text))
     handles = [Line2D([], [], color=INK, lw=1.4, label="boundary"),
                Line2D([], [], color=GREY, lw=0.7, ls=(0, (4, 3)), label="sections drawn")]  # fmt: skip
-    if finite.min() < 0.0 < finite.max():
-        handles.append(Line2D([], [], color=INK, lw=1.0, label="surface on the base"))
+    if has_both:
+        handles.append(Line2D([], [], color=INK, lw=1.2, ls=ZERO_LINE, label="surface on the base"))
     figure.legend(handles=handles, loc="center left", bbox_to_anchor=(0.9 / WIDTH, 0.25 / (height + 1.95)), ncols=3)
     return figure
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from aerotri.diagnosis.accuracy_inspire import inspire_accuracy
 from aerotri.diagnosis.accuracy_rules import cm, reached
 from aerotri.report.quality import printable
 from aerotri.report.tables.adjustment import Column, Table, table
@@ -58,6 +61,37 @@ def _name(one: CoordinateErrors, r: AccuracyRecord) -> str:
     if one.vegetated:
         return "Z in vegetation (VVA)"
     return f"{one.axis} outside vegetation (NVA)" if one.axis == "Z" and r.errors[3].count else one.axis
+
+
+def inspire_table(r: AccuracyRecord) -> Table:
+    """A row a measure of INSPIRE, cm."""
+    one, plan, height = inspire_accuracy(r), r.errors[0].count, r.errors[2].count
+    rows = [
+        ("root mean square error of planimetry (RMSEP)", "47", one.rmse_p, plan),
+        ("root mean square error in X (RMSE-x)", "adapted from 39", one.rmse_x, plan),
+        ("root mean square error in Y (RMSE-y)", "adapted from 39", one.rmse_y, plan),
+        ("root mean square error of heights (RMSE)", "39", one.rmse_z, height),
+    ]
+    return table(
+        "In the measures of INSPIRE",
+        (Column("measure"), [name for name, _, _, _ in rows]),
+        (Column("ISO 19157"), [number for _, number, _, _ in rows]),
+        (Column("result", "cm", ".2f"), [100.0 * value for _, _, value, _ in rows]),
+        (Column("points", "", "d"), [count for _, _, _, count in rows]),
+    )
+
+
+def inspire_words(r: AccuracyRecord) -> str:
+    """What INSPIRE recommends such an accuracy for."""
+    one = inspire_accuracy(r)
+    said = "INSPIRE has no minimum requirements. Its recommendations for elevation data are kept by"
+    parts = (
+        (one.spacing, f"grids with a spacing of {one.spacing:.2f} m or more"),
+        (one.interval, f"contour lines every {one.interval:.2f} m or more"),
+        (one.scale, f"vector data at scales of 1:{np.ceil(one.scale):.0f} or smaller"),
+    )
+    known = [text for value, text in parts if np.isfinite(value)]
+    return f"{said} {', '.join(known)}." if known else ""
 
 
 def points_table(r: AccuracyRecord) -> Table:

@@ -11,6 +11,8 @@ from aerotri.formats.results.run_comparison import readable_setting
 from aerotri.report.tables.adjustment import Column, Table, cell_text, table
 from aerotri.statistics.comparison import Change, Comparison, Differences, ParameterChange
 
+WORDS = {"sigma0": "σ0", "sigma0_um": "σ0 [µm]", "vtpv": "sum of squared residuals, weighted (vᵀPv)"}
+"""Of the outcome, where its key in adjustment.json is no word."""
 UNITS = {"X0": "m", "Y0": "m", "Z0": "m", "omega": "mgon", "phi": "mgon", "kappa": "mgon", "X": "m", "Y": "m", "Z": "m"}
 
 
@@ -44,7 +46,10 @@ def _titled(title: str, count: int, shown: int) -> str:
 
 
 def _changes(title: str, changes: tuple[Change, ...]) -> Table:
-    rows = [(c.name, *(_text(readable_setting(c.name, value)) for value in (c.first, c.second))) for c in changes]
+    rows = [
+        (WORDS.get(c.name, c.name), *(_text(readable_setting(c.name, value)) for value in (c.first, c.second)))
+        for c in changes
+    ]
     return Table(title, (Column("what"), Column("first"), Column("second")), tuple(rows))
 
 

@@ -15,6 +15,7 @@ from matplotlib.text import Text
 from matplotlib.ticker import Formatter
 
 from aerotri.report.documents.words import languages
+from aerotri.report.plots.canvas import OWN_NAME
 from aerotri.report.plots.rendering import save_plots
 
 POINT = re.compile(r"(?<=[0-9])\.(?=[0-9])")
@@ -93,7 +94,7 @@ def _translate(figure: Figure, language: str) -> None:
     of_ticks = {id(text) for axis in axes for text in _tick_texts(axis)}
     for text in figure.findobj(Text):
         said = text.get_text()
-        if said.strip() and id(text) not in of_ticks:
+        if said.strip() and id(text) not in of_ticks and text.get_label() != OWN_NAME:
             text.set_text("\n".join(picture_line(line, language) or line for line in said.split("\n")))
 
 
