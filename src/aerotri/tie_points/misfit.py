@@ -12,8 +12,11 @@ from aerotri.formats.assembly.reprojection import Reprojection, ideal_tangents
 from aerotri.observations import Block
 
 POWERS = tuple((i, j) for i in range(4) for j in range(4 - i))
-"""Of x and y, up to the third together: what errors of an orientation and of a lens do to the parallaxes of a pair."""
-FEWEST = 10 * len(POWERS)
+"""Of x and y, up to the third together: what errors of an orientation and of a lens do to the parallaxes of a pair over
+flat ground."""
+UNKNOWNS = len(POWERS) + 3
+"""With what the height of the ground changes in it: the place along the base in the other photograph, by 1, x and y."""
+FEWEST = 10 * UNKNOWNS
 """Points of a pair from which so many unknowns can be taken off without much effect on the rest [C]."""
 MOST_PAIRS = 2000
 """Pairs that are looked at [C]: the median of their parallaxes is known to a per cent long before."""
@@ -71,11 +74,12 @@ def _rest_of_pairs(
     scale = np.array([camera.focal_length_mm for camera in block.cameras])[block.images.camera[rays.image]]
     sigma = rays.sigma.mean(axis=1) / scale
     for one, other in _pairs(rays.image, rays.point, own):
-        z = parallaxes(orientation, (rays.image[one[0]], rays.image[other[0]]), (tangent[one], tangent[other]),
-                       (sigma[one], sigma[other]))  # fmt: skip
+        pair = rays.image[one[0]], rays.image[other[0]]
+        z = parallaxes(orientation, pair, (tangent[one], tangent[other]), (sigma[one], sigma[other]))
         known = np.isfinite(z)
         if known.sum() >= FEWEST:
-            yield without_smooth_part(z[known], tangent[one][known])
+            along = tangent[other] @ base_in(orientation, pair)
+            yield without_smooth_part(z[known], tangent[one][known], along[known])
 
 
 def _pairs(image: np.ndarray, point: np.ndarray, own: np.ndarray) -> Iterator[Rays]:
@@ -116,12 +120,25 @@ def parallaxes(
         return np.einsum("ki,ki->k", one, by_one) / np.sqrt(variance)
 
 
-def without_smooth_part(value: np.ndarray, xy: np.ndarray) -> np.ndarray:
-    """(k,) values less a polynomial of their places (k, 2), as large as without its unknowns."""
+def base_in(orientation: tuple[np.ndarray, np.ndarray], pair: tuple[int, int]) -> np.ndarray:
+    """(2,) direction of the base in the second photograph of a pair."""
+    centre, rotation = orientation
+    base = ((centre[pair[1]] - centre[pair[0]]) @ rotation[pair[1]])[:2]
+    return base / max(float(np.linalg.norm(base)), 1e-300)
+
+
+def without_smooth_part(value: np.ndarray, xy: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """(k,) values less a polynomial, as large as without its unknowns.
+
+    Parameters
+    ----------
+    xy : (k, 2) places in the first photograph. along : (k,) those along the base in the second.
+    """
     x, y = (xy / np.abs(xy).max()).T
-    design = np.column_stack([x**i * y**j for i, j in POWERS])
+    height = along / np.abs(along).max()
+    design = np.column_stack([*(x**i * y**j for i, j in POWERS), height, height * x, height * y])
     rest, good = value, np.ones(len(value), bool)
     for _ in range(2):
         rest = value - design @ np.linalg.lstsq(design[good], value[good], rcond=None)[0]
         good = np.abs(rest) <= GROSS * SIGMA_PER_MAD * np.median(np.abs(rest))
-    return rest * np.sqrt(len(value) / (len(value) - len(POWERS)))
+    return rest * np.sqrt(len(value) / (len(value) - UNKNOWNS))
