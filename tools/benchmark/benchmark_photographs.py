@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import aerotri
-from aerotri.coordinates.similarity import nearest_similarity
 
 HEAD = """| program | features s | matching s | orientation s | together s | of the processor s | photographs | points \
 | rays a photograph | rays a point | three or more | median residual px | 95 % below px | check RMS X Y Z m |
@@ -146,8 +146,12 @@ def check(found: dict[str, np.ndarray], marks: Marks | None) -> str:
         return "–"
     control = sorted(name for name in found if name.startswith("C"))
     others = sorted(name for name in found if name.startswith("K"))
-    carried = nearest_similarity(*(np.array([xyz[name] for name in control]) for xyz in (found, marks.xyz)))
-    left = carried(np.array([found[name] for name in others])) - np.array([marks.xyz[name] for name in others])
+    source, target = (np.array([xyz[name] for name in (*control, *others)]) for xyz in (found, marks.xyz))
+    held = slice(0, len(control))
+    one, other = source - source[held].mean(axis=0), target - target[held].mean(axis=0)
+    turned = Rotation.align_vectors(other[held], one[held])[0].apply(one)
+    scale = (turned[held] * other[held]).sum() / (turned[held] ** 2).sum()
+    left = (scale * turned - other)[len(control) :]
     return " ".join(f"{value:.4f}" for value in np.sqrt((left**2).mean(axis=0)))
 
 
