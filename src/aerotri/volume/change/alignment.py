@@ -80,7 +80,8 @@ def slopes_of(grid: Grid, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if not known.any():
         return np.full(z.shape, np.nan), np.full(z.shape, np.nan)
     row, column = np.indices(z.shape)
-    means = (_means(values, known) for values in (z - np.median(z[known]), column * grid.cell_x, -row * grid.cell_y))
+    of: tuple[np.ndarray, ...] = (z - np.median(z[known]), column * grid.cell_x, -row * grid.cell_y)
+    means = (_means(values, known) for values in of)
     (z_down, z_along), (x_down, x_along), (y_down, y_along) = (np.gradient(mean) for mean in means)
     area = x_along * y_down - x_down * y_along
     told = known & (np.abs(area) > LEAST_SPREAD * grid.cell_x * grid.cell_y)
