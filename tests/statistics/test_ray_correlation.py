@@ -64,6 +64,13 @@ def test_independent_errors_are_not_alike():
     assert sum(value > 0.5 for value in p) >= 7
 
 
+def test_residuals_of_zero_tell_nothing():
+    block, rays = residuals(1, 0.0)
+    found = ray_correlation(block, replace(rays, w=0.0 * rays.w))
+    assert not found.alike
+    assert "do not scatter" in found.reason
+
+
 def test_rays_that_do_not_take_part():
     block, rays = residuals(1, SHARED)
     off = np.arange(len(rays.status)) % 3 == 0

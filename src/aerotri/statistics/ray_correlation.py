@@ -67,6 +67,8 @@ def ray_correlation(block: Block, rays: RayResults) -> RayCorrelation:
     if int(pairs[inside].sum()) < FEWEST_PAIRS:
         reason = f"fewer than {FEWEST_PAIRS} pairs of rays lie near one another"
         return RayCorrelation(limits, pairs, mean, sigma, reason=reason)
+    if not (of_near[0] > 0.0).all():
+        return RayCorrelation(limits, pairs, mean, sigma, reason="the residuals near one another do not scatter")
     return RayCorrelation(
         limits, pairs, mean, sigma, _probability(near[0] / of_near[0], len(n) - 1), float(NEAR * diagonal_px)
     )

@@ -79,9 +79,8 @@ def slopes_of(grid: Grid, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     known = np.isfinite(z)
     if not known.any():
         return np.full(z.shape, np.nan), np.full(z.shape, np.nan)
-    place: np.ndarray = np.indices(z.shape, dtype=float)
-    above = z - float(np.median(z[known]))
-    means = (_means(values, known) for values in (above, grid.cell_x * place[1], -grid.cell_y * place[0]))
+    x, y = np.meshgrid(grid.cell_x * np.arange(z.shape[1]), -grid.cell_y * np.arange(z.shape[0]))
+    means = (_means(values, known) for values in (z - float(np.median(z[known])), x, y))
     (z_down, z_along), (x_down, x_along), (y_down, y_along) = (np.gradient(mean) for mean in means)
     area = x_along * y_down - x_down * y_along
     told = known & (np.abs(area) > LEAST_SPREAD * grid.cell_x * grid.cell_y)
