@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from dataclasses import replace
 
@@ -171,3 +172,18 @@ def test_scale_of_the_map_shows_the_sides_that_count(below, both):
     assert ("surface on the base" in legend) is both
     assert bool(low < 0.0 < high) is both
     assert bool(high > 0.0) is (below < 400.0)
+
+
+def test_every_argument_stands_in_the_file_and_on_the_page(cone, tmp_path):
+    found = aerotri.volume(cone, PILE, base=100.0, boundary_sigma=0.05, density=1.8)
+    used = {one["key"]: one for one in found.summary["settings"]}
+    assert used["boundary_sigma"] == {"key": "boundary_sigma", "value": 0.05, "unit": "m", "origin": "given"}
+    assert (used["base"]["value"], used["density"]["value"]) == (100.0, 1.8)
+    left = inspect.signature(aerotri.volume).parameters.keys() - used.keys()
+    assert left == {"surface", "boundary", "adjustment", "pickets", "base_adjustment", "base_pickets", "project",
+                    "scratch", "progress"}  # fmt: skip
+    others = [one for name, one in used.items() if name not in ("base", "boundary_sigma", "density")]
+    assert {one["origin"] for one in others} == {"default"}
+    page = (found.save(tmp_path / "volume") / "volume.html").read_text(encoding="utf-8")
+    assert "<td>boundary_sigma</td><td>0.05 m</td><td>given</td>" in page
+    assert "<td>matching_window</td><td>–</td><td>default</td>" in page

@@ -117,17 +117,19 @@ def command(*words: object) -> None:
 
 def measured(folder: Path, epoch: int) -> tuple[dict[str, Any], float]:
     """volume.json of an epoch from its photographs, and the seconds of `aerotri run`."""
-    flight = aerotri.simulate(plan(epoch), seed=epoch)
-    flown = flight.save(folder / f"flown_{epoch}", photographs=True)
+    flight, flown = aerotri.simulate(plan(epoch), seed=epoch), folder / f"flown_{epoch}"
+    if not (flown / "gcp_list.txt").is_file():
+        flight.save(flown, photographs=True)
     control = flight.block.control
     check = flight.block.points[control.point[control.is_check]].tolist()
     named = folder / f"project_{epoch}.toml"
     named.write_text(PROJECT.format(date=DATES[epoch]), encoding="utf-8")
     project, piles = folder / f"epoch_{epoch}", folder / "piles.geojson"
     begun = time.perf_counter()
-    command("run", flown / "photographs", "--out", project, "--gcp", flown / "gcp_list.txt", "--control-sigma-m",
-            "0.01,0.01,0.02", *(word for name in check for word in ("--check", name)), "--boundary", piles,
-            "--project", named)  # fmt: skip
+    if not (project / "run.json").is_file():
+        command("run", flown / "photographs", "--out", project, "--gcp", flown / "gcp_list.txt", "--control-sigma-m",
+                "0.01,0.01,0.02", *(word for name in check for word in ("--check", name)), "--boundary", piles,
+                "--project", named)  # fmt: skip
     seconds = time.perf_counter() - begun
     out = folder / f"volume_{epoch}"
     command("volume", project / "dtm", "--layer", "dsm", "--boundary", piles, "--adjustment", project / "result",
@@ -190,10 +192,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("folder", type=Path, help="to work in")
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--keep", action="store_true", help="go on with photographs and runs that are there")
     options = parser.parse_args()
     folder = options.folder
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
+    if not options.keep:
+        shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True, exist_ok=True)
     write_geojson(folder / "piles.geojson", {name: outline(name) for name in PLACES})
     write_geojson(folder / "stable.geojson", {"stable": stable()})
     truth = {epoch: standing(epoch) for epoch in HEIGHTS}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import BLOCK, HEAD
+from aerotri.reference.adjust_contents import ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.image_error_files import MODELS
 from aerotri.reference.records import DescribedFile, Item, of_axes
 from aerotri.terrain.picket_status import TEXTS, PicketStatus
@@ -191,6 +191,7 @@ VOLUME_JSON = (
     Item("base.y0_m", "number", "Of a plane: Y of its point.", "m", optional=True),
     Item("base.slope_x", "number", "Of a plane: slope along X.", "m/m", optional=True),
     Item("base.slope_y", "number", "Of a plane: slope along Y.", "m/m", optional=True),
+    *ARGUMENTS,
     Item("boundary", "object", "The boundary."),
     Item("boundary.name", "text", "File or text it comes from."),
     Item("boundary.area_m2", "number", "Area inside.", "m²"),

@@ -9,6 +9,7 @@ from aerotri.report.documents.figures import as_files
 from aerotri.report.documents.head import Context, document, signature_fields
 from aerotri.report.documents.messages import in_english, message_parts
 from aerotri.report.documents.parts import Document, Part, heading, pairs, paragraph, picture, signature, table
+from aerotri.report.documents.used import argument_parts
 from aerotri.report.documents.words import NO_VALUE, Words, breakable, decimals
 from aerotri.report.plots.rendering import RenderedPlot
 
@@ -42,6 +43,7 @@ def volume_certificate(content: Mapping[str, Any], plots: Mapping[str, RenderedP
     if names:
         parts.append(heading(words("report.pictures")))
         parts += [picture(file, words(f"figure.{name}"), narrow=True) for name, file in names.items()]
+    parts += argument_parts(content, words)
     return document(context, words("volume.title"), content["crs"], content["aerotri"], parts, files)
 
 
