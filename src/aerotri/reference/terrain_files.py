@@ -181,6 +181,21 @@ def _mass(of: str) -> tuple[Item, ...]:
     )
 
 
+def _parts(of: str) -> list[Item]:
+    """The parts of the standard deviation of a volume."""
+    return [
+        *(Item(f"{of}.{name}", "number", f"Part of {what}.", "m³") for name, what in PART_WORDS.items()),
+        Item(
+            f"{of}.{MODEL}",
+            "number",
+            "Part of errors that strips or other groups of photographs share. Only where the adjustment has a model "
+            "part.",
+            "m³",
+            optional=True,
+        ),
+    ]
+
+
 VOLUME_JSON = (
     *HEAD,
     Item("dtm", "text", "File of the surface."),
@@ -212,14 +227,7 @@ VOLUME_JSON = (
     Item("sigma.sigma_m3", "number", "Standard deviation of the net volume.", "m³"),
     Item("sigma.sigma_mean_height_m", "number", "The same over the area: of the mean height.", "m"),
     Item("sigma.parts_m3", "object", "The parts of the standard deviation, each alone.", "m³"),
-    *(Item(f"sigma.parts_m3.{name}", "number", f"Part of {what}.", "m³") for name, what in PART_WORDS.items()),
-    Item(
-        f"sigma.parts_m3.{MODEL}",
-        "number",
-        "Part of errors that strips or other groups of photographs share. Only where the adjustment has a model part.",
-        "m³",
-        optional=True,
-    ),
+    *_parts("sigma.parts_m3"),
     Item("sigma.curvature", "object?", "Terrain between the measured points, listed separately; null where not known."),
     Item("sigma.curvature.meaning", "text", "What it is, in words."),
     Item("sigma.curvature.in_the_volume", "yes/no", "Whether the volume contains it."),
@@ -249,7 +257,8 @@ VOLUME_JSON = (
     Item("piles[].base", "text", "Its base, in words."),
     *(Item(f"piles[].{name}", "number", text, unit) for name, text, unit in VOLUMES),
     Item("piles[].sigma_m3", "number?", "Standard deviation of its net volume; null without --adjustment.", "m³"),
-    Item("piles[].parts_m3", "object?", "The parts of it, each alone, as of sigma.parts_m3.", "m³"),
+    Item("piles[].parts_m3", "object?", "The parts of it, each alone.", "m³"),
+    *_parts("piles[].parts_m3"),
     Item("piles[].mass", "object?", "Its tonnes; null without --density."),
     *_mass("piles[].mass"),
     Item("warnings[]", "text", "Sentences to read."),
