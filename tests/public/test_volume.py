@@ -5,7 +5,9 @@ from __future__ import annotations
 import inspect
 import json
 from dataclasses import replace
+from importlib.resources import files
 
+import jsonschema
 import numpy as np
 import pytest
 import shapely
@@ -158,6 +160,17 @@ def test_shown_and_drawn(cone, measured):
 def test_what_makes_no_sense(cone, options, match):
     with pytest.raises(InputError, match=match):
         aerotri.volume(cone, **({"boundary": PILE} | options))
+
+
+def test_file_of_piles_with_sigma_is_that_of_the_schema(measured):
+    _, result, model, _ = measured
+    left, bottom, right, top = model.dsm.grid.bounds
+    x, y, size = 0.5 * (left + right), 0.5 * (bottom + top), 0.15 * min(right - left, top - bottom)
+    piles = {"west": shapely.box(x - 2 * size, y, x - size, y + size), "east": shapely.box(x, y, x + size, y + size)}
+    content = aerotri.volume(model, piles, base="lowest", adjustment=result).summary
+    assert all(one["parts_m3"]["base"] >= 0.0 for one in content["piles"])
+    schema = json.loads(files("aerotri.reference").joinpath("schema_files/volume.schema.json").read_text("utf-8"))
+    jsonschema.validate(json.loads(json.dumps(content)), schema)
 
 
 @pytest.mark.parametrize(("below", "both"), [(0.0, False), (0.01, False), (0.9, True), (4.0, True), (400.0, False)])
