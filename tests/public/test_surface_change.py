@@ -189,3 +189,12 @@ def test_system_of_heights_that_one_surface_states_alone_is_told(tmp_path):
 def test_surfaces_in_two_systems_are_refused(tmp_path, systems, said):
     with pytest.raises(InputError, match=said):
         aerotri.change(*in_systems(tmp_path, *systems), align="none")
+
+
+def test_arguments_stand_in_the_file():
+    found = aerotri.change(*epochs(3)[:2], stable=STABLE, area={"heap": AREA})
+    used = {one["key"]: (one["value"], one["origin"]) for one in found.summary["settings"]}
+    assert used == {
+        "stable": ("Polygon", "given"), "align": ("shift", "default"), "area": ("heap", "given"),
+        "noise_length": (None, "default"),
+    }  # fmt: skip

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from dataclasses import replace
+from importlib.resources import files
 
+import jsonschema
 import numpy as np
 import pytest
 import shapely
@@ -159,6 +162,17 @@ def test_what_makes_no_sense(cone, options, match):
         aerotri.volume(cone, **({"boundary": PILE} | options))
 
 
+def test_file_of_piles_with_sigma_is_that_of_the_schema(measured):
+    _, result, model, _ = measured
+    left, bottom, right, top = model.dsm.grid.bounds
+    x, y, size = 0.5 * (left + right), 0.5 * (bottom + top), 0.15 * min(right - left, top - bottom)
+    piles = {"west": shapely.box(x - 2 * size, y, x - size, y + size), "east": shapely.box(x, y, x + size, y + size)}
+    content = aerotri.volume(model, piles, base="lowest", adjustment=result).summary
+    assert all(one["parts_m3"]["base"] >= 0.0 for one in content["piles"])
+    schema = json.loads(files("aerotri.reference").joinpath("schema_files/volume.schema.json").read_text("utf-8"))
+    jsonschema.validate(json.loads(json.dumps(content)), schema)
+
+
 @pytest.mark.parametrize(("below", "both"), [(0.0, False), (0.01, False), (0.9, True), (4.0, True), (400.0, False)])
 def test_scale_of_the_map_shows_the_sides_that_count(below, both):
     """A step of 2 m up and of `below` down; a hundredth of the larger one is no side of its own."""
@@ -171,3 +185,18 @@ def test_scale_of_the_map_shows_the_sides_that_count(below, both):
     assert ("surface on the base" in legend) is both
     assert bool(low < 0.0 < high) is both
     assert bool(high > 0.0) is (below < 400.0)
+
+
+def test_every_argument_stands_in_the_file_and_on_the_page(cone, tmp_path):
+    found = aerotri.volume(cone, PILE, base=100.0, boundary_sigma=0.05, density=1.8)
+    used = {one["key"]: one for one in found.summary["settings"]}
+    assert used["boundary_sigma"] == {"key": "boundary_sigma", "value": 0.05, "unit": "m", "origin": "given"}
+    assert (used["base"]["value"], used["density"]["value"]) == (100.0, 1.8)
+    left = inspect.signature(aerotri.volume).parameters.keys() - used.keys()
+    assert left == {"surface", "boundary", "adjustment", "pickets", "base_adjustment", "base_pickets", "project",
+                    "scratch", "progress"}  # fmt: skip
+    others = [one for name, one in used.items() if name not in ("base", "boundary_sigma", "density")]
+    assert {one["origin"] for one in others} == {"default"}
+    page = (found.save(tmp_path / "volume") / "volume.html").read_text(encoding="utf-8")
+    assert "<td>boundary_sigma</td><td>0.05 m</td><td>given</td>" in page
+    assert "<td>matching_window</td><td>–</td><td>default</td>" in page

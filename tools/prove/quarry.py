@@ -2,13 +2,13 @@
 
     python tools/prove/quarry.py FOLDER [--out tools/results]
 
-A floor of some 60 m between banks of 6 m, and three piles on it. Each epoch has 15 rendered photographs of
-1600 × 1200 pixels, 5 cm a pixel, by a lens that bends and a wrong interior orientation, with the GNSS of a drone in
+A level floor between heaps of 6 m, and three piles on it. Each epoch has 15 rendered photographs of
+1200 × 900 pixels, 6 cm a pixel, by a lens that bends and a wrong interior orientation, with the GNSS of a drone in
 EXIF; six control and three check points are marked in them with 0.1 px. Between the epochs the first pile stays, the
-second is half taken away, and the third grows. `aerotri run` makes everything from the photographs and the list of
-control points; `aerotri volume` weighs the piles, `aerotri change` compares the epochs on the ground around the piles.
-The truth of a pile is what stands on the floor inside its outline. Also made: certificates of the volume and
-of the change, English and German.
+second is half taken away, and the third grows. `aerotri run` makes everything but the dense surface from photographs
+and the list of control points, `aerotri volume` weighs the piles, `aerotri change` compares the epochs on the ground
+around the piles. The truth of a pile is what stands on the floor inside its outline. Also made: certificates of the
+volumes and of the change, English and German.
 With --out quarry.md is written there. The last answer stands in tools/results/quarry.md.
 """
 
@@ -31,21 +31,22 @@ from pyproj import Transformer
 import aerotri
 
 CRS, ORIGIN = "EPSG:32632", (680000.0, 5330000.0, 520.0)
-BANKS, BANK = 8, (48.0, 6.0, 10.0)
-"""Around the floor of the quarry: number, and distance from its middle, height and radius, m."""
+BANKS, BANK = 8, (48.0, 6.0, 6.0)
+"""Heaps around the floor of the quarry: number, and distance from its middle, height and radius, m."""
 PLACES = {"north": (4.0, 15.0), "west": (-14.0, -8.0), "east": (13.0, -9.0)}
 HEIGHTS = {1: {"north": 3.6, "west": 4.2, "east": 2.6}, 2: {"north": 3.6, "west": 2.1, "east": 3.5}}
 """m, by epoch; a pile of 3.5 m rises with 32° at most."""
 RADIUS, OUTLINE, CORNERS = 3.4, 10.5, 24
 DENSITY = (1.7, 0.05)
 """t/m³ and its σ."""
-CELL = 0.1
+INTERVAL, CELL = 0.7, 0.1
+"""m, of the pickets: a fifth of the radius of a pile, and of the sum that is the truth."""
 SPEC = {
     "name": "quarry",
-    "camera": {"drone": {"size_px": [1600, 1200], "pixel_um": 4.0, "focal_length_mm": 5.6,
+    "camera": {"drone": {"size_px": [1200, 900], "pixel_um": 4.0, "focal_length_mm": 5.6,
                          "errors": {"lens": {"k1": -0.05, "k2": 0.01},
                                     "interior": {"focal_length_mm": 0.03, "x0_mm": 0.02, "y0_mm": -0.015}}}},
-    "flight": {"gsd_m": 0.05, "strips": 3, "images_per_strip": 5, "end_lap": 0.75, "side_lap": 0.65,
+    "flight": {"gsd_m": 0.06, "strips": 3, "images_per_strip": 5, "end_lap": 0.75, "side_lap": 0.65,
                "heading_deg": 20.0, "attitude_sigma_deg": [2.0, 2.0, 3.0], "position_sigma_m": [0.5, 0.5, 0.5]},
     "tie_points": {"per_image": 20, "probability": 0.9, "sigma_um": 0.4},
     "control": {"positions": [[0.1, 0.1], [0.1, 0.9], [0.5, 0.15], [0.5, 0.85], [0.9, 0.1], [0.9, 0.9]],
@@ -66,7 +67,7 @@ DATES = {1: "2026-05-04", 2: "2026-06-08"}
 
 
 def site() -> list[list[float]]:
-    """The banks around the floor, and humps and hollows of a few centimetres on it, the same in both epochs."""
+    """The heaps around the floor, and humps and hollows of a few centimetres on it, the same in both epochs."""
     distance, height, radius = BANK
     turn = 2.0 * np.pi * np.arange(BANKS) / BANKS
     banks = [[distance * x, distance * y, height, radius] for x, y in zip(np.cos(turn), np.sin(turn), strict=True)]
@@ -117,17 +118,19 @@ def command(*words: object) -> None:
 
 def measured(folder: Path, epoch: int) -> tuple[dict[str, Any], float]:
     """volume.json of an epoch from its photographs, and the seconds of `aerotri run`."""
-    flight = aerotri.simulate(plan(epoch), seed=epoch)
-    flown = flight.save(folder / f"flown_{epoch}", photographs=True)
+    flight, flown = aerotri.simulate(plan(epoch), seed=epoch), folder / f"flown_{epoch}"
+    if not (flown / "gcp_list.txt").is_file():
+        flight.save(flown, photographs=True)
     control = flight.block.control
     check = flight.block.points[control.point[control.is_check]].tolist()
     named = folder / f"project_{epoch}.toml"
     named.write_text(PROJECT.format(date=DATES[epoch]), encoding="utf-8")
     project, piles = folder / f"epoch_{epoch}", folder / "piles.geojson"
     begun = time.perf_counter()
-    command("run", flown / "photographs", "--out", project, "--gcp", flown / "gcp_list.txt", "--control-sigma-m",
-            "0.01,0.01,0.02", *(word for name in check for word in ("--check", name)), "--boundary", piles,
-            "--project", named)  # fmt: skip
+    if not (project / "run.json").is_file():
+        command("run", flown / "photographs", "--out", project, "--gcp", flown / "gcp_list.txt", "--control-sigma-m",
+                "0.01,0.01,0.02", *(word for name in check for word in ("--check", name)), "--boundary", piles,
+                "--interval", INTERVAL, "--no-dense", "--project", named)  # fmt: skip
     seconds = time.perf_counter() - begun
     out = folder / f"volume_{epoch}"
     command("volume", project / "dtm", "--layer", "dsm", "--boundary", piles, "--adjustment", project / "result",
@@ -190,10 +193,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("folder", type=Path, help="to work in")
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--keep", action="store_true", help="go on with photographs and runs that are there")
     options = parser.parse_args()
     folder = options.folder
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
+    if not options.keep:
+        shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True, exist_ok=True)
     write_geojson(folder / "piles.geojson", {name: outline(name) for name in PLACES})
     write_geojson(folder / "stable.geojson", {"stable": stable()})
     truth = {epoch: standing(epoch) for epoch in HEIGHTS}

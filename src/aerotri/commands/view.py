@@ -33,7 +33,7 @@ def run_view(path: Path, photographs: Path | None, below: tuple[Path, ...], port
     bench = Bench(places_of(path), photographs or photographs_beside(path), below)
 
     def tell(address: str) -> None:
-        shown = "the block alone" if bench.result is None else str(bench.result)
+        shown = "the block alone" if bench.shown.result is None else str(bench.shown.result)
         console.lines([f"Bench of {shown}: {address}", "Ctrl-C ends it; everything is saved at once."])
 
     try:

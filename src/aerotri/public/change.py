@@ -26,6 +26,7 @@ from aerotri.public.change_epochs import (
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.projects import project_of
 from aerotri.public.table import Table
+from aerotri.public.used_arguments import used_arguments
 from aerotri.results.head import Head
 from aerotri.volume.change.alignment import ALIGNS, Align
 
@@ -243,6 +244,8 @@ def change(
         notes.append("the surfaces are shifted by more than a few cells: bring the second nearer and measure again")
     summary = change_json(found, names_of(epochs), crs, "" if ground is None else ground.name, align, tuple(notes))
     head = Head(project_of(project, second_adjustment, second, first_adjustment, first), crs)
+    asked = {"stable": stable, "align": align, "area": area, "noise_length": noise_length}
+    summary["settings"] = used_arguments(change, asked, {"noise_length": "m"})
     return MeasuredChange(found, head.as_dict() | summary, tuple(areas.values()), head)
 
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from aerotri.observations.project import Project
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.projects import project_of
 from aerotri.public.stated import StatedAdjustment
+from aerotri.public.used_arguments import used_arguments
 from aerotri.public.volume_result import THICKNESS, MeasuredVolume
 from aerotri.public.volume_sigma import MeasuredSurface, SigmaOfVolumes
 from aerotri.results.head import Head
@@ -143,7 +144,15 @@ def volume(
     )  # fmt: skip
     known = None if density is None else Density(density, density_sigma)
     plan, whose = SectionPlan(section_spacing, azimuth), project_of(project, adjustment, surface)
-    asked = _Asked(top, below, base, boundary, method, plan, options, known, whose)
+    settings = used_arguments(
+        volume,
+        {"layer": layer, "base": base, "method": method, "section_spacing": section_spacing, "azimuth": azimuth,
+         "matching_sigma_um": matching_sigma_um, "matching_window": matching_window, "base_sigma": base_sigma,
+         "boundary_sigma": boundary_sigma, "boundary_from": boundary_from, "corrected": corrected,
+         "density": density, "density_sigma": density_sigma},
+        UNITS,
+    )  # fmt: skip
+    asked = _Asked(top, below, base, boundary, method, plan, options, known, whose, settings)
     with stage_report(progress) as report, ExitStack() as stack:
         return _compute(asked, Spool(scratch), stack, report)
 
@@ -161,6 +170,13 @@ class _Asked:
     options: SigmaOptions
     density: Density | None = None
     project: Project = field(default_factory=Project)
+    settings: list[dict[str, Any]] = field(default_factory=list)
+
+
+UNITS = {
+    "section_spacing": "m", "azimuth": "°", "matching_sigma_um": "µm", "matching_window": "m", "base_sigma": "m",
+    "boundary_sigma": "m", "density": "t/m³", "density_sigma": "t/m³",
+}  # fmt: skip
 
 
 def is_surface(base: SurfaceLike | float) -> TypeGuard[SurfaceLike]:
@@ -220,6 +236,7 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     head = Head(asked.project, crs)
     content = head.as_dict() | volume_json(volumes, base, boundary, sources, sigma, asked.density)
     content["piles"] = [pile_json(one, own, asked.density) for one, own in zip(piles, sigmas, strict=True)]
+    content["settings"] = asked.settings
     crs_notes = (reader.note, *(other.note for other in others), boundary.note)
     content["warnings"] = [*(text for text in crs_notes if text), *content["warnings"]]
     profiles = chosen_profiles(reader, base, boundary, volumes.sections)

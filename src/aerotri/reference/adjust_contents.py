@@ -35,6 +35,17 @@ HEAD_BESIDE_CRS = (
 )
 HEAD = (*HEAD_BESIDE_CRS, CRS)
 """What the JSON file of every result begins with."""
+ORIGINS = {"given": "stated, or chosen by the program", "default": "the default value, stated or not"}
+ARGUMENTS = (
+    Item(
+        "settings[]", "object", "Every argument that was used, by its name in Python; commands have them with dashes."
+    ),
+    Item("settings[].key", "text", "Name of the argument."),
+    Item("settings[].value", "anything", "The value; null where it is not in use."),
+    Item("settings[].unit", "text", "Unit; empty where it has none."),
+    Item("settings[].origin", "text", "Where it comes from.", values=ORIGINS),
+)
+"""What the JSON files of volumes and changes say of how they were computed."""
 STATUS_WORDS = {
     "converged": "the iterations came to an end",
     "not converged": "they did not",
@@ -207,12 +218,7 @@ ADJUSTMENT = (
     Item("settings[].key", "text", "Name in full, such as camera.NAME.pixel_um."),
     Item("settings[].value", "anything", "The value; null where it is not in use."),
     Item("settings[].unit", "text", "Unit; empty where it has none."),
-    Item(
-        "settings[].origin",
-        "text",
-        "Where it comes from.",
-        values={"given": "stated, or chosen by the program", "default": "the default value, stated or not"},
-    ),
+    Item("settings[].origin", "text", "Where it comes from.", values=ORIGINS),
     Item("notes[]", "text", "Sentences about what the program chose by itself, and why."),
     Item("warnings[]", "text", "Sentences to read: what was left out, assumed or is weak."),
     Item("timings_s", "object", "Time by stage.", "s"),

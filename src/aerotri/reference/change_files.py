@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import HEAD
+from aerotri.reference.adjust_contents import ARGUMENTS, HEAD
 from aerotri.reference.records import DescribedFile, Item
 from aerotri.volume.change.alignment import ALIGNS
 from aerotri.volume.change.compute import PARTS
@@ -43,6 +43,7 @@ CHANGE_JSON = (
     *HEAD,
     Item("first", "text", "The earlier surface."),
     Item("second", "text", "The later surface."),
+    *ARGUMENTS,
     Item("cell_m", "number", "Cell of the difference.", "m"),
     Item("cells", "whole", "Cells with heights in both."),
     Item("level_of_detection_sigma", "number", "Standard deviations beyond which a change is told from noise, 95 %."),

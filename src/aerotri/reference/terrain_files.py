@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import BLOCK, HEAD
+from aerotri.reference.adjust_contents import ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.image_error_files import MODELS
 from aerotri.reference.records import DescribedFile, Item, of_axes
 from aerotri.terrain.picket_status import TEXTS, PicketStatus
@@ -181,6 +181,21 @@ def _mass(of: str) -> tuple[Item, ...]:
     )
 
 
+def _parts(of: str) -> list[Item]:
+    """The parts of the standard deviation of a volume."""
+    return [
+        *(Item(f"{of}.{name}", "number", f"Part of {what}.", "m³") for name, what in PART_WORDS.items()),
+        Item(
+            f"{of}.{MODEL}",
+            "number",
+            "Part of errors that strips or other groups of photographs share. Only where the adjustment has a model "
+            "part.",
+            "m³",
+            optional=True,
+        ),
+    ]
+
+
 VOLUME_JSON = (
     *HEAD,
     Item("dtm", "text", "File of the surface."),
@@ -191,6 +206,7 @@ VOLUME_JSON = (
     Item("base.y0_m", "number", "Of a plane: Y of its point.", "m", optional=True),
     Item("base.slope_x", "number", "Of a plane: slope along X.", "m/m", optional=True),
     Item("base.slope_y", "number", "Of a plane: slope along Y.", "m/m", optional=True),
+    *ARGUMENTS,
     Item("boundary", "object", "The boundary."),
     Item("boundary.name", "text", "File or text it comes from."),
     Item("boundary.area_m2", "number", "Area inside.", "m²"),
@@ -211,14 +227,7 @@ VOLUME_JSON = (
     Item("sigma.sigma_m3", "number", "Standard deviation of the net volume.", "m³"),
     Item("sigma.sigma_mean_height_m", "number", "The same over the area: of the mean height.", "m"),
     Item("sigma.parts_m3", "object", "The parts of the standard deviation, each alone.", "m³"),
-    *(Item(f"sigma.parts_m3.{name}", "number", f"Part of {what}.", "m³") for name, what in PART_WORDS.items()),
-    Item(
-        f"sigma.parts_m3.{MODEL}",
-        "number",
-        "Part of errors that strips or other groups of photographs share. Only where the adjustment has a model part.",
-        "m³",
-        optional=True,
-    ),
+    *_parts("sigma.parts_m3"),
     Item("sigma.curvature", "object?", "Terrain between the measured points, listed separately; null where not known."),
     Item("sigma.curvature.meaning", "text", "What it is, in words."),
     Item("sigma.curvature.in_the_volume", "yes/no", "Whether the volume contains it."),
@@ -248,7 +257,8 @@ VOLUME_JSON = (
     Item("piles[].base", "text", "Its base, in words."),
     *(Item(f"piles[].{name}", "number", text, unit) for name, text, unit in VOLUMES),
     Item("piles[].sigma_m3", "number?", "Standard deviation of its net volume; null without --adjustment.", "m³"),
-    Item("piles[].parts_m3", "object?", "The parts of it, each alone, as of sigma.parts_m3.", "m³"),
+    Item("piles[].parts_m3", "object?", "The parts of it, each alone.", "m³"),
+    *_parts("piles[].parts_m3"),
     Item("piles[].mass", "object?", "Its tonnes; null without --density."),
     *_mass("piles[].mass"),
     Item("warnings[]", "text", "Sentences to read."),

@@ -103,6 +103,19 @@ def test_ticks_have_a_comma():
     assert not any("." in text for text in ticks)
 
 
+def test_words_at_an_axis_are_translated():
+    """The bars of the parts of σ."""
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    axes = figure.add_subplot()
+    axes.barh([0, 1], [1.0, 2.5])
+    axes.set_yticks([0, 1], ["matching of the pickets", "base"])
+    in_language({"one": figure}, "de")
+    figure.canvas.draw()
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["Bildzuordnung der Punkte", "Basis"]
+
+
 def test_what_is_bound_to_a_signature():
     own = [heading("a"), table(["b"], [["1"]] * (MOST_ROWS + 1)), heading("c"), paragraph("d"), signature(["e"])]
     *before, signed = signed_together(own)

@@ -9,6 +9,7 @@ from aerotri.report.documents.figures import as_files
 from aerotri.report.documents.head import Context, document, signature_fields
 from aerotri.report.documents.messages import in_english, message_parts
 from aerotri.report.documents.parts import Document, Part, heading, pairs, paragraph, picture, signature, table
+from aerotri.report.documents.used import argument_parts
 from aerotri.report.documents.volume import WIDE, amount, known_to, two
 from aerotri.report.documents.words import NO_VALUE, Words, breakable
 from aerotri.report.plots.rendering import RenderedPlot
@@ -41,6 +42,7 @@ def change_certificate(content: Mapping[str, Any], plots: Mapping[str, RenderedP
     if names:
         parts.append(heading(words("report.pictures")))
         parts += [picture(file, words(f"figure.{name}")) for name, file in names.items()]
+    parts += argument_parts(content, words)
     return document(context, words("change.title"), content["crs"], content["aerotri"], parts, files)
 
 

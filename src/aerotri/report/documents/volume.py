@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,6 +10,7 @@ from aerotri.report.documents.figures import as_files
 from aerotri.report.documents.head import Context, document, signature_fields
 from aerotri.report.documents.messages import in_english, message_parts
 from aerotri.report.documents.parts import Document, Part, heading, pairs, paragraph, picture, signature, table
+from aerotri.report.documents.used import argument_parts
 from aerotri.report.documents.words import NO_VALUE, Words, breakable, decimals
 from aerotri.report.plots.rendering import RenderedPlot
 
@@ -18,6 +20,8 @@ PICTURES = ("thickness", "budget")
 
 OWN_BASES = "a base for each of "
 """Beginning of the name of the bases of piles that have one of their own."""
+SPLINE = re.compile(r"spline through ([0-9]+) places of the boundary")
+"""Name of a base through the outline."""
 
 
 def volume_certificate(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot], context: Context) -> Document:
@@ -42,6 +46,7 @@ def volume_certificate(content: Mapping[str, Any], plots: Mapping[str, RenderedP
     if names:
         parts.append(heading(words("report.pictures")))
         parts += [picture(file, words(f"figure.{name}"), narrow=True) for name, file in names.items()]
+    parts += argument_parts(content, words)
     return document(context, words("volume.title"), content["crs"], content["aerotri"], parts, files)
 
 
@@ -105,7 +110,10 @@ def _piles(c: Mapping[str, Any], words: Words) -> Part:
 
 def _base_name(c: Mapping[str, Any], words: Words) -> str:
     name = str(c["base"]["name"])
-    return words("volume.own_bases", number=len(c["piles"])) if name.startswith(OWN_BASES) else words.term("base", name)
+    if name.startswith(OWN_BASES):
+        return words("volume.own_bases", number=len(c["piles"]))
+    spline = SPLINE.fullmatch(name)
+    return words("volume.spline", number=spline[1]) if spline else words.term("base", name)
 
 
 def _measured(c: Mapping[str, Any], context: Context) -> list[tuple[str, str]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from aerotri.report.pages.adjustment import data_address
-from aerotri.report.pages.head import page_environment, page_head
+from aerotri.report.pages.head import page_environment, page_head, settings_rows
 from aerotri.report.plots.rendering import RenderedPlot
 from aerotri.report.quality import printable, two_digits, with_sigma
 from aerotri.results.head import Head
@@ -31,7 +31,7 @@ def write_change_page(content: Mapping[str, Any], plots: Mapping[str, RenderedPl
         cards=_cards(content["volumes"][-1]), warnings=[printable(text, 1000) for text in content["warnings"]],
         sure=_sure(content), rows=[_row(one) for one in content["volumes"]], unknowns=_unknowns(content),
         alignment=_alignment(content), plots=[data_address(plot) for plot in plots.values()], caption=CAPTION,
-        head=page_head(head),
+        head=page_head(head), settings=settings_rows(content),
     )  # fmt: skip
     path.write_text(text, encoding="utf-8")
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -34,6 +36,23 @@ def page_head(head: Head, block: str = "") -> PageHead:
     """The head as `head.html.j2` shows it; `block` as of `head_rows`."""
     rows = [(word, printable(text, 4000)) for word, text in head_rows(Words("en"), head, block)]
     return PageHead(printable(head.project.title), logo_address(head.project), tuple(rows), head.version)
+
+
+def settings_rows(content: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Name, value and origin of all `settings` of volume.json or change.json, as `head.html.j2` shows them."""
+    return [
+        (printable(one["key"]), _stated(one["value"], one["unit"]), str(one["origin"]))
+        for one in content.get("settings") or []
+    ]
+
+
+def _stated(value: Any, unit: str) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    text = f"{value:.9g}" if isinstance(value, int | float) else printable(str(value), 300)
+    return f"{text} {unit}".strip()
 
 
 def page_environment() -> Environment:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from aerotri.report.pages.adjustment import data_address
-from aerotri.report.pages.head import page_environment, page_head
+from aerotri.report.pages.head import page_environment, page_head, settings_rows
 from aerotri.report.plots.rendering import RenderedPlot
 from aerotri.report.quality import printable, two_digits, with_sigma
 from aerotri.results.head import Head
@@ -19,7 +19,7 @@ CAPTIONS = {
         "correlation between all heights; it is found by one solution with the factor of the normal equations."
     ),
     "thickness": "Height of the surface over the base: brown is cut (above), blue is fill (below).",
-    "section_areas": "Areas of the cross sections; what lies between them is the rule's business.",
+    "section_areas": "Areas of the cross sections. The rule (trapezoidal or Simpson's) says what lies between them.",
     "section_profiles": "Three of the sections; their places are broken lines on the map.",
 }
 
@@ -37,7 +37,7 @@ def volume_html(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot], h
         name=printable(content["dtm"]), base=printable(content["base"]["name"]),
         boundary=printable(content["boundary"]["name"]), head=page_head(head), cards=_cards(content),
         warnings=[printable(text, 1000) for text in content["warnings"]], budget=_budget(content),
-        methods=_methods(content), piles=_piles(content), mass=_mass_words(content),
+        methods=_methods(content), settings=settings_rows(content), piles=_piles(content), mass=_mass_words(content),
         plots=[{"name": name, "source": data_address(plot), "caption": CAPTIONS[name]}
                for name, plot in plots.items()],
     )  # fmt: skip

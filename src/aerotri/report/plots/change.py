@@ -53,7 +53,7 @@ def plot_change(change: Change, content: Mapping[str, Any], areas: Sequence[Boun
         x0 = 0.95 + k * (width + 1.6)
         axes = axes_at(figure, x0, 1.1, width, height)
         if k == 0:
-            quiet = np.where(np.isfinite(d)[..., None], np.array(QUIET), 0.0)
+            quiet = np.where(np.isfinite(d)[..., None], np.array(QUIET), np.array((1.0, 1.0, 1.0, 0.0)))
             axes.imshow(quiet, extent=extent, interpolation="nearest", aspect="auto")
         image = axes.imshow(values, extent=extent, interpolation="nearest", aspect="auto", **style)
         if k == 0:

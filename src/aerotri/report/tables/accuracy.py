@@ -86,12 +86,17 @@ def inspire_words(r: AccuracyRecord) -> str:
     one = inspire_accuracy(r)
     said = "INSPIRE has no minimum requirements. Its recommendations for elevation data are kept by"
     parts = (
-        (one.spacing, f"grids with a spacing of {one.spacing:.2f} m or more"),
-        (one.interval, f"contour lines every {one.interval:.2f} m or more"),
+        (one.spacing, f"grids with a spacing of {_cm_up(one.spacing):.2f} m or more"),
+        (one.interval, f"contour lines every {_cm_up(one.interval):.2f} m or more"),
         (one.scale, f"vector data at scales of 1:{np.ceil(one.scale):.0f} or smaller"),
     )
     known = [text for value, text in parts if np.isfinite(value)]
     return f"{said} {', '.join(known)}." if known else ""
+
+
+def _cm_up(length: float) -> float:
+    """m, rounded up to a centimetre: what is kept by a length is not kept by less."""
+    return float(np.ceil(100.0 * length - 1e-9)) / 100.0
 
 
 def points_table(r: AccuracyRecord) -> Table:

@@ -24,16 +24,17 @@ MARKS = {"name": "\ue000", "other": "\ue001"}
 
 
 class _Localised(Formatter):
-    """The numbers of an axis with a decimal comma."""
+    """The numbers of an axis with a decimal comma, and the words where it has words."""
 
-    def __init__(self, formatter: Formatter) -> None:
-        self._formatter = formatter
+    def __init__(self, formatter: Formatter, language: str) -> None:
+        self._formatter, self._language = formatter, language
 
     def set_locs(self, locs: list[float]) -> None:
         self._formatter.set_locs(locs)
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        return POINT.sub(",", self._formatter(x, pos))
+        text = self._formatter(x, pos)
+        return picture_line(text, self._language) or POINT.sub(",", text)
 
 
 def in_language(figures: Mapping[str, Figure], language: str) -> dict[str, Figure]:
@@ -90,7 +91,7 @@ def _lines(language: str) -> tuple[tuple[re.Pattern[str], str], ...]:
 def _translate(figure: Figure, language: str) -> None:
     axes = [axis for one in figure.axes for axis in (one.xaxis, one.yaxis)]
     for axis in axes:
-        axis.set_major_formatter(_Localised(axis.get_major_formatter()))
+        axis.set_major_formatter(_Localised(axis.get_major_formatter(), language))
     of_ticks = {id(text) for axis in axes for text in _tick_texts(axis)}
     for text in figure.findobj(Text):
         said = text.get_text()
