@@ -56,7 +56,9 @@ Robust = Annotated[
 ]
 MarkedControl = Annotated[
     str,
-    typer.Option(help="Control points with their image points: gcp_list.txt of OpenDroneMap, or CSV.", rich_help_panel=CONTROL),
+    typer.Option(
+        help="Control points with their image points: gcp_list.txt of OpenDroneMap, or CSV.", rich_help_panel=CONTROL
+    ),
 ]
 CheckPoints = Annotated[
     list[str] | None,
