@@ -117,9 +117,8 @@ def tie_photographs(
     reading = complete(replace(Reading(block), messages=said), given, crs, positions)
     reading = with_start_values(reading, oriented.kept(keep))
     frame = oriented.frame
-    local, *orientation = in_frame(reading.block, frame)
-    found = reproject(local, *orientation)
-    block, sigma_px = with_sigma_of_ties(reading.block, (orientation[0], orientation[1]), found, len(tracks))
+    found = reproject(*in_frame(reading.block, frame))
+    block, sigma_px = with_sigma_of_ties(reading.block, found.offset_px, len(tracks))
     points = found.points if frame is None else frame.from_local(found.points)
     reading = with_unmarked_control(replace(reading, block=block, points=points), given)
     return TiedBlock(
