@@ -9,7 +9,7 @@ second is half taken away, and the third grows. `aerotri run` makes everything b
 and the list of control points, `aerotri volume` weighs the piles, `aerotri change` compares the epochs on the ground
 around the piles. The truth of a pile is what stands on the floor inside its outline. Also made: certificates of the
 volumes and of the change, English and German.
-With --out quarry.md is written there. The last answer stands in tools/results/quarry.md.
+With --out quarry.md is written there.
 """
 
 from __future__ import annotations
