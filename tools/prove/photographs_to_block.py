@@ -18,7 +18,7 @@ all: RMS w 1.23, 10.0% beyond 1.96
 points is taken, is not exact to that. σ of check points is then too small, by a quarter of the errors.
 
 brighton, tie points and adjustment: 18 photographs, 5566 points, 24259 rays; median residual 0.34 px, 95 % below
-1.06 px; GNSS residuals, RMS: 0.17, 0.60, 0.31 m; σ0 0.96
+1.06 px; GNSS residuals, RMS: 0.17, 0.60, 0.31 m; σ0 1.20
 """
 
 from __future__ import annotations
