@@ -1,4 +1,4 @@
-"""The standard deviation of tie points, from how they fit one another at their start values."""
+"""The standard deviation of tie points, from how they fit one another."""
 
 from __future__ import annotations
 
@@ -6,10 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerotri.adjustment.prepare import prepare
+from aerotri.adjustment.solve import SolveOptions, minimise
+from aerotri.conventions import InputError
 from aerotri.observations import Block
 
 POWERS = tuple((i, j) for i in range(4) for j in range(4 - i))
 """Of x and y, up to the third together: what errors of an orientation and of a lens do within a photograph."""
+STEPS = 6
+"""Iterations of each stage of the adjustment that the misfit is taken from [C]: a first orientation is near its end."""
 FEWEST = 10 * len(POWERS)
 """Rays of a photograph from which so many unknowns can be taken off without much effect on the rest [C]."""
 
@@ -39,6 +44,30 @@ def with_sigma_of_ties(block: Block, offset_px: np.ndarray, ties: int) -> tuple[
     settings = replace(block.settings, image_sigma_um=1e3 * common)
     found = replace(block, image_points=replace(rays, sigma=sigma), settings=settings)
     return found, common / block.cameras[0].pixel_mm
+
+
+def adjusted_offsets(local: Block, points: np.ndarray, offset_px: np.ndarray) -> np.ndarray:
+    """(m, 2) px, measured less predicted after some steps of the adjustment; as given where it leads nowhere.
+
+    Parameters
+    ----------
+    local : in a local frame, with start values. points : (N, 3) m, start values of its points.
+    offset_px : (m, 2) at the start values, and of rays that the adjustment leaves out.
+    """
+    try:
+        prepared = prepare(local, points)
+        unknowns = prepared.system.unknowns
+        redundancy = max(2 * len(unknowns.rays.source) - unknowns.count, 1)
+        found = minimise(prepared.system, prepared.state, redundancy, SolveOptions(STEPS, "huber"))
+    except (InputError, np.linalg.LinAlgError):
+        return offset_px
+    residual = found.equations.residual
+    if found.defects or not np.isfinite(residual).all():
+        return offset_px
+    pixel = np.array([camera.pixel_mm for camera in local.cameras])[local.images.camera[local.image_points.image]]
+    after, rows = offset_px.copy(), unknowns.rays.source
+    after[rows] = residual / pixel[rows, None]
+    return after
 
 
 def without_smooth_part(offset: np.ndarray, xy: np.ndarray, image: np.ndarray) -> np.ndarray:

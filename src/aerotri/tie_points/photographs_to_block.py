@@ -11,6 +11,7 @@ import numpy as np
 
 from aerotri.adjustment.parallel import thread_count
 from aerotri.conventions import InputError, mm_from_px
+from aerotri.coordinates.blocks import transform_block
 from aerotri.execution.work import Workplace
 from aerotri.formats.assembly import assemble
 from aerotri.formats.assembly.parts import PositionList, Reading, no_sigma
@@ -29,7 +30,7 @@ from aerotri.tie_points.given import (
     with_unmarked_control,
 )
 from aerotri.tie_points.matching import MatchOptions, match_all, neighbours
-from aerotri.tie_points.misfit import with_sigma_of_ties
+from aerotri.tie_points.misfit import adjusted_offsets, with_sigma_of_ties
 from aerotri.tie_points.orientation import Oriented, Progress, in_frame, orient, with_start_values
 from aerotri.tie_points.photographs import LENS, PhotographSet
 from aerotri.tie_points.settings import DEFAULTS
@@ -118,7 +119,9 @@ def tie_photographs(
     reading = with_start_values(reading, oriented.kept(keep))
     frame = oriented.frame
     found = reproject(*in_frame(reading.block, frame))
-    block, sigma_px = with_sigma_of_ties(reading.block, found.offset_px, len(tracks))
+    local = reading.block if frame is None else transform_block(reading.block, frame)
+    offset_px = adjusted_offsets(local, found.points, found.offset_px)
+    block, sigma_px = with_sigma_of_ties(reading.block, offset_px, len(tracks))
     points = found.points if frame is None else frame.from_local(found.points)
     reading = with_unmarked_control(replace(reading, block=block, points=points), given)
     return TiedBlock(
