@@ -2,7 +2,7 @@
 
 Features are found in every photograph by itself, and random samples are drawn with a stated seed in an order of what
 the photographs show. So the tie points are the same, ray by ray and to the last digit, whatever files are called; and
-what is adjusted from them is the same to 1e-9 σ by least squares. Strips are read off the order of the files' names and
+what is adjusted from them is the same to 2e-7 σ by least squares. Strips are read off the order of the files' names and
 are compared where that order stays, or is turned round.
 """
 
@@ -31,14 +31,17 @@ from aerotri.rasters.grids import RasterReader
 from rendered_photographs import Lists, copy_photographs, fly, write_gcp_list, write_positions
 from small_blocks import with_adjustment
 
-ALL = 1e-9
-"""σ, by which results may differ."""
+ALL = 2e-7
+"""σ, by which results may differ: windows fit to some 0.005 px, so that σ0, and all that it scales, has two digits
+fewer than coordinates have (2e-8 seen)."""
 ROBUST = 1e-7
 """σ, of a robust adjustment: it ends where a step changes nothing by more than 0.01 σ, and of that step the seventh
 digit hangs on the processor (6e-9 σ seen)."""
 TURNED = 1e-5
 """σ, of a robust adjustment in a frame with other axes: damped steps are damped by axis, so that it goes another way,
 and it ends where a step changes nothing by more than 0.01 σ."""
+PICKETS = 1e-4
+"""σ, of heights by matching, whose iterations end at a thousandth of a pixel (3e-6 seen)."""
 ROUNDED = 1e-6
 """σ, where coordinates of 5e6 m, or degrees, are rounded to some 1e-9 m in files: 1e-7 of the σ of control."""
 RASTER = 1e-5
@@ -152,7 +155,7 @@ def test_tiepoints(flown, before, tmp_path, case):
 
 
 def test_tiepoints_in_a_turned_frame(flown, before, tmp_path):
-    """Adjusted by least squares the same to 1e-9 σ; robustly to what the end of that leaves open."""
+    """Adjusted by least squares the same to 2e-7 σ; robustly to what the end of that leaves open."""
     frame = Similarity(about_z(37.0), SHIFT, 10.0)
     lists = Lists({}, seed=6, scale=10.0, frame=frame.points)
     block = read_block(tied(flown, tmp_path, lists, before[0]))
@@ -235,7 +238,7 @@ def test_run_measures_the_same_terrain(runs):
     good = a.status[i] == "accepted"
     assert good.sum() > 100
     sigma = a.sigma[i][good]
-    assert np.abs((b.xyz[j][good] - SHIFT - a.xyz[i][good]) / sigma).max() < ROBUST
+    assert np.abs((b.xyz[j][good] - SHIFT - a.xyz[i][good]) / sigma).max() < PICKETS
     surfaces = []
     for folder in (one, other):
         with RasterReader(folder / "dtm" / "dsm.tif") as reader:

@@ -37,8 +37,8 @@ def with_sigma_of_ties(block: Block, offset_px: np.ndarray, ties: int) -> tuple[
     rest = np.linalg.norm(without_smooth_part(offset_px[own], rays.xy[own], rays.image[own]), axis=1)
     relative = rest * pixel[own] / rays.sigma[own].mean(axis=1) / np.sqrt(1.0 - 3.0 / (2.0 * length))
     factor = float(np.median(relative)) / np.sqrt(2.0 * np.log(2.0)) if own.any() else 0.0
-    if not factor > 0.0:
-        factor = 1.0
+    # three digits, more than it is known to: rounding in the adjustment shall change no σ
+    factor = float(f"{factor:.3g}") if factor > 0.0 else 1.0
     sigma = np.where((rays.point < ties)[:, None], factor * rays.sigma, rays.sigma)
     common = float(np.median(sigma[own])) if own.any() else float(np.median(sigma))
     settings = replace(block.settings, image_sigma_um=1e3 * common)

@@ -34,13 +34,20 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class Oriented:
-    """Orientation in the local frame of the CRS (None: the block is local), with the cameras that belong to it."""
+    """Orientation in the local frame of the CRS (None: the block is local), with the cameras that belong to it.
+
+    Parameters
+    ----------
+    relative : centre (n, 3) and rotation (n, 3, 3) in a frame of the photographs alone, which no list of positions or
+        control changes by a single bit; the same as the others where the orientation was given.
+    """
 
     centre: np.ndarray
     rotation: np.ndarray
     cameras: tuple[Camera, ...]
     frame: LocalFrame | None
     messages: tuple[str, ...]
+    relative: tuple[np.ndarray, np.ndarray]
 
     def block_of(self, block: Block) -> Block:
         return replace(block, cameras=self.cameras)
@@ -49,10 +56,13 @@ class Oriented:
         """The photographs in another order (n,), and the cameras in the order of others of the same names."""
         own = {camera.name: camera for camera in self.cameras}
         cameras = tuple(own.get(camera.name, camera) for camera in cameras)
-        return replace(self, centre=self.centre[rows], rotation=self.rotation[rows], cameras=cameras)
+        return replace(self.kept(rows), cameras=cameras)
 
     def kept(self, keep: np.ndarray) -> Oriented:
-        return replace(self, centre=self.centre[keep], rotation=self.rotation[keep])
+        centre, rotation = self.relative
+        return replace(
+            self, centre=self.centre[keep], rotation=self.rotation[keep], relative=(centre[keep], rotation[keep])
+        )
 
 
 def orient(
@@ -142,7 +152,7 @@ def _given_orientation(reading: Reading, given: OrientationList, stated: assembl
     block = assemble.with_orientations(reading, given, start_only).block
     frame = None if block.crs == "local" else frame_of_block(block, stated.geoid)
     _, centre, rotation = in_frame(block, frame)
-    return Oriented(centre, rotation, block.cameras, frame, ())
+    return Oriented(centre, rotation, block.cameras, frame, (), (centre, rotation))
 
 
 def in_frame(block: Block, frame: LocalFrame | None) -> tuple[Block, np.ndarray, np.ndarray]:
@@ -175,7 +185,8 @@ def _placed(block: Block, mapped: Mapped, frame: LocalFrame | None, seed: int) -
     median = float(np.median(placement.misfit))
     said = f"the first orientation fits {len(source)} {what} to {median:.3g} m (median)"
     rotation = placement.rotation @ mapped.rotation
-    return Oriented(placement(mapped.centre), rotation, mapped.cameras, frame, (said,))
+    relative = mapped.centre, mapped.rotation
+    return Oriented(placement(mapped.centre), rotation, mapped.cameras, frame, (said,), relative)
 
 
 def _positions_of(block: Block, mapped: Mapped) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -196,7 +207,8 @@ def _unplaced(block: Block, mapped: Mapped, looking: np.ndarray) -> Oriented:
         )
     turn = _rotation_between(looking, np.array([0.0, 0.0, -1.0]))
     said = "neither control points nor positions are given: place, scale and north of the block are arbitrary"
-    return Oriented(mapped.centre @ turn.T, turn @ mapped.rotation, mapped.cameras, None, (said,))
+    relative = mapped.centre, mapped.rotation
+    return Oriented(mapped.centre @ turn.T, turn @ mapped.rotation, mapped.cameras, None, (said,), relative)
 
 
 def _rotation_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:

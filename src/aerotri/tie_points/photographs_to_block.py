@@ -156,7 +156,7 @@ def _oriented_tracks(
     bare = _bare_block(photographs, photographs.cameras, tracks, measured.of(tracks))
     few = _with_few_points(bare, tracks, measured.of(tracks)[0], size)
     oriented = orient(few, given, crs, positions, options.matches.seed, progress)
-    meeting = rays_that_meet(oriented.block_of(bare), oriented.centre, oriented.rotation)
+    meeting = rays_that_meet(oriented.block_of(bare), *oriented.relative)
     tracks, measured = _by_windows(photographs, tracks.chosen(meeting), measured, oriented, progress)
     return thin(tracks, measured.of(tracks)[0], size, options.points), measured, oriented, pairs
 
@@ -166,13 +166,13 @@ def _by_windows(
 ) -> tuple[Tracks, Measured]:
     """Tracks measured by windows, of which the rays meet."""
     block = _bare_block(photographs, oriented.cameras, tracks, measured.of(tracks))
-    points = reproject(block, oriented.centre, oriented.rotation).points
-    view = View(oriented.centre, oriented.rotation, oriented.cameras, photographs.camera, photographs.paths)
+    points = reproject(block, *oriented.relative).points
+    view = View(*oriented.relative, oriented.cameras, photographs.camera, photographs.paths)
     tracks, measured = measured_by_windows(
         view, tracks, measured, points, lambda done: progress(WINDOWS, done, len(photographs))
     )
     block = _bare_block(photographs, oriented.cameras, tracks, measured.of(tracks))
-    return tracks.chosen(rays_that_meet(block, oriented.centre, oriented.rotation)), measured
+    return tracks.chosen(rays_that_meet(block, *oriented.relative)), measured
 
 
 def _measured(tracks: Tracks, features: list[Features]) -> tuple[Tracks, Measured]:
