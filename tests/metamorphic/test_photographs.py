@@ -41,7 +41,7 @@ TURNED = 1e-5
 """σ, of a robust adjustment in a frame with other axes: damped steps are damped by axis, so that it goes another way,
 and it ends where a step changes nothing by more than 0.01 σ."""
 PICKETS = 1e-4
-"""σ, of heights by matching, whose iterations end at a thousandth of a pixel (3e-6 seen)."""
+"""σ, of heights by matching, whose steps end at .005 of the spacing of the posts of a window (3e-6 seen)."""
 ROUNDED = 1e-6
 """σ, where coordinates of 5e6 m, or degrees, are rounded to some 1e-9 m in files: 1e-7 of the σ of control."""
 RASTER = 1e-5
