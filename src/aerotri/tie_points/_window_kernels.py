@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from aerotri.compiled import kernel, leaf_kernel
+from aerotri.terrain._sampling_kernels import cubic_weights
 from aerotri.terrain._shift_kernels import invert
 
 HALF = 10
@@ -39,15 +40,6 @@ def _columns(window, out):
 
 
 @leaf_kernel
-def _weights(f, weight):
-    """Of four pixels around a place f beyond the second [L: Keys 1981, a = −1/2]."""
-    weight[0] = ((-0.5 * f + 1.0) * f - 0.5) * f
-    weight[1] = (1.5 * f - 2.5) * f * f + 1.0
-    weight[2] = ((-1.5 * f + 2.0) * f + 0.5) * f
-    weight[3] = (0.5 * f - 0.5) * f * f
-
-
-@leaf_kernel
 def _sample(image, x, y, a, along, across, out):
     """Grey values (n²,) at (x, y) + a·(u, v), by cubic convolution; False where the window leaves the photograph."""
     reach_x, reach_y = HALF * (abs(a[0]) + abs(a[1])), HALF * (abs(a[2]) + abs(a[3]))
@@ -60,8 +52,8 @@ def _sample(image, x, y, a, along, across, out):
         for j in range(-HALF, HALF + 1):
             c, r = x - 0.5 + a[0] * j + a[1] * i, y - 0.5 + a[2] * j + a[3] * i
             ic, ir = int(c), int(r)
-            _weights(c - ic, along)
-            _weights(r - ir, across)
+            cubic_weights(c - ic, along)
+            cubic_weights(r - ir, across)
             value = 0.0
             for k in range(4):
                 line = image[ir - 1 + k]
