@@ -215,8 +215,10 @@ class Bench {
     if (Boolean(was && was.running) !== Boolean(job && job.running)) this.actions();
     if (was && was.running && job && !job.running && job.error) say(job.error);
     if (state.generation !== this.generation) await this.renew();
-    if (this.waiting && state.equations !== "being set up") { this.waiting = false; await this.loadPoint(); await this.showTab(); if (this.chosen.image !== null) await this.reopen(); if (this.plan.show.ellipses) await this.wanted("ellipses"); }
+    if (this.waiting && state.equations !== "being set up") { this.waiting = false; await this.loadPoint(); await this.showTab(); if (this.chosen.image !== null) await this.reopen(); }
     if (state.equations === "being set up") this.waiting = true;
+    // equations may be ready before anybody saw them being set up
+    if (state.equations === "ready" && this.plan.show.ellipses) await this.wanted("ellipses");
   }
 
   // Another result is there: everything is asked for again, what is looked at stays.
