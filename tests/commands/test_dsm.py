@@ -1,5 +1,6 @@
 """`aerotri dsm`: from a result folder and photographs to files that later commands read."""
 
+import inspect
 import json
 
 import laspy
@@ -136,6 +137,11 @@ def test_the_function_gives_what_the_command_writes_and_goes_on_with_its_tiles(m
     other = aerotri.dense_surface(here / "result", photographs, area=area, most_pairs=1, tiles=tmp_path / "tiles")
     assert first.summary["tiles_resumed"] == other.summary["tiles_resumed"] == 0
     assert again.summary["tiles_resumed"] == again.summary["tiles"]
+    used = {one["key"]: one for one in other.summary["settings"]}
+    assert used["area"] == {"key": "area", "value": list(area), "unit": "m", "origin": "given"}
+    assert {name for name, one in used.items() if one["origin"] == "given"} == {"area", "most_pairs"}
+    left = inspect.signature(aerotri.dense_surface).parameters.keys() - used.keys()
+    assert left == {"result", "photographs", "tiles", "executor", "progress"}
     np.testing.assert_array_equal(first.surface.z, again.surface.z)
     with RasterReader(here / "dsm" / "dsm.tif") as reader:
         row, column = (

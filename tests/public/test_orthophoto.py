@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import json
 import os
 import signal
@@ -41,6 +42,11 @@ def made(tmp_path_factory):
 def test_files(made):
     here, _, found = made
     assert json.loads((here / "out" / "ortho.json").read_text(encoding="utf-8")) == found.summary
+    used = {one["key"]: one for one in found.summary["settings"]}
+    assert used["cell"] == {"key": "cell", "value": 2.0, "unit": "m", "origin": "given"}
+    assert {one["origin"] for name, one in used.items() if name != "cell"} == {"default"}
+    left = inspect.signature(aerotri.orthophoto).parameters.keys() - used.keys()
+    assert left == {"result", "photographs", "surface", "out", "layer", "plots", "tiles", "executor", "progress"}
     with rasterio.open(found.path) as image, rasterio.open(here / "out" / "photographs.tif") as numbers:
         assert image.count == 2
         assert image.colorinterp[-1].name == "alpha"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from importlib.util import find_spec
 
@@ -24,6 +25,11 @@ def test_the_model_is_that_of_its_files(measured):
     np.testing.assert_array_equal(model.pickets["Z"], table.column("Z").to_numpy())
     assert model.summary == json.loads((folder / "dtm.json").read_text(encoding="utf-8"))
     assert model.summary["pickets"]["accepted"] > 150
+    used = {one["key"]: one for one in model.summary["settings"]}
+    assert used["interval"] == {"key": "interval", "value": 20.0, "unit": "m", "origin": "given"}
+    assert {name for name, one in used.items() if one["origin"] == "given"} == {"interval", "pairs"}
+    left = inspect.signature(aerotri.terrain).parameters.keys() - used.keys()
+    assert left == {"result", "photographs", "executor", "scratch", "progress"}
     assert pyarrow.csv.read_csv(folder / "models.csv").to_pydict() == model.models.to_arrow().to_pydict()
     for name, surface in (("dsm", model.dsm), ("dtm", model.dtm)):
         saved = aerotri.Surface(folder / f"{name}.tif")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import inspect
 import json
 import re
 import shutil
@@ -311,6 +312,13 @@ def test_the_same_from_python(files, tied, tmp_path, capsys):
     run_tiepoints(files[0] / "photographs", tied, options(files), True)
     told, kept = (json.loads(text) for text in (capsys.readouterr().out, (folder / "tiepoints.json").read_text()))
     assert told["rays"] == kept["rays"]
+    used = {one["key"]: one for one in kept["settings"]}
+    assert used["control"] == {"key": "control", "value": "gcp_list.txt", "unit": "", "origin": "given"}
+    assert used["control_sigma_m"] == {"key": "control_sigma_m", "value": [0.02, 0.02, 0.03], "unit": "m",
+                                       "origin": "given"}  # fmt: skip
+    assert used["seed"]["origin"] == used["crs"]["origin"] == "default"
+    left = inspect.signature(aerotri.tie_points).parameters.keys() - used.keys()
+    assert left == {"photographs", "project", "cache", "executor", "progress"}
     assert told["marking_page"] == str(tied / "control_marks" / "marking.html")
 
 

@@ -27,7 +27,6 @@ def run_accuracy(
         Where the folder holds no result that has converged, or the list of points names another one.
     """
     console = Console(quiet=as_json)
-    from aerotri.formats.results.accuracy import accuracy_json
     from aerotri.public.accuracy import ACCURACY_NAMES, accuracy
     from aerotri.report.tables.accuracy import accuracy_lines
 
@@ -42,7 +41,7 @@ def run_accuracy(
     )
     found.save(target)
     if as_json:
-        print(json_text(accuracy_json(found.record)))
+        print(json_text(found.content))
     else:
         console.lines([*accuracy_lines(found.record), f"Written to {target}, page: {target / 'accuracy.html'}"])
     return 1 if found.record.verdict == "rejected" else 0

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.table import Table
+from aerotri.public.used_arguments import used_arguments
 
 if TYPE_CHECKING:
     from aerotri.results.accuracy import AccuracyRecord, Met
@@ -28,10 +29,11 @@ class Accuracy:
 
     Parameters
     ----------
-    record : what was found.
+    record : what was found. settings : every argument that was used, as accuracy.json has them.
     """
 
     record: AccuracyRecord
+    settings: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def met(self) -> Met:
@@ -75,6 +77,13 @@ class Accuracy:
         """What a reader of the numbers has to know."""
         return self.record.warnings
 
+    @property
+    def content(self) -> dict[str, Any]:
+        """The content of accuracy.json."""
+        from aerotri.formats.results.accuracy import accuracy_json
+
+        return accuracy_json(self.record) | {"settings": self.settings}
+
     def html(self) -> str:
         """The page as text."""
         from aerotri.report.pages.accuracy import accuracy_html
@@ -90,14 +99,13 @@ class Accuracy:
             When the folder holds other files, or cannot be written to.
         """
         from aerotri.formats.files.atomic import atomic_folder
-        from aerotri.formats.results.accuracy import accuracy_json
         from aerotri.formats.results.json_text import write_json
         from aerotri.report.pages.accuracy import write_accuracy_page
 
         target = Path(out)
         refuse_foreign_folder(target, ACCURACY_NAMES[0])
         with atomic_folder(target, own=ACCURACY_NAMES) as folder:
-            write_json(folder / "accuracy.json", accuracy_json(self.record))
+            write_json(folder / "accuracy.json", self.content)
             write_accuracy_page(self.record, folder / "accuracy.html")
         return target
 
@@ -168,7 +176,11 @@ def accuracy(
     if result.status != "converged":
         raise InputError(f"the adjustment ended '{result.status}'", "give the result of a converged one")
     names = _vegetated(result.adjusted, vegetated)
-    return Accuracy(accuracy_of(result.adjusted, names, Asked(class_horizontal, class_vertical, project_area)))
+    used = used_arguments(accuracy, {**asked, "vegetated": vegetated}, UNITS)
+    return Accuracy(accuracy_of(result.adjusted, names, Asked(class_horizontal, class_vertical, project_area)), used)
+
+
+UNITS = {"class_horizontal": "m", "class_vertical": "m", "project_area": "m²"}
 
 
 def _vegetated(adjusted: AdjustedBlock, given: Sequence[str] | FilePath) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from aerotri.public.change_epochs import plan_code, system_of_both
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.projects import project_of
 from aerotri.public.table import Table
+from aerotri.public.used_arguments import used_arguments
 from aerotri.results.head import Head
 
 if TYPE_CHECKING:
@@ -189,6 +190,10 @@ def cloud_change(
     """
     from aerotri.volume.change.clouds import Cloud, Scales, cloud_distances, core_points, registration_of
 
+    asked = {
+        "cylinder": cylinder, "normal": normal, "reach": reach, "spacing": spacing, "stable": stable,
+        "registration": registration,
+    }  # fmt: skip
     (before, of_before), (after, of_after) = (_opened(one) for one in (first, second))
     crs, of_heights = system_of_both((of_before, of_after), (_label(first), _label(second)))
     width = _default_width(before.xyz) if cylinder is None else cylinder
@@ -225,6 +230,7 @@ def cloud_change(
         "stable": None if held is None else {"core_points": int((held & known).sum()), "mean_m": shift},
         "sigma_m": float(np.nanmedian(found.sigma)), "level_of_detection_m": float(np.nanmedian(found.level(used))),
         "beyond_level_percent": 100.0 * float(beyond[known].mean()), "warnings": notes,
+        "settings": used_arguments(cloud_change, asked, dict.fromkeys(asked.keys() - {"stable"}, "m")),
     }  # fmt: skip
     return MeasuredCloudChange(found, summary)
 

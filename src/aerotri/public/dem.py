@@ -22,6 +22,7 @@ from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.stated import StatedAdjustment
 from aerotri.public.surfaces import Surface, as_surface
 from aerotri.public.table import Table
+from aerotri.public.used_arguments import used_arguments
 from aerotri.results.head import Head
 
 if TYPE_CHECKING:
@@ -196,6 +197,8 @@ def correct_dem(
         crs_note = numbers.note if isinstance(numbers, PolygonMap) else ""
         models_of_dem = dem_models(record, photographs, numbers.names)
         content = _correct(models_of_dem, numbers, reader, record.result.block, spool, report, executor)
+    asked = {"pair": pair, "models": models, "model_table": model_table, "orientation": orientation}
+    content["settings"] = used_arguments(correct_dem, asked, {})
     return CorrectedDem(content, as_surface(dem).path, spool, tuple(text for text in (doubt, crs_note) if text))
 
 

@@ -20,6 +20,7 @@ from aerotri.public.results import open_result
 from aerotri.public.surfaces import Surface
 from aerotri.public.terrain import rows_and_files
 from aerotri.public.tile_folder import fingerprints, open_tiles
+from aerotri.public.used_arguments import used_settings
 from aerotri.results.head import Head
 from aerotri.terrain.settings import DENSE_DEFAULTS, DenseSettings
 
@@ -85,7 +86,7 @@ class DenseSurface:
     adjustment : key of the adjustment it was measured with.
     ground : the ground without objects, None where it was not asked for.
     keeper : what removes the tiles when nobody uses them any more; None where they stay.
-    head : of files.
+    head : of files. settings : every argument that was used, as dsm.json has them.
     """
 
     record: DenseOutcome
@@ -95,6 +96,7 @@ class DenseSurface:
     ground: BareGround | None = None
     keeper: Spool | None = None
     head: Head = field(default_factory=Head)
+    settings: list[dict[str, Any]] = field(default_factory=list)
 
     @cached_property
     def surface(self) -> Surface:
@@ -136,7 +138,7 @@ class DenseSurface:
         from aerotri.formats.results.dense import dense_json
 
         found = dense_json(self.record, self.block, self.crs, self.ground)
-        return self.head.as_dict() | found | {"adjustment": self.adjustment}
+        return self.head.as_dict() | found | {"adjustment": self.adjustment, "settings": self.settings}
 
     @property
     def plot(self) -> DensePlots:
@@ -276,7 +278,8 @@ def measure_dense(
         outcome = measure_surface(record, plan, report.stage, workers)
     ground = bare_ground(outcome, settings.widest_object) if settings.ground else None
     block = record.result.block
-    return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper, Head(block.project, block.crs))
+    used = used_settings(dense_surface, settings, {"resolution": "m", "area": "m", "widest_object": "m"})
+    return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper, Head(block.project, block.crs), used)
 
 
 def _surface_parts(o: DenseOutcome) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -15,6 +15,7 @@ from aerotri.public.adjustment import Adjustment
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.table import Table
+from aerotri.public.used_arguments import used_arguments
 from aerotri.public.workplaces import workplace
 from aerotri.results.head import Head
 
@@ -34,10 +35,12 @@ class Halves:
     Parameters
     ----------
     record : what was found. adjusted : the block of which the halves are.
+    settings : every argument that was used, as halves.json has them.
     """
 
     record: HalvesRecord
     adjusted: AdjustedBlock
+    settings: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def found(self) -> tuple[str, ...]:
@@ -96,7 +99,7 @@ class Halves:
         from aerotri.formats.results.halves import halves_json
 
         block = self.adjusted.block
-        return Head(block.project, block.crs).as_dict() | halves_json(self.record)
+        return Head(block.project, block.crs).as_dict() | halves_json(self.record) | {"settings": self.settings}
 
     def save(self, out: FilePath) -> Path:
         """Write halves.json, the tables and the plots into a folder.
@@ -195,4 +198,5 @@ def halves(
             result = open_result(result)
         if result.status != "converged":
             raise InputError(f"the adjustment ended '{result.status}'", "give the result of a converged one")
-        return Halves(compare_halves(result.record, chosen, alpha, report.stage, at), result.adjusted)
+        used = used_arguments(halves, {"divisions": divisions, "alpha": alpha}, {})
+        return Halves(compare_halves(result.record, chosen, alpha, report.stage, at), result.adjusted, used)

@@ -18,6 +18,7 @@ from aerotri.public.folders import paths_of, refuse_existing_file, refuse_foreig
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.stated import StatedAdjustment
 from aerotri.public.table import Table
+from aerotri.public.used_arguments import used_arguments
 from aerotri.rasters.photograph_settings import (
     COMPRESSION,
     COMPRESSIONS,
@@ -153,6 +154,8 @@ def ideal_photographs(
     with held(folder), stage_report(progress) as report:
         exports = exports_of(adjusted, errors, resampling)
         record = _write_exports(exports, folder, [job.name for job in jobs], overwrite)
+        asked = {"resampling": resampling, "compression": compression, "group": group}
+        record["settings"] = used_arguments(ideal_photographs, asked, {})
         record["photographs"] = _resample_all(
             calibration, jobs, errors, folder, (resampling, compression), report, executor
         )  # fmt: skip

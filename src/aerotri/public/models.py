@@ -17,6 +17,7 @@ from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.optional import optional_module
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.results import open_result
+from aerotri.public.used_arguments import used_arguments
 from aerotri.results.head import Head
 
 if TYPE_CHECKING:
@@ -41,13 +42,14 @@ class ModelDeformation:
     Parameters
     ----------
     record : the numbers as arrays. block : name of the block. notes : what was done with the DEM, in sentences.
-    head : of files.
+    head : of files. settings : every argument that was used, as deform.json has them.
     """
 
     record: Deformation | BlockDeformation
     block: str
     notes: tuple[str, ...] = ()
     head: Head = field(default_factory=Head)
+    settings: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def x(self) -> np.ndarray:
@@ -84,9 +86,9 @@ class ModelDeformation:
         """The content of deform.json: extremes, RMS, height-to-base ratio, cm per µm."""
         from aerotri.formats.results.deformation import block_deformation_json, deformation_json
 
-        if isinstance(self.record, BlockDeformation):
-            return self.head.as_dict() | block_deformation_json(self.record, self.block)
-        return self.head.as_dict() | deformation_json(self.record, self.block)
+        whole = isinstance(self.record, BlockDeformation)
+        found = block_deformation_json(self.record, self.block) if whole else deformation_json(self.record, self.block)
+        return self.head.as_dict() | found | {"settings": self.settings}
 
     def to_xarray(self) -> Any:
         """An `xarray.Dataset` with dX, dY, dZ and their σ over y and x.
@@ -201,14 +203,21 @@ def deform(
         models = restitution_of(record, variant)
         refuse_without_errors(models, name)
         block = record.result.block
-        head = Head(block.project, block.crs)
+        head, notes = Head(block.project, block.crs), ()
         report.stage("deformation", None)
         if end_lap is not None:
-            return ModelDeformation(deform_normal_case(record, models, end_lap, spacing, group, gsd), name, head=head)
-        ground, notes = _ground(record, dem, stack)
-        if pair is not None:
-            return ModelDeformation(deform_pair(record, models, pair, ground, spacing), name, notes, head)
-        return ModelDeformation(_of_block(record, models, ground, spacing, step, report), name, notes, head)
+            found = deform_normal_case(record, models, end_lap, spacing, group, gsd)
+        else:
+            ground, notes = _ground(record, dem, stack)
+            if pair is not None:
+                found = deform_pair(record, models, pair, ground, spacing)
+            else:
+                found = _of_block(record, models, ground, spacing, step, report)
+    asked = {
+        "pair": pair, "end_lap": end_lap, "step": step, "variant": variant, "dem": dem, "spacing": spacing, "gsd": gsd,
+        "group": group,
+    }  # fmt: skip
+    return ModelDeformation(found, name, notes, head, used_arguments(deform, asked, {"spacing": "m", "gsd": "m"}))
 
 
 def _of_block(

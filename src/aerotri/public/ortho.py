@@ -21,6 +21,7 @@ from aerotri.public.results import open_result
 from aerotri.public.surfaces import as_surface
 from aerotri.public.terrain import ENDINGS
 from aerotri.public.tile_folder import fingerprints, open_tiles
+from aerotri.public.used_arguments import used_settings
 from aerotri.results.head import Head
 from aerotri.terrain.ortho.settings import DEFAULTS, OrthoSettings, Sampling
 from aerotri.volume.settings import LAYERS, Layer
@@ -240,6 +241,7 @@ def _described(
     block = record.result.block
     write_seams(folder / SEAMS, outcome, horizontal_crs(block.crs))
     summary = Head(block.project, block.crs).as_dict() | ortho_json(outcome, block, name, settings.resampling)
+    summary["settings"] = used_settings(orthophoto, settings, {"cell": "m", "area": "m"})
     write_json(folder / RECORD, summary)
     return outcome, summary, tuple(marked_points(outcome, block))
 

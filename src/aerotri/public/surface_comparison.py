@@ -18,6 +18,7 @@ from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.projects import project_of
 from aerotri.public.surfaces import Surface, as_surface
 from aerotri.public.table import Table
+from aerotri.public.used_arguments import used_arguments
 from aerotri.results.head import Head
 from aerotri.terrain.settings import ALIGNMENT, ALIGNMENTS, INTERPOLATION, INTERPOLATIONS, Interpolation, Movement
 
@@ -44,7 +45,7 @@ class SurfaceComparison:
     test, control : names of the surfaces. method : how both were interpolated.
     crs : 'EPSG:n', None where not known.
     notes : what was done to bring the surfaces to metres, in sentences.
-    head : of files.
+    head : of files. settings : every argument that was used, as compare.json has them.
     """
 
     record: Comparison
@@ -54,6 +55,7 @@ class SurfaceComparison:
     crs: str | None = None
     notes: tuple[str, ...] = ()
     head: Head = field(default_factory=Head)
+    settings: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def rmse(self) -> float:
@@ -118,7 +120,7 @@ class SurfaceComparison:
 
         sure = {"sigma_bias_m": self.bias_sigma, "noise_length_m": self.noise_length}
         found = comparison_json(self.record, self.test, self.control, self.method)
-        return self.head.as_dict() | found | sure
+        return self.head.as_dict() | found | sure | {"settings": self.settings}
 
     def plot(self) -> Figure:
         """The differences as a map and as a histogram."""
@@ -221,7 +223,8 @@ def compare(
     notes = tuple(source.note for source in (one, other) if source.note) + _of_heights(one, other)
     crs = None if epsg is None else f"EPSG:{epsg}"
     head = Head(project_of(project, test, control), max(one.crs, other.crs, key=len))
-    return SurfaceComparison(found, _name(test), _name(control), method, crs, notes, head)
+    used = used_arguments(compare, {"method": method, "align": align, "cell": cell}, {"cell": "m"})
+    return SurfaceComparison(found, _name(test), _name(control), method, crs, notes, head, used)
 
 
 def _check(method: str, align: str) -> None:

@@ -20,6 +20,7 @@ from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
 from aerotri.public.surfaces import Surface, dataset_of
 from aerotri.public.table import Table
+from aerotri.public.used_arguments import used_settings
 from aerotri.results.head import Head
 from aerotri.terrain.settings import DEFAULTS, Subset, TerrainSettings
 
@@ -78,7 +79,7 @@ class TerrainModel:
     adjustment : key of the adjustment it was measured with.
     notes : what was done with the input before, in sentences.
     ground_within : name of the outline within which all is ground; '' where there is none.
-    head : of files.
+    head : of files. settings : every argument that was used, as dtm.json has them.
     """
 
     record: TerrainOutcome
@@ -88,6 +89,7 @@ class TerrainModel:
     notes: tuple[str, ...] = ()
     ground_within: str = ""
     head: Head = field(default_factory=Head)
+    settings: list[dict[str, Any]] = field(default_factory=list)
 
     @cached_property
     def dsm(self) -> Surface:
@@ -129,7 +131,7 @@ class TerrainModel:
         """The content of dtm.json: interval, counts of pickets, σ."""
         from aerotri.formats.results.terrain import terrain_json
 
-        stated = {"adjustment": self.adjustment, "ground_within": self.ground_within}
+        stated = {"adjustment": self.adjustment, "ground_within": self.ground_within, "settings": self.settings}
         return self.head.as_dict() | terrain_json(self.record, self.block, self.crs) | stated
 
     @property
@@ -307,7 +309,8 @@ def measure_terrain(
         with opened(executor, report.said) as workers:
             outcome = make_terrain_model(record, plan, report.stage, Workplace(workers, spool.folder))
     head = Head(block.project, block.crs)
-    return TerrainModel(outcome, str(block.name), block.crs, adjustment_key(record), notes, name, head)
+    used = used_settings(terrain, settings, {"interval": "m", "cell": "m", "area": "m", "window": "px"})
+    return TerrainModel(outcome, str(block.name), block.crs, adjustment_key(record), notes, name, head, used)
 
 
 def terrain_plan(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ from aerotri.public.blocks import Sigmas, text_of_path
 from aerotri.public.folders import refuse_foreign_entries, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.projects import project_of
+from aerotri.public.used_arguments import used_arguments
 from aerotri.public.workplaces import workplace
 from aerotri.results.head import Head
 from aerotri.tie_points.settings import DEFAULTS, TiePointSettings
@@ -41,13 +42,14 @@ class TiedPhotographs:
     Parameters
     ----------
     record : the block and how it was found. photographs : their files and cameras. given : what was read beside them.
-    seconds : that it took.
+    seconds : that it took. settings : every argument that was used, as tiepoints.json has them.
     """
 
     record: TiedBlock
     photographs: PhotographSet
     given: Given
     seconds: float
+    settings: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def block(self) -> Block:
@@ -88,7 +90,8 @@ class TiedPhotographs:
 
         page = "" if folder is None or self.given.control is None else str(Path(folder) / MARKS / PAGE)
         head = Head(self.block.project, self.block.crs).as_dict()
-        return head | tie_points_json(self.record, self.seconds) | {"marking_page": page}
+        stated = {"settings": self.settings, "marking_page": page}
+        return head | tie_points_json(self.record, self.seconds) | stated
 
     def save(self, out: FilePath, *, overwrite: bool = False, progress: ProgressLike = None) -> Path:
         """Write the block's folder, tiepoints.json, and a page to mark control points in.
@@ -223,6 +226,14 @@ def tie_points(
     >>> tied = aerotri.tie_points("photographs", control="gcp_list.txt", check=["GCP7"])  # doctest: +SKIP
     >>> result = aerotri.adjust(tied.block)  # doctest: +SKIP
     """
+    asked = {
+        "control": control, "check": check, "positions": positions, "orientation": orientation, "camera": camera,
+        "focal_length_mm": focal_length_mm, "pixel_um": pixel_um, "free_interior": free_interior, "crs": crs,
+        "geoid": geoid, "control_sigma_m": control_sigma_m, "control_prefix": control_prefix,
+        "mark_sigma_px": mark_sigma_px, "positions_sigma_m": positions_sigma_m,
+        "orientation_sigma_m": orientation_sigma_m, "orientation_sigma_deg": orientation_sigma_deg, "points": points,
+        "features": features, "feature_size": feature_size, "neighbours": neighbours, "seed": seed,
+    }  # fmt: skip
     begun = time.perf_counter()
     TiePointSettings(mark_sigma_px, points, features, feature_size, neighbours, seed).check()
     from aerotri.formats.assembly.assemble import Statements
@@ -246,9 +257,16 @@ def tie_points(
         keep = Path(stack.enter_context(tempfile.TemporaryDirectory()) if cache is None else cache)
         at = stack.enter_context(workplace(executor, keep, report.said))
         tied = _tied(Path(photographs), files, spec, mark_sigma_px, options, keep, report, begun, at)
+    tied = replace(tied, settings=used_arguments(tie_points, asked, UNITS))
     if whose is None:
         return tied
     return replace(tied, record=replace(tied.record, block=replace(tied.record.block, project=whose)))
+
+
+UNITS = {
+    "focal_length_mm": "mm", "pixel_um": "µm", "control_sigma_m": "m", "mark_sigma_px": "px", "positions_sigma_m": "m",
+    "orientation_sigma_m": "m", "orientation_sigma_deg": "°", "feature_size": "px",
+}  # fmt: skip
 
 
 def _tied(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import BLOCK, HEAD
+from aerotri.reference.adjust_contents import ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.records import DescribedFile, Item, of_axes, within
 
 PLACE = "folder of accuracy"
@@ -98,6 +98,7 @@ ACCURACY = (
         *of_axes("s{}", "number?", "Survey error (standard deviation) of the given {}.", "m"),
         Item("vegetated", "yes/no", "Whether it stands in vegetation."),
     ),
+    *ARGUMENTS,
 )  # fmt: skip
 
 

@@ -38,14 +38,14 @@ HEAD = (*HEAD_BESIDE_CRS, CRS)
 ORIGINS = {"given": "stated, or chosen by the program", "default": "the default value, stated or not"}
 ARGUMENTS = (
     Item(
-        "settings[]", "object", "Every argument that was used, by its name in Python; commands have them with dashes."
+        "settings[]", "object", "Every argument that was used, by its name in Python, most of them options with dashes."
     ),
     Item("settings[].key", "text", "Name of the argument."),
     Item("settings[].value", "anything", "The value; null where it is not in use."),
     Item("settings[].unit", "text", "Unit; empty where it has none."),
     Item("settings[].origin", "text", "Where it comes from.", values=ORIGINS),
 )
-"""What the JSON files of volumes and changes say of how they were computed."""
+"""What the JSON file of every result but an adjustment says of how it was computed."""
 STATUS_WORDS = {
     "converged": "the iterations came to an end",
     "not converged": "they did not",

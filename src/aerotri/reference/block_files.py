@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import BLOCK, HEAD
+from aerotri.reference.adjust_contents import ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.adjust_tables import PLACE as RESULT
 from aerotri.reference.records import DescribedFile, Item, of_axes
 
@@ -136,6 +136,7 @@ TIEPOINTS_JSON = (
     Item("messages[]", "text", "What was matched, assumed or left out, in sentences."),
     Item("seconds", "number", "Time it took.", "s"),
     Item("marking_page", "text", "Page to mark control points in; empty without control."),
+    *ARGUMENTS,
 )
 PREDICTED = (
     POINT,

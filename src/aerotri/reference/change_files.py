@@ -100,6 +100,7 @@ CLOUD_JSON = (
     Item("level_of_detection_m", "number", "Level of detection (95 %), median of the places.", "m"),
     Item("beyond_level_percent", "number", "Share of the places beyond it.", "%"),
     Item("warnings[]", "text", "Sentences to read."),
+    *ARGUMENTS,
 )
 CLOUD_TABLE = (
     *(Item(axis, "number", f"{axis} of the place.", "m") for axis in "XYZ"),

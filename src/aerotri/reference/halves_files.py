@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import HEAD
+from aerotri.reference.adjust_contents import ARGUMENTS, HEAD
 from aerotri.reference.records import DescribedFile, Item, of_axes, within
 from aerotri.results.halves import DIVISIONS
 
@@ -83,6 +83,7 @@ HALVES = (
             *of_axes("rms_of_sigma.{}", "number?", "The same in {}.", "m"),
         ),
     ),
+    *ARGUMENTS,
 )
 IMAGE_CELLS = (
     DIVISION,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import BLOCK, HEAD, HEAD_BESIDE_CRS
+from aerotri.reference.adjust_contents import ARGUMENTS, BLOCK, HEAD, HEAD_BESIDE_CRS
 from aerotri.reference.records import DescribedFile, Item, of_axes, statistics
 
 DEFORM, DEMCOR, IMGEO, CROSSCHECK = (f"folder of {name}" for name in ("deform", "demcor", "imgeo", "crosscheck"))
@@ -76,6 +76,7 @@ DEFORM_JSON = (
     Item("seams.worst[].mean", "number", "Mean step, first less second.", "m"),
     Item("seams.worst[].rms", "number", "Root mean square step.", "m"),
     Item("seams.worst[].max", "number", "Largest step.", "m"),
+    *ARGUMENTS,
 )
 MODELS = (
     Item("number", "whole", "Number of the model, as in model.tif."),
@@ -128,6 +129,7 @@ DEMCOR_JSON = (
     Item("halo_cells", "whole", "Cells by which neighbouring windows overlapped."),
     Item("timings_s", "object", "Time by stage.", "s"),
     Item("timings_s.*", "number", "Time of a stage.", "s"),
+    *ARGUMENTS,
 )
 IMGEO_JSON = (
     *HEAD,
@@ -164,6 +166,7 @@ IMGEO_JSON = (
         optional=True,
     ),
     Item("files[]", "text", "All files written."),
+    *ARGUMENTS,
 )
 CORRECTION = (
     Item("camera", "text", "Camera."),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import BLOCK, HEAD
+from aerotri.reference.adjust_contents import ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.records import DescribedFile, Item, within
 
 ORTHO = "folder of ortho"
@@ -72,6 +72,7 @@ ORTHO_JSON = (
     Item("photographs[].area_m2", "number", "Area taken from it.", "m²"),
     Item("photographs[].gain[]", "number", "Factor of its colours, by band."),
     Item("photographs[].offset[]", "number", "Added to its colours, by band, share of white."),
+    *ARGUMENTS,
 )
 
 

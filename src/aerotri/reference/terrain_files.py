@@ -63,6 +63,7 @@ DTM_JSON = (
     Item("ground_share", "number", "Share of the points that are ground, not objects."),
     Item("ground_within", "text", "Outline within which all is ground; empty where none was given."),
     Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
+    *ARGUMENTS,
 )
 DSM_JSON = (
     *HEAD,
@@ -100,6 +101,7 @@ DSM_JSON = (
     Item("ground.bridge.power", "number", "Power by which it grows with the distance."),
     Item("ground.bridge.discs", "whole", "Discs of ground that were taken out, bridged and compared to find it."),
     Item("adjustment", "text", "Key of the adjustment; volumes tell by it what two surfaces share."),
+    *ARGUMENTS,
 )
 DIFFERENCE = (
     ("count", "whole", "Number of cells compared.", ""),
@@ -132,6 +134,7 @@ COMPARE_JSON = (
     Item("alignment.about_m[]", "number", "Point of the rotation.", "m"),
     Item("sigma_bias_m", "number?", "Standard deviation of the mean difference: cells of one noise count once.", "m"),
     Item("noise_length_m", "number?", "Side of the square whose cells share one noise; null where too few tell.", "m"),
+    *ARGUMENTS,
 )
 METHOD_WORDS = dict(
     zip(
