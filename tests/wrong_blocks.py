@@ -18,7 +18,7 @@ from aerotri.coordinates.local_frame import local_frame
 from aerotri.formats.block.folder import write_block
 from aerotri.functional_model.rotation import angles_from_rotation, rotation_from_angles
 from aerotri.observations import Block
-from aerotri.observations.block import GnssSettings, InsSettings
+from aerotri.observations.settings import GnssSettings, InsSettings
 from aerotri.simulation import parse_spec, simulate
 
 Spoil = Callable[[Block], Block]

@@ -7,7 +7,7 @@ import pytest
 
 from aerotri.diagnosis.position_errors import position_errors_in_words
 from aerotri.formats.results.solution import read_solution, write_solution
-from aerotri.observations.block import GnssSettings
+from aerotri.observations.settings import GnssSettings
 from aerotri.pipeline import adjust_keeping_system, reopen
 from aerotri.strategies.position_estimation import LEVEL, chance, estimate, neighbours
 from aerotri.strategies.position_likelihood import (

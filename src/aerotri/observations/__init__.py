@@ -12,25 +12,19 @@ number; image coordinates in mm from the image centre, x right, y up, object coo
 (80.0, 55.0)
 """
 
-from aerotri.observations.block import (
+from aerotri.observations.block import Block, Camera, Constraints, Control, GnssIns, ImagePoints, Images
+from aerotri.observations.prior import Prior
+from aerotri.observations.rigs import Mounting, Rig
+from aerotri.observations.rolling_shutter import RollingShutter
+from aerotri.observations.settings import (
     AdjustmentSettings,
-    Block,
-    Camera,
     CollocationSettings,
-    Constraints,
-    Control,
     DeviationSettings,
-    GnssIns,
     GnssSettings,
-    ImagePoints,
-    Images,
     InsSettings,
     PhotographFieldSettings,
     Settings,
 )
-from aerotri.observations.prior import Prior
-from aerotri.observations.rigs import Mounting, Rig
-from aerotri.observations.rolling_shutter import RollingShutter
 
 __all__ = [
     "AdjustmentSettings",

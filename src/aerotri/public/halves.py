@@ -86,9 +86,9 @@ class Halves:
 
         out, block = {}, str(self.adjusted.block.name)
         for one in self.record.comparisons:
-            for field in one.fields:
+            for errors in one.fields:
                 number = "" if len(one.fields) == 1 else f"_{len(out) + 1}"
-                out[f"image_errors_{one.division}{number}"] = plot_field_difference(one, field, block)
+                out[f"image_errors_{one.division}{number}"] = plot_field_difference(one, errors, block)
             if one.points is not None:
                 out[f"heights_{one.division}"] = plot_height_differences(one, block, self.adjusted.block.crs)
         return out

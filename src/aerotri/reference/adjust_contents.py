@@ -10,42 +10,11 @@ from aerotri.reference.adjust_models import (
     rigidity,
     rolling_shutters,
 )
-from aerotri.reference.adjust_tables import COMPARED, PARAMETERS, PLACE, RIGS, WHERE_MODEL, with_totals
-from aerotri.reference.records import DescribedFile, Item, of_axes, within
+from aerotri.reference.adjust_tables import PARAMETERS, PLACE, RIGS, WHERE_MODEL, with_totals
+from aerotri.reference.compared_contents import COMPARE_PARAMETERS
+from aerotri.reference.head import BLOCK, HEAD, ORIGINS
+from aerotri.reference.records import DescribedFile, Item, axes_object, of_axes, within
 
-VERSION = Item("aerotri", "text", "Version of aerotri that wrote the file.")
-BLOCK = Item("block", "text", "Name of the block.")
-PROJECT = (
-    Item("project", "object", "What [project] of block.toml says; empty texts where it says nothing."),
-    Item("project.title", "text", "Title of the project."),
-    Item("project.client", "text", "Who ordered the work."),
-    Item("project.operator", "text", "Who computes."),
-    Item("project.company", "text", "Company of the operator."),
-    Item("project.survey_date", "text", "Day of the survey, YYYY-MM-DD."),
-    Item("project.notes", "text", "Notes."),
-    Item("project.logo", "text", "Name of the logo in the block folder."),
-)
-CRS = Item("crs", "text", "Coordinate system: local, or EPSG codes; empty where none is stated.")
-HEAD_BESIDE_CRS = (
-    VERSION,
-    Item("computed", "text", "When it was computed: 2026-05-04T12:30:00Z, in UTC."),
-    *PROJECT,
-    Item("crs_name", "text", "Name of the coordinate system; empty for local ones."),
-    Item("height_system", "text", "Name of the system of the heights; empty where none is stated."),
-)
-HEAD = (*HEAD_BESIDE_CRS, CRS)
-"""What the JSON file of every result begins with."""
-ORIGINS = {"given": "stated, or chosen by the program", "default": "the default value, stated or not"}
-ARGUMENTS = (
-    Item(
-        "settings[]", "object", "Every argument that was used, by its name in Python, most of them options with dashes."
-    ),
-    Item("settings[].key", "text", "Name of the argument."),
-    Item("settings[].value", "anything", "The value; null where it is not in use."),
-    Item("settings[].unit", "text", "Unit; empty where it has none."),
-    Item("settings[].origin", "text", "Where it comes from.", values=ORIGINS),
-)
-"""What the JSON file of every result but an adjustment says of how it was computed."""
 STATUS_WORDS = {
     "converged": "the iterations came to an end",
     "not converged": "they did not",
@@ -54,20 +23,13 @@ STATUS_WORDS = {
 SUSPECT_UNIT = "m, mm for image points, rad for angles"
 
 
-def _axes_object(name: str, text: str, unit: str = "m") -> tuple[Item, ...]:
-    return (
-        Item(name, "object", f"{text}, by axis.", unit),
-        *of_axes(f"{name}.{{}}", "number?", f"{text} in {{}}.", unit),
-    )
-
-
 def _ground_points(name: str, what: str) -> tuple[Item, ...]:
     return (
         Item(name, "object", f"Differences at the {what} points."),
         Item(f"{name}.count", "whole", f"Number of {what} points."),
-        *_axes_object(f"{name}.rms", "Root mean square difference"),
-        *_axes_object(f"{name}.mean", "Mean difference"),
-        *_axes_object(f"{name}.max", "Largest difference without sign"),
+        *axes_object(f"{name}.rms", "Root mean square difference"),
+        *axes_object(f"{name}.mean", "Mean difference"),
+        *axes_object(f"{name}.max", "Largest difference without sign"),
         Item(f"{name}.points[]", "object", f"One entry a {what} point."),
         Item(f"{name}.points[].point", "text", "Name of the point."),
         *of_axes(f"{name}.points[].d{{}}", "number?", "Adjusted minus given {}.", "m"),
@@ -288,7 +250,7 @@ CHECK_FREE = (
     Item("transformation.rotation_deg[]", "number", "Rotation about X, Y, Z.", "deg"),
     Item("transformation.scale_ppm", "number", "Change of scale.", "ppm"),
     Item("transformation.redundancy", "whole", "Redundancy of the transformation."),
-    *_axes_object("transformation.rms", "Root mean square residual"),
+    *axes_object("transformation.rms", "Root mean square residual"),
     Item("transformation.points[]", "object", "Residuals at the control points."),
     Item("transformation.points[].point", "text", "Name of the point."),
     *of_axes("transformation.points[].d{}", "number?", "Transformed minus given {}.", "m"),
@@ -347,67 +309,6 @@ CHANGES = (
     Item("[].changed", "yes/no", "Whether the image errors changed (p below 0.01)."),
     Item("[].sentence", "text", "The outcome in words."),
 )
-
-
-def _accuracy(name: str, what: str) -> tuple[Item, ...]:
-    return (
-        Item(name, "object", f"Differences at {what}."),
-        Item(f"{name}.count", "object", "Number of known differences, by axis."),
-        *of_axes(f"{name}.count.{{}}", "whole", "Number of known differences in {}."),
-        *_axes_object(f"{name}.rms", "Root mean square difference"),
-        *_axes_object(f"{name}.low", "Lower 95 % bound of the RMS"),
-        *_axes_object(f"{name}.high", "Upper 95 % bound of the RMS"),
-        Item(f"{name}.differences[]", "object", "One entry a point, in the order of the names at the top."),
-        Item(f"{name}.differences[][]", "number?", "Differences in X, Y, Z.", "m"),
-    )
-
-
-def _gain(name: str, text: str) -> tuple[Item, ...]:
-    return (
-        Item(name, "object?", text),
-        Item(f"{name}.against", "text", "The set it is held against."),
-        Item(f"{name}.value", "number?", "Gain in RMS: 0.1 is 10 % smaller."),
-        Item(f"{name}.standard_error", "number?", "Standard deviation of the gain."),
-    )
-
-
-_OF_SET = tuple(
-    one
-    for one in COMPARED
-    if one.name
-    in ("set", "status", "count", "significant", "effective", "sigma0", "sigma0_um", "aic", "bic", "verdict")
-)
-COMPARE_PARAMETERS = (
-    *HEAD,
-    BLOCK,
-    Item("folds", "whole", "Parts in which control points were left out and predicted."),
-    Item("robust", "text", "Robust estimation used, as adjustment.robust."),
-    Item("check_points[]", "text", "Names of the check points."),
-    Item("control_points[]", "text", "Names of the control points that were predicted."),
-    Item("sets[]", "object", "One entry a set, in the order asked for."),
-    *within("sets[]", *_OF_SET),
-    *_accuracy("sets[].check", "check points"),
-    *_accuracy("sets[].control", "control points, each predicted without itself"),
-    Item("sets[].collocation", "object", "The random field, where the set has one."),
-    Item("sets[].collocation.sigma_um", "number?", "Its standard deviation.", "µm"),
-    Item("sets[].collocation.length_mm", "number?", "Its correlation length.", "mm"),
-    *_gain("sets[].gain", "Gain over the best of the smaller sets it contains; null where there is none."),
-    Item("sets[].groups", "text?", "Column of images.csv whose groups have values of their own; empty: one for all."),
-    Item("sets[].kind", "text", "How these values are tied: free, independent or walk."),
-    Item("sets[].p", "number?", "Probability of their differences by chance."),
-    Item("sets[].prediction", "object", "What predictions of parts of the block by everything else say of the set."),
-    Item("sets[].prediction.areas[]", "number?", "−2 ln of the density of the image points of every area."),
-    Item("sets[].prediction.strips[]", "number?", "The same of every strip."),
-    Item("sets[].prediction.control[]", "number?", "The same of every control point."),
-    Item("sets[].prediction.sigma_height", "number?", "RMS of the σ of predicted heights.", "m"),
-    Item("sets[].prediction.best", "text?", "The set that predicts best."),
-    Item(
-        "sets[].prediction.value", "number?", "Sum of control and the mean of areas and strips, less that of the best."
-    ),
-    Item("sets[].prediction.standard_error", "number?", "Standard error of value."),
-    *_gain("sets[].behind", "How it stands against the best of all sets; null where it has no result."),
-)
-CHOICE = Item("choice", "text", "Which set auto would take and why, in a sentence.")
 
 
 def adjust_contents() -> tuple[DescribedFile, ...]:

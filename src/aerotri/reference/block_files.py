@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.adjust_tables import PLACE as RESULT
+from aerotri.reference.head import ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.records import DescribedFile, Item, of_axes
 
 SIMULATED = "block of simulate"

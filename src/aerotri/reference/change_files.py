@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import ARGUMENTS, HEAD
+from aerotri.reference.head import ARGUMENTS, HEAD
 from aerotri.reference.records import DescribedFile, Item
 from aerotri.volume.change.alignment import ALIGNS
 from aerotri.volume.change.compute import PARTS

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import ARGUMENTS, HEAD
+from aerotri.reference.head import ARGUMENTS, HEAD
 from aerotri.reference.records import DescribedFile, Item, of_axes, within
 from aerotri.results.halves import DIVISIONS
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import ARGUMENTS, BLOCK, HEAD, HEAD_BESIDE_CRS
+from aerotri.reference.head import ARGUMENTS, BLOCK, HEAD, HEAD_BESIDE_CRS
 from aerotri.reference.records import DescribedFile, Item, of_axes, statistics
 
 DEFORM, DEMCOR, IMGEO, CROSSCHECK = (f"folder of {name}" for name in ("deform", "demcor", "imgeo", "crosscheck"))

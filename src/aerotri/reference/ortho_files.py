@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import ARGUMENTS, BLOCK, HEAD
+from aerotri.reference.head import ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.records import DescribedFile, Item, within
 
 ORTHO = "folder of ortho"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import HEAD
+from aerotri.reference.head import HEAD
 from aerotri.reference.records import DescribedFile, Item, within
 
 PLACE = "folder of plan"

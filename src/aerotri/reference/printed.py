@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from aerotri.reference.adjust_contents import CHOICE, COMPARE_PARAMETERS
 from aerotri.reference.adjust_tables import MARKS
+from aerotri.reference.compared_contents import CHOICE, COMPARE_PARAMETERS
 from aerotri.reference.records import DescribedFile, Item, of_axes
 
 UNIT = "m, deg for angles"

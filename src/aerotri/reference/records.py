@@ -80,3 +80,11 @@ def statistics(name: str, what: str, unit: str = "m", keys: Sequence[str] = ("mi
     words = {"min": "Smallest", "max": "Largest", "mean": "Mean", "rms": "Root mean square"}
     head = Item(name, "object", f"Statistics of {what}.", unit)
     return (head, *(Item(f"{name}.{key}", "number?", f"{words[key]} of {what}.", unit) for key in keys))
+
+
+def axes_object(name: str, text: str, unit: str = "m") -> tuple[Item, ...]:
+    """An object with a number by axis."""
+    return (
+        Item(name, "object", f"{text}, by axis.", unit),
+        *of_axes(f"{name}.{{}}", "number?", f"{text} in {{}}.", unit),
+    )

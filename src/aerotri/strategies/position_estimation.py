@@ -12,7 +12,7 @@ from aerotri.adjustment.position_errors import KIND
 from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
-from aerotri.observations.block import GnssSettings
+from aerotri.observations.settings import GnssSettings
 from aerotri.quantiles import chi_square_exceedance
 from aerotri.results.position_errors import CHECK_LEVEL, PositionErrors
 from aerotri.strategies.position_likelihood import (

@@ -18,7 +18,7 @@ from aerotri.formats.assembly.parts import PositionList, Reading, no_sigma
 from aerotri.formats.assembly.reprojection import reproject
 from aerotri.memory import fitting
 from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Settings
-from aerotri.observations.block import GnssSettings
+from aerotri.observations.settings import GnssSettings
 from aerotri.tie_points.features import FeatureOptions, Features, features_of
 from aerotri.tie_points.given import (
     Given,

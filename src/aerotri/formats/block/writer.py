@@ -15,7 +15,8 @@ from aerotri.formats.text.table_writer import check_names, write_table
 from aerotri.formats.text.toml_text import Inline, toml_of
 from aerotri.functional_model.additional_parameters import format_parameters
 from aerotri.observations import Block, Camera, Mounting, Prior, Rig, RollingShutter
-from aerotri.observations.block import INTERIOR_ELEMENTS, GnssSettings, PhotographFieldSettings
+from aerotri.observations.block import INTERIOR_ELEMENTS
+from aerotri.observations.settings import GnssSettings, PhotographFieldSettings
 
 ANGLE_UNIT = "deg"
 TABLE_NAMES = ("images", "image_points", "control", "gnss_ins", "fiducials", "edits", "constraints")
