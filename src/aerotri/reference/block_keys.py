@@ -8,7 +8,8 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from aerotri.formats.block.settings_model import BlockModel, PriorModel, ThreePriorsModel
+from aerotri.formats.block.settings_model import BlockModel
+from aerotri.formats.block.settings_types import PriorModel, ThreePriorsModel
 from aerotri.simulation.camera_spec import PriorSpec
 from aerotri.simulation.spec import SimulationSpec
 

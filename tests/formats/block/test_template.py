@@ -14,7 +14,8 @@ import aerotri
 from aerotri import InputError
 from aerotri.cli.app import invoke
 from aerotri.formats.block.settings import read_block_toml
-from aerotri.formats.block.settings_model import BlockModel, PriorModel, ThreePriorsModel
+from aerotri.formats.block.settings_model import BlockModel
+from aerotri.formats.block.settings_types import PriorModel, ThreePriorsModel
 from aerotri.formats.block.template import EMPTY_TABLES, NewCamera, block_toml_text, write_template
 from aerotri.formats.block.unread import TABLES
 

@@ -12,8 +12,10 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from aerotri.conventions import InputError
+from aerotri.formats.block.camera_model import CameraModel
 from aerotri.formats.block.project_model import ProjectFileModel
-from aerotri.formats.block.settings_model import BlockModel, CameraModel, CamerasModel, PriorModel
+from aerotri.formats.block.settings_model import BlockModel, CamerasModel
+from aerotri.formats.block.settings_types import PriorModel
 from aerotri.formats.text.csv_text import BLANKS
 from aerotri.formats.text.tables import CONTROL_CHARACTERS, SMALLEST_POSITIVE
 from aerotri.formats.text.toml_text import line_of_key, read_toml

@@ -16,7 +16,8 @@ from pydantic_core import PydanticUndefined
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.block.points import CONTROL_COLUMNS, GNSS_COLUMNS, IMAGE_POINT_COLUMNS
-from aerotri.formats.block.settings_model import BlockModel, PriorModel, Section, ThreePriorsModel
+from aerotri.formats.block.settings_model import BlockModel
+from aerotri.formats.block.settings_types import PriorModel, Section, ThreePriorsModel
 from aerotri.formats.block.unread import TABLES
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.text.tables import Columns

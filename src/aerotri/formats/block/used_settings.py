@@ -9,7 +9,8 @@ from typing import Any, Literal
 from pydantic import BaseModel
 
 from aerotri.conventions import InputError
-from aerotri.formats.block.settings_model import BlockModel, PriorModel, ThreePriorsModel
+from aerotri.formats.block.settings_model import BlockModel
+from aerotri.formats.block.settings_types import PriorModel, ThreePriorsModel
 from aerotri.formats.block.writer import settings_content
 from aerotri.formats.text.toml_text import key_text, value_text
 from aerotri.observations import Block
