@@ -61,7 +61,7 @@ def files_of(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def divided(source, folder, parts=4, tables="csv"):
+def divided(source, folder, parts=3, tables="csv"):
     return files_of(aerotri.divide(source, folder, parts=parts, tables=tables))
 
 
@@ -71,7 +71,7 @@ def test_files_are_those_of_the_whole(kept, tables, block, tmp_path, small_piece
     write_block(block, tmp_path / "block", tables=kept)
     # as it is read: points in the order of their first image point
     expected = divided(read_block(tmp_path / "block"), tmp_path / "whole", tables=tables)
-    assert sum(name.endswith(f"image_points.{tables}") for name in expected) == 4
+    assert sum(name.endswith(f"image_points.{tables}") for name in expected) == 3
     monkeypatch.setattr(block_folder, "read_image_points", refuse)
     assert divided(tmp_path / "block", tmp_path / "pieces", tables=tables) == expected
     assert sorted(path.name for path in tmp_path.iterdir()) == ["block", "pieces", "whole"]

@@ -66,9 +66,9 @@ class RayFiles:
         """Every image point to the file of its number, (m,) int."""
         order = np.argsort(number, kind="stable")
         table = _arrow(rays.take(order))
-        there, first = np.unique(number[order], return_index=True)
-        for one, begin, end in zip(there.tolist(), first, [*first[1:], len(order)], strict=True):
-            self._writer(one, table.schema).write_table(table.slice(begin, end - begin))
+        there, first, count = np.unique(number[order], return_index=True, return_counts=True)
+        for one, begin, length in zip(there.tolist(), first, count, strict=True):
+            self._writer(one, table.schema).write_table(table.slice(begin, length))
 
     def read(self, number: int) -> NamedRays:
         """The image points of a file in the order of the table of all; none where there is no file.
