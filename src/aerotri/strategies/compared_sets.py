@@ -17,7 +17,8 @@ from aerotri.results.parameter_comparison import Choice, ParameterComparison, Se
 from aerotri.strategies.parameter_comparison import Candidate, Progress, SetComparer, set_name
 
 BYTES_OF_PROCESS, BYTES_OF_RAY = 300_000_000, 12_000
-"""Memory of a process that adjusts sets, without and by rays of the block."""
+"""Memory of a process that adjusts sets, without and by rays of the block; with 26 541 and 112 339 rays 475 and 1253 MB
+were measured for sets of up to 66 parameters that all act on every ray. The second is chosen [C] above that."""
 
 
 def compare_sets(

@@ -27,6 +27,7 @@ from aerotri.adjustment.carry_over import start_values_at, with_shared
 from aerotri.adjustment.defects import checked_factor
 from aerotri.adjustment.error_transfer import with_image_errors
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.parallel import blas_threads
 from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor
@@ -102,7 +103,8 @@ class SetComparer:
 
     def outcome(self, candidate: Candidate) -> SetOutcome:
         """The block adjusted with a set, and what speaks for it; the next set begins where this one ended."""
-        found, adjusted = self._tried(candidate)
+        with blas_threads(0.0):
+            found, adjusted = self._tried(candidate)
         if adjusted is not None:
             self._last = adjusted
             self._start = start_values_at(adjusted[0].unknowns, adjusted[1])
@@ -110,7 +112,8 @@ class SetComparer:
 
     def outcome_from_here(self, candidate: Candidate) -> SetOutcome:
         """The same, and the next set begins where this one began: what comes out depends on no order."""
-        return self._tried(candidate)[0]
+        with blas_threads(0.0):
+            return self._tried(candidate)[0]
 
     def _tried(self, candidate: Candidate) -> tuple[SetOutcome, tuple[NormalSystem, State] | None]:
         """What a set did, and where its adjustment stands if there is one."""
