@@ -269,9 +269,10 @@ def compare_parameters(
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default NAME_compare here.", rich_help_panel=OUTPUT)
     ] = None,
+    executor: Workers = THREADS,
     json_: Json = False,
 ) -> None:
     """Sets of additional parameters side by side: fit, check points, cross-validation over control points."""
     from aerotri.commands.compare_parameters import run_compare_parameters
 
-    raise typer.Exit(run_compare_parameters(block, sets or (), folds, robust, geoid, out, json_))
+    raise typer.Exit(run_compare_parameters(block, sets or (), folds, robust, geoid, out, json_, executor))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerotri.commands.adjust import folder_name
 from aerotri.commands.console import Console
+from aerotri.execution.choice import THREADS, chosen
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 
@@ -23,23 +25,30 @@ def run_compare_parameters(
     geoid: Path | None,
     out: Path | None,
     as_json: bool,
+    executor: str = THREADS,
 ) -> int:
     """Exit code of the command: 0 when a set could be adjusted, 1 when none; arguments as on the command line.
 
     Raises
     ------
     InputError
+    TasksFailedError
+        Where sets could not be computed elsewhere.
     """
     console = Console(quiet=as_json)
     from aerotri.compiled import compilation_notice
+    from aerotri.formats.files.atomic import room_beside
     from aerotri.pipeline import AdjustmentFailedError
     from aerotri.public.comparing import COMPARISON_NAMES, compare_parameters
 
     target = out or Path(f"{folder_name(path)}_compare")
     refuse_foreign_folder(target, COMPARISON_NAMES[0])
     console.progress(compilation_notice())
+    in_threads = chosen(executor).kind == "threads"
     try:
-        found = compare_parameters(path, sets, folds=folds, robust=robust, geoid=geoid, progress=console.stage)
+        with nullcontext() if in_threads else room_beside(target) as room:
+            found = compare_parameters(path, sets, folds=folds, robust=robust, geoid=geoid, executor=executor,
+                                       scratch=room, progress=console.stage)  # fmt: skip
     except AdjustmentFailedError as failure:
         console.failure(str(failure))
         return 1

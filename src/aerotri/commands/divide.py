@@ -16,22 +16,23 @@ def run_divide(path: Path, out: Path | None, parts: int | None, as_json: bool) -
     InputError
     """
     from aerotri.commands.adjust import folder_name
-    from aerotri.formats.block.folder import read_block, read_photographs
+    from aerotri.formats.block.folder import read_photographs
     from aerotri.partition.adjusting import part_folders
     from aerotri.public.parts import divide
 
     console = Console(quiet=as_json)
-    block, target = read_block(path), out or Path(f"{folder_name(path)}_parts")
-    divide(block, target, parts=parts, progress=console.stage)
+    target = out or Path(f"{folder_name(path)}_parts")
+    divide(path, target, parts=parts, progress=console.stage)
     counts = {folder.name: len(read_photographs(folder)) for folder in part_folders(target)}
-    twice = sum(counts.values()) - len(block.images)
+    photographs = len(read_photographs(path))
+    twice = sum(counts.values()) - photographs
     if as_json:
-        print(json_text({"folder": str(target), "parts": counts, "photographs": len(block.images)}))
+        print(json_text({"folder": str(target), "parts": counts, "photographs": photographs}))
         return
     console.lines(
         [
             f"{len(counts)} parts of {min(counts.values())} to {max(counts.values())} photographs; "
-            f"{len(block.images)} photographs stand in them {twice} times more than once",
+            f"{photographs} photographs stand in them {twice} times more than once",
             f"Written to {target}: aerotri adjust {target}",
         ]
     )

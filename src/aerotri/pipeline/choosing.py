@@ -13,19 +13,19 @@ from aerotri.adjustment.solve import SolveOptions
 from aerotri.conventions import FilePath
 from aerotri.coordinates.blocks import frame_of_block, transform_block
 from aerotri.diagnosis.doubts import failure
+from aerotri.execution.work import Workplace
 from aerotri.observations import Block, PhotographFieldSettings
-from aerotri.pipeline.local import Report
 from aerotri.pipeline.starting import with_start
 from aerotri.pipeline.verdict import with_outcome
 from aerotri.results.adjustment import Adjustment
 from aerotri.results.parameter_comparison import Choice, ParameterComparison
+from aerotri.strategies.compared_sets import compare_sets
 from aerotri.strategies.moving_sets import moving_outcomes, names_of_strips
 from aerotri.strategies.parameter_choice import Chosen, choose, sets_to_choose_from
 from aerotri.strategies.parameter_comparison import (
     Candidate,
     Progress,
     SetComparer,
-    compare_sets,
     set_name,
     with_candidate,
 )
@@ -65,7 +65,7 @@ def compare_parameters(
     folds: int = FOLDS,
     geoid: FilePath | None = None,
     progress: Progress | None = None,
-    report: Report | None = None,
+    at: Workplace | None = None,
 ) -> ParameterComparison:
     """Adjust a block with several sets of additional parameters, in the frame of the adjustment.
 
@@ -74,12 +74,18 @@ def compare_parameters(
     Parameters
     ----------
     choices : as `parse_parameters` returns them. folds : parts in which control points are left out, one by one where
-        there are no more points than that. progress : called before each set. report : after every iteration.
+        there are no more points than that. progress : called before each set.
+    at : where the sets after the first are adjusted, a task each; in this process where None.
+
+    Raises
+    ------
+    TasksFailedError
+        When a set could not be computed elsewhere.
     """
     prepared = _prepared_without(with_start(block, geoid).block, geoid)
     settings = prepared.system.unknowns.block.settings.adjustment
-    options = SolveOptions(settings.max_iterations, settings.robust, report)
-    return compare_sets(prepared, choices, folds, options, progress)
+    options = SolveOptions(settings.max_iterations, settings.robust)
+    return compare_sets(prepared, choices, folds, options, progress, at)
 
 
 def choose_parameters(

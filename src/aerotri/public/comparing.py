@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.execution.choice import THREADS
 from aerotri.observations import Block
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.block_settings import with_settings
@@ -19,6 +20,7 @@ from aerotri.public.blocks import read
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.table import Table
+from aerotri.public.workplaces import workplace
 from aerotri.results.head import Head
 
 if TYPE_CHECKING:
@@ -93,9 +95,13 @@ def compare_parameters(
     folds: int = 10,
     robust: str | None = None,
     geoid: FilePath | None = None,
+    executor: str = THREADS,
+    scratch: FilePath | None = None,
     progress: ProgressLike = None,
 ) -> ComparedParameters:
     """Adjust a block with several sets of additional parameters, and predict its control by cross-validation.
+
+    The first set that can be adjusted begins at the start values of the block, all others where that one ended.
 
     Parameters
     ----------
@@ -104,6 +110,9 @@ def compare_parameters(
     folds : parts in which control points are left out and predicted.
     robust : estimator, as of `aerotri.adjust`; data snooping is replaced by Huber's.
     geoid, progress : as of `aerotri.adjust`.
+    executor : where the sets after the first are adjusted, a task each: 'threads', 'processes:N', 'dask:ADDRESS' or
+        'dask:local:N'.
+    scratch : folder for what other processes read, one that all of them have; a temporary one where None.
 
     Returns
     -------
@@ -112,9 +121,12 @@ def compare_parameters(
     Raises
     ------
     InputError
-        For a set that does not exist, or that the block's camera does not have.
+        For a set that does not exist, or that the block's camera does not have; when the executor is none or cannot be
+        reached.
     AdjustmentFailedError
         When the block cannot be adjusted with any set.
+    TasksFailedError
+        When sets could not be computed elsewhere; the message names them. One that does not converge is none of these.
 
     Examples
     --------
@@ -134,8 +146,8 @@ def compare_parameters(
             "'auto' cannot be one of the sets", "leave the sets out: then all that 'auto' chooses from are compared"
         )
     chosen = with_settings(block, robust=robust)
-    with stage_report(progress) as report:
-        found = pipeline.compare_parameters(chosen, choices or candidate_sets(chosen), folds, geoid, report.set_of)
+    with stage_report(progress) as report, workplace(executor, scratch, report.said) as at:
+        found = pipeline.compare_parameters(chosen, choices or candidate_sets(chosen), folds, geoid, report.set_of, at)
     head = Head(chosen.project, chosen.crs)
     if not any(outcome.converged for outcome in found.outcomes):
         return ComparedParameters(found, "", "", head)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from aerotri.partition.whole import Whole
     from aerotri.public.table import Table
 
+Say = Callable[[str, float | None], None]
 PHOTOGRAPHS_A_PART = 2000
 """Photographs of a part where nothing is said [C]: a task takes about 1.5 GB then."""
 
@@ -105,7 +106,8 @@ def divide(
 
     Parameters
     ----------
-    block : a block, or the folder of one.
+    block : a block, or the folder of one; of a folder the image points are read piece by piece and never held whole,
+        unless it has decisions, constraints or datum points, or states no σ of image coordinates.
     folder : an empty folder; the parts are written to parts/0000, parts/0001 and so on.
     parts : how many; as many as have 2000 photographs each where None, two at least.
     tables : 'csv' or 'parquet'.
@@ -132,26 +134,55 @@ def divide(
     ['0000', '0001']
     """
     from aerotri.formats.block.writer import write_block
+    from aerotri.formats.files.atomic import room_beside
+    from aerotri.observations import Block
     from aerotri.partition.adjusting import PARTS
-    from aerotri.partition.dividing import divide as cut
-    from aerotri.partition.dividing import part_of
-    from aerotri.partition.part_system import refuse_what_parts_cannot
-    from aerotri.public.blocks import as_block
     from aerotri.public.folders import refuse_foreign_folder
 
-    whole, target = as_block(block), Path(folder)
+    target = Path(folder)
     if parts is not None and parts < 2:
         raise InputError(f"{parts} parts", "a block is divided into two parts or more")
     refuse_foreign_folder(target)
-    refuse_what_parts_cannot(whole)
-    count = max(2, math.ceil(len(whole.images) / PHOTOGRAPHS_A_PART)) if parts is None else parts
-    with stage_report(progress) as report:
-        report.stage("dividing", None)
-        division = cut(whole, count)
-        for number in range(division.count):
-            report.counted("writing parts", number, division.count)
-            write_block(part_of(whole, division, number), target / PARTS / f"{number:04d}", tables=tables)
+    with stage_report(progress) as report, room_beside(target) as room:
+        if isinstance(block, Block):
+            cut = _whole_parts(block, parts, report.stage)
+        else:
+            cut = _parts_in_pieces(block, parts, room, report.stage)
+        for number, part in enumerate(cut):
+            write_block(part, target / PARTS / f"{number:04d}", tables=tables)
     return target
+
+
+def _parts_in_pieces(path: FilePath, parts: int | None, room: Path, say: Say) -> Iterator[Block]:
+    """The parts of the block of a folder."""
+    from aerotri.formats.block.in_pieces import open_in_pieces
+    from aerotri.partition.dividing_pieces import divided
+    from aerotri.partition.part_system import refuse_what_parts_cannot
+    from aerotri.public.blocks import read_block
+
+    source = open_in_pieces(path)
+    if source is None:
+        return _whole_parts(read_block(path), parts, say)
+    refuse_what_parts_cannot(source.block)
+    return divided(source, _count(source.block, parts), room, say)
+
+
+def _whole_parts(block: Block, parts: int | None, say: Say) -> Iterator[Block]:
+    """The parts of a block that is held whole."""
+    from aerotri.partition.dividing import divide as cut
+    from aerotri.partition.dividing import part_of
+    from aerotri.partition.part_system import refuse_what_parts_cannot
+
+    refuse_what_parts_cannot(block)
+    say("dividing", None)
+    division = cut(block, _count(block, parts))
+    for number in range(division.count):
+        say("writing parts", number / division.count)
+        yield part_of(block, division, number)
+
+
+def _count(block: Block, parts: int | None) -> int:
+    return max(2, math.ceil(len(block.images) / PHOTOGRAPHS_A_PART)) if parts is None else parts
 
 
 def simulate_parts(

@@ -22,6 +22,7 @@ from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
 from aerotri.adjustment.field_prior import known_or_first
 from aerotri.adjustment.joint_prior import JointPrior
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.parallel import blas_threads
 from aerotri.adjustment.shared_parameters import RandomField
 from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
@@ -126,17 +127,20 @@ def with_estimated_fields(
         return system, solution
     for _ in range(MOST_ROUNDS):
         before = covariance_in_use(system)
-        try:
-            reduced = ReducedToFields.of(system, solution, system.factorise(solution.equations))
-        except NotPositiveDefiniteError:
-            # what is not determined is named where the result is factorised
-            break
-        found = estimate_covariance(reduced, given, before)
+        # hundreds of factors of some hundred nodes: threads of BLAS would wait for one another most of the time
+        with blas_threads(0.0):
+            try:
+                reduced = ReducedToFields.of(system, solution, system.factorise(solution.equations))
+            except NotPositiveDefiniteError:
+                # what is not determined is named where the result is factorised
+                break
+            found = estimate_covariance(reduced, given, before)
+            gain = reduced.deviance(before) - reduced.deviance(found)
         collocation = CollocationSettings(found.sigma_um, found.length_mm)
         system = system.with_settings(replace(system.unknowns.block.settings, collocation=collocation))
         system, again = minimise_at_adjusted(system, solution.state, redundancy, options)
         solution = replace(again, iterations=solution.iterations + again.iterations)
-        if reduced.deviance(before) - reduced.deviance(found) < SETTLED:
+        if gain < SETTLED:
             break
     return system, solution
 

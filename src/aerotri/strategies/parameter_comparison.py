@@ -27,6 +27,7 @@ from aerotri.adjustment.carry_over import start_values_at, with_shared
 from aerotri.adjustment.defects import checked_factor
 from aerotri.adjustment.error_transfer import with_image_errors
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.parallel import blas_threads
 from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.solve import Solution, SolveOptions
 from aerotri.adjustment.sparse_cholesky import Factor
@@ -74,7 +75,7 @@ class Candidate:
 
 
 class SetComparer:
-    """Adjusts one block with one set after the other, each from where the last one ended.
+    """Adjusts one block with one set after the other, each from where the last one ended, or from where one ended.
 
     Parameters
     ----------
@@ -95,13 +96,32 @@ class SetComparer:
         self._divisions: Divisions | None = None
         self._names: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
+    @property
+    def rays(self) -> int:
+        """Image points of the block."""
+        return len(self._status)
+
     def outcome(self, candidate: Candidate) -> SetOutcome:
-        """The block adjusted with a set, and what speaks for it."""
+        """The block adjusted with a set, and what speaks for it; the next set begins where this one ended."""
+        with blas_threads(0.0):
+            found, adjusted = self._tried(candidate)
+        if adjusted is not None:
+            self._last = adjusted
+            self._start = start_values_at(adjusted[0].unknowns, adjusted[1])
+        return found
+
+    def outcome_from_here(self, candidate: Candidate) -> SetOutcome:
+        """The same, and the next set begins where this one began: what comes out depends on no order."""
+        with blas_threads(0.0):
+            return self._tried(candidate)[0]
+
+    def _tried(self, candidate: Candidate) -> tuple[SetOutcome, tuple[NormalSystem, State] | None]:
+        """What a set did, and where its adjustment stands if there is one."""
         try:
             block = with_candidate(self._block, candidate, self._strips)
             system, state = build_system(block, self._start, self._status)
         except InputError as error:
-            return _failed(candidate, error.message)
+            return _failed(candidate, error.message), None
         if self._last is not None:
             last, ended = self._last
             state = with_shared(system.unknowns, last.unknowns, state, ended)
@@ -110,11 +130,7 @@ class SetComparer:
             # the same points and divisions for every set
             self._divisions = divisions_of(system.unknowns, state)
             self._names = _check_points(system.unknowns), _control_points(system.unknowns)
-        found, adjusted = self._adjusted(system, state, candidate)
-        if adjusted is not None:
-            self._last = adjusted
-            self._start = start_values_at(adjusted[0].unknowns, adjusted[1])
-        return found
+        return self._adjusted(system, state, candidate)
 
     def comparison(self, outcomes: Sequence[SetOutcome]) -> ParameterComparison:
         """Outcomes together, with what they have in common."""
@@ -154,24 +170,6 @@ class SetComparer:
         evidence = evidence_of(system, solution, factor, self._status, self._divisions, predicted, sigma0**2)
         check, control = Accuracy.of(_check_differences(u, solution.state)), Accuracy.of(predicted.difference)
         return replace(found, check=check, control=control, evidence=evidence)
-
-
-def compare_sets(
-    prepared: Prepared, choices: Sequence[Choice], folds: int, options: SolveOptions, progress: Progress | None = None
-) -> ParameterComparison:
-    """Adjust a block with every set, each from where the last one ended.
-
-    Parameters
-    ----------
-    prepared : the block with any set. folds : of the cross-validation over control points.
-    progress : called before each set with its number from 1, how many there are, and its name.
-    """
-    comparer, outcomes = SetComparer(prepared, folds, options), []
-    for number, choice in enumerate(choices, start=1):
-        if progress is not None:
-            progress(number, len(choices), set_name(choice))
-        outcomes.append(comparer.outcome(Candidate(choice)))
-    return comparer.comparison(outcomes)
 
 
 def with_candidate(block: Block, candidate: Candidate, strips: np.ndarray | None) -> Block:

@@ -8,6 +8,8 @@ lens parameters k1 k2 p1 p2 k3 as `[camera.<name>.brown]` holds Brown's. Of scan
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +19,7 @@ from aerotri.conventions import RADIANS_PER, FilePath, InputError
 from aerotri.formats.block.extras import edits_of, read_constraints
 from aerotri.formats.block.journal import read_journal, with_given, with_marks
 from aerotri.formats.block.logo import with_logo
-from aerotri.formats.block.points import read_control, read_gnss_ins, read_image_points
+from aerotri.formats.block.points import Rays, read_control, read_gnss_ins, read_image_points
 from aerotri.formats.block.scanned_film import read_fiducials
 from aerotri.formats.block.writer import write_block
 from aerotri.formats.text.table_checks import refuse_duplicates, three_or_none
@@ -27,8 +29,10 @@ from aerotri.observations.rigs import station_fault
 
 if TYPE_CHECKING:
     from aerotri.formats.block.settings import BlockToml
+    from aerotri.functional_model.interior import FiducialFit
+    from aerotri.observations.block import Fiducials
 
-__all__ = ["read_block", "write_block"]
+__all__ = ["BlockTables", "block_of", "open_tables", "read_block", "read_photographs", "table_file", "write_block"]
 
 NEAR = 0.7
 """Likeness of a file's name from which it seems to be the table that is missing."""
@@ -59,29 +63,74 @@ def read_block(path: FilePath, rays_needed: bool = True, images_needed: bool = T
     InputError
         With file, line, what is wrong and the remedy, for anything the format does not allow.
     """
+    tables = open_tables(path, images_needed)
+    rays = read_image_points(
+        tables.image_points, tables.images, tables.cameras, tables.settings, tables.fits, may_be_empty=not rays_needed
+    )
+    return block_of(tables, rays)
+
+
+@dataclass(frozen=True, eq=False)
+class BlockTables:
+    """A block folder whose settings and photographs are read; image points and what refers to them are not.
+
+    Parameters
+    ----------
+    fiducials : measured marks of scanned film. fits : what follows from them, by photograph.
+    image_points : the table.
+    """
+
+    folder: Path
+    settings: BlockToml
+    cameras: tuple[Camera, ...]
+    rigs: tuple[Rig, ...]
+    images: Images
+    fiducials: Fiducials | None
+    fits: Mapping[int, FiducialFit]
+    image_points: Path
+
+
+def open_tables(path: FilePath, images_needed: bool = True) -> BlockTables:
+    """What `read_block` reads before the image points.
+
+    Raises
+    ------
+    InputError
+        As `read_block`.
+    """
     toml = settings_file(Path(path))
     folder = toml.parent
     # pydantic is imported by the settings model only when a block is read
     from aerotri.formats.block.settings import read_block_toml
 
     settings = read_block_toml(toml)
-    cameras = settings.cameras()
-    model = settings.model
+    cameras, rigs, model = settings.cameras(), settings.rigs(), settings.model
     radians = RADIANS_PER[model.angle_unit]
-    rigs = settings.rigs()
     images = _images(_required_table(folder, "images"), cameras, rigs, radians, may_be_empty=not images_needed)
-    fiducials, fits = read_fiducials(_table_file(folder, "fiducials"), images, cameras)
+    fiducials, fits = read_fiducials(table_file(folder, "fiducials"), images, cameras)
     if fiducials is not None and model.image_unit != "px":
         message = f"image_unit = '{model.image_unit}', but fiducials.csv says the photographs are scans"
         raise settings.error(("image_unit",), message, 'measure in pixels of the scan: image_unit = "px"')
     table = _required_table(folder, "image_points")
-    rays = read_image_points(table, images, cameras, settings, fits, may_be_empty=not rays_needed)
-    listed, known = read_control(_table_file(folder, "control"), rays.point_names, settings)
+    return BlockTables(folder, settings, cameras, rigs, images, fiducials, fits, table)
+
+
+def block_of(tables: BlockTables, rays: Rays) -> Block:
+    """What `read_block` reads after the image points, and all of it together.
+
+    Raises
+    ------
+    InputError
+        As `read_block`.
+    """
+    folder, settings, images, cameras = tables.folder, tables.settings, tables.images, tables.cameras
+    model = settings.model
+    listed, known = read_control(table_file(folder, "control"), rays.point_names, settings)
     default = settings.settings(rays.image_sigma_um)
-    journal = read_journal(_table_file(folder, "edits"))
+    journal = read_journal(table_file(folder, "edits"))
     control, names = with_given(listed, as_str_array(known), journal)
     image_points, points = with_marks(
-        rays.image_points, names, control, journal, images, cameras, fits, default.image_sigma_um * 1e-3
+        rays.image_points, names, control, journal, images, cameras, tables.fits, default.image_sigma_um * 1e-3
     )
     block = Block(
         name=folder.resolve().name if model.name is None else model.name,
@@ -90,15 +139,15 @@ def read_block(path: FilePath, rays_needed: bool = True, images_needed: bool = T
         points=points,
         image_points=image_points,
         control=control,
-        gnss_ins=read_gnss_ins(_table_file(folder, "gnss_ins"), images, radians),
+        gnss_ins=read_gnss_ins(table_file(folder, "gnss_ins"), images, RADIANS_PER[model.angle_unit]),
         settings=default,
         crs=model.crs,
         rotation=model.rotation,
         edits=edits_of(journal, images, points, image_points, control),
-        fiducials=fiducials,
-        constraints=read_constraints(_table_file(folder, "constraints"), points),
-        interior_fits=fits,
-        rigs=rigs,
+        fiducials=tables.fiducials,
+        constraints=read_constraints(table_file(folder, "constraints"), points),
+        interior_fits=tables.fits,
+        rigs=tables.rigs,
         project=with_logo(model.project.project(), settings),
     )
     _check_names_in_settings(block, settings)
@@ -144,7 +193,7 @@ def settings_file(path: Path) -> Path:
 
 
 def _required_table(folder: Path, name: str) -> Path:
-    path = _table_file(folder, name)
+    path = table_file(folder, name)
     if path is None:
         place = folder / f"{name}.csv"
         near = difflib.get_close_matches(place.name, [one.name for one in folder.iterdir() if one.is_file()], 1, NEAR)
@@ -154,7 +203,7 @@ def _required_table(folder: Path, name: str) -> Path:
     return path
 
 
-def _table_file(folder: Path, name: str) -> Path | None:
+def table_file(folder: Path, name: str) -> Path | None:
     """The table of a name as .csv or .parquet; None where there is none."""
     found = [path for path in (folder / f"{name}.csv", folder / f"{name}.parquet") if path.exists()]
     if len(found) > 1:

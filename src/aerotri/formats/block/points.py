@@ -67,9 +67,26 @@ def read_image_points(
         See `block_folder.read_block`.
     """
     table = read_table(path, IMAGE_POINT_COLUMNS)
-    table.require("image", "point", "x", "y")
     if not table.length and not may_be_empty:
         raise InputError("holds no image points", "give a row for every measured point", path)
+    return rays_of(table, images, cameras, settings, fits)
+
+
+def rays_of(
+    table: Table,
+    images: Images,
+    cameras: tuple[Camera, ...],
+    settings: BlockToml,
+    fits: Mapping[int, FiducialFit],
+) -> Rays:
+    """Image points of a table, or of a piece of one; see `read_image_points`.
+
+    Raises
+    ------
+    InputError
+        See `block_folder.read_block`; of a point that is there twice in a photograph only where both rows are given.
+    """
+    table.require("image", "point", "x", "y")
     image = image_index(table, images)
     point = table.text["point"]
     refuse_duplicates(

@@ -66,12 +66,19 @@ def read_bytes(path: Path) -> bytes:
         When it cannot be read.
     """
     try:
-        raw = path.read_bytes()
+        return without_mark(path.read_bytes())
     except OSError as error:
-        raise InputError(
-            f"cannot be read: {error.strerror or error}", "check the file and its permissions", path
-        ) from error
-    return raw[3:] if raw.startswith(b"\xef\xbb\xbf") else raw
+        raise unreadable(path, error) from error
+
+
+def unreadable(path: Path, error: OSError) -> InputError:
+    """The error of a file that the system does not give."""
+    return InputError(f"cannot be read: {error.strerror or error}", "check the file and its permissions", path)
+
+
+def without_mark(raw: bytes) -> bytes:
+    """The bytes of a file without its byte order mark."""
+    return raw.removeprefix(b"\xef\xbb\xbf")
 
 
 def read_csv_text(path: Path, header: tuple[str, ...] | None = None) -> CsvText:
@@ -87,13 +94,28 @@ def read_csv_text(path: Path, header: tuple[str, ...] | None = None) -> CsvText:
     InputError
         When the file cannot be read, is empty, or its header is not UTF-8.
     """
-    raw = read_bytes(path)
+    return csv_text_of(read_bytes(path), path, header)
+
+
+def csv_text_of(raw: bytes, path: Path, header: tuple[str, ...] | None = None, first_line: int = 1) -> CsvText:
+    """Bytes of a table as its text.
+
+    Parameters
+    ----------
+    raw : whole lines of the file, without a byte order mark.
+    header : names of the columns where the bytes have no header row. first_line : of the file that they begin on.
+
+    Raises
+    ------
+    InputError
+        When there is nothing, or the header is not UTF-8.
+    """
     if b"\n" not in raw and b"\r" in raw:
         raw = raw.replace(b"\r", b"\n")
     raw = without_comments(raw)
     if header is not None:
-        return CsvText(path, header, raw, 1)
-    start, line = 0, 1
+        return CsvText(path, header, raw, first_line)
+    start, line = 0, first_line
     while start < len(raw):
         end = raw.find(b"\n", start)
         end = len(raw) if end < 0 else end

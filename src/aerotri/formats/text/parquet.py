@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,11 +24,40 @@ def load_parquet(path: Path) -> pa.Table:
     InputError
         When the file is not readable.
     """
+    from pyarrow import parquet
+
+    with _told(path):
+        return parquet.ParquetFile(path).read()
+
+
+def batches(path: Path, rows: int) -> Iterator[pa.Table]:
+    """The rows of a Parquet file, so many at a time; one table at least, which may have none.
+
+    Raises
+    ------
+    InputError
+        When the file is not readable.
+    """
     import pyarrow as pa
     from pyarrow import parquet
 
+    with _told(path):
+        # without a buffer a whole column of a row group is read at once
+        file = parquet.ParquetFile(path, buffer_size=1 << 20, pre_buffer=False)
+        if not file.metadata.num_rows:
+            yield file.read()
+        for batch in file.iter_batches(rows):
+            yield pa.Table.from_batches([batch])
+
+
+@contextmanager
+def _told(path: Path) -> Generator[None]:
+    import pyarrow as pa
+
     try:
-        return parquet.ParquetFile(path).read()
+        yield
+    except InputError:
+        raise
     except (pa.ArrowException, OSError, ValueError, TypeError, MemoryError) as error:
         short = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"cannot be read as Parquet: {short}", "write the table anew, or as CSV", path) from error

@@ -99,6 +99,7 @@ class Table:
     text : the text columns by name.
     numbers : the number columns by name, (n,) each, NaN where the cell is empty.
     source : the CSV text, None for Parquet.
+    first_row : rows of the file before these, where the table is a piece of it.
     """
 
     path: Path
@@ -106,11 +107,12 @@ class Table:
     text: Mapping[str, TextColumn]
     numbers: Mapping[str, np.ndarray]
     source: CsvText | None = field(default=None, repr=False)
+    first_row: int = 0
 
     def error(self, row: int, message: str, remedy: str) -> InputError:
         """An `InputError` at a row, by the line of the file for CSV, by the number of the row for Parquet."""
         if self.source is None:
-            return InputError(f"row {row + 1}: {message}", remedy, self.path)
+            return InputError(f"row {self.first_row + row + 1}: {message}", remedy, self.path)
         return InputError(message, remedy, self.path, self.source.line_of_row(row))
 
     def cell(self, column: str, row: int) -> str:
@@ -162,13 +164,13 @@ def read_table(path: Path, columns: Columns, header: tuple[str, ...] | None = No
 
         arrow, source = load_parquet(path), None
         names = tuple(arrow.column_names)
-        _check_header(names, columns, path, None)
-        arrow = with_kinds(arrow, _text_names(names, columns), [n for n in columns.all_numbers if n in names], path)
+        check_header(names, columns, path, None)
+        arrow = with_kinds(arrow, text_names(names, columns), [n for n in columns.all_numbers if n in names], path)
     else:
         source = csv_text.read_csv_text(path, header)
-        _check_header(source.header, columns, path, source.first_line - 1)
-        arrow = _parse(source, columns)
-    return _checked_table(arrow, columns, path, source)
+        check_header(source.header, columns, path, source.first_line - 1)
+        arrow = parse_rows(source, columns)
+    return checked_table(arrow, columns, path, source)
 
 
 def as_str_array(names: pa.StringArray) -> np.ndarray:
@@ -176,7 +178,13 @@ def as_str_array(names: pa.StringArray) -> np.ndarray:
     return np.array(names.to_pylist(), dtype=str) if len(names) else np.zeros(0, "<U1")
 
 
-def _check_header(header: tuple[str, ...], columns: Columns, path: Path, line: int | None) -> None:
+def check_header(header: tuple[str, ...], columns: Columns, path: Path, line: int | None) -> None:
+    """Refuse a header with columns missing, unknown or twice, or without a name.
+
+    Raises
+    ------
+    InputError
+    """
     if "" in header:
         raise InputError("a column has no name", "name every column in the first row", path, line)
     odd = [name for name in header if len(name) > LONGEST_NAME or re.search(CONTROL_CHARACTERS, name)]
@@ -213,18 +221,19 @@ def _hint_of_separator(header: tuple[str, ...]) -> str:
     return ""
 
 
-def _text_names(header: tuple[str, ...], columns: Columns) -> list[str]:
+def text_names(header: tuple[str, ...], columns: Columns) -> list[str]:
+    """The columns of a header that are taken as text."""
     named = [name for name in columns.text + columns.optional_text if name in header]
     if not columns.free_text:
         return named
     return named + [name for name in header if name not in columns.known and not name.startswith(IGNORED_PREFIX)]
 
 
-def _parse(source: CsvText, columns: Columns) -> pa.Table:
+def parse_rows(source: CsvText, columns: Columns) -> pa.Table:
     """The rows by pyarrow; when that fails, once more as text, to find the culprit or to read what only looks odd."""
     import pyarrow as pa
 
-    text = _text_names(source.header, columns)
+    text = text_names(source.header, columns)
     numbers = [name for name in columns.all_numbers if name in source.header]
     kinds = {name: pa.string() for name in text} | {name: pa.float64() for name in numbers}
     if not source.has_rows():
@@ -275,11 +284,18 @@ def _numbers_from_text(column: pa.ChunkedArray, name: str, source: CsvText) -> p
     return digits.cast(pa.float64())
 
 
-def _checked_table(arrow: pa.Table, columns: Columns, path: Path, source: CsvText | None) -> Table:
-    bare = Table(path, arrow.num_rows, {}, {}, source)
-    text = {n: _text_column(arrow.column(n), n, bare) for n in _text_names(tuple(arrow.column_names), columns)}
+def checked_table(arrow: pa.Table, columns: Columns, path: Path, source: CsvText | None, first_row: int = 0) -> Table:
+    """Rows of text and float64 columns as a table.
+
+    Raises
+    ------
+    InputError
+        For names that are none, and numbers that are not finite.
+    """
+    bare = Table(path, arrow.num_rows, {}, {}, source, first_row)
+    text = {n: _text_column(arrow.column(n), n, bare) for n in text_names(tuple(arrow.column_names), columns)}
     numbers = {n: _number_column(arrow.column(n), n, bare) for n in columns.all_numbers if n in arrow.column_names}
-    return Table(path, arrow.num_rows, text, numbers, source)
+    return Table(path, arrow.num_rows, text, numbers, source, first_row)
 
 
 def _text_column(column: pa.ChunkedArray, name: str, table: Table) -> TextColumn:
