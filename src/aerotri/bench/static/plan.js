@@ -2,7 +2,7 @@
 
 import { checkbox, choice, slider, make, fixed } from "./dom.js";
 import { STEPS, UNKNOWN, sixths, stepOf, limitsOfW } from "./colours.js";
-import { drawBars, showColours } from "./legend.js";
+import { BARS_PX, drawBars, showColours } from "./legend.js";
 import { Surface } from "./surface.js";
 
 export class Plan {
@@ -47,7 +47,11 @@ export class Plan {
     return xs.length ? [[least(xs), least(ys)], [most(xs), most(ys)]] : [[-1, -1], [1, 1]];
   }
 
-  fit() { this.surface.fit(...this.bounds()); }
+  // The whole block beside the legend or above it, whichever shows it larger.
+  fit() {
+    const legend = document.getElementById("legend"), wide = legend.offsetWidth + 10, tall = legend.offsetHeight + 10;
+    this.surface.fit(...this.bounds(), legend.hidden ? [[0, BARS_PX]] : [[wide, BARS_PX], [0, Math.max(tall, BARS_PX)]]);
+  }
 
   // By how much vectors are drawn larger: the longest is a twentieth of the block.
   suitable() {
@@ -160,7 +164,7 @@ export class Plan {
   }
 
   drawControl(pen) {
-    pen.font = "12px system-ui, sans-serif";
+    const names = [];
     for (const point of this.content.control.point) {
       const at = this.place(point);
       if (!at) continue;
@@ -173,11 +177,24 @@ export class Plan {
       pen.fillStyle = check ? "#fff" : "#ffd84d";
       pen.fill();
       pen.stroke();
-      pen.strokeStyle = "#ffffffd0";
-      pen.lineWidth = 3;
-      pen.strokeText(this.points.name[point], x + 9, y + 4);
-      pen.fillStyle = "#111";
-      pen.fillText(this.points.name[point], x + 9, y + 4);
+      names.push([this.points.name[point], x + 9, y + 4]);
+    }
+    this.drawNames(pen, names);
+  }
+
+  // A name that would lie over an earlier one is left out: a larger scale shows it.
+  drawNames(pen, names) {
+    const taken = [];
+    pen.font = "12px system-ui, sans-serif";
+    pen.strokeStyle = "#ffffffd0";
+    pen.lineWidth = 3;
+    pen.fillStyle = "#111";
+    for (const [name, x, y] of names) {
+      const box = [x, y - 10, x + pen.measureText(name).width, y + 3];
+      if (taken.some(other => box[0] < other[2] && other[0] < box[2] && box[1] < other[3] && other[1] < box[3])) continue;
+      taken.push(box);
+      pen.strokeText(name, x, y);
+      pen.fillText(name, x, y);
     }
   }
 

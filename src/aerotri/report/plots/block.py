@@ -29,8 +29,10 @@ from aerotri.report.plots.canvas import (
 )
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 
-MOST_NAMED_CONTROL_POINTS = 30
-"""Control points up to which their names are drawn; chosen [C]: with more the names overlap."""
+MOST_NAMED_POINTS = 40
+"""Control and check points up to which their names are drawn; chosen [C]: with more the names overlap."""
+LONGEST_INCH = 0.55
+"""Inches of the longest arrow of a difference."""
 CONTROL_SYMBOLS: dict[str, dict[str, Any]] = {
     "full": {"marker": "^", "mfc": INK, "mec": INK},
     "plan only": {"marker": "^", "mfc": "white", "mec": INK},
@@ -63,10 +65,10 @@ def plot_block_plan(adjusted: AdjustedBlock) -> Figure:
     for kind, symbol in CONTROL_SYMBOLS.items():
         axes.plot(*control_xy[kinds == kind].T, ls="none", ms=6.5, mew=0.9, zorder=5, **symbol)
     axes.plot(*check_xy.T, ls="none", ms=5.5, mew=1.2, zorder=4, **CHECK_SYMBOL)
-    if len(control_xy) <= MOST_NAMED_CONTROL_POINTS:
-        drawable = np.isfinite(control_xy).all(axis=1)
-        names = block.points[adjusted.control.point[drawable]].tolist()
-        plan.draw_names(axes, control_xy[drawable], names, check_xy[np.isfinite(check_xy).all(axis=1)])
+    points, xy = np.concatenate([adjusted.control.point, adjusted.check.point]), np.concatenate([control_xy, check_xy])
+    if len(points) <= MOST_NAMED_POINTS:
+        drawable = np.isfinite(xy).all(axis=1)
+        plan.draw_names(axes, xy[drawable], block.points[points[drawable]].tolist(), adjusted.images.centre[:0, :2])
     at = (0.95 + width + 0.3, below + height) if beside else (0.85, 0.58)
     _legend(figure, _plan_symbols(kinds, len(check_xy), strips), at, columns=1 if beside else 3)
     return figure
@@ -102,7 +104,10 @@ def plot_ground_points(adjusted: AdjustedBlock) -> Figure:
     extent = plan.extent_of(adjusted.images.centre[:, :2], *xy)
     extent = extent.widened(0.03 * max(extent.width, extent.height), 0.05 * max(extent.width, extent.height))
     stacked = extent.width > 1.25 * extent.height
-    width, height = plan.plan_size(extent, WIDTH - 1.2 if stacked else 3.55, 3.9 if stacked else 5.6)
+    widest, highest = (WIDTH - 1.2, 3.9) if stacked else (3.55, 5.6)
+    arrows = [_vectors_of(r, heights) for heights in (False, True) for r in results]
+    extent = _around_arrows(extent, xy * 2, arrows, (widest, highest))
+    width, height = plan.plan_size(extent, widest, highest)
     width = max(width, 3.0)
     panels_high = 2 * height + 0.85 if stacked else height
     title = f"Control and check points – {plain(adjusted.block.name)}"
@@ -120,6 +125,32 @@ def plot_ground_points(adjusted: AdjustedBlock) -> Figure:
     return figure
 
 
+def _around_arrows(
+    extent: plan.Extent, xy: Sequence[np.ndarray], arrows: Sequence[np.ndarray], size: tuple[float, float]
+) -> plan.Extent:
+    """An extent widened until the arrows end inside, drawn as long as `_difference_vectors` draws them.
+
+    Parameters
+    ----------
+    xy, arrows : (n, 2) m each, of the control and of the check points: in plan, then in height.
+    size : widest, highest inches of the axes.
+    """
+    per_inch = [_per_inch(arrows[:2])[0]] * 2 + [_per_inch(arrows[2:])[0]] * 2
+    # a wider extent makes the same inches longer on the ground
+    for _ in range(3):
+        width, height = plan.plan_size(extent, *size)
+        metres_per_inch = max(extent.width / width, extent.height / height)
+        ends = [at + metres_per_inch / scale * v for at, v, scale in zip(xy, arrows, per_inch, strict=True)]
+        corners = np.array([[extent.left, extent.bottom], [extent.right, extent.top]])
+        extent = plan.extent_of(corners, *ends)
+    return extent
+
+
+def _per_inch(arrows: Sequence[np.ndarray]) -> tuple[float, float]:
+    """Metres of an inch of arrows, and of the one that stands for the scale."""
+    return per_inch_for(np.concatenate([np.hypot(*v.T) for v in arrows]), LONGEST_INCH)
+
+
 def _difference_vectors(
     axes: Axes,
     results: Sequence[GroundPointResults],
@@ -128,8 +159,7 @@ def _difference_vectors(
     scale_at: tuple[float, float],
 ) -> None:
     vector = [_vectors_of(r, heights) for r in results]
-    lengths = np.concatenate([np.hypot(v[:, 0], v[:, 1]) for v in vector])
-    per_inch, size = per_inch_for(lengths, 0.55)
+    per_inch, size = _per_inch(vector)
     symbols: tuple[dict[str, Any], ...] = (CONTROL_SYMBOLS["full"] | {"ms": 4}, CHECK_SYMBOL | {"ms": 3.5})
     for symbol, color, at, v in zip(symbols, (INK, ACCENT), xy, vector, strict=True):
         there = np.isfinite(v).all(axis=1) & np.isfinite(at).all(axis=1)

@@ -26,6 +26,7 @@ from aerotri.report.plots.canvas import (
     styled,
     value_text,
 )
+from aerotri.report.quality import two_digits
 from aerotri.terrain.compare import Comparison
 from aerotri.terrain.dtm import TerrainOutcome
 from aerotri.terrain.picket_status import PicketStatus
@@ -52,7 +53,7 @@ def plot_surface(outcome: TerrainOutcome, block_name: str) -> Figure:
     subtitle = (
         f"{len(o.pickets.names)} photographs, pickets every {length_text(float(f'{o.interval:.3g}'))}, cells of "
         f"{length_text(float(f'{o.cell:.3g}'))}; heights {np.nanmin(z):.1f} … {np.nanmax(z):.1f} m\n"
-        f"σ of the heights: median {np.nanmedian(o.dsm.sigma):.3f} m; white: no pickets"
+        f"σ of the heights: median {two_digits(float(np.nanmedian(o.dsm.sigma)))} m; white: no pickets"
     )
     return _plot_heights(o.dsm.grid, z, o.dsm.sigma, block_name, subtitle, o.photographs.places.frame is None)
 
@@ -64,7 +65,7 @@ def plot_heights(grid: Grid, z: np.ndarray, sigma: np.ndarray | None, name: str,
     ----------
     z, sigma : (rows, columns) m, NaN where not known.
     """
-    known = f"; σ: median {np.nanmedian(sigma):.3f} m" if sigma is not None else ""
+    known = f"; σ: median {two_digits(float(np.nanmedian(sigma)))} m" if sigma is not None else ""
     subtitle = (
         f"{grid.rows} × {grid.columns} cells of {length_text(float(f'{grid.cell_x:.3g}'))}; heights "
         f"{np.nanmin(z):.1f} … {np.nanmax(z):.1f} m{known}; white: not known"
@@ -86,8 +87,8 @@ def plot_dense(grid: Grid, z: np.ndarray, matching: np.ndarray, total: float, na
     z, matching = z[part], matching[part]
     subtitle = (
         f"cells of {length_text(float(f'{grid.cell_x:.3g}'))}; heights {np.nanmin(z):.1f} … {np.nanmax(z):.1f} m; "
-        f"white: not measured\nσ of matching, drawn: median {np.nanmedian(matching):.3f} m; with the adjustment "
-        f"{total:.3f} m"
+        f"white: not measured\nσ of matching, drawn: median {two_digits(float(np.nanmedian(matching)))} m; with the "
+        f"adjustment {two_digits(total)} m"
     )
     shown = grid.window(int(rows[0]), int(columns[0]), *z.shape)
     return _plot_heights(shown, z, matching, name, subtitle, is_local, "σ of matching [m]")
