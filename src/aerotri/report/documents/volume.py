@@ -59,7 +59,7 @@ def known_to(words: Words, value: float, sigma: float | None, unit: str) -> str:
 
 
 def two(words: Words, sigma: float | None) -> str:
-    """A σ to two digits."""
+    """A σ to two digits; a dash where none is stated."""
     return NO_VALUE if sigma is None else words.plain(sigma, 2)
 
 
@@ -147,7 +147,7 @@ def _sigma(c: Mapping[str, Any], words: Words) -> list[Part]:
     s = c["sigma"]
     if s is None:
         return [paragraph(words("volume.why_no_sigma"))]
-    rows = [(words.term("part", name), two(words, value), two(words, WIDE * value))
+    rows = [(words.term("part", name), two(words, value or None), two(words, WIDE * value or None))
             for name, value in s["parts_m3"].items()]  # fmt: skip
     rows.append((words("part.together"), two(words, s["sigma_m3"]), two(words, WIDE * s["sigma_m3"])))
     parts = [table([words("volume.part"), words("volume.sigma_m3"), words("volume.wide_m3")], rows, words=1)]
@@ -169,7 +169,7 @@ def _parts_of_piles(c: Mapping[str, Any], words: Words) -> list[Part]:
     if not piles:
         return []
     names = list(piles[0]["parts_m3"])
-    rows = [(breakable(one["name"]), *(two(words, one["parts_m3"].get(name)) for name in names),
+    rows = [(breakable(one["name"]), *(two(words, one["parts_m3"].get(name) or None) for name in names),
              two(words, one["sigma_m3"])) for one in piles]  # fmt: skip
     columns = [words("volume.pile_sigma"), *(words.term("part", name) for name in names), words("part.together")]
     return [table(columns, rows, words=1)]

@@ -57,6 +57,8 @@ SYSTEMATIC = {
     "free": "image errors uncorrected, calibrated orientation",
     "absorbed": "image errors uncorrected, orientation without parameters",
 }
+LEAST = 0.001
+"""m³, below which a volume is as good as none."""
 BAR = 0.36
 """Inches of a row of bars; chosen [C]: its name of 8.5 points has room."""
 
@@ -231,5 +233,7 @@ def _coordinates(axes: Axes, width: float, height: float, crs: str) -> None:
 
 def _count(value: float, place: int | None = None) -> str:
     """A number of cubic metres with thin spaces between thousands; small ones with three digits."""
+    if 0.0 < value < LEAST:
+        return f"< {LEAST:g}"
     text = f"{value:,.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
     return text.replace(",", "\u2009").replace("-", "−")
