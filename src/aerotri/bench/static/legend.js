@@ -44,27 +44,27 @@ export function drawBars(pen, plan) {
 
 // Bars of a photograph: a length in it, and how long a residual is drawn.
 export function drawPhotoBars(pen, photo) {
-  const { scale, height } = photo.surface, bars = [["#111", scale, "in the photograph"]];
-  if (photo.show.marks && photo.show.residuals) bars.push(["#b3001b", scale * photo.times, "residual"]);
-  stack(pen, height, bars, value => `${+value.toPrecision(3)} px`);
+  const { scale, height } = photo.surface, bars = [["#ffffff", scale, "in the photograph"]];
+  if (photo.show.marks && photo.show.residuals) bars.push(["#ff8f7a", scale * photo.times, "residual"]);
+  stack(pen, height, bars, value => `${+value.toPrecision(3)} px`, "#ffffff", "#000000c0");
 }
 
 // Bars over one another in the lower left corner: colour, pixels of a unit, what it is; in words how much it is.
-function stack(pen, height, bars, inWords) {
+function stack(pen, height, bars, inWords, ink = "#111", edge = "#ffffffe0") {
   pen.font = "12px system-ui, sans-serif";
   bars.reverse().forEach(([colour, pixels, words], k) => {
     const length = roundLength(LONGEST_PX / pixels), y = height - 12 - 17 * k, end = 10 + length * pixels;
     pen.beginPath();
     pen.moveTo(10, y - 4); pen.lineTo(10, y); pen.lineTo(end, y); pen.lineTo(end, y - 4);
-    for (const [tone, wide] of [["#ffffffe0", 5], [colour, 2]]) {
+    for (const [tone, wide] of [[edge, 5], [colour, 2]]) {
       pen.strokeStyle = tone;
       pen.lineWidth = wide;
       pen.stroke();
     }
-    pen.strokeStyle = "#ffffffe0";
+    pen.strokeStyle = edge;
     pen.lineWidth = 4;
     pen.strokeText(`${inWords(length)}, ${words}`, end + 6, y + 1);
-    pen.fillStyle = "#111";
+    pen.fillStyle = ink;
     pen.fillText(`${inWords(length)}, ${words}`, end + 6, y + 1);
   });
 }

@@ -5,6 +5,8 @@ import { STEPS, UNKNOWN, sixths, stepOf, limitsOfW } from "./colours.js";
 import { BARS_PX, drawBars, showColours } from "./legend.js";
 import { Surface } from "./surface.js";
 
+const ELLIPSE_PX = 28;
+
 export class Plan {
   constructor(bench) {
     this.bench = bench;
@@ -71,7 +73,7 @@ export class Plan {
       choice("by", { w: "|w|", sigma: "σ" }, this.by, by => { this.by = by; this.sort(); showColours(this); this.surface.redraw(); }),
       set("control", "control"), set("vectors", "differences", "Adjusted − given of control and check points, drawn larger"),
       scale("vectors", "How much larger differences are drawn"),
-      set("ellipses", "ellipses", "Error ellipses of the points in plan, drawn larger"), scale("ellipses", "How much larger ellipses are drawn"),
+      set("ellipses", "ellipses", "Error ellipses of the points in plan, drawn larger; one in every square, all when you zoom in"), scale("ellipses", "How much larger ellipses are drawn"),
       make("button", { type: "button", onclick: () => this.fit() }, "whole block"),
       ...(this.more || []));
     showColours(this);
@@ -219,9 +221,14 @@ export class Plan {
     pen.strokeStyle = "#5a2d82";
     pen.lineWidth = 0.8;
     pen.beginPath();
+    // one in every square of the ground: all of them would cover one another
+    const side = ELLIPSE_PX / s.scale, taken = new Set();
     this.ellipses.point.forEach((point, row) => {
       const [x, y] = s.screen(this.x[point], this.y[point]);
       if (x < -50 || y < -50 || x > s.width + 50 || y > s.height + 50) return;
+      const square = `${Math.floor(this.x[point] / side)} ${Math.floor(this.y[point] / side)}`;
+      if (taken.has(square)) return;
+      taken.add(square);
       const a = this.ellipses.a[row] * k * s.scale, b = this.ellipses.b[row] * k * s.scale, turn = this.ellipses.azimuth[row] - Math.PI / 2;
       pen.moveTo(x + a * Math.cos(turn), y + a * Math.sin(turn));
       pen.ellipse(x, y, a, b, turn, 0, 2 * Math.PI);

@@ -16,6 +16,8 @@ from aerotri.report.plots.rendering import RenderedPlot
 
 WIDE = 1.96
 """Standard deviations on either side within which 95 % of normally distributed values lie."""
+LEAST = 0.001
+"""m³, below which a part of σ is as good as none."""
 PICTURES = ("thickness", "budget")
 
 OWN_BASES = "a base for each of "
@@ -60,7 +62,9 @@ def known_to(words: Words, value: float, sigma: float | None, unit: str) -> str:
 
 def two(words: Words, sigma: float | None) -> str:
     """A σ to two digits; a dash where none is stated."""
-    return NO_VALUE if sigma is None else words.plain(sigma, 2)
+    if sigma is None:
+        return NO_VALUE
+    return f"< {words.plain(LEAST, 1)}" if 0.0 < sigma < LEAST else words.plain(sigma, 2)
 
 
 def amount(words: Words, value: float | None) -> str:

@@ -123,9 +123,7 @@ def plot_budget(content: Mapping[str, Any]) -> Figure:
         f"{two_digits(1e3 * s['sigma_mean_height_m'])} mm of mean height\n"
     )
     if apart:
-        held = "are in the volume, not in σ" if s["systematic"]["in_the_volume"] else "would have been, not in σ"
-        subtitle += f"hatched, on a scale of its own: what uncorrected image errors {held}"
-        subtitle += "" if s["curvature"] is None else "; what lines cut off, in σ"
+        subtitle += f"hatched, on a scale of its own: {_hatched(s)}"
     upper, lower = BAR * len(parts), BAR * len(apart)
     figure = new_figure(upper + 1.6 + (lower + 0.75 if apart else 0.0), "How sure the volume is", subtitle)
     axes = axes_at(figure, 4.15, 0.6 + (lower + 0.75 if apart else 0.0), WIDTH - 5.35, upper)
@@ -144,6 +142,13 @@ def plot_budget(content: Mapping[str, Any]) -> Figure:
         _bars(below, [name for name, _ in apart], [one["value_m3"] for _, one in apart], texts, hatched)
         below.set_xlabel("change of the volume [m³]")
     return figure
+
+
+def _hatched(s: Mapping[str, Any]) -> str:
+    """What stands apart from the parts of σ."""
+    held = "are in the volume, not in σ" if s["systematic"]["in_the_volume"] else "would have been, not in σ"
+    said = [f"what uncorrected image errors {held}"] if s["systematic"]["variants"] else []
+    return "; ".join(said + ([] if s["curvature"] is None else ["what lines cut off, in σ"]))
 
 
 def _bars(axes: Axes, labels: list[str], values: list[float], texts: list[str], style: dict[str, Any]) -> None:
