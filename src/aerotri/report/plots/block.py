@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from aerotri.conventions import counted
 from aerotri.report.plots import plan
 from aerotri.report.plots.canvas import (
     ACCENT,
@@ -52,9 +53,10 @@ def plot_block_plan(adjusted: AdjustedBlock) -> Figure:
     beside = width < WIDTH - 3.7
     block = adjusted.block
     strips = len(np.unique(block.images.strip[block.images.strip != ""]))
+    in_strips = f" in {counted(strips, 'strip')}" if strips else ""
     subtitle = (
-        f"{len(block.images)} photographs in {strips} strip{'s' * (strips != 1)}, {len(adjusted.control)} control and "
-        f"{len(adjusted.check)} check points; outlines on the mean height of the ground"
+        f"{len(block.images)} photographs{in_strips}, {len(adjusted.control)} control and {len(adjusted.check)} check "
+        "points; outlines on the mean height of the ground"
     )
     below = 0.65 if beside else 1.15
     figure = new_figure(below + height + 0.75, f"Block plan – {plain(block.name)}", subtitle)

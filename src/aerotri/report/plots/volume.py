@@ -221,9 +221,8 @@ def _section_marks(axes: Axes, sections: Sections, boundary: Boundary) -> None:
     along = direction_of(sections.azimuth)
     across = np.array([along[1], -along[0]])
     reach = (np.concatenate(boundary.rings) - sections.origin) @ across
-    wanted = sections.station[-1] * np.array([0.25, 0.5, 0.75])
-    chosen = sections.station[np.unique(np.argmin(np.abs(sections.station[:, None] - wanted), axis=0))]
-    lines = [sections.origin + s * along + np.array([reach.min(), reach.max()])[:, None] * across for s in chosen]
+    ends = np.array([reach.min(), reach.max()])[:, None] * across
+    lines = [sections.origin + s * along + ends for s in sections.chosen()]
     axes.add_collection(LineCollection(lines, colors=GREY, linewidths=0.7, linestyles=[(0, (4, 3))], zorder=3))
 
 
