@@ -132,6 +132,20 @@ def test_arrows_of_differences_end_inside(shape, toward):
     assert ends >= 2 * len(adjusted.check)
 
 
+def test_coordinates_of_neighbouring_panels_keep_apart():
+    """Wherever the block lies, the last coordinate of the left panel does not meet the first of the right one."""
+    adjusted = make_adjusted_block(4, 10, n_points=200)
+    for east in np.linspace(0.0, 1000.0, 9):
+        shift = np.array([6e6 + east, 0.0, 0.0])
+        points = replace(adjusted.points, xyz=adjusted.points.xyz + shift)
+        images = replace(adjusted.images, centre=adjusted.images.centre + shift)
+        figure = drawn(plot_ground_points(replace(adjusted, points=points, images=images)))
+        left, right = (tick_labels(axes.xaxis) for axes in figure.axes[:2])
+        renderer = figure.canvas.get_renderer()
+        ends = max(label.get_window_extent(renderer).x1 for label in left)
+        assert ends + 2.0 <= min(label.get_window_extent(renderer).x0 for label in right)
+
+
 def test_check_points_are_named_on_the_plan(adjusted):
     names = adjusted.block.points[adjusted.check.point[:3]].tolist()
     text = all_text(drawn(plot_block_plan(adjusted))).split()

@@ -34,6 +34,8 @@ MOST_NAMED_POINTS = 40
 """Control and check points up to which their names are drawn; chosen [C]: with more the names overlap."""
 LONGEST_INCH = 0.55
 """Inches of the longest arrow of a difference."""
+BETWEEN = 0.45
+"""Inches between two panels; a coordinate of seven digits stands at the edge of each."""
 CONTROL_SYMBOLS: dict[str, dict[str, Any]] = {
     "full": {"marker": "^", "mfc": INK, "mec": INK},
     "plan only": {"marker": "^", "mfc": "white", "mec": INK},
@@ -106,7 +108,7 @@ def plot_ground_points(adjusted: AdjustedBlock) -> Figure:
     extent = plan.extent_of(adjusted.images.centre[:, :2], *xy)
     extent = extent.widened(0.03 * max(extent.width, extent.height), 0.05 * max(extent.width, extent.height))
     stacked = extent.width > 1.25 * extent.height
-    widest, highest = (WIDTH - 1.2, 3.9) if stacked else (3.55, 5.6)
+    widest, highest = (WIDTH - 1.2, 3.9) if stacked else (3.4, 5.6)
     arrows = [_vectors_of(r, heights) for heights in (False, True) for r in results]
     extent = _around_arrows(extent, xy * 2, arrows, (widest, highest))
     width, height = plan.plan_size(extent, widest, highest)
@@ -114,7 +116,7 @@ def plot_ground_points(adjusted: AdjustedBlock) -> Figure:
     panels_high = 2 * height + 0.85 if stacked else height
     title = f"Control and check points – {plain(adjusted.block.name)}"
     figure = new_figure(panels_high + 1.9, title, "adjusted − given: " + _differences_text(adjusted))
-    places = [(0.95, 0.95 + (height + 0.85 if stacked else 0.0)), (0.95 if stacked else 1.15 + width, 0.95)]
+    places = [(0.95, 0.95 + (height + 0.85 if stacked else 0.0)), (0.95 if stacked else 0.95 + width + BETWEEN, 0.95)]
     for heights, (left, bottom) in zip((False, True), places, strict=True):
         axes = plan.plan_axes(figure, (left, bottom, width, height), extent, plan.axis_names(adjusted))
         if heights and not stacked:
