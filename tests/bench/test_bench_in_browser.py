@@ -128,6 +128,35 @@ def test_lengths_of_scale_bars_are_round_and_in_fitting_units(page):
     assert said == ["500 m", "2 cm", "100 m"]
 
 
+def test_the_whole_block_stands_beside_the_legend_and_above_the_bars(page):
+    over = page.page.evaluate("""() => { bench.plan.fit();
+        const plan = bench.plan, box = e => e.getBoundingClientRect(), canvas = box(plan.surface.canvas);
+        const legend = box(document.getElementById('legend')), [low, high] = plan.bounds();
+        const [left, bottom] = plan.surface.screen(...low), [right, top] = plan.surface.screen(...high);
+        return { inside: left >= 0 && top >= 0 && right <= canvas.width && bottom <= canvas.height - 51,
+            covered: right > legend.left - canvas.left && bottom > legend.top - canvas.top }; }""")
+    assert over == {"inside": True, "covered": False}
+
+
+def test_space_shows_points_and_centres_whole_from_every_side(page):
+    p = page.page
+    p.click("#tab-space")
+    p.wait_for_selector("#space")
+    outside = p.evaluate("""() => { const space = bench.tabs.space[1], { points, images } = bench.plan.content;
+        let count = 0;
+        for (const [turn, tilt] of [[0, 0], [0.6, 0.5], [2.1, 1.5], [4.0, 0.9]]) {
+          Object.assign(space, { turn, tilt });
+          const at = space.view(900, 300);
+          for (const place of [...points.xyz, ...images.centre]) {
+            if (place[0] === null || place[2] === null) continue;
+            const [x, y] = at(...place);
+            if (x < 0 || y < 0 || x > 900 || y > 300) count++;
+          }
+        }
+        return count; }""")
+    assert outside == 0
+
+
 def test_next_mark_leads_to_its_place_and_space_is_drawn(page, bench):
     p = page.page
     p.wait_for_selector("body[data-equations=ready]")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
 
-from aerotri.bench.layers import layer_picture, layers_beside, open_layer
+from aerotri.bench.layers import Layer, layer_picture, layers_beside, names_of, open_layer
 from aerotri.bench.places import places_of
 from aerotri.bench.session import Bench
 from aerotri.conventions import InputError
@@ -78,6 +80,13 @@ def test_rasters_of_a_run_are_found_beside_its_result(surface, tmp_path):
     assert layers_beside(result) == []
     (tmp_path / "project" / "run.json").write_text("{}")
     assert layers_beside(result) == [tmp_path / "project" / "dsm" / "dsm.tif"]
+
+
+def test_two_files_of_one_name_are_told_apart_by_their_folders():
+    layers = [
+        Layer(Path(name), (0.0, 0.0, 1.0, 1.0)) for name in ("p/ortho/ortho.tif", "p/dsm/dsm.tif", "p/dtm/dsm.tif")
+    ]
+    assert names_of(layers) == ["ortho.tif", "dsm/dsm.tif", "dtm/dsm.tif"]
 
 
 def test_bounds_count_from_the_origin_of_the_plan(result, surface):

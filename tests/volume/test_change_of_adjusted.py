@@ -87,7 +87,7 @@ def ring(shape):
 @pytest.mark.parametrize("how", [None, "height", "tilt"])
 def test_what_is_left_of_the_adjustments_scatters_by_its_sigma(proof, blocks, how):
     """No noise of cells: the volume inside errs by the adjustments alone; Σz² in the 99.9 % band of χ²."""
-    z, cells = [], []
+    z, cells, moved = [], [], []
     for first, second, truth in blocks.values():
         grid = grid_in(truth)
         before, after = (measured(proof, one, truth, grid) for one in (first, second))
@@ -98,8 +98,12 @@ def test_what_is_left_of_the_adjustments_scatters_by_its_sigma(proof, blocks, ho
         v = found.volumes[0]
         z.append(v.net / np.hypot(v.parts["net"]["adjustment"], v.parts["net"]["model"]))
         cells.append(np.sqrt(np.nanmean(found.significance[7:-7, 7:-7] ** 2)))
+        moved.append(found.alignment.values / found.moved_sigma)
     low, high = chi2.ppf([0.0005, 0.9995], RUNS)
     assert low < np.sum(np.square(z)) < high
+    # nothing was moved in truth: what the alignment finds are errors of the adjustments
+    assert (np.sum(np.square(moved), axis=0) > low).all()
+    assert (np.sum(np.square(moved), axis=0) < high).all()
     # of neighbouring cells, which err alike: a few independent ones a run. With an alignment what bends stable ground
     # is in its noise as well, which makes σ of cells larger
     assert np.sqrt(np.mean(np.square(cells))) < 1.7

@@ -7,9 +7,11 @@ A level floor between heaps of 6 m, and three piles on it. Each epoch has 15 ren
 EXIF; six control and three check points are marked in them with 0.1 px. Between the epochs the first pile stays, the
 second is half taken away, and the third grows. `aerotri run` makes everything but the dense surface from photographs
 and the list of control points, `aerotri volume` weighs the piles, `aerotri change` compares the epochs on the ground
-around the piles. The truth of a volume is that of the true ground over a base through the same outline; what the floor
-does under a pile is not in it. The truth of a change is what came and went inside the outline. Also made: certificates
-of the volumes and of the change, English and German.
+around the piles: moved in height alone, since control holds both flights in plan and the floor is too level to tell a
+shift, and for comparison with a shift as well. The truth of a volume is that of the true ground over a base through
+the same outline; what the floor does under a pile is not in it. What stands on the floor inside the outline is listed
+beside it. The truth of a change is what came and went inside the outline. Also made: certificates of the volumes and
+of the change, English and German.
 With --out quarry.md is written there.
 """
 
@@ -182,19 +184,38 @@ def row(words: Sequence[str], truth: float, value: float, sigma: float) -> str:
     return "| " + " | ".join([*words, *numbers]) + " |"
 
 
-def volume_rows(epoch: int, content: dict[str, Any], truth: dict[str, float]) -> Iterable[str]:
+def volume_rows(
+    epoch: int, content: dict[str, Any], truth: dict[str, float], stands: dict[str, float]
+) -> Iterable[str]:
     """Every pile and all together."""
     for one in content["piles"]:
-        yield row([str(epoch), one["name"]], truth[one["name"]], one["net_m3"], one["sigma_m3"])
-    yield row([str(epoch), "all together"], sum(truth.values()), content["net_m3"], content["sigma"]["sigma_m3"])
+        found = row([str(epoch), one["name"]], truth[one["name"]], one["net_m3"], one["sigma_m3"])
+        yield f"{found} {stands[one['name']]:.1f} |"
+    whole = row([str(epoch), "all together"], sum(truth.values()), content["net_m3"], content["sigma"]["sigma_m3"])
+    yield f"{whole} {sum(stands.values()):.1f} |"
 
 
 def change_rows(content: dict[str, Any], truth: dict[int, dict[str, float]]) -> Iterable[str]:
     """Net change of every pile and all together."""
+    moved = content["alignment"]["how"]
     for one in content["volumes"]:
         names = [one["name"]] if one["name"] in PLACES else list(PLACES)
         true = sum(truth[2][name] - truth[1][name] for name in names)
-        yield row([one["name"]], true, one["net_m3"], one["sigma_net_m3"])
+        yield row([moved, one["name"]], true, one["net_m3"], one["sigma_net_m3"])
+
+
+def changed(folder: Path, align: str) -> dict[str, Any]:
+    """change.json of both epochs, the second moved in one way."""
+    out = folder / ("change" if align == "height" else f"change_{align}")
+    command("change", folder / "epoch_1", folder / "epoch_2", "--align", align, "--stable", folder / "stable.geojson",
+            "--area", folder / "piles.geojson", "--project", folder / "project_2.toml", "--out", out)  # fmt: skip
+    return json.loads((out / "change.json").read_text(encoding="utf-8"))
+
+
+def moved_row(content: dict[str, Any]) -> str:
+    """Level of detection of single cells, and what the second surface was moved by."""
+    moved = [f"{one['name']} {one['value']:+.3f} ± {one['sigma']:.3f} m" for one in content["alignment"]["unknowns"]]
+    return f"| {content['alignment']['how']} | {content['level_of_detection_m']:.2f} | {', '.join(moved)} |"
 
 
 def main() -> None:
@@ -211,17 +232,16 @@ def main() -> None:
     write_geojson(folder / "piles.geojson", {name: outline(name) for name in PLACES})
     write_geojson(folder / "stable.geojson", {"stable": stable()})
     truth = {epoch: standing(epoch) for epoch in HEIGHTS}
-    lines = ["# A quarry with three piles, from photographs (tools/prove/quarry.py)", "",
-             "| epoch | pile | true, m³ | computed | error | σ | error/σ |", "|" + "---|" * 7]  # fmt: skip
+    heads = "| epoch | pile | true, m³ | computed | error | σ | error/σ | standing, m³ |"
+    lines = ["# A quarry with three piles, from photographs (tools/prove/quarry.py)", "", heads, "|" + "---|" * 8]
     for epoch in HEIGHTS:
         content, seconds = measured(folder, epoch)
         print(f"epoch {epoch}: aerotri run took {seconds:.0f} s", flush=True)
-        lines += volume_rows(epoch, content, over_outline(epoch))
-    command("change", folder / "epoch_1", folder / "epoch_2", "--stable", folder / "stable.geojson", "--area",
-            folder / "piles.geojson", "--project", folder / "project_2.toml", "--out", folder / "change")  # fmt: skip
-    found = json.loads((folder / "change" / "change.json").read_text(encoding="utf-8"))
-    lines += ["", "| change of | true, m³ | computed | error | σ | error/σ |", "|" + "---|" * 6]
-    lines += change_rows(found, truth)
+        lines += volume_rows(epoch, content, over_outline(epoch), truth[epoch])
+    found = [changed(folder, align) for align in ("height", "shift")]
+    lines += ["", "| moved in | change of | true, m³ | computed | error | σ | error/σ |", "|" + "---|" * 7]
+    lines += [line for one in found for line in change_rows(one, truth)]
+    lines += ["", "| moved in | level of detection, m | by |", "|---|---|---|", *map(moved_row, found)]
     documents(folder)
     print("\n".join(lines))
     if options.out:

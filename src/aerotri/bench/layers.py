@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,6 +44,15 @@ def open_layer(path: Path) -> Layer:
         When it is none, or has no place.
     """
     return Layer(path, bounds_of(path))
+
+
+def names_of(layers: Sequence[Layer]) -> list[str]:
+    """Names of the files; with their folders where two have one name."""
+    names = [one.path.name for one in layers]
+    return [
+        name if names.count(name) == 1 else f"{one.path.parent.name}/{name}"
+        for one, name in zip(layers, names, strict=True)
+    ]
 
 
 def layers_beside(result: Path | None) -> list[Path]:

@@ -12,7 +12,7 @@ import numpy as np
 from aerotri.bench.difference import difference_content
 from aerotri.bench.equations import Equations
 from aerotri.bench.job import Jobs
-from aerotri.bench.layers import layer_picture, layers_beside, open_layer
+from aerotri.bench.layers import layer_picture, layers_beside, names_of, open_layer
 from aerotri.bench.measuring import Measuring
 from aerotri.bench.next_mark import NextMark, next_marks
 from aerotri.bench.pictures import Pictures
@@ -156,8 +156,8 @@ class Bench:
         """Surfaces and orthophotos to be drawn below the plan: name and bounds, from the origin of the plan."""
         origin = plan_origin(self.records)[:2].tolist() * 2
         return {"layers": [
-            {"name": one.path.name, "bounds": [value - zero for value, zero in zip(one.bounds, origin, strict=True)]}
-            for one in self._layers
+            {"name": name, "bounds": [value - zero for value, zero in zip(one.bounds, origin, strict=True)]}
+            for name, one in zip(names_of(self._layers), self._layers, strict=True)
         ]}  # fmt: skip
 
     def layer(self, number: int) -> bytes:

@@ -242,6 +242,13 @@ def change(
     by = dict(zip(found.alignment.names, found.alignment.values.tolist(), strict=True))
     if max(abs(by.get("dX", 0.0)), abs(by.get("dY", 0.0))) > FARTHEST * grid.cell_x:
         notes.append("the surfaces are shifted by more than a few cells: bring the second nearer and measure again")
+    unsure = [f"{name} ± {sigma:.2g} m" for name, sigma in zip(found.alignment.names, found.moved_sigma, strict=True)
+              if name in ("dX", "dY") and sigma > grid.cell_x]  # fmt: skip
+    if unsure:
+        notes.append(
+            f"the stable ground is too level to tell a shift in plan ({', '.join(unsure)}): where both surfaces have "
+            "good positions, --align height moves the second in height alone and leaves a smaller σ"
+        )
     summary = change_json(found, names_of(epochs), crs, "" if ground is None else ground.name, align, tuple(notes))
     head = Head(project_of(project, second_adjustment, second, first_adjustment, first), crs)
     asked = {"stable": stable, "align": align, "area": area, "noise_length": noise_length}

@@ -60,7 +60,11 @@ CHANGE_JSON = (
     Item("alignment.unknowns[]", "object", "What it was moved by."),
     Item("alignment.unknowns[].name", "text", "dZ, dX, dY (m), tilt_X, tilt_Y (m/m)."),
     Item("alignment.unknowns[].value", "number", "Second surface less first."),
-    Item("alignment.unknowns[].sigma", "number", "Standard deviation of it."),
+    Item(
+        "alignment.unknowns[].sigma",
+        "number",
+        "Standard deviation of it, with the part of the adjustments where given.",
+    ),
     Item("volumes[]", "object", "One entry an area; the last is all together."),
     Item("volumes[].name", "text", "Its name."),
     *(Item(f"volumes[].{name}", "number", text, "m²") for name, text in AREAS),

@@ -46,6 +46,16 @@ class Sections:
         """m, between sections; the last interval may be shorter."""
         return float(self.station[1] - self.station[0])
 
+    def chosen(self, count: int = 3) -> np.ndarray:
+        """(k,) stations of at most so many sections to be shown: they divide cut and fill into equal parts.
+
+        So a section between two piles, where nothing lies, is none of them.
+        """
+        area = self.sums[:, 0] + self.sums[:, 1]
+        share = np.cumsum(area if area.sum() > 0.0 else np.ones_like(area))
+        wanted = share[-1] * (np.arange(count) + 1.0) / (count + 1.0)
+        return self.station[np.unique(np.searchsorted(share, wanted))]
+
 
 def direction_of(azimuth: float) -> np.ndarray:
     """(2,) unit vector of an azimuth in degrees, clockwise from north."""
@@ -126,14 +136,12 @@ class Profile:
 def chosen_profiles(
     surface: Surface, base: Base, boundary: Boundary, sections: Sections, count: int = 3, places: int = 400
 ) -> list[Profile]:
-    """Some sections evenly spread between the first and the last one."""
+    """Those that `Sections.chosen` names."""
     along = direction_of(sections.azimuth)
     across = np.array([along[1], -along[0]])
     reach = (np.concatenate(boundary.rings) - sections.origin) @ across
-    wanted = sections.station[-1] * (np.arange(count) + 1.0) / (count + 1.0)
-    chosen = sections.station[np.unique(np.argmin(np.abs(sections.station[:, None] - wanted), axis=0))]
     out = []
-    for station in chosen:
+    for station in sections.chosen(count):
         ends = sections.origin + station * along + np.array([reach.min(), reach.max()])[:, None] * across
         at = ends[0] + np.linspace(0.0, 1.0, places)[:, None] * (ends[1] - ends[0])
         z = sampled(surface, at[:, 0], at[:, 1])

@@ -113,6 +113,45 @@ def test_nothing_overlaps(name, shape):
             assert apart, (first, second)
 
 
+@pytest.mark.parametrize("shape", [(4, 10), (1, 14), (12, 3)])
+@pytest.mark.parametrize("toward", [(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)])
+def test_arrows_of_differences_end_inside(shape, toward):
+    """The longest arrow of a point at the edge is not cut at the frame."""
+    adjusted = make_adjusted_block(*shape, n_points=200)
+    moved = 0.1 * np.array(toward) * np.ones((len(adjusted.check), 1))
+    figure = drawn(plot_ground_points(replace(adjusted, check=replace(adjusted.check, difference=moved))))
+    ends = 0
+    for axes in figure.axes:
+        for quiver in (artist for artist in axes.get_children() if isinstance(artist, matplotlib.quiver.Quiver)):
+            begin = axes.transData.transform(np.column_stack([quiver.X, quiver.Y]))
+            end = begin + figure.dpi / quiver.scale * np.column_stack([quiver.U, quiver.V])
+            box = axes.get_window_extent()
+            assert (end >= (box.x0, box.y0)).all()
+            assert (end <= (box.x1, box.y1)).all()
+            ends += len(end)
+    assert ends >= 2 * len(adjusted.check)
+
+
+def test_coordinates_of_neighbouring_panels_keep_apart():
+    """Wherever the block lies, the last coordinate of the left panel does not meet the first of the right one."""
+    adjusted = make_adjusted_block(4, 10, n_points=200)
+    for east in np.linspace(0.0, 1000.0, 9):
+        shift = np.array([6e6 + east, 0.0, 0.0])
+        points = replace(adjusted.points, xyz=adjusted.points.xyz + shift)
+        images = replace(adjusted.images, centre=adjusted.images.centre + shift)
+        figure = drawn(plot_ground_points(replace(adjusted, points=points, images=images)))
+        left, right = (tick_labels(axes.xaxis) for axes in figure.axes[:2])
+        renderer = figure.canvas.get_renderer()
+        ends = max(label.get_window_extent(renderer).x1 for label in left)
+        assert ends + 2.0 <= min(label.get_window_extent(renderer).x0 for label in right)
+
+
+def test_check_points_are_named_on_the_plan(adjusted):
+    names = adjusted.block.points[adjusted.check.point[:3]].tolist()
+    text = all_text(drawn(plot_block_plan(adjusted))).split()
+    assert any(name in text for name in names)
+
+
 def test_size(tmp_path):
     """All plots of 132 photographs as SVG and PNG."""
     big = make_adjusted_block(11, 12, 1774, n_control=30, n_check=60)

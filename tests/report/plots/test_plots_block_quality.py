@@ -70,7 +70,8 @@ def test_ellipses_are_those_of_the_covariance():
     drawn = figure.findobj(EllipseCollection)[0]
     assert len(drawn.get_offsets()) <= len(found.point)
     text = words(figure)
-    assert "95 %, drawn " in text
+    assert "95 % ellipses, " in text
+    assert " times larger than the plan" in text
     assert "largest 0.155 m" in text
 
 
@@ -125,5 +126,6 @@ def test_ellipses_larger_than_the_block_are_drawn_smaller():
     adjusted = make_adjusted_block(3, 8, 200)
     covariance = np.tile(np.diag([1e6, 1e6, 1e6]), (len(adjusted.block.points), 1, 1))
     figure = plot_error_ellipses(replace(adjusted, points=replace(adjusted.points, covariance=covariance)))
-    larger = float(words(figure).split("drawn ")[1].split()[0])
-    assert larger < 0.1
+    factor, smaller = words(figure).split("ellipses, ")[1].split(" times ")
+    assert smaller.startswith("smaller than the plan")
+    assert float(factor) > 10.0

@@ -28,7 +28,10 @@ export function showColours(plan) {
   place.hidden = !plan.show.points;
 }
 
-// Bars in the lower left corner, each with the length that it stands for; north is up.
+// Pixels that the bars at the lower edge take.
+export const BARS_PX = 60;
+
+// Bars of the plan; north is up.
 export function drawBars(pen, plan) {
   const { scale, height } = plan.surface, bars = [];
   bars.push(["#111", scale, "north is up"]);
@@ -36,18 +39,32 @@ export function drawBars(pen, plan) {
     bars.push(["#b3001b", scale * plan.times.vectors * plan.factor.vectors, "difference in plan"], ["#0b63b8", scale * plan.times.vectors * plan.factor.vectors, "difference in height"]);
   }
   if (plan.show.ellipses && plan.ellipses) bars.push(["#5a2d82", scale * plan.ellipses.k * plan.factor.ellipses, "σ, semi-axes of ellipses"]);
+  stack(pen, height, bars, metres);
+}
+
+// Bars of a photograph: a length in it, and how long a residual is drawn.
+export function drawPhotoBars(pen, photo) {
+  const { scale, height } = photo.surface, bars = [["#ffffff", scale, "in the photograph"]];
+  if (photo.show.marks && photo.show.residuals) bars.push(["#ff8f7a", scale * photo.times, "residual"]);
+  stack(pen, height, bars, value => `${+value.toPrecision(3)} px`, "#ffffff", "#000000c0");
+}
+
+// Bars over one another in the lower left corner: colour, pixels of a unit, what it is; in words how much it is.
+function stack(pen, height, bars, inWords, ink = "#111", edge = "#ffffffe0") {
   pen.font = "12px system-ui, sans-serif";
   bars.reverse().forEach(([colour, pixels, words], k) => {
     const length = roundLength(LONGEST_PX / pixels), y = height - 12 - 17 * k, end = 10 + length * pixels;
-    pen.strokeStyle = colour;
-    pen.lineWidth = 2;
     pen.beginPath();
     pen.moveTo(10, y - 4); pen.lineTo(10, y); pen.lineTo(end, y); pen.lineTo(end, y - 4);
-    pen.stroke();
-    pen.strokeStyle = "#ffffffe0";
-    pen.lineWidth = 3;
-    pen.strokeText(`${metres(length)}, ${words}`, end + 6, y + 1);
-    pen.fillStyle = "#111";
-    pen.fillText(`${metres(length)}, ${words}`, end + 6, y + 1);
+    for (const [tone, wide] of [[edge, 5], [colour, 2]]) {
+      pen.strokeStyle = tone;
+      pen.lineWidth = wide;
+      pen.stroke();
+    }
+    pen.strokeStyle = edge;
+    pen.lineWidth = 4;
+    pen.strokeText(`${inWords(length)}, ${words}`, end + 6, y + 1);
+    pen.fillStyle = ink;
+    pen.fillText(`${inWords(length)}, ${words}`, end + 6, y + 1);
   });
 }

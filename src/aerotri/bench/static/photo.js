@@ -3,6 +3,7 @@
 import { ask, tell } from "./api.js";
 import { button, checkbox, choice, fixed, guarded, make, slider } from "./dom.js";
 import { colourOfW } from "./colours.js";
+import { drawPhotoBars } from "./legend.js";
 import { cross, label, line, ring } from "./marks.js";
 import { Surface } from "./surface.js";
 import { Tiles } from "./tiles.js";
@@ -165,6 +166,7 @@ export class Photo {
     this.drawTargets(pen);
     this.drawChanges(pen);
     this.drawChosen(pen);
+    drawPhotoBars(pen, this);
   }
 
   filter() {

@@ -2,8 +2,10 @@
 
 import { checkbox, choice, slider, make, fixed } from "./dom.js";
 import { STEPS, UNKNOWN, sixths, stepOf, limitsOfW } from "./colours.js";
-import { drawBars, showColours } from "./legend.js";
+import { BARS_PX, drawBars, showColours } from "./legend.js";
 import { Surface } from "./surface.js";
+
+const ELLIPSE_PX = 28;
 
 export class Plan {
   constructor(bench) {
@@ -47,7 +49,11 @@ export class Plan {
     return xs.length ? [[least(xs), least(ys)], [most(xs), most(ys)]] : [[-1, -1], [1, 1]];
   }
 
-  fit() { this.surface.fit(...this.bounds()); }
+  // The whole block beside the legend or above it, whichever shows it larger.
+  fit() {
+    const legend = document.getElementById("legend"), wide = legend.offsetWidth + 10, tall = legend.offsetHeight + 10;
+    this.surface.fit(...this.bounds(), legend.hidden ? [[0, BARS_PX]] : [[wide, BARS_PX], [0, Math.max(tall, BARS_PX)]]);
+  }
 
   // By how much vectors are drawn larger: the longest is a twentieth of the block.
   suitable() {
@@ -67,7 +73,7 @@ export class Plan {
       choice("by", { w: "|w|", sigma: "σ" }, this.by, by => { this.by = by; this.sort(); showColours(this); this.surface.redraw(); }),
       set("control", "control"), set("vectors", "differences", "Adjusted − given of control and check points, drawn larger"),
       scale("vectors", "How much larger differences are drawn"),
-      set("ellipses", "ellipses", "Error ellipses of the points in plan, drawn larger"), scale("ellipses", "How much larger ellipses are drawn"),
+      set("ellipses", "ellipses", "Error ellipses of the points in plan, drawn larger; one in every square, all when you zoom in"), scale("ellipses", "How much larger ellipses are drawn"),
       make("button", { type: "button", onclick: () => this.fit() }, "whole block"),
       ...(this.more || []));
     showColours(this);
@@ -160,7 +166,7 @@ export class Plan {
   }
 
   drawControl(pen) {
-    pen.font = "12px system-ui, sans-serif";
+    const names = [];
     for (const point of this.content.control.point) {
       const at = this.place(point);
       if (!at) continue;
@@ -173,11 +179,24 @@ export class Plan {
       pen.fillStyle = check ? "#fff" : "#ffd84d";
       pen.fill();
       pen.stroke();
-      pen.strokeStyle = "#ffffffd0";
-      pen.lineWidth = 3;
-      pen.strokeText(this.points.name[point], x + 9, y + 4);
-      pen.fillStyle = "#111";
-      pen.fillText(this.points.name[point], x + 9, y + 4);
+      names.push([this.points.name[point], x + 9, y + 4]);
+    }
+    this.drawNames(pen, names);
+  }
+
+  // A name that would lie over an earlier one is left out: a larger scale shows it.
+  drawNames(pen, names) {
+    const taken = [];
+    pen.font = "12px system-ui, sans-serif";
+    pen.strokeStyle = "#ffffffd0";
+    pen.lineWidth = 3;
+    pen.fillStyle = "#111";
+    for (const [name, x, y] of names) {
+      const box = [x, y - 10, x + pen.measureText(name).width, y + 3];
+      if (taken.some(other => box[0] < other[2] && other[0] < box[2] && box[1] < other[3] && other[1] < box[3])) continue;
+      taken.push(box);
+      pen.strokeText(name, x, y);
+      pen.fillText(name, x, y);
     }
   }
 
@@ -202,9 +221,14 @@ export class Plan {
     pen.strokeStyle = "#5a2d82";
     pen.lineWidth = 0.8;
     pen.beginPath();
+    // one in every square of the ground: all of them would cover one another
+    const side = ELLIPSE_PX / s.scale, taken = new Set();
     this.ellipses.point.forEach((point, row) => {
       const [x, y] = s.screen(this.x[point], this.y[point]);
       if (x < -50 || y < -50 || x > s.width + 50 || y > s.height + 50) return;
+      const square = `${Math.floor(this.x[point] / side)} ${Math.floor(this.y[point] / side)}`;
+      if (taken.has(square)) return;
+      taken.add(square);
       const a = this.ellipses.a[row] * k * s.scale, b = this.ellipses.b[row] * k * s.scale, turn = this.ellipses.azimuth[row] - Math.PI / 2;
       pen.moveTo(x + a * Math.cos(turn), y + a * Math.sin(turn));
       pen.ellipse(x, y, a, b, turn, 0, 2 * Math.PI);

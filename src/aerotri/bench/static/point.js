@@ -24,7 +24,7 @@ export class PointSheet {
 
   facts(found) {
     const three = (values, digits) => values.map(value => fixed(value, digits) || "–").join("  ");
-    const facts = [["X Y Z", three(found.xyz, 3)], ["σ", three(found.sigma, 3) + " m"], ["largest |w|", fixed(found.w, 1) || "–"], ["rays", found.rays.ray.length]];
+    const facts = [["X Y Z", three(found.xyz, 3) + " m"], ["σ", three(found.sigma, 3) + " m"], ["largest |w|", fixed(found.w, 1) || "–"], ["rays", found.rays.ray.length]];
     if (found.given) facts.push([found.given.is_check ? "check point" : "control point", `adjusted − given  ${three(found.given.difference, 3)} m`]);
     return make("div", { class: "tools" }, make("b", { id: "point-name" }, found.name), ...facts.map(([name, value]) => make("span", {}, `${name}: ${value}`)));
   }

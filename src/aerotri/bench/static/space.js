@@ -33,14 +33,24 @@ export class SpaceSheet {
     this.canvas.addEventListener("wheel", event => { event.preventDefault(); this.zoom *= Math.exp(-event.deltaY * 0.0015); this.draw(); }, { passive: false });
   }
 
-  // The block's middle in the middle of the canvas, seen from far away.
+  // Points and centres: the least and the largest coordinates.
+  bounds() {
+    const { points, images } = this.bench.plan.content, low = [Infinity, Infinity, Infinity], high = low.map(value => -value);
+    for (const place of [...points.xyz, ...images.centre]) {
+      if (place[0] === null || place[2] === null) continue;
+      place.forEach((value, k) => { low[k] = Math.min(low[k], value); high[k] = Math.max(high[k], value); });
+    }
+    return low[0] > high[0] ? [[-1, -1, -1], [1, 1, 1]] : [low, high];
+  }
+
+  // The block's middle in the middle of the canvas, seen from far away; whole from every side.
   view(width, height) {
-    const [low, high] = this.bench.plan.bounds(), cx = (low[0] + high[0]) / 2, cy = (low[1] + high[1]) / 2;
-    const scale = this.zoom * 0.85 * Math.min(width, height * 1.6) / Math.hypot(high[0] - low[0], high[1] - low[1]);
+    const [low, high] = this.bounds(), [cx, cy, cz] = low.map((value, k) => (value + high[k]) / 2);
+    const scale = this.zoom * 0.95 * Math.min(width, height) / Math.max(Math.hypot(...low.map((value, k) => high[k] - value)), 1e-9);
     const cos = Math.cos(this.turn), sin = Math.sin(this.turn), ct = Math.cos(this.tilt), st = Math.sin(this.tilt);
     return (x, y, z) => {
       const u = (x - cx) * cos - (y - cy) * sin, v = (x - cx) * sin + (y - cy) * cos;
-      return [width / 2 + scale * u, height / 2 - scale * (v * st + z * ct)];
+      return [width / 2 + scale * u, height / 2 - scale * (v * st + (z - cz) * ct)];
     };
   }
 

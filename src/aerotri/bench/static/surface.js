@@ -69,11 +69,14 @@ export class Surface {
     this.redraw();
   }
 
-  fit(low, high) {
-    this.x = (low[0] + high[0]) / 2;
-    this.y = (low[1] + high[1]) / 2;
+  // rooms: pixels to keep free on the right and below, the one taken that shows the content largest.
+  fit(low, high, rooms = [[0, 0]]) {
     const wide = Math.max(high[0] - low[0], 1e-9), tall = Math.max(high[1] - low[1], 1e-9);
-    this.scale = 0.94 * Math.min(Math.max(this.width, 50) / wide, Math.max(this.height, 50) / tall);
+    const fitted = rooms.map(([right, below]) => {
+      const scale = 0.94 * Math.min(Math.max(this.width - right, 50) / wide, Math.max(this.height - below, 50) / tall);
+      return { scale, x: (low[0] + high[0] + right / scale) / 2, y: (low[1] + high[1] - this.up * below / scale) / 2 };
+    });
+    Object.assign(this, fitted.reduce((best, one) => one.scale > best.scale ? one : best));
     this.redraw();
   }
 

@@ -29,7 +29,7 @@ export class RayTable {
   }
 
   table(rows) {
-    const names = this.bench.names, heads = ["|w|", "wx", "wy", "photograph", "point", "column", "row", "v column", "v row", "weight", "status"];
+    const names = this.bench.names, heads = ["|w|", "wx", "wy", "photograph", "point", "column, px", "row, px", "v column, px", "v row, px", "weight", "status"];
     const numeric = new Set([0, 1, 2, 5, 6, 7, 8, 9]);
     const body = make("tbody");
     rows.ray.forEach((ray, k) => {

@@ -18,20 +18,20 @@ def change_json(
     """The content of change.json; m, m², m³."""
     c, a = change, change.alignment
     known = np.isfinite(c.difference)
-    sigma = c.sigma[known]
+    of_cells = c.sigma[known]
     return {
         "aerotri": __version__, "first": names[0], "second": names[1], "crs": crs, "cell_m": c.grid.cell_x,
         "cells": int(known.sum()), "level_of_detection_sigma": LEVEL,
-        "level_of_detection_m": float(LEVEL * np.median(sigma)) if len(sigma) else None,
+        "level_of_detection_m": float(LEVEL * np.median(of_cells)) if len(of_cells) else None,
         "beyond_level_percent": 100.0 * c.beyond,
-        "sigma_m": float(np.median(sigma)) if len(sigma) else None,
+        "sigma_m": float(np.median(of_cells)) if len(of_cells) else None,
         "noise_length_m": float(np.sqrt(c.sharing * c.grid.cell_x * c.grid.cell_y)),
         "alignment": None if not stable else {
             "how": how, "stable": stable, "cells": a.cells, "cells_used": a.used,
             "noise_factor": float(a.factor) if np.isfinite(a.factor) else None,
             "unknowns": [
-                {"name": name, "value": float(value), "sigma": float(np.sqrt(variance))}
-                for name, value, variance in zip(a.names, a.values, np.diag(a.covariance), strict=True)
+                {"name": name, "value": float(value), "sigma": float(sigma)}
+                for name, value, sigma in zip(a.names, a.values, c.moved_sigma, strict=True)
             ],
         },
         "volumes": [_volume(one) for one in c.volumes], "warnings": list(notes),

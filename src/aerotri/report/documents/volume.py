@@ -16,6 +16,8 @@ from aerotri.report.plots.rendering import RenderedPlot
 
 WIDE = 1.96
 """Standard deviations on either side within which 95 % of normally distributed values lie."""
+LEAST = 0.001
+"""m³, below which a part of σ is as good as none."""
 PICTURES = ("thickness", "budget")
 
 OWN_BASES = "a base for each of "
@@ -59,8 +61,10 @@ def known_to(words: Words, value: float, sigma: float | None, unit: str) -> str:
 
 
 def two(words: Words, sigma: float | None) -> str:
-    """A σ to two digits."""
-    return NO_VALUE if sigma is None else words.plain(sigma, 2)
+    """A σ to two digits; a dash where none is stated."""
+    if sigma is None:
+        return NO_VALUE
+    return f"< {words.plain(LEAST, 1)}" if 0.0 < sigma < LEAST else words.plain(sigma, 2)
 
 
 def amount(words: Words, value: float | None) -> str:
@@ -147,7 +151,7 @@ def _sigma(c: Mapping[str, Any], words: Words) -> list[Part]:
     s = c["sigma"]
     if s is None:
         return [paragraph(words("volume.why_no_sigma"))]
-    rows = [(words.term("part", name), two(words, value), two(words, WIDE * value))
+    rows = [(words.term("part", name), two(words, value or None), two(words, WIDE * value or None))
             for name, value in s["parts_m3"].items()]  # fmt: skip
     rows.append((words("part.together"), two(words, s["sigma_m3"]), two(words, WIDE * s["sigma_m3"])))
     parts = [table([words("volume.part"), words("volume.sigma_m3"), words("volume.wide_m3")], rows, words=1)]
@@ -169,7 +173,7 @@ def _parts_of_piles(c: Mapping[str, Any], words: Words) -> list[Part]:
     if not piles:
         return []
     names = list(piles[0]["parts_m3"])
-    rows = [(breakable(one["name"]), *(two(words, one["parts_m3"].get(name)) for name in names),
+    rows = [(breakable(one["name"]), *(two(words, one["parts_m3"].get(name) or None) for name in names),
              two(words, one["sigma_m3"])) for one in piles]  # fmt: skip
     columns = [words("volume.pile_sigma"), *(words.term("part", name) for name in names), words("part.together")]
     return [table(columns, rows, words=1)]

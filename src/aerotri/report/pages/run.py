@@ -12,7 +12,7 @@ import numpy as np
 
 from aerotri.conventions import counted
 from aerotri.report.pages.head import page_environment, page_head
-from aerotri.report.quality import printable
+from aerotri.report.quality import printable, two_digits
 from aerotri.results.head import Head
 
 RESULT = "result"
@@ -89,11 +89,13 @@ def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
         found.append((name, _net(volume, (volume.get("sigma") or {}).get("sigma_m3"))))
     if surface := of_step.get("dsm"):
         sigma = surface["sigma_Z_m"]["median"]
-        found.append(("Dense surface", f"cells of {surface['cell_m']:.3g} m; σ of heights {sigma:.3f} m (median)"))
+        found.append(
+            ("Dense surface", f"cells of {surface['cell_m']:.3g} m; σ of heights {two_digits(sigma)} m (median)")
+        )
     if image := of_step.get("ortho"):
         total = image["sigma_m"]["total"]
-        text = f"cells of {image['cell_m']:g} m; σ of positions {total['median']:.3f} m (median), 95 % below "
-        found.append(("Orthophoto", f"{text}{total['q95']:.3f} m"))
+        text = f"cells of {image['cell_m']:g} m; σ of positions {two_digits(total['median'])} m (median), 95 % below "
+        found.append(("Orthophoto", f"{text}{two_digits(total['q95'])} m"))
     return found
 
 

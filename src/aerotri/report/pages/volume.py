@@ -49,7 +49,8 @@ def write_volume_page(content: Mapping[str, Any], plots: Mapping[str, RenderedPl
 
 
 def _number(value: float) -> str:
-    text = f"{value:,.0f}" if abs(value) >= 100.0 else f"{value:.4g}"
+    """Without decimals from a hundred on, else with two."""
+    text = f"{value:,.0f}" if abs(value) >= 100.0 else f"{value:.2f}"
     return text.replace(",", "\u2009").replace("-", "−")
 
 

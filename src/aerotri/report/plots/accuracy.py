@@ -16,6 +16,7 @@ from scipy.spatial import KDTree
 from aerotri.report.plots import plan
 from aerotri.report.plots.block import CHECK_SYMBOL, CONTROL_SYMBOLS
 from aerotri.report.plots.canvas import WIDTH, axes_at, new_figure, plain, styled
+from aerotri.report.quality import two_digits
 from aerotri.results.adjusted_block import AdjustedBlock
 
 NEAREST = 9
@@ -40,9 +41,10 @@ def plot_height_accuracy(adjusted: AdjustedBlock) -> Figure:
     xy, sigma = _heights(adjusted)
     extent = plan.extent_of(xy)
     width, height = plan.plan_size(extent, WIDTH - 2.4, 6.4)
+    middle, high = (two_digits(float(np.quantile(sigma, share))) for share in (0.5, 0.95))
     subtitle = (
-        f"median of the nearest {min(NEAREST, len(xy))} object points; of all points: median {np.median(sigma):.3f} m, "
-        f"95 % below {np.quantile(sigma, 0.95):.3f} m; white: no points"
+        f"median of the nearest {min(NEAREST, len(xy))} object points; of all points: median {middle} m, "
+        f"95 % below {high} m; white: no points"
     )
     word = "σ" if adjusted.points.model is None else "Total σ"
     figure = new_figure(1.1 + height + 0.75, f"{word} of heights – {plain(adjusted.block.name)}", subtitle)

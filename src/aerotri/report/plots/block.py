@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from aerotri.conventions import counted
 from aerotri.report.plots import plan
 from aerotri.report.plots.canvas import (
     ACCENT,
@@ -29,8 +30,12 @@ from aerotri.report.plots.canvas import (
 )
 from aerotri.results.adjusted_block import AdjustedBlock, GroundPointResults
 
-MOST_NAMED_CONTROL_POINTS = 30
-"""Control points up to which their names are drawn; chosen [C]: with more the names overlap."""
+MOST_NAMED_POINTS = 40
+"""Control and check points up to which their names are drawn; chosen [C]: with more the names overlap."""
+LONGEST_INCH = 0.55
+"""Inches of the longest arrow of a difference."""
+BETWEEN = 0.45
+"""Inches between two panels; a coordinate of seven digits stands at the edge of each."""
 CONTROL_SYMBOLS: dict[str, dict[str, Any]] = {
     "full": {"marker": "^", "mfc": INK, "mec": INK},
     "plan only": {"marker": "^", "mfc": "white", "mec": INK},
@@ -50,9 +55,10 @@ def plot_block_plan(adjusted: AdjustedBlock) -> Figure:
     beside = width < WIDTH - 3.7
     block = adjusted.block
     strips = len(np.unique(block.images.strip[block.images.strip != ""]))
+    in_strips = f" in {counted(strips, 'strip')}" if strips else ""
     subtitle = (
-        f"{len(block.images)} photographs in {strips} strip{'s' * (strips != 1)}, {len(adjusted.control)} control and "
-        f"{len(adjusted.check)} check points; outlines on the mean height of the ground"
+        f"{len(block.images)} photographs{in_strips}, {len(adjusted.control)} control and {len(adjusted.check)} check "
+        "points; outlines on the mean height of the ground"
     )
     below = 0.65 if beside else 1.15
     figure = new_figure(below + height + 0.75, f"Block plan – {plain(block.name)}", subtitle)
@@ -63,10 +69,10 @@ def plot_block_plan(adjusted: AdjustedBlock) -> Figure:
     for kind, symbol in CONTROL_SYMBOLS.items():
         axes.plot(*control_xy[kinds == kind].T, ls="none", ms=6.5, mew=0.9, zorder=5, **symbol)
     axes.plot(*check_xy.T, ls="none", ms=5.5, mew=1.2, zorder=4, **CHECK_SYMBOL)
-    if len(control_xy) <= MOST_NAMED_CONTROL_POINTS:
-        drawable = np.isfinite(control_xy).all(axis=1)
-        names = block.points[adjusted.control.point[drawable]].tolist()
-        plan.draw_names(axes, control_xy[drawable], names, check_xy[np.isfinite(check_xy).all(axis=1)])
+    points, xy = np.concatenate([adjusted.control.point, adjusted.check.point]), np.concatenate([control_xy, check_xy])
+    if len(points) <= MOST_NAMED_POINTS:
+        drawable = np.isfinite(xy).all(axis=1)
+        plan.draw_names(axes, xy[drawable], block.points[points[drawable]].tolist(), adjusted.images.centre[:0, :2])
     at = (0.95 + width + 0.3, below + height) if beside else (0.85, 0.58)
     _legend(figure, _plan_symbols(kinds, len(check_xy), strips), at, columns=1 if beside else 3)
     return figure
@@ -102,12 +108,15 @@ def plot_ground_points(adjusted: AdjustedBlock) -> Figure:
     extent = plan.extent_of(adjusted.images.centre[:, :2], *xy)
     extent = extent.widened(0.03 * max(extent.width, extent.height), 0.05 * max(extent.width, extent.height))
     stacked = extent.width > 1.25 * extent.height
-    width, height = plan.plan_size(extent, WIDTH - 1.2 if stacked else 3.55, 3.9 if stacked else 5.6)
+    widest, highest = (WIDTH - 1.2, 3.9) if stacked else (3.4, 5.6)
+    arrows = [_vectors_of(r, heights) for heights in (False, True) for r in results]
+    extent = _around_arrows(extent, xy * 2, arrows, (widest, highest))
+    width, height = plan.plan_size(extent, widest, highest)
     width = max(width, 3.0)
     panels_high = 2 * height + 0.85 if stacked else height
     title = f"Control and check points – {plain(adjusted.block.name)}"
     figure = new_figure(panels_high + 1.9, title, "adjusted − given: " + _differences_text(adjusted))
-    places = [(0.95, 0.95 + (height + 0.85 if stacked else 0.0)), (0.95 if stacked else 1.15 + width, 0.95)]
+    places = [(0.95, 0.95 + (height + 0.85 if stacked else 0.0)), (0.95 if stacked else 0.95 + width + BETWEEN, 0.95)]
     for heights, (left, bottom) in zip((False, True), places, strict=True):
         axes = plan.plan_axes(figure, (left, bottom, width, height), extent, plan.axis_names(adjusted))
         if heights and not stacked:
@@ -120,6 +129,32 @@ def plot_ground_points(adjusted: AdjustedBlock) -> Figure:
     return figure
 
 
+def _around_arrows(
+    extent: plan.Extent, xy: Sequence[np.ndarray], arrows: Sequence[np.ndarray], size: tuple[float, float]
+) -> plan.Extent:
+    """An extent widened until the arrows end inside, drawn as long as `_difference_vectors` draws them.
+
+    Parameters
+    ----------
+    xy, arrows : (n, 2) m each, of the control and of the check points: in plan, then in height.
+    size : widest, highest inches of the axes.
+    """
+    per_inch = [_per_inch(arrows[:2])[0]] * 2 + [_per_inch(arrows[2:])[0]] * 2
+    # a wider extent makes the same inches longer on the ground
+    for _ in range(3):
+        width, height = plan.plan_size(extent, *size)
+        metres_per_inch = max(extent.width / width, extent.height / height)
+        ends = [at + metres_per_inch / scale * v for at, v, scale in zip(xy, arrows, per_inch, strict=True)]
+        corners = np.array([[extent.left, extent.bottom], [extent.right, extent.top]])
+        extent = plan.extent_of(corners, *ends)
+    return extent
+
+
+def _per_inch(arrows: Sequence[np.ndarray]) -> tuple[float, float]:
+    """Metres of an inch of arrows, and of the one that stands for the scale."""
+    return per_inch_for(np.concatenate([np.hypot(*v.T) for v in arrows]), LONGEST_INCH)
+
+
 def _difference_vectors(
     axes: Axes,
     results: Sequence[GroundPointResults],
@@ -128,8 +163,7 @@ def _difference_vectors(
     scale_at: tuple[float, float],
 ) -> None:
     vector = [_vectors_of(r, heights) for r in results]
-    lengths = np.concatenate([np.hypot(v[:, 0], v[:, 1]) for v in vector])
-    per_inch, size = per_inch_for(lengths, 0.55)
+    per_inch, size = _per_inch(vector)
     symbols: tuple[dict[str, Any], ...] = (CONTROL_SYMBOLS["full"] | {"ms": 4}, CHECK_SYMBOL | {"ms": 3.5})
     for symbol, color, at, v in zip(symbols, (INK, ACCENT), xy, vector, strict=True):
         there = np.isfinite(v).all(axis=1) & np.isfinite(at).all(axis=1)

@@ -88,7 +88,12 @@ def micron(value_mm: float, camera: Camera) -> str:
     """'2.31 µm (0.26 px)'."""
     if not np.isfinite(value_mm):
         return "–"
-    return f"{1e3 * value_mm:.2f} µm ({value_mm / camera.pixel_mm:.2f} px)"
+    return f"{1e3 * value_mm:.2f} µm ({_pixels(value_mm / camera.pixel_mm)} px)"
+
+
+def _pixels(value: float) -> str:
+    """Two decimals, of less than a tenth two digits."""
+    return f"{value:.2f}" if value >= 0.1 else f"{value:.2g}"
 
 
 def _format_figure(title: str, subtitle: str, camera: Camera, shape: tuple[int, ...]) -> tuple[Axes, Figure, float]:

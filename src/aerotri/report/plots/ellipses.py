@@ -69,8 +69,8 @@ def plot_error_ellipses(adjusted: AdjustedBlock) -> Figure | None:
     worst = int(np.argmax(found.major))
     name = plain(adjusted.block.points[found.point[worst]], 24)
     subtitle = (
-        f"{100 * PROBABILITY:.0f} %, drawn {larger:.10g} times as large as the ground; {len(shown)} of {len(xy)} "
-        "points: the one of median size in every cell\n"
+        f"{100 * PROBABILITY:.0f} % ellipses, {_enlarged(larger)} than the plan; {len(shown)} of {len(xy)} points: the "
+        "one of median size in every cell\n"
         f"longer semi-axis of all: median {np.median(found.major):.3g} m, 95 % below "
         f"{np.quantile(found.major, 0.95):.3g} m, largest {found.major[worst]:.3g} m ({name})"
     )
@@ -88,6 +88,11 @@ def plot_error_ellipses(adjusted: AdjustedBlock) -> Figure | None:
     figure.colorbar(ScalarMappable(norm, shades), cax=scale).set_label("σ of Z [m]")
     _scale(figure, larger, (axes.get_xlim()[1] - axes.get_xlim()[0]) / width)
     return figure
+
+
+def _enlarged(factor: float) -> str:
+    """'20 times larger'."""
+    return f"{factor:.10g} times larger" if factor >= 1.0 else f"{1.0 / factor:.10g} times smaller"
 
 
 def one_a_cell(xy: np.ndarray, size: np.ndarray, cell: float) -> np.ndarray:

@@ -22,6 +22,7 @@ from aerotri.report.plots.canvas import (
     plain,
     styled,
 )
+from aerotri.report.quality import two_digits
 from aerotri.terrain.ortho.make import IMAGE, OrthoOutcome
 
 HIGHEST = 6.4
@@ -50,7 +51,7 @@ def plot_orthophoto(outcome: OrthoOutcome, folder: Path, block_name: str) -> Fig
     subtitle = (
         f"{int((o.cells > 0).sum())} of {len(o.cells)} photographs, cells of {length_text(float(f'{g.cell_x:.3g}'))}; "
         f"{covered:.1f} % of the surface is seen; line: seams\n"
-        f"σ of X and Y (each): median {np.nanmedian(o.accuracy.total):.3f} m"
+        f"σ of X and Y (each): median {two_digits(float(np.nanmedian(o.accuracy.total)))} m"
     )
     figure = new_figure(height + 1.75, f"Orthophoto – {plain(block_name)}", subtitle)
     left, bottom, right, top = g.bounds

@@ -118,7 +118,7 @@ def _legends(figure: Figure, effect: np.ndarray, redundancy: np.ndarray, uncontr
         look: dict[str, Any] = {"marker": "o", "ms": POINT_SIZES[k], "mfc": SHADES[k], "mec": GREY, "mew": 0.25}
         points.append(Line2D([], [], ls="none", label=label, **look))
     if uncontrolled:
-        points.append(Line2D([], [], ls="none", marker="x", ms=4.5, color=INK, label=f"no control ({uncontrolled})"))
+        points.append(Line2D([], [], ls="none", marker="x", ms=4.5, color=INK, label=f"of any size ({uncontrolled})"))
     for k, label in _named(redundancy, ".2f", ""):
         look = {"marker": "s", "ms": _square(k), "mfc": "none", "mec": INK, "mew": 0.8}
         photographs.append(Line2D([], [], ls="none", label=label, **look))

@@ -9,6 +9,7 @@ from matplotlib.lines import Line2D
 
 from aerotri.image_errors.residual_profiles import ResidualProfile, ResidualProfiles
 from aerotri.report.plots.canvas import GREY, INK, LIGHT, WIDTH, axes_at, new_figure, plain, styled
+from aerotri.report.quality import two_digits
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.statistics.photograph_residuals import PhotographResiduals
 
@@ -101,7 +102,7 @@ def plot_photograph_residuals(found: PhotographResiduals, adjusted: AdjustedBloc
     whole = float(np.sqrt(np.mean(found.rms_all_px**2)))
     beyond = found.beyond
     says = f"beyond chance (95 %, all photographs together): {int(beyond.sum())} of {len(order)} photographs"
-    text = f"RMS of all: x {found.rms_all_px[0]:.2f}, y {found.rms_all_px[1]:.2f} px; {says}"
+    text = f"RMS of all: x {two_digits(found.rms_all_px[0])}, y {two_digits(found.rms_all_px[1])} px; {says}"
     if len(order) > MOST_DOTS:
         text += f"\ndrawn: the {MOST_DOTS} photographs with the largest"
     figure = new_figure(3.6, f"Residuals by photograph – {plain(adjusted.block.name)}", text)
@@ -123,7 +124,7 @@ def plot_photograph_residuals(found: PhotographResiduals, adjusted: AdjustedBloc
 
 
 def _name_worst(axes: Axes, adjusted: AdjustedBlock, rows: np.ndarray, rms: np.ndarray) -> None:
-    """Names of photographs, none over another one."""
+    """Names of photographs, none over another one or over the dot of a neighbour."""
     taken: list[float] = []
     low, high = axes.get_xlim()
     for row in rows.tolist():
@@ -133,6 +134,7 @@ def _name_worst(axes: Axes, adjusted: AdjustedBlock, rows: np.ndarray, rms: np.n
             continue
         taken.append(row)
         late = row + room > high
-        axes.annotate(name, (row + 1, rms[row]), fontsize=7,
+        beside = rms[int(max(row - room, 0)) : row + 1] if late else rms[row : int(row + room) + 2]
+        axes.annotate(name, (row + 1, float(np.nanmax(beside))), fontsize=7,
                       xytext=(-3 if late else 3, 4), textcoords="offset points", ha="right" if late else "left",
                       annotation_clip=False)  # fmt: skip

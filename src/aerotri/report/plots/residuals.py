@@ -10,7 +10,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from aerotri.adjustment.ray_status import RayStatus
-from aerotri.report.plots.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, plain, styled
+from aerotri.conventions import counted
+from aerotri.report.plots.canvas import ACCENT, GREY, INK, LIGHT, WIDTH, axes_at, new_figure, plain, styled, value_text
 from aerotri.results.adjusted_block import AdjustedBlock
 from aerotri.results.ray_correlation import RayCorrelation
 
@@ -103,8 +104,12 @@ def plot_ray_correlation(found: RayCorrelation, block_name: str) -> Figure:
     known = np.flatnonzero(np.isfinite(found.correlation).any(axis=1))
     if not len(known):
         raise ValueError("no two image points of a photograph are near enough to one another")
-    chance = f"p = {found.p:.2g}" if found.p >= LEAST_P else f"p < {LEAST_P:g}"
-    subtitle = f"{int(found.pairs[known].sum())} pairs; by chance up to {found.near_px:.3g} px: {chance}; bars 2 σ"
+    chance = f"{found.p:.2g}" if found.p >= LEAST_P else f"below {LEAST_P:.7f}".rstrip("0")
+    beyond = "; above 1: near rays scatter more than all" if (found.correlation[known] > 1.0).any() else ""
+    subtitle = (
+        f"{int(found.pairs[known].sum())} pairs of rays; bars: ±2 σ{beyond}\n"
+        f"probability that chance alone makes rays up to {found.near_px:.3g} px so alike: {chance}"
+    )
     figure = new_figure(3.75, f"Residuals of neighbouring image points – {plain(block_name)}", subtitle)
     axes = axes_at(figure, 0.95, 0.9, WIDTH - 1.25, 1.95)
     place = np.arange(len(known))
@@ -177,8 +182,9 @@ def _strongest(adjusted: AdjustedBlock, rows: np.ndarray, labels: list[str], r: 
     i, j = np.unravel_index(np.argmax(size), r.shape)
     left_out = len(adjusted.parameters) - len(rows)
     return (
-        f"strongest: {labels[i]} with {labels[j]}, r = {r[i, j]:+.2f}; {int((size > limit).sum() / 2)} pairs beyond "
-        f"±{limit:g}" + (f"; {left_out} parameters held, removed or left out" if left_out else "")
+        f"strongest: {labels[i]} with {labels[j]}, r = {value_text(float(f'{r[i, j]:.2f}'))}; "
+        f"{counted(int((size > limit).sum() / 2), 'pair')} beyond ±{limit:g}"
+        + (f"; {left_out} parameters held, removed or left out" if left_out else "")
     )
 
 

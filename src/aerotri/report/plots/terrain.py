@@ -26,6 +26,7 @@ from aerotri.report.plots.canvas import (
     styled,
     value_text,
 )
+from aerotri.report.quality import two_digits
 from aerotri.terrain.compare import Comparison
 from aerotri.terrain.dtm import TerrainOutcome
 from aerotri.terrain.picket_status import PicketStatus
@@ -52,7 +53,7 @@ def plot_surface(outcome: TerrainOutcome, block_name: str) -> Figure:
     subtitle = (
         f"{len(o.pickets.names)} photographs, pickets every {length_text(float(f'{o.interval:.3g}'))}, cells of "
         f"{length_text(float(f'{o.cell:.3g}'))}; heights {np.nanmin(z):.1f} … {np.nanmax(z):.1f} m\n"
-        f"σ of the heights: median {np.nanmedian(o.dsm.sigma):.3f} m; white: no pickets"
+        f"σ of the heights: median {two_digits(float(np.nanmedian(o.dsm.sigma)))} m; white: no pickets"
     )
     return _plot_heights(o.dsm.grid, z, o.dsm.sigma, block_name, subtitle, o.photographs.places.frame is None)
 
@@ -64,7 +65,7 @@ def plot_heights(grid: Grid, z: np.ndarray, sigma: np.ndarray | None, name: str,
     ----------
     z, sigma : (rows, columns) m, NaN where not known.
     """
-    known = f"; σ: median {np.nanmedian(sigma):.3f} m" if sigma is not None else ""
+    known = f"; σ: median {two_digits(float(np.nanmedian(sigma)))} m" if sigma is not None else ""
     subtitle = (
         f"{grid.rows} × {grid.columns} cells of {length_text(float(f'{grid.cell_x:.3g}'))}; heights "
         f"{np.nanmin(z):.1f} … {np.nanmax(z):.1f} m{known}; white: not known"
@@ -86,8 +87,8 @@ def plot_dense(grid: Grid, z: np.ndarray, matching: np.ndarray, total: float, na
     z, matching = z[part], matching[part]
     subtitle = (
         f"cells of {length_text(float(f'{grid.cell_x:.3g}'))}; heights {np.nanmin(z):.1f} … {np.nanmax(z):.1f} m; "
-        f"white: not measured\nσ of matching, drawn: median {np.nanmedian(matching):.3f} m; with the adjustment "
-        f"{total:.3f} m"
+        f"white: not measured\nσ of matching, drawn: median {two_digits(float(np.nanmedian(matching)))} m; with the "
+        f"adjustment {two_digits(total)} m"
     )
     shown = grid.window(int(rows[0]), int(columns[0]), *z.shape)
     return _plot_heights(shown, z, matching, name, subtitle, is_local, "σ of matching [m]")
@@ -181,20 +182,20 @@ def plot_comparison(comparison: Comparison, title: str) -> Figure:
         f"{s.nmad:.3f}, LE90 {s.le90:.3f} m; covered {100 * c.coverage:.0f} %, blue: not covered"
         + (f"\n{c.alignment_text}" if c.alignment_text else "")
     ).replace("-", "−")
-    width, height = _size(c.grid, WIDTH - 4.4)
+    width, height = _size(c.grid, WIDTH - 4.6)
     height_all = max(height, 2.4)
     figure = new_figure(height_all + 1.75, f"Differences – {plain(title, 90)}", subtitle)
-    axes = axes_at(figure, 0.75, 0.75, width, height)
+    axes = axes_at(figure, 0.95, 0.75, width, height)
     limit = float(np.nanpercentile(np.abs(d), 98)) or 1e-3
     axes.set_facecolor(HOLE)
     every = _every(d)
     image = axes.imshow(d[::every, ::every], cmap="Greys_r", vmin=-limit, vmax=limit, extent=_extent(c.grid),
                         interpolation="nearest")  # fmt: skip
     _coordinates(axes, width, height, local=False, labels=("X [m]", "Y [m]"))
-    scale = axes_at(figure, 0.75 + width + 0.12, 0.75, 0.14, height)
+    scale = axes_at(figure, 0.95 + width + 0.12, 0.75, 0.14, height)
     figure.colorbar(image, cax=scale).set_label("difference [m]")
     _signed(scale)
-    place = 0.75 + width + 1.35
+    place = 0.95 + width + 1.35
     histogram = axes_at(figure, place, 0.75, WIDTH - place - 0.25, height_all)
     known = d[np.isfinite(d)]
     reach = 4.0 * max(s.nmad, 0.01 * limit)
@@ -203,7 +204,7 @@ def plot_comparison(comparison: Comparison, title: str) -> Figure:
     curve = len(known) * (bins[1] - bins[0]) / (s.nmad * np.sqrt(2 * np.pi)) if s.nmad > 0 else 0.0
     histogram.plot(bins, curve * np.exp(-0.5 * ((bins - s.median) / max(s.nmad, 1e-9)) ** 2), color=INK, lw=1.0)
     histogram.axvline(0.0, color=GREY, lw=0.8, ls=(0, (4, 2)))
-    histogram.set_xlabel("difference [m], line: normal, σ = NMAD")
+    histogram.set_xlabel("difference [m], line: normal, σ = NMAD;\nall beyond stand at the ends")
     histogram.set_yticks([])
     histogram.spines[["top", "right", "left"]].set_visible(False)
     histogram.xaxis.set_major_formatter(FuncFormatter(value_text))

@@ -57,6 +57,8 @@ SYSTEMATIC = {
     "free": "image errors uncorrected, calibrated orientation",
     "absorbed": "image errors uncorrected, orientation without parameters",
 }
+LEAST = 0.001
+"""m³, below which a volume is as good as none."""
 BAR = 0.36
 """Inches of a row of bars; chosen [C]: its name of 8.5 points has room."""
 
@@ -121,9 +123,7 @@ def plot_budget(content: Mapping[str, Any]) -> Figure:
         f"{two_digits(1e3 * s['sigma_mean_height_m'])} mm of mean height\n"
     )
     if apart:
-        held = "are in the volume, not in σ" if s["systematic"]["in_the_volume"] else "would have been, not in σ"
-        subtitle += f"hatched, on a scale of its own: what uncorrected image errors {held}"
-        subtitle += "" if s["curvature"] is None else "; what lines cut off, in σ"
+        subtitle += f"hatched, on a scale of its own: {_hatched(s)}"
     upper, lower = BAR * len(parts), BAR * len(apart)
     figure = new_figure(upper + 1.6 + (lower + 0.75 if apart else 0.0), "How sure the volume is", subtitle)
     axes = axes_at(figure, 4.15, 0.6 + (lower + 0.75 if apart else 0.0), WIDTH - 5.35, upper)
@@ -142,6 +142,13 @@ def plot_budget(content: Mapping[str, Any]) -> Figure:
         _bars(below, [name for name, _ in apart], [one["value_m3"] for _, one in apart], texts, hatched)
         below.set_xlabel("change of the volume [m³]")
     return figure
+
+
+def _hatched(s: Mapping[str, Any]) -> str:
+    """What stands apart from the parts of σ."""
+    held = "are in the volume, not in σ" if s["systematic"]["in_the_volume"] else "would have been, not in σ"
+    said = [f"what uncorrected image errors {held}"] if s["systematic"]["variants"] else []
+    return "; ".join(said + ([] if s["curvature"] is None else ["what lines cut off, in σ"]))
 
 
 def _bars(axes: Axes, labels: list[str], values: list[float], texts: list[str], style: dict[str, Any]) -> None:
@@ -214,9 +221,8 @@ def _section_marks(axes: Axes, sections: Sections, boundary: Boundary) -> None:
     along = direction_of(sections.azimuth)
     across = np.array([along[1], -along[0]])
     reach = (np.concatenate(boundary.rings) - sections.origin) @ across
-    wanted = sections.station[-1] * np.array([0.25, 0.5, 0.75])
-    chosen = sections.station[np.unique(np.argmin(np.abs(sections.station[:, None] - wanted), axis=0))]
-    lines = [sections.origin + s * along + np.array([reach.min(), reach.max()])[:, None] * across for s in chosen]
+    ends = np.array([reach.min(), reach.max()])[:, None] * across
+    lines = [sections.origin + s * along + ends for s in sections.chosen()]
     axes.add_collection(LineCollection(lines, colors=GREY, linewidths=0.7, linestyles=[(0, (4, 3))], zorder=3))
 
 
@@ -231,5 +237,7 @@ def _coordinates(axes: Axes, width: float, height: float, crs: str) -> None:
 
 def _count(value: float, place: int | None = None) -> str:
     """A number of cubic metres with thin spaces between thousands; small ones with three digits."""
+    if 0.0 < value < LEAST:
+        return f"< {LEAST:g}"
     text = f"{value:,.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
     return text.replace(",", "\u2009").replace("-", "−")

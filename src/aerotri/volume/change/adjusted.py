@@ -134,6 +134,12 @@ class AlignedPair:
             values[k] = np.sqrt(sum(self._of(first, second, self.design[row, column])))
         return _between(pair.known.shape, rows, columns, values)
 
+    def unknowns(self) -> np.ndarray:
+        """(u,) variances of what the second surface was moved by: what the adjustments bring, with the model part."""
+        still = np.zeros(self.design.shape[-1])
+        one, two = self.gains
+        return np.array([sum(self._of(one[:, :, k], two[:, :, k], still)) for k in range(len(still))])
+
     def _of(self, first: np.ndarray, second: np.ndarray, along: np.ndarray) -> tuple[float, float]:
         """Of gradients (b, 3) of a functional by both surfaces, and by the alignment (u,)."""
         one = self.pair.first.part(first - self.gains[0] @ along)

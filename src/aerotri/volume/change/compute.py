@@ -73,12 +73,15 @@ class Change:
     Parameters
     ----------
     difference, sigma : (rows, columns) m, second less first after the alignment; NaN where not known.
+    moved_sigma : (u,) of what the second was moved by, m and m/m: by the noise on stable ground, and by the
+        adjustments where they are given.
     """
 
     grid: Grid
     difference: np.ndarray
     sigma: np.ndarray
     alignment: Alignment
+    moved_sigma: np.ndarray
     volumes: tuple[ChangedVolume, ...]
     sharing: float
 
@@ -132,7 +135,10 @@ def compute_change(
     cells = _Cells(grid, difference, noise, adjustment, design, found, sharing, pair)
     significant = np.abs(difference) > LEVEL * sigma
     volumes = tuple(cells.volume(name, part, significant) for name, part in areas)
-    return Change(grid, difference, np.where(np.isfinite(difference), sigma, np.nan), found, volumes, sharing)
+    own = np.diag(found.covariance)
+    moved_sigma = np.sqrt(own if pair is None else own + pair.unknowns())
+    sigma = np.where(np.isfinite(difference), sigma, np.nan)
+    return Change(grid, difference, sigma, found, moved_sigma, volumes, sharing)
 
 
 def _sharing(first: Epoch, second: Epoch) -> float:
@@ -165,7 +171,7 @@ class _Cells:
                    "net": inside}  # fmt: skip
         sums = {of: float(np.sum(weight * d)) for of, weight in weights.items()}
         return ChangedVolume(
-            name, sums["gained"], -sums["lost"], sums["net"], {of: self._parts(w) for of, w in weights.items()},
+            name, sums["gained"], abs(sums["lost"]), sums["net"], {of: self._parts(w) for of, w in weights.items()},
             float(inside.sum()), float(np.sum(part) * cell - inside.sum()), float(weights["gained"].sum()),
             float(weights["lost"].sum()),
         )  # fmt: skip
