@@ -3,8 +3,7 @@
 The block is simulated (UltraCamD, 60/30 %) and written as CSV and as Parquet. Programs started anew divide it, by its
 folder and after reading it; the files of both are compared. Prints Markdown.
 
-The packages that dividing uses are loaded before the memory is looked at, by the names they have within the package, on
-purpose.
+Measures the memory of the program before the work with the modules that it will use: it names them on purpose.
 
     python tools/prove/parts_divided.py FOLDER --photographs 10000 --parts 20 > tools/results/parts_divided.md
 """
