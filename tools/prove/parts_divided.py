@@ -3,6 +3,8 @@
 The block is simulated (UltraCamD, 60/30 %) and written as CSV and as Parquet. Programs started anew divide it, by its
 folder and after reading it; the files of both are compared. Prints Markdown.
 
+Measures the memory of the program before the work with the modules that it will use: it names them on purpose.
+
     python tools/prove/parts_divided.py FOLDER --photographs 10000 --parts 20 > tools/results/parts_divided.md
 """
 
@@ -19,16 +21,19 @@ from pathlib import Path
 import aerotri
 
 PROGRAM = """
-import json, resource, sys, time, aerotri
-source, target, whole, parts = sys.argv[1:]
+import json, pathlib, sys, time, aerotri
 import aerotri.formats.block.writer, aerotri.partition.dividing_pieces, aerotri.public.blocks, pyarrow.parquet
-before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()
+def peak():
+    lines = pathlib.Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
+source, target, whole, parts = sys.argv[1:]
+before, start = peak(), time.perf_counter()
 block = aerotri.read_block(source) if whole == "whole" else source
 aerotri.divide(block, target, parts=int(parts))
-of = resource.getrusage(resource.RUSAGE_SELF)
-print(json.dumps([time.perf_counter() - start, of.ru_utime + of.ru_stime, of.ru_maxrss / 1024, before / 1024]))
+print(json.dumps([time.perf_counter() - start, time.process_time(), peak(), before]))
 """
-"""Prints time and processor time in s, peak memory and that before the work in MB."""
+"""Prints time and processor time in s, peak memory and that before the work in MiB; of this program alone: what
+`getrusage` says begins at the memory of the program that started it."""
 
 
 def plan_of(photographs: int, points: int) -> dict:
@@ -77,7 +82,7 @@ def main() -> None:
     block = flown.block
     print(f"{len(block.images)} photographs, {len(block.image_points)} image points, {asked.parts} parts.")
     print("Memory is the peak of the program; before the work it is that of the packages it uses.\n")
-    print("| tables | table MB | block | s | s of the processor | peak MB | before MB | files |")
+    print("| tables | table MB | block | s | s of the processor | peak MiB | before MiB | files |")
     print("|---|---|---|---|---|---|---|---|")
     for tables in ("csv", "parquet"):
         source = asked.folder / tables

@@ -8,9 +8,9 @@ from pathlib import Path
 from aerotri.formats.text.csv_text import csv_text_of, unreadable, without_mark
 from aerotri.formats.text.tables import Columns, Table, check_header, checked_table, parse_rows, text_names
 
-PIECE_BYTES = 16 << 20
-"""Text of a piece [C]: some 300 000 image points, parsed in less than 0.2 GB."""
-PIECE_ROWS = 250_000
+PIECE_BYTES = 4 << 20
+"""Text of a piece [C]: some 80 000 image points."""
+PIECE_ROWS = 80_000
 """Rows of a piece of a Parquet file, likewise."""
 
 
