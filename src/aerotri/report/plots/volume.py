@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
@@ -101,8 +102,8 @@ def plot_thickness(found: ThicknessMap, boundary: Boundary, volumes: Volumes, co
     bar.set_label("surface − base [m]")
     scale.set_ylim(-size if has_both or high < -low else 0.0, size if has_both or high >= -low else 0.0)
     scale.yaxis.set_major_formatter(FuncFormatter(coordinate_text))
-    handles = [Line2D([], [], color=INK, lw=1.4, label="boundary"),
-               Line2D([], [], color=GREY, lw=0.7, ls=(0, (4, 3)), label="sections drawn")]  # fmt: skip
+    handles: list[Artist] = [Line2D([], [], color=INK, lw=1.4, label="boundary"),
+                             Line2D([], [], color=GREY, lw=0.7, ls=(0, (4, 3)), label="sections drawn")]  # fmt: skip
     if has_both:
         handles.append(Line2D([], [], color=INK, lw=1.2, ls=ZERO_LINE, label="surface on the base"))
         handles.append(Patch(facecolor=COLOURS(0.35), edgecolor=GREY, hatch=HATCH, lw=0.0, label="fill"))
