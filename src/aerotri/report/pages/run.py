@@ -21,8 +21,9 @@ LARGEST_PLOTS = 12
 """Plots of a step that has no report of its own."""
 IN_PARTS = ("cells", "sigma_Z_m", "sigma_m", "area_m2")
 """Figures of surfaces and orthophotos that consist of several."""
-
-
+UNITS = {"m": "m", "m2": "m²", "m3": "m³", "px": "px", "um": "µm", "mm": "mm", "percent": "%"}
+WORDS = {"sigma": "σ", "q90": "90 % below", "q95": "95 % below", "gsd": "GSD", "crs": "CRS", "max": "largest"}
+"""Of keys, as the page writes them."""
 PICTURES = (
     ("ortho", "orthophoto.png", "Orthophoto"),
     ("dsm", "surface.png", "Dense surface: heights and the σ of matching"),
@@ -145,18 +146,26 @@ def _figures(folder: Path) -> list[tuple[str, str]]:
     found = []
     for path in sorted(folder.glob("*.json")):
         content = _read(path)
-        found += [(key.replace("_", " "), _text(value)) for key, value in content.items() if _is_plain(value)]
+        found += [(_worded(key), _text(value)) for key, value in content.items() if _is_plain(value)]
         for key in IN_PARTS:
             if isinstance(content.get(key), dict):
-                found += _parts(key.replace("_", " "), content[key])
+                found += _parts(_worded(key), content[key])
         found += [("", printable(text, 1000)) for text in content.get("messages", []) if isinstance(text, str)]
     return found
+
+
+def _worded(key: str) -> str:
+    """'sigma_m' → 'σ [m]', 'q95' → '95 % below'."""
+    words = key.split("_")
+    unit = UNITS.get(words[-1], "") if len(words) > 1 else ""
+    text = " ".join(WORDS.get(word, word) for word in (words[:-1] if unit else words))
+    return f"{text} [{unit}]" if unit else text
 
 
 def _parts(name: str, value: Any) -> list[tuple[str, str]]:
     """Numbers within others, each by the names that lead to it."""
     if isinstance(value, dict):
-        return [one for key, part in value.items() for one in _parts(f"{name}: {key.replace('_', ' ')}", part)]
+        return [one for key, part in value.items() for one in _parts(f"{name}: {_worded(key)}", part)]
     return [(name, _text(value))] if _is_plain(value) else []
 
 

@@ -18,7 +18,7 @@ CAPTIONS = {
         "One standard deviation of each part alone, and of all together. The part of the adjustment holds the "
         "correlation between all heights; it is found by one solution with the factor of the normal equations."
     ),
-    "thickness": "Height of the surface over the base: brown is cut (above), blue is fill (below).",
+    "thickness": "Height of the surface over the base: brown is cut (above), blue and hatched is fill (below).",
     "section_areas": "Areas of the cross sections. The rule (trapezoidal or Simpson's) says what lies between them.",
     "section_profiles": "Three of the sections; their places are broken lines on the map.",
 }

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
@@ -57,6 +58,7 @@ SYSTEMATIC = {
     "free": "image errors uncorrected, calibrated orientation",
     "absorbed": "image errors uncorrected, orientation without parameters",
 }
+HATCH = "////"
 LEAST = 0.001
 """m³, below which a volume is as good as none."""
 BAR = 0.36
@@ -87,8 +89,7 @@ def plot_thickness(found: ThicknessMap, boundary: Boundary, volumes: Volumes, co
     image = axes.imshow(found.thickness, cmap=COLOURS, norm=norm, interpolation="nearest", aspect="auto",
                         extent=(extent[0], extent[2], extent[1], extent[3]), zorder=1)  # fmt: skip
     if has_both and min(found.thickness.shape) > 1:
-        x, y = found.grid.x(np.arange(found.grid.columns)), found.grid.y(np.arange(found.grid.rows))
-        axes.contour(x, y, found.thickness, levels=[0.0], colors=INK, linewidths=1.2, linestyles=[ZERO_LINE], zorder=2)
+        _mark_fill(axes, found)
     axes.add_collection(LineCollection(boundary.rings, colors=INK, linewidths=1.4, linestyles="-", zorder=3))
     _section_marks(axes, volumes.sections, boundary)
     for name, polygon in boundary.piles:
@@ -101,12 +102,24 @@ def plot_thickness(found: ThicknessMap, boundary: Boundary, volumes: Volumes, co
     bar.set_label("surface − base [m]")
     scale.set_ylim(-size if has_both or high < -low else 0.0, size if has_both or high >= -low else 0.0)
     scale.yaxis.set_major_formatter(FuncFormatter(coordinate_text))
-    handles = [Line2D([], [], color=INK, lw=1.4, label="boundary"),
-               Line2D([], [], color=GREY, lw=0.7, ls=(0, (4, 3)), label="sections drawn")]  # fmt: skip
+    handles: list[Artist] = [Line2D([], [], color=INK, lw=1.4, label="boundary"),
+                             Line2D([], [], color=GREY, lw=0.7, ls=(0, (4, 3)), label="sections drawn")]  # fmt: skip
     if has_both:
         handles.append(Line2D([], [], color=INK, lw=1.2, ls=ZERO_LINE, label="surface on the base"))
-    figure.legend(handles=handles, loc="center left", bbox_to_anchor=(0.9 / WIDTH, 0.25 / (height + 1.95)), ncols=3)
+        handles.append(Patch(facecolor=COLOURS(0.35), edgecolor=GREY, hatch=HATCH, lw=0.0, label="fill"))
+    figure.legend(handles=handles, loc="center left", bbox_to_anchor=(0.9 / WIDTH, 0.25 / (height + 1.95)), ncols=4)
     return figure
+
+
+def _mark_fill(axes: Axes, found: ThicknessMap) -> None:
+    """The line of zero, and hatches below it: in black and white fill is as dark as cut."""
+    x, y = found.grid.x(np.arange(found.grid.columns)), found.grid.y(np.arange(found.grid.rows))
+    thickness = np.ma.masked_invalid(found.thickness)
+    axes.contour(x, y, thickness, levels=[0.0], colors=INK, linewidths=1.2, linestyles=[ZERO_LINE], zorder=2)
+    below = axes.contourf(
+        x, y, thickness, levels=[float(thickness.min()) - 1.0, 0.0], colors="none", hatches=[HATCH], zorder=2
+    )
+    below.set(edgecolor=GREY, linewidth=0.0)
 
 
 @styled
