@@ -86,8 +86,10 @@ class ModelDeformation:
         """The content of deform.json: extremes, RMS, height-to-base ratio, cm per µm."""
         from aerotri.formats.results.deformation import block_deformation_json, deformation_json
 
-        whole = isinstance(self.record, BlockDeformation)
-        found = block_deformation_json(self.record, self.block) if whole else deformation_json(self.record, self.block)
+        if isinstance(self.record, BlockDeformation):
+            found = block_deformation_json(self.record, self.block)
+        else:
+            found = deformation_json(self.record, self.block)
         return self.head.as_dict() | found | {"settings": self.settings}
 
     def to_xarray(self) -> Any:
