@@ -2,7 +2,7 @@
 
 Begins with photographs: `tiepoints` and `adjust` make what the others need. Every command is a program started anew, so
 that beginning workers and compiling nothing twice counts. Two workers have two processors, as two threads have. What
-says when and how long is left out of the comparison of files. Prints Markdown.
+says when and how long is left out of the comparison of files (of GeoPackages the table of contents). Prints Markdown.
 
 Example
 -------
@@ -15,11 +15,13 @@ import argparse
 import json
 import os
 import shutil
+import sqlite3
 import statistics
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +66,9 @@ def content(folder: Path) -> dict[str, Any]:
             continue
         if path.suffix == ".json":
             found[name] = without(json.loads(path.read_text(encoding="utf-8")))
+        elif path.suffix == ".gpkg":
+            with closing(sqlite3.connect(path)) as base:
+                found[name] = [line for line in base.iterdump() if '"gpkg_contents"' not in line]
         else:
             found[name] = path.read_bytes()
     return found
@@ -116,7 +121,7 @@ def main() -> None:
                 "--no-plots",
             ]
         )
-    print(f"# Executors ({os.cpu_count()} processors, {options.repeats} runs of every command, medians)\n")
+    print(f"# Executors ({os.cpu_count()} processors, runs of every command: {options.repeats}, medians)\n")
     print(HEAD + "\n|" + "---|" * (HEAD.count("|") - 1), flush=True)
     for name, words in commands(options.photographs, folder).items():
         if not options.commands or name in options.commands:
