@@ -207,3 +207,22 @@ def test_the_user_gives_two_results(blocks, proof, tmp_path):
     folder = results[0].save(tmp_path / "result")
     with pytest.raises(InputError, match="has no surface"):
         aerotri.change(folder, second)
+
+
+def test_ground_too_level_to_tell_a_shift_in_plan_is_named(proof):
+    """What tilts of the adjustments are taken for on level ground is larger than a cell; on hills it is not."""
+    flights = [aerotri.simulate(proof.simulated.SPEC, seed) for seed in (4, 5)]
+    results = [aerotri.adjust(flight.block, parameters="bluh:1-12", explain=False) for flight in flights]
+    grid = grid_in(flights[0].truth)
+    place = shapely.box(grid.left, grid.top - SIDE * CELL, grid.left + SIDE * CELL, grid.top)
+
+    def said(relief):
+        z = 100.0 + relief * (ground(grid)[0] - 100.0)
+        first, second = surface_of(z, grid, "may"), surface_of(z, grid, "june")
+        found = aerotri.change(
+            first, second, stable=place, first_adjustment=results[0], second_adjustment=results[1]
+        )  # fmt: skip
+        return " ".join(found.warnings)
+
+    assert "too level to tell a shift in plan (dX ±" in said(1e-4)
+    assert "too level" not in said(10.0)
