@@ -7,7 +7,7 @@ import pytest
 
 from aerotri.adjustment.datum import datum_rows, motions_of_points
 from aerotri.functional_model.rotation import small_rotation_per_angle
-from aerotri.observations import CollocationSettings, Prior
+from aerotri.observations import CollocationSettings, Control, Prior
 from aerotri.observations.block import Constraints
 from aerotri.pipeline import adjust_keeping_system
 from dense_algebra import TINY, dense_design
@@ -124,6 +124,27 @@ def test_interior_orientation_weighted_and_gnss():
     assert {"focal_length_mm", "gnss.shift_X", "bluh.1"} <= set(adjustment.result.parameters.names)
     design, q = dense_cofactors(adjustment)
     check(adjustment, q, design)
+
+
+@pytest.mark.parametrize("sigma_m", [600.0, 1000.0])
+def test_weakly_held_datum_has_its_sigma(sigma_m):
+    """GNSS a million times weaker than the image points: no rank defect, and σ is that of an orthogonal decomposition,
+    which forms no normal matrix."""
+    weak = {"sigma_m": [sigma_m, sigma_m, 2.0 * sigma_m]}
+    block = small_block(4, **TINY, gnss=weak)[0]
+    none = Control(
+        *(column[:0] for column in (block.control.point, block.control.xyz, block.control.sigma)), np.zeros(0, bool)
+    )
+    adjustment = adjust_keeping_system(replace(block, control=none))
+    assert adjustment.result.outcome.status == "converged"
+    design = dense_design(adjustment)
+    norm = np.linalg.norm(design, axis=0)
+    assert 1e-13 < np.linalg.svd(design / norm, compute_uv=False)[-1] ** 2 < 1e-12
+    root = np.linalg.inv(np.linalg.qr(design / norm, mode="r"))
+    sigma = adjustment.result.outcome.sigma0 * np.linalg.norm(root, axis=1) / norm
+    u, n = adjustment.system.unknowns, len(adjustment.system.unknowns.images)
+    got = np.sqrt(np.diagonal(adjustment.result.points.covariance[u.points], axis1=1, axis2=2))
+    np.testing.assert_allclose(got.ravel(), sigma[6 * n + len(u.shared) :], rtol=0.001)
 
 
 def test_minimal_datum():

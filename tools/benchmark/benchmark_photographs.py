@@ -1,10 +1,12 @@
 """From photographs to a block: time by stage and tracks, with pycolmap's features, matching and mapping beside.
 
-    python tools/benchmark/benchmark_photographs.py PHOTOGRAPHS --out DIR [--points 1000] [--gcp LIST] [--no-peer]
+    python tools/benchmark/benchmark_photographs.py PHOTOGRAPHS --out DIR [--points 1000] [--gcp LIST] [--spatial] [--no-peer]
 
 Both begin with nothing kept, one after the other, each with its defaults and with all processors. Kernels are compiled
 before (run it twice). Residuals are those of both programs in pixels of the photograph: of aerotri after `adjust`, all
 rays with Huber's weights; of pycolmap's model, whose bundle adjustment has left out rays beyond 4 px.
+
+With --spatial pycolmap matches photographs near one another by the positions of EXIF, in place of all pairs.
 
 With --gcp both blocks are free of control (aerotri has the positions of EXIF), control points are intersected, and a
 similarity brings those called C… onto their coordinates; what is left at those called K… is the check.
@@ -97,14 +99,15 @@ def ours(photographs: Path, folder: Path, points: int, marks: Marks | None) -> F
     return Found(times, tracks_of(lengths, residual, len(tied.block.images)), xyz)
 
 
-def pycolmaps(photographs: Path, folder: Path, marks: Marks | None) -> Found:
+def pycolmaps(photographs: Path, folder: Path, marks: Marks | None, spatial: bool) -> Found:
     import pycolmap
 
     pycolmap.logging.minloglevel = pycolmap.logging.FATAL.value
     times, database = [now()], folder / "database.db"
     pycolmap.extract_features(database, photographs, camera_mode=pycolmap.CameraMode.SINGLE)
     times.append(now())
-    pycolmap.match_exhaustive(database)
+    match = pycolmap.match_spatial if spatial else pycolmap.match_exhaustive
+    match(database)
     times.append(now())
     models = pycolmap.incremental_mapping(database, photographs, folder)
     times.append(now())
@@ -161,6 +164,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--points", type=int, default=1000)
     parser.add_argument("--gcp", type=Path)
+    parser.add_argument("--spatial", action="store_true")
     parser.add_argument("--no-peer", action="store_true")
     arguments = parser.parse_args()
     shutil.rmtree(arguments.out, ignore_errors=True)
@@ -168,7 +172,7 @@ def main() -> None:
     marks = read_marks(arguments.gcp)
     found = {"aerotri": ours(arguments.photographs, arguments.out, arguments.points, marks)}
     if not arguments.no_peer:
-        found["pycolmap"] = pycolmaps(arguments.photographs, arguments.out, marks)
+        found["pycolmap"] = pycolmaps(arguments.photographs, arguments.out, marks, arguments.spatial)
     print(HEAD)
     for name, one in found.items():
         clock, processor = one.seconds.T

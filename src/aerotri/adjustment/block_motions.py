@@ -124,7 +124,7 @@ def _weak(effect: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def _motions(u: Unknowns, state: State) -> _Motions:
-    used = (u.rays.inv_sigma > 0.0).any(axis=1)
+    used = (u.rays.inv_sigma[:, 0] > 0.0) | (u.rays.inv_sigma[:, 1] > 0.0)
     seen = (np.add.reduceat(used, u.rays.start[:-1], dtype=np.int64) > 0) | (u.kept >= 0)
     active = np.bincount(u.rays.image[used], minlength=len(u.images)) > 0
     if u.rigging is not None:

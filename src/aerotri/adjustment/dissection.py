@@ -102,6 +102,7 @@ def bisect(
     members : (·,) of n nodes. edges : (e, 2) among them. position : (n, 2). side_of : (n,) room to work in.
     """
     best = None
+    halves = np.clip(np.rint(CUTS * len(members)).astype(np.int64), 1, len(members) - 1)
     centred = position[members] - position[members].mean(axis=0)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
     of_node = np.empty(len(side_of), dtype=np.int64)
@@ -109,24 +110,33 @@ def bisect(
         rank = np.argsort(centred @ axis, kind="stable")
         of_node[members[rank]] = np.arange(len(members))
         farthest, nearest = _reach(of_node[edges], len(members))
-        for share in CUTS:
-            half = max(1, min(len(members) - 1, round(share * len(members))))
-            for separator in (np.flatnonzero(farthest[:half] >= half), half + np.flatnonzero(nearest[half:] < half)):
-                cost = len(separator) + 0.05 * max(half, len(members) - half)
-                if best is None or cost < best[0]:
-                    best = (cost, rank, half, np.sort(members[rank[separator]]))
+        sizes = np.stack([_over(farthest, halves), _over(len(members) - 1 - nearest[::-1], len(members) - halves)], 1)
+        costs = sizes + 0.05 * np.maximum(halves, len(members) - halves)[:, None]
+        k, side = np.unravel_index(np.argmin(costs), costs.shape)
+        if best is None or costs[k, side] < best[0]:
+            half = int(halves[k])
+            tied = half + np.flatnonzero(nearest[half:] < half) if side else np.flatnonzero(farthest[:half] >= half)
+            best = (costs[k, side], rank, half, tied)
     if best is None or len(best[3]) > 0.6 * len(members):
         return None
-    _, rank, half, separator = best
+    _, rank, half, tied = best
+    separator = np.sort(members[rank[tied]])
     side_of[members[rank[:half]]] = 0
     side_of[members[rank[half:]]] = 1
     side_of[separator] = 2
-    halves = [members[side_of[members] == s] for s in (0, 1)]
-    if not len(halves[0]) or not len(halves[1]):
+    parts = [members[side_of[members] == s] for s in (0, 1)]
+    if not len(parts[0]) or not len(parts[1]):
         return None
     first, second = side_of[edges[:, 0]], side_of[edges[:, 1]]
     inner = [edges[(first == s) & (second == s)] for s in (0, 1)]
-    return (halves[0], inner[0]), (halves[1], inner[1]), separator
+    return (parts[0], inner[0]), (parts[1], inner[1]), separator
+
+
+def _over(farthest: np.ndarray, cuts: np.ndarray) -> np.ndarray:
+    """(c,) how many nodes before each cut are tied to one behind it; farthest (n,) the last that a node is tied to."""
+    n = len(farthest)
+    change = np.bincount(np.arange(1, n + 1), minlength=n + 2) - np.bincount(farthest + 1, minlength=n + 2)
+    return np.cumsum(change)[cuts]
 
 
 def _reach(edges: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor
 from aerotri.adjustment.unknowns import State
 
-NOT_DETERMINED = 1e-12
+NOT_DETERMINED = 1e-13
 """λ below which a direction counts as free: rounding of the normal matrix would leave its σ without a sure digit."""
 SUSPECT = 1e-10
 """Estimate of the smallest λ, by the factor alone, below which the directions are measured."""
@@ -42,16 +42,15 @@ def smallest_eigenvalue(factor: Factor, diagonal: np.ndarray) -> float:
     ----------
     diagonal : (size,) of the normal matrix before the points are eliminated.
     """
-    length = np.sqrt(diagonal)[:, None]
-    basis = np.random.default_rng(0).normal(size=(len(diagonal), min(3, len(diagonal))))
-    largest = 0.0
+    length = np.sqrt(diagonal)
+    direction, largest = np.random.default_rng(0).normal(size=len(diagonal)), 0.0
     for _ in range(2):
-        basis = np.linalg.qr(basis)[0]
-        image = length * factor.solve(length * basis)
+        direction /= np.linalg.norm(direction)
+        image = length * factor.solve(length * direction)
         if not np.isfinite(image).all():
             return 0.0
-        largest = float(np.linalg.norm(basis.T @ image, 2))
-        basis = image
+        # its length is nearer to the largest than its share along the direction
+        largest, direction = float(np.linalg.norm(image)), image
     return 1.0 / max(largest, 1e-300)
 
 

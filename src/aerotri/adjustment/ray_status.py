@@ -44,25 +44,25 @@ def ray_status(block: Block, start: StartValues, off: np.ndarray | None = None) 
     """
     rays = block.image_points
     status = np.full(len(rays), RayStatus.USED, dtype=np.int8)
-    status[~np.isfinite(start.centre[rays.image, 0])] = RayStatus.NO_START
+    placed, located = np.isfinite(start.centre[:, 0]), np.isfinite(start.points[:, 0])
+    status[~placed[rays.image]] = RayStatus.NO_START
     if off is not None:
         status[off] = RayStatus.OFF
     status = with_lonely_rays(block, status)
-    status[(status == RayStatus.USED) & ~np.isfinite(start.points[rays.point, 0])] = RayStatus.NO_START
+    status[(status == RayStatus.USED) & ~located[rays.point]] = RayStatus.NO_START
     warnings = []
-    photos = np.setdiff1d(np.unique(rays.image), np.unique(rays.image[status == RayStatus.USED]))
-    photos = np.union1d(photos, np.flatnonzero(~np.isfinite(start.centre[:, 0])))
-    no_rays = np.setdiff1d(np.arange(len(block.images)), np.unique(rays.image))
+    count = np.bincount(rays.image, minlength=len(block.images))
+    used = np.bincount(rays.image[status == RayStatus.USED], minlength=len(block.images))
+    photos, no_rays = np.flatnonzero((count > 0) & ((used == 0) | ~placed)), np.flatnonzero(count == 0)
     if len(no_rays):
         warnings.append(f"{some_names(block.images.names[no_rays], 'photograph')} without image points, left out")
-    photos = np.setdiff1d(photos, no_rays)
     if len(photos):
         warnings.append(
             f"{some_names(block.images.names[photos], 'photograph')} without start values or usable points, left out"
         )
     left_out = {RayStatus.ONE_RAY: "measured in one photograph only", RayStatus.NO_START: "whose rays do not intersect"}
     for code, words in left_out.items():
-        points = np.unique(rays.point[(status == code) & np.isfinite(start.centre[rays.image, 0])])
+        points = np.unique(rays.point[(status == code) & placed[rays.image]])
         if len(points):
             warnings.append(f"{some_names(block.points[points], 'point')} {words}, left out")
     return status, warnings

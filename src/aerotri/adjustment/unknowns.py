@@ -279,8 +279,9 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
     source, images, points, ray_image, row_start = _sort_rays(block, active, start.centre)
     shared = SharedList()
     lens = lens_table(block, images, shared)
-    xy = np.ascontiguousarray(block.image_points.xy[source])
-    at = xy if start.at is None else np.ascontiguousarray(start.at[source])
+    # by `take`, which is three times as fast as an index
+    xy = block.image_points.xy.take(source, axis=0)
+    at = xy if start.at is None else start.at.take(source, axis=0)
     linear = linear_parameters(block, images, ray_image, shared)
     if block.settings.photograph_fields.correlated == "on":
         linear = linear.beside(add_photograph_fields(block, images, ray_image, shared))
@@ -303,7 +304,7 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
             lens_row=lens.of_image[ray_image],
             xy=xy,
             at=at,
-            inv_sigma=1.0 / block.image_points.sigma[source],
+            inv_sigma=1.0 / block.image_points.sigma.take(source, axis=0),
             ap_index=columns.index,
             ap_value=columns.value,
             source=source,
@@ -336,18 +337,22 @@ def build_unknowns(block: Block, start: StartValues, active: np.ndarray) -> tupl
 def _sort_rays(block: Block, active: np.ndarray, centre: np.ndarray):
     """Active rays by point, points by their first photograph: neighbours in memory are neighbours in the air."""
     rows = np.flatnonzero(active)
-    images = with_leads(block, np.unique(block.image_points.image[rows]), centre)
-    ray_image = np.searchsorted(images, block.image_points.image[rows])
-    counts = np.bincount(block.image_points.point[rows], minlength=len(block.points))
+    ray_image, ray_point = block.image_points.image[rows], block.image_points.point[rows]
+    there = np.flatnonzero(np.bincount(ray_image, minlength=len(block.images)))
+    images = with_leads(block, there, centre)
+    row_of_image = np.zeros(len(block.images), dtype=np.int64)
+    row_of_image[images] = np.arange(len(images))
+    ray_image = row_of_image[ray_image]
+    counts = np.bincount(ray_point, minlength=len(block.points))
     points = np.flatnonzero(counts)
     first_image = np.full(len(block.points), len(images))
-    np.minimum.at(first_image, block.image_points.point[rows], ray_image)
+    np.minimum.at(first_image, ray_point, ray_image)
     points = points[np.argsort(first_image[points], kind="stable")]
     rank = np.empty(len(block.points), dtype=np.int64)
     rank[points] = np.arange(len(points))
-    order = np.argsort(rank[block.image_points.point[rows]] * len(images) + ray_image, kind="stable")
+    order = np.argsort(rank[ray_point] * len(images) + ray_image, kind="stable")
     row_start = np.concatenate([[0], np.cumsum(counts[points])]).astype(np.int64)
-    return rows[order], images, points, ray_image[order].astype(np.int64), row_start
+    return rows[order], images, points, ray_image[order], row_start
 
 
 def _ties(on_rigs: OnRigs, block: np.ndarray) -> Ties:
