@@ -126,15 +126,14 @@ def test_interior_orientation_weighted_and_gnss():
     check(adjustment, q, design)
 
 
-@pytest.mark.parametrize("sigma_m", [600.0, 1000.0])
-def test_weakly_held_datum_has_its_sigma(sigma_m):
-    """GNSS a million times weaker than the image points: no rank defect, and σ is that of an orthogonal decomposition,
+@pytest.mark.parametrize("sigma_um", [0.01, 0.005])
+def test_weakly_held_datum_has_its_sigma(sigma_um):
+    """GNSS to some metres beside very sharp image points: no rank defect, and σ is that of an orthogonal decomposition,
     which forms no normal matrix."""
-    weak = {"sigma_m": [sigma_m, sigma_m, 2.0 * sigma_m]}
-    block = small_block(4, **TINY, gnss=weak)[0]
-    none = Control(
-        *(column[:0] for column in (block.control.point, block.control.xyz, block.control.sigma)), np.zeros(0, bool)
-    )
+    sharp = TINY | {"tie_points": {"per_image": 25, "probability": 1.0, "sigma_um": sigma_um}}
+    block = small_block(4, **sharp, gnss={"sigma_m": [3.0, 3.0, 6.0]})[0]
+    given = block.control
+    none = Control(given.point[:0], given.xyz[:0], given.sigma[:0], given.is_check[:0])
     adjustment = adjust_keeping_system(replace(block, control=none))
     assert adjustment.result.outcome.status == "converged"
     design = dense_design(adjustment)
@@ -142,9 +141,10 @@ def test_weakly_held_datum_has_its_sigma(sigma_m):
     assert 1e-13 < np.linalg.svd(design / norm, compute_uv=False)[-1] ** 2 < 1e-12
     root = np.linalg.inv(np.linalg.qr(design / norm, mode="r"))
     sigma = adjustment.result.outcome.sigma0 * np.linalg.norm(root, axis=1) / norm
-    u, n = adjustment.system.unknowns, len(adjustment.system.unknowns.images)
+    u = adjustment.system.unknowns
+    first = 6 * len(u.images) + len(u.shared)
     got = np.sqrt(np.diagonal(adjustment.result.points.covariance[u.points], axis1=1, axis2=2))
-    np.testing.assert_allclose(got.ravel(), sigma[6 * n + len(u.shared) :], rtol=0.001)
+    np.testing.assert_allclose(got.ravel(), sigma[first:], rtol=0.001)
 
 
 def test_minimal_datum():

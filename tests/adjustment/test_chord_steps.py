@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from small_blocks import small_block, with_adjustment
 
 from aerotri.adjustment import chord_steps
 from aerotri.adjustment.chord_steps import follow
@@ -16,6 +15,7 @@ from aerotri.adjustment.solve import SolveOptions, minimise
 from aerotri.adjustment.steps import Trial, Visited
 from aerotri.adjustment.unknowns import Step
 from aerotri.functional_model.additional_parameters import parse_parameters
+from small_blocks import small_block, with_adjustment
 
 
 class Bowl:

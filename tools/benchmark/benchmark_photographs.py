@@ -1,6 +1,6 @@
 """From photographs to a block: time by stage and tracks, with pycolmap's features, matching and mapping beside.
 
-    python tools/benchmark/benchmark_photographs.py PHOTOGRAPHS --out DIR [--points 1000] [--gcp LIST] [--spatial] [--no-peer]
+    python tools/benchmark/benchmark_photographs.py PHOTOGRAPHS --out DIR [--gcp LIST] [--spatial] [--no-peer]
 
 Both begin with nothing kept, one after the other, each with its defaults and with all processors. Kernels are compiled
 before (run it twice). Residuals are those of both programs in pixels of the photograph: of aerotri after `adjust`, all

@@ -28,8 +28,8 @@ SUSPECT_PIVOT = 1e-11
 rounding (`sparse_cholesky.PIVOT_LIMIT`)."""
 
 FAITHFUL = 1.0 - 1e-4
-"""Gain over promise from which on the matrix is taken to be the same at the end of a step: what is left of the step is a
-hundredth of its length."""
+"""Gain over promise from which on the matrix is taken to be the same at the end of a step [C]: what is left of the step
+is a hundredth of its length."""
 
 STEEP = 0.9
 """Slope at the end of a step, over that at its beginning, from which on the step was too short [L: the curvature
@@ -81,7 +81,7 @@ class Trial:
         return self.factor.smallest_pivot < SUSPECT_PIVOT
 
     def can_be_followed(self, before: RightSide) -> bool:
-        """Whether its factor serves for the next: it gained what it promised, or was no longer than unknowns scatter."""
+        """Whether its factor serves for the next: it gained what it promised, or is no longer than unknowns scatter."""
         kept = self.gain_ratio(before) >= FAITHFUL or abs(self.decrement) <= self.equations.cost
         return kept and self.improves(before) and not self.is_suspect
 
