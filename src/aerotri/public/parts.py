@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,9 +12,11 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.execution.choice import THREADS, chosen
+from aerotri.public.blocks import request_of
 from aerotri.public.progress import ProgressLike, stage_report
 
 if TYPE_CHECKING:
+    from aerotri.formats.assembly.project import Request
     from aerotri.observations import Block
     from aerotri.partition.whole import Whole
     from aerotri.public.table import Table
@@ -140,8 +142,7 @@ def divide(
     from aerotri.public.folders import refuse_foreign_folder
 
     target = Path(folder)
-    if parts is not None and parts < 2:
-        raise InputError(f"{parts} parts", "a block is divided into two parts or more")
+    _refuse_few(parts)
     refuse_foreign_folder(target)
     with stage_report(progress) as report, room_beside(target) as room:
         if isinstance(block, Block):
@@ -183,6 +184,91 @@ def _whole_parts(block: Block, parts: int | None, say: Say) -> Iterator[Block]:
 
 def _count(block: Block, parts: int | None) -> int:
     return max(2, math.ceil(len(block.images) / PHOTOGRAPHS_A_PART)) if parts is None else parts
+
+
+def convert_parts(
+    source: FilePath, folder: FilePath, *, parts: int | None = None, tables: Literal["csv", "parquet"] = "parquet",
+    progress: ProgressLike = None, **stated: Any,
+) -> tuple[str, ...]:  # fmt: skip
+    """Write a block of another program in parts for `adjust_parts`, without ever holding its image points.
+
+    The files are those of `divide` after `convert`. Image points of COLMAP, PAT-B (.im) and BINGO are read piece by
+    piece; other formats are refused by name.
+
+    Parameters
+    ----------
+    source : COLMAP model, folder of PAT-B files, .im or BINGO file.
+    folder : an empty folder; the parts are written to parts/0000, parts/0001 and so on.
+    parts : how many; as many as have 2000 photographs each where None, two at least.
+    tables : 'csv' or 'parquet'.
+    progress : True for a bar, or a function that takes (stage, share).
+    **stated : further files, the camera and what else the source does not tell, as of `aerotri.read`.
+
+    Returns
+    -------
+    tuple of str
+        What was matched, assumed or left out, in sentences.
+
+    Raises
+    ------
+    InputError
+        As `aerotri.read` and `divide`; for a format that is not read in pieces.
+
+    Examples
+    --------
+    >>> import aerotri, tempfile
+    >>> plan = aerotri.example_flight()
+    >>> plan["flight"]["images_per_strip"] = 16
+    >>> flown = aerotri.simulate(plan, seed=1)
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     said = aerotri.convert(flown.block, f"{place}/patb", "patb")
+    ...     said = aerotri.convert_parts(
+    ...         f"{place}/patb", f"{place}/parts", parts=2, control_sigma_m=(0.02, 0.02, 0.04),
+    ...         camera_size=(11500, 7500), pixel_um=9.0,
+    ...     )
+    ...     found = aerotri.adjust_parts(f"{place}/parts", f"{place}/result")
+    >>> found.status
+    'converged'
+    """
+    return convert_request_parts(
+        request_of(source, **stated), Path(folder), parts=parts, tables=tables, progress=progress
+    )  # fmt: skip
+
+
+def convert_request_parts(
+    request: Request, target: Path, *, parts: int | None = None, tables: Literal["csv", "parquet"] = "parquet",
+    progress: ProgressLike = None,
+) -> tuple[str, ...]:  # fmt: skip
+    """As `convert_parts`, with everything that is stated in one record.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.formats.assembly.project_in_pieces import read_in_pieces
+    from aerotri.formats.block.writer import write_block
+    from aerotri.formats.files.atomic import room_beside
+    from aerotri.partition.adjusting import PARTS
+    from aerotri.partition.dividing_pieces import divided
+    from aerotri.partition.part_system import refuse_what_parts_cannot
+    from aerotri.public.folders import refuse_foreign_folder
+
+    _refuse_few(parts)
+    refuse_foreign_folder(target)
+    request = replace(request, name=request.name or target.resolve().name)
+    with stage_report(progress) as report, room_beside(target) as room:
+        report.stage("reading photographs", None)
+        source = read_in_pieces(request, room / "head")
+        refuse_what_parts_cannot(source.block)
+        cut = divided(source, _count(source.block, parts), room, report.stage)
+        for number, part in enumerate(cut):
+            write_block(part, target / PARTS / f"{number:04d}", tables=tables)
+    return source.messages
+
+
+def _refuse_few(parts: int | None) -> None:
+    if parts is not None and parts < 2:
+        raise InputError(f"{parts} parts", "a block is divided into two parts or more")
 
 
 def simulate_parts(
