@@ -92,7 +92,7 @@ def test_a_colmap_model_gives_the_same_files(form, flown, tmp_path, small_pieces
 def test_a_model_is_never_held(flown, tmp_path, small_pieces, never_whole):
     model, control = write_model(flown, tmp_path / "model"), control_file(flown[0], tmp_path / "lists")
     aerotri.convert_parts(model, tmp_path / "parts", parts=3, control=control, pixel_um=9.0, **SIGMAS)
-    found = aerotri.adjust_parts(tmp_path / "parts", tmp_path / "result")
+    found = aerotri.adjust_parts(tmp_path / "parts", tmp_path / "result", plots=False)
     assert (found.status, len(found.parts)) == ("converged", 3)
 
 
@@ -112,7 +112,7 @@ def test_marks_of_control_from_a_list_are_added(flown, tmp_path, small_pieces):
     stated |= {"image_sigma_px": 0.4, **SIGMAS}
     expected, found, _, _ = both_ways(model, tmp_path, **stated)
     assert found == expected
-    result = aerotri.adjust_parts(tmp_path / "three" / "flight", tmp_path / "result").folder
+    result = aerotri.adjust_parts(tmp_path / "three" / "flight", tmp_path / "result", plots=False).folder
     names = [line.split(",")[0] for line in (result / "control.csv").read_text(encoding="utf-8").splitlines()[1:]]
     assert sorted(names) == ["G0", "G1", "G2"]
     # a mark that the model has already
@@ -176,7 +176,7 @@ def test_patb_gives_the_same_files(flown, tmp_path, small_pieces):
     expected, found, _, said = both_ways(tmp_path / "files", tmp_path, **PATB)
     assert found == expected
     assert any("rotations are camera-to-object" in text for text in said)
-    assert aerotri.adjust_parts(tmp_path / "three" / "flight", tmp_path / "result").status == "converged"
+    assert aerotri.adjust_parts(tmp_path / "three" / "flight", tmp_path / "result", plots=False).status == "converged"
 
 
 def test_bingo_gives_the_same_files(flown, tmp_path, small_pieces):

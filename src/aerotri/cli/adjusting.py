@@ -98,7 +98,7 @@ def adjust(
             "parameters": parameters, "geoid": geoid, "check_free": check_free, "control_prefix": control_prefix,
             "check": names, "model_part": model_part, "start": start, "photos": photos,
         }  # fmt: skip
-        raise typer.Exit(run_adjust_parts(block, out, robust, executor, json_, **others))
+        raise typer.Exit(run_adjust_parts(block, out, robust, executor, json_, plots, **others))
     if executor != THREADS:
         raise InputError(f"--executor {executor} for a block in one piece", "divide it first: aerotri divide")
     raise typer.Exit(

@@ -17,15 +17,16 @@ from aerotri.observations import Block
 from aerotri.partition.common import Common, PartFacts
 from aerotri.partition.course import Course, Ended
 from aerotri.partition.joints import LEAST_BYTES, Joints
+from aerotri.partition.part_picture import SAMPLE_RAYS
 from aerotri.partition.part_results import Ending, Written, measure_part, write_part
 from aerotri.partition.part_system import refuse_robust
 from aerotri.partition.part_tasks import PartTask, Setting, prepare_part
-from aerotri.partition.whole import Whole, whole_of
+from aerotri.partition.whole import PARTS, Whole, whole_of
 from aerotri.results.adjusted_block import Outcome
 from aerotri.statistics.summarise import parameters_of
 
-PARTS, WORK = "parts", "work"
-"""Folders: of the parts in a block and in a result; of what the tasks exchange, while they run."""
+WORK = "work"
+"""Folder of what the tasks exchange, while they run."""
 BYTES_A_RAY = 3000
 """Memory of a part's task beside its factor [C]: tables, partials and pairs of a ray."""
 Say = Callable[[str, float | None], None]
@@ -86,7 +87,8 @@ def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSet
         solved = time.perf_counter()
         say("standard deviations", None)
         photographs = sum(part.images for part in facts) + len(common.images)
-        whole = _with_sigma(course, ended, first, out, observations, unknowns, photographs)
+        every = max(1, sum(part.rays for part in facts) // SAMPLE_RAYS)
+        whole = _with_sigma(course, ended, first, out, observations, unknowns, photographs, every)
         seconds = {"solve": solved - begun, "statistics": time.perf_counter() - solved}
         warnings = tuple(
             f"part {t.name}: {said}" for t, part in zip(tasks, facts, strict=True) for said in part.warnings
@@ -98,8 +100,9 @@ def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSet
 
 
 def _with_sigma(
-    course: Course, ended: Ended, first: Block, out: Path, observations: int, unknowns: int, photographs: int
-) -> Whole:
+    course: Course, ended: Ended, first: Block, out: Path, observations: int, unknowns: int, photographs: int,
+    every: int,
+) -> Whole:  # fmt: skip
     """Inverse, tables of the parts, and what they say together."""
     place, common = ended.place, course.common
     corner = course.solved(place)
@@ -116,9 +119,9 @@ def _with_sigma(
         iterations=ended.iterations, sigma0=sigma0, sigma0_um=sigma0 * first.settings.image_sigma_um, vtpv=vtpv,
         observations=observations, unknowns=unknowns, conditions=0, redundancy=observations - unknowns,
     )  # fmt: skip
-    written: list[Written] = course.run(write_part, Ending(place.at, outcome, (out / PARTS).resolve()))
+    written: list[Written] = course.run(write_part, Ending(place.at, outcome, (out / PARTS).resolve(), every))
     parameters = parameters_of(common.labels, place.at.shared, corner.inverse, common.weighted, sigma0)
-    return whole_of(first, outcome, parameters, [task.name for task in course.tasks], written, photographs)
+    return whole_of(first, outcome, parameters, [task.name for task in course.tasks], written, photographs, every)
 
 
 def _reading(setting: Setting, tasks: list[PartTask], work: Path) -> Work[Setting, PartTask, PartFacts]:

@@ -12,6 +12,7 @@ from aerotri.adjustment.ray_status import RayStatus
 from aerotri.adjustment.solve import Solution
 from aerotri.diagnosis import judge
 from aerotri.formats.results.adjustment import write_result
+from aerotri.partition.part_picture import PartPicture, picture_of
 from aerotri.partition.part_tasks import At, PartTask
 from aerotri.results.adjusted_block import AdjustedBlock, Blunder, GroundPointResults, ObservationGroup, Outcome
 from aerotri.statistics.covariance import Cofactors
@@ -42,11 +43,13 @@ class Ending:
     Parameters
     ----------
     at : where. outcome : of the whole. folder : for the folders of the parts, by name.
+    every : one point of so many goes to the page of the whole.
     """
 
     at: At
     outcome: Outcome
     folder: Path
+    every: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +76,7 @@ class Written:
     ----------
     verdict : 'accepted', 'doubtful' or 'rejected'. reasons : sentences.
     control, check : its ground points. groups : of its observations. blunders : suspected gross errors.
-    points, rays : how many; rays that were used.
+    points, rays : how many; rays that were used. picture : for the page of the whole.
     """
 
     verdict: str
@@ -84,6 +87,7 @@ class Written:
     blunders: tuple[Blunder, ...]
     points: int
     rays: int
+    picture: PartPicture
 
 
 def measure_part(at: At, task: PartTask) -> Measured:
@@ -113,9 +117,12 @@ def write_part(ending: Ending, task: PartTask) -> Written:
     verdict = judge(found)
     found = replace(found, outcome=replace(outcome, verdict=verdict.level, reasons=verdict.reasons))
     write_result(found, ending.folder / task.name)
+    shared = np.zeros(len(found.block.images), bool)
+    shared[part.system.unknowns.images[part.kept]] = True
     return Written(
         verdict.level, verdict.reasons, _ground_points(found, found.control), _ground_points(found, found.check),
         found.groups, found.blunders, len(found.block.points), int(np.sum(found.rays.status == RayStatus.USED)),
+        picture_of(found, shared, ending.every),
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -138,7 +139,7 @@ def divide(
     from aerotri.formats.block.writer import write_block
     from aerotri.formats.files.atomic import room_beside
     from aerotri.observations import Block
-    from aerotri.partition.adjusting import PARTS
+    from aerotri.partition.whole import PARTS
     from aerotri.public.folders import refuse_foreign_folder
 
     target = Path(folder)
@@ -248,9 +249,9 @@ def convert_request_parts(
     from aerotri.formats.assembly.project_in_pieces import read_in_pieces
     from aerotri.formats.block.writer import write_block
     from aerotri.formats.files.atomic import room_beside
-    from aerotri.partition.adjusting import PARTS
     from aerotri.partition.dividing_pieces import divided
     from aerotri.partition.part_system import refuse_what_parts_cannot
+    from aerotri.partition.whole import PARTS
     from aerotri.public.folders import refuse_foreign_folder
 
     _refuse_few(parts)
@@ -309,8 +310,8 @@ def simulate_parts(
     (32, 'converged')
     """
     from aerotri import simulation
-    from aerotri.partition.adjusting import PARTS
     from aerotri.partition.part_system import refuse_what_parts_cannot
+    from aerotri.partition.whole import PARTS
     from aerotri.public.folders import refuse_foreign_folder
 
     spec = simulation.parse_spec(plan) if isinstance(plan, Mapping) else simulation.read_spec(plan)
@@ -331,7 +332,7 @@ def simulate_parts(
 
 def adjust_parts(
     folder: FilePath, out: FilePath, *, robust: Literal["off", "huber"] | None = None,
-    max_iterations: int | None = None, executor: str = THREADS, progress: ProgressLike = None,
+    max_iterations: int | None = None, plots: bool = True, executor: str = THREADS, progress: ProgressLike = None,
 ) -> PartsAdjustment:  # fmt: skip
     """Adjust a block in parts: the numbers of `adjust` of the whole, without ever holding it whole.
 
@@ -344,6 +345,7 @@ def adjust_parts(
     out : folder to write; the tables of a part go to parts/NAME in it.
     robust : 'huber' lowers the weight of gross errors; as the parts say where None.
     max_iterations : at most, in each stage of a robust estimator.
+    plots : draw the plots and the report, report.html; without them it is quicker.
     executor : where the parts are computed: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'.
     progress : True for a bar, or a function that takes (stage, share).
 
@@ -372,20 +374,36 @@ def adjust_parts(
     """
     from aerotri.execution.opening import opened
     from aerotri.formats.files.atomic import atomic_folder
-    from aerotri.partition.adjusting import PARTS, PartsSettings
+    from aerotri.partition.adjusting import PartsSettings
     from aerotri.partition.adjusting import adjust_parts as adjust
-    from aerotri.partition.whole import write_whole
+    from aerotri.partition.whole import PARTS, write_whole
     from aerotri.public.folders import refuse_foreign_folder
 
     target = Path(out)
     refuse_foreign_folder(target, "adjustment.json")
     chosen(executor)
-    own = ("adjustment.json", "parameters.csv", "control.csv", "check.csv", PARTS)
+    tables = ("parameters.csv", "control.csv", "check.csv", "work_list.csv")
+    own = ("adjustment.json", *tables, "report.html", "plots", PARTS)
     with (
         stage_report(progress) as report,
         opened(executor, report.said) as workers,
         atomic_folder(target, own) as place,
     ):
         whole = adjust(Path(folder), place, workers, PartsSettings(robust, max_iterations), report.stage)
+        if plots:
+            report.stage("drawing", None)
+            whole = _drawn(whole, place)
         write_whole(whole, place)
     return PartsAdjustment(whole, target)
+
+
+def _drawn(whole: Whole, folder: Path) -> Whole:
+    """The report and its plots, the time of them counted."""
+    from aerotri.report.pages.parts import parts_plots, write_parts_report
+    from aerotri.report.plots.overview import save_plots
+
+    begun = time.perf_counter()
+    write_parts_report(whole, save_plots(parts_plots(whole), folder / "plots"), folder / "report.html")
+    outcome = whole.record.outcome
+    timings = {**outcome.timings_s, "plots": time.perf_counter() - begun}
+    return replace(whole, record=replace(whole.record, outcome=replace(outcome, timings_s=timings)))
