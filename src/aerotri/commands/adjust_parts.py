@@ -11,7 +11,14 @@ from aerotri.formats.results.json_text import json_text
 
 
 def run_adjust_parts(
-    path: Path, out: Path | None, robust: Any, executor: str, as_json: bool, plots: bool, **others: Any
+    path: Path,
+    out: Path | None,
+    robust: Any,
+    geoid: Path | None,
+    executor: str,
+    as_json: bool,
+    plots: bool,
+    **others: Any,
 ) -> int:
     """Exit code of the command: 0 when converged and not rejected, 1 otherwise; arguments as on the command line.
 
@@ -35,7 +42,9 @@ def run_adjust_parts(
     console = Console(quiet=as_json)
     target = out or Path(f"{path.resolve().name}_result")
     console.progress(compilation_notice())
-    found = adjust_parts(path, target, robust=robust, plots=plots, executor=executor, progress=console.stage)
+    found = adjust_parts(
+        path, target, robust=robust, geoid=geoid, plots=plots, executor=executor, progress=console.stage
+    )
     if as_json:
         print(json_text(whole_json(found.record)))
     else:

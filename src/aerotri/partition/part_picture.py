@@ -46,12 +46,13 @@ class PartPicture:
     sigma: np.ndarray
 
 
-def picture_of(found: AdjustedBlock, shared: np.ndarray, every: int) -> PartPicture:
+def picture_of(local: AdjustedBlock, found: AdjustedBlock, shared: np.ndarray, every: int) -> PartPicture:
     """The picture of a part.
 
     Parameters
     ----------
-    found : its result, judged. shared : (n,) bool, photographs that other parts have as well.
+    local : its result in the frame of the adjustment, judged. found : the same in the CRS of the block.
+    shared : (n,) bool, photographs that other parts have as well.
     every : one point of so many belongs to the sample.
     """
     names, results = found.block.points.tolist(), found.points
@@ -64,8 +65,8 @@ def picture_of(found: AdjustedBlock, shared: np.ndarray, every: int) -> PartPict
     known = np.isfinite(results.total_sigma).all(axis=1)
     median = np.median(results.total_sigma[known], axis=0) if known.any() else np.full(3, np.nan)
     return PartPicture(
-        _restricted(found, chosen), _restricted(found, far), residual_sums(found), tuple(findings(found)),
-        _own_work(work_list(found), shared), len(shared), int(shared.sum()), float(w.max(initial=0.0)), median,
+        _restricted(found, chosen), _restricted(found, far), residual_sums(found), tuple(findings(local)),
+        _own_work(work_list(local), shared), len(shared), int(shared.sum()), float(w.max(initial=0.0)), median,
     )  # fmt: skip
 
 

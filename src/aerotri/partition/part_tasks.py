@@ -12,11 +12,13 @@ from aerotri.adjustment.partial_factor import eliminate_inner, restored
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.conventions import InputError
+from aerotri.coordinates.blocks import transform_block
 from aerotri.formats.block.folder import read_block
 from aerotri.partition.common import Left, PartFacts
 from aerotri.partition.joint_tasks import Above
 from aerotri.partition.part_files import PartFiles
 from aerotri.partition.part_system import PartSystem, part_system
+from aerotri.partition.placing import Place
 from aerotri.statistics.summarise import count_observations
 
 
@@ -58,10 +60,12 @@ class Setting:
     Parameters
     ----------
     shared_images : str, photographs that stand in several parts, sorted. origin : (3,) m, the local origin.
+    place : where a block with a coordinate system is adjusted; None of a local one.
     """
 
     shared_images: np.ndarray
     origin: np.ndarray
+    place: Place | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +114,8 @@ def prepare_part(setting: Setting, task: PartTask) -> PartFacts:
     """Read a part and set up its system."""
     block = read_block(task.source, rays_needed=False)
     shared = np.isin(block.images.names, setting.shared_images)
-    part, state = part_system(block, shared, setting.origin)
+    local = block if setting.place is None else transform_block(block, setting.place.frame())
+    part, state = part_system(local, shared, setting.origin)
     system, u = part.system, part.system.unknowns
     task.files.keep_system(part, 0)
     task.files.keep_state(state, 0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -165,6 +166,7 @@ def _parts_in_pieces(path: FilePath, parts: int | None, room: Path, say: Say) ->
     source = open_in_pieces(path)
     if source is None:
         return _whole_parts(read_block(path), parts, say)
+    source = replace(source, block=_in_metres(source.block))
     refuse_what_parts_cannot(source.block)
     return divided(source, _count(source.block, parts), room, say)
 
@@ -175,12 +177,29 @@ def _whole_parts(block: Block, parts: int | None, say: Say) -> Iterator[Block]:
     from aerotri.partition.dividing import part_of
     from aerotri.partition.part_system import refuse_what_parts_cannot
 
+    block = _in_metres(block)
     refuse_what_parts_cannot(block)
     say("dividing", None)
     division = cut(block, _count(block, parts))
     for number in range(division.count):
         say("writing parts", number / division.count)
         yield part_of(block, division, number)
+
+
+def _in_metres(block: Block) -> Block:
+    """A block that counts in degrees in the UTM zone of its datum, as `adjust` brings it there.
+
+    Warns
+    -----
+    UserWarning
+        Naming both systems.
+    """
+    from aerotri.coordinates.metric import in_metres
+
+    block, said = in_metres(block)
+    if said:
+        warnings.warn(said, stacklevel=4)
+    return block
 
 
 def _count(block: Block, parts: int | None) -> int:
@@ -260,6 +279,7 @@ def convert_request_parts(
     with stage_report(progress) as report, room_beside(target) as room:
         report.stage("reading photographs", None)
         source = read_in_pieces(request, room / "head")
+        source = replace(source, block=_in_metres(source.block))
         refuse_what_parts_cannot(source.block)
         cut = divided(source, _count(source.block, parts), room, report.stage)
         for number, part in enumerate(cut):
@@ -332,7 +352,8 @@ def simulate_parts(
 
 def adjust_parts(
     folder: FilePath, out: FilePath, *, robust: Literal["off", "huber"] | None = None,
-    max_iterations: int | None = None, plots: bool = True, executor: str = THREADS, progress: ProgressLike = None,
+    max_iterations: int | None = None, geoid: FilePath | None = None, plots: bool = True, executor: str = THREADS,
+    progress: ProgressLike = None,
 ) -> PartsAdjustment:  # fmt: skip
     """Adjust a block in parts: the numbers of `adjust` of the whole, without ever holding it whole.
 
@@ -345,6 +366,7 @@ def adjust_parts(
     out : folder to write; the tables of a part go to parts/NAME in it.
     robust : 'huber' lowers the weight of gross errors; as the parts say where None.
     max_iterations : at most, in each stage of a robust estimator.
+    geoid : grid of geoid undulations for heights of the coordinate system; every worker sees it under this name.
     plots : draw the plots and the report, report.html; without them it is quicker.
     executor : where the parts are computed: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'.
     progress : True for a bar, or a function that takes (stage, share).
@@ -379,7 +401,7 @@ def adjust_parts(
     from aerotri.partition.whole import PARTS, write_whole
     from aerotri.public.folders import refuse_foreign_folder
 
-    target = Path(out)
+    target, grid = Path(out), None if geoid is None else Path(geoid).resolve()
     refuse_foreign_folder(target, "adjustment.json")
     chosen(executor)
     tables = ("parameters.csv", "control.csv", "check.csv", "work_list.csv")
@@ -389,7 +411,7 @@ def adjust_parts(
         opened(executor, report.said) as workers,
         atomic_folder(target, own) as place,
     ):
-        whole = adjust(Path(folder), place, workers, PartsSettings(robust, max_iterations), report.stage)
+        whole = adjust(Path(folder), place, workers, PartsSettings(robust, max_iterations, grid), report.stage)
         if plots:
             report.stage("drawing", None)
             whole = _drawn(whole, place)
