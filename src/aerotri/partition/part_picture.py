@@ -197,8 +197,11 @@ def _positions(parts: Sequence[AdjustedBlock], row_of: Sequence[np.ndarray]) -> 
     given = [(gnss, rows) for gnss, rows in there if gnss is not None and len(gnss)]
     if not given:
         return None
-    keys = ("xyz", "sigma", "angles", "angles_sigma", "time")
     return GnssIns(
         np.concatenate([rows[gnss.image] for gnss, rows in given]),
-        *(np.concatenate([getattr(gnss, key) for gnss, _ in given]) for key in keys),
+        np.concatenate([gnss.xyz for gnss, _ in given]),
+        np.concatenate([gnss.sigma for gnss, _ in given]),
+        np.concatenate([gnss.angles for gnss, _ in given]),
+        np.concatenate([gnss.angles_sigma for gnss, _ in given]),
+        np.concatenate([gnss.time for gnss, _ in given]),
     )

@@ -237,7 +237,7 @@ def _parts(request: Request, options: ReadingOptions, sources: Sources) -> _Part
             "is a folder of no known format", f"known are {', '.join(convert.RECOGNISERS)}, ign, patb", path
         )
     kind = stated or kinds.kind_of(path, kinds.RAYS) or kinds.kind_of(path, kinds.ORIENTATIONS)
-    if kind in kinds.RAYS:
+    if kind is not None and kind in kinds.RAYS:
         if kind == "odm-gcp":
             control = kinds.read_control(f"odm-gcp:{path}", options)
             rays = () if control.rays is None else (control.rays,)

@@ -58,7 +58,12 @@ def open_bingo(path: Path, always: frozenset[str]) -> Bulk:
     InputError
         As `read_bingo`.
     """
-    return _opened(path, True, lambda file: (*bingo.bingo_of(file), frozenset()), always)[0]
+
+    def part(file: TextFile) -> tuple[RayList, list[int], frozenset[tuple[str, ...]]]:
+        rays, heads = bingo.bingo_of(file)
+        return rays, heads, frozenset()
+
+    return _opened(path, True, part, always)[0]
 
 
 def _opened(
