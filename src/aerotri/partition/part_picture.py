@@ -168,13 +168,15 @@ def _photographs(parts: Sequence[AdjustedBlock]) -> tuple[Images, list[np.ndarra
     """All photographs, part by part, shared ones once; rows of those of every part."""
     row: dict[str, int] = {}
     row_of = [np.array([row.setdefault(n, len(row)) for n in p.block.images.names.tolist()], np.int64) for p in parts]
-    together = [p.block.images for p in parts]
+    given = [p.block.images for p in parts]
     _, first = np.unique(np.concatenate(row_of), return_index=True)
-    names = together[0].columns
     return Images(
-        *(np.concatenate([getattr(one, key) for one in together])[first] for key in ("names", "camera", "strip")),
-        *(np.concatenate([getattr(one, key) for one in together])[first] for key in ("centre", "angles")),
-        {name: np.concatenate([one.columns[name] for one in together])[first] for name in names},
+        np.concatenate([one.names for one in given])[first],
+        np.concatenate([one.camera for one in given])[first],
+        np.concatenate([one.strip for one in given])[first],
+        np.concatenate([one.centre for one in given])[first],
+        np.concatenate([one.angles for one in given])[first],
+        {name: np.concatenate([one.columns[name] for one in given])[first] for name in given[0].columns},
     ), row_of
 
 
