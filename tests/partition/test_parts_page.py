@@ -6,6 +6,7 @@ from dataclasses import replace
 from html import unescape
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 import aerotri
@@ -93,6 +94,12 @@ def test_parts_stand_side_by_side(both, flown):
     twice = sum(int(row[2]) for row in rows.values()) - len(flown.images)
     assert 0 < twice < sum(int(row[3]) for row in rows.values())
     assert (parts / "work_list.csv").exists()
+    beyond = 0
+    for part in found.parts:
+        table = pq.read_table(parts / "parts" / part / "residuals.parquet", columns=["wx", "wy"])
+        w = np.column_stack([table["wx"].to_numpy(), table["wy"].to_numpy()]).astype(float)
+        beyond += int((np.nan_to_num(np.abs(w)).max(axis=1) > 3.2905).sum())
+    assert beyond == sum(int(row[7]) for row in rows.values()) > 0
 
 
 def test_nothing_is_drawn_where_that_is_not_wanted(flown, tmp_path):

@@ -14,6 +14,7 @@ from aerotri.diagnosis.work_list import WorkList, work_list
 from aerotri.observations import GnssIns, ImagePoints, Images
 from aerotri.results.adjusted_block import AdjustedBlock, ImageResults, PointResults, RayResults
 from aerotri.statistics.photograph_residuals import ResidualSums, residual_sums
+from aerotri.statistics.reliability import critical_value
 
 SAMPLE_RAYS = 200_000
 """Image points of the sample in all parts, about [C]: plots look the same with more."""
@@ -32,7 +33,8 @@ class PartPicture:
     sample : all photographs, some points with all their rays, all control and check points among them.
     extremes : the points with the largest residuals and standard deviations, with all their rays.
     sums : of the residuals of the photographs. lights : what the part is judged by. work : what to look at.
-    photographs, shared : how many. largest_w : of an image coordinate. sigma : (3,) m, median of the points.
+    photographs, shared : how many. largest_w : of an image coordinate. beyond : rays whose |w| exceeds the test.
+    sigma : (3,) m, median of the points.
     """
 
     sample: AdjustedBlock
@@ -43,6 +45,7 @@ class PartPicture:
     photographs: int
     shared: int
     largest_w: float
+    beyond: int
     sigma: np.ndarray
 
 
@@ -63,10 +66,12 @@ def picture_of(local: AdjustedBlock, found: AdjustedBlock, shared: np.ndarray, e
     for size in (w, sigma):
         far[np.argsort(-size, kind="stable")[:MOST_EXTREMES]] = True
     known = np.isfinite(results.total_sigma).all(axis=1)
+    limit = critical_value(found.block.settings.adjustment.alpha)
+    beyond = int((np.nan_to_num(np.abs(found.rays.w)).max(axis=1, initial=0.0) > limit).sum())
     median = np.median(results.total_sigma[known], axis=0) if known.any() else np.full(3, np.nan)
     return PartPicture(
         _restricted(found, chosen), _restricted(found, far), residual_sums(found), tuple(findings(local)),
-        _own_work(work_list(local), shared), len(shared), int(shared.sum()), float(w.max(initial=0.0)), median,
+        _own_work(work_list(local), shared), len(shared), int(shared.sum()), float(w.max(initial=0.0)), beyond, median,
     )  # fmt: skip
 
 

@@ -121,7 +121,7 @@ def whole_of(
     rows = [
         PartRow(
             name, one.picture.photographs, one.picture.shared, one.points, one.rays, one.picture.largest_w,
-            one.picture.sigma, one.verdict, len(one.blunders),
+            one.picture.beyond, one.picture.sigma, one.verdict,
         )
         for name, one in zip(names, written, strict=True)
     ]  # fmt: skip

@@ -24,7 +24,8 @@ class PartRow:
     Parameters
     ----------
     photographs, shared, points, rays : how many. largest_w : of an image coordinate.
-    sigma : (3,) m, median of the points. verdict : 'accepted', 'doubtful' or 'rejected'. suspects : gross errors.
+    beyond : rays whose |w| exceeds the test. sigma : (3,) m, median of the points.
+    verdict : 'accepted', 'doubtful' or 'rejected'.
     """
 
     name: str
@@ -33,9 +34,9 @@ class PartRow:
     points: int
     rays: int
     largest_w: float
+    beyond: int
     sigma: np.ndarray
     verdict: str
-    suspects: int
 
 
 @dataclass(frozen=True, eq=False)

@@ -78,7 +78,7 @@ def parts_table(whole: Whole) -> Table:
         (Column("points", "", "d"), [row.points for row in rows]),
         (Column("rays", "", "d"), [row.rays for row in rows]),
         (Column("largest |w|", "", ".1f"), [row.largest_w for row in rows]),
-        (Column("suspected gross errors", "", "d"), [row.suspects for row in rows]),
+        (Column("rays beyond the test", "", "d"), [row.beyond for row in rows]),
         *(
             (Column(f"σ{axis}, median", "m", f".{digits}f"), [row.sigma[k] for row in rows])
             for k, axis in enumerate("XYZ")
