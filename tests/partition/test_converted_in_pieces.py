@@ -227,3 +227,18 @@ def test_what_parts_cannot_have_is_refused_before_anything_is_written(flown, tmp
     with pytest.raises(InputError, match='datum = "minimal" of a block in parts'):
         aerotri.convert_parts(model, tmp_path / "parts", parts=3)
     assert not (tmp_path / "parts").exists()
+
+
+def test_the_command(flown, tmp_path, capsys):
+    from aerotri.cli.app import invoke
+
+    model, control = write_model(flown, tmp_path / "model"), control_file(flown[0], tmp_path / "lists")
+    stated = ["--control", str(control), "--control-sigma-m", "0.02,0.02,0.04", "--pixel-um", "9", "--parts", "3"]
+    out = str(tmp_path / "parts")
+    assert invoke(["convert", str(model), "--out", out, *stated]) == 0
+    said = capsys.readouterr().out
+    assert "3 parts of" in said
+    assert f"Written to {out}: aerotri adjust {out}" in said
+    assert len(list((tmp_path / "parts" / "parts").iterdir())) == 3
+    with pytest.raises(InputError, match="--to colmap does not go with --parts"):
+        invoke(["convert", str(model), "--out", str(tmp_path / "other"), "--to", "colmap", *stated])
