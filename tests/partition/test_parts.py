@@ -15,7 +15,7 @@ from aerotri.adjustment.solve import SolveOptions
 from aerotri.diagnosis import judge
 from aerotri.execution.work import TasksFailedError
 from aerotri.formats.block.folder import read_block, write_block
-from aerotri.partition import adjusting, course, joints
+from aerotri.partition import adjusting, course, joints, part_tasks
 from aerotri.partition.adjusting import part_folders
 from aerotri.partition.dividing import SHARED, divide, part_of
 from aerotri.partition.tree import tree_over
@@ -271,3 +271,18 @@ def test_commands(tmp_path, capsys):
         invoke(["adjust", str(tmp_path / "parts"), "--parameters", "none"])
     with pytest.raises(aerotri.InputError, match="aerotri divide"):
         invoke(["adjust", str(tmp_path / "block"), "--executor", "processes:2"])
+
+
+def test_no_equations_are_taken_where_the_last_step_leads(divided, tmp_path, monkeypatch):
+    """A round of positions begins with equations, and every step but its last leads to some; then those of the end."""
+    seen = []
+    eliminate = part_tasks.eliminate_inner
+
+    def counted(symbolic, matrix):
+        seen.append(symbolic)
+        return eliminate(symbolic, matrix)
+
+    monkeypatch.setattr(part_tasks, "eliminate_inner", counted)
+    found = aerotri.adjust_parts(divided, tmp_path / "result", plots=False)
+    assert found.status == "converged"
+    assert len(seen) == len(found.parts) * (found.record.outcome.iterations + 1)

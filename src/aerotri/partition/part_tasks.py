@@ -88,10 +88,16 @@ class At:
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """From one place to another."""
+    """From one place to another.
+
+    Parameters
+    ----------
+    last : whether nothing but the cost is wanted there, because the equations are taken elsewhere next.
+    """
 
     start: At
     end: At
+    last: bool = False
 
 
 @dataclass(frozen=True)
@@ -155,7 +161,11 @@ def move_part(move: Move, task: PartTask) -> Reduced:
     step = part.system.whole_step(state, x, start.damping, start.estimator)
     if step is None:
         return Reduced(np.inf, fault="a step that is no number")
-    files.keep_state(part.system.unknowns.advance(state, step), move.end.state)
+    there = part.system.unknowns.advance(state, step)
+    files.keep_state(there, move.end.state)
+    if move.last:
+        there = files.state(move.end.state, move.end.shared[task.shared])
+        return Reduced(part.system.right_side(there, move.end.estimator).cost)
     return _reduced(part, move.end, task)
 
 
