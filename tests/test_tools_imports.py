@@ -37,6 +37,7 @@ INSIDE = {
     "prove/metamorphic_photographs.py": "the first orientation in orders that no file gives",
     "prove/parts.py": "lets an adjustment go on until only rounding is left",
     "prove/parts_scale.py": "the fronts that the tree lets expect, beside the memory that is measured",
+    "prove/parts_converted.py": "loads the packages that convert uses before it looks at the memory",
     "prove/parts_divided.py": "loads the packages that divide uses before it looks at the memory",
     "prove/parts_plan.py": "the plan of a factor and the cuts of a block, without any numbers",
     "prove/runs_elsewhere.py": "hands runs to the executors of the program",

@@ -63,7 +63,7 @@ PYTHON = {
         "adjust", "open_result", "Adjustment", "Covariance", "Table", "with_settings", "changes",
         "compare_parameters", "halves", "accuracy", "crosscheck", "export", "parameters", "InputError",
         "AdjustmentFailedError",
-        "TasksFailedError", "divide", "simulate_parts", "adjust_parts", "PartsAdjustment",
+        "TasksFailedError", "divide", "convert_parts", "simulate_parts", "adjust_parts", "PartsAdjustment",
     ),
     "Image errors, terrain, volume": (
         "ImageErrors", "deform", "correct_dem", "ideal_photographs", "terrain", "dense_surface", "Surface", "compare",

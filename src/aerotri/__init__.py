@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from aerotri.public.ortho import orthophoto as orthophoto
     from aerotri.public.parts import PartsAdjustment as PartsAdjustment
     from aerotri.public.parts import adjust_parts as adjust_parts
+    from aerotri.public.parts import convert_parts as convert_parts
     from aerotri.public.parts import divide as divide
     from aerotri.public.parts import simulate_parts as simulate_parts
     from aerotri.public.planning import plan_flight as plan_flight
@@ -92,6 +93,7 @@ _PLACES = {
     "edit": "aerotri.public.editing",
     "adjust": "aerotri.public.results",
     "adjust_parts": "aerotri.public.parts",
+    "convert_parts": "aerotri.public.parts",
     "divide": "aerotri.public.parts",
     "simulate_parts": "aerotri.public.parts",
     "convert": "aerotri.public.converting",
@@ -141,6 +143,7 @@ __all__ = [
     "compare",
     "compare_parameters",
     "convert",
+    "convert_parts",
     "correct_dem",
     "crosscheck",
     "deform",

@@ -15,7 +15,7 @@ from aerotri.adjustment.solve import SolveOptions
 from aerotri.diagnosis import judge
 from aerotri.execution.work import TasksFailedError
 from aerotri.formats.block.folder import read_block, write_block
-from aerotri.partition import adjusting, course, joints
+from aerotri.partition import adjusting, course, joints, part_tasks
 from aerotri.partition.adjusting import part_folders
 from aerotri.partition.dividing import SHARED, divide, part_of
 from aerotri.partition.tree import tree_over
@@ -72,7 +72,7 @@ def test_numbers_are_those_of_one_piece(parts, tmp_path):
     block = flown()
     whole = in_one_piece(block)
     folder = aerotri.divide(block, tmp_path / "parts", parts=parts)
-    found = aerotri.adjust_parts(folder, tmp_path / "result")
+    found = aerotri.adjust_parts(folder, tmp_path / "result", plots=False)
     assert (found.status, found.verdict, found.redundancy) == (
         "converged", judge(whole).level, whole.outcome.redundancy
     )  # fmt: skip
@@ -118,7 +118,7 @@ def test_robust_weights_follow_the_residuals_of_all_parts(tmp_path):
     block = replace(block, image_points=replace(block.image_points, xy=xy))
     whole = in_one_piece(block, "huber")
     folder = aerotri.divide(block, tmp_path / "parts", parts=3)
-    found = aerotri.adjust_parts(folder, tmp_path / "result", robust="huber")
+    found = aerotri.adjust_parts(folder, tmp_path / "result", robust="huber", plots=False)
     assert found.sigma0 == pytest.approx(whole.outcome.sigma0, rel=1e-3)
     image = {name: k for k, name in enumerate(block.images.names)}
     for part in found.parts:
@@ -134,7 +134,7 @@ def test_errors_over_sigma_are_normal(tmp_path):
     for seed in range(6):
         block, truth = small_block(seed=seed + 20, flight=LONG_FLIGHT)
         folder = aerotri.divide(with_adjustment(block, model_part="off"), tmp_path / f"{seed}", parts=2)
-        found = aerotri.adjust_parts(folder, tmp_path / f"{seed}_result")
+        found = aerotri.adjust_parts(folder, tmp_path / f"{seed}_result", plots=False)
         row = {name: k for k, name in enumerate(block.points)}
         for part in found.parts:
             for line in rows_of(tmp_path / f"{seed}_result" / "parts" / part / "points.csv"):
@@ -181,24 +181,24 @@ def tables_of(folder):
 
 def test_files_are_the_same_wherever_parts_are_computed(divided, tmp_path):
     pytest.importorskip("distributed")
-    aerotri.adjust_parts(divided, tmp_path / "threads")
+    aerotri.adjust_parts(divided, tmp_path / "threads", plots=False)
     expected = tables_of(tmp_path / "threads")
-    assert len(expected) == 3 + 3 * 5 + 3
+    assert len(expected) == 4 + 3 * 5 + 3
     for executor in ("processes:2", "dask:local:2"):
-        aerotri.adjust_parts(divided, tmp_path / executor, executor=executor)
+        aerotri.adjust_parts(divided, tmp_path / executor, executor=executor, plots=False)
         assert tables_of(tmp_path / executor) == expected
 
 
 def test_a_worker_killed_in_mid_run_changes_nothing(divided, tmp_path, monkeypatch):
     """Of every kind of task one is killed, in the same run."""
-    aerotri.adjust_parts(divided, tmp_path / "threads")
+    aerotri.adjust_parts(divided, tmp_path / "threads", plots=False)
     marks = tmp_path / "marks"
     marks.mkdir()
     monkeypatch.setenv(killed_parts.MARKS, str(marks))
     for name, function in killed_parts.KILLED.items():
         place = next(module for module in (course, joints, adjusting) if hasattr(module, name))
         monkeypatch.setattr(place, name, function)
-    aerotri.adjust_parts(divided, tmp_path / "killed_result", executor="processes:2")
+    aerotri.adjust_parts(divided, tmp_path / "killed_result", executor="processes:2", plots=False)
     assert {path.name for path in marks.iterdir()} == set(killed_parts.KILLED)
     assert tables_of(tmp_path / "killed_result") == tables_of(tmp_path / "threads")
 
@@ -208,7 +208,7 @@ def test_a_part_without_a_result_is_named(divided, tmp_path, monkeypatch):
     with pytest.raises(
         TasksFailedError, match=r"1 of 3 parts could not be computed: part 0001 \(RuntimeError: no luck"
     ):
-        aerotri.adjust_parts(divided, tmp_path / "result")
+        aerotri.adjust_parts(divided, tmp_path / "result", plots=False)
     assert not (tmp_path / "result").exists()
 
 
@@ -217,19 +217,19 @@ def test_parts_that_do_not_belong_together_are_refused(divided, tmp_path):
     block = read_block(second)
     write_block(with_adjustment(block, additional_parameters=()), second, tables="parquet")
     with pytest.raises(aerotri.InputError, match=r"block\.toml of part 0001 differs from that of part 0000"):
-        aerotri.adjust_parts(divided, tmp_path / "result")
+        aerotri.adjust_parts(divided, tmp_path / "result", plots=False)
     points = block.points.copy()
     points[int(block.image_points.point[0])] = read_block(first).points[0]
     write_block(replace(block, points=points), second, tables="parquet")
     with pytest.raises(aerotri.InputError, match="stands in the parts 0000 and 0001"):
-        aerotri.adjust_parts(divided, tmp_path / "result")
+        aerotri.adjust_parts(divided, tmp_path / "result", plots=False)
 
 
 def test_parts_that_nothing_holds_are_refused(tmp_path):
     block = flown("none")
     folder = aerotri.divide(replace(block, gnss_ins=None, control=block.control.empty()), tmp_path / "parts", parts=2)
     with pytest.raises(aerotri.InputError, match="the observations do not determine the block"):
-        aerotri.adjust_parts(folder, tmp_path / "result")
+        aerotri.adjust_parts(folder, tmp_path / "result", plots=False)
 
 
 @pytest.mark.parametrize(
@@ -271,3 +271,18 @@ def test_commands(tmp_path, capsys):
         invoke(["adjust", str(tmp_path / "parts"), "--parameters", "none"])
     with pytest.raises(aerotri.InputError, match="aerotri divide"):
         invoke(["adjust", str(tmp_path / "block"), "--executor", "processes:2"])
+
+
+def test_no_equations_are_taken_where_the_last_step_leads(divided, tmp_path, monkeypatch):
+    """A round of positions begins with equations, and every step but its last leads to some; then those of the end."""
+    seen = []
+    eliminate = part_tasks.eliminate_inner
+
+    def counted(symbolic, matrix):
+        seen.append(symbolic)
+        return eliminate(symbolic, matrix)
+
+    monkeypatch.setattr(part_tasks, "eliminate_inner", counted)
+    found = aerotri.adjust_parts(divided, tmp_path / "result", plots=False)
+    assert found.status == "converged"
+    assert len(seen) == len(found.parts) * (found.record.outcome.iterations + 1)

@@ -65,7 +65,7 @@ def test_points_belong_to_one_part_and_photographs_have_as_many_as_the_plan_says
 
 
 def test_errors_over_sigma_are_normal(folder, tmp_path):
-    found = aerotri.adjust_parts(folder, tmp_path / "result")
+    found = aerotri.adjust_parts(folder, tmp_path / "result", plots=False)
     assert (found.status, found.verdict) == ("converged", "accepted")
     normed = []
     for part in found.parts:

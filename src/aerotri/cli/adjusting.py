@@ -95,10 +95,10 @@ def adjust(
         from aerotri.commands.adjust_parts import run_adjust_parts
 
         others = {
-            "parameters": parameters, "geoid": geoid, "check_free": check_free, "control_prefix": control_prefix,
+            "parameters": parameters, "check_free": check_free, "control_prefix": control_prefix,
             "check": names, "model_part": model_part, "start": start, "photos": photos,
         }  # fmt: skip
-        raise typer.Exit(run_adjust_parts(block, out, robust, executor, json_, **others))
+        raise typer.Exit(run_adjust_parts(block, out, robust, geoid, executor, json_, plots, **others))
     if executor != THREADS:
         raise InputError(f"--executor {executor} for a block in one piece", "divide it first: aerotri divide")
     raise typer.Exit(

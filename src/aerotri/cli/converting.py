@@ -151,12 +151,21 @@ def convert(
             rich_help_panel=OUTPUT,
         ),
     ] = False,
+    parts: Annotated[
+        int | None,
+        typer.Option(
+            min=2,
+            help="Write the block in so many parts, for adjust --executor, never holding its image points (COLMAP, "
+            "PAT-B, BINGO).",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
     overwrite: Overwrite = False,
     json_: Json = False,
 ) -> None:
     """Convert between formats, or make a block of several files; adjusts first where the target needs it."""
     from aerotri.commands.console import OldForm
-    from aerotri.commands.convert import camera_spec, run_convert
+    from aerotri.commands.convert import camera_spec, run_convert, run_convert_parts
     from aerotri.formats.assembly.assemble import Statements
     from aerotri.formats.assembly.project import Request
 
@@ -187,7 +196,10 @@ def convert(
         station_pattern=station_pattern,
         rig_reference=rig_reference,
     )
-    run_convert(request, form.needed(), to, json_, overwrite, in_place)
+    if parts is None:
+        run_convert(request, form.needed(), to, json_, overwrite, in_place)
+    else:
+        run_convert_parts(request, form.needed(), to, parts, json_, in_place)
     form.tell()
 
 

@@ -10,7 +10,16 @@ from aerotri.conventions import InputError
 from aerotri.formats.results.json_text import json_text
 
 
-def run_adjust_parts(path: Path, out: Path | None, robust: Any, executor: str, as_json: bool, **others: Any) -> int:
+def run_adjust_parts(
+    path: Path,
+    out: Path | None,
+    robust: Any,
+    geoid: Path | None,
+    executor: str,
+    as_json: bool,
+    plots: bool,
+    **others: Any,
+) -> int:
     """Exit code of the command: 0 when converged and not rejected, 1 otherwise; arguments as on the command line.
 
     Parameters
@@ -33,11 +42,17 @@ def run_adjust_parts(path: Path, out: Path | None, robust: Any, executor: str, a
     console = Console(quiet=as_json)
     target = out or Path(f"{path.resolve().name}_result")
     console.progress(compilation_notice())
-    found = adjust_parts(path, target, robust=robust, executor=executor, progress=console.stage)
+    found = adjust_parts(
+        path, target, robust=robust, geoid=geoid, plots=plots, executor=executor, progress=console.stage
+    )
     if as_json:
         print(json_text(whole_json(found.record)))
     else:
         console.lines(
-            [*parts_lines(found.record), f"Written to {target}, photographs and points of each part to {target}/parts"]
+            [
+                *parts_lines(found.record),
+                f"Written to {target}, photographs and points of each part to {target}/parts"
+                + (f", report: {target}/report.html" if plots else ""),
+            ]
         )
     return 1 if found.status != "converged" or found.verdict == "rejected" else 0

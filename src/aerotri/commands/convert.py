@@ -104,3 +104,26 @@ def run_convert(
         print(json_text({"target": str(target), "format": to, "messages": messages}, None))
         return
     print("\n".join([*messages, f"Written to {target}"]))
+
+
+def run_convert_parts(request: Request, target: Path, to: str, parts: int, as_json: bool, in_place: bool) -> None:
+    """Convert into parts; arguments as on the command line.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.formats.block.folder import read_photographs
+    from aerotri.partition.adjusting import part_folders
+    from aerotri.public.parts import convert_request_parts
+
+    if to != "block" or in_place:
+        option = "--in-place" if in_place else f"--to {to}"
+        raise InputError(f"{option} does not go with --parts", "parts are block folders: leave it out")
+    messages = convert_request_parts(request, target, parts=parts, progress=Console(quiet=as_json).stage)
+    counts = {folder.name: len(read_photographs(folder)) for folder in part_folders(target)}
+    if as_json:
+        print(json_text({"target": str(target), "format": "block", "parts": counts, "messages": list(messages)}, None))
+        return
+    said = f"{len(counts)} parts of {min(counts.values())} to {max(counts.values())} photographs"
+    print("\n".join([*messages, said, f"Written to {target}: aerotri adjust {target}"]))

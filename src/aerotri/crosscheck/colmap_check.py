@@ -30,7 +30,8 @@ from aerotri.crosscheck.freed import FreedBlock, freed_block
 from aerotri.crosscheck.start import displacement, intersect, typical_distance
 from aerotri.formats.assembly.oriented import OrientedBlock, oriented_from_adjusted
 from aerotri.formats.assembly.reprojection import ideal_tangents
-from aerotri.formats.foreign.colmap import COLMAP_FROM_CAMERA, point_numbers, write_colmap
+from aerotri.formats.foreign.colmap import point_numbers, write_colmap
+from aerotri.formats.foreign.colmap_rigs import COLMAP_FROM_CAMERA
 from aerotri.functional_model.rotation import angles_from_rotation, exponential, small_rotation_per_angle
 from aerotri.observations import Block
 from aerotri.results.adjusted_block import AdjustedBlock

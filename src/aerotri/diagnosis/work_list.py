@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -74,8 +74,21 @@ def work_list(adjusted: AdjustedBlock, limits: WorkLimits | None = None) -> Work
         *_parameters(adjusted),
         *_points(adjusted, limits),
     ]
+    return _listed(found, limits)
+
+
+def joined(lists: Sequence[WorkList], limits: WorkLimits | None = None) -> WorkList:
+    """One work list of those of several parts of a block; rows of points and photographs are left out."""
+    items = [replace(item, points=(), images=()) for one in lists for item in one.items]
+    count = Counter[str]()
+    for one in lists:
+        count.update(one.found)
+    return replace(_listed(items, limits or WorkLimits()), found=dict(count))
+
+
+def _listed(found: list[WorkItem], limits: WorkLimits) -> WorkList:
     found.sort(key=lambda item: (item.priority, -item.severity, KINDS.index(item.kind)))
-    listed, of_kind = [], Counter()
+    listed, of_kind = list[WorkItem](), Counter[str]()
     for item in found:
         of_kind[item.kind] += 1
         if of_kind[item.kind] <= limits.per_kind and len(listed) < limits.items:

@@ -20,8 +20,9 @@ from aerotri.formats.foreign import bundler, colmap, opensfm, patb
 from aerotri.formats.foreign.bal import is_bal, read_bal, write_bal
 from aerotri.formats.foreign.bingo import write_bingo
 from aerotri.formats.foreign.bundler import is_bundler, read_bundler, write_bundler
-from aerotri.formats.foreign.colmap import is_colmap, read_colmap, write_colmap
+from aerotri.formats.foreign.colmap import read_colmap, write_colmap
 from aerotri.formats.foreign.colmap_in_place import update_colmap
+from aerotri.formats.foreign.colmap_model import is_colmap
 from aerotri.formats.foreign.dbat import read_dbat
 from aerotri.formats.foreign.dbat_script import is_dbat
 from aerotri.formats.foreign.ign import write_ign_opk

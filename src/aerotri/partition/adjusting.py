@@ -17,15 +17,17 @@ from aerotri.observations import Block
 from aerotri.partition.common import Common, PartFacts
 from aerotri.partition.course import Course, Ended
 from aerotri.partition.joints import LEAST_BYTES, Joints
+from aerotri.partition.part_picture import SAMPLE_RAYS
 from aerotri.partition.part_results import Ending, Written, measure_part, write_part
 from aerotri.partition.part_system import refuse_robust
 from aerotri.partition.part_tasks import PartTask, Setting, prepare_part
-from aerotri.partition.whole import Whole, whole_of
+from aerotri.partition.placing import Place, place_of
+from aerotri.partition.whole import PARTS, Whole, whole_of
 from aerotri.results.adjusted_block import Outcome
 from aerotri.statistics.summarise import parameters_of
 
-PARTS, WORK = "parts", "work"
-"""Folders: of the parts in a block and in a result; of what the tasks exchange, while they run."""
+WORK = "work"
+"""Folder of what the tasks exchange, while they run."""
 BYTES_A_RAY = 3000
 """Memory of a part's task beside its factor [C]: tables, partials and pairs of a ray."""
 Say = Callable[[str, float | None], None]
@@ -39,10 +41,12 @@ class PartsSettings:
     ----------
     robust : estimator that lowers the weight of gross errors; as the parts say where None.
     max_iterations : at most, in each stage of a robust estimator; as the parts say where None.
+    geoid : grid for the heights of the block's CRS, where PROJ does not have it; every worker sees it.
     """
 
     robust: str | None = None
     max_iterations: int | None = None
+    geoid: Path | None = None
 
 
 def part_folders(folder: Path) -> list[Path]:
@@ -66,10 +70,10 @@ def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSet
         raise InputError("holds no parts", "divide a block: aerotri divide BLOCK FOLDER --parts N", folder)
     work = out / WORK
     try:
-        names, origin = _shared_photographs(sources)
+        names, origin, place = _shared_photographs(sources, settings.geoid)
         tasks = [PartTask(p.name, p.resolve(), (work / p.name).resolve()) for p in sources]
         say("reading the parts", None)
-        facts = executor.run(_reading(Setting(names, origin), tasks, work))
+        facts = executor.run(_reading(Setting(names, origin, place), tasks, work))
         first = read_block(sources[0], rays_needed=False)
         common = _common_of(facts, tasks)
         joints = Joints(common, tasks, executor, work)
@@ -86,7 +90,8 @@ def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSet
         solved = time.perf_counter()
         say("standard deviations", None)
         photographs = sum(part.images for part in facts) + len(common.images)
-        whole = _with_sigma(course, ended, first, out, observations, unknowns, photographs)
+        every = max(1, sum(part.rays for part in facts) // SAMPLE_RAYS)
+        whole = _with_sigma(course, ended, first, out, observations, unknowns, photographs, every, place)
         seconds = {"solve": solved - begun, "statistics": time.perf_counter() - solved}
         warnings = tuple(
             f"part {t.name}: {said}" for t, part in zip(tasks, facts, strict=True) for said in part.warnings
@@ -98,8 +103,9 @@ def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSet
 
 
 def _with_sigma(
-    course: Course, ended: Ended, first: Block, out: Path, observations: int, unknowns: int, photographs: int
-) -> Whole:
+    course: Course, ended: Ended, first: Block, out: Path, observations: int, unknowns: int, photographs: int,
+    every: int, place_of_block: Place | None,
+) -> Whole:  # fmt: skip
     """Inverse, tables of the parts, and what they say together."""
     place, common = ended.place, course.common
     corner = course.solved(place)
@@ -116,9 +122,11 @@ def _with_sigma(
         iterations=ended.iterations, sigma0=sigma0, sigma0_um=sigma0 * first.settings.image_sigma_um, vtpv=vtpv,
         observations=observations, unknowns=unknowns, conditions=0, redundancy=observations - unknowns,
     )  # fmt: skip
-    written: list[Written] = course.run(write_part, Ending(place.at, outcome, (out / PARTS).resolve()))
+    written: list[Written] = course.run(
+        write_part, Ending(place.at, outcome, (out / PARTS).resolve(), every, place_of_block)
+    )
     parameters = parameters_of(common.labels, place.at.shared, corner.inverse, common.weighted, sigma0)
-    return whole_of(first, outcome, parameters, [task.name for task in course.tasks], written, photographs)
+    return whole_of(first, outcome, parameters, [task.name for task in course.tasks], written, photographs, every)
 
 
 def _reading(setting: Setting, tasks: list[PartTask], work: Path) -> Work[Setting, PartTask, PartFacts]:
@@ -127,12 +135,15 @@ def _reading(setting: Setting, tasks: list[PartTask], work: Path) -> Work[Settin
     return Work(prepare_part, setting, tasks, names, "parts", work, bytes_each=60 * size + LEAST_BYTES)
 
 
-def _shared_photographs(sources: Sequence[Path]) -> tuple[np.ndarray, np.ndarray]:
-    """Names of the photographs that stand in several parts, sorted; (3,) m, the local origin of all parts."""
+def _shared_photographs(sources: Sequence[Path], geoid: Path | None) -> tuple[np.ndarray, np.ndarray, Place | None]:
+    """Names of the photographs that stand in several parts, sorted; (3,) m, the local origin; the place of all."""
     of_parts = [read_photographs(source) for source in sources]
     unique, count = np.unique(np.concatenate([images.names for images in of_parts]), return_counts=True)
-    middle = np.nanmean(np.concatenate([images.centre for images in of_parts]), axis=0)
-    return unique[count > 1], np.round(np.nan_to_num(middle))
+    centres = np.concatenate([images.centre for images in of_parts])
+    place = place_of(sources, geoid)
+    if place is not None:
+        centres = place.frame().to_local(centres)
+    return unique[count > 1], np.round(np.nan_to_num(np.nanmean(centres, axis=0))), place
 
 
 def _common_of(facts: Sequence[PartFacts], tasks: Sequence[PartTask]) -> Common:

@@ -52,12 +52,14 @@ class Place:
     Parameters
     ----------
     cost : Σρ of all observations. decrement : of what the parts eliminated; of_points : of the points among it.
+    is_bare : whether there are no equations: where a step that changes nothing led.
     """
 
     at: At
     cost: float
     decrement: float
     of_points: float
+    is_bare: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +147,7 @@ class Course:
         for _ in range(max_iterations):
             self._iteration += 1
             before = place
-            place, decrement, damping = self._improved(place, damping)
+            place, decrement, damping = self._improved(place, damping, last_decrement, name)
             if place is before:
                 return Ended("not converged", place, self._iteration)
             if self._report is not None:
@@ -157,15 +159,21 @@ class Course:
                 place, settled, scales = fresh, False, scales + 1
             if settled:
                 return Ended("converged", place, self._iteration)
+            if place.is_bare:
+                place = self._reduced(place.at)
         return Ended("not converged", place, self._iteration)
 
-    def _improved(self, place: Place, damping: Damping) -> tuple[Place, float, Damping]:
+    def _improved(
+        self, place: Place, damping: Damping, last_decrement: float, name: str
+    ) -> tuple[Place, float, Damping]:
         """The place that a step leads to, damped until it improves; the place itself where none does."""
         while True:
             damped = place if damping.value == 0.0 else self._reduced(self._again(place.at, damping.value))
             solved = self.solved(damped)
             decrement = solved.decrement + damped.decrement
-            there = self._moved(damped, solved)
+            # the equations at the end are taken with parameters at adjusted image points, not here
+            last = name == "off" and damping.value == 0.0 and self._is_negligible(decrement, last_decrement, place.cost)
+            there = self._moved(damped, solved, last)
             if damped is not place:
                 self._drop(damped.at)
             if there.cost <= place.cost * (1.0 + COST_TOLERANCE):
@@ -187,19 +195,23 @@ class Course:
             variance = max(after.cost, 1e-30) / max(self.redundancy, 1)
             still = abs(before.cost - after.cost) <= ROBUST_COST_TOLERANCE * before.cost
             return still and decrement - before.of_points <= tolerance**2 * variance
+        return self._is_negligible(decrement, last_decrement, after.cost)
+
+    def _is_negligible(self, decrement: float, last_decrement: float, cost: float) -> bool:
         contraction = min(1.0, max(1e-2, abs(decrement) / last_decrement)) if np.isfinite(last_decrement) else 1.0
-        return is_negligible(abs(decrement) * contraction, after.cost, self.redundancy)
+        return is_negligible(abs(decrement) * contraction, cost, self.redundancy)
 
     def _reduced(self, at: At) -> Place:
         """The equations of all parts there."""
         return self._place(at, self.run(reduce_part, at))
 
-    def _moved(self, place: Place, solved: Corner) -> Place:
-        """Where a solution leads all parts."""
+    def _moved(self, place: Place, solved: Corner, last: bool) -> Place:
+        """Where a solution leads all parts; without equations there where it is the last step."""
         self.joints.follow(place.at.tag)
         shared = place.at.shared + solved.step
         at = replace(place.at, state=self._next_state(), shared=shared, damping=0.0, tag=self._next_tag())
-        return self._place(at, self.run(move_part, Move(place.at, at)), may_fail=True)
+        there = self._place(at, self.run(move_part, Move(place.at, at, last)), may_fail=True)
+        return replace(there, is_bare=last)
 
     def _place(self, at: At, found: list[Reduced], may_fail: bool = False) -> Place:
         if not may_fail:

@@ -14,11 +14,12 @@ import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from aerotri.formats.block.in_pieces import BlockInPieces
+from aerotri.conventions import InputError
+from aerotri.formats.block.in_pieces import PieceOfRays
 from aerotri.formats.text.arrow_compute import arrow_compute
 from aerotri.observations import Block
 from aerotri.partition.dividing import (
@@ -40,7 +41,24 @@ MOST_FILES = 500
 Say = Callable[[str, float | None], None]
 
 
-def divided(source: BlockInPieces, parts: int, room: Path, say: Say) -> Iterator[Block]:
+class InPieces(Protocol):
+    """A block whose image points are read piece by piece, as `formats.block.in_pieces.BlockInPieces`."""
+
+    @property
+    def block(self) -> Block:
+        """No image points; `points` are the names of control and check points alone."""
+        ...
+
+    def pieces(self) -> Iterator[PieceOfRays]:
+        """All image points, some at a time."""
+        ...
+
+    def twice(self, rows: tuple[int, int]) -> InputError:
+        """The error of a point that is there twice in a photograph, in two rows from 0."""
+        ...
+
+
+def divided(source: InPieces, parts: int, room: Path, say: Say) -> Iterator[Block]:
     """The parts of a block one after the other, as `dividing.part_of` gives them.
 
     Parameters
@@ -76,7 +94,7 @@ def _file_of(names: pa.StringArray, count: int) -> np.ndarray:
     return np.array([zlib.crc32(name.encode()) % count for name in names.to_pylist()], dtype=np.int64)
 
 
-def _divided(source: BlockInPieces, by_point: RayFiles, count: int, parts: int, position: np.ndarray) -> Division:
+def _divided(source: InPieces, by_point: RayFiles, count: int, parts: int, position: np.ndarray) -> Division:
     """Which part photographs belong to; nothing is said of points."""
     n = len(position)
     edges = np.zeros((0, 2), np.int64)
@@ -124,7 +142,7 @@ def _groups(found: NamedRays) -> PointRays:
     return PointRays.of(found.rays.image, found.rays.point, len(found.names))
 
 
-def _refuse_twice(source: BlockInPieces, found: NamedRays) -> None:
+def _refuse_twice(source: InPieces, found: NamedRays) -> None:
     """A point that is there twice in a photograph, in pieces that were read apart."""
     rays = found.rays
     order = np.lexsort((found.row, rays.point, rays.image))

@@ -11,9 +11,13 @@ from aerotri.adjustment.partial_factor import restored
 from aerotri.adjustment.ray_status import RayStatus
 from aerotri.adjustment.solve import Solution
 from aerotri.diagnosis import judge
+from aerotri.formats.block.folder import read_block
 from aerotri.formats.results.adjustment import write_result
+from aerotri.partition.part_picture import PartPicture, picture_of
 from aerotri.partition.part_tasks import At, PartTask
+from aerotri.partition.placing import Place
 from aerotri.results.adjusted_block import AdjustedBlock, Blunder, GroundPointResults, ObservationGroup, Outcome
+from aerotri.results.in_crs import transform_result
 from aerotri.statistics.covariance import Cofactors
 from aerotri.statistics.held_control import no_held_tests
 from aerotri.statistics.summarise import record_of, turned_down, weighted_sum
@@ -42,11 +46,14 @@ class Ending:
     Parameters
     ----------
     at : where. outcome : of the whole. folder : for the folders of the parts, by name.
+    every : one point of so many goes to the page of the whole. place : see `Setting`.
     """
 
     at: At
     outcome: Outcome
     folder: Path
+    every: int
+    place: Place | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +80,7 @@ class Written:
     ----------
     verdict : 'accepted', 'doubtful' or 'rejected'. reasons : sentences.
     control, check : its ground points. groups : of its observations. blunders : suspected gross errors.
-    points, rays : how many; rays that were used.
+    points, rays : how many; rays that were used. picture : for the page of the whole.
     """
 
     verdict: str
@@ -84,6 +91,7 @@ class Written:
     blunders: tuple[Blunder, ...]
     points: int
     rays: int
+    picture: PartPicture
 
 
 def measure_part(at: At, task: PartTask) -> Measured:
@@ -112,10 +120,16 @@ def write_part(ending: Ending, task: PartTask) -> Written:
     found = record_of(part.system, solution, q, outcome, no_held_tests(part.system), part.ray_status)
     verdict = judge(found)
     found = replace(found, outcome=replace(outcome, verdict=verdict.level, reasons=verdict.reasons))
-    write_result(found, ending.folder / task.name)
+    result = found
+    if ending.place is not None:
+        result = transform_result(found, read_block(task.source, rays_needed=False), ending.place.frame())
+    write_result(result, ending.folder / task.name)
+    shared = np.zeros(len(found.block.images), bool)
+    shared[part.system.unknowns.images[part.kept]] = True
     return Written(
-        verdict.level, verdict.reasons, _ground_points(found, found.control), _ground_points(found, found.check),
+        verdict.level, verdict.reasons, _ground_points(result, result.control), _ground_points(result, result.check),
         found.groups, found.blunders, len(found.block.points), int(np.sum(found.rays.status == RayStatus.USED)),
+        picture_of(found, result, shared, ending.every),
     )  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from aerotri.adjustment.system import build_system
 from aerotri.adjustment.unknowns import State
 from aerotri.conventions import InputError
 from aerotri.observations import Block
+from aerotri.partition.placing import refuse_partly_known
 
 IN_ONE_PIECE = "adjust the block in one piece: aerotri adjust of the block that was divided"
 ROBUST = ("off", "huber")
@@ -95,14 +96,13 @@ def refuse_what_parts_cannot(block: Block) -> None:
     """
     s = block.settings
     refuse_robust(s.adjustment.robust)
+    refuse_partly_known(block)
     known = np.isfinite(np.hstack([block.images.centre, block.images.angles])).all(axis=1)
     without = block.images.names[np.flatnonzero(~known)[:1]]
     held = bool((block.control.sigma[~block.control.is_check] == 0.0).any())
     families = {family for family, _ in s.adjustment.additional_parameters}
     chosen, fields = "auto" in families, "collocation" in families
     refused = [
-        (block.crs != "local", f'crs = "{block.crs}" of a block in parts',
-         'bring it to a local system: aerotri convert … ; crs = "local" in every block.toml'),
         (len(without) > 0, f"photograph '{''.join(without)}' has no orientation to begin with",
          "give X0, Y0, Z0, omega, phi, kappa of every photograph in images.csv"),
         (s.adjustment.datum != "control", f'datum = "{s.adjustment.datum}" of a block in parts', IN_ONE_PIECE),

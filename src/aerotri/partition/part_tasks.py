@@ -12,11 +12,13 @@ from aerotri.adjustment.partial_factor import eliminate_inner, restored
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.conventions import InputError
+from aerotri.coordinates.blocks import transform_block
 from aerotri.formats.block.folder import read_block
 from aerotri.partition.common import Left, PartFacts
 from aerotri.partition.joint_tasks import Above
 from aerotri.partition.part_files import PartFiles
 from aerotri.partition.part_system import PartSystem, part_system
+from aerotri.partition.placing import Place
 from aerotri.statistics.summarise import count_observations
 
 
@@ -58,10 +60,12 @@ class Setting:
     Parameters
     ----------
     shared_images : str, photographs that stand in several parts, sorted. origin : (3,) m, the local origin.
+    place : where a block with a coordinate system is adjusted; None of a local one.
     """
 
     shared_images: np.ndarray
     origin: np.ndarray
+    place: Place | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +88,16 @@ class At:
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """From one place to another."""
+    """From one place to another.
+
+    Parameters
+    ----------
+    last : whether nothing but the cost is wanted there, because the equations are taken elsewhere next.
+    """
 
     start: At
     end: At
+    last: bool = False
 
 
 @dataclass(frozen=True)
@@ -110,7 +120,8 @@ def prepare_part(setting: Setting, task: PartTask) -> PartFacts:
     """Read a part and set up its system."""
     block = read_block(task.source, rays_needed=False)
     shared = np.isin(block.images.names, setting.shared_images)
-    part, state = part_system(block, shared, setting.origin)
+    local = block if setting.place is None else transform_block(block, setting.place.frame())
+    part, state = part_system(local, shared, setting.origin)
     system, u = part.system, part.system.unknowns
     task.files.keep_system(part, 0)
     task.files.keep_state(state, 0)
@@ -150,7 +161,11 @@ def move_part(move: Move, task: PartTask) -> Reduced:
     step = part.system.whole_step(state, x, start.damping, start.estimator)
     if step is None:
         return Reduced(np.inf, fault="a step that is no number")
-    files.keep_state(part.system.unknowns.advance(state, step), move.end.state)
+    there = part.system.unknowns.advance(state, step)
+    files.keep_state(there, move.end.state)
+    if move.last:
+        there = files.state(move.end.state, move.end.shared[task.shared])
+        return Reduced(part.system.right_side(there, move.end.estimator).cost)
     return _reduced(part, move.end, task)
 
 

@@ -11,10 +11,12 @@ import numpy as np
 
 from aerotri.diagnosis.finding import GRADES
 from aerotri.formats.results.adjustment import adjustment_json, ground_point_columns, parameter_columns, write_csv
+from aerotri.formats.results.evaluation import work_columns
 from aerotri.formats.results.json_text import write_json
 from aerotri.observations import Block
 from aerotri.observations.block import Control
 from aerotri.partition.part_results import GroundPoints, Written
+from aerotri.partition.whole_picture import PartRow, WholePicture, whole_picture
 from aerotri.results.adjusted_block import (
     AdjustedBlock,
     Blunder,
@@ -26,7 +28,14 @@ from aerotri.results.adjusted_block import (
     RayResults,
     SharedParameters,
 )
+from aerotri.results.model_part import ModelPart
 
+NO_MODEL_PART = (
+    "σ holds for independent errors of the image points. What photographs of a strip, a direction of flight or a day "
+    "have in common (the model part of σ) is not in it, because the block was adjusted in parts"
+)
+PARTS = "parts"
+"""Folder of the parts in a block and in a result."""
 MOST_BLUNDERS, MOST_REASONS = 100, 10
 """Suspected gross errors, and reasons, of the whole that are listed; those of the parts have all."""
 
@@ -39,7 +48,7 @@ class Whole:
     ----------
     record : status, σ0, parameters, control and check points of the whole; its photographs, points and rays stand in
         the folders of the parts.
-    parts : names. photographs, points, rays : how many in all.
+    parts : names. photographs, points, rays : how many in all. picture : what its page shows.
     """
 
     record: AdjustedBlock
@@ -47,6 +56,7 @@ class Whole:
     photographs: int
     points: int
     rays: int
+    picture: WholePicture
 
     @property
     def outcome(self) -> Outcome:
@@ -55,13 +65,13 @@ class Whole:
 
 def whole_of(
     first: Block, outcome: Outcome, parameters: SharedParameters, names: Sequence[str], written: Sequence[Written],
-    photographs: int,
+    photographs: int, every: int,
 ) -> Whole:  # fmt: skip
     """What the parts say together.
 
     Parameters
     ----------
-    first : a part, for cameras and settings. outcome : without verdict.
+    first : a part, for cameras and settings. outcome : without verdict. every : see `WholePicture`.
     """
     control, of_control = _ground_points([part.control for part in written], is_check=False, first=0)
     check, of_check = _ground_points([part.check for part in written], is_check=True, first=len(control.point))
@@ -91,7 +101,13 @@ def whole_of(
     note = f"adjusted in {len(names)} parts: {photographs} photographs, {count_points} points, {count_rays} rays"
     record = AdjustedBlock(
         block=block,
-        outcome=replace(outcome, verdict=worst, reasons=tuple(reasons[:MOST_REASONS]), notes=(note,)),
+        outcome=replace(
+            outcome,
+            verdict=worst,
+            reasons=tuple(reasons[:MOST_REASONS]),
+            notes=(note,),
+            warnings=_said_first(first, names, written),
+        ),
         images=ImageResults(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 6, 6)), nothing),
         points=PointResults(adjusted, np.zeros((len(points), 3, 3)), np.zeros(len(points), int), np.zeros(len(points))),
         rays=RayResults(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int8)),
@@ -100,16 +116,37 @@ def whole_of(
         check=of_check,
         groups=_groups(written),
         blunders=_largest(written),
+        model_part=ModelPart(reason=NO_MODEL_PART),
     )
-    return Whole(record, tuple(names), photographs, count_points, count_rays)
+    rows = [
+        PartRow(
+            name, one.picture.photographs, one.picture.shared, one.points, one.rays, one.picture.largest_w,
+            one.picture.beyond, one.picture.sigma, one.verdict,
+        )
+        for name, one in zip(names, written, strict=True)
+    ]  # fmt: skip
+    picture = whole_picture(record, [one.picture for one in written], rows, every)
+    return Whole(record, tuple(names), photographs, count_points, count_rays, picture)
+
+
+def _said_first(first: Block, names: Sequence[str], written: Sequence[Written]) -> tuple[str, ...]:
+    """That σ has no model part, and how to test whether there is one; nothing where the block asks for none."""
+    if first.settings.adjustment.model_part == "off":
+        return ()
+    largest = max(zip(names, written, strict=True), key=lambda one: one[1].rays)[0]
+    return (
+        f"{NO_MODEL_PART}. Test it on a part: aerotri adjust BLOCK/{PARTS}/{largest} says by how much its total σ are "
+        "larger",
+    )
 
 
 def write_whole(whole: Whole, folder: Path) -> None:
-    """adjustment.json, parameters.csv, control.csv and check.csv beside the folder of the parts."""
+    """adjustment.json, parameters.csv, control.csv, check.csv and work_list.csv beside the folder of the parts."""
     record = whole.record
     write_csv(folder / "parameters.csv", parameter_columns(record))
     write_csv(folder / "control.csv", ground_point_columns(record, record.control))
     write_csv(folder / "check.csv", ground_point_columns(record, record.check))
+    write_csv(folder / "work_list.csv", work_columns(whole.picture.work))
     write_json(folder / "adjustment.json", whole_json(whole))
 
 

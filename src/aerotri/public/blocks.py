@@ -181,6 +181,83 @@ def read(
     InputError
         For whatever is missing, damaged or contradictory, naming the file.
     """
+    return read_request(
+        request_of(
+            source,
+            name=name,
+            image_points=image_points,
+            positions=positions,
+            control=control,
+            orientation=orientation,
+            check=check,
+            crs=crs,
+            camera=camera,
+            camera_name=camera_name,
+            camera_size=camera_size,
+            pixel_um=pixel_um,
+            focal_length_mm=focal_length_mm,
+            flight_axis=flight_axis,
+            free_interior=free_interior,
+            image_sigma_um=image_sigma_um,
+            image_sigma_px=image_sigma_px,
+            control_prefix=control_prefix,
+            control_sigma_m=control_sigma_m,
+            control_heights=control_heights,
+            positions_sigma_m=positions_sigma_m,
+            orientation_sigma_m=orientation_sigma_m,
+            orientation_sigma_deg=orientation_sigma_deg,
+            gnss_shift=gnss_shift,
+            geoid=geoid,
+            axes=axes,
+            offset=offset,
+            patb_rotation=patb_rotation,
+            linear_alteration_m=linear_alteration_m,
+            station_pattern=station_pattern,
+            rig_reference=rig_reference,
+        )
+    )
+
+
+def request_of(
+    source: FilePath,
+    *,
+    name: str = "",
+    image_points: Sequence[FilePath] = (),
+    positions: FilePath | None = None,
+    control: FilePath | None = None,
+    orientation: FilePath | None = None,
+    check: Sequence[str] = (),
+    crs: str = "",
+    camera: FilePath | None = None,
+    camera_name: str = "",
+    camera_size: tuple[int, int] | None = None,
+    pixel_um: float | None = None,
+    focal_length_mm: float | None = None,
+    flight_axis: FlightAxis | None = None,
+    free_interior: bool = False,
+    image_sigma_um: float | None = None,
+    image_sigma_px: float | None = None,
+    control_prefix: str = "",
+    control_sigma_m: Sigmas | None = None,
+    control_heights: ControlHeights = "crs",
+    positions_sigma_m: Sigmas | None = None,
+    orientation_sigma_m: Sigmas | None = None,
+    orientation_sigma_deg: Sigmas | None = None,
+    gnss_shift: GnssShift | None = None,
+    geoid: FilePath | None = None,
+    axes: Axes | None = None,
+    offset: FilePath | None = None,
+    patb_rotation: PatbRotation | None = None,
+    linear_alteration_m: float | None = None,
+    station_pattern: str = "",
+    rig_reference: str = "",
+) -> Request:
+    """What `read` is asked for, in one record; arguments as there.
+
+    Raises
+    ------
+    InputError
+    """
     from aerotri.formats.assembly.assemble import Statements
     from aerotri.formats.assembly.camera_spec import CameraSpec
     from aerotri.formats.assembly.project import Request
@@ -197,7 +274,7 @@ def read(
         linear_alteration_m=linear_alteration_m,
         patb_rotation=patb_rotation,
     )
-    request = Request(
+    return Request(
         source=text_of_path(source),
         name=name,
         image_points=tuple(text_of_path(path) for path in image_points),
@@ -215,7 +292,6 @@ def read(
         station_pattern=station_pattern,
         rig_reference=rig_reference,
     )
-    return read_request(request)
 
 
 def read_request(request: Request) -> ReadBlock:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,9 +14,11 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.execution.choice import THREADS, chosen
+from aerotri.public.blocks import request_of
 from aerotri.public.progress import ProgressLike, stage_report
 
 if TYPE_CHECKING:
+    from aerotri.formats.assembly.project import Request
     from aerotri.observations import Block
     from aerotri.partition.whole import Whole
     from aerotri.public.table import Table
@@ -136,12 +140,11 @@ def divide(
     from aerotri.formats.block.writer import write_block
     from aerotri.formats.files.atomic import room_beside
     from aerotri.observations import Block
-    from aerotri.partition.adjusting import PARTS
+    from aerotri.partition.whole import PARTS
     from aerotri.public.folders import refuse_foreign_folder
 
     target = Path(folder)
-    if parts is not None and parts < 2:
-        raise InputError(f"{parts} parts", "a block is divided into two parts or more")
+    _refuse_few(parts)
     refuse_foreign_folder(target)
     with stage_report(progress) as report, room_beside(target) as room:
         if isinstance(block, Block):
@@ -163,6 +166,7 @@ def _parts_in_pieces(path: FilePath, parts: int | None, room: Path, say: Say) ->
     source = open_in_pieces(path)
     if source is None:
         return _whole_parts(read_block(path), parts, say)
+    source = replace(source, block=_in_metres(source.block))
     refuse_what_parts_cannot(source.block)
     return divided(source, _count(source.block, parts), room, say)
 
@@ -173,6 +177,7 @@ def _whole_parts(block: Block, parts: int | None, say: Say) -> Iterator[Block]:
     from aerotri.partition.dividing import part_of
     from aerotri.partition.part_system import refuse_what_parts_cannot
 
+    block = _in_metres(block)
     refuse_what_parts_cannot(block)
     say("dividing", None)
     division = cut(block, _count(block, parts))
@@ -181,8 +186,110 @@ def _whole_parts(block: Block, parts: int | None, say: Say) -> Iterator[Block]:
         yield part_of(block, division, number)
 
 
+def _in_metres(block: Block) -> Block:
+    """A block that counts in degrees in the UTM zone of its datum, as `adjust` brings it there.
+
+    Warns
+    -----
+    UserWarning
+        Naming both systems.
+    """
+    from aerotri.coordinates.metric import in_metres
+
+    block, said = in_metres(block)
+    if said:
+        warnings.warn(said, stacklevel=4)
+    return block
+
+
 def _count(block: Block, parts: int | None) -> int:
     return max(2, math.ceil(len(block.images) / PHOTOGRAPHS_A_PART)) if parts is None else parts
+
+
+def convert_parts(
+    source: FilePath, folder: FilePath, *, parts: int | None = None, tables: Literal["csv", "parquet"] = "parquet",
+    progress: ProgressLike = None, **stated: Any,
+) -> tuple[str, ...]:  # fmt: skip
+    """Write a block of another program in parts for `adjust_parts`, without ever holding its image points.
+
+    The files are those of `divide` after `convert`. Image points of COLMAP, PAT-B (.im) and BINGO are read piece by
+    piece; other formats are refused by name.
+
+    Parameters
+    ----------
+    source : COLMAP model, folder of PAT-B files, .im or BINGO file.
+    folder : an empty folder; the parts are written to parts/0000, parts/0001 and so on.
+    parts : how many; as many as have 2000 photographs each where None, two at least.
+    tables : 'csv' or 'parquet'.
+    progress : True for a bar, or a function that takes (stage, share).
+    **stated : further files, the camera and what else the source does not tell, as of `aerotri.read`.
+
+    Returns
+    -------
+    tuple of str
+        What was matched, assumed or left out, in sentences.
+
+    Raises
+    ------
+    InputError
+        As `aerotri.read` and `divide`; for a format that is not read in pieces.
+
+    Examples
+    --------
+    >>> import aerotri, tempfile
+    >>> plan = aerotri.example_flight()
+    >>> plan["flight"]["images_per_strip"] = 16
+    >>> flown = aerotri.simulate(plan, seed=1)
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     said = aerotri.convert(flown.block, f"{place}/patb", "patb")
+    ...     said = aerotri.convert_parts(
+    ...         f"{place}/patb", f"{place}/parts", parts=2, control_sigma_m=(0.02, 0.02, 0.04),
+    ...         camera_size=(11500, 7500), pixel_um=9.0,
+    ...     )
+    ...     found = aerotri.adjust_parts(f"{place}/parts", f"{place}/result")
+    >>> found.status
+    'converged'
+    """
+    return convert_request_parts(
+        request_of(source, **stated), Path(folder), parts=parts, tables=tables, progress=progress
+    )  # fmt: skip
+
+
+def convert_request_parts(
+    request: Request, target: Path, *, parts: int | None = None, tables: Literal["csv", "parquet"] = "parquet",
+    progress: ProgressLike = None,
+) -> tuple[str, ...]:  # fmt: skip
+    """As `convert_parts`, with everything that is stated in one record.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.formats.assembly.project_in_pieces import read_in_pieces
+    from aerotri.formats.block.writer import write_block
+    from aerotri.formats.files.atomic import room_beside
+    from aerotri.partition.dividing_pieces import divided
+    from aerotri.partition.part_system import refuse_what_parts_cannot
+    from aerotri.partition.whole import PARTS
+    from aerotri.public.folders import refuse_foreign_folder
+
+    _refuse_few(parts)
+    refuse_foreign_folder(target)
+    request = replace(request, name=request.name or target.resolve().name)
+    with stage_report(progress) as report, room_beside(target) as room:
+        report.stage("reading photographs", None)
+        source = read_in_pieces(request, room / "head")
+        source = replace(source, block=_in_metres(source.block))
+        refuse_what_parts_cannot(source.block)
+        cut = divided(source, _count(source.block, parts), room, report.stage)
+        for number, part in enumerate(cut):
+            write_block(part, target / PARTS / f"{number:04d}", tables=tables)
+    return source.messages
+
+
+def _refuse_few(parts: int | None) -> None:
+    if parts is not None and parts < 2:
+        raise InputError(f"{parts} parts", "a block is divided into two parts or more")
 
 
 def simulate_parts(
@@ -223,8 +330,8 @@ def simulate_parts(
     (32, 'converged')
     """
     from aerotri import simulation
-    from aerotri.partition.adjusting import PARTS
     from aerotri.partition.part_system import refuse_what_parts_cannot
+    from aerotri.partition.whole import PARTS
     from aerotri.public.folders import refuse_foreign_folder
 
     spec = simulation.parse_spec(plan) if isinstance(plan, Mapping) else simulation.read_spec(plan)
@@ -245,7 +352,8 @@ def simulate_parts(
 
 def adjust_parts(
     folder: FilePath, out: FilePath, *, robust: Literal["off", "huber"] | None = None,
-    max_iterations: int | None = None, executor: str = THREADS, progress: ProgressLike = None,
+    max_iterations: int | None = None, geoid: FilePath | None = None, plots: bool = True, executor: str = THREADS,
+    progress: ProgressLike = None,
 ) -> PartsAdjustment:  # fmt: skip
     """Adjust a block in parts: the numbers of `adjust` of the whole, without ever holding it whole.
 
@@ -258,6 +366,8 @@ def adjust_parts(
     out : folder to write; the tables of a part go to parts/NAME in it.
     robust : 'huber' lowers the weight of gross errors; as the parts say where None.
     max_iterations : at most, in each stage of a robust estimator.
+    geoid : grid of geoid undulations for heights of the coordinate system; every worker sees it under this name.
+    plots : draw the plots and the report, report.html; without them it is quicker.
     executor : where the parts are computed: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'.
     progress : True for a bar, or a function that takes (stage, share).
 
@@ -286,20 +396,36 @@ def adjust_parts(
     """
     from aerotri.execution.opening import opened
     from aerotri.formats.files.atomic import atomic_folder
-    from aerotri.partition.adjusting import PARTS, PartsSettings
+    from aerotri.partition.adjusting import PartsSettings
     from aerotri.partition.adjusting import adjust_parts as adjust
-    from aerotri.partition.whole import write_whole
+    from aerotri.partition.whole import PARTS, write_whole
     from aerotri.public.folders import refuse_foreign_folder
 
-    target = Path(out)
+    target, grid = Path(out), None if geoid is None else Path(geoid).resolve()
     refuse_foreign_folder(target, "adjustment.json")
     chosen(executor)
-    own = ("adjustment.json", "parameters.csv", "control.csv", "check.csv", PARTS)
+    tables = ("parameters.csv", "control.csv", "check.csv", "work_list.csv")
+    own = ("adjustment.json", *tables, "report.html", "plots", PARTS)
     with (
         stage_report(progress) as report,
         opened(executor, report.said) as workers,
         atomic_folder(target, own) as place,
     ):
-        whole = adjust(Path(folder), place, workers, PartsSettings(robust, max_iterations), report.stage)
+        whole = adjust(Path(folder), place, workers, PartsSettings(robust, max_iterations, grid), report.stage)
+        if plots:
+            report.stage("drawing", None)
+            whole = _drawn(whole, place)
         write_whole(whole, place)
     return PartsAdjustment(whole, target)
+
+
+def _drawn(whole: Whole, folder: Path) -> Whole:
+    """The report and its plots, the time of them counted."""
+    from aerotri.report.pages.parts import parts_plots, write_parts_report
+    from aerotri.report.plots.overview import save_plots
+
+    begun = time.perf_counter()
+    write_parts_report(whole, save_plots(parts_plots(whole), folder / "plots"), folder / "report.html")
+    outcome = whole.record.outcome
+    timings = {**outcome.timings_s, "plots": time.perf_counter() - begun}
+    return replace(whole, record=replace(whole.record, outcome=replace(outcome, timings_s=timings)))

@@ -13,8 +13,8 @@ import numpy as np
 
 from aerotri.conventions import InputError, px_from_mm
 from aerotri.formats.assembly.reprojection import ideal_tangents
-from aerotri.formats.foreign.colmap import COLMAP_FROM_CAMERA
 from aerotri.formats.foreign.colmap_cameras import SIGN
+from aerotri.formats.foreign.colmap_rigs import COLMAP_FROM_CAMERA
 from aerotri.observations import Block, Camera, Prior
 
 LENS_IN_MAPPING = ("k1", "k2")

@@ -96,8 +96,8 @@ def with_rays(reading: Reading, rays: RayList, sigma_px: float = 1.0) -> Reading
         place.setdefault(name, len(place))
     points = np.array(list(place), dtype=str) if place else np.zeros(0, "<U1")
     point = np.array([place[name] for name in rays.points[used].tolist()], dtype=np.int64)[point_of_ray.ravel()]
-    xy = _to_mm(rays.xy[keep], rays.unit, block.images.camera[image], block.cameras)
-    _refuse_outside(block, rays, image, point, points, xy)
+    xy = rays_to_mm(rays.xy[keep], rays.unit, block.images.camera[image], block.cameras)
+    refuse_outside(block, rays.path, image, points[point], xy)
     pixel = np.array([camera.pixel_mm for camera in block.cameras])[block.images.camera[image]]
     sigma = np.repeat(sigma_px * pixel[:, None], 2, axis=1)
     old = block.image_points
@@ -139,7 +139,8 @@ def _not_met(known: np.ndarray, index: np.ndarray) -> list[str]:
     return known[np.setdiff1d(np.arange(len(known)), index)].astype(str).tolist()
 
 
-def _to_mm(xy: np.ndarray, unit: str, camera: np.ndarray, cameras: tuple[Camera, ...]) -> np.ndarray:
+def rays_to_mm(xy: np.ndarray, unit: str, camera: np.ndarray, cameras: tuple[Camera, ...]) -> np.ndarray:
+    """(m, 2) mm of image points in a unit of `RayList`, of cameras (m,)."""
     if unit == "mm":
         return xy
     found = np.empty_like(xy)
@@ -149,20 +150,28 @@ def _to_mm(xy: np.ndarray, unit: str, camera: np.ndarray, cameras: tuple[Camera,
     return found
 
 
-def _refuse_outside(
-    block: Block, rays: RayList, image: np.ndarray, point: np.ndarray, points: np.ndarray, xy: np.ndarray
-) -> None:
+def refuse_outside(block: Block, path: os.PathLike[str], image: np.ndarray, names: np.ndarray, xy: np.ndarray) -> None:
+    """Refuse image points outside of the format.
+
+    Parameters
+    ----------
+    path : their file. image : (m,) photographs of the block. names : (m,) of the points. xy : (m, 2) mm.
+
+    Raises
+    ------
+    InputError
+    """
     half = np.array([camera.half_format_mm for camera in block.cameras])[block.images.camera[image]]
     outside = np.flatnonzero((np.abs(xy) > (1.0 + 2.0 * OUTSIDE) * half).any(axis=1))
     if len(outside):
         row = int(outside[0])
         camera = block.cameras[block.images.camera[image[row]]]
-        where = f"point '{points[point[row]]}' in photograph '{block.images.names[image[row]]}'"
+        where = f"point '{names[row]}' in photograph '{block.images.names[image[row]]}'"
         raise InputError(
             f"{where} lies outside the format of camera '{camera.name}': x = {xy[row, 0]:.6g} mm, "
             f"y = {xy[row, 1]:.6g} mm, the format reaches to ±{half[row, 0]:.6g}, ±{half[row, 1]:.6g} mm",
             "check the size of the camera and of its pixels",
-            rays.path,
+            path,
         )
 
 

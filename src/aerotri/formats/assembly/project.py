@@ -6,6 +6,7 @@ points, or a list of orientations (photographs alone). What else is given is add
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -93,9 +94,34 @@ def read_project(request: Request) -> Reading:
     InputError
         For whatever is missing, damaged or contradictory, naming the file and, of lists, the line.
     """
-    options = _options(request)
-    whole = _whole(request)
-    parts = _Parts() if whole is not None else _parts(request, options)
+    return assembled(request, _WHOLE)
+
+
+@dataclass(frozen=True)
+class Sources:
+    """How the source of a request is read where its image points are the bulk of it.
+
+    Parameters
+    ----------
+    colmap : a COLMAP model at a size of its pixels. rays : a file of image points, of a kind.
+    """
+
+    colmap: Callable[[Path, float], tuple[Block, np.ndarray | None]]
+    rays: Callable[[str, Path, ReadingOptions], RayList]
+
+
+def _read_rays(kind: str, path: Path, options: ReadingOptions) -> RayList:
+    return kinds.read_rays(f"{kind}:{path}", options)
+
+
+_WHOLE = Sources(read_colmap, _read_rays)
+
+
+def assembled(request: Request, sources: Sources) -> Reading:
+    """As `read_project`, its source read in a way of one's own."""
+    options = reading_options(request)
+    whole = _whole(request, sources)
+    parts = _Parts() if whole is not None else _parts(request, options, sources)
     reading = whole if whole is not None else _begin(request, parts)
     control = [*parts.control, *([kinds.read_control(request.control, options)] if request.control else [])]
     positions = kinds.read_position_list(request.positions, options) if request.positions else None
@@ -129,7 +155,14 @@ def _on_rig(reading: Reading, request: Request) -> Reading:
         raise InputError(error.message, error.remedy, error.file or Path(request.source)) from error
 
 
-def _options(request: Request) -> ReadingOptions:
+def reading_options(request: Request) -> ReadingOptions:
+    """What single formats leave open, of a request.
+
+    Raises
+    ------
+    InputError
+        When what is stated makes no sense.
+    """
     offset = None if request.offset is None else read_pix4d_offset(request.offset)
     if request.rig_reference and not request.station_pattern:
         raise InputError("--rig-reference is given, but no rig", "say how names tell it: --station-pattern PATTERN")
@@ -139,22 +172,33 @@ def _options(request: Request) -> ReadingOptions:
     return ReadingOptions(axes, offset, request.stated.patb_rotation)
 
 
-def _whole(request: Request) -> Reading | None:
+def _whole(request: Request, sources: Sources) -> Reading | None:
     """The source as a whole block; None where it is made of parts."""
-    reading = _as_it_is(request)
+    reading = _as_it_is(request, sources)
     if reading is None or not request.camera.free:
         return reading
     cameras = tuple(freed(camera) for camera in reading.block.cameras)
     return replace(reading, block=replace(reading.block, cameras=cameras))
 
 
-def _as_it_is(request: Request) -> Reading | None:
+def kind_of_source(request: Request) -> tuple[str | None, Path]:
+    """The kind of the source of a request, where it is stated or that of a whole block, and its path.
+
+    Raises
+    ------
+    InputError
+        When there is no such file.
+    """
     stated, path = kinds.split_kind(request.source, convert.READERS, FOLDERS, kinds.RAYS, kinds.ORIENTATIONS)
     if not path.exists():
         raise InputError("there is no such file or folder", "check the path", path)
-    kind = (
-        next((name for name, is_it in convert.RECOGNISERS.items() if is_it(path)), None) if stated is None else stated
-    )
+    if stated is None:
+        stated = next((name for name, is_it in convert.RECOGNISERS.items() if is_it(path)), None)
+    return stated, path
+
+
+def _as_it_is(request: Request, sources: Sources) -> Reading | None:
+    kind, path = kind_of_source(request)
     if kind not in convert.READERS:
         return None
     pixel_um, size_px = request.camera.pixel_um, request.camera.size_px
@@ -170,7 +214,7 @@ def _as_it_is(request: Request) -> Reading | None:
     if kind in ("bundler", "opensfm", "colmap"):
         pixel_um = UNKNOWN_PIXEL_UM if pixel_um is None else pixel_um
         if kind == "colmap":
-            block, points = read_colmap(path, pixel_um)
+            block, points = sources.colmap(path, pixel_um)
             return Reading(block, points, said)
         read = read_bundler(path, pixel_um, size_px) if kind == "bundler" else read_opensfm(path, pixel_um)
         return replace(read, messages=(*read.messages, *said))
@@ -182,23 +226,23 @@ def _as_it_is(request: Request) -> Reading | None:
     return Reading(block, points)
 
 
-def _parts(request: Request, options: ReadingOptions) -> _Parts:
+def _parts(request: Request, options: ReadingOptions, sources: Sources) -> _Parts:
     stated, path = kinds.split_kind(request.source, FOLDERS, kinds.RAYS, kinds.ORIENTATIONS)
     if path.is_dir():
         if stated == "ign" or (stated is None and is_ign(path)):
             return _ign(path, request)
         if stated == "patb" or (stated is None and files_of(path, ".im")):
-            return _patb(path, options)
+            return _patb(path, options, sources)
         raise InputError(
             "is a folder of no known format", f"known are {', '.join(convert.RECOGNISERS)}, ign, patb", path
         )
     kind = stated or kinds.kind_of(path, kinds.RAYS) or kinds.kind_of(path, kinds.ORIENTATIONS)
-    if kind in kinds.RAYS:
+    if kind is not None and kind in kinds.RAYS:
         if kind == "odm-gcp":
             control = kinds.read_control(f"odm-gcp:{path}", options)
             rays = () if control.rays is None else (control.rays,)
             return _Parts(rays, control=(control,), files=(path,))
-        return _Parts((kinds.read_rays(f"{kind}:{path}", options),))
+        return _Parts((sources.rays(kind, path, options),))
     if kind in kinds.ORIENTATIONS:
         return _Parts(orientations=kinds.read_orientations(f"{kind}:{path}", options))
     known = ", ".join((*convert.RECOGNISERS, *FOLDERS, *kinds.RAYS, *kinds.ORIENTATIONS))
@@ -222,10 +266,10 @@ def _ign(folder: Path, request: Request) -> _Parts:
     return _Parts(rays, list_of, control, cameras, () if told else (said,))
 
 
-def _patb(folder: Path, options: ReadingOptions) -> _Parts:
+def _patb(folder: Path, options: ReadingOptions, sources: Sources) -> _Parts:
     """The .im, .ori and .con file of a folder."""
     paths = {ending: _only_one(folder, ending) if files_of(folder, ending) else None for ending in (".ori", ".con")}
-    rays = kinds.read_rays(f"patb-im:{_only_one(folder, '.im')}", options)
+    rays = sources.rays("patb-im", _only_one(folder, ".im"), options)
     orientations = kinds.read_orientations(f"patb-ori:{paths['.ori']}", options) if paths[".ori"] else None
     control = (kinds.read_control(f"patb-con:{paths['.con']}", options),) if paths[".con"] else ()
     return _Parts((rays,), orientations, control)
@@ -280,7 +324,6 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
     """Settings as stated, and how well image points fit the start values."""
     block, messages = replace(reading.block, name=request.name or reading.block.name), list(reading.messages)
     settings, rays = block.settings, block.image_points
-    pixel = np.array([camera.pixel_mm for camera in block.cameras])[block.images.camera[rays.image]]
     sigma_um, sigma_px = request.image_sigma_um, request.image_sigma_px
     if sigma_um is not None and sigma_px is not None:
         raise InputError("--image-sigma-um and --image-sigma-px exclude each other", "state one of the two")
@@ -291,7 +334,7 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
             )
         sigma_px = 1.0 if sigma_px is None else sigma_px
         sigma_um = sigma_px * block.cameras[0].pixel_um
-        sigma = np.repeat(sigma_px * pixel[:, None], 2, axis=1)
+        sigma = sigma_in_px(block, rays.image, sigma_px)
     else:
         sigma = rays.sigma if sigma_um is None else np.full_like(rays.sigma, sigma_um * 1e-3)
     if sigma_um is not None:
@@ -313,6 +356,12 @@ def _finished(reading: Reading, request: Request, is_new: bool) -> Reading:
     block = replace(block, settings=settings, image_points=replace(rays, sigma=sigma))
     messages += fit_of_start_values(block, request.stated.geoid)
     return replace(reading, block=block, messages=tuple(messages))
+
+
+def sigma_in_px(block: Block, image: np.ndarray, sigma_px: float) -> np.ndarray:
+    """(m, 2) mm, σ of image points in photographs (m,), stated in pixels."""
+    pixel = np.array([camera.pixel_mm for camera in block.cameras])[block.images.camera[image]]
+    return np.repeat(sigma_px * pixel[:, None], 2, axis=1)
 
 
 def fit_of_start_values(block: Block, geoid: FilePath | None = None) -> list[str]:

@@ -99,6 +99,18 @@ def open_in_pieces(path: FilePath) -> BlockInPieces | None:
     return BlockInPieces(block_of(tables, _no_rays(given)), tables)
 
 
+def read_without_rays(path: FilePath) -> Block:
+    """A block folder without its image points: photographs, control, positions and settings.
+
+    Raises
+    ------
+    InputError
+        As `read_block`.
+    """
+    tables = open_tables(path)
+    return block_of(tables, _no_rays(tables.settings.model.stochastic.image_sigma_um or 1.0))
+
+
 def _has_rows(path: Path | None) -> bool:
     return path is not None and not is_blank(path)
 

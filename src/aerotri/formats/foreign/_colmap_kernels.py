@@ -29,6 +29,28 @@ def find_points(raw, offsets):
 
 
 @kernel
+def find_points_in(raw, offsets):
+    """Fill in where object points begin, as many as there are whole; how many, and where they end.
+
+    raw : (b,) uint8, from the beginning of one. offsets : (N,) int64, out.
+    """
+    at = 0
+    for k in range(len(offsets)):
+        if at + FIXED > len(raw):
+            return k, at
+        length = 0
+        for byte in range(7, -1, -1):
+            if length > len(raw):
+                return k, at
+            length = length * 256 + raw[at + FIXED - 8 + byte]
+        if at + FIXED + 8 * length > len(raw):
+            return k, at
+        offsets[k] = at
+        at += FIXED + 8 * length
+    return len(offsets), at
+
+
+@kernel
 def number_by_appearance(point, place, index):
     """Number object points 0, 1, 2 … in the order in which they appear; how many there are.
 

@@ -40,6 +40,27 @@ def read_bingo(path: FilePath) -> RayList:
         twice in a photograph.
     """
     file = TextFile(Path(path))
+    if not len(file):
+        raise InputError("is empty", "give a BINGO file of image coordinates", file.path)
+    rays, _ = bingo_of(file)
+    if not len(rays.image):
+        raise no_measurements(file)
+    return rays
+
+
+def no_measurements(file: TextFile) -> InputError:
+    """The error of a file without image points."""
+    return file.error(0, "holds no image points", "give a file with measurements")
+
+
+def bingo_of(file: TextFile) -> tuple[RayList, list[int]]:
+    """Image points of the sections of a BINGO file, or of some of them, and the row of each photograph.
+
+    Raises
+    ------
+    InputError
+        As `read_bingo`, but for what concerns photographs of other sections.
+    """
     words = file.words()
     heads = _sections(file, words)
     images, cameras = [words[row][0] for row in heads], [" ".join(words[row][1:]) for row in heads]
@@ -53,14 +74,12 @@ def read_bingo(path: FilePath) -> RayList:
         rays += words[head + 1 : bounds[number + 1] - 1]
         row_of += rows
         image += [number] * len(rows)
-    if not rays:
-        raise file.error(0, "holds no image points", "give a file with measurements")
     place: dict[str, int] = {}
     point = np.array([place.setdefault(ray[0], len(place)) for ray in rays], dtype=np.int64)
     image_of_ray = np.array(image, dtype=np.int64)
-    xy = file.table([ray[1:] for ray in rays], row_of, "image coordinate")
+    xy = file.table([ray[1:] for ray in rays], row_of, "image coordinate").reshape(-1, 2)
     _check_rays(file, image_of_ray, point, xy, row_of, list(place), images)
-    return RayList(
+    found = RayList(
         path=file.path,
         images=texts(images),
         cameras=texts(cameras),
@@ -71,12 +90,11 @@ def read_bingo(path: FilePath) -> RayList:
         unit="mm",
         focal_length_mm=np.full(len(images), np.nan),
     )
+    return found, heads
 
 
 def _sections(file: TextFile, words: list[list[str]]) -> list[int]:
     """Rows of the heads; every section is checked to be closed and to hold rows of three words."""
-    if not words:
-        raise InputError("is empty", "give a BINGO file of image coordinates", file.path)
     heads, inside = [], False
     for row, line in enumerate(words):
         if not inside:

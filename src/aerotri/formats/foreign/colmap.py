@@ -1,4 +1,4 @@
-"""COLMAP models, text and binary, by way of pycolmap, which is known to this module only.
+"""COLMAP models, text and binary, by way of pycolmap.
 
 COLMAP's camera frame is x right, y down, z forwards: this program's turned by diag(1, −1, −1). Its pixels begin at the
 corner of the upper left one, as here. Its cameras are those of `colmap_cameras`.
@@ -9,43 +9,39 @@ camera's own where it is known.
 
 from __future__ import annotations
 
-import re
-import tempfile
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError, counted, mm_from_px, px_from_mm
+from aerotri.conventions import FilePath, InputError, counted, px_from_mm
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.files.atomic import atomic_folder
 from aerotri.formats.foreign._colmap_kernels import mark_repeated, number_by_appearance
-from aerotri.formats.foreign.colmap_arrays import FILES, ModelArrays, read_arrays, write_bare
+from aerotri.formats.foreign.colmap_arrays import FILES, ModelArrays, read_arrays
 from aerotri.formats.foreign.colmap_binary import check_binary_model
-from aerotri.formats.foreign.colmap_cameras import MOST_PIXELS, colmap_camera, expressible, read_camera, value
+from aerotri.formats.foreign.colmap_cameras import colmap_camera, expressible, value
+from aerotri.formats.foreign.colmap_model import (
+    bare_model,
+    block_without_rays,
+    image_point_mm,
+    no_measured_points,
+    open_model,
+    refuse_far,
+    refuse_no_colmap,
+    refuse_unknown,
+    warn_of_repeated,
+)
 from aerotri.formats.foreign.colmap_rigs import (
-    COLMAP_FROM_CAMERA,
     add_frames,
     add_rigs,
-    rigs_of_model,
-    stations_of_model,
 )
-from aerotri.formats.text.tables import CONTROL_CHARACTERS, LARGEST_NUMBER, LONGEST_NAME
-from aerotri.functional_model.rotation import angles_from_rotation
-from aerotri.observations import AdjustmentSettings, Block, Camera, ImagePoints, Images, Prior, Settings
-from aerotri.observations.block import LENS_NAMES
-from aerotri.observations.rigs import STATION
+from aerotri.observations import Block, Camera, ImagePoints, Images, Prior
 
 OWN_ENTRIES = tuple(f"{name}.{end}" for name in (*FILES, "rigs", "frames") for end in ("txt", "bin"))
 SPARSE = 8
 """Largest number of an object point, per ray, up to which a table of all numbers is made [C]."""
-
-
-def is_colmap(path: Path) -> bool:
-    """Whether a folder holds a COLMAP model."""
-    return any(all((path / f"{name}.{ending}").is_file() for name in FILES) for ending in ("bin", "txt"))
 
 
 def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndarray]:
@@ -78,30 +74,13 @@ def read_colmap(folder: FilePath, pixel_um: float = 1.0) -> tuple[Block, np.ndar
     """
     folder = Path(folder)
     model, arrays = _opened(folder)
-    cameras, camera_place = _cameras_of(model, pixel_um, folder)
     ids = sorted(model.images)
-    images = _images_of(model, ids, camera_place, folder)
-    names = {number: cameras[place].name for number, place in camera_place.items()}
-    rigs = rigs_of_model(model, names, Block.rotation)
-    if rigs:
-        images = replace(images, columns={STATION: stations_of_model(model, ids, names, rigs)})
-    _check_images(images, folder)
-    image, point_id, xy = _rays_of(arrays, ids, images, cameras, folder)
+    bare = block_without_rays(model, ids, pixel_um, folder)
+    image, point_id, xy = _rays_of(arrays, ids, bare.images, bare.cameras, folder)
     numbers, point = _by_appearance(point_id)
     keep = _once_each(image, point, len(numbers))
-    block = Block(
-        name=folder.resolve().name,
-        cameras=cameras,
-        images=images,
-        points=numbers.astype(str),
-        image_points=ImagePoints(image[keep], point[keep], xy[keep], np.full_like(xy[keep], pixel_um * 1e-3)),
-        settings=Settings(
-            adjustment=AdjustmentSettings(additional_parameters=_free_parameters(cameras), datum="minimal"),
-            image_sigma_um=pixel_um,
-        ),
-        rigs=rigs,
-    )
-    return block, _points_of(arrays, numbers, folder)
+    rays = ImagePoints(image[keep], point[keep], xy[keep], np.full_like(xy[keep], pixel_um * 1e-3))
+    return replace(bare, points=numbers.astype(str), image_points=rays), _points_of(arrays, numbers, folder)
 
 
 def _points_of(arrays: ModelArrays, numbers: np.ndarray, folder: Path) -> np.ndarray:
@@ -109,13 +88,9 @@ def _points_of(arrays: ModelArrays, numbers: np.ndarray, folder: Path) -> np.nda
     order = np.argsort(arrays.ids, kind="stable")
     ids, known = arrays.ids[order], arrays.xyz[order]
     place = np.minimum(np.searchsorted(ids, numbers), max(len(ids) - 1, 0))
-    missing = np.flatnonzero(ids[place] != numbers) if len(ids) else np.arange(len(numbers))
-    if len(missing):
-        message = f"image points belong to object point {numbers[missing[0]]}, which there is not"
-        raise InputError(message, "export the model with its points", folder)
+    refuse_unknown(ids, numbers, folder)
     xyz = known[place]
-    if not (np.abs(xyz) <= LARGEST_NUMBER).all():
-        raise InputError("an object point lies at no possible place", "export the model anew", folder)
+    refuse_far(xyz, folder)
     return xyz
 
 
@@ -126,14 +101,11 @@ def _rays_of(
     parts = [arrays.images[number] for number in ids]
     ends = np.cumsum([0, *(len(point) for _, point in parts)])
     if not ends[-1]:
-        raise InputError("the model has no points that were measured", "export it with its points", folder)
+        raise no_measured_points(folder)
     point, xy = np.empty(ends[-1], np.uint64), np.empty((ends[-1], 2))
     for row, (px, numbers) in enumerate(parts):
-        camera = cameras[images.camera[row]]
-        if not (np.abs(px) <= MOST_PIXELS).all():
-            raise InputError("an image point lies outside of any image", "export the model anew", folder)
         point[ends[row] : ends[row + 1]] = numbers
-        xy[ends[row] : ends[row + 1]] = mm_from_px(px, camera.size_px, camera.pixel_mm)
+        xy[ends[row] : ends[row + 1]] = image_point_mm(px, cameras[images.camera[row]], folder)
     return np.repeat(np.arange(len(ids)), np.diff(ends)), point, xy
 
 
@@ -151,14 +123,13 @@ def _by_appearance(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _opened(folder: Path) -> tuple[Any, ModelArrays]:
     """pycolmap's reconstruction of a folder, without its image points and object points, and these in arrays."""
-    _check(folder)
+    refuse_no_colmap(folder)
+    check_binary_model(folder)
     arrays = read_arrays(folder)
     if arrays is None:
-        model = _reconstruction(folder, folder)
+        model = open_model(folder)
         return model, _arrays_of(model)
-    with tempfile.TemporaryDirectory(prefix="aerotri_colmap_") as place:
-        write_bare(arrays, folder, Path(place))
-        return _reconstruction(Path(place), folder), arrays
+    return bare_model(arrays.heads, folder), arrays
 
 
 def _arrays_of(model: Any) -> ModelArrays:
@@ -173,117 +144,13 @@ def _arrays_of(model: Any) -> ModelArrays:
     return ModelArrays(images, b"", np.array(ids, np.uint64), xyz)
 
 
-def open_model(folder: Path) -> Any:
-    """pycolmap's reconstruction of a folder.
-
-    Raises
-    ------
-    InputError
-        When it cannot be read.
-    """
-    _check(folder)
-    return _reconstruction(folder, folder)
-
-
-def _check(folder: Path) -> None:
-    if not is_colmap(folder):
-        raise InputError("holds no COLMAP model", "give a folder with cameras, images and points3D", folder)
-    check_binary_model(folder)
-
-
-def _reconstruction(place: Path, folder: Path) -> Any:
-    """What pycolmap reads at a place; errors name the folder of the model."""
-    import pycolmap
-
-    try:
-        return pycolmap.Reconstruction(place)
-    except (RuntimeError, ValueError, IndexError, MemoryError, OSError) as error:
-        short = str(error).strip().splitlines()[-1] if str(error).strip() else type(error).__name__
-        short = short.replace(str(place), str(folder))
-        raise InputError(f"is no readable COLMAP model: {short}", "export the model anew", folder) from error
-
-
-def _cameras_of(model: Any, pixel_um: float, folder: Path) -> tuple[tuple[Camera, ...], dict[int, int]]:
-    """The cameras, and their places by COLMAP's numbers."""
-    ids = sorted(model.cameras)
-    read = [read_camera(model.cameras[number], pixel_um, folder) for number in ids]
-    for sentence in dict.fromkeys(sentence for _, said in read for sentence in said):
-        warnings.warn(sentence, stacklevel=3)
-    found = [camera for camera, _ in read]
-    used = [name for name in LENS_NAMES if any(name in camera.lens for camera in found)]
-    complete = []
-    for camera in found:
-        # a parameter that other cameras estimate is held at zero where this one does not have it
-        lens = {name: camera.lens.get(name, Prior(0.0, fixed=True)) for name in used}
-        complete.append(replace(camera, lens=lens))
-    return tuple(complete), {number: place for place, number in enumerate(ids)}
-
-
-def _free_parameters(cameras: tuple[Camera, ...]) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    lens = tuple(name for name in LENS_NAMES if any(is_free(camera.lens.get(name)) for camera in cameras))
-    affinity = ("b1",) if any(camera.brown for camera in cameras) else ()
-    return tuple((family, items) for family, items in (("lens", lens), ("brown", affinity)) if items)
-
-
-def is_free(prior: Prior | None) -> bool:
-    """Whether there is a parameter to be estimated."""
-    return prior is not None and not prior.fixed
-
-
-def _name(image: Any, folder: Path) -> str:
-    try:
-        return image.name
-    except UnicodeDecodeError as error:
-        raise InputError("the name of an image is not UTF-8", "export the model anew", folder) from error
-
-
-def _pose(image: Any, folder: Path) -> np.ndarray:
-    """(3, 4) camera from world."""
-    try:
-        return image.cam_from_world().matrix()
-    except RuntimeError as error:
-        message = f"the pose of image '{_name(image, folder)}' on its rig is missing"
-        raise InputError(message, "export the model anew", folder) from error
-
-
-def _images_of(model: Any, ids: list[int], camera_place: dict[int, int], folder: Path) -> Images:
-    centre, angles = np.full((len(ids), 3), np.nan), np.full((len(ids), 3), np.nan)
-    for row, number in enumerate(ids):
-        image = model.images[number]
-        if image.has_pose:
-            colmap_from_world = _pose(image, folder)
-            if not (np.abs(colmap_from_world) <= LARGEST_NUMBER).all():
-                continue
-            rotation = colmap_from_world[:, :3].T @ COLMAP_FROM_CAMERA
-            centre[row] = -colmap_from_world[:, :3].T @ colmap_from_world[:, 3]
-            angles[row] = angles_from_rotation(rotation)
-    return Images(
-        names=np.array([_name(model.images[number], folder) for number in ids], dtype=str),
-        camera=np.array([camera_place[model.images[number].camera_id] for number in ids], dtype=np.int64),
-        strip=np.full(len(ids), ""),
-        centre=centre,
-        angles=angles,
-    )
-
-
-def _check_images(images: Images, folder: Path) -> None:
-    """Refuse names that occur twice or that no table could hold, and photographs at no possible place."""
-    names = images.names.tolist()
-    odd = [name for name in names if not name or len(name) > LONGEST_NAME or re.search(CONTROL_CHARACTERS, name)]
-    if odd or len(set(names)) < len(names):
-        what = f"{odd[0][:60]!r} is no name of an image" if odd else "two images have the same name"
-        raise InputError(what, "export the model anew", folder)
-    if (np.abs(images.centre) > LARGEST_NUMBER).any() or (np.isnan(images.centre) != np.isnan(images.angles)).any():
-        raise InputError("an image lies at no possible place", "export the model anew", folder)
-
-
 def _once_each(image: np.ndarray, point: np.ndarray, count: int) -> np.ndarray | slice:
     """Rays to keep: COLMAP's tracks may hold two image points of one image; a block's may not."""
     again = np.zeros(len(image), bool)
     repeated = int(mark_repeated(image, point, np.full(count, -1), again))
     if not repeated:
         return slice(None)
-    warnings.warn(f"left out: {counted(repeated, 'repeated measurement')} of a point in the same image", stacklevel=3)
+    warn_of_repeated(repeated)
     return ~again
 
 

@@ -71,18 +71,18 @@ def read_arrays(folder: Path) -> ModelArrays | None:
         raise InputError(f"cannot be read: {error}", "check the files and their permissions", folder) from error
 
 
-def write_bare(arrays: ModelArrays, folder: Path, place: Path) -> None:
+def write_bare(heads: bytes, folder: Path, place: Path) -> None:
     """A copy of a model without image points and object points, for pycolmap.
 
     Parameters
     ----------
-    folder : of the model. place : the folder of the copy.
+    heads : see `ModelArrays`. folder : of the model. place : the folder of the copy.
     """
     end = "bin" if is_binary(folder) else "txt"
     for name in SMALL_FILES:
         if (folder / f"{name}.{end}").is_file():
             shutil.copyfile(folder / f"{name}.{end}", place / f"{name}.{end}")
-    (place / f"images.{end}").write_bytes(arrays.heads)
+    (place / f"images.{end}").write_bytes(heads)
     (place / f"points3D.{end}").write_bytes(struct.pack("<Q", 0) if end == "bin" else b"")
 
 
@@ -143,22 +143,39 @@ def _text(folder: Path) -> ModelArrays:
             head = line.strip()
             if not head or head.startswith(b"#"):
                 continue
-            points = _numbers(next(file, b""), 3)
-            if (points[:, 2] < -1.0).any():
-                raise ValueError("a number of an object point is negative")
-            used = points[points[:, 2] >= 0.0]
-            _add(images, int(head.split(None, 1)[0]), used[:, :2], _ids(used[:, 2]), folder)
+            _add(images, int(head.split(None, 1)[0]), *text_points(next(file, b"")), folder)
             heads.append(head + b"\n\n")
     with (folder / "points3D.txt").open("rb") as file:
         rows = [line.split(None, 4)[:4] for line in file if line.strip() and not line.lstrip().startswith(b"#")]
     if any(len(row) < 4 for row in rows):
         raise ValueError("an object point has no coordinates")
-    table = _numbers(b" ".join([b" ".join(row) for row in rows]), 4)
-    return ModelArrays(images, b"".join(heads), _ids(table[:, 0]), table[:, 1:])
+    table = numbers_of_text(b" ".join([b" ".join(row) for row in rows]), 4)
+    return ModelArrays(images, b"".join(heads), ids_of_text(table[:, 0]), table[:, 1:])
 
 
-def _numbers(text: bytes, columns: int) -> np.ndarray:
-    """(n, columns) of a text, by pyarrow as one column; what is no number is a ValueError."""
+def text_points(line: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """(k, 2) px and (k,) object points of a line of image points, of those that belong to one.
+
+    Raises
+    ------
+    ValueError
+        When it is not written as COLMAP does.
+    """
+    points = numbers_of_text(line, 3)
+    if (points[:, 2] < -1.0).any():
+        raise ValueError("a number of an object point is negative")
+    used = points[points[:, 2] >= 0.0]
+    return used[:, :2], ids_of_text(used[:, 2])
+
+
+def numbers_of_text(text: bytes, columns: int) -> np.ndarray:
+    """(n, columns) of a text, by pyarrow as one column.
+
+    Raises
+    ------
+    ValueError
+        When something is no number.
+    """
     import pyarrow as pa
     from pyarrow import csv
 
@@ -173,7 +190,14 @@ def _numbers(text: bytes, columns: int) -> np.ndarray:
     return table["value"].to_numpy().reshape(-1, columns)
 
 
-def _ids(values: np.ndarray) -> np.ndarray:
+def ids_of_text(values: np.ndarray) -> np.ndarray:
+    """(k,) numbers of object points that were read as floating point.
+
+    Raises
+    ------
+    ValueError
+        When one is no such number.
+    """
     if not ((values >= 0.0) & (values < EXACT) & (values == np.floor(values))).all():
         raise ValueError("is no number of an object point")
     return values.astype(np.uint64)

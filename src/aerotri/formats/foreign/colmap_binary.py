@@ -71,7 +71,19 @@ def check_binary_model(folder: Path) -> None:
 
     if (folder / "points3D.bin").is_file():
         read_points(folder / "points3D.bin")
-    for name, record in RECORDS.items():
+    check_small_files(folder, tuple(RECORDS))
+
+
+def check_small_files(folder: Path, names: tuple[str, ...] = ("cameras", "rigs", "frames")) -> None:
+    """Refuse a model of which some files announce more than they hold.
+
+    Raises
+    ------
+    InputError
+        Naming the file.
+    """
+    for name in names:
+        record = RECORDS[name]
         path = folder / f"{name}.bin"
         if path.is_file():
             cursor = _Cursor(path)

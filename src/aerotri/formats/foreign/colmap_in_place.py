@@ -16,8 +16,9 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.coordinates.similarity import Similarity
 from aerotri.formats.assembly.oriented import OrientedBlock
-from aerotri.formats.foreign.colmap import OWN_ENTRIES, open_model
+from aerotri.formats.foreign.colmap import OWN_ENTRIES
 from aerotri.formats.foreign.colmap_cameras import colmap_camera, whole_camera
+from aerotri.formats.foreign.colmap_model import open_model
 from aerotri.formats.foreign.colmap_rigs import colmap_pose
 from aerotri.formats.foreign.in_place import about_others, mean_pose, move_between, poses_differ, replaced_files
 

@@ -19,7 +19,7 @@ from aerotri.coordinates.georeference import georeference, is_projected, utm_on_
 from aerotri.coordinates.local_frame import topocentric_frame
 from aerotri.formats.assembly import placing
 from aerotri.formats.assembly.parts import Reading, no_sigma, texts
-from aerotri.formats.foreign.colmap import is_free
+from aerotri.formats.foreign.colmap_model import is_free
 from aerotri.formats.foreign.colmap_rigs import COLMAP_FROM_CAMERA
 from aerotri.formats.foreign.metashape_chunk import (
     Sensor,

@@ -19,8 +19,9 @@ from aerotri.conventions import FilePath, counted, mm_from_px, px_from_mm
 from aerotri.formats.assembly.oriented import OrientedBlock
 from aerotri.formats.assembly.parts import Reading, no_sigma, texts
 from aerotri.formats.files.atomic import atomic_folder
-from aerotri.formats.foreign.colmap import is_free, without_shear
+from aerotri.formats.foreign.colmap import without_shear
 from aerotri.formats.foreign.colmap_cameras import value
+from aerotri.formats.foreign.colmap_model import is_free
 from aerotri.formats.foreign.colmap_rigs import COLMAP_FROM_CAMERA
 from aerotri.formats.foreign.opensfm_cameras import camera_json, expressible, read_cameras
 from aerotri.formats.foreign.opensfm_json import Node, largest, points_of, read_reconstructions

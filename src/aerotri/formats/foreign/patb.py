@@ -9,6 +9,7 @@ h and v classes of accuracy, 0 where plan position or height is no control; 1 an
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -74,9 +75,69 @@ def read_patb_im(path: FilePath) -> RayList:
     """
     file = TextFile(Path(path), comments=False)
     words = file.words()
+    heads, _, _ = _sections(file, words)
+    # one unit for the whole file, as writers have it
+    in_mm = all(float(words[row][1]) < SMALLEST_C_UM for row in heads)
+    found = patb_im_of(file, in_mm)
+    if not len(found.rays.image):
+        raise no_measurements(file)
+    return replace(found.rays, messages=about_im(in_mm, found.classes))
+
+
+@dataclass(frozen=True, eq=False)
+class ImPart:
+    """Image points of whole sections of an .im file.
+
+    Parameters
+    ----------
+    rays : without messages. heads : row of each photograph. classes : texts behind the coordinates, each once.
+    """
+
+    rays: RayList
+    heads: list[int]
+    classes: frozenset[tuple[str, ...]]
+
+
+def about_im(in_mm: bool, classes: frozenset[tuple[str, ...]]) -> tuple[str, ...]:
+    """What to say of an .im file with these classes of image points."""
+    said = ["coordinates are taken as mm: the principal distances are below 1000"] if in_mm else []
+    return (*said, *(["could not be carried over: the classes of the image points"] if len(classes) > 1 else []))
+
+
+def no_measurements(file: TextFile) -> InputError:
+    """The error of a file without image points."""
+    return file.error(0, "holds no image points", "give a file with measurements")
+
+
+def is_in_mm(path: Path) -> bool:
+    """Whether all principal distances of an .im file are millimetres, its lines read one by one."""
+    inside, in_mm = False, True
+    with path.open("rb") as file:
+        for line in file:
+            words = line.split()
+            if words == [END.encode()]:
+                inside = False
+            elif words and not inside:
+                inside = True
+                word = words[-1].decode("utf-8", "replace")
+                in_mm = in_mm and is_number(word) and float(word) < SMALLEST_C_UM
+    return in_mm
+
+
+def patb_im_of(file: TextFile, in_mm: bool) -> ImPart:
+    """Image points of the sections of an .im file, or of some of them.
+
+    Parameters
+    ----------
+    in_mm : whether its coordinates are mm, else µm.
+
+    Raises
+    ------
+    InputError
+        As `read_patb_im`, but for what concerns photographs of other sections.
+    """
+    words = file.words()
     heads, rows, image = _sections(file, words)
-    if not rows:
-        raise file.error(0, "holds no image points", "give a file with measurements")
     images = [words[row][0] for row in heads]
     file.check_names(images, heads, "photograph")
     file.refuse_repeated(images, heads, "photograph")
@@ -84,10 +145,8 @@ def read_patb_im(path: FilePath) -> RayList:
     small = np.flatnonzero(c < SMALLEST_POSITIVE)
     if len(small):
         raise file.error(heads[int(small[0])], "the principal distance is not greater than 0", "give it in µm")
-    # one unit for the whole file, as writers have it
-    in_mm = bool((c < SMALLEST_C_UM).all())
     scale = 1.0 if in_mm else 1e-3
-    xy = file.table([words[row][1:3] for row in rows], rows, "image coordinate") * scale
+    xy = file.table([words[row][1:3] for row in rows], rows, "image coordinate").reshape(-1, 2) * scale
     place: dict[str, int] = {}
     point = np.array([place.setdefault(words[row][0], len(place)) for row in rows], dtype=np.int64)
     file.check_names([words[row][0] for row in rows], rows, "point")
@@ -101,13 +160,11 @@ def read_patb_im(path: FilePath) -> RayList:
             "an image point lies outside of any image",
             "give coordinates in µm from the image centre",
         )
-    messages = ["coordinates are taken as mm: the principal distances are below 1000"] if in_mm else []
-    if len({tuple(words[row][3:]) for row in rows}) > 1:
-        messages.append("could not be carried over: the classes of the image points")
-    return RayList(
+    rays = RayList(
         file.path, texts(images), np.full(len(images), ""), texts(list(place)), np.array(image, dtype=np.int64), point,
-        xy, "mm", c * scale, tuple(messages),
+        xy, "mm", c * scale,
     )  # fmt: skip
+    return ImPart(rays, heads, frozenset(tuple(words[row][3:]) for row in rows))
 
 
 def _sections(file: TextFile, words: list[list[str]]) -> tuple[list[int], list[int], list[int]]:

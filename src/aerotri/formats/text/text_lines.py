@@ -24,6 +24,7 @@ class TextFile:
     ----------
     path : the file.
     comments : whether lines that begin with # are left out.
+    part : bytes of some lines of the file, where not all are meant. first_line : number of the first of them.
 
     Raises
     ------
@@ -31,16 +32,16 @@ class TextFile:
         When it cannot be read, or is not UTF-8.
     """
 
-    def __init__(self, path: Path, comments: bool = True):
+    def __init__(self, path: Path, comments: bool = True, part: bytes | None = None, first_line: int = 1):
         self.path = path
-        text = _decoded(read_bytes(path), path)
+        text = _decoded(read_bytes(path) if part is None else part, path, first_line)
         raw = text.split("\n")
         lines = [line.strip() for line in raw]
-        kept = [(i, line) for i, line in enumerate(lines, 1) if line and not (comments and line[0] == "#")]
-        self.numbers = [number for number, _ in kept]
+        kept = [(i, line) for i, line in enumerate(lines) if line and not (comments and line[0] == "#")]
+        self.numbers = [i + first_line for i, _ in kept]
         self.lines = [line for _, line in kept]
-        self.is_indented = [raw[number - 1][:1].isspace() for number in self.numbers]
-        self.last_line = max(len(lines) - (not lines[-1]), 1)
+        self.is_indented = [raw[i][:1].isspace() for i, _ in kept]
+        self.last_line = max(len(lines) - (not lines[-1]), 1) + first_line - 1
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -131,11 +132,11 @@ def is_number(word: str) -> bool:
     return word.isascii() and re.match(NUMBER, word) is not None and math.isfinite(float(word))
 
 
-def _decoded(raw: bytes, path: Path) -> str:
+def _decoded(raw: bytes, path: Path, first_line: int) -> str:
     try:
         return raw.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
+        line = raw.count(b"\n", 0, error.start) + first_line
         raise InputError("is not UTF-8", UTF8_REMEDY, path, line) from error
 
 

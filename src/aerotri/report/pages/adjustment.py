@@ -152,12 +152,16 @@ def report_html(
     plots : by the names of `all_plots`, drawn or already rendered (what `save_plots` returned need not be rendered
         twice); those missing are left out.
     """
+    return filled_page(page_content(adjusted, render_plots(plots), findings))
+
+
+def filled_page(content: dict[str, Any]) -> str:
+    """The page with its content, that of `page_content`, and its script."""
     environment = page_environment()
     script = (environment.loader or PackageLoader("aerotri.report")).get_source(environment, "report.js")[0]
     digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
-    content = _content(adjusted, render_plots(plots), findings)
-    content |= {"script": Markup(script), "script_hash": Markup(f"sha256-{digest}")}
-    return environment.get_template("report.html.j2").render(content)
+    script_of_page = {"script": Markup(script), "script_hash": Markup(f"sha256-{digest}")}
+    return environment.get_template("report.html.j2").render(content | script_of_page)
 
 
 def write_report(
@@ -170,7 +174,8 @@ def write_report(
     Path(path).write_text(report_html(adjusted, plots, findings), encoding="utf-8")
 
 
-def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside: Findings) -> dict[str, Any]:
+def page_content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside: Findings) -> dict[str, Any]:
+    """What the page says, by the names of its template."""
     work = work_list(adjusted) if beside.work is None else beside.work
     elsewhere, elsewhere_notes = elsewhere_tables(adjusted)
     return {
@@ -190,7 +195,7 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         "contents": CONTENTS,
         "plan": interactive_plan(adjusted),
         "tables": _tables(adjusted)
-        | {"work": work_tables.work_table(work), "effects": _effects(adjusted, beside)}
+        | {"work": work_tables.work_table(work), "effects": _effects(adjusted, beside), "parts": None}
         | _parameter_tables(adjusted, beside),
         "rig_verdicts": rig_tables.verdicts(adjusted),
         "shutter_verdict": shutter_tables.verdict(adjusted),
@@ -205,6 +210,8 @@ def _content(adjusted: AdjustedBlock, plots: Mapping[str, RenderedPlot], beside:
         "elsewhere_notes": elsewhere_notes,
         "free": None if beside.free_check is None else _free_check(beside.free_check),
         "crosscheck": None if beside.crosscheck is None else _crosscheck(beside.crosscheck),
+        "first": [],
+        "sampled": "",
     }
 
 

@@ -26,7 +26,7 @@ from aerotri.report.plots.residuals import (
 from aerotri.report.plots.rigs import plot_rig
 from aerotri.report.plots.trajectory import plot_trajectory
 from aerotri.results.adjusted_block import AdjustedBlock
-from aerotri.statistics.photograph_residuals import photograph_residuals
+from aerotri.statistics.photograph_residuals import PhotographResiduals, photograph_residuals
 from aerotri.statistics.position_differences import position_differences
 
 __all__ = [
@@ -56,8 +56,9 @@ draw."""
 
 
 def all_plots(
-    adjusted: AdjustedBlock, changes: Sequence[Change] = (), prints: np.ndarray | None = None
-) -> dict[str, Figure]:
+    adjusted: AdjustedBlock, changes: Sequence[Change] = (), prints: np.ndarray | None = None,
+    of_photographs: PhotographResiduals | None = None,
+) -> dict[str, Figure]:  # fmt: skip
     """The figures of the report by a name fit for a file, in the order of the report.
 
     Plots over the image format are drawn for the first eight image groups and numbered from the second on.
@@ -66,6 +67,7 @@ def all_plots(
     ----------
     changes : of the image errors between groups, as `group_changes` finds them.
     prints : (n,) footprints over the relief, see `plot_overlap`.
+    of_photographs : residuals of the photographs; None: of the rays that `adjusted` has.
     """
     name = adjusted.block.name
     figures = {"block_plan": plot_block_plan(adjusted)}
@@ -92,7 +94,8 @@ def all_plots(
         figures["correlations"] = plot_correlations(adjusted)
     figures["residual_histogram"] = plot_residual_histogram(adjusted)
     _add(figures, "column_row_residuals", plot_residual_profiles(residual_profiles(adjusted), name))
-    _add(figures, "photograph_residuals", plot_photograph_residuals(photograph_residuals(adjusted), adjusted))
+    of_photographs = photograph_residuals(adjusted) if of_photographs is None else of_photographs
+    _add(figures, "photograph_residuals", plot_photograph_residuals(of_photographs, adjusted))
     if adjusted.ray_correlation is not None and adjusted.ray_correlation.nearest >= 0:
         figures["ray_correlation"] = plot_ray_correlation(adjusted.ray_correlation, name)
     figures["rays_per_point"] = plot_rays_per_point(adjusted)
