@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rendered_blocks import rendered_block
 
+from aerotri.pipeline import adjust_keeping_system
 from aerotri.terrain.dense.measure import DensePlan, measure_surface
 from aerotri.terrain.pickets import Area
 
@@ -94,3 +95,20 @@ def test_tilted_photographs_have_no_bias(tmp_path):
     assert abs(np.median(error)) < 0.1  # of a pixel of 1 m
     assert 0.7 < z.std() < 1.3
     assert (np.abs(z) > 4.0).mean() < 0.01
+
+
+def test_errors_of_the_orientation_are_no_noise_of_the_matching(tmp_path):
+    found = rendered_block(tmp_path / "block", **UNDULATING)
+    rays = found.block.image_points
+    noise = np.random.default_rng(4).normal(scale=0.09, size=rays.xy.shape)  # mm, half a pixel
+    noisy = replace(found.block, image_points=replace(rays, xy=rays.xy + noise))
+    area = Area(np.array([-60.0, -60.0]), np.array([60.0, 60.0]))
+    sigmas, shifts = [], []
+    for name, calibration in (("exact", found.calibration), ("noisy", adjust_keeping_system(noisy))):
+        (tmp_path / name).mkdir()
+        o = measure_surface(calibration, DensePlan(np.arange(4), found.paths, tmp_path / name, area=area))
+        tiles = [part for _, part in o.files.read_all(list(o.windows))]
+        sigmas.append(np.nanmedian(np.concatenate([part.sigma.ravel() for part in tiles])))
+        shifts.append(np.abs(o.across_px).max())
+    assert shifts[1] > 0.05  # pairs of the noisy block have y-parallaxes
+    assert sigmas[1] < 1.5 * sigmas[0]  # four to six times as much where they count as noise

@@ -143,7 +143,7 @@ def test_pixels_with_their_parallax_lie_where_they_were_projected_from(hill):
         assert np.isnan(xyz[:, 0, 0]).all()
 
 
-def textured_pair(shift: float, across: float, noise: float, seed: int) -> EpipolarImages:
+def textured_pair(shift: float, across: float | np.ndarray, noise: float, seed: int) -> EpipolarImages:
     """Two images of one texture, the right one moved by so many pixels along and across the base."""
     rng = np.random.default_rng(seed)
     row, column = np.mgrid[:240, :320].astype(float)
@@ -171,6 +171,17 @@ def test_parallaxes_are_recovered_whatever_the_shift_across_the_base(shift, acro
     assert abs(np.median(error)) < 0.02
     assert abs(found.across - across) < 0.02
     assert 0.7 < (error / sigma).std() < 1.3
+
+
+def test_shifts_across_the_base_that_change_over_an_image_are_no_noise():
+    y, x = np.meshgrid(np.linspace(-1.0, 1.0, 240), np.linspace(-1.0, 1.0, 320), indexing="ij")
+    level = parallaxes_of(textured_pair(0.25, 0.0, 3.0, 3))
+    bent = parallaxes_of(textured_pair(0.25, 0.2 + 0.4 * x - 0.3 * y + 0.2 * x * x - 0.1 * x * y + 0.1 * y * y, 3.0, 3))
+    known = np.isfinite(bent.value)
+    assert known.mean() > 0.85
+    assert bent.factor < 1.1 * level.factor
+    assert np.median(bent.sigma[known]) < 1.1 * np.nanmedian(level.sigma)
+    assert 0.7 < ((bent.value[known] - 0.25) / bent.sigma[known]).std() < 1.3
 
 
 def test_resampling_keeps_straight_lines_and_parabolas():

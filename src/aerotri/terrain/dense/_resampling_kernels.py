@@ -70,12 +70,13 @@ def within(x, y, low, high, known):
 def align(right, value, across, known, left, out):
     """The right epipolar image where the left one's pixels have their parallaxes; the left one's where not known.
 
-    value : (rows, columns) px, left column − right column. across : px, right row − left row. out : float32.
+    value : (rows, columns) px, left column − right column. across : (6,) px, right row − left row: coefficients of 1,
+    x, y, x², xy, y², x and y from −1 to 1 over columns and rows. out : float32.
     """
     rows, columns = out.shape
-    whole = int(np.floor(across))
-    vertical = _weights(across - whole)
     for i in range(rows):
+        y = 2.0 * i / (rows - 1.0) - 1.0
+        level, slope, bend = across[0] + y * (across[2] + y * across[5]), across[1] + y * across[4], across[3]
         for j in range(columns):
             out[i, j] = left[i, j]
             if not known[i, j]:
@@ -84,10 +85,14 @@ def align(right, value, across, known, left, out):
             column = int(np.floor(place))
             if not (1 <= column < columns - 2):
                 continue
+            x = 2.0 * j / (columns - 1.0) - 1.0
+            down = i + level + x * (slope + x * bend)
+            row = int(np.floor(down))
             a, b, c, d = _weights(place - column)
+            vertical = _weights(down - row)
             total = 0.0
             for k in range(4):
-                line = right[min(max(i + whole - 1 + k, 0), rows - 1)]
+                line = right[min(max(row - 1 + k, 0), rows - 1)]
                 total += vertical[k] * (
                     a * line[column - 1] + b * line[column] + c * line[column + 1] + d * line[column + 2]
                 )

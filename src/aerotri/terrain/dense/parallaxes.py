@@ -2,8 +2,8 @@
 
 The matching of OpenCV (Hirschmüller 2008) finds them to a part of a pixel with a bias towards whole ones. The right
 image is therefore resampled by the parallaxes found, smoothed where they are continuous, and what is left in a window
-between the two is solved for with gain, offset and the shift across the base. That one is zero but for noise: it tells
-how much larger the noise is than its formal σ.
+between the two is solved for with gain, offset and the shift across the base. That one changes slowly but for noise: it
+tells how much larger the noise is than its formal σ.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.terrain.dense._refinement_kernels import HALF, keep_seen, shift_windows
 from aerotri.terrain.dense._resampling_kernels import align
 from aerotri.terrain.dense._smoothing_kernels import smooth
+from aerotri.terrain.dense.across_base import median_across, parabola_across, scatter_across
 from aerotri.terrain.dense.epipolar import EpipolarImages
 
 BLOCK_PX = 5
@@ -54,10 +54,6 @@ LEAST_SIGMA_PX = 0.02
 """σ of a parallax is never stated smaller; chosen [C]: interpolation between pixels leaves that even without noise."""
 LARGEST_SIGMA_PX = 1.0
 """σ of a parallax at which nothing is known."""
-FEWEST_TELL = 200
-"""Shifts across the base of which a factor is taken."""
-MOST_TELL = 15_000
-"""Shifts whose medians are taken, spread over a tile; chosen [C]: they are then sure to a per cent of a spread."""
 INVALID = -1e4
 
 
@@ -119,17 +115,18 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
     start = value.copy()
     shape = value.shape
     shift, across, variance, of_across, correlation, room = (np.empty(shape, np.float32) for _ in range(6))
-    middle, factor = 0.0, 1.0
+    slow = left_slow = np.zeros(6)
     for _ in range(ROUNDS):
         value = _smoothed(value, known)
-        align(right, value, middle, known, left, aligned)
+        align(right, value, slow, known, left, aligned)
         level = np.float32(aligned.mean())
         shift_windows(left, aligned, level, known, shift, across, variance, of_across, correlation)
         known &= np.abs(shift, out=room) < LARGEST_SHIFT_PX
         value += shift
         value[~known] = INVALID
-        left_across, factor = _noise(across, of_across, known)
-        middle += left_across
+        left_slow = parabola_across(across, of_across, known)
+        slow = slow + left_slow
+    factor = scatter_across(across, of_across, known, left_slow)
     # arrays of the size of the images are filled again rather than made anew, which takes a third less time
     known &= np.abs(np.subtract(value, start, out=room), out=room) < LARGEST_SHIFT_PX
     known &= correlation > LEAST_CORRELATION
@@ -148,7 +145,7 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
     nothing = np.float32(np.nan)
     value[~known] = nothing
     sigma[~known] = nothing
-    return Parallaxes(value, sigma, middle, factor)
+    return Parallaxes(value, sigma, median_across(slow, known), factor)
 
 
 def _alike_about(correlation: np.ndarray, known: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -163,16 +160,3 @@ def _smoothed(value: np.ndarray, known: np.ndarray) -> np.ndarray:
     out = np.empty_like(value)
     smooth(value, known, SMOOTHED_STEP_PX, SMOOTHED_PX, np.float32(INVALID), out)
     return out
-
-
-def _noise(across: np.ndarray, variance: np.ndarray, known: np.ndarray) -> tuple[float, float]:
-    """Median of the shifts across the base, px, and how much larger they scatter than their formal σ."""
-    chosen = known & (variance > 0.0)
-    if chosen.sum() < FEWEST_TELL:
-        return 0.0, 2.0
-    at = np.flatnonzero(chosen)
-    at = at[:: len(at) // MOST_TELL + 1]
-    v = across.ravel()[at]
-    middle = float(np.median(v))
-    scaled = np.abs(v - middle) / np.sqrt(variance.ravel()[at])
-    return middle, max(float(np.median(scaled)) * SIGMA_PER_MAD, 1.0)

@@ -37,6 +37,10 @@ MARGIN_PX = 16.0
 what epipolar images have besides."""
 MOST_LAGS = 12
 """Cells up to which the noise of neighbouring cells is looked at for what they share."""
+SLOW_CELLS = 2 * MOST_LAGS + 1
+"""Side of the square from whose mean the noise of pairs is told; chosen [C]: several windows wide."""
+SLOW_ROUNDS = 2
+"""Means of what is left, one after the other: at the edge of a pair a mean alone leaves its slope."""
 FEWEST_MISFITS = 500
 """Cells measured twice of which the noise of a tile is taken."""
 LARGEST_FACTOR = 3.0
@@ -116,10 +120,10 @@ def measure_tile(
     used, layers = [m.pair for m in matched], [m.layer for m in matched]
     numbers = np.array([[p.left, p.right] for p in used])
     scale = CellScale.of(cell_px, metres_per_pixel(place, used, options.level))
-    *maps, factor = _fused(place, used, layers, middle[2], scale)
+    *maps, factor, shared_cells = _fused(place, used, layers, middle[2], scale)
     z, sigma, count, shown_by = (a[spare:-spare, spare:-spare].copy() for a in maps)
     across = np.array([m.across for m in matched])
-    return TileSurface(z, sigma, count, shown_by, factor, numbers, across, _shared_cells(layers))
+    return TileSurface(z, sigma, count, shown_by, factor, numbers, across, shared_cells)
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +237,8 @@ def metres_per_pixel(place: Place, pairs: list[Pair], level: int) -> float:
 
 def _fused(
     place: Place, pairs: list[Pair], layers: list[tuple[np.ndarray, np.ndarray]], height: float, scale: CellScale
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, float]:
+    """Heights of the CRS and their σ, m, number of photographs and the first, factor of σ, cells of one noise."""
     heights, sigmas = (np.stack(part) for part in zip(*layers, strict=True))
     correlation = noise_correlation(place, pairs)
     photographs = sorted({k for p in pairs for k in (p.left, p.right)}, key=lambda k: _off_nadir(place, k))
@@ -244,11 +249,15 @@ def _fused(
     members = np.zeros(shape, np.int64)
     tolerance = AGREEING_PX * scale.pixel
     kernels.fuse(heights, sigmas, correlation, used, AGREEING_SIGMAS, tolerance, z, sigma, members, misfit)
+    level = _levelled(heights, sigmas, z, tolerance)
+    out = (np.empty(shape), np.empty(shape), np.empty(shape, np.int64), misfit)
+    kernels.fuse(level, sigmas, correlation, used, AGREEING_SIGMAS, tolerance, *out)
     factor = _factor(misfit)
     patched = _without_patches(z, PATCH_STEP_PX * tolerance)
     z[~patched], sigma[~patched], members[~patched] = np.nan, np.nan, 0
     sigma = cell_sigma(z, sigma * factor, heights, sigmas, scale)
-    return z + height, sigma, *_seen_by(members, np.array(photographs)), factor
+    count, first = _seen_by(members, np.array(photographs))
+    return z + height, sigma, count, first, factor, _shared_cells(level, sigmas)
 
 
 def _off_nadir(place: Place, k: int) -> float:
@@ -279,6 +288,28 @@ def _without_patches(z: np.ndarray, step: float) -> np.ndarray:
     return held != NO_HEIGHT
 
 
+def _levelled(heights: np.ndarray, sigmas: np.ndarray, z: np.ndarray, tolerance: float) -> np.ndarray:
+    """(pairs, rows, columns) m, heights less what a pair is above or below the surface z over many cells.
+
+    That comes from the orientation of the pairs, whose σ the adjustment states: it is no noise of the matching.
+    """
+    both = zip(heights, sigmas, strict=True)
+    return np.stack([h - _slow(h - z, s, AGREEING_SIGMAS * s + tolerance) for h, s in both])
+
+
+def _slow(difference: np.ndarray, sigma: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """(rows, columns) m, weighted mean of the differences about a cell; what is larger than `most` does not count."""
+    known = np.abs(difference) < most
+    weight = np.where(known, sigma, np.inf) ** -2.0
+    size = SLOW_CELLS, SLOW_CELLS
+    weights = cv2.boxFilter(weight, -1, size, normalize=False) + 1e-9 * weight.max(initial=1e-300)
+    slow = np.zeros(known.shape)
+    for _ in range(SLOW_ROUNDS):
+        left = weight * np.where(known, difference - slow, 0.0)
+        slow += cv2.boxFilter(left, -1, size, normalize=False) / weights
+    return slow
+
+
 def _factor(misfit: np.ndarray) -> float:
     """By which heights of pairs scatter more than their σ say; 1 where too few cells were measured twice."""
     told = misfit[np.isfinite(misfit)]
@@ -288,26 +319,25 @@ def _factor(misfit: np.ndarray) -> float:
     return float(np.clip(np.sqrt(np.median(told)) * SIGMA_PER_MAD, 1.0, LARGEST_FACTOR))
 
 
-def _shared_cells(layers: list[tuple[np.ndarray, np.ndarray]]) -> float:
+def _shared_cells(level: np.ndarray, sigmas: np.ndarray) -> float:
     """Side of the square of cells that have one noise: from how differences of two pairs are alike at neighbours.
 
     The noise of a sum over many cells is that of cells for themselves times the sum of the correlations over all lags,
     the side of the square being its root.
+
+    Parameters
+    ----------
+    level, sigmas : (pairs, rows, columns) m, heights of pairs without what differs slowly between them, and their σ.
     """
-    if len(layers) < 2:
+    if len(level) < 2:
         return np.nan
-    both = {(n, m): int(np.isfinite(layers[n][0] + layers[m][0]).sum()) for m in range(len(layers)) for n in range(m)}
+    both = {(n, m): int(np.isfinite(level[n] + level[m]).sum()) for m in range(len(level)) for n in range(m)}
     n, m = max(both, key=lambda pair: both[pair])
-    (one, s1), (other, s2) = layers[n], layers[m]
-    difference = (one - other) / np.hypot(s1, s2)
+    difference = (level[n] - level[m]) / np.hypot(sigmas[n], sigmas[m])
     known = np.isfinite(difference) & (np.abs(difference) < AGREEING_SIGMAS)
     if known.sum() < FEWEST_MISFITS:
         return np.nan
-    d = np.where(known, difference - np.median(difference[known]), 0.0)
-    # the slow part is the orientation of the pairs, which cells share as a part of the adjustment
-    size = 4 * MOST_LAGS + 1, 4 * MOST_LAGS + 1
-    weight = cv2.boxFilter(known.astype(np.float64), -1, size)
-    d = np.where(known, d - cv2.boxFilter(d, -1, size) / np.maximum(weight, 1e-9), 0.0)
+    d = np.where(known, difference, 0.0)
     variance = float((d**2).sum() / known.sum())
     total = []
     for a, b in ((d, known), (d.T, known.T)):
