@@ -50,6 +50,9 @@ CROWD_PX, LEAST_ALIKE = 41, 0.42
 """Side of the square about a pixel, and the mean correlation of the windows in it (0 where nothing matched) for the
 pixel to count; chosen [C]: semi-global matching finds matches in noise by themselves whose windows are alike by .6,
 but over a square of fine noise the mean stays below .42 in all but a thousandth."""
+ALONE_POWER, LEAST_SHARE = 2.0, 0.1
+"""Power of the share of its window that matches by which σ of a pixel is divided, and the least share; chosen [C]: so
+errors at the rim of glass, of water and of photographs are within σ (tools/prove/dense_surface.py)."""
 LEAST_SIGMA_PX = 0.02
 """σ of a parallax is never stated smaller; chosen [C]: interpolation between pixels leaves that even without noise."""
 LARGEST_SIGMA_PX = 1.0
@@ -134,9 +137,10 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
     of_across += LARGEST_ACROSS_PX**2
     known &= np.square(across, out=across) < of_across
     known &= _alike_about(correlation, known, images.left_known) > LEAST_ALIKE
-    # where a pixel of the window is not known both images are the same: it tells nothing and hides noise
-    share = cv2.boxFilter((start > INVALID / 2).astype(np.float32), -1, (WINDOW_PX, WINDOW_PX))
-    np.square(np.maximum(share, 0.1, out=share), out=share)
+    # where a pixel of the window is not known both images are the same: it tells nothing and hides noise. Where few
+    # pixels about match, by chance, those that do are wrong by more
+    share = cv2.boxFilter(known.astype(np.float32), -1, (WINDOW_PX, WINDOW_PX))
+    np.power(np.maximum(share, LEAST_SHARE, out=share), 2.0 * ALONE_POWER, out=share)
     variance *= factor**2
     variance /= share
     variance += LEAST_SIGMA_PX**2
