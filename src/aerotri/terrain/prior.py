@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, RegularGridInterpolator
 from scipy.ndimage import distance_transform_edt, gaussian_filter, median_filter
+from scipy.spatial import cKDTree
 
 from aerotri.conventions import InputError
 from aerotri.terrain.pickets import Area
@@ -19,6 +20,8 @@ SPARE_PX = 4.0
 OUTLIER_PX = 3.0
 """Posts of parallax off the median of the neighbours from which a height is taken out; chosen [C]: less takes off true
 edges of the ground, more leaves outliers that mislead the next level."""
+NEIGHBOURS = 8
+"""Points around one with whose median height it is compared; chosen [C]: a pit or tower with six points stays."""
 COARSE_CORRELATION = 0.5
 """Correlation from which a coarse height counts; chosen [C]: coarse levels only guide the search; more leaves holes
 over weak texture, less lets chance in."""
@@ -58,11 +61,17 @@ class Prior:
 
 
 def first_prior(known: np.ndarray, area: Area, gsd: float, levels: int) -> Prior:
-    """From points of the ground: their heights, and as much about them as they differ."""
+    """From points of the ground: their heights, and as much about them as they differ.
+
+    A point that lies farther than that from the median of its neighbours does not count: it would bend the search over
+    all ground as far as the next points.
+    """
     known = known[np.isfinite(known).all(axis=1)]
     if len(known) < 3:
         raise InputError("the block has fewer than three object points", "adjust a block with tie points")
     low, high = np.percentile(known[:, 2], [0.5, 99.5])
+    about = 0.75 * (high - low) + SPARE_PX * gsd * 2 ** (levels - 1) / 0.3
+    known = known[np.abs(known[:, 2] - _of_neighbours(known)) <= about]
     size = area.high - area.low
     spacing = max(size.max() / 60.0, COARSE_NODES_PX * gsd * 2 ** (levels - 1))
     x, y = (np.linspace(a, b, max(int((b - a) / spacing) + 1, 3)) for a, b in zip(area.low, area.high, strict=True))
@@ -70,8 +79,15 @@ def first_prior(known: np.ndarray, area: Area, gsd: float, levels: int) -> Prior
     z = LinearNDInterpolator(known[:, :2], known[:, 2])(nodes)
     nearest = NearestNDInterpolator(known[:, :2], known[:, 2])(nodes)
     z = gaussian_filter(np.where(np.isfinite(z), z, nearest).reshape(len(y), len(x)), 1.0)
-    spare = np.full(z.shape, 0.75 * (high - low) + SPARE_PX * gsd * 2 ** (levels - 1) / 0.3)
-    return Prior(x, y, z, spare)
+    return Prior(x, y, z, np.full(z.shape, about))
+
+
+def _of_neighbours(known: np.ndarray) -> np.ndarray:
+    """(n,) m, median height of the neighbours in plan of points (n, 3); their own where there are too few."""
+    if len(known) <= NEIGHBOURS:
+        return known[:, 2]
+    _, near = cKDTree(known[:, :2]).query(known[:, :2], NEIGHBOURS + 1)
+    return np.median(known[near[:, 1:], 2], axis=1)
 
 
 def cleaned(z: np.ndarray, score: np.ndarray, per_post: float, prior: np.ndarray) -> np.ndarray:
