@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, RegularGridInterpolator
 from scipy.ndimage import distance_transform_edt, gaussian_filter, median_filter
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from aerotri.conventions import InputError
 from aerotri.terrain.pickets import Area
@@ -86,7 +86,7 @@ def _of_neighbours(known: np.ndarray) -> np.ndarray:
     """(n,) m, median height of the neighbours in plan of points (n, 3); their own where there are too few."""
     if len(known) <= NEIGHBOURS:
         return known[:, 2]
-    _, near = cKDTree(known[:, :2]).query(known[:, :2], NEIGHBOURS + 1)
+    _, near = KDTree(known[:, :2]).query(known[:, :2], NEIGHBOURS + 1)
     return np.median(known[near[:, 1:], 2], axis=1)
 
 
