@@ -86,7 +86,7 @@ def _of_neighbours(known: np.ndarray) -> np.ndarray:
     """(n,) m, median height of the neighbours in plan of points (n, 3); their own where there are too few."""
     if len(known) <= NEIGHBOURS:
         return known[:, 2]
-    _, near = KDTree(known[:, :2]).query(known[:, :2], NEIGHBOURS + 1)
+    near = np.asarray(KDTree(known[:, :2]).query(known[:, :2], NEIGHBOURS + 1)[1])
     return np.median(known[near[:, 1:], 2], axis=1)
 
 
