@@ -1,7 +1,7 @@
-"""Steps with the factor of the step before: a quarter of the work of a step with a factor of its own.
+"""Steps with the factor of the step before: a third of the work of a step with a factor of its own.
 
-After a step that gained what it promised the matrix hardly changes any more [L: the chord method, Kelley, Iterative
-methods for linear and nonlinear equations, 1995, 5.4]. What it does change shows in the steps themselves (`secants`).
+After a step within the scatter of the unknowns the matrix hardly changes any more [L: the chord method, Kelley,
+Iterative methods for linear and nonlinear equations, 1995, 5.4].
 """
 
 from __future__ import annotations
@@ -11,13 +11,12 @@ from dataclasses import dataclass
 
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem, RightSide
 from aerotri.adjustment.robust import LEAST_SQUARES
-from aerotri.adjustment.secants import Secants
 from aerotri.adjustment.steps import COST_TOLERANCE, Place, Trial, assembled, place_at
 from aerotri.adjustment.stopping import is_negligible
 
 SLOWEST_CONTRACTION = 1e-2
 """Decrement over that of the step before up to which the old factor is kept, a tenth in length: a new factor, three
-times the work, would win one or two such steps."""
+times the work, would win one such step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,18 +38,16 @@ def follow(system: NormalSystem, first: Trial, redundancy: int, most: int, say: 
     """
     state, decrement, costs, settled = first.place.state, first.decrement, [], False
     side: RightSide = first.equations
-    secants = Secants()
     for _ in range(most):
-        x = secants.solve(first.factor, side.right)
+        x = first.factor.solve(side.right)
         next_decrement = abs(float(x @ side.right) + side.point_decrement)
         contraction = next_decrement / max(abs(decrement), 1e-300)
         move = system.whole_step(state, x, 0.0, LEAST_SQUARES) if contraction <= SLOWEST_CONTRACTION else None
         if move is None:
             break
         settled = is_negligible(next_decrement * SLOWEST_CONTRACTION, side.cost, redundancy)
-        there, before = system.unknowns.advance(state, move), side.right
+        there = system.unknowns.advance(state, move)
         side = system.assemble(there, 0.0, LEAST_SQUARES) if settled else system.right_side(there, LEAST_SQUARES)
-        secants.learn(x, before, side.right)
         if not side.cost <= (costs[-1] if costs else first.equations.cost) * (1.0 + COST_TOLERANCE):
             settled = False
             break

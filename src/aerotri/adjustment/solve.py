@@ -2,7 +2,7 @@
 
 `minimise` reads as the algorithm; it knows normal equations and steps, not photographs. Its parts: `steps` solves for a
 step and makes it lead downhill, `damping` says how much, `secants` learn the curvature that the normal matrix misses,
-`stopping` says when to end, `chord_steps` takes further steps with one factor, `robust` gives the weights.
+`stopping` says when to end, `chord_steps` takes the last steps with an old factor, `robust` gives the weights.
 """
 
 from __future__ import annotations
@@ -181,7 +181,6 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
         step, damping = until_better(system, at, step, damping, secants)
         if step is None:
             return course.ended("not converged", at)
-        may_be_followed = step.can_be_followed(at.equations)
         is_plain = damping.value == 0.0 and (secants is not None or not step.points_settled)
         if is_plain and secants is not None:
             step = lengthened(system, at, step)
@@ -192,7 +191,7 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
         last_decrement = step.decrement if is_plain else np.inf
         damping = damping.lowered(step.gain_ratio(at.equations), secants is not None)
         course.add(step.equations.cost, damping.value)
-        if is_plain and not (stage.is_robust or settled) and may_be_followed:
+        if is_plain and not (stage.is_robust or settled) and step.is_within_scatter:
             at, last_decrement, settled = _followed(system, step, redundancy, last_iteration, course)
         else:
             at = assembled(system, step.place)

@@ -27,10 +27,6 @@ SUSPECT_PIVOT = 1e-11
 """Pivot (relative to a unit diagonal) below which a factor serves for one step only: a hundred times what is taken for
 rounding (`sparse_cholesky.PIVOT_LIMIT`)."""
 
-FAITHFUL = 1.0 - 1e-4
-"""Gain over promise from which on the matrix is taken to be the same at the end of a step [C]: what is left of the step
-is a hundredth of its length."""
-
 STEEP = 0.9
 """Slope at the end of a step, over that at its beginning, from which on the step was too short [L: the curvature
 condition of Wolfe with the c2 of quasi-Newton methods, Nocedal and Wright, 2006, section 3.1]."""
@@ -80,10 +76,10 @@ class Trial:
     def is_suspect(self) -> bool:
         return self.factor.smallest_pivot < SUSPECT_PIVOT
 
-    def can_be_followed(self, before: RightSide) -> bool:
-        """Whether its factor serves for the next: it gained what it promised, or is no longer than unknowns scatter."""
-        kept = self.gain_ratio(before) >= FAITHFUL or abs(self.decrement) <= self.equations.cost
-        return kept and self.improves(before) and not self.is_suspect
+    @property
+    def is_within_scatter(self) -> bool:
+        """Whether the whole step is no longer than the unknowns scatter, so that its factor serves for the next."""
+        return abs(self.decrement) <= self.equations.cost and not self.is_suspect
 
     @property
     def reduced(self) -> np.ndarray:
@@ -184,9 +180,9 @@ def _tried(system: NormalSystem, at: Place, factor: Factor, damping: float, seca
     there = system.unknowns.advance(at.state, move)
     if secants is not None:
         there = system.settle_points(there, at.estimator)
-    # steps with the same factor may follow: they need no matrix
+    # a step with the same factor follows: it needs no matrix
     chord = secants is None and damping == 0.0 and not at.estimator.is_robust
-    if chord and factor.smallest_pivot >= SUSPECT_PIVOT:
+    if chord and abs(decrement) <= at.equations.cost - decrement and factor.smallest_pivot >= SUSPECT_PIVOT:
         side = system.right_side(there, at.estimator)
         return Trial(Visited(there, side, at.estimator), decrement, factor, move)
     return Trial(place_at(system, there, at.estimator), decrement, factor, move, secants is not None)
