@@ -34,7 +34,10 @@ def test_drone_without_control(shared_data, tmp_path):
     adjusted = adjust(block)
     assert adjusted.outcome.status == "converged"
     pixel = block.cameras[0].pixel_mm
+    # on some processors the first orientation ties two of the photographs too weakly, and they are set aside
     residual = np.hypot(*adjusted.rays.v.T)
+    residual = residual[np.isfinite(residual)]
+    assert len(residual) > 0.7 * len(adjusted.rays.v)
     assert np.median(residual) / pixel < 1.0
     off = adjusted.images.centre[block.gnss_ins.image] - block.gnss_ins.xyz
     assert np.sqrt((off**2).mean(axis=0)).max() < 1.0

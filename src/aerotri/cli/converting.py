@@ -155,7 +155,7 @@ def convert(
         int | None,
         typer.Option(
             min=2,
-            help="Write the block in so many parts, for adjust --executor, never holding its image points (COLMAP, "
+            help="Number of parts to write the block in, for adjust --executor, never holding its image points (COLMAP, "
             "PAT-B, BINGO).",
             rich_help_panel=OUTPUT,
         ),
