@@ -155,8 +155,8 @@ def convert(
         int | None,
         typer.Option(
             min=2,
-            help="Number of parts to write the block in, for adjust --executor, never holding its image points (COLMAP, "
-            "PAT-B, BINGO).",
+            help="Number of parts to write the block in, for adjust --executor, never holding its image points "
+            "(COLMAP, PAT-B, BINGO).",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
