@@ -83,7 +83,7 @@ def read(path) -> dict:
 
 
 def test_from_photographs_to_the_true_volume(place, run_once):
-    """Accepted, the volume within three of its σ, which is below 2 % on any processor; the whole chain at full size."""
+    """Accepted, the volume within three of its σ, which is below 2 %; the whole chain at full size."""
     assert run_once == 0
     adjusted = read(place / "drone_project" / "result" / "adjustment.json")
     assert adjusted["verdict"] == "accepted"

@@ -34,7 +34,7 @@ def test_drone_without_control(shared_data, tmp_path):
     adjusted = adjust(block)
     assert adjusted.outcome.status == "converged"
     pixel = block.cameras[0].pixel_mm
-    # on some processors the first orientation ties two of the photographs too weakly, and they are set aside
+    # where the first orientation comes out otherwise, a photograph is tied too weakly and set aside
     residual = np.hypot(*adjusted.rays.v.T)
     residual = residual[np.isfinite(residual)]
     assert len(residual) > 0.7 * len(adjusted.rays.v)
