@@ -11,6 +11,7 @@ import pytest
 from aerotri.diagnosis.parameter_sets import verdict
 from aerotri.formats.results.parameter_sets import comparison_columns, comparison_json
 from aerotri.functional_model.additional_parameters import AUTO, parse_parameters
+from aerotri.observations import Prior
 from aerotri.pipeline import adjust, adjust_keeping_system, chain, compare_parameters
 from aerotri.pipeline.choosing import choose_parameters
 from aerotri.pipeline.in_frame import adjust_in_frame
@@ -256,3 +257,11 @@ def test_auto_takes_the_next_set_where_the_first_does_not_converge(block, monkey
     assert len(tried) == chain.MOST_CHOICES
     assert found.result.block.settings.adjustment.additional_parameters == first
     assert found.result.outcome.status == "not converged"
+
+
+def test_a_lens_with_start_values_is_not_held(block):
+    """None is no candidate where the lens was found by a first orientation; one that was calibrated may be held."""
+    camera = block.cameras[0]
+    for prior, there in ((Prior(), True), (Prior(-0.05), False), (Prior(-0.05, sigma=1e-3), True)):
+        own = replace(block, cameras=(replace(camera, lens={"k1": prior}), *block.cameras[1:]))
+        assert (() in candidate_sets(own)) == there

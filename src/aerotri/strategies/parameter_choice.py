@@ -93,18 +93,25 @@ def sets_to_choose_from(block: Block) -> tuple[Choice, ...]:
     """The sets of `candidate_sets`, of small blocks those with few parameters."""
     if len(block.images) >= FEW_PHOTOGRAPHS:
         return candidate_sets(block)
-    return tuple(parse_parameters(spec) for spec in OF_SMALL_BLOCKS)
+    return _parsed(OF_SMALL_BLOCKS, block)
 
 
 def candidate_sets(block: Block) -> tuple[Choice, ...]:
-    """The sets worth comparing for the cameras of a block, none among them."""
+    """The sets worth comparing for the cameras of a block; none among them unless the lens has start values only."""
     models = {block.cameras[k].model for k in set(block.images.camera.tolist())}
     specs: list[str] = list(COMMON)
     for model, own in OF_MODEL.items():
         if model in models:
             specs += own
     # without parameters a strong lens does not converge: from where the others ended it costs least to see that
-    return tuple(parse_parameters(spec) for spec in (*specs, "none"))
+    return _parsed((*specs, "none"), block)
+
+
+def _parsed(specs: Sequence[str], block: Block) -> tuple[Choice, ...]:
+    """The sets, without "none" where a lens has start values: it would hold what these image points alone gave."""
+    cameras = [block.cameras[k] for k in set(block.images.camera.tolist())]
+    start_only = any(prior.kind == "free" and prior.value for camera in cameras for prior in camera.lens.values())
+    return tuple(parse_parameters(spec) for spec in specs if not (start_only and spec == "none"))
 
 
 def choose(comparison: ParameterComparison) -> Chosen:
