@@ -212,7 +212,7 @@ def surfaces(result: aerotri.Adjustment, photographs: Path, matcher: Matcher):
     """The surface with a matcher alone, and refined; seconds of the refined one."""
     ours, start = tile.parallaxes_of, parallaxes.semi_global
 
-    def alone(images, refine: bool = True) -> Parallaxes:
+    def alone(images) -> Parallaxes:
         value = matcher(images)
         return Parallaxes(value, np.where(np.isfinite(value), np.float32(0.3), np.float32(np.nan)), 0.0, 1.0)
 

@@ -238,7 +238,7 @@ def semi_global_surface(result: aerotri.Adjustment, photographs: Path) -> DenseS
     """The same surface with what OpenCV gives in place of our parallaxes."""
     ours = tile.parallaxes_of
 
-    def theirs(images, refine: bool = True) -> Parallaxes:
+    def theirs(images) -> Parallaxes:
         value = semi_global(images)
         sigma = np.where(np.isfinite(value), np.float32(0.3), np.float32(np.nan))
         return Parallaxes(value, sigma, 0.0, 1.0)

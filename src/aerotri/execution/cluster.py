@@ -6,6 +6,7 @@ import logging
 import queue
 import signal
 import uuid
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -51,17 +52,24 @@ class Dask:
         self._address, self._count, self._say = address, workers, say
         self._stack = ExitStack()
         self._client: Any = None
+        self._starting: Future[Client] | None = None
         self._told_waiting = False
 
     def __enter__(self) -> Self:
         if self._address:
             self._client = self._stack.enter_context(_connected(self._address))
             self._say_dashboard()
+        else:
+            # workers take seconds to begin: meanwhile the command reads its files
+            self._starting = self._stack.enter_context(ThreadPoolExecutor(1)).submit(self._started)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._starting is not None and self._client is None:
+            with suppress(Exception):
+                self._client = self._starting.result()
         self._stack.close()
 
     def run(self, work: Work[S, T, R], report: Report | None = None) -> list[R]:
@@ -71,8 +79,9 @@ class Dask:
             refuse_beyond_memory(
                 count * work.bytes_each, f"{count} {work.what} at once", "give fewer workers, {share} times as many"
             )
-            if self._client is None:
-                self._start()
+            if self._client is None and self._starting is not None:
+                self._client = self._starting.result()
+                self._say_dashboard()
         options = {"pure": False, **self._resources(work)}
         ledger: Ledger[R] = Ledger(work, report)
         with parcels(work) as waiting:
@@ -122,7 +131,8 @@ class Dask:
                     self._say(f"Dask scheduler {self._client.scheduler.address}: no worker at the moment, waiting")
                     self._told_waiting = True
 
-    def _start(self) -> None:
+    def _started(self) -> Client:
+        """The client of workers that begin; they end with the context."""
         there = available_bytes()
         memory: dict[str, Any] = {} if there is None else {"resources": {MEMORY: SHARE * there / self._count}}
         self._stack.enter_context(dask.config.set(OWN_CLUSTER))
@@ -132,9 +142,9 @@ class Dask:
                 silence_logs=logging.CRITICAL, env={**ONE_THREAD, **UNWATCHED}, **memory,
             )
         )  # fmt: skip
-        self._client = self._stack.enter_context(Client(cluster))
-        self._client.register_plugin(_NotInterrupted())
-        self._say_dashboard()
+        client = self._stack.enter_context(Client(cluster))
+        client.register_plugin(_NotInterrupted())
+        return client
 
     def _say_dashboard(self) -> None:
         if find_spec("bokeh") is not None or self._address:

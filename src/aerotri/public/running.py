@@ -246,8 +246,9 @@ def run(
     target = Path(f"{place.resolve().name}_project" if out is None else out)
     with stage_report(progress) as report:
         steps = steps_of(place, target, settings, dense)
-        with opened(executor, report.said):
-            pass  # a scheduler that does not answer is told now, not after hours
+        if chosen(executor).address:
+            with opened(executor, report.said):
+                pass  # a scheduler that does not answer is told now, not after hours
         if unmarked != "stop" and not from_block and (target / BLOCK / EDITS).is_file():
             steps["tie_points"] = replace(steps["tie_points"], status="left out", reason=MARKED_SINCE)
         begun = Project(target, place)

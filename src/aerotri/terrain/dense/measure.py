@@ -149,7 +149,7 @@ def measure_surface(
     grid = grid_of_area(area, cell)
     files = TileFiles(plan.folder, finest)
     windows = tile_windows(grid, tile_side(grid, gsd, finest))
-    options = TileOptions(finest, plan.pairs, plan.edge, True)
+    options = TileOptions(finest, plan.pairs, plan.edge)
     work = TileWork(photographs, store, grid, heights, options, files)
     resumed = do_windows(work, windows, executor, partial(tell, "surface"))
     return _outcome(calibration, plan, photographs, grid, windows, files, finest, resumed)
@@ -178,7 +178,7 @@ def _coarse(
     )  # fmt: skip
     files = TileFiles(plan.folder, level)
     windows = tile_windows(grid, tile_side(grid, gsd, level))
-    options = TileOptions(level, COARSE_PAIRS, plan.edge, False)
+    options = TileOptions(level, COARSE_PAIRS, plan.edge)
     do_windows(TileWork(photographs, store, grid, heights, options, files), windows, executor, report)
     z = np.full((grid.rows, grid.columns), np.nan)
     for window, tile in files.read_all(windows):

@@ -76,20 +76,15 @@ class Parallaxes:
     factor: float
 
 
-def parallaxes_of(images: EpipolarImages, refine: bool = True) -> Parallaxes:
+def parallaxes_of(images: EpipolarImages) -> Parallaxes:
     """Match a pair.
 
-    Parameters
-    ----------
-    refine : by least squares; without, σ is that of rounding.
+    Coarse levels are treated as the finest: the tests of least squares take out what matched by chance, in water and
+    leaves, which would make the range of heights too wide for the finest level to find anything.
     """
     found = semi_global(images)
     value = cv2.medianBlur(np.nan_to_num(found, nan=INVALID), 3)
     value[np.isnan(found)] = INVALID
-    if not refine:
-        known = value > INVALID / 2
-        nothing = np.full(value.shape, np.nan, np.float32)
-        return Parallaxes(np.where(known, value, nothing), np.where(known, np.float32(0.3), nothing), 0.0, 1.0)
     return _refined(images, value)
 
 

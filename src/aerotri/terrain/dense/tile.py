@@ -72,12 +72,11 @@ class TileSurface:
 
 @dataclass(frozen=True)
 class TileOptions:
-    """level : of resolution. pairs : most of a tile. edge : share of the format not used. refine : least squares."""
+    """level : of resolution. pairs : most of a tile. edge : share of the format not used."""
 
     level: int
     pairs: int
     edge: float
-    refine: bool
 
 
 def measure_tile(
@@ -101,9 +100,9 @@ def measure_tile(
     place = place_at(photographs, middle, reach, options.edge)
     ground, low, high = (place.from_crs(np.column_stack([nodes, h])) for h in (z, low_z, high_z))
     candidates = possible_pairs(place, ground)
-    work = _TileMatching(place, store, grid, options.level, options.refine, (ground, low, high))
+    work = _TileMatching(place, store, grid, options.level, (ground, low, high))
     matched = [m for pair in chosen_pairs(candidates, options.pairs) if (m := work.match(pair)) is not None]
-    if options.refine and matched:
+    if matched:
         matched += _fill_holes(work, candidates, matched, nodes, inside)
     if not matched:
         empty = np.full(shape, np.nan)
@@ -143,7 +142,6 @@ class _TileMatching:
     store: GreyStore
     grid: Grid
     level: int
-    refine: bool
     heights: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     def match(self, pair: Pair) -> _Matched | None:
@@ -154,7 +152,7 @@ class _TileMatching:
         images = epipolar_images(self.place, geometry, self.store)
         if not (images.left_known.any() and images.right_known.any()):
             return None
-        found = parallaxes_of(images, self.refine)
+        found = parallaxes_of(images)
         return _Matched(pair, _heights(self.place, geometry, found, self.grid), found.across)
 
 
