@@ -32,6 +32,12 @@ SIDES = (4, 5, 6, 7)
 BLOCKS_PX = (15, 31, 61)
 """Neighbourhoods of the threshold."""
 SMALLEST_PX, WORST_SIGMA_PX = 10.0, 0.3
+MOST_OFF, MEAN_OFF = 0.25, 0.12
+"""By which an outline may leave an ellipse, of its radius: at most, and on average."""
+ROUGHLY = 0.25
+"""Besides, where the ellipse is only that of the moments of the outline."""
+AT_ONCE = 20_000
+"""Outlines that are looked at together."""
 LEAST_CONTRAST = 25.0
 """Grey values between black and white of a target, of 255 [C]."""
 LEAST_CLEAR = -0.3
@@ -77,11 +83,11 @@ def find_coded(piece: np.ndarray) -> tuple[CodedTarget, ...]:
     grey = np.clip((np.where(known, piece, low) - low) * (255.0 / max(high - low, 1e-9)), 0, 255).astype(np.uint8)
     filled = np.where(known, piece, np.nan)
     found: list[CodedTarget] = []
-    for contour in _contours(grey):
+    for contour, is_round in _contours(grey):
         if any(one.covers(contour.mean(axis=0)) for one in found):
             continue
-        readings = [*_square_readings(grey, contour), *_ring_readings(grey, contour)]
-        one = _best(filled, readings)
+        readings = [*_square_readings(grey, contour), *(_ring_readings(grey, contour) if is_round else ())]
+        one = _best(filled, readings) if readings else None
         found += [] if one is None else [one]
     return tuple(found)
 
@@ -105,22 +111,50 @@ def _best(piece: np.ndarray, readings: list[Reading]) -> CodedTarget | None:
     return CodedTarget(family, number, one.place, one.sigma_px, one.corners)
 
 
-def _contours(grey: np.ndarray) -> Iterator[np.ndarray]:
-    """(n, 2) px, outlines of what is darker or brighter than its surroundings, the largest first."""
-    every: list[np.ndarray] = []
+def _contours(grey: np.ndarray) -> Iterator[tuple[np.ndarray, bool]]:
+    """(n, 2) px, outlines of what is darker or brighter than its surroundings, the largest first, and whether round."""
+    every: list[tuple[np.ndarray, bool]] = []
     for block in BLOCKS_PX:
         if block >= min(grey.shape):
             continue
         for kind in (cv2.THRESH_BINARY, cv2.THRESH_BINARY_INV):
             black = cv2.adaptiveThreshold(grey, 255, cv2.ADAPTIVE_THRESH_MEAN_C, kind, block, 5)
-            lines, _ = cv2.findContours(black, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-            every += [line[:, 0].astype(float) + 0.5 for line in lines if len(line) >= 2 * SMALLEST_PX]
-    every.sort(key=len, reverse=True)
-    yield from every
+            found, _ = cv2.findContours(black, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+            lines = [line for line in found if len(line) >= 2 * SMALLEST_PX]
+            for first in range(0, len(lines), AT_ONCE):
+                some = lines[first : first + AT_ONCE]
+                every += zip(some, _are_round(some).tolist(), strict=True)
+    every.sort(key=lambda one: len(one[0]), reverse=True)
+    for line, is_round in every:
+        yield line[:, 0].astype(float) + 0.5, is_round
+
+
+def _are_round(lines: list[np.ndarray]) -> np.ndarray:
+    """(n,) bool, whether outlines may be ellipses: every place about as far from the middle as it is on average.
+
+    Distances are in the ellipse that the second moments of the outline give, so that any ellipse is a circle. Looked at
+    for all outlines at once: photographs of grass have a million of them, and an ellipse takes long to fit.
+    """
+    count = np.array([len(line) for line in lines])
+    first = np.concatenate([[0], np.cumsum(count)[:-1]])
+    away = np.concatenate(lines)[:, 0].astype(float)
+    away -= np.repeat(np.add.reduceat(away, first) / count[:, None], count, axis=0)
+    x, y = away.T
+    xx, xy, yy = (np.add.reduceat(product, first) / count for product in (x * x, x * y, y * y))
+    flat = np.maximum(xx * yy - xy * xy, 1e-9)
+    a, b, c = (np.repeat(part, count) for part in (yy / flat, xy / flat, xx / flat))
+    # of a circle of radius 1 the moments are one half
+    off = np.abs(np.sqrt(np.maximum(a * x * x - 2.0 * b * x * y + c * y * y, 0.0) / 2.0) - 1.0)
+    smaller = np.sqrt(8.0 * flat / (xx + yy + np.sqrt((xx - yy) ** 2 + 4.0 * xy * xy)))
+    largest, mean = np.maximum.reduceat(off, first), np.add.reduceat(off, first) / count
+    # an ellipse of 4 : 1 is off by .25 because its places are closest together where it is flattest
+    return (largest <= np.maximum(MOST_OFF, 3.0 / (2.0 * smaller)) + ROUGHLY) & (mean <= MEAN_OFF + ROUGHLY / 2.0)
 
 
 def _square_readings(grey: np.ndarray, contour: np.ndarray) -> Iterator[Reading]:
     """What a square says, where the outline is one."""
+    if len(contour) < 4.0 * SMALLEST_PX / np.sqrt(2.0) - 2.0:  # as many places has one that stands on its corner
+        return
     line = contour.astype(np.float32).reshape(-1, 1, 2)
     corners = cv2.approxPolyDP(line, 0.05 * cv2.arcLength(line, True), True).reshape(-1, 2).astype(float)
     if len(corners) != 4 or not cv2.isContourConvex(corners.astype(np.float32).reshape(-1, 1, 2)):
@@ -171,7 +205,7 @@ def _ring_readings(grey: np.ndarray, contour: np.ndarray) -> Iterator[Reading]:
     axes = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]) * [width / 2, height / 2]
     # the outline runs through the middles of the outermost pixels
     off = np.linalg.norm(np.linalg.solve(axes, (contour - (x, y)).T), axis=0)
-    if np.abs(off - 1.0).max() > max(0.25, 3.0 / min(width, height)) or np.abs(off - 1.0).mean() > 0.12:
+    if np.abs(off - 1.0).max() > max(MOST_OFF, 3.0 / min(width, height)) or np.abs(off - 1.0).mean() > MEAN_OFF:
         return
     axes = axes @ np.linalg.inv(_rotation(angle)) * (1.0 + 0.5 / np.sqrt(width * height / 4))
     middle = np.array([x, y])
