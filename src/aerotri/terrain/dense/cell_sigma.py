@@ -102,19 +102,24 @@ def step_sigma(
     """(rows, columns) m, σ of a cell by the step that it lies beside; 0 where there is none.
 
     A step is more than a pixel of parallax, from the lowest to the highest that any pair saw about a cell. It is looked
-    for in what heights leave their mean by, so that a slope is none. Beside a hole half a pixel counts.
+    for in heights and in what they leave their mean by, and the smaller one counts: the second is none on a slope, the
+    first none on level ground whose mean holds a wall nearby. Beside a hole, which may hide the step, what heights
+    leave their mean by counts alone, and half a pixel of it.
     """
     known = np.isfinite(z)
     if not known.any():
         return np.zeros(z.shape)
-    middle = np.nanmedian(z)
+    middle = float(np.nanmedian(z))
     around = 4 * scale.lag + 1
     mean = _sum(np.where(known, z - middle, 0.0).astype(np.float32), around)
     mean = mean / np.maximum(_sum(known.astype(np.float32), around), 1.0) + middle
-    # what is not known stays far beyond all heights
-    high, low = (np.where(np.abs(a) < UNKNOWN, a - mean, a).astype(np.float32) for a in (highest, lowest))
-    near, far = (_range(high, low, side) for side in (2 * ((scale.lag + 1) // 2) + 1, 2 * scale.lag + 1))
+    left, whole = ((_less(highest, level), _less(lowest, level)) for level in (mean, middle))
+    sides = 2 * ((scale.lag + 1) // 2) + 1, 2 * scale.lag + 1
+    near, far_left = (_range(*left, side) for side in sides)
+    near_whole, far_whole = (_range(*whole, side) for side in sides)
+    near = np.minimum(near, near_whole)
     hidden = cv2.erode(known.view(np.uint8), _square(2 * scale.lag + 1)) == 0
+    far = np.where(hidden, far_left, np.minimum(far_left, far_whole))
     least = STEP_SIGMAS * noise
     next_to = np.where((near > scale.pixel) & (near > least), STEP_SHARE * near, 0.0)
     off = np.where(hidden, HIDDEN_SHARE, FAR_SHARE) * far
@@ -124,6 +129,11 @@ def step_sigma(
 
 def _sum(values: np.ndarray, side: int) -> np.ndarray:
     return cv2.boxFilter(values, -1, (side, side), normalize=False, borderType=cv2.BORDER_CONSTANT)
+
+
+def _less(values: np.ndarray, level: np.ndarray | float) -> np.ndarray:
+    """(rows, columns) float32 m above a level; what is not known stays far beyond all heights."""
+    return np.where(np.abs(values) < UNKNOWN, values - level, values).astype(np.float32)
 
 
 def _range(high: np.ndarray, low: np.ndarray, side: int) -> np.ndarray:
