@@ -43,6 +43,7 @@ def main(project: Path, deformation: Path) -> None:
     save(Image.open(project / "dtm" / "plots" / "surface.png"), "drone_surface")
     volume = project / "volume" / "plots"
     save(beside(*(Image.open(volume / f"{name}.png") for name in ("thickness", "budget")), height=700), "drone_volume")
+    save(Image.open(project / "ortho" / "plots" / "orthophoto.png"), "drone_ortho")
     save(Image.open(deformation / "plots" / "contours.png"), "deformation")
 
 

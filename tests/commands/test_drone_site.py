@@ -83,7 +83,7 @@ def read(path) -> dict:
 
 
 def test_from_photographs_to_the_true_volume(place, run_once):
-    """Accepted, the volume within three of its σ, which is below 2 %; the whole chain at full size."""
+    """Accepted, the volume within three of its σ, which is below 1 %; the whole chain at full size."""
     assert run_once == 0
     adjusted = read(place / "drone_project" / "result" / "adjustment.json")
     assert adjusted["verdict"] == "accepted"
@@ -93,7 +93,7 @@ def test_from_photographs_to_the_true_volume(place, run_once):
     assert read(place / "drone_project" / "dtm" / "dtm.json")["ground_within"] == "pile.geojson"
     truth = read(place / "true_volume" / "volume.json")["net_m3"]
     assert abs(measured["net_m3"] - truth) < 3.0 * measured["sigma"]["sigma_m3"]
-    assert measured["sigma"]["sigma_m3"] < 0.02 * truth
+    assert measured["sigma"]["sigma_m3"] < 0.01 * truth
     assert invoke(commands()["compare"]) == 0
     assert abs(read(place / "difference" / "compare.json")["difference_m"]["bias"]) < 0.1
 
