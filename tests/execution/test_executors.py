@@ -1,7 +1,11 @@
 """Tasks in threads, in processes and on workers of Dask: the same results, the same failures, killed workers or not."""
 
 import json
+import os
 import pickle
+import signal
+import subprocess
+import sys
 from functools import partial
 
 import pytest
@@ -194,3 +198,32 @@ def test_what_cannot_be_sent_back_is_a_failure(work):
 
 def _unsendable(shared, task):
     return lambda: None
+
+
+WAITING = """
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from aerotri.execution.opening import opened
+with opened("dask:local:1") as workers:
+    workers._starting.result()
+    print("reading", flush=True)
+    try:
+        time.sleep(60)
+    except KeyboardInterrupt:
+        sys.exit(130)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of a system")
+def test_an_interruption_before_the_work_begins_is_quiet():
+    """The terminal's signal reaches the workers too, which began while the command still reads its files."""
+    pytest.importorskip("distributed")
+    process = subprocess.Popen(
+        [sys.executable, "-c", WAITING], stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline().strip() == b"reading"
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said.decode() == ""

@@ -263,5 +263,6 @@ def test_a_lens_with_start_values_is_not_held(block):
     """None is no candidate where the lens was found by a first orientation; one that was calibrated may be held."""
     camera = block.cameras[0]
     for prior, there in ((Prior(), True), (Prior(-0.05), False), (Prior(-0.05, sigma=1e-3), True)):
-        own = replace(block, cameras=(replace(camera, lens={"k1": prior}), *block.cameras[1:]))
-        assert (() in candidate_sets(own)) == there
+        for part in ({"lens": {"k1": prior}}, {"brown": {"K1": prior}}):
+            own = replace(block, cameras=(replace(camera, **part), *block.cameras[1:]))
+            assert (() in candidate_sets(own)) == there

@@ -268,6 +268,9 @@ def test_sigma_beside_a_step_is_a_share_of_it():
     assert (found[:, 20:24] == 0.0).all()
     level = np.where(np.arange(30) < 15, 100.0, 108.0) + np.zeros((20, 1))  # from three cells off on it is no step
     assert (by_step(level, noise)[:, [*range(6, 13), *range(17, 24)]] == 0.0).all()
+    # down where the slope goes up, where heights by themselves differ by less than the step
+    against = np.arange(30) + np.where(np.arange(30) < 15, 2.0, 0.0) + np.zeros((20, 1))
+    assert (by_step(against, noise)[:, [14, 15]] > 1.5 * STEP_SHARE).all()
     assert (by_step(z, noise, CellScale(2, 20.0)) == 0.0).all()
     assert (by_step(z, np.full(z.shape, 3.0)) == 0.0).all()
     z[:, 13:15] = np.nan  # hidden by a hole, farther than looked for: what is seen is how heights leave their mean

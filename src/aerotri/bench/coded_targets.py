@@ -145,7 +145,8 @@ def _are_round(lines: list[np.ndarray]) -> np.ndarray:
     a, b, c = (np.repeat(part, count) for part in (yy / flat, xy / flat, xx / flat))
     # of a circle of radius 1 the moments are one half
     off = np.abs(np.sqrt(np.maximum(a * x * x - 2.0 * b * x * y + c * y * y, 0.0) / 2.0) - 1.0)
-    smaller = np.sqrt(8.0 * flat / (xx + yy + np.sqrt((xx - yy) ** 2 + 4.0 * xy * xy)))
+    # half the smaller axis: twice the smaller moment is its square
+    smaller = np.sqrt(4.0 * flat / (xx + yy + np.sqrt((xx - yy) ** 2 + 4.0 * xy * xy)))
     largest, mean = np.maximum.reduceat(off, first), np.add.reduceat(off, first) / count
     # an ellipse of 4 : 1 is off by .25 because its places are closest together where it is flattest
     return (largest <= np.maximum(MOST_OFF, 3.0 / (2.0 * smaller)) + ROUGHLY) & (mean <= MEAN_OFF + ROUGHLY / 2.0)

@@ -52,7 +52,7 @@ class Dask:
         self._address, self._count, self._say = address, workers, say
         self._stack = ExitStack()
         self._client: Any = None
-        self._starting: Future[LocalCluster] | None = None
+        self._starting: Future[tuple[LocalCluster, Client]] | None = None
         self._told_waiting = False
 
     def __enter__(self) -> Self:
@@ -79,8 +79,7 @@ class Dask:
                 count * work.bytes_each, f"{count} {work.what} at once", "give fewer workers, {share} times as many"
             )
             if self._client is None and self._starting is not None:
-                self._client = self._stack.enter_context(Client(self._starting.result()))
-                self._client.register_plugin(_NotInterrupted())
+                _, self._client = self._starting.result()
                 self._say_dashboard()
         options = {"pure": False, **self._resources(work)}
         ledger: Ledger[R] = Ledger(work, report)
@@ -131,19 +130,24 @@ class Dask:
                     self._say(f"Dask scheduler {self._client.scheduler.address}: no worker at the moment, waiting")
                     self._told_waiting = True
 
-    def _started(self) -> LocalCluster:
-        """Workers that begin."""
+    def _started(self) -> tuple[LocalCluster, Client]:
+        """Workers that begin, and who speaks with them."""
         there = available_bytes()
         memory: dict[str, Any] = {} if there is None else {"resources": {MEMORY: SHARE * there / self._count}}
-        return LocalCluster(
+        cluster = LocalCluster(
             n_workers=self._count, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
             silence_logs=logging.CRITICAL, env={**ONE_THREAD, **UNWATCHED}, **memory,
         )  # fmt: skip
+        client = Client(cluster)
+        client.register_plugin(_NotInterrupted())
+        return cluster, client
 
     def _end(self) -> None:
         """End the workers; what kept them from beginning was told where they were asked for."""
         if self._starting is not None and self._starting.exception() is None:
-            self._starting.result().close()
+            cluster, client = self._starting.result()
+            client.close()
+            cluster.close()
 
     def _say_dashboard(self) -> None:
         if find_spec("bokeh") is not None or self._address:

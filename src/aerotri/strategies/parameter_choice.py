@@ -110,7 +110,8 @@ def candidate_sets(block: Block) -> tuple[Choice, ...]:
 def _parsed(specs: Sequence[str], block: Block) -> tuple[Choice, ...]:
     """The sets, without "none" where a lens has start values: it would hold what these image points alone gave."""
     cameras = [block.cameras[k] for k in set(block.images.camera.tolist())]
-    start_only = any(prior.kind == "free" and prior.value for camera in cameras for prior in camera.lens.values())
+    values = [prior for camera in cameras for part in (camera.lens, camera.brown) for prior in part.values()]
+    start_only = any(prior.kind == "free" and prior.value for prior in values)
     return tuple(parse_parameters(spec) for spec in specs if not (start_only and spec == "none"))
 
 

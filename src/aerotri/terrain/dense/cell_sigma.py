@@ -102,9 +102,9 @@ def step_sigma(
     """(rows, columns) m, σ of a cell by the step that it lies beside; 0 where there is none.
 
     A step is more than a pixel of parallax, from the lowest to the highest that any pair saw about a cell. It is looked
-    for in heights and in what they leave their mean by, and the smaller one counts: the second is none on a slope, the
-    first none on level ground whose mean holds a wall nearby. Beside a hole, which may hide the step, what heights
-    leave their mean by counts alone, and half a pixel of it.
+    for in what heights leave their mean by, so that a slope is none. That mean holds a wall some cells away: no step is
+    therefore larger than the range of the heights themselves and what the slope may hide of it. Beside a hole, which
+    may hide the step, half a pixel counts, whatever the heights themselves.
     """
     known = np.isfinite(z)
     if not known.any():
@@ -114,9 +114,10 @@ def step_sigma(
     mean = _sum(np.where(known, z - middle, 0.0).astype(np.float32), around)
     mean = mean / np.maximum(_sum(known.astype(np.float32), around), 1.0) + middle
     left, whole = ((_less(highest, level), _less(lowest, level)) for level in (mean, middle))
+    slope = _slope(np.where(known, z - middle, 0.0).astype(np.float32), known)
     sides = 2 * ((scale.lag + 1) // 2) + 1, 2 * scale.lag + 1
     near, far_left = (_range(*left, side) for side in sides)
-    near_whole, far_whole = (_range(*whole, side) for side in sides)
+    near_whole, far_whole = (_range(*whole, side) + (side - 1) * slope for side in sides)
     near = np.minimum(near, near_whole)
     hidden = cv2.erode(known.view(np.uint8), _square(2 * scale.lag + 1)) == 0
     far = np.where(hidden, far_left, np.minimum(far_left, far_whole))
@@ -129,6 +130,20 @@ def step_sigma(
 
 def _sum(values: np.ndarray, side: int) -> np.ndarray:
     return cv2.boxFilter(values, -1, (side, side), normalize=False, borderType=cv2.BORDER_CONSTANT)
+
+
+def _slope(z: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """(rows, columns) float32 m, change of height from cell to cell, along rows and columns together.
+
+    The median of a square of 5 × 5 cells, which a wall does not change.
+    """
+    total = np.zeros(z.shape, np.float32)
+    for axis in (0, 1):
+        change = np.abs(np.diff(z, axis=axis))
+        change *= np.minimum(*(np.take(known, range(k, z.shape[axis] - 1 + k), axis) for k in (0, 1)))
+        change = np.concatenate([change, np.take(change, [-1], axis)], axis) if change.shape[axis] else 0.0 * z
+        total += cv2.medianBlur(np.ascontiguousarray(change), 5)
+    return total
 
 
 def _less(values: np.ndarray, level: np.ndarray | float) -> np.ndarray:
