@@ -27,8 +27,23 @@ def remove_tiles(folder: Path) -> None:
 
 
 def fingerprints(paths: Iterable[Path]) -> list[list[Any]]:
-    """Name, size and time of files: tiles of other ones are not taken up."""
-    return [[path.name, path.stat().st_size, path.stat().st_mtime_ns] for path in paths]
+    """Name, size and time of files: tiles of other ones are not taken up.
+
+    Raises
+    ------
+    InputError
+        When a file is not there.
+    """
+    found = []
+    for path in paths:
+        try:
+            state = path.stat()
+        except OSError as error:
+            raise InputError(
+                f"cannot be read ({error.strerror})", "give the path of a file that exists", path
+            ) from error
+        found.append([path.name, state.st_size, state.st_mtime_ns])
+    return found
 
 
 def open_tiles(folder: Path, stated: Mapping[str, Any]) -> None:
