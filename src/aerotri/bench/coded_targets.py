@@ -36,8 +36,6 @@ MOST_OFF, MEAN_OFF = 0.25, 0.12
 """By which an outline may leave an ellipse, of its radius: at most, and on average."""
 ROUGHLY = 0.25
 """Besides, where the ellipse is only that of the moments of the outline."""
-AT_ONCE = 20_000
-"""Outlines that are looked at together."""
 LEAST_CONTRAST = 25.0
 """Grey values between black and white of a target, of 255 [C]."""
 LEAST_CLEAR = -0.3
@@ -121,9 +119,7 @@ def _contours(grey: np.ndarray) -> Iterator[tuple[np.ndarray, bool]]:
             black = cv2.adaptiveThreshold(grey, 255, cv2.ADAPTIVE_THRESH_MEAN_C, kind, block, 5)
             found, _ = cv2.findContours(black, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
             lines = [line for line in found if len(line) >= 2 * SMALLEST_PX]
-            for first in range(0, len(lines), AT_ONCE):
-                some = lines[first : first + AT_ONCE]
-                every += zip(some, _are_round(some).tolist(), strict=True)
+            every += zip(lines, _are_round(lines).tolist(), strict=True) if lines else []
     every.sort(key=lambda one: len(one[0]), reverse=True)
     for line, is_round in every:
         yield line[:, 0].astype(float) + 0.5, is_round
