@@ -206,8 +206,8 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 from aerotri.execution.opening import opened
 with opened("dask:local:1") as workers:
     workers._starting.result()
-    print("reading", flush=True)
     try:
+        print("reading", flush=True)
         time.sleep(60)
     except KeyboardInterrupt:
         sys.exit(130)
