@@ -16,12 +16,11 @@ from aerotri.terrain.dense import _mesh_kernels as kernels
 from aerotri.terrain.dense import parallaxes
 from aerotri.terrain.dense._resampling_kernels import resample
 from aerotri.terrain.dense.cell_sigma import (
-    FAR_SHARE,
-    HIDDEN_SHARE,
+    LARGEST_STEP_PX,
     STEP_SHARE,
     CellScale,
     cell_sigma,
-    outermost,
+    others_seen,
     roughness,
     step_sigma,
 )
@@ -253,7 +252,7 @@ SCALE = CellScale(2, 1.0)
 def by_step(z, noise, scale=SCALE, heights=None):
     """σ beside steps of a surface, by itself or with heights of pairs."""
     pairs = z[None] if heights is None else heights
-    return step_sigma(z, noise, *outermost(z, pairs, np.full(pairs.shape, 0.05), scale), scale)
+    return step_sigma(z, noise, others_seen(z, pairs, np.full(pairs.shape, 0.05), scale), scale)
 
 
 def test_sigma_beside_a_step_is_a_share_of_it():
@@ -262,23 +261,44 @@ def test_sigma_beside_a_step_is_a_share_of_it():
     noise = np.full(z.shape, 0.05)
     found = by_step(z, noise)
     assert (found[:, [14, 15]] > 6.0 * STEP_SHARE).all()
-    assert (found[:, [13, 16]] > 6.0 * FAR_SHARE).all()
-    assert (found[:, [13, 16]] < found[:, [14, 15]] / 3.0).all()
-    assert (found[:, 6:10] == 0.0).all()
-    assert (found[:, 20:24] == 0.0).all()
-    level = np.where(np.arange(30) < 15, 100.0, 108.0) + np.zeros((20, 1))  # from three cells off on it is no step
-    assert (by_step(level, noise)[:, [*range(6, 13), *range(17, 24)]] == 0.0).all()
+    assert (found[:, [*range(6, 11), *range(19, 24)]] == 0.0).all()
+    assert (found[:, 11:14] < found[:, [14]] / 5.0).all()
+    assert (found[:, 16:19] < found[:, [15]] / 5.0).all()
     # down where the slope goes up, where heights by themselves differ by less than the step
     against = np.arange(30) + np.where(np.arange(30) < 15, 2.0, 0.0) + np.zeros((20, 1))
     assert (by_step(against, noise)[:, [14, 15]] > 1.5 * STEP_SHARE).all()
     assert (by_step(z, noise, CellScale(2, 20.0)) == 0.0).all()
     assert (by_step(z, np.full(z.shape, 3.0)) == 0.0).all()
-    z[:, 13:15] = np.nan  # hidden by a hole, farther than looked for: what is seen is how heights leave their mean
-    assert (by_step(z, noise)[:, [12, 15]] > 2.0 * HIDDEN_SHARE).all()
+
+
+def test_a_hole_may_hide_a_step():
+    z = np.full((20, 30), 100.0) + np.where(np.arange(30) < 15, 0.0, 8.0)
+    z[:, 13:15] = np.nan
+    noise = np.full(z.shape, 0.05)
+    # the other side is farther than looked for: what is seen is how heights leave their mean
+    assert (by_step(z, noise)[:, [12, 15]] > 2.0 * STEP_SHARE).all()
+    z[:, 13] = 100.0
+    # one pair alone: all that differs across the hole counts, of several what the step leaves of their mean
+    assert by_step(z, noise)[:, [13, 15]] == pytest.approx(8.0 * STEP_SHARE)
+    three = by_step(z, noise, heights=np.repeat(z[None], 3, axis=0))
+    assert three[:, [13, 15]] == pytest.approx(LARGEST_STEP_PX[2] * STEP_SHARE)
+    z[:, 13] = np.nan
     # what one pair saw in the hole is a step as well
     pair = np.full(z.shape, np.nan)
     pair[:, 13] = 130.0
-    assert (by_step(z, noise, heights=pair[None])[:, 12] > 20.0 * STEP_SHARE).all()
+    assert (by_step(z, noise, heights=pair[None])[:, 12] > 29.0 * STEP_SHARE).all()
+
+
+@pytest.mark.parametrize("pairs", [1, 2, 3, 5])
+def test_pairs_that_agree_bound_what_a_step_does(pairs):
+    """What one saw may lie on the other side; what several saw is blurred at most."""
+    for step in (1.2, 8.0):
+        z = np.full((20, 30), 100.0) + np.where(np.arange(30) < 15, 0.0, step)
+        found = by_step(z, np.full(z.shape, 0.05), heights=np.repeat(z[None], pairs, axis=0))[:, [14, 15]] / STEP_SHARE
+        if step < LARGEST_STEP_PX[min(pairs, 3) - 1]:
+            assert ((found > 0.85 * step) & (found <= step)).all()  # their mean takes a part of it
+        else:
+            assert found == pytest.approx(LARGEST_STEP_PX[min(pairs, 3) - 1])
 
 
 @pytest.mark.parametrize("lag", [1, 2, 4])
@@ -296,9 +316,10 @@ def test_a_pair_far_from_the_surface_contradicts_it():
     z = np.array([[10.0, 10.0, np.nan]])
     heights = np.array([[[10.1, 10.0, np.nan]], [[9.9, 18.0, 12.0]]])
     sigmas = np.full(heights.shape, 0.1)
-    highest, lowest = outermost(z, heights, sigmas, SCALE)
-    np.testing.assert_allclose(highest, [[10.0, 18.0, 12.0]])
-    np.testing.assert_allclose(lowest, [[10.0, 10.0, 12.0]])
+    seen = others_seen(z, heights, sigmas, SCALE)
+    np.testing.assert_allclose(seen.highest, [[10.0, 18.0, 12.0]])
+    np.testing.assert_allclose(seen.lowest, [[10.0, 10.0, 12.0]])
+    np.testing.assert_array_equal(seen.agreeing, [[2, 1, 0]])
     far = np.repeat(np.repeat(z, 20, axis=1), 20, axis=0)
     pairs = np.repeat(np.repeat(heights, 20, axis=2), 20, axis=1)
     sigma = cell_sigma(far, np.full(far.shape, 0.07), pairs, np.full(pairs.shape, 0.1), SCALE)

@@ -17,9 +17,14 @@ two that make errors of rendered scenes most likely, on smooth, noisy and rough 
 (tools/prove/dense_surface.py)."""
 LAG_PX = 4.0
 """From a cell to the neighbours with which its height is compared: more than half of a window of the matching."""
-STEP_SHARE, FAR_SHARE, HIDDEN_SHARE = 0.27, 0.05, 0.15
-"""Of a step that is σ of the cells next to it, of those twice as far off, and of those where a hole may hide it; chosen
-[C]: that share of steps in rendered scenes is the root mean square error beside them (tools/prove/dense_surface.py)."""
+STEP_SHARE = 0.38
+"""Of a step that is σ of the cells beside it; chosen [C]: the root mean square error beside steps in rendered scenes
+(tools/prove/dense_surface.py)."""
+LEAST_STEP_PX, LEAST_HIDDEN_PX = 0.9, 0.5
+"""Of parallax, from which on a difference of heights is a step, and where a hole may hide the rest of it; chosen [C]."""
+LARGEST_STEP_PX = (np.inf, 2.7, 1.4)
+"""Of parallax, that count where one pair, two, three or more agree on a height; chosen [C] on the same scenes: what
+several pairs see alike is seldom the height of the other side, but a window across a step blurs it for all of them."""
 STEP_SIGMAS = 6.0
 """σ of the noise that a step is larger than: the range of some twenty cells reaches five."""
 CONTRADICTED_SIGMAS = 4.0
@@ -51,7 +56,7 @@ def cell_sigma(
     heights, sigmas : (pairs, rows, columns) m of which they were fused.
     """
     rough = roughness(z, scale.lag, np.maximum(scale.pixel, np.sqrt(6.0) * STEP_SIGMAS * noise))
-    beside = step_sigma(z, noise, *outermost(z, heights, sigmas, scale), scale)
+    beside = step_sigma(z, noise, others_seen(z, heights, sigmas, scale), scale)
     return np.sqrt((NOISE_SHARE * noise) ** 2 + (ROUGH_SHARE * rough) ** 2 + beside**2)
 
 
@@ -79,32 +84,44 @@ def roughness(z: np.ndarray, lag: int, step: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(_sum(square, 3), 0.0) / np.maximum(_sum(count, 3), 1.0))
 
 
-def outermost(
-    z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: CellScale
-) -> tuple[np.ndarray, np.ndarray]:
-    """Highest and lowest (rows, columns) m of a cell: its height, and those of pairs that contradict it or stand alone.
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What pairs saw in the cells, (rows, columns).
 
-    −`UNKNOWN` and `UNKNOWN` where there is none.
+    Parameters
+    ----------
+    highest, lowest : m, of the height of a cell and those of pairs that contradict it or stand alone; −`UNKNOWN` and
+        `UNKNOWN` where there is none.
+    agreeing : pairs that agree on the height.
     """
+
+    highest: np.ndarray
+    lowest: np.ndarray
+    agreeing: np.ndarray
+
+
+def others_seen(z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: CellScale) -> Seen:
+    """What pairs saw besides the heights that count."""
     known = np.isfinite(z)
     highest, lowest = np.where(known, z, -UNKNOWN), np.where(known, z, UNKNOWN)
+    agreeing = np.zeros(z.shape, np.uint8)
     for height, sigma in zip(heights, sigmas, strict=True):
         agrees = np.abs(height - z) <= scale.pixel + CONTRADICTED_SIGMAS * sigma
         other = np.isfinite(height) & ~agrees
         np.maximum(highest, height, out=highest, where=other)
         np.minimum(lowest, height, out=lowest, where=other)
-    return highest, lowest
+        agreeing += agrees
+    return Seen(highest, lowest, agreeing)
 
 
-def step_sigma(
-    z: np.ndarray, noise: np.ndarray, highest: np.ndarray, lowest: np.ndarray, scale: CellScale
-) -> np.ndarray:
+def step_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
     """(rows, columns) m, σ of a cell by the step that it lies beside; 0 where there is none.
 
-    A step is more than a pixel of parallax, from the lowest to the highest that any pair saw about a cell. It is looked
+    A step is almost a pixel of parallax, from the lowest to the highest that any pair saw about a cell. It is looked
     for in what heights leave their mean by, so that a slope is none. That mean holds a wall some cells away: no step is
     therefore larger than the range of the heights themselves and what the slope may hide of it. Beside a hole, which
-    may hide the step, half a pixel counts, whatever the heights themselves.
+    may hide the step, half a pixel counts, over twice the distance, whatever the heights themselves; where one pair
+    alone saw the cell, all that differs there counts.
     """
     known = np.isfinite(z)
     if not known.any():
@@ -113,19 +130,20 @@ def step_sigma(
     around = 4 * scale.lag + 1
     mean = _sum(np.where(known, z - middle, 0.0).astype(np.float32), around)
     mean = mean / np.maximum(_sum(known.astype(np.float32), around), 1.0) + middle
-    left, whole = ((_less(highest, level), _less(lowest, level)) for level in (mean, middle))
+    left, whole = ((_less(seen.highest, level), _less(seen.lowest, level)) for level in (mean, middle))
     slope = _slope(np.where(known, z - middle, 0.0).astype(np.float32), known)
-    sides = 2 * ((scale.lag + 1) // 2) + 1, 2 * scale.lag + 1
-    near, far_left = (_range(*left, side) for side in sides)
-    near_whole, far_whole = (_range(*whole, side) + (side - 1) * slope for side in sides)
-    near = np.minimum(near, near_whole)
-    hidden = cv2.erode(known.view(np.uint8), _square(2 * scale.lag + 1)) == 0
-    far = np.where(hidden, far_left, np.minimum(far_left, far_whole))
+    side, far_side = 2 * ((scale.lag + 1) // 2) + 1, 2 * scale.lag + 1
+    near = np.minimum(_range(*left, side), _range(*whole, side) + (side - 1) * slope)
+    hidden = cv2.erode(known.view(np.uint8), _square(far_side)) == 0
+    alone = hidden & (seen.agreeing < 2)
+    far = _range(*left, far_side)
+    np.maximum(far, _range(*whole, far_side), out=far, where=alone)
     least = STEP_SIGMAS * noise
-    next_to = np.where((near > scale.pixel) & (near > least), STEP_SHARE * near, 0.0)
-    off = np.where(hidden, HIDDEN_SHARE, FAR_SHARE) * far
-    is_step = (far > np.where(hidden, 0.5, 1.0) * scale.pixel) & (far > least)
-    return np.where(known, np.maximum(next_to, np.where(is_step, off, 0.0)), 0.0)
+    next_to = (near > LEAST_STEP_PX * scale.pixel) & (near > least)
+    behind = hidden & (far > LEAST_HIDDEN_PX * scale.pixel) & ((far > least) | alone)
+    step = np.maximum(np.where(next_to, near, 0.0), np.where(behind, far, 0.0))
+    most = scale.pixel * np.array(LARGEST_STEP_PX)[np.clip(seen.agreeing, 1, len(LARGEST_STEP_PX)) - 1]
+    return np.where(known, STEP_SHARE * np.minimum(step, most), 0.0)
 
 
 def _sum(values: np.ndarray, side: int) -> np.ndarray:
