@@ -21,7 +21,7 @@ STEP_SHARE = 0.38
 """Of a step that is σ of the cells beside it; chosen [C]: the root mean square error beside steps in rendered scenes
 (tools/prove/dense_surface.py)."""
 LEAST_STEP_PX, LEAST_HIDDEN_PX = 0.9, 0.5
-"""Of parallax, from which on a difference of heights is a step, and where a hole may hide the rest of it; chosen [C]."""
+"""Of parallax, from which on heights differ by a step, and where a hole may hide the rest of it; chosen [C]."""
 LARGEST_STEP_PX = (np.inf, 2.7, 1.4)
 """Of parallax, that count where one pair, two, three or more agree on a height; chosen [C] on the same scenes: what
 several pairs see alike is seldom the height of the other side, but a window across a step blurs it for all of them."""
