@@ -34,13 +34,14 @@ SAME_NAME = (".json", ".csv", ".tif", ".gpkg", ".parquet", ".npz", ".laz", ".geo
 """Endings of the files that are compared."""
 
 
-def commands(photographs: Path, folder: Path) -> dict[str, tuple[str, ...]]:
+def commands(photographs: Path, folder: Path, resolution: str) -> dict[str, tuple[str, ...]]:
     """The words of every command without its folder and executor; later ones need the folders of earlier ones."""
+    cell = ("--resolution", resolution) if resolution else ()
     block, result, dsm = (str(folder / name) for name in ("block", "result", "threads_dsm"))
     return {
         "tiepoints": ("tiepoints", str(photographs)),
         "dtm": ("dtm", result, str(photographs), "--no-plots"),
-        "dsm": ("dsm", result, str(photographs), "--no-plots"),
+        "dsm": ("dsm", result, str(photographs), "--no-plots", *cell),
         "ortho": ("ortho", result, str(photographs), dsm, "--no-plots"),
         "imgeo": ("imgeo", result, str(photographs)),
         "halves": ("halves", result),
@@ -105,6 +106,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="to work in")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--commands", nargs="+", help="all where not given")
+    parser.add_argument("--resolution", default="", help="cell of dsm, m; two GSD where not given")
     options = parser.parse_args()
     folder = options.folder
     folder.mkdir(parents=True, exist_ok=True)
@@ -123,7 +125,7 @@ def main() -> None:
         )
     print(f"# Executors ({os.cpu_count()} processors, runs of every command: {options.repeats}, medians)\n")
     print(HEAD + "\n|" + "---|" * (HEAD.count("|") - 1), flush=True)
-    for name, words in commands(options.photographs, folder).items():
+    for name, words in commands(options.photographs, folder, options.resolution).items():
         if not options.commands or name in options.commands:
             print(measured(name, words, folder, options.repeats), flush=True)
 

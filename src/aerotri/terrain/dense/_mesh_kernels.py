@@ -159,45 +159,53 @@ def fuse(heights, sigmas, correlation, used, agree, tolerance, z, sigma, members
     their mean over pairs − 1, NaN of one pair. members : (rows, columns) out, bits of the photographs that measured.
     """
     pairs = len(heights)
-    member = np.empty(pairs, np.bool_)
-    best = np.empty(pairs, np.bool_)
+    at = np.empty(pairs, np.int64)
+    height, share = np.empty(pairs), np.empty(pairs)
     for i in range(heights.shape[1]):
         for j in range(heights.shape[2]):
             z[i, j] = sigma[i, j] = misfit[i, j] = np.nan
             members[i, j] = 0
-            most, highest = 0.0, -np.inf
+            n = 0
             for p in range(pairs):
-                hp = heights[p, i, j]
-                if not np.isfinite(hp):
-                    continue
-                total = 0.0
-                for r in range(pairs):
-                    hr = heights[r, i, j]
-                    member[r] = False
-                    if np.isfinite(hr):
-                        bound = agree * np.hypot(sigmas[p, i, j], sigmas[r, i, j]) + tolerance
-                        if abs(hp - hr) <= bound:
-                            member[r] = True
-                            total += 1.0 / sigmas[r, i, j] ** 2
-                if total > most * 1.000001 or (total > most * 0.999999 and hp > highest):
-                    most, highest = total, hp
-                    best[:] = member
-            if most <= 0.0:
+                if np.isfinite(heights[p, i, j]) and np.isfinite(sigmas[p, i, j]):
+                    at[n], height[n], share[n] = p, heights[p, i, j], 1.0 / sigmas[p, i, j]
+                    n += 1
+            if n == 0:
                 continue
-            mean, bits, inside = 0.0, 0, 0
-            for p in range(pairs):
-                if best[p]:
-                    mean += heights[p, i, j] / sigmas[p, i, j] ** 2 / most
-                    bits |= used[p]
+            most, best = _largest_group(height[:n], share[:n], agree, tolerance)
+            mean, variance, square, bits, inside = 0.0, 0.0, 0.0, 0, 0
+            for p in range(n):
+                if best >> p & 1:
+                    mean += height[p] * share[p] ** 2
+                    bits |= used[at[p]]
                     inside += 1
-            variance, square = 0.0, 0.0
-            for p in range(pairs):
-                if best[p]:
-                    square += ((heights[p, i, j] - mean) / sigmas[p, i, j]) ** 2
-                    for r in range(pairs):
-                        if best[r]:
-                            variance += correlation[p, r] / (sigmas[p, i, j] * sigmas[r, i, j] * most * most)
-            z[i, j], sigma[i, j] = mean, np.sqrt(max(variance, 0.0))
+            mean /= most
+            for p in range(n):
+                if best >> p & 1:
+                    square += ((height[p] - mean) * share[p]) ** 2
+                    for r in range(n):
+                        if best >> r & 1:
+                            variance += correlation[at[p], at[r]] * share[p] * share[r]
+            z[i, j], sigma[i, j] = mean, np.sqrt(max(variance, 0.0)) / most
             if inside > 1:
                 misfit[i, j] = square / (inside - 1)
             members[i, j] = bits
+
+
+@leaf_kernel
+def _largest_group(height, share, agree, tolerance):
+    """Sum of 1/σ² of the heights (n,) that agree with one of them, the largest there is, and their bits.
+
+    share : (n,) 1/σ. Of groups as large the one about the highest counts.
+    """
+    most, highest, best = 0.0, -np.inf, 0
+    for p in range(len(height)):
+        total, members = 0.0, 0
+        for r in range(len(height)):
+            beyond = abs(height[p] - height[r]) - tolerance
+            if beyond <= 0.0 or (beyond / agree) ** 2 <= share[p] ** -2 + share[r] ** -2:
+                members |= 1 << r
+                total += share[r] ** 2
+        if total > most * 1.000001 or (total > most * 0.999999 and height[p] > highest):
+            most, highest, best = total, height[p], members
+    return most, best

@@ -30,6 +30,8 @@ STEP_SIGMAS = 6.0
 CONTRADICTED_SIGMAS = 4.0
 """σ of a pair from which on its height contradicts the surface."""
 UNKNOWN = np.float32(1e9)
+MIDDLE_STEP = 8
+"""Cells from one to the next of which the middle of heights is taken."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,12 @@ def cell_sigma(
     rough = roughness(z, scale.lag, np.maximum(scale.pixel, np.sqrt(6.0) * STEP_SIGMAS * noise))
     beside = step_sigma(z, noise, others_seen(z, heights, sigmas, scale), scale)
     return np.sqrt((NOISE_SHARE * noise) ** 2 + (ROUGH_SHARE * rough) ** 2 + beside**2)
+
+
+def middle_height(z: np.ndarray) -> float:
+    """m, a height in the middle of those known, of some of the cells where that is enough."""
+    some = z[::MIDDLE_STEP, ::MIDDLE_STEP]
+    return float(np.nanmedian(some if np.isfinite(some).any() else z))
 
 
 def roughness(z: np.ndarray, lag: int, step: np.ndarray) -> np.ndarray:
@@ -126,7 +134,7 @@ def step_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -
     known = np.isfinite(z)
     if not known.any():
         return np.zeros(z.shape)
-    middle = float(np.nanmedian(z))
+    middle = middle_height(z)
     around = 4 * scale.lag + 1
     mean = _sum(np.where(known, z - middle, 0.0).astype(np.float32), around)
     mean = mean / np.maximum(_sum(known.astype(np.float32), around), 1.0) + middle

@@ -134,10 +134,9 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
     known &= _alike_about(correlation, known, images.left_known) > LEAST_ALIKE
     # where a pixel of the window is not known both images are the same: it tells nothing and hides noise. Where few
     # pixels about match, by chance, those that do are wrong by more
-    share = cv2.boxFilter(known.astype(np.float32), -1, (WINDOW_PX, WINDOW_PX))
-    np.power(np.maximum(share, LEAST_SHARE, out=share), 2.0 * ALONE_POWER, out=share)
-    variance *= factor**2
-    variance /= share
+    matching = cv2.boxFilter(known.view(np.uint8), -1, (WINDOW_PX, WINDOW_PX), normalize=False)
+    share = np.maximum(np.arange(256) / WINDOW_PX**2, LEAST_SHARE)
+    variance *= cv2.LUT(matching, (factor**2 / share ** (2.0 * ALONE_POWER)).astype(np.float32))
     variance += LEAST_SIGMA_PX**2
     sigma = np.sqrt(variance, out=variance)
     known &= sigma < LARGEST_SIGMA_PX
@@ -151,7 +150,7 @@ def _alike_about(correlation: np.ndarray, known: np.ndarray, seen: np.ndarray) -
     """(rows, columns) mean correlation of the windows about a pixel; 0 where nothing matched, outside left out."""
     size = CROWD_PX, CROWD_PX
     alike = cv2.boxFilter(np.where(known, correlation, np.float32(0.0)), -1, size)
-    return alike / np.maximum(cv2.boxFilter(seen.astype(np.float32), -1, size), 1e-3)
+    return alike / np.maximum(cv2.boxFilter(seen.view(np.uint8), cv2.CV_32F, size), 1e-3)
 
 
 def _smoothed(value: np.ndarray, known: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from aerotri.conventions import SIGMA_PER_MAD
 from aerotri.rasters.grids import Grid
 from aerotri.terrain.dense import _mesh_kernels as kernels
-from aerotri.terrain.dense.cell_sigma import CellScale, cell_sigma
+from aerotri.terrain.dense.cell_sigma import CellScale, cell_sigma, middle_height
 from aerotri.terrain.dense.epipolar import EpipolarGeometry, epipolar_geometry, epipolar_images
 from aerotri.terrain.dense.grey_store import GreyStore
 from aerotri.terrain.dense.height_range import HeightRange
@@ -280,7 +280,7 @@ def _without_patches(z: np.ndarray, step: float) -> np.ndarray:
     if not known.any():
         return known
     unit = step / STEP_UNITS
-    whole = np.where(known, np.rint((z - np.nanmedian(z)) / unit), NO_HEIGHT)
+    whole = np.where(known, np.rint((z - middle_height(z)) / unit), NO_HEIGHT)
     held = np.clip(whole, NO_HEIGHT, -NO_HEIGHT).astype(np.int16)
     cv2.filterSpeckles(held, NO_HEIGHT, SMALLEST_PATCH, STEP_UNITS)
     return held != NO_HEIGHT
@@ -297,13 +297,16 @@ def _levelled(heights: np.ndarray, sigmas: np.ndarray, z: np.ndarray, tolerance:
 
 def _slow(difference: np.ndarray, sigma: np.ndarray, most: np.ndarray) -> np.ndarray:
     """(rows, columns) m, weighted mean of the differences about a cell; what is larger than `most` does not count."""
+    # OpenCV sums them in double precision
+    difference, sigma, most = (a.astype(np.float32) for a in (difference, sigma, most))
     known = np.abs(difference) < most
-    weight = np.where(known, sigma, np.inf) ** -2.0
+    weight = np.where(known, sigma, np.float32(np.inf))
+    weight = np.float32(1.0) / (weight * weight)
     size = SLOW_CELLS, SLOW_CELLS
-    weights = cv2.boxFilter(weight, -1, size, normalize=False) + 1e-9 * weight.max(initial=1e-300)
-    slow = np.zeros(known.shape)
+    weights = cv2.boxFilter(weight, -1, size, normalize=False) + np.float32(1e-9) * weight.max(initial=1e-20)
+    slow = np.zeros(known.shape, np.float32)
     for _ in range(SLOW_ROUNDS):
-        left = weight * np.where(known, difference - slow, 0.0)
+        left = weight * np.where(known, difference - slow, np.float32(0.0))
         slow += cv2.boxFilter(left, -1, size, normalize=False) / weights
     return slow
 
