@@ -6,6 +6,7 @@ import pickle
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from functools import partial
 
 import pytest
@@ -216,14 +217,18 @@ with opened("dask:local:1") as workers:
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of a system")
 def test_an_interruption_before_the_work_begins_is_quiet():
-    """The terminal's signal reaches the workers too, which began while the command still reads its files."""
+    """The terminal's signal reaches the workers too, which have begun while the command still reads its files."""
     pytest.importorskip("distributed")
     process = subprocess.Popen(
         [sys.executable, "-c", WAITING], stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
     )
     assert process.stdout is not None
     assert process.stdout.readline().strip() == b"reading"
-    os.killpg(process.pid, signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    try:
+        os.killpg(process.pid, signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == 130
     assert said.decode() == ""

@@ -172,6 +172,20 @@ def test_parallaxes_are_recovered_whatever_the_shift_across_the_base(shift, acro
     assert 0.7 < (error / sigma).std() < 1.3
 
 
+def test_what_was_found_outlives_the_next_pair():
+    """Arrays are filled again from pair to pair, smaller ones too: none of them is given away."""
+    first = parallaxes_of(textured_pair(0.25, 0.0, 3.0, 3))
+    value, sigma = first.value.copy(), first.sigma.copy()
+    other = textured_pair(0.4, 0.0, 6.0, 4)
+    parts = (a[:120, :160].copy() for a in (other.left, other.right, other.left_known, other.right_known))
+    parallaxes_of(EpipolarImages(other.geometry, *parts))
+    np.testing.assert_array_equal(first.value, value)
+    np.testing.assert_array_equal(first.sigma, sigma)
+    again = parallaxes_of(textured_pair(0.25, 0.0, 3.0, 3))
+    np.testing.assert_array_equal(again.value, value)
+    np.testing.assert_array_equal(again.sigma, sigma)
+
+
 def test_shifts_across_the_base_that_change_over_an_image_are_no_noise():
     y, x = np.meshgrid(np.linspace(-1.0, 1.0, 240), np.linspace(-1.0, 1.0, 320), indexing="ij")
     level = parallaxes_of(textured_pair(0.25, 0.0, 3.0, 3))
@@ -212,21 +226,40 @@ def fused(heights: np.ndarray, sigmas: np.ndarray, correlation: np.ndarray):
     members = np.zeros(shape, np.int64)
     used = np.array([0b00011, 0b00110, 0b11000][: len(heights)], np.int64)
     kernels.fuse(heights, sigmas, correlation, used, 4.0, 0.1, z, sigma, members, misfit)
-    return z[0, 0], sigma[0, 0], int(members[0, 0]).bit_count()
+    return z[0, 0], sigma[0, 0], int(members[0, 0]).bit_count(), misfit[0, 0]
 
 
 def test_the_pairs_that_agree_make_the_height():
     heights = np.array([10.0, 10.2, 30.0]).reshape(3, 1, 1)
-    z, sigma, count = fused(heights, np.full((3, 1, 1), 0.2), np.eye(3))
+    z, sigma, count, misfit = fused(heights, np.full((3, 1, 1), 0.2), np.eye(3))
     assert z == pytest.approx(10.1)
+    assert misfit == pytest.approx(0.5)
     assert sigma == pytest.approx(0.2 / np.sqrt(2.0))
     assert count == 3
-    z, _, count = fused(np.array([np.nan, np.nan, 30.0]).reshape(3, 1, 1), np.full((3, 1, 1), 0.2), np.eye(3))
+    z, _, count, misfit = fused(np.array([np.nan, np.nan, 30.0]).reshape(3, 1, 1), np.full((3, 1, 1), 0.2), np.eye(3))
     assert (z, count) == (30.0, 2)
-    z, sigma, count = fused(np.full((3, 1, 1), np.nan), np.full((3, 1, 1), 0.2), np.eye(3))
+    assert np.isnan(misfit)
+    z, sigma, count, _ = fused(np.full((3, 1, 1), np.nan), np.full((3, 1, 1), 0.2), np.eye(3))
     assert np.isnan(z)
     assert np.isnan(sigma)
     assert count == 0
+
+
+def test_fused_heights_have_weights_and_correlations():
+    sigmas = np.array([0.2, 0.5, 0.2]).reshape(3, 1, 1)
+    correlation = np.eye(3) + np.diag([-0.5], 2) + np.diag([-0.5], -2)
+    z, sigma, count, _ = fused(np.array([10.0, np.nan, 10.2]).reshape(3, 1, 1), sigmas, correlation)
+    assert z == pytest.approx(10.1)
+    assert sigma == pytest.approx(0.1)  # 0.2 · √((1 − 0.5) / 2)
+    assert count == 4
+    # of groups that weigh the same the higher one; otherwise the one that weighs more
+    z, _, _, _ = fused(np.array([10.0, np.nan, 30.0]).reshape(3, 1, 1), sigmas, correlation)
+    assert z == 30.0
+    z, _, _, _ = fused(np.array([10.0, 30.0, np.nan]).reshape(3, 1, 1), sigmas, correlation)
+    assert z == 10.0
+    z, sigma, _, _ = fused(np.array([10.0, 10.3, np.nan]).reshape(3, 1, 1), sigmas, np.eye(3))
+    assert z == pytest.approx((10.0 / 0.04 + 10.3 / 0.25) / (1.0 / 0.04 + 1.0 / 0.25))
+    assert sigma == pytest.approx((1.0 / 0.04 + 1.0 / 0.25) ** -0.5)
 
 
 @pytest.mark.parametrize("missing", [(0, 0), (0, 1), (1, 0), (1, 1)])
@@ -287,6 +320,21 @@ def test_a_hole_may_hide_a_step():
     pair = np.full(z.shape, np.nan)
     pair[:, 13] = 130.0
     assert (by_step(z, noise, heights=pair[None])[:, 12] > 29.0 * STEP_SHARE).all()
+
+
+@pytest.mark.parametrize("pairs", [1, 2])
+def test_noise_beside_a_hole_is_no_step(pairs):
+    """It is in σ of the matching already."""
+    z = 100.0 + np.random.default_rng(2).normal(scale=0.3, size=(40, 60))
+    z[:, 30] = np.nan
+    found = by_step(z, np.full(z.shape, 0.3), heights=np.repeat(z[None], pairs, axis=0))
+    assert (found == 0.0).mean() > 0.99
+
+
+@pytest.mark.parametrize("shape", [(1, 9), (9, 1), (1, 1), (9, 9)])
+@pytest.mark.parametrize("height", [100.0, np.nan])
+def test_few_cells_have_no_step(shape, height):
+    assert (by_step(np.full(shape, height), np.full(shape, 0.05)) == 0.0).all()
 
 
 @pytest.mark.parametrize("pairs", [1, 2, 3, 5])

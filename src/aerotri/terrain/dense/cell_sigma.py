@@ -18,8 +18,8 @@ two that make errors of rendered scenes most likely, on smooth, noisy and rough 
 LAG_PX = 4.0
 """From a cell to the neighbours with which its height is compared: more than half of a window of the matching."""
 STEP_SHARE = 0.38
-"""Of a step that is σ of the cells beside it; chosen [C]: the root mean square error beside steps in rendered scenes
-(tools/prove/dense_surface.py)."""
+"""Of a step that is σ of the cells beside it; chosen [C]: between what houses and walls, and what crowns of trees would
+have, in rendered scenes (tools/prove/dense_surface.py)."""
 LEAST_STEP_PX, LEAST_HIDDEN_PX = 0.9, 0.5
 """Of parallax, from which on heights differ by a step, and where a hole may hide the rest of it; chosen [C]."""
 LARGEST_STEP_PX = (np.inf, 2.7, 1.4)
@@ -125,11 +125,11 @@ def others_seen(z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: C
 def step_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
     """(rows, columns) m, σ of a cell by the step that it lies beside; 0 where there is none.
 
-    A step is almost a pixel of parallax, from the lowest to the highest that any pair saw about a cell. It is looked
-    for in what heights leave their mean by, so that a slope is none. That mean holds a wall some cells away: no step is
-    therefore larger than the range of the heights themselves and what the slope may hide of it. Beside a hole, which
-    may hide the step, half a pixel counts, over twice the distance, whatever the heights themselves; where one pair
-    alone saw the cell, all that differs there counts.
+    A step is almost a pixel of parallax, from the lowest to the highest that any pair saw about a cell. The mean of the
+    cells around is taken off first, so that a slope is none. That mean holds a wall some cells away: no step is
+    therefore larger than the range of the heights themselves plus the slope over that distance. Beside a hole, which
+    may hide the step, half a pixel counts, over twice the distance and without that limit; where, besides, one pair
+    alone saw the cell, the whole range of heights there counts.
     """
     known = np.isfinite(z)
     if not known.any():
@@ -148,7 +148,7 @@ def step_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -
     np.maximum(far, _range(*whole, far_side), out=far, where=alone)
     least = STEP_SIGMAS * noise
     next_to = (near > LEAST_STEP_PX * scale.pixel) & (near > least)
-    behind = hidden & (far > LEAST_HIDDEN_PX * scale.pixel) & ((far > least) | alone)
+    behind = hidden & (far > LEAST_HIDDEN_PX * scale.pixel) & (far > least)
     step = np.maximum(np.where(next_to, near, 0.0), np.where(behind, far, 0.0))
     most = scale.pixel * np.array(LARGEST_STEP_PX)[np.clip(seen.agreeing, 1, len(LARGEST_STEP_PX)) - 1]
     return np.where(known, STEP_SHARE * np.minimum(step, most), 0.0)
@@ -165,9 +165,11 @@ def _slope(z: np.ndarray, known: np.ndarray) -> np.ndarray:
     """
     total = np.zeros(z.shape, np.float32)
     for axis in (0, 1):
-        change = np.abs(np.diff(z, axis=axis))
-        change *= np.minimum(*(np.take(known, range(k, z.shape[axis] - 1 + k), axis) for k in (0, 1)))
-        change = np.concatenate([change, np.take(change, [-1], axis)], axis) if change.shape[axis] else 0.0 * z
+        if z.shape[axis] < 2:
+            continue
+        ahead, behind = (known[1:], known[:-1]) if axis == 0 else (known[:, 1:], known[:, :-1])
+        change = np.abs(np.diff(z, axis=axis)) * (ahead & behind)
+        change = np.concatenate([change, np.take(change, [-1], axis)], axis)
         total += cv2.medianBlur(np.ascontiguousarray(change), 5)
     return total
 

@@ -87,6 +87,7 @@ class _Scratch(local):
         """(count, *shape) float32 of any content, the thread's own until it takes others."""
         size = count * int(np.prod(shape))
         if self._held.size < size:
+            self._held = np.empty(0, np.float32)  # never both at once
             self._held = np.empty(size, np.float32)
         return self._held[:size].reshape(count, *shape)
 
@@ -141,7 +142,6 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
         left_slow = parabola_across(across, of_across, known)
         slow = slow + left_slow
     factor = scatter_across(across, of_across, known, left_slow)
-    # arrays of the size of the images are filled again rather than made anew, which takes a third less time
     known &= np.abs(np.subtract(value, start, out=room), out=room) < LARGEST_SHIFT_PX
     known &= correlation > LEAST_CORRELATION
     of_across *= (ACROSS_SIGMAS * factor) ** 2
