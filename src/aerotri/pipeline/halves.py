@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from aerotri.adjustment.ray_status import some_names
 from aerotri.execution.work import Work, Workplace
@@ -164,7 +165,9 @@ def _compared(found: Adjustment, whole: Whole, division: Division, how: str, alp
         if pair.n_points < FEWEST_COMMON:
             few = f"the halves have {pair.n_points} points in common, {FEWEST_COMMON} are needed"
             return HalvesComparison(how, division.names, few)
-        return _comparison(found, division, pair, how, hold, alpha)
+        # the same digits in turn, in processes and by Dask
+        with threadpool_limits(1, "blas"):
+            return _comparison(found, division, pair, how, hold, alpha)
     return HalvesComparison(how, division.names, f"one half cannot be adjusted alone: {said}")
 
 
