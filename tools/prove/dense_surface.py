@@ -175,7 +175,7 @@ def main() -> None:
     folder = arguments.folder or Path(tempfile.mkdtemp())
     print(HEAD, flush=True)
     for name in arguments.scenes:
-        seeds = [arguments.seed] if arguments.seed else list(range(1, SEEDS.get(name, 1) + 1))
+        seeds = list(range(1, SEEDS.get(name, 1) + 1)) if arguments.seed is None else [arguments.seed]
         print(row(folder / name.replace(" ", "_"), name, seeds), flush=True)
 
 
