@@ -93,3 +93,36 @@ def test_what_was_kept_of_other_kernels_is_not_taken(environment):
     changed = f"from aerotri import kernel_cache; kernel_cache._kernels_as_written = lambda: 'changed'; {CALL}"
     said = [begun(environment, line).communicate(timeout=120)[0].split() for line in (CALL, CALL, changed)]
     assert said == [["8.0", "1"], ["8.0", "0"], ["8.0", "1"]]
+
+
+TAKES_A_RECORD = """
+from aerotri.compiled import kernel
+
+@kernel
+def twice(x):
+    return 2.0 * x[0]
+"""
+RECORD = "from typing import NamedTuple\nclass One(NamedTuple):\n    x: float\n"
+WITH_RECORD = "import here; from {0} import One; print('begins', flush=True); " \
+              "print(here.twice(One(4.0)), sum(here.twice.stats.cache_misses.values()))"  # fmt: skip
+
+
+def test_an_index_of_types_that_are_gone_is_written_anew(environment, tmp_path):
+    """After an upgrade in which a record moved to another module."""
+    (tmp_path / "here.py").write_text(TAKES_A_RECORD)
+    (tmp_path / "before.py").write_text(RECORD)
+    assert begun(environment, WITH_RECORD.format("before")).communicate(timeout=120)[0].split() == ["8.0", "1"]
+    (tmp_path / "before.py").rename(tmp_path / "after.py")
+    for misses in ("1", "0"):
+        assert begun(environment, WITH_RECORD.format("after")).communicate(timeout=120)[0].split() == ["8.0", misses]
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_a_damaged_file_is_written_anew(environment, tmp_path, ending, share):
+    """A disk was full, a copy was cut off."""
+    assert begun(environment, CALL).communicate(timeout=120)[0].split() == ["8.0", "1"]
+    (file,) = (tmp_path / "kept").rglob(f"here.twice*.{ending}")
+    file.write_bytes(file.read_bytes()[: int(share * file.stat().st_size)])
+    for misses in ("1", "0"):
+        assert begun(environment, CALL).communicate(timeout=120)[0].split() == ["8.0", misses]

@@ -8,6 +8,7 @@ process that holds it, however that ends.
 from __future__ import annotations
 
 import os
+import pickle
 import time
 from contextlib import suppress
 from functools import cache
@@ -21,6 +22,8 @@ PATIENCE_S = 60.0
 """For another process to compile a kernel, before it is compiled here; chosen [C]: ten times what the longest takes."""
 LOOK_S = 0.02
 """Between two looks whether the lock is free."""
+UNREADABLE = (pickle.UnpicklingError, EOFError, ImportError, AttributeError, LookupError, TypeError, ValueError)
+"""What reading a damaged file raises, or one whose types have other names or modules now."""
 
 
 @cache
@@ -32,6 +35,27 @@ def _kernels_as_written() -> str:
     return digest.hexdigest()
 
 
+class KeptFiles(IndexDataCacheFile):
+    """Numba's files of one function. One that cannot be read counts as not there: it is compiled and written anew.
+
+    Numba reads the types of an index before it looks whether the index is of these sources: after an upgrade in which a
+    record of kernels got another name or module, that would end the program.
+    """
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            return super()._load_index()
+        except UNREADABLE:
+            return {}
+
+    def _load_data(self, name: str) -> Any:
+        try:
+            return super()._load_data(name)
+        except UNREADABLE as error:
+            # numba goes on as with a file that was removed
+            raise FileNotFoundError(name) from error
+
+
 class SharedCache(FunctionCache):
     """Numba's cache on disk for one function; numba calls it under its own lock, for one thread at a time."""
 
@@ -40,7 +64,7 @@ class SharedCache(FunctionCache):
         self._lock: int | None = None
         # numba looks at the function's own file; kernels of other files stand in its code as well
         stamp = self._impl.locator.get_source_stamp(), _kernels_as_written()
-        self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, stamp)
+        self._cache_file = KeptFiles(self._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What is compiled for the types; None where this process is to compile it, and holds the lock for it."""
