@@ -9,12 +9,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from aerotri.adjustment import _covariance_kernels, _kernels, _point_kernels, position_errors, rigging
+from aerotri.adjustment import _kernels, _point_kernels, position_errors, rigging
 from aerotri.adjustment.chunk_sums import ChunkSums, add_gaps, add_own_squares, add_squares
 from aerotri.adjustment.datum import ExtraObservations, free_motions, observes_centres, without_motion
 from aerotri.adjustment.kernel_records import (
     Directions,
-    Inverse,
     Pairs,
     Points,
     Problem,
@@ -349,23 +348,6 @@ class NormalSystem:
         )
         return loose
 
-    def point_cofactors(self, state: State, inverse: Inverse, estimator: Estimator):
-        """Cofactors of the points (P, 3, 3) and redundancy numbers of the rays (m, 2), in the order of `unknowns`."""
-        u = self.unknowns
-        cofactor, redundancy = np.empty((len(u.points), 3, 3)), np.empty((len(u.rays.image), 2))
-        self.over_points(
-            self.problem(state, estimator),
-            lambda first, last, problem, work: _covariance_kernels.point_cofactors(
-                first, last, problem, inverse, cofactor, redundancy, work
-            ),
-        )
-        held = u.point_held
-        cofactor[held] = 0.0
-        np.swapaxes(cofactor, 1, 2)[held] = 0.0
-        for row, columns in zip(u.kept_rows, u.kept_columns, strict=True):
-            cofactor[row] = inverse.corner[np.ix_(columns, columns)]
-        return cofactor, redundancy
-
     def over_points(self, problem: Problem, kernel: Callable[[int, int, Problem, Work], object]) -> None:
         """kernel(first, last, problem, work) over ranges of points, in threads."""
         self.over_chunks(lambda k: kernel(*self._bounds[k], problem, self.work()))
@@ -413,70 +395,3 @@ class NormalSystem:
         if self._reduction is None or equations.chain is None:
             return equations.matrix.blocks[: len(self.unknowns.images)].copy()
         return self._reduction.reduced(equations.matrix, equations.chain).blocks[: len(self._reduction.leads)]
-
-    def solve_sides(
-        self, state: State, factor: Factor, sides: np.ndarray, estimator: Estimator,
-        shared_sides: np.ndarray | None = None, rows: np.ndarray | None = None,
-    ):  # fmt: skip
-        """Columns Q·b for right sides b that act on the points, and on the shared parameters where given.
-
-        Parameters
-        ----------
-        sides : (P, 3, k). shared_sides : (s, k).
-        rows : the points that have sides or whose solution is wanted, where these are few; all unless given.
-
-        Returns
-        -------
-        Solutions of photographs (n, 6, k), shared parameters (s, k) and points (P, 3, k).
-        """
-        u = self.unknowns
-        n, s, k = len(u.images), len(u.shared), sides.shape[2]
-        free = np.ascontiguousarray(sides * u.point_free[:, :, None])
-        problem = self.problem(state, estimator)
-        rights = [(np.zeros((n, 6, k)), np.zeros((s, k))) for _ in self._bounds]
-
-        def reduce(c: int):
-            _covariance_kernels.reduce_point_sides(*self._bounds[c], problem, free, *rights[c], self.work())
-
-        if rows is None:
-            self.over_chunks(reduce)
-        else:
-            for p in rows.tolist():
-                _covariance_kernels.reduce_point_sides(p, p + 1, problem, free, *rights[0], self.work())
-        right = np.concatenate(
-            [np.sum([r[0] for r in rights], axis=0).reshape(6 * n, k), np.sum([r[1] for r in rights], axis=0)]
-        )
-        right[6 * n + u.kept_columns] += sides[u.kept_rows]
-        if shared_sides is not None:
-            right[6 * n :] += shared_sides
-        x = factor.solve(right)
-        images, shared = np.ascontiguousarray(x[: 6 * n].reshape(n, 6, k)), np.ascontiguousarray(x[6 * n :])
-        return images, shared, self.expand_sides(state, images, shared, sides, estimator, rows)
-
-    def expand_sides(
-        self, state: State, images: np.ndarray, shared: np.ndarray, sides: np.ndarray, estimator: Estimator,
-        rows: np.ndarray | None = None,
-    ) -> np.ndarray:  # fmt: skip
-        """Solutions of the points (P, 3, k) from those of photographs (n, 6, k) and shared parameters (s, k).
-
-        Parameters
-        ----------
-        rows : of the points that are wanted, where these are few; the others are 0.
-        """
-        u = self.unknowns
-        points = np.zeros((len(u.points), 3, sides.shape[2]))
-        free = np.ascontiguousarray(sides * u.point_free[:, :, None])
-        solution, problem = Directions(images, shared, points), self.problem(state, estimator)
-        if rows is None:
-            self.over_points(
-                problem,
-                lambda first, last, problem, work: _covariance_kernels.expand_point_sides(
-                    first, last, problem, free, solution, work
-                ),
-            )
-        else:
-            for p in rows.tolist():
-                _covariance_kernels.expand_point_sides(p, p + 1, problem, free, solution, self.work())
-        points *= u.point_free[:, :, None]
-        points[u.kept_rows] = shared[u.kept_columns]
-        return points

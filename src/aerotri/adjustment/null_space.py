@@ -14,6 +14,7 @@ from scipy.linalg import eigh
 from aerotri.adjustment._null_space_kernels import add_products
 from aerotri.adjustment.kernel_records import Directions, Problem, Work
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.point_sides import expand_sides
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import BorderedMatrix, Factor
 from aerotri.adjustment.unknowns import State
@@ -114,7 +115,7 @@ def products(
     n, k = len(u.images), directions.shape[1]
     images = np.ascontiguousarray(directions[: 6 * n].reshape(n, 6, k))
     shared = np.ascontiguousarray(directions[6 * n :])
-    points = system.expand_sides(state, images, shared, np.zeros((len(u.points), 3, k)), estimator)
+    points = expand_sides(system, state, images, shared, np.zeros((len(u.points), 3, k)), estimator)
     sums: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def chunk(first: int, last: int, problem: Problem, work: Work) -> None:

@@ -23,6 +23,7 @@ from aerotri.adjustment.adjusted_positions import minimise_at_adjusted
 from aerotri.adjustment.carry_over import reference_state, start_values_at, with_shared
 from aerotri.adjustment.kernel_records import Inverse
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.point_sides import point_cofactors
 from aerotri.adjustment.prepare import Prepared
 from aerotri.adjustment.ray_status import RayStatus, with_lonely_rays, with_weak_words
 from aerotri.adjustment.rigging import Rigging
@@ -231,7 +232,7 @@ def _loose_points(
 ) -> np.ndarray:
     """Rows of the points that are loose within the whole block; none where it is the block."""
     u = system.unknowns
-    cofactor, _ = system.point_cofactors(state, inverse, estimator)
+    cofactor, _ = point_cofactors(system, state, inverse, estimator)
     of_centres = np.where(u.eo_free[:, :3, None], inverse.blocks[: len(u.images), :3, :3], 0.0)
     point = np.repeat(np.arange(len(u.points)), np.diff(u.rays.start))
     variances = scale**2 * cofactor, scale**2 * of_centres

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.deformation import _kernels, _resample_kernels
+from aerotri.deformation import _exact_kernels, _resample_kernels, _window_kernels
+from aerotri.deformation._exact_kernels import Models
+from aerotri.deformation._patch_kernels import Dem, Moves
 from aerotri.deformation.error_tables import ErrorTables, error_tables
 from aerotri.deformation.model_geometry import geometry_of
 from aerotri.deformation.model_grid import Places, mean_ground, pair_of, places_of
@@ -97,8 +99,8 @@ class DemModels:
         x, y = xyz[known, :2].mean(axis=0)
         chosen, local = np.unique(number[known], return_inverse=True)
         found = np.empty((len(known), 3))
-        models = _kernels.Models(self.photos(x, y, chosen), self.source[chosen], self.tables.for_kernels)
-        _kernels.deform_points(models, local, xyz[known] - (x, y, 0.0), found)
+        models = Models(self.photos(x, y, chosen), self.source[chosen], self.tables.for_kernels)
+        _exact_kernels.deform_points(models, local, xyz[known] - (x, y, 0.0), found)
         out[known] = found
         return out
 
@@ -124,7 +126,7 @@ class DemModels:
             return CorrectedWindow(np.full(window, np.nan, z.dtype), np.full(window, np.nan, np.float32), sums, 0)
         x, y = float(grid.x(column + z.shape[1] // 2)), float(grid.y(row + z.shape[0] // 2))
         number = _renumbered(number, chosen, present)
-        models = _kernels.Models(self.photos(x, y, chosen), self.source[chosen], self.tables.for_kernels)
+        models = Models(self.photos(x, y, chosen), self.source[chosen], self.tables.for_kernels)
         out, out_dz, exact = np.empty(window, z.dtype), np.empty(window, np.float32), 0
         for i in range(0, window[0], PART):
             for j in range(0, window[1], PART):
@@ -133,7 +135,7 @@ class DemModels:
                 place = np.array(
                     [grid.x(column + j) - x, grid.cell_x, grid.y(row + i) - y, -grid.cell_y], dtype=float
                 )  # fmt: skip
-                dem = _kernels.Dem(np.ascontiguousarray(z[around]), np.ascontiguousarray(number[around]), place)
+                dem = Dem(np.ascontiguousarray(z[around]), np.ascontiguousarray(number[around]), place)
                 part = _corrected_part(dem, models, halo)
                 inner = np.s_[i : i + rows, j : j + columns]
                 out[inner], out_dz[inner] = part.z, part.dz
@@ -141,11 +143,11 @@ class DemModels:
         return CorrectedWindow(out, out_dz, sums, exact)
 
 
-def _corrected_part(dem: _kernels.Dem, models: _kernels.Models, halo: int) -> CorrectedWindow:
+def _corrected_part(dem: Dem, models: Models, halo: int) -> CorrectedWindow:
     """Correct a part of a window that stays in the processor's cache; `dem.number` counts within `models`."""
     z = dem.z
-    moves = _kernels.Moves(*(np.empty(z.shape, np.float32) for _ in range(3)))
-    exact = _kernels.deform_window(dem, models, FIT_TOLERANCE_M, LARGEST_PATCH, moves)
+    moves = Moves(*(np.empty(z.shape, np.float32) for _ in range(3)))
+    exact = _window_kernels.deform_window(dem, models, FIT_TOLERANCE_M, LARGEST_PATCH, moves)
     shape = z.shape[0] - 2 * halo, z.shape[1] - 2 * halo
     corrected = _resample_kernels.Corrected(np.empty(shape, z.dtype), np.empty(shape, np.float32), no_sums())
     tolerance = FIXED_POINT_TOLERANCE_M / np.abs(dem.place[[1, 3]])

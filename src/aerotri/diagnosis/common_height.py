@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.point_sides import solve_sides
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 
@@ -53,7 +54,7 @@ def common_height(system: NormalSystem, solution: Solution, factor: Factor, sigm
         return None
     sides = np.zeros((len(u.points), 3, 1))
     sides[:, 2] = 1.0 / len(u.points)
-    _, shared, points = system.solve_sides(solution.state, factor, sides, solution.estimator)
+    _, shared, points = solve_sides(system, solution.state, factor, sides, solution.estimator)
     sigma = float(np.sqrt(np.mean(points[:, 2, 0])))
     focal = [k for k, name in enumerate(u.shared.names) if name == "focal_length_mm"]
     if not focal:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.adjustment.partial_factor import restored
+from aerotri.adjustment.point_sides import point_cofactors
 from aerotri.adjustment.ray_status import RayStatus
 from aerotri.adjustment.solve import Solution
 from aerotri.diagnosis import judge
@@ -102,7 +103,7 @@ def measure_part(at: At, task: PartTask) -> Measured:
     state = files.state(at.state, at.shared[task.shared])
     numbers, _ = files.eliminated(at.tag)
     inverse = restored(system.symbolic, numbers).inverse_below(task.there.inverse())
-    points, redundancy = system.point_cofactors(state, inverse, at.estimator)
+    points, redundancy = point_cofactors(system, state, inverse, at.estimator)
     n = len(system.unknowns.images)
     q = Cofactors(
         inverse.blocks[:n].copy(), inverse.corner, points, np.swapaxes(inverse.border, 1, 2).copy(), redundancy, inverse

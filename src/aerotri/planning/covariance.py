@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.adjustment.defects import checked_factor
+from aerotri.adjustment.point_sides import solve_sides
 from aerotri.adjustment.ray_status import RayStatus
 from aerotri.adjustment.robust import LEAST_SQUARES
 from aerotri.adjustment.system import build_system
@@ -49,7 +50,7 @@ def joint_covariance(block: Block, xyz: np.ndarray, rows: np.ndarray) -> np.ndar
         column = np.arange(first, min(first + COLUMNS_AT_A_TIME, 3 * len(rows)))
         sides = np.zeros((len(system.unknowns.points), 3, len(column)))
         sides[chosen[column // 3], column % 3, np.arange(len(column))] = 1.0
-        _, _, points = system.solve_sides(state, factor, sides, LEAST_SQUARES, rows=np.unique(chosen))
+        _, _, points = solve_sides(system, state, factor, sides, LEAST_SQUARES, rows=np.unique(chosen))
         found[:, column] = points[chosen].reshape(3 * len(rows), len(column))
     return 0.5 * (found + found.T)
 

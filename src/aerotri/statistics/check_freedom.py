@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.point_sides import solve_sides
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.results.adjusted_block import AdjustedBlock
@@ -58,7 +59,7 @@ def _cofactors_between(system: NormalSystem, solution: Solution, factor: Factor,
         sides = np.zeros((len(system.unknowns.points), 3, len(own)))
         for column, (k, axis) in enumerate(own):
             sides[rows[k], axis, column] = 1.0
-        points = system.solve_sides(solution.state, factor, sides, solution.estimator)[2]
+        points = solve_sides(system, solution.state, factor, sides, solution.estimator)[2]
         for column, (k, axis) in enumerate(own):
             q[axis, :, k] = points[rows, axis, column]
     return 0.5 * (q + np.swapaxes(q, 1, 2))

@@ -19,6 +19,7 @@ import numpy as np
 
 from aerotri.adjustment.kernel_records import Problem
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.point_sides import expand_sides
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.results.model_part import ClusterTest, ModelRoot
@@ -122,10 +123,8 @@ def root_of_field(
         parts = slice(first, min(first + at_once, m))
         own = slice(2 * k * parts.start, 2 * k * parts.stop)
         columns = _point_sides(system, problem, equations.nodes, field.root, parts)
-        points[:, :, own] = system.expand_sides(
-            solution.state, np.ascontiguousarray(images[:, :, own]), np.ascontiguousarray(shared[:, own]), columns,
-            solution.estimator,
-        )  # fmt: skip
+        of_images, of_shared = np.ascontiguousarray(images[:, :, own]), np.ascontiguousarray(shared[:, own])
+        points[:, :, own] = expand_sides(system, solution.state, of_images, of_shared, columns, solution.estimator)
     if inner is not None:
         images, shared, points = inner.moved(images, shared, points)
     return ModelRoot(images, shared, points.astype(np.float32, copy=False), 0.0)

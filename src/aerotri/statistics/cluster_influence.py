@@ -27,6 +27,7 @@ import numpy as np
 from aerotri.adjustment.datum import ExtraObservations
 from aerotri.adjustment.kernel_records import Directions, Problem
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.point_sides import expand_sides, solve_sides
 from aerotri.adjustment.robust import LEAST_SQUARES
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
@@ -91,7 +92,7 @@ def _plain_changes(system: NormalSystem, solution: Solution, factor: Factor, clu
         sides = np.zeros((count, 3, own.stop - first))
         system.over_chunks(partial(_pull, system, problem, label, first, sides))
         of_images, of_shared = (np.ascontiguousarray(part[..., own]) for part in (images, shared))
-        points[:, :, own] = system.expand_sides(solution.state, of_images, of_shared, sides, solution.estimator)
+        points[:, :, own] = expand_sides(system, solution.state, of_images, of_shared, sides, solution.estimator)
     return Directions(images, shared, points)
 
 
@@ -150,7 +151,7 @@ def known_part(
         part = mix[:, first : first + at_once]
         sides = np.zeros((count, 3, part.shape[1]))
         sides[rows, axes] = of_points[:, None] * part[: len(rows)]
-        found = system.solve_sides(solution.state, factor, sides, solution.estimator, root @ part[len(rows) :])
+        found = solve_sides(system, solution.state, factor, sides, solution.estimator, root @ part[len(rows) :])
         of_images, of_shared, at_points = found if inner is None else inner.moved(*found)
         images += of_images @ np.swapaxes(of_images, 1, 2)
         shared += of_shared @ of_shared.T

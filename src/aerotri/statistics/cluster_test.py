@@ -26,6 +26,7 @@ import numpy as np
 from aerotri.adjustment.datum import motions_of_points
 from aerotri.adjustment.kernel_records import Directions
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.point_sides import expand_sides, solve_sides
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.functional_model.observed_unknowns import Rows
@@ -87,7 +88,7 @@ def weakest_modes(system: NormalSystem, solution: Solution, factor: Factor) -> M
         columns = np.arange(first, min(first + at_once, size))
         sides = np.zeros((len(u.points), 3, len(columns)))
         sides[rows[columns // 3], columns % 3, np.arange(len(columns))] = 1.0
-        _, shared, points = system.solve_sides(solution.state, factor, sides, solution.estimator, rows=wanted)
+        _, shared, points = solve_sides(system, solution.state, factor, sides, solution.estimator, rows=wanted)
         q[:, columns] = points[rows].reshape(size, -1)
         at_observed[:, :, columns], at_shared[:, columns] = points[observed], shared
     own += np.einsum("pia,pi,pib->ab", at_observed, u.prior_weight[observed], at_observed)
@@ -99,8 +100,8 @@ def weakest_modes(system: NormalSystem, solution: Solution, factor: Factor) -> M
     sides = np.zeros((len(u.points), 3, chosen.shape[1]))
     sides[rows] = chosen.reshape(len(rows), 3, -1)
     # only the sample has sides, so that no other point has to be looked at before the solution
-    images, shared, _ = system.solve_sides(solution.state, factor, sides, solution.estimator, rows=rows)
-    points = system.expand_sides(solution.state, images, shared, sides, solution.estimator)
+    images, shared, _ = solve_sides(system, solution.state, factor, sides, solution.estimator, rows=rows)
+    points = expand_sides(system, solution.state, images, shared, sides, solution.estimator)
     return _with_scores(system, solution, Directions(images, shared, points))
 
 

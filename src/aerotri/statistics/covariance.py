@@ -10,6 +10,7 @@ from aerotri.adjustment.datum import datum_rows, motions_of_images, motions_of_p
 from aerotri.adjustment.kernel_records import Inverse
 from aerotri.adjustment.normal_equations import NormalSystem
 from aerotri.adjustment.parallel import blas_threads
+from aerotri.adjustment.point_sides import point_cofactors, solve_sides
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.unknowns import State, Unknowns
@@ -75,7 +76,7 @@ def cofactors(system: NormalSystem, state: State, factor: Factor, estimator: Est
     # threads of BLAS that wait for work would take a processor from the kernels
     with blas_threads(0.0):
         inverse = factor.inverse_on_pattern()
-        points, redundancy = system.point_cofactors(state, inverse, estimator)
+        points, redundancy = point_cofactors(system, state, inverse, estimator)
     images, border = _without_held(system.unknowns, inverse)
     result = Cofactors(images, inverse.corner, points, border, redundancy, inverse)
     if system.unknowns.block.settings.adjustment.datum == "inner" and system.unknowns.motions.count:
@@ -109,7 +110,7 @@ def inner_datum(system: NormalSystem, state: State, factor: Factor, estimator: E
     g_datum = g_points[rows].reshape(-1, d)
     a = np.zeros((len(state.points), 3, d))
     a[rows] = np.linalg.solve(g_datum.T @ g_datum, g_datum.T).T.reshape(-1, 3, d)
-    q_images, q_shared, q_points = system.solve_sides(state, factor, a, estimator)
+    q_images, q_shared, q_points = solve_sides(system, state, factor, a, estimator)
     both = np.einsum("pia,pib->ab", a, q_points)
     return InnerDatum(g_images, g_shared, g_points, q_images, q_shared, q_points, both, a)
 

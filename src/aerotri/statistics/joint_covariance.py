@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.point_sides import expand_sides, solve_sides
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.unknowns import State, Unknowns
@@ -161,12 +162,12 @@ def _unit_solutions(
             right[6 * one.row + axis, c] = float(u.eo_free[one.row, axis])
         else:
             right[6 * n + one.row, c] = 1.0
-    images, shared, points = system.solve_sides(state, factor, sides, estimator, right[6 * n :])
+    images, shared, points = solve_sides(system, state, factor, sides, estimator, right[6 * n :])
     if right[: 6 * n].any():
         direct = factor.solve(np.concatenate([right[: 6 * n], np.zeros((s, k))]))
         of_images, of_shared = np.ascontiguousarray(direct[: 6 * n].reshape(n, 6, k)), direct[6 * n :].copy()
         images, shared = images + of_images, shared + of_shared
-        points = points + system.expand_sides(state, of_images, of_shared, np.zeros_like(sides), estimator)
+        points = points + expand_sides(system, state, of_images, of_shared, np.zeros_like(sides), estimator)
     held = ~u.eo_free
     images[held] = 0.0
     return images, shared, points

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.point_sides import expand_sides
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.unknowns import Unknowns
 from aerotri.results.model_part import ModelRoot
@@ -55,8 +56,8 @@ def known_root(system: NormalSystem, solution: Solution, solved: np.ndarray) -> 
             own = slice(first, min(first + at_once, k))
             images = np.ascontiguousarray(solved[:n, own]).reshape(len(u.images), 6, -1)
             nothing = np.zeros((len(u.points), 3, images.shape[2]))
-            points = system.expand_sides(
-                solution.state, images, np.ascontiguousarray(solved[n:, own]), nothing, solution.estimator
+            points = expand_sides(
+                system, solution.state, images, np.ascontiguousarray(solved[n:, own]), nothing, solution.estimator
             )
             at[:, :, own] = points[observed]
     return _weighted(system, solved[n:], at)

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.point_sides import solve_sides
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.functional_model.additional_parameters import Parameter
@@ -134,7 +135,7 @@ def _cofactors(system: NormalSystem, solution: Solution, factor: Factor, columns
         sides = np.zeros((len(system.unknowns.shared), len(columns[own])))
         sides[columns[own], np.arange(sides.shape[1])] = 1.0
         nothing = np.zeros((len(system.unknowns.points), 3, sides.shape[1]))
-        _, shared, points = system.solve_sides(solution.state, factor, nothing, solution.estimator, sides)
+        _, shared, points = solve_sides(system, solution.state, factor, nothing, solution.estimator, sides)
         q_points[:, :, own], q[:, own] = points[at], shared[columns]
     return q_points, q
 

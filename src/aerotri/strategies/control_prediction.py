@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.adjustment.normal_equations import NormalSystem
+from aerotri.adjustment.point_sides import solve_sides
 from aerotri.adjustment.solve import Solution
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.unknowns import Unknowns
@@ -76,7 +77,7 @@ def predict_control(
         point = rows[own[at]]
         sides = np.zeros((len(u.points), 3, len(point)))
         sides[point, axis, np.arange(len(point))] = 1.0
-        q = system.solve_sides(solution.state, factor, sides, solution.estimator)[2][point, axis]
+        q = solve_sides(system, solution.state, factor, sides, solution.estimator)[2][point, axis]
         root = np.sqrt(u.prior_weight[point, axis])
         whitened = np.eye(len(point)) - root[:, None] * (0.5 * (q + q.T)) * root
         if not len(point) or np.linalg.eigvalsh(whitened)[0] < UNDETERMINED:

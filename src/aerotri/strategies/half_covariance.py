@@ -18,6 +18,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from aerotri.adjustment.point_sides import solve_sides
 from aerotri.functional_model.constraints import ConstraintObservations
 from aerotri.strategies.half_adjustment import Half
 
@@ -166,7 +167,7 @@ class HalfPair:
         u = half.unknowns
         right = np.zeros((len(u.points), 3, sides.shape[2]))
         right[self.rows[which]] = sides
-        _, shared, points = half.system.solve_sides(half.solution.state, half.factor, right, half.solution.estimator)
+        _, shared, points = solve_sides(half.system, half.solution.state, half.factor, right, half.solution.estimator)
         return points[self.rows[which]], self.shared[which].of(points, shared)
 
     def responses(self, which: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -175,8 +176,8 @@ class HalfPair:
         n = len(half.unknowns.points)
         for first in range(0, shared.count, COLUMNS_AT_ONCE):
             sides, of_shared = shared.sides(n, first, min(first + COLUMNS_AT_ONCE, shared.count))
-            _, found, points = half.system.solve_sides(
-                half.solution.state, half.factor, sides, half.solution.estimator, of_shared
+            _, found, points = solve_sides(
+                half.system, half.solution.state, half.factor, sides, half.solution.estimator, of_shared
             )
             yield points[self.rows[which]], found
 

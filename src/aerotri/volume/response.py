@@ -21,6 +21,7 @@ import numpy as np
 from aerotri.adjustment import scanning
 from aerotri.adjustment.kernel_records import Scans
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
+from aerotri.adjustment.point_sides import expand_sides
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.conventions import InputError
 from aerotri.deformation.absorbed import absorbed_orientation, absorbed_partials
@@ -147,9 +148,9 @@ def control_response(calibration: Adjustment, response: Response) -> np.ndarray:
     system = calibration.system
     u = system.unknowns
     n = 6 * len(u.images)
-    points = system.expand_sides(
-        calibration.solution.state, response.solved[:n].reshape(-1, 6, 1).copy(), response.solved[n:, None].copy(),
-        np.zeros((len(u.points), 3, 1)), calibration.solution.estimator,
+    points = expand_sides(
+        system, calibration.solution.state, response.solved[:n].reshape(-1, 6, 1).copy(),
+        response.solved[n:, None].copy(), np.zeros((len(u.points), 3, 1)), calibration.solution.estimator,
     )  # fmt: skip
     return u.prior_weight * points[:, :, 0]
 
