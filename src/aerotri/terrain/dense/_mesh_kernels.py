@@ -13,10 +13,12 @@ MOST_PAIRS = 8
 
 
 class Rays(NamedTuple):
-    """How a left epipolar image looks at the ground; q and the CRS as of `Place`.
+    """How a left epipolar image looks at the ground, and the grid that it is laid on.
 
     f : px. base : m. first : column, row of the first pixel. known : (rows, columns) px, parallaxes P that were taken
-    out. centre : (3,). rotation : (3, 3). to_crs : (3, 10). reach : m.
+    out. centre : (3,), rotation : (3, 3) of the image. reach : m.
+    to_grid : (3, 10) column and row of the grid, whole at centres of cells, and height, m: coefficients of 1, a, b, d,
+        a², b², d², ab, ad, bd, where (a, b, d) is a place in units of `reach`.
     """
 
     f: float
@@ -25,13 +27,13 @@ class Rays(NamedTuple):
     known: np.ndarray
     centre: np.ndarray
     rotation: np.ndarray
-    to_crs: np.ndarray
+    to_grid: np.ndarray
     reach: float
 
 
 @kernel
 def place_of_pixels(rays, value, out, per_pixel):
-    """CRS less origin (3, rows, columns) m of pixels with parallaxes, and m of height a pixel of parallax is.
+    """Column and row of the grid and height, m, (3, rows, columns) of pixels, and m of height a pixel of parallax is.
 
     value : (rows, columns) px beyond P, NaN unknown.
     """
@@ -41,38 +43,56 @@ def place_of_pixels(rays, value, out, per_pixel):
 
 @leaf_kernel
 def _place_of_row(rays, i, value, known, x, y, z, per_pixel):
-    """Of the pixels of row i, without a branch: so several are computed at once."""
-    r, c, m = rays.rotation, rays.centre, rays.to_crs
-    columns = value.shape[0]
-    share = 1.0 / rays.reach
+    """Of the pixels of row i, without a branch: so several are computed at once.
+
+    A ray is linear in the column p, so what it reaches at a depth t is t·(e + p·g) beyond the centre, and a coordinate
+    is a polynomial in t and p.
+    """
+    r, columns, share = rays.rotation, value.shape[0], 1.0 / rays.reach
     up = -(rays.first[1] + i) / rays.f
+    e = share * (r[0, 1] * up - r[0, 2]), share * (r[1, 1] * up - r[1, 2]), share * (r[2, 1] * up - r[2, 2])
+    g = share * r[0, 0], share * r[1, 0], share * r[2, 0]
+    start = share * rays.centre[0], share * rays.centre[1], share * rays.centre[2]
+    x0, x1, x2, x3, x4, x5 = _along_row(rays.to_grid[0], start, e, g)
+    y0, y1, y2, y3, y4, y5 = _along_row(rays.to_grid[1], start, e, g)
+    z0, z1, z2, z3, z4, z5 = _along_row(rays.to_grid[2], start, e, g)
+    down, aside = e[2] * rays.reach, g[2] * rays.reach
+    scale, per = rays.f * rays.base, 1.0 / rays.f
     for j in range(columns):
         found = value[j]
         at = min(max(j - (found if found == found else 0.0), 0.0), columns - 1.001)
         left = int(at)
         by_column = known[left + 1] - known[left]
-        parallax = found + known[left] + (at - left) * by_column
-        depth = rays.f * rays.base / parallax
-        depth = depth if depth > 0.0 else np.nan
-        u0, u1, u2 = depth * ((rays.first[0] + j) / rays.f), depth * up, -depth
-        down = r[2, 0] * u0 + r[2, 1] * u1 + r[2, 2] * u2
-        a = (c[0] + r[0, 0] * u0 + r[0, 1] * u1 + r[0, 2] * u2) * share
-        b = (c[1] + r[1, 0] * u0 + r[1, 1] * u1 + r[1, 2] * u2) * share
-        d = (c[2] + down) * share
-        aa, bb, dd, ab, ad, bd = a * a, b * b, d * d, a * b, a * d, b * d
-        x[j] = (
-            m[0, 0] + m[0, 1] * a + m[0, 2] * b + m[0, 3] * d + m[0, 4] * aa + m[0, 5] * bb + m[0, 6] * dd
-            + m[0, 7] * ab + m[0, 8] * ad + m[0, 9] * bd
-        )  # fmt: skip
-        y[j] = (
-            m[1, 0] + m[1, 1] * a + m[1, 2] * b + m[1, 3] * d + m[1, 4] * aa + m[1, 5] * bb + m[1, 6] * dd
-            + m[1, 7] * ab + m[1, 8] * ad + m[1, 9] * bd
-        )  # fmt: skip
-        z[j] = (
-            m[2, 0] + m[2, 1] * a + m[2, 2] * b + m[2, 3] * d + m[2, 4] * aa + m[2, 5] * bb + m[2, 6] * dd
-            + m[2, 7] * ab + m[2, 8] * ad + m[2, 9] * bd
-        )  # fmt: skip
-        per_pixel[j] = abs(down) * (1.0 - by_column) / parallax
+        inverse = 1.0 / (found + known[left] + (at - left) * by_column)
+        t = scale * inverse
+        t = t if t > 0.0 else np.nan
+        p = (rays.first[0] + j) * per
+        x[j] = x0 + t * (x1 + x2 * p + t * (x3 + p * (x4 + p * x5)))
+        y[j] = y0 + t * (y1 + y2 * p + t * (y3 + p * (y4 + p * y5)))
+        z[j] = z0 + t * (z1 + z2 * p + t * (z3 + p * (z4 + p * z5)))
+        per_pixel[j] = abs(t * (down + aside * p)) * (1.0 - by_column) * inverse
+
+
+@leaf_kernel
+def _along_row(m, start, e, g):
+    """Of a quadratic m (10,) at start + t·(e + p·g): coefficients of 1, t, t·p, t², t²·p, t²·p²."""
+    (a, b, d), (ea, eb, ed), (ga, gb, gd) = start, e, g
+    by_a = m[1] + 2.0 * m[4] * a + m[7] * b + m[8] * d
+    by_b = m[2] + 2.0 * m[5] * b + m[7] * a + m[9] * d
+    by_d = m[3] + 2.0 * m[6] * d + m[8] * a + m[9] * b
+    return (
+        m[0] + m[1] * a + m[2] * b + m[3] * d + _square_part(m, a, b, d),
+        by_a * ea + by_b * eb + by_d * ed,
+        by_a * ga + by_b * gb + by_d * gd,
+        _square_part(m, ea, eb, ed),
+        _square_part(m, ea + ga, eb + gb, ed + gd) - _square_part(m, ea, eb, ed) - _square_part(m, ga, gb, gd),
+        _square_part(m, ga, gb, gd),
+    )
+
+
+@leaf_kernel
+def _square_part(m, a, b, d):
+    return m[4] * a * a + m[5] * b * b + m[6] * d * d + m[7] * a * b + m[8] * a * d + m[9] * b * d
 
 
 @kernel

@@ -14,8 +14,8 @@ from aerotri.conventions import SIGMA_PER_MAD
 
 FEWEST_TELL = 200
 """Shifts of which a parabola and a factor are taken."""
-MOST_TELL = 15_000
-"""Shifts that are taken, spread over a tile; chosen [C]: medians are then sure to a per cent of a spread."""
+MOST_TELL = 6_000
+"""Shifts that are taken, spread over a tile; chosen [C]: medians are then sure to two per cent of a spread."""
 SLOW_SIGMA_PX = 1.0
 """By which shifts may change from the middle to the edge of an image; chosen [C]: it holds the parabola only where few
 pixels tell anything."""

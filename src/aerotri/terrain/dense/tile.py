@@ -206,18 +206,19 @@ def _holes_at(holes: np.ndarray, grid: Grid, nodes: np.ndarray) -> np.ndarray:
 
 def _heights(place: Place, g: EpipolarGeometry, found: Parallaxes, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Heights above the place and σ, (rows, columns) m, of the cells as one pair sees them."""
+    # metres of the CRS to columns and rows of the grid, whole at centres of cells
+    to_grid = place.to_crs.copy()
+    for axis, start, sign in ((0, grid.left - place.origin[0], 1.0), (1, grid.top - place.origin[1], -1.0)):
+        to_grid[axis, 0] -= start
+        to_grid[axis] *= sign / grid.cell_x
+        to_grid[axis, 0] -= 0.5
     rays = kernels.Rays(
-        g.f, g.base, g.first, g.known, np.ascontiguousarray(g.centre), np.ascontiguousarray(g.rotation),
-        np.ascontiguousarray(place.to_crs), place.reach,
+        g.f, g.base, g.first, g.known, np.ascontiguousarray(g.centre), np.ascontiguousarray(g.rotation), to_grid,
+        place.reach,
     )  # fmt: skip
     place_of = np.empty((3, *found.value.shape))
     per_pixel = np.empty(found.value.shape)
     kernels.place_of_pixels(rays, found.value, place_of, per_pixel)
-    # metres of the CRS to columns and rows of the grid, whole at centres of cells
-    for axis, start, sign in ((0, grid.left - place.origin[0], 1.0), (1, grid.top - place.origin[1], -1.0)):
-        place_of[axis] -= start
-        place_of[axis] *= sign / grid.cell_x
-        place_of[axis] -= 0.5
     z, sigma = (np.full((grid.rows, grid.columns), np.nan) for _ in range(2))
     kernels.lay_mesh(place_of, found.sigma, per_pixel, found.value, LARGEST_JUMP_PX, z, sigma)
     return z, sigma
