@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -126,3 +128,55 @@ def test_a_damaged_file_is_written_anew(environment, tmp_path, ending, share):
     file.write_bytes(file.read_bytes()[: int(share * file.stat().st_size)])
     for misses in ("1", "0"):
         assert begun(environment, CALL).communicate(timeout=120)[0].split() == ["8.0", misses]
+
+
+FILL = """
+import errno
+from aerotri import kernel_cache
+whole = kernel_cache.KeptFiles._save_data
+def full(self, name, data):
+    raise OSError(errno.ENOSPC, "No space left on device")
+kernel_cache.KeptFiles._save_data = full
+"""
+
+
+def test_a_full_disk_keeps_nothing_and_stops_nobody(environment, tmp_path):
+    """After it the index points to a file that is not there, or to that of an older kernel."""
+    assert begun(environment, CALL).communicate(timeout=120)[0].split() == ["8.0", "1"]
+    (tmp_path / "here.py").write_text(KERNELS.replace("2.0 * x", "3.0 * x"))
+    process = subprocess.Popen(
+        [sys.executable, "-c", FILL + CALL], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    said, warned = process.communicate(timeout=120)
+    assert said.split() == ["begins", "12.0", "1"]
+    assert str(tmp_path / "kept") in warned
+    assert "No space left" in warned
+    for misses in ("1", "0"):
+        assert begun(environment, CALL).communicate(timeout=120)[0].split() == ["12.0", misses]
+
+
+def test_an_index_that_cannot_be_read_or_replaced_stops_nobody(environment, tmp_path):
+    """A folder stands in its place: a file that may not be read would be one that root may read."""
+    assert begun(environment, CALL).communicate(timeout=120)[0].split() == ["8.0", "1"]
+    (index,) = (tmp_path / "kept").rglob("here.twice*.nbi")
+    index.unlink()
+    index.mkdir()
+    process = subprocess.Popen(
+        [sys.executable, "-c", CALL], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    said, warned = process.communicate(timeout=120)
+    assert said.split() == ["begins", "8.0", "1"]
+    # it cannot be replaced either
+    assert "cannot be kept" in warned
+
+
+def test_the_digest_reads_every_module_that_kernels_import():
+    """Constants and the order of fields are compiled in: a change of them is another kernel."""
+    package = Path(kernel_cache.__file__).parent
+    read = {path for pattern in kernel_cache.KERNEL_FILES for path in package.rglob(pattern)}
+    imported = set()
+    for path in package.rglob("_*kernels.py"):
+        for name in re.findall(r"^(?:from|import) (aerotri[\w.]*)", path.read_text(encoding="utf-8"), re.M):
+            imported.add(package.parent / f"{name.replace('.', '/')}.py")
+    assert len(imported) > 10
+    assert imported <= read

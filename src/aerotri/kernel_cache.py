@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import pickle
 import time
+import warnings
 from contextlib import suppress
 from functools import cache
 from hashlib import sha256
@@ -22,16 +23,28 @@ PATIENCE_S = 60.0
 """For another process to compile a kernel, before it is compiled here; chosen [C]: ten times what the longest takes."""
 LOOK_S = 0.02
 """Between two looks whether the lock is free."""
-UNREADABLE = (pickle.UnpicklingError, EOFError, ImportError, AttributeError, LookupError, TypeError, ValueError)
-"""What reading a damaged file raises, or one whose types have other names or modules now."""
+KERNEL_FILES = ("compiled.py", "_*kernels.py", "kernel_records.py", "picket_status.py")
+"""Modules whose code, constants and order of fields are compiled in."""
+UNREADABLE = (
+    OSError,
+    pickle.UnpicklingError,
+    EOFError,
+    ImportError,
+    AttributeError,
+    LookupError,
+    TypeError,
+    ValueError,
+)
+"""What reading a file raises that may not be read, is damaged, or whose types have other names or modules now."""
 
 
 @cache
 def _kernels_as_written() -> str:
     """A digest of all files of kernels and of the options they are compiled with."""
     package, digest = Path(__file__).parent, sha256()
-    for path in [package / "compiled.py", *sorted(package.rglob("_*kernels.py"))]:
-        digest.update(path.read_bytes())
+    for pattern in KERNEL_FILES:
+        for path in sorted(package.rglob(pattern)):
+            digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
@@ -55,9 +68,26 @@ class KeptFiles(IndexDataCacheFile):
             # numba goes on as with a file that was removed
             raise FileNotFoundError(name) from error
 
+    def save(self, key: Any, data: Any) -> None:
+        """Keep what was compiled, with what it was compiled from.
+
+        Numba writes the index first: where the disk was full after that, or the process ended, it points to the file
+        of an older kernel.
+        """
+        super().save(key, (self._source_stamp, key, data))
+
+    def load(self, key: Any) -> Any:
+        """What is kept for the types, of these sources; None where it is of others."""
+        kept = super().load(key)
+        if not isinstance(kept, tuple) or kept[:2] != (self._source_stamp, key):
+            return None
+        return kept[2]
+
 
 class SharedCache(FunctionCache):
     """Numba's cache on disk for one function; numba calls it under its own lock, for one thread at a time."""
+
+    _told = False
 
     def __init__(self, function: Any):
         super().__init__(function)
@@ -79,11 +109,25 @@ class SharedCache(FunctionCache):
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled, and let others go on."""
+        """Keep what was compiled, and let others go on. Where it cannot be kept the program goes on with it.
+
+        Warns
+        -----
+        UserWarning
+        """
         try:
             super().save_overload(sig, data)
+        except OSError as error:
+            self._say_not_kept(error.strerror or str(error))
         finally:
             self._let_go()
+
+    def _say_not_kept(self, why: str) -> None:
+        """Once, not for every kernel."""
+        if not SharedCache._told:
+            SharedCache._told = True
+            text = f"kernels are compiled in every run: they cannot be kept in {self._cache_path} ({why})"
+            warnings.warn(f"{text}; the variable NUMBA_CACHE_DIR names another place", stacklevel=2)
 
     def _lock_path(self) -> Path:
         return Path(self._cache_path) / f"{self._impl.filename_base}.lock"

@@ -62,7 +62,10 @@ def test_an_interruption_is_one_line(program, number, code):
 def test_what_was_written_is_said(monkeypatch, tmp_path):
     from aerotri.formats.files import work_place
 
-    monkeypatch.setattr(work_place, "written", [tmp_path / "a", tmp_path / "b"])
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+    # what stood in a folder that did not become whole is gone with it
+    monkeypatch.setattr(work_place, "written", [tmp_path / name for name in ("gone", "a", "b")])
     assert interruption.message() == f"aerotri: interrupted, after {tmp_path / 'a'} was written and 1 more"
 
 

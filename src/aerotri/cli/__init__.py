@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import io
 import os
 import sys
+import warnings
 from typing import Any
 
 from aerotri.cli import interruption
@@ -53,6 +55,8 @@ def main() -> None:
     interrupted.
     """
     interruption.while_running()
+    _speak_any_encoding()
+    warnings.formatwarning = _as_line
     try:
         code = _ended()
     except KeyboardInterrupt:
@@ -60,10 +64,27 @@ def main() -> None:
         code = _told(interruption.message(), interruption.exit_code())
     interruption.afterwards()
     try:
-        sys.stdout.flush()
-    except OSError:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except (OSError, ValueError):
         _forget_output()
     _leave(code)
+
+
+def _speak_any_encoding() -> None:
+    """Letters that the encoding of the output lacks (σ, × in a log of Windows) become question marks, not errors."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def _as_line(
+    message: Warning | str, category: type[Warning], filename: str, lineno: int, line: str | None = None
+) -> str:
+    """What is meant for the user without the place in the code."""
+    if category is UserWarning:
+        return f"aerotri: {message}\n"
+    return f"{filename}:{lineno}: {category.__name__}: {message}\n"
 
 
 def _leave(code: int) -> None:
@@ -75,8 +96,9 @@ def _leave(code: int) -> None:
     if "pyarrow" not in sys.modules:
         raise SystemExit(code)
     atexit._run_exitfuncs()  # pyright: ignore[reportPrivateUsage]
-    with contextlib.suppress(OSError):
-        sys.stderr.flush()
+    with contextlib.suppress(OSError, ValueError):
+        if sys.stderr is not None:
+            sys.stderr.flush()
     os._exit(code)
 
 
@@ -126,7 +148,8 @@ def _unexpected(error: Exception) -> int:
 
 def _told(text: str, code: int) -> int:
     """Print a line to stderr, whoever reads it; the code."""
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, ValueError):
+        # with stderr closed, print writes nowhere
         print(text, file=sys.stderr, flush=True)
     return code
 
@@ -134,4 +157,5 @@ def _told(text: str, code: int) -> int:
 def _forget_output() -> None:
     """What is still to be written to stdout goes nowhere, so that the end of the program does not fail by it."""
     with contextlib.suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if sys.stdout is not None:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -52,6 +52,8 @@ def was_interrupted() -> bool:
 def message() -> str:
     """The line for the user: what was brought to its place before, if anything was."""
     places = getattr(sys.modules.get("aerotri.formats.files.work_place"), "written", [])
+    # files of a folder that did not become whole are gone with it
+    places = [place for place in places if place.exists()]
     if not places:
         return "aerotri: interrupted, nothing was written"
     return f"aerotri: interrupted, after {places[0]} was written" + (f" and {len(places) - 1} more" * (len(places) > 1))

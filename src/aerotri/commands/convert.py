@@ -114,7 +114,7 @@ def run_convert_parts(request: Request, target: Path, to: str, parts: int, as_js
     InputError
     """
     from aerotri.formats.block.folder import read_photographs
-    from aerotri.partition.adjusting import part_folders
+    from aerotri.partition.part_list import part_folders
     from aerotri.public.parts import convert_request_parts
 
     if to != "block" or in_place:

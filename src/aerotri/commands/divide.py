@@ -17,7 +17,7 @@ def run_divide(path: Path, out: Path | None, parts: int | None, as_json: bool) -
     """
     from aerotri.commands.adjust import folder_name
     from aerotri.formats.block.folder import read_photographs
-    from aerotri.partition.adjusting import part_folders
+    from aerotri.partition.part_list import part_folders
     from aerotri.public.parts import divide
 
     console = Console(quiet=as_json)

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pycolmap
 
 from aerotri.adjustment.parallel import thread_count
+from aerotri.colmap_library import pycolmap
 from aerotri.crosscheck.ceres_solver import ObservedCost, run_solver
 from aerotri.crosscheck.comparison import (
     CovarianceDifference,

@@ -17,6 +17,7 @@ from aerotri.observations import Block
 from aerotri.partition.common import Common, PartFacts
 from aerotri.partition.course import Course, Ended
 from aerotri.partition.joints import LEAST_BYTES, Joints
+from aerotri.partition.part_list import part_folders
 from aerotri.partition.part_picture import SAMPLE_RAYS
 from aerotri.partition.part_results import Ending, Written, measure_part, write_part
 from aerotri.partition.part_system import refuse_robust
@@ -47,12 +48,6 @@ class PartsSettings:
     robust: str | None = None
     max_iterations: int | None = None
     geoid: Path | None = None
-
-
-def part_folders(folder: Path) -> list[Path]:
-    """Folders of the parts of a block, in order; none where it is no block in parts."""
-    there = folder / PARTS
-    return sorted(path.parent for path in there.glob("*/block.toml")) if there.is_dir() else []
 
 
 def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSettings, say: Say) -> Whole:

@@ -138,21 +138,23 @@ def divide(
     ['0000', '0001']
     """
     from aerotri.formats.block.writer import write_block
-    from aerotri.formats.files.atomic import room_beside
+    from aerotri.formats.files.atomic import atomic_folder, room_beside
     from aerotri.observations import Block
+    from aerotri.partition.part_list import write_part_list
     from aerotri.partition.whole import PARTS
     from aerotri.public.folders import refuse_foreign_folder
 
     target = Path(folder)
     _refuse_few(parts)
     refuse_foreign_folder(target)
-    with stage_report(progress) as report, room_beside(target) as room:
+    with stage_report(progress) as report, room_beside(target) as room, atomic_folder(target) as place:
         if isinstance(block, Block):
             cut = _whole_parts(block, parts, report.stage)
         else:
             cut = _parts_in_pieces(block, parts, room, report.stage)
         for number, part in enumerate(cut):
-            write_block(part, target / PARTS / f"{number:04d}", tables=tables)
+            write_block(part, place / PARTS / f"{number:04d}", tables=tables)
+        write_part_list(place)
     return target
 
 
@@ -267,8 +269,9 @@ def convert_request_parts(
     """
     from aerotri.formats.assembly.project_in_pieces import read_in_pieces
     from aerotri.formats.block.writer import write_block
-    from aerotri.formats.files.atomic import room_beside
+    from aerotri.formats.files.atomic import atomic_folder, room_beside
     from aerotri.partition.dividing_pieces import divided
+    from aerotri.partition.part_list import write_part_list
     from aerotri.partition.part_system import refuse_what_parts_cannot
     from aerotri.partition.whole import PARTS
     from aerotri.public.folders import refuse_foreign_folder
@@ -276,14 +279,15 @@ def convert_request_parts(
     _refuse_few(parts)
     refuse_foreign_folder(target)
     request = replace(request, name=request.name or target.resolve().name)
-    with stage_report(progress) as report, room_beside(target) as room:
+    with stage_report(progress) as report, room_beside(target) as room, atomic_folder(target) as place:
         report.stage("reading photographs", None)
         source = read_in_pieces(request, room / "head")
         source = replace(source, block=_in_metres(source.block))
         refuse_what_parts_cannot(source.block)
         cut = divided(source, _count(source.block, parts), room, report.stage)
         for number, part in enumerate(cut):
-            write_block(part, target / PARTS / f"{number:04d}", tables=tables)
+            write_block(part, place / PARTS / f"{number:04d}", tables=tables)
+        write_part_list(place)
     return source.messages
 
 
@@ -330,6 +334,8 @@ def simulate_parts(
     (32, 'converged')
     """
     from aerotri import simulation
+    from aerotri.formats.files.atomic import atomic_folder
+    from aerotri.partition.part_list import write_part_list
     from aerotri.partition.part_system import refuse_what_parts_cannot
     from aerotri.partition.whole import PARTS
     from aerotri.public.folders import refuse_foreign_folder
@@ -337,15 +343,16 @@ def simulate_parts(
     spec = simulation.parse_spec(plan) if isinstance(plan, Mapping) else simulation.read_spec(plan)
     target, images, counts = Path(folder), set[str](), np.zeros(4, dtype=np.int64)
     refuse_foreign_folder(target)
-    with stage_report(progress) as report:
+    with stage_report(progress) as report, atomic_folder(target) as place:
         report.stage("flight", None)
         for number, (block, truth) in enumerate(simulation.simulate_parts(spec, seed, parts)):
             refuse_what_parts_cannot(block)
             report.counted("simulating parts", number, parts)
-            simulation.write_simulated(target / PARTS / f"{number:04d}", block, truth, tables="parquet")
+            simulation.write_simulated(place / PARTS / f"{number:04d}", block, truth, tables="parquet")
             images.update(block.images.names.tolist())
             is_check = block.control.is_check
             counts += (len(block.image_points), len(block.points), int((~is_check).sum()), int(is_check.sum()))
+        write_part_list(place)
     measured = dict(zip(("image_points", "points", "control", "check"), counts.tolist(), strict=True))
     return {"block": spec.name, "images": len(images), **measured, "parts": parts}
 

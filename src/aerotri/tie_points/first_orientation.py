@@ -71,7 +71,7 @@ def pinhole(camera: Camera) -> Any:
     InputError
         For a fisheye.
     """
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     if camera.is_fisheye:
         raise InputError(
@@ -101,7 +101,7 @@ def two_view_inliers(
     ----------
     cameras : see `pinhole`. xy : (m, 2) px each, row by row the same point.
     """
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     options = _two_view_options(fewest, seed)
     options.ransac.max_error = tolerance_px
@@ -113,7 +113,7 @@ def two_view_inliers(
 
 
 def _two_view_options(fewest: int, seed: int) -> Any:
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     options = pycolmap.TwoViewGeometryOptions()
     options.min_num_inliers = fewest
@@ -173,7 +173,7 @@ def _mapped_parts(
 
     `partners` are those that a photograph is matched with at most.
     """
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     with tempfile.TemporaryDirectory() as folder, _quiet():
         database = Path(folder) / "database.db"
@@ -202,7 +202,7 @@ def _mapped_parts(
 @contextmanager
 def _quiet() -> Generator[None]:
     """pycolmap's own messages silenced for the time being."""
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     level = pycolmap.logging.minloglevel
     pycolmap.logging.minloglevel = pycolmap.logging.FATAL.value
@@ -213,7 +213,7 @@ def _quiet() -> Generator[None]:
 
 
 def _mapping_options(block: Block, seed: int, angle_deg: float, tolerance_px: float) -> Any:
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     options = pycolmap.IncrementalPipelineOptions()
     options.random_seed = options.mapper.random_seed = options.triangulation.random_seed = seed
@@ -252,7 +252,7 @@ def _keypoints(block: Block) -> np.ndarray:
 
 def _write_database(block: Block, path: Path, partners: int | None) -> None:
     """Cameras, photographs, image points and, as matches, what every two photographs have in common."""
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     rays, px = block.image_points, _keypoints(block)
     order = np.lexsort((rays.point, rays.image))
@@ -326,7 +326,7 @@ def _strongest(first: np.ndarray, second: np.ndarray, count: np.ndarray, images:
 def _write_pair(
     database: Any, pair: tuple[int, int], matches: np.ndarray, px: np.ndarray, bounds: np.ndarray, block: Block
 ) -> None:
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     cameras = [pinhole(block.cameras[block.images.camera[k]]) for k in pair]
     own = [px[bounds[k] : bounds[k + 1]] for k in pair]

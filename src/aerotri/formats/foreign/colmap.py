@@ -223,7 +223,7 @@ def _model(
     oriented: OrientedBlock, cameras: list[Camera], xy: np.ndarray, keep: np.ndarray
 ) -> tuple[Any, tuple[str, ...]]:
     """The model, and what of its rigs could not be carried over, in words."""
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     block, rays = oriented.block, oriented.block.image_points
     model = pycolmap.Reconstruction()

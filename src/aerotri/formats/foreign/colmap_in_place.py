@@ -94,14 +94,14 @@ def _move(
 
 
 def _transform(model: Any, move: Similarity) -> None:
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     model.transform(pycolmap.Sim3d(move.scale, pycolmap.Rotation3d(move.rotation), move.translation))
 
 
 def _set_cameras(oriented: OrientedBlock, model: Any, rows: Mapping[int, int], folder: Path) -> tuple[str, ...]:
     """The cameras of adjusted photographs, and what was fitted, in words."""
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     used: dict[int, set[int]] = {}
     for number, row in rows.items():
@@ -135,7 +135,7 @@ def _set_poses(oriented: OrientedBlock, model: Any, rows: Mapping[int, int], fol
     InputError
         When the photographs of a rig deviate from rigidity.
     """
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     wanted = {number: colmap_pose(oriented, row) for number, row in rows.items()}
     for rig in model.rigs.values():

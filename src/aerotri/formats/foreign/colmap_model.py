@@ -74,7 +74,7 @@ def bare_model(heads: bytes, folder: Path) -> Any:
 
 def _reconstruction(place: Path, folder: Path) -> Any:
     """What pycolmap reads at a place; errors name the folder of the model."""
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     try:
         return pycolmap.Reconstruction(place)

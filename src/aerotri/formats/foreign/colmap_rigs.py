@@ -94,7 +94,7 @@ class WrittenRigs:
 
 def add_rigs(model: Any, oriented: OrientedBlock) -> WrittenRigs:
     """Add the rigs to a model that has its cameras, numbered from 1: rigid ones, and one for every other camera."""
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     block, places = oriented.block, station_places(oriented.block)
     number = {camera.name: place for place, camera in enumerate(block.cameras)}
@@ -122,7 +122,7 @@ def add_rigs(model: Any, oriented: OrientedBlock) -> WrittenRigs:
 
 def add_frames(model: Any, written: WrittenRigs, oriented: OrientedBlock) -> None:
     """Add the frames of the oriented images to a model that has its rigs; the images come after them."""
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     camera = oriented.block.images.camera
     rows = np.flatnonzero(oriented.oriented)
@@ -137,7 +137,7 @@ def add_frames(model: Any, written: WrittenRigs, oriented: OrientedBlock) -> Non
 
 
 def _sensor(place: int) -> Any:
-    import pycolmap
+    from aerotri.colmap_library import pycolmap
 
     return pycolmap.sensor_t(pycolmap.SensorType.CAMERA, place + 1)
 
