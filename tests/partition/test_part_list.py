@@ -30,7 +30,7 @@ def test_a_missing_part_is_named(in_parts):
 
 def test_a_part_without_its_file_is_named(in_parts):
     (in_parts / "parts" / "0002" / "block.toml").unlink()
-    with pytest.raises(InputError, match="part 0002 has no block.toml"):
+    with pytest.raises(InputError, match=r"part 0002 has no block\.toml"):
         part_folders(in_parts)
 
 
@@ -38,7 +38,7 @@ def test_a_part_of_another_block_is_named(in_parts):
     (in_parts / "parts" / "0000").rename(in_parts / "parts" / "0007")
     (in_parts / "parts" / "0000").mkdir()
     (in_parts / "parts" / "0000" / "block.toml").touch()
-    with pytest.raises(InputError, match="part 0007 not named in parts.json"):
+    with pytest.raises(InputError, match=r"part 0007 not named in parts\.json"):
         part_folders(in_parts)
 
 
