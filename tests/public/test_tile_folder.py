@@ -108,3 +108,14 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
     assert fingerprints([tmp_path / "dsm.tif"])[0][:2] == ["dsm.tif", 7]
     with pytest.raises(InputError, match=r"no_dsm.*cannot be read \(No such file or directory\) — give the path"):
         fingerprints([tmp_path / "no_dsm"])
+
+
+@pytest.mark.parametrize("damage", [b"\xff\xfe\x80", b"{", b""])
+def test_tiles_whose_run_is_not_known_are_removed(tmp_path, damage):
+    with open_tiles(tmp_path, {"cell": 1.0}):
+        whole = (tmp_path / STATED).read_bytes()
+    (tmp_path / STATED).write_bytes(damage)
+    (tmp_path / "level0_0_0.npz").write_bytes(b"a tile")
+    with open_tiles(tmp_path, {"cell": 1.0}):
+        assert not (tmp_path / "level0_0_0.npz").exists()
+        assert (tmp_path / STATED).read_bytes() == whole

@@ -146,7 +146,7 @@ def _remove_others(folder: Path, stated: Mapping[str, Any]) -> None:
     there = folder / STATED
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if there.is_file() and there.read_text(encoding="utf-8") == mark:
+        if there.is_file() and there.read_bytes() == mark.encode():
             return
         for path in folder.iterdir():
             if path.name not in OWN:
