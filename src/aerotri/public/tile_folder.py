@@ -13,6 +13,7 @@ from weakref import WeakValueDictionary
 
 from aerotri.conventions import InputError
 from aerotri.formats.files.locked import LOCK, FolderLock
+from aerotri.formats.files.ownership import told_by
 from aerotri.version import __version__
 
 STATED = "tiles.json"
@@ -51,23 +52,14 @@ def remove_tiles(folder: Path) -> None:
 
 
 def fingerprints(paths: Iterable[Path]) -> list[list[Any]]:
-    """Name, size and time of files: tiles of other ones are not taken up.
+    """What tells files from others: tiles of other ones are not taken up.
 
     Raises
     ------
     InputError
         When a file is not there.
     """
-    found = []
-    for path in paths:
-        try:
-            state = path.stat()
-        except OSError as error:
-            raise InputError(
-                f"cannot be read ({error.strerror})", "give the path of a file that exists", path
-            ) from error
-        found.append([path.name, state.st_size, state.st_mtime_ns])
-    return found
+    return [told_by(path) for path in paths]
 
 
 @contextmanager
