@@ -33,6 +33,8 @@ from aerotri.terrain.dense.pairs import Candidate, Pair, chosen_pairs, noise_cor
 from aerotri.terrain.dense.parallaxes import parallaxes_of
 from aerotri.terrain.dense.place import place_at
 from aerotri.terrain.dense.points import normals
+from aerotri.terrain.dense.tile import TileSurface
+from aerotri.terrain.dense.tile_files import TileFiles, TileWindow
 from aerotri.terrain.pickets import Area
 
 
@@ -97,6 +99,26 @@ def test_tiles_of_an_earlier_run_are_used_and_damaged_ones_measured_again(surfac
     last = measure_surface(hill.calibration, plan)
     assert last.resumed == len(last.windows) - 1
     np.testing.assert_array_equal(last.files.read(first.windows[0]).z, held.z)
+
+
+def test_no_damage_of_a_kept_tile_outlives_the_next_run(tmp_path):
+    """Whatever byte is wrong, the tile counts as not there, or is what it was."""
+    rng = np.random.default_rng(2)
+    z, count = rng.normal(100.0, 1.0, (3, 4)), rng.integers(0, 5, (3, 4))
+    tile = TileSurface(z, z / 1e3, count, count, 1.5, count[:, :2], z[0], 2.5)
+    files, window = TileFiles(tmp_path, 0), TileWindow(0, 0, 3, 4)
+    files.write(window, tile)
+    whole = files.path(window).read_bytes()
+    refused = 0
+    for place in range(len(whole)):
+        files.path(window).write_bytes(whole[:place] + bytes([whole[place] ^ 0x11]) + whole[place + 1 :])
+        read = files.read(window)
+        refused += read is None
+        if read is not None:
+            np.testing.assert_array_equal(read.z, tile.z)
+            np.testing.assert_array_equal(read.pairs, tile.pairs)
+            assert (read.factor, read.shared_cells) == (1.5, 2.5)
+    assert refused > 0.5 * len(whole)
 
 
 def test_a_place_has_one_row_in_both_epipolar_images(hill):

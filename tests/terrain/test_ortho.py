@@ -26,6 +26,8 @@ from aerotri.terrain.ortho._sight_kernels import centres_for, is_hidden, look, p
 from aerotri.terrain.ortho.ground import ground_surface, tile_ground
 from aerotri.terrain.ortho.make import make_orthophoto
 from aerotri.terrain.ortho.settings import OrthoSettings
+from aerotri.terrain.ortho.tile_files import OrthoTiles
+from aerotri.terrain.ortho.tiles import Tile
 from small_blocks import small_spec, with_adjustment
 
 HOUSES = ((-30.0, -20.0, 24.0, 28.0, 25.0), (40.0, 15.0, 30.0, 20.0, 40.0))
@@ -269,6 +271,29 @@ def test_bridges_are_the_same_in_every_window():
     assert np.isnan(whole[30:50, 40:60]).all()
     assert np.isnan(whole[:, :3]).all()
     assert np.nanmin(z) <= whole[made].min() < whole[made].max() <= np.nanmax(z)
+
+
+@pytest.mark.parametrize("bridged", [None, np.eye(3, 4, dtype=bool)])
+def test_no_damage_of_a_kept_tile_outlives_the_next_run(tmp_path, bridged):
+    """Whatever byte is wrong, the tile counts as not there, or is what it was; one with nothing in it, too."""
+    rng, files = np.random.default_rng(2), OrthoTiles(tmp_path)
+    tile = Tile(0, 4, rng.integers(0, 255, (2, 3, 4)).astype(np.uint8), np.eye(3, 4, dtype=np.int32), 7, 1, bridged)
+    files.write(0, 4, tile)
+    files.write(3, 4, None)
+    for row, wanted in ((0, tile), (3, None)):
+        whole = files.path(row, 4).read_bytes()
+        refused = 0
+        for place in range(len(whole)):
+            files.path(row, 4).write_bytes(whole[:place] + bytes([whole[place] ^ 0x11]) + whole[place + 1 :])
+            there, read = files.read(row, 4, (3, 4))
+            refused += not there
+            assert not there or (read is None) == (wanted is None)
+            if read is not None:
+                np.testing.assert_array_equal(read.colours, tile.colours)
+                np.testing.assert_array_equal(read.number, tile.number)
+                np.testing.assert_array_equal(read.bridged, bridged)
+                assert (read.heights, read.hidden) == (7, 1)
+        assert refused > 0.5 * len(whole)
 
 
 def test_seams_have_nearly_the_smallest_energy():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
@@ -47,6 +49,20 @@ def test_features_are_spread():
     assert len(np.unique(found.xy, axis=0)) == 500
     inside = np.histogram2d(*found.xy.T, bins=(8, 6), range=((0, 400), (0, 300)))[0]
     assert inside.min() >= 4
+
+
+def test_features_of_another_photograph_of_the_same_name_size_and_time_are_not_taken(tmp_path):
+    image, _ = blobs(3.0)
+    path, found = tmp_path / "a.tif", []
+    for grey in (image, image[::-1].copy()):
+        with create_image(path, 500, 400, 1, "uint8") as writer:
+            writer.write(0, grey[None])
+        # padded to one size
+        path.write_bytes(path.read_bytes().ljust(1 << 18, b"\0"))
+        os.utime(path, (1e9, 1e9))
+        found.append(features_of(path, FeatureOptions(), tmp_path / "cache"))
+    assert found[0].key != found[1].key
+    np.testing.assert_array_equal(found[1].xy, find_features(grey_8bit(path), FeatureOptions()).xy)
 
 
 def test_sixteen_bits_are_stretched_and_kept_on_disk(tmp_path):

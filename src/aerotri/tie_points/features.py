@@ -17,6 +17,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.files.atomic import atomic_file
+from aerotri.formats.files.ownership import told_by
 from aerotri.tie_points.detection import EDGE_THRESHOLD, LAYERS, SIGMA, keypoints_of, scale_space, with_directions
 from aerotri.tie_points.settings import DEFAULTS
 
@@ -204,9 +205,8 @@ def _stretched(grey: np.ndarray, path: Path) -> np.ndarray:
 def _key(path: Path, options: FeatureOptions) -> str:
     import cv2
 
-    state = path.stat()
     sought = (options, CONTRAST_THRESHOLD, ENOUGH, CELLS, STRETCH, cv2.__version__)
-    told = (path.name, state.st_size, state.st_mtime_ns, *sought)
+    told = (*told_by(path), *sought)
     return hashlib.sha256(repr(told).encode()).hexdigest()
 
 

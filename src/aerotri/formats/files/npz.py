@@ -8,10 +8,7 @@ file that unpacks to gigabytes gets any further.
 from __future__ import annotations
 
 import io
-import struct
-import tokenize
 import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.kept_arrays import WHAT_DAMAGE_RAISES
 
 MAGIC = b"\x93NUMPY"
 LARGEST_HEADER = 10_000
@@ -26,11 +24,6 @@ LARGEST_HEADER = 10_000
 LARGEST_BYTES = 1 << 33
 """Of one array, where nothing else bounds it."""
 REMEDY = "adjust the block again"
-WHAT_DAMAGE_RAISES = (
-    OSError, ValueError, KeyError, TypeError, EOFError, NotImplementedError, OverflowError, RecursionError, SyntaxError,
-    MemoryError, RuntimeError, struct.error, zlib.error, tokenize.TokenError, zipfile.BadZipFile,
-)  # fmt: skip
-"""zipfile, zlib and numpy.lib.format, from the directory to the last byte of an array."""
 
 Shape = tuple[int | None, ...]
 

@@ -12,22 +12,41 @@ import os
 import shutil
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
+from typing import Any
+
+from aerotri.conventions import InputError
 
 LEDGER, LEFT_OVER = ".aerotri-files", ".aerotri.tmp"
 WHOLE_BYTES = 64 << 20
 """Larger files are told by their size, their first and their last such part: nobody edits them by hand."""
+ENDS_BYTES = 64 << 10
+"""Of a photograph or raster, both ends: its header, and rows of pixels; chosen [C]: no time is lost on them."""
 
 
-def fingerprint(path: Path) -> str:
-    """Size and BLAKE2 of the content."""
+def fingerprint(path: Path, part_bytes: int = WHOLE_BYTES) -> str:
+    """Size and BLAKE2 of the content, of its first and last part where it is larger than two of them."""
     size = path.stat().st_size
     digest = hashlib.blake2b(digest_size=16)
     with path.open("rb") as file:
-        digest.update(file.read(WHOLE_BYTES))
-        if size > 2 * WHOLE_BYTES:
-            file.seek(-WHOLE_BYTES, os.SEEK_END)
-        digest.update(file.read(WHOLE_BYTES))
+        digest.update(file.read(part_bytes))
+        if size > 2 * part_bytes:
+            file.seek(-part_bytes, os.SEEK_END)
+        digest.update(file.read(part_bytes))
     return f"{size}:{digest.hexdigest()}"
+
+
+def told_by(path: Path) -> list[Any]:
+    """What tells a file that is read from others: name, time, size, and its first and last `ENDS_BYTES`.
+
+    Raises
+    ------
+    InputError
+        When it is not there, or cannot be read.
+    """
+    try:
+        return [path.name, path.stat().st_mtime_ns, fingerprint(path, ENDS_BYTES)]
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", "give the path of a file that exists", path) from error
 
 
 def record_files(folder: Path) -> None:

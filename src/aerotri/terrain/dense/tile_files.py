@@ -7,10 +7,10 @@ import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
+from aerotri.kept_arrays import kept_arrays
 from aerotri.rasters.grids import Grid
 from aerotri.terrain.dense.tile import TileSurface
 
@@ -64,13 +64,8 @@ class TileFiles:
 
     def read(self, window: TileWindow) -> TileSurface | None:
         """A tile that is there and whole; None otherwise."""
-        path = self.path(window)
-        try:
-            with np.load(path, allow_pickle=False) as held:
-                parts = {name: held[name] for name in FIELDS}
-        except (OSError, ValueError, KeyError, BadZipFile, EOFError):
-            return None
-        if parts["z"].shape != (window.rows, window.columns):
+        parts = kept_arrays(self.path(window))
+        if parts is None or parts.keys() != set(FIELDS) or parts["z"].shape != (window.rows, window.columns):
             return None
         return TileSurface(
             parts["z"], parts["sigma"], parts["count"], parts["shown_by"], float(parts["factor"]), parts["pairs"],

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
+from aerotri.kept_arrays import kept_arrays
 from aerotri.terrain.ortho.tiles import Tile
+
+FIELDS = ("colours", "number", "counts", "bridged")
 
 
 @dataclass(frozen=True)
@@ -44,13 +46,12 @@ class OrthoTiles:
         ----------
         shape : rows and columns that it must have.
         """
-        try:
-            with np.load(self.path(row, column), allow_pickle=False) as held:
-                if not held["colours"].size:
-                    return True, None
-                colours, number, counts, bridged = (held[name] for name in ("colours", "number", "counts", "bridged"))
-        except (OSError, ValueError, KeyError, BadZipFile, EOFError):
+        held = kept_arrays(self.path(row, column))
+        if held is not None and held.keys() == {"colours"} and not held["colours"].size:
+            return True, None
+        if held is None or held.keys() != set(FIELDS):
             return False, None
+        colours, number, counts, bridged = (held[name] for name in FIELDS)
         if colours.shape[1:] != shape or number.shape != shape or counts.shape != (2,):
             return False, None
         kept = bridged if bridged.size else None
