@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.execution.choice import THREADS, chosen
+from aerotri.formats.files.work_place import held
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.tile_folder import remove_tiles, tiles_beside
@@ -31,10 +32,12 @@ def run_dsm(
     target = out or Path(f"{source.resolve().name.removesuffix('_result')}_dsm")
     refuse_foreign_folder(target, RECORD)
     tiles = tiles_beside(target)
-    found = measure_dense(Adjustment(reopened(source, console)), photographs, settings, tiles, console.stage, executor)
-    console.progress("writing")
-    found.save(target, plots)
-    remove_tiles(tiles)
+    with held(target):
+        result = Adjustment(reopened(source, console))
+        found = measure_dense(result, photographs, settings, tiles, console.stage, executor)
+        console.progress("writing")
+        found.save(target, plots)
+        remove_tiles(tiles)
     if as_json:
         print(json_text(found.summary))
     else:

@@ -9,6 +9,7 @@ from aerotri.commands.console import Console
 from aerotri.commands.results import reopened
 from aerotri.conventions import InputError
 from aerotri.execution.choice import THREADS, chosen
+from aerotri.formats.files.work_place import held
 from aerotri.formats.results.json_text import json_text
 from aerotri.terrain.ortho.settings import OrthoSettings
 from aerotri.volume.settings import LAYERS
@@ -35,11 +36,12 @@ def run_ortho(
     refuse_foreign_folder(target, RECORD)
     if layer not in LAYERS:
         raise InputError(f"there is no layer '{layer}'", f"choose one of {', '.join(LAYERS)}")
-    ground = as_surface(surface, layer)
-    result = Adjustment(reopened(source, console))
     tiles = tiles_beside(target)
-    found = make_ortho(result, photographs, ground, target, settings, plots, tiles, console.stage, executor)
-    remove_tiles(tiles)
+    with held(target):
+        ground = as_surface(surface, layer)
+        result = Adjustment(reopened(source, console))
+        found = make_ortho(result, photographs, ground, target, settings, plots, tiles, console.stage, executor)
+        remove_tiles(tiles)
     if as_json:
         print(json_text(found.summary))
     else:

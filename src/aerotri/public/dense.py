@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from html import escape
@@ -20,7 +19,7 @@ from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
 from aerotri.public.surfaces import Surface
 from aerotri.public.terrain import rows_and_files
-from aerotri.public.tile_folder import TileFolder, fingerprints, open_tiles
+from aerotri.public.tile_folder import fingerprints, open_tiles
 from aerotri.public.used_arguments import used_settings
 from aerotri.results.head import Head
 from aerotri.terrain.settings import DENSE_DEFAULTS, DenseSettings
@@ -86,7 +85,7 @@ class DenseSurface:
     record : the numbers, in tiles. block : name of the block. crs : its coordinate system.
     adjustment : key of the adjustment it was measured with.
     ground : the ground without objects, None where it was not asked for.
-    keeper : what removes the tiles when nobody uses them any more; where they stay, what keeps other runs out of them.
+    keeper : what removes the tiles when nobody uses them any more; None where they stay.
     head : of files. settings : every argument that was used, as dsm.json has them.
     """
 
@@ -95,7 +94,7 @@ class DenseSurface:
     crs: str
     adjustment: str
     ground: BareGround | None = None
-    keeper: Spool | TileFolder | None = None
+    keeper: Spool | None = None
     head: Head = field(default_factory=Head)
     settings: list[dict[str, Any]] = field(default_factory=list)
 
@@ -266,18 +265,18 @@ def measure_dense(
     record = (result if isinstance(result, Adjustment) else open_result(result)).record
     rows, paths = rows_and_files(record, photographs, chosen_rows(record, "all"))
     key = adjustment_key(record)
+    keeper = None
     if tiles is None:
-        kept = nullcontext(Spool())
+        keeper = Spool()
+        tiles = keeper.folder
     else:
         of_tiles = {name: value for name, value in asdict(settings).items() if name not in ("ground", "widest_object")}
-        kept = open_tiles(tiles, {"settings": of_tiles, "adjustment": key, "photographs": fingerprints(paths)})
+        open_tiles(tiles, {"settings": of_tiles, "adjustment": key, "photographs": fingerprints(paths)})
     area = None if settings.area is None else Area(np.array(settings.area[:2]), np.array(settings.area[2:]))
-    s = settings
-    with kept as keeper:
-        plan = DensePlan(rows, paths, keeper.folder, s.resolution, area, s.most_pairs, s.edge, s.ideal)
-        with stage_report(progress) as report, opened(executor, report.said) as workers:
-            outcome = measure_surface(record, plan, report.stage, workers)
-        ground = bare_ground(outcome, s.widest_object) if s.ground else None
+    plan = DensePlan(rows, paths, tiles, settings.resolution, area, settings.most_pairs, settings.edge, settings.ideal)
+    with stage_report(progress) as report, opened(executor, report.said) as workers:
+        outcome = measure_surface(record, plan, report.stage, workers)
+    ground = bare_ground(outcome, settings.widest_object) if settings.ground else None
     block = record.result.block
     used = used_settings(dense_surface, settings, {"resolution": "m", "area": "m", "widest_object": "m"})
     return DenseSurface(outcome, str(block.name), block.crs, key, ground, keeper, Head(block.project, block.crs), used)

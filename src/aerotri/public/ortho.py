@@ -212,9 +212,9 @@ def make_ortho(
     record = (result if isinstance(result, Adjustment) else open_result(result)).record
     taken = _photographs(record, photographs)
     ground = as_surface(surface, LAYER)
+    if tiles is not None:
+        open_tiles(tiles, _stated(record, taken[1], ground, settings))
     with ExitStack() as stack, stage_report(progress) as report:
-        if tiles is not None:
-            stack.enter_context(open_tiles(tiles, _stated(record, taken[1], ground, settings)))
         heights, sigma, notes = _opened(ground, horizontal_crs(record.result.block.crs), stack)
         folder = stack.enter_context(atomic_folder(out, own=OWN_NAMES))
         workers = None if in_threads else stack.enter_context(opened(executor, report.said))

@@ -397,6 +397,7 @@ class _Chain:
         return found
 
     def _dense(self, folder: Path) -> DenseSurface:
+        from aerotri.formats.files.work_place import held
         from aerotri.public.dense import RECORD as DENSE_RECORD
         from aerotri.public.dense import dense_surface
         from aerotri.public.folders import refuse_foreign_folder
@@ -406,22 +407,25 @@ class _Chain:
         refuse_foreign_folder(folder, DENSE_RECORD)
         tiles = tiles_beside(folder)
         result = self._project.folder / RESULT
-        found = dense_surface(result, self._project.source, tiles=tiles, progress=self._progress, **settings)
-        found.save(folder, plots)
-        remove_tiles(tiles)
+        with held(folder):
+            found = dense_surface(result, self._project.source, tiles=tiles, progress=self._progress, **settings)
+            found.save(folder, plots)
+            remove_tiles(tiles)
         self._project.dense = found
         return found
 
     def _orthophoto(self, folder: Path) -> Orthophoto:
+        from aerotri.formats.files.work_place import held
         from aerotri.public.ortho import orthophoto
         from aerotri.public.tile_folder import remove_tiles, tiles_beside
 
         (settings, plots), place = self._given("orthophoto"), self._project.folder
-        found = orthophoto(
-            place / RESULT, self._project.source, place / DSM, folder, plots=plots, tiles=tiles_beside(folder),
-            progress=self._progress, **settings,
-        )  # fmt: skip
-        remove_tiles(tiles_beside(folder))
+        with held(folder):
+            found = orthophoto(
+                place / RESULT, self._project.source, place / DSM, folder, plots=plots, tiles=tiles_beside(folder),
+                progress=self._progress, **settings,
+            )  # fmt: skip
+            remove_tiles(tiles_beside(folder))
         self._project.orthophoto = found
         return found
 
