@@ -1,0 +1,51 @@
+"""Outputs that are closed or cannot say every letter, and signals beside a library with handlers of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+RUN = "import sys; {}; sys.argv = ['aerotri', *sys.argv[1:]]; from aerotri.cli import main; main()"
+IN_A_THREAD = """
+import signal, threading
+signal.signal(signal.SIGTERM, lambda *_: print("ours", flush=True))
+def imported():
+    from aerotri.colmap_library import pycolmap
+thread = threading.Thread(target=imported)
+thread.start()
+thread.join()
+signal.raise_signal(signal.SIGTERM)
+print("goes on")
+"""
+
+
+def ended(*arguments: str, before: str = "pass", **variables: str) -> subprocess.CompletedProcess[str]:
+    """The program, run anew."""
+    return subprocess.run(
+        [sys.executable, "-c", RUN.format(before), *arguments], env={**os.environ, **variables}, capture_output=True,
+        encoding="utf-8", errors="replace", timeout=120, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
+def test_help_can_be_written_in_any_encoding(encoding):
+    done = ended("adjust", "--help", PYTHONIOENCODING=encoding)
+    assert done.returncode == 0, done.stderr
+    assert "--robust" in done.stdout
+
+
+@pytest.mark.parametrize("closed", ["stdout", "stderr"])
+@pytest.mark.parametrize(("argument", "code"), [("--version", 0), ("no-such-command", 2)])
+def test_a_closed_output_changes_no_exit_code(closed, argument, code):
+    """Python makes None of a stream that was closed when the program began."""
+    done = ended(argument, before=f"sys.{closed} = None")
+    assert done.returncode == code
+    assert "Traceback" not in done.stderr
+
+
+def test_a_signal_stays_ours_beside_pycolmap():
+    done = subprocess.run([sys.executable, "-c", IN_A_THREAD], capture_output=True, text=True, timeout=120, check=False)
+    assert done.stdout.split("\n") == ["ours", "goes on", ""], done.stderr
