@@ -167,7 +167,7 @@ def test_an_index_that_cannot_be_read_or_replaced_stops_nobody(environment, tmp_
     said, warned = process.communicate(timeout=120)
     assert said.split() == ["begins", "8.0", "1"]
     # it cannot be replaced either
-    assert "cannot be kept" in warned
+    assert "cannot be stored" in warned
 
 
 def test_the_digest_reads_every_module_that_kernels_import():

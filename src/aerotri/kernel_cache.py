@@ -126,8 +126,9 @@ class SharedCache(FunctionCache):
         """Once, not for every kernel."""
         if not SharedCache._told:
             SharedCache._told = True
-            text = f"kernels are compiled in every run: they cannot be kept in {self._cache_path} ({why})"
-            warnings.warn(f"{text}; the variable NUMBA_CACHE_DIR names another place", stacklevel=2)
+            text = f"compiled code cannot be stored in {self._cache_path} ({why}), so every run starts more slowly"
+            remedy = "free some space, or set the variable NUMBA_CACHE_DIR to a folder that may be written"
+            warnings.warn(f"{text} — {remedy}", stacklevel=2)
 
     def _lock_path(self) -> Path:
         return Path(self._cache_path) / f"{self._impl.filename_base}.lock"

@@ -24,7 +24,7 @@ def test_all_parts_are_found_in_order(in_parts):
 
 def test_a_missing_part_is_named(in_parts):
     (in_parts / "parts" / "0001").rename(in_parts / "elsewhere")
-    with pytest.raises(InputError, match="part 0001 not there, of 3 parts"):
+    with pytest.raises(InputError, match="1 of 3 parts missing: 0001 — put it back"):
         part_folders(in_parts)
 
 
@@ -38,7 +38,7 @@ def test_a_part_of_another_block_is_named(in_parts):
     (in_parts / "parts" / "0000").rename(in_parts / "parts" / "0007")
     (in_parts / "parts" / "0000").mkdir()
     (in_parts / "parts" / "0000" / "block.toml").touch()
-    with pytest.raises(InputError, match=r"part 0007 not named in parts\.json"):
+    with pytest.raises(InputError, match=r"parts that parts\.json does not list: 0007"):
         part_folders(in_parts)
 
 

@@ -37,25 +37,37 @@ adjusted_positions.MOST_ROUNDS, adjusted_positions.STANDING = 20, 1e-10
 adjusted_positions.MOST_STEPS, adjusted_positions.SETTLED = 30, 1e-12
 """
 """Goes before a program, and is run in its processes too: ends where only rounding is left."""
-ONE = """
-import sys, json, resource, time, aerotri
+OWN_MEMORY = """
+def own_memory_mb():
+    with open("/proc/self/status") as file:
+        return next(int(line.split()[1]) / 1024 for line in file if line.startswith("VmHWM"))
+"""
+"""Peak of a program. What getrusage says of it begins with the memory of the script that started it."""
+ONE = (
+    OWN_MEMORY
+    + """
+import sys, json, time, aerotri
 begun = time.perf_counter()
 block = aerotri.read_block(sys.argv[1])
 start = time.perf_counter()
 found = aerotri.adjust(block, model_part="off", explain=False)
 seconds = time.perf_counter() - start
 found.save(sys.argv[2], plots=False)
-print(json.dumps([seconds, time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
+print(json.dumps([seconds, time.perf_counter() - begun, own_memory_mb()]))
 """
-PARTS = """
+)
+PARTS = (
+    OWN_MEMORY
+    + """
 import sys, json, resource, time, aerotri
 if __name__ == "__main__":
     start = time.perf_counter()
     found = aerotri.adjust_parts(sys.argv[1], sys.argv[2], plots=False, executor=sys.argv[3])
     seconds = time.perf_counter() - start
-    of = [resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    print(json.dumps([seconds, *of]))
+    of_children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    print(json.dumps([seconds, own_memory_mb(), of_children]))
 """
+)
 """Programs that print their time in s and their memory in MB."""
 
 

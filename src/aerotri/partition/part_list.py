@@ -11,8 +11,9 @@ from aerotri.formats.files.atomic import atomic_file
 from aerotri.partition.whole import PARTS
 
 LIST = "parts.json"
-AGAIN = "divide the block again, or put the part back"
+AGAIN = "put it back, or make the parts again (divide, convert --parts or simulate --parts)"
 MOST_NAMED = 5
+"""Of parts, in a message."""
 
 
 def write_part_list(folder: Path) -> None:
@@ -37,11 +38,16 @@ def part_folders(folder: Path) -> list[Path]:
     found = sorted(path for path in there.iterdir() if path.is_dir() and not path.name.startswith("."))
     for part in found:
         if not (part / "block.toml").is_file():
-            raise InputError(f"part {part.name} has no block.toml", AGAIN, folder)
+            remedy = "put the file back, or remove the folder if it is no part"
+            raise InputError(f"part {part.name} has no block.toml", remedy, folder)
     names, listed = {part.name for part in found}, _listed(folder / LIST)
     if listed is not None:
-        _refuse(sorted(set(listed) - names), f"not there, of {len(listed)} parts", folder)
-        _refuse(sorted(names - set(listed)), f"not named in {LIST}", folder)
+        missing, more = sorted(set(listed) - names), sorted(names - set(listed))
+        if missing:
+            raise InputError(f"{len(missing)} of {len(listed)} parts missing: {_named(missing)}", AGAIN, folder)
+        if more:
+            remedy = f"remove them, or {LIST} if you made the parts yourself"
+            raise InputError(f"parts that {LIST} does not list: {_named(more)}", remedy, folder)
     return found
 
 
@@ -52,13 +58,12 @@ def _listed(path: Path) -> Sequence[str] | None:
     try:
         names = json.loads(path.read_text(encoding="utf-8"))["parts"]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError("cannot be read as a list of parts", "divide the block again", path) from error
+        raise InputError("cannot be read as a list of parts", "make the parts again", path) from error
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise InputError("cannot be read as a list of parts", "divide the block again", path)
+        raise InputError("cannot be read as a list of parts", "make the parts again", path)
     return names
 
 
-def _refuse(names: Sequence[str], what: str, folder: Path) -> None:
-    if names:
-        parts = "parts" if len(names) > 1 else "part"
-        raise InputError(f"{parts} {', '.join(names[:MOST_NAMED])} {what}", AGAIN, folder)
+def _named(names: Sequence[str]) -> str:
+    others = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + others
