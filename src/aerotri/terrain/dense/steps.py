@@ -1,0 +1,184 @@
+"""σ of cells beside steps: they may have the height of the other side, and windows of the matching blur low steps.
+
+Neither shows in the images that were matched: what they leave is small on the wrong side too. It shows in the heights
+themselves: in steps, in how straight they are, in what stands out from its surroundings, and in pairs that contradict.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from aerotri.terrain.dense.cell_scale import CellScale, middle_height, square, sum_about
+
+STEP_SHARE, STRAIGHT_SHARE = 0.5, 0.25
+"""Of a step that is σ of the cells beside it, where steps about them run in all directions, as crowns of trees have
+them, and where they run straight, as at houses and walls; chosen [C] with the rest of this module on rendered houses,
+walls, trees and few photographs (tools/prove/dense_surface.py)."""
+CROOKED, STRAIGHT = 0.4, 0.8
+"""Straightness up to which a step counts whole, and from which on as a straight one."""
+STEEPEST_PX = 2.0
+"""Of parallax from cell to cell; a higher step tells its direction no better."""
+LEAST_STEP_PX, LEAST_HIDDEN_PX = 0.9, 0.5
+"""Of parallax, from which on heights differ by a step, and where a hole may hide the rest of it; chosen [C]."""
+LARGEST_STEP_PX = (np.inf, 6.0, 1.1)
+"""Of parallax, that count where one pair, two, three or more agree on a height; chosen [C]: what several pairs see
+alike is seldom the height of the other side, but a window across a step blurs it for all of them."""
+SPIKE_PX, SPIKE_SIGMAS = 1.0, 4.0
+"""Of parallax, and σ of its noise, by which a cell that one pair alone saw stands out when it is a spike; chosen [C]: a
+third to two thirds of those of rendered houses, walls and trees, and five of six with few photographs, are wrong by
+most of it."""
+STEP_SIGMAS = 6.0
+"""σ of the noise that a step is larger than: the range of some twenty cells reaches five."""
+CONTRADICTED_SIGMAS = 4.0
+"""σ of a pair from which on its height contradicts the surface."""
+UNKNOWN = np.float32(1e9)
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What pairs saw in the cells, (rows, columns).
+
+    Parameters
+    ----------
+    highest, lowest : m, of the height of a cell and those of pairs that contradict it or stand alone; −`UNKNOWN` and
+        `UNKNOWN` where there is none.
+    agreeing : pairs that agree on the height.
+    """
+
+    highest: np.ndarray
+    lowest: np.ndarray
+    agreeing: np.ndarray
+
+
+def others_seen(z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: CellScale) -> Seen:
+    """What pairs saw besides the heights that count."""
+    known = np.isfinite(z)
+    highest, lowest = np.where(known, z, -UNKNOWN), np.where(known, z, UNKNOWN)
+    agreeing = np.zeros(z.shape, np.uint8)
+    for height, sigma in zip(heights, sigmas, strict=True):
+        agrees = np.abs(height - z) <= scale.pixel + CONTRADICTED_SIGMAS * sigma
+        other = np.isfinite(height) & ~agrees
+        np.maximum(highest, height, out=highest, where=other)
+        np.minimum(lowest, height, out=lowest, where=other)
+        agreeing += agrees
+    return Seen(highest, lowest, agreeing)
+
+
+def step_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
+    """(rows, columns) m, σ of a cell by the step that it lies beside; 0 where there is none.
+
+    A share of the step, half of it where the step runs straight and more than one pair saw the cell.
+    """
+    known = np.isfinite(z)
+    if not known.any():
+        return np.zeros(z.shape)
+    above = np.where(known, z - middle_height(z), 0.0).astype(np.float32)
+    hidden = cv2.erode(known.view(np.uint8), square(scale.window)) == 0
+    step = _step(z, above, noise, seen, scale, hidden)
+    most = scale.pixel * np.array(LARGEST_STEP_PX)[np.clip(seen.agreeing, 1, len(LARGEST_STEP_PX)) - 1]
+    straight = np.clip((straightness(above, known, scale) - CROOKED) / (STRAIGHT - CROOKED), 0.0, 1.0)
+    share = np.where(seen.agreeing < 2, STEP_SHARE, STEP_SHARE + (STRAIGHT_SHARE - STEP_SHARE) * straight)
+    return np.where(known, share * np.minimum(step, most), 0.0)
+
+
+def spikes(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
+    """(rows, columns) which cells one pair alone saw, and stand out from all that is as wide as a window."""
+    least = np.maximum(SPIKE_PX * scale.pixel, SPIKE_SIGMAS * noise)
+    return (seen.agreeing < 2) & (standing_out(z, scale.window) >= least)
+
+
+def standing_out(z: np.ndarray, side: int) -> np.ndarray:
+    """(rows, columns) m, by which a cell is above, or below, every square of `side` cells that it lies in.
+
+    It is the height less that of the morphological opening, or that of the closing less the height: 0 on a plane, at a
+    straight step between level grounds, and where there is no height.
+    """
+    found = np.zeros(z.shape, np.float32)
+    known = np.pad(np.isfinite(z), side)  # squares may reach beyond the edge
+    if not known.any():
+        return found
+    inside = (slice(side, -side),) * 2
+    for sign in (1.0, -1.0):
+        height = np.where(known, np.pad(sign * (z - middle_height(z)), side), UNKNOWN).astype(np.float32)
+        lowest = cv2.erode(height, square(side))
+        opened = cv2.dilate(np.where(lowest < UNKNOWN, lowest, -UNKNOWN), square(side))
+        np.maximum(found, (height - opened)[inside], out=found, where=known[inside])
+    return found
+
+
+def straightness(above: np.ndarray, known: np.ndarray, scale: CellScale) -> np.ndarray:
+    """(rows, columns) 0 where heights change in all directions alike, to 1 where they change in one.
+
+    The coherence of the structure tensor, over two windows of the matching, of the change of heights from cell to cell.
+
+    Parameters
+    ----------
+    above : (rows, columns) float32 m, heights; those not known do not count.
+    """
+    whole = cv2.erode(known.view(np.uint8), square(3)) > 0
+    x, y = (
+        cv2.Sobel(above, cv2.CV_32F, *order, ksize=3, scale=1.0 / (8.0 * scale.pixel)) for order in ((1, 0), (0, 1))
+    )
+    change = np.hypot(x, y)
+    weight = np.where(whole, np.minimum(change, STEEPEST_PX) / np.maximum(change, 1e-9), 0.0).astype(np.float32)
+    x, y = x * weight, y * weight
+    xx, xy, yy = (cv2.blur(product, (scale.around, scale.around)) for product in (x * x, x * y, y * y))
+    return np.hypot(xx - yy, 2.0 * xy) / np.maximum(xx + yy, 1e-9)
+
+
+def _step(
+    z: np.ndarray, above: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale, hidden: np.ndarray
+) -> np.ndarray:
+    """(rows, columns) m, the step that a cell lies beside; 0 where there is none.
+
+    A step is almost a pixel of parallax, from the lowest to the highest that any pair saw about a cell. The mean of the
+    cells around is taken off first, so that a slope is none. That mean holds a wall some cells away: no step is
+    therefore larger than the range of the heights themselves plus the slope over that distance. Beside a hole, which
+    may hide the step, half a pixel counts, over twice the distance and without that limit; where, besides, one pair
+    alone saw the cell, the whole range of heights there counts.
+
+    Parameters
+    ----------
+    above : (rows, columns) float32 m, heights over their middle, 0 where not known. hidden : whether a hole is near.
+    """
+    known, middle = np.isfinite(z), middle_height(z)
+    mean = sum_about(above, scale.around)
+    mean = mean / np.maximum(sum_about(known.astype(np.float32), scale.around), 1.0) + middle
+    left, whole = ((_less(seen.highest, level), _less(seen.lowest, level)) for level in (mean, middle))
+    side = 2 * ((scale.lag + 1) // 2) + 1
+    near = np.minimum(_range(*left, side), _range(*whole, side) + (side - 1) * _slope(above, known))
+    far = _range(*left, scale.window)
+    np.maximum(far, _range(*whole, scale.window), out=far, where=hidden & (seen.agreeing < 2))
+    least = STEP_SIGMAS * noise
+    next_to = (near > LEAST_STEP_PX * scale.pixel) & (near > least)
+    behind = hidden & (far > LEAST_HIDDEN_PX * scale.pixel) & (far > least)
+    return np.maximum(np.where(next_to, near, 0.0), np.where(behind, far, 0.0))
+
+
+def _slope(z: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """(rows, columns) float32 m, change of height from cell to cell, along rows and columns together.
+
+    The median of a square of 5 × 5 cells, which a wall does not change.
+    """
+    total = np.zeros(z.shape, np.float32)
+    for axis in (0, 1):
+        if z.shape[axis] < 2:
+            continue
+        ahead, behind = (known[1:], known[:-1]) if axis == 0 else (known[:, 1:], known[:, :-1])
+        change = np.abs(np.diff(z, axis=axis)) * (ahead & behind)
+        change = np.concatenate([change, np.take(change, [-1], axis)], axis)
+        total += cv2.medianBlur(np.ascontiguousarray(change), 5)
+    return total
+
+
+def _less(values: np.ndarray, level: np.ndarray | float) -> np.ndarray:
+    """(rows, columns) float32 m above a level; what is not known stays far beyond all heights."""
+    return np.where(np.abs(values) < UNKNOWN, values - level, values).astype(np.float32)
+
+
+def _range(high: np.ndarray, low: np.ndarray, side: int) -> np.ndarray:
+    """(rows, columns) from the lowest to the highest of a square."""
+    return cv2.dilate(high, square(side)) - cv2.erode(low, square(side))
