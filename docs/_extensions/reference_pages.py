@@ -269,8 +269,9 @@ def commands_page(commands: Sequence[CommandLine]) -> str:
     panels = [panel for panel in COMMAND_PANELS if any(one.panel == panel for one in commands)]
     lines = [
         "# Commands", "",
-        "`aerotri COMMAND --help` prints what stands here. Every command takes `--json`, which prints its outcome for "
-        "other programs. Exit codes: 0 success; 1 the adjustment failed or is rejected; 2 the input cannot be used; 3 "
+        "`aerotri COMMAND --help` prints what stands here. `python -m aerotri COMMAND` is the same, where `aerotri` is "
+        "not on the path. Every command takes `--json`, which prints its outcome for other programs. "
+        "Exit codes: 0 success; 1 the adjustment failed or is rejected; 2 the input cannot be used; 3 "
         "an error of the program, to be reported. Results appear whole or not at all. The environment variable "
         "`AEROTRI_THREADS` limits the number of threads.", "",
     ]  # fmt: skip

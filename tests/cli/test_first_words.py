@@ -4,6 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib.util import find_spec
+
+import pytest
+
+import aerotri
+from aerotri.cli import interruption
 
 HEAVY = ("numpy", "scipy", "numba", "pyarrow", "matplotlib", "pydantic", "cv2", "rasterio")
 
@@ -16,3 +22,16 @@ def test_the_help_imports_nothing_heavy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("module", ["aerotri", "aerotri.cli"])
+def test_the_package_runs_as_a_module(module, monkeypatch):
+    done = subprocess.run([sys.executable, "-m", module, "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == aerotri.__version__
+    # what Python calls the program then, whose signals are taken from the first import on
+    spec = find_spec(f"{module}.__main__")
+    assert spec is not None
+    monkeypatch.setattr(sys, "argv", [spec.origin])
+    assert interruption.is_program()
+    monkeypatch.setattr(sys, "argv", ["/elsewhere/__main__.py"])
+    assert not interruption.is_program()

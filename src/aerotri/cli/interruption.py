@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM") if hasattr(signal, name))
+MAIN_MODULES = tuple(folder / "__main__.py" for folder in Path(__file__).parents[:2])
+"""Of `python -m aerotri.cli` and `python -m aerotri`."""
 _state = {"signal": 0, "unwinding": False}
 
 
@@ -20,8 +23,10 @@ def is_program() -> bool:
     """Whether this process is the command line program, and not one that imports it."""
     if "--multiprocessing-fork" in sys.orig_argv:
         return False  # a process that the program started
-    name = os.path.basename(sys.argv[0]) if sys.argv else ""
-    return name == "-m" or name.removesuffix(".exe") == "aerotri" or name.endswith("aerotri/cli/__main__.py")
+    if not sys.argv:
+        return False
+    name = os.path.basename(sys.argv[0])
+    return name == "-m" or name.removesuffix(".exe") == "aerotri" or Path(sys.argv[0]) in MAIN_MODULES
 
 
 def while_importing() -> None:

@@ -1,0 +1,5 @@
+"""python -m aerotri"""
+
+from aerotri.cli import main
+
+main()
