@@ -247,6 +247,20 @@ def test_what_parts_cannot_is_refused_by_name(changes, said, tmp_path):
         aerotri.divide(flown("none", **changes), tmp_path / "parts", parts=2)
 
 
+def test_too_many_parts_are_told_with_what_is_possible(tmp_path, capsys):
+    from aerotri.cli.app import invoke
+
+    short, _ = small_block(flight={**LONG_FLIGHT, "strips": 2, "images_per_strip": 6, "end_lap": 0.75})
+    short = with_adjustment(short, model_part="off")
+    with pytest.raises(aerotri.InputError, match="12 photographs cannot be divided into 50 parts") as caught:
+        aerotri.divide(short, tmp_path / "parts", parts=50)
+    assert "only one part is possible — adjust it in one piece" in str(caught.value)
+    write_block(flown("none"), tmp_path / "block")
+    assert invoke(["divide", str(tmp_path / "block"), "--out", str(tmp_path / "parts"), "--parts", "50"]) == 0
+    count = len(list((tmp_path / "parts" / "parts").iterdir()))
+    assert f"(50 were asked for; the block can be cut into {count} at most)" in capsys.readouterr().out
+
+
 def test_photographs_without_orientation_are_named(tmp_path):
     block = flown("none")
     angles = block.images.angles.copy()

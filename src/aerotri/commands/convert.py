@@ -113,6 +113,7 @@ def run_convert_parts(request: Request, target: Path, to: str, parts: int, as_js
     ------
     InputError
     """
+    from aerotri.commands.divide import parts_in_words
     from aerotri.formats.block.folder import read_photographs
     from aerotri.partition.part_list import part_folders
     from aerotri.public.parts import convert_request_parts
@@ -125,5 +126,4 @@ def run_convert_parts(request: Request, target: Path, to: str, parts: int, as_js
     if as_json:
         print(json_text({"target": str(target), "format": "block", "parts": counts, "messages": list(messages)}, None))
         return
-    said = f"{len(counts)} parts of {min(counts.values())} to {max(counts.values())} photographs"
-    print("\n".join([*messages, said, f"Written to {target}: aerotri adjust {target}"]))
+    print("\n".join([*messages, parts_in_words(counts, parts), f"Written to {target}: aerotri adjust {target}"]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from aerotri.commands.console import Console
@@ -31,8 +32,20 @@ def run_divide(path: Path, out: Path | None, parts: int | None, as_json: bool) -
         return
     console.lines(
         [
-            f"{len(counts)} parts of {min(counts.values())} to {max(counts.values())} photographs; "
-            f"{photographs} photographs stand in them {twice} times more than once",
+            f"{parts_in_words(counts, parts)}; {photographs} photographs stand in them {twice} times more than once",
             f"Written to {target}: aerotri adjust {target}",
         ]
     )
+
+
+def parts_in_words(photographs: Mapping[str, int], wanted: int | None) -> str:
+    """How many parts there are, and of how many photographs.
+
+    Parameters
+    ----------
+    photographs : of each part. wanted : parts that were asked for; None where nothing was said.
+    """
+    count = len(photographs)
+    fewer = wanted is not None and count < wanted
+    possible = f" ({wanted} were asked for; the block can be cut into {count} at most)" if fewer else ""
+    return f"{count} parts of {min(photographs.values())} to {max(photographs.values())} photographs{possible}"

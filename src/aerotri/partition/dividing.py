@@ -129,7 +129,11 @@ def cut_photographs(position: np.ndarray, edges: np.ndarray, parts: int) -> tupl
             whole += [cut[0], cut[1]]
     sets = [members for members, _ in whole] + done
     if len(sets) < 2:
-        raise InputError("the block cannot be cut into parts", "adjust it in one piece: aerotri adjust")
+        raise InputError(
+            f"{len(position)} photographs cannot be divided into {parts} parts: wherever the block is cut, too many of "
+            "them share points with the other side; only one part is possible",
+            "adjust it in one piece: aerotri adjust",
+        )
     of_image = np.full(len(position), SHARED)
     for number, members in enumerate(sorted(sets, key=lambda members: int(members.min()))):
         of_image[members] = number
