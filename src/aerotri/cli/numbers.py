@@ -1,8 +1,9 @@
-"""Numbers of the command line are finite and of a size that something measured can have."""
+"""Numbers of the command line are finite and of a size that something measured can have; --out can be written to."""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any, cast
 
 import typer
@@ -18,7 +19,7 @@ LARGEST_SEED = 2**63 - 1
 
 
 class CheckedCommand(TyperCommand):
-    """A command whose numbers are held against what can be, before anything is done; help stands last."""
+    """A command whose numbers and --out are held against what can be, before anything is done; help stands last."""
 
     def get_help_option(self, ctx: Any) -> Any:
         """--help in the panel of its own."""
@@ -32,6 +33,10 @@ class CheckedCommand(TyperCommand):
             reason = refusal(str(param.name), ctx.params.get(param.name))
             if reason:
                 raise typer.BadParameter(reason, ctx=ctx, param=cast(Any, param))
+        if isinstance(out := ctx.params.get("out"), Path):
+            from aerotri.formats.files.places import refuse_impossible_place
+
+            refuse_impossible_place(out)
         return super().invoke(ctx)
 
 

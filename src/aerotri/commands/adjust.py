@@ -33,6 +33,9 @@ def run_adjust(
 ) -> int:
     """Exit code of the command: 0 when converged and not rejected, 1 otherwise; arguments as on the command line."""
     console = Console(quiet=as_json)
+    target = out or Path(f"{folder_name(path)}_result")
+    refuse_foreign_folder(target, "adjustment.json")
+    refuse_missing_photographs(photographs)
     begun = time.perf_counter()
     from aerotri.execution.first_run import compile_ahead
 
@@ -49,10 +52,6 @@ def run_adjust(
     if check_free:
         refuse_free_datum(block)
     read_s = time.perf_counter() - begun
-    target = out or Path(f"{folder_name(path)}_result")
-    refuse_foreign_folder(target, "adjustment.json")
-    refuse_missing_photographs(photographs)
-
     from aerotri.compiled import compilation_notice
     from aerotri.public.progress import StageReport
     from aerotri.public.results import adjust

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
 from aerotri.formats.results.json_text import json_text
+from aerotri.public.folders import refuse_no_folder
 
 if TYPE_CHECKING:
     from aerotri.simulation.rendering import RenderOptions
@@ -36,6 +37,7 @@ def run_simulate(
     from aerotri.public.simulating import simulate
 
     console = Console(quiet=as_json)
+    refuse_no_folder(out)
     flight = simulate(spec, seed)
     wanted, counts = render is not None, flight.summary
     looks: dict[str, Any] = (

@@ -14,7 +14,7 @@ def refuse_foreign_entries(folder: Path, own: Collection[str], overwrite: bool =
 
     Parameters
     ----------
-    own : names in the folder that are going to be written.
+    folder : that can be written to. own : names in it that are going to be written.
 
     Raises
     ------
@@ -22,6 +22,7 @@ def refuse_foreign_entries(folder: Path, own: Collection[str], overwrite: bool =
     """
     from aerotri.formats.files.ownership import foreign_files
 
+    refuse_no_folder(folder)
     found = [] if overwrite or not folder.is_dir() else foreign_files(folder, own)
     if found:
         others = f" and {len(found) - 1} more" if len(found) > 1 else ""
@@ -38,6 +39,11 @@ def refuse_existing_file(file: Path, overwrite: bool = False) -> None:
     ------
     InputError
     """
+    from aerotri.formats.files.places import refuse_impossible_place
+
+    refuse_impossible_place(file)
+    if file.is_dir():
+        raise InputError("is a folder, a file is to be written here", "give another name", file)
     if file.is_file() and not overwrite:
         raise InputError("exists already", "choose another name, or add --overwrite", file)
 
@@ -49,8 +55,23 @@ def refuse_foreign_folder(folder: Path, *own: str) -> None:
     ------
     InputError
     """
+    refuse_no_folder(folder)
     if folder.is_dir() and any(folder.iterdir()) and not any((folder / name).exists() for name in own):
         raise InputError(f"'{folder}' holds other files", "choose another --out, or an empty folder")
+
+
+def refuse_no_folder(folder: Path) -> None:
+    """A place where no folder can be written; to be called before any work is done.
+
+    Raises
+    ------
+    InputError
+    """
+    from aerotri.formats.files.places import refuse_impossible_place
+
+    refuse_impossible_place(folder)
+    if folder.exists() and not folder.is_dir():
+        raise InputError("is a file, a folder is to be written here", "give another name", folder)
 
 
 def refuse_missing_photographs(given: Sequence[Path]) -> None:

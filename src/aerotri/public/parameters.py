@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.public.folders import refuse_no_folder
 
 if TYPE_CHECKING:
     from aerotri.functional_model.additional_parameters import ParameterDescription
@@ -68,7 +69,7 @@ def draw_parameters(out: FilePath, family: str | None = None) -> tuple[str, ...]
     Raises
     ------
     InputError
-        For a family that there is not.
+        For a family that there is not, or a folder that cannot be written to.
 
     Examples
     --------
@@ -84,6 +85,7 @@ def draw_parameters(out: FilePath, family: str | None = None) -> tuple[str, ...]
     from aerotri.simulation.cameras import block_camera
 
     _refuse_unknown(family)
+    refuse_no_folder(Path(out))
     drawn = [name for name in FAMILIES if family in (None, name)]
     for name in drawn:
         model = FAMILIES[name].camera_model or USUAL_CAMERA

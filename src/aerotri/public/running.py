@@ -18,6 +18,7 @@ from aerotri.execution.opening import opened
 from aerotri.execution.work import TasksFailedError
 from aerotri.formats.results.json_text import write_json
 from aerotri.public.blocks import Sigmas
+from aerotri.public.folders import refuse_no_folder
 from aerotri.public.progress import Progress, ProgressLike, StageReport, stage_report
 from aerotri.public.run_steps import (
     BLOCK,
@@ -244,6 +245,7 @@ def run(
         settings[verb] |= more
     place = Path(source)
     target = Path(f"{place.resolve().name}_project" if out is None else out)
+    refuse_no_folder(target)
     with stage_report(progress) as report:
         steps = steps_of(place, target, settings, dense)
         if chosen(executor).address:

@@ -9,21 +9,20 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
-import shutil
 import sys
 from collections.abc import Callable, Collection, Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from aerotri.conventions import LEAST_ROOM, FilePath, InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.formats.files.ownership import carry_over, record_files
+from aerotri.formats.files.places import full_disk, is_full, not_written, place_of
 from aerotri.formats.files.work_place import OLDER, work_place, written
 
 AT_FDCWD = -100
 """Of linux/fcntl.h: paths count from the working directory."""
 RENAME_EXCHANGE = 2
 """Of linux/fs.h: renameat2 exchanges two names in one step."""
-NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @contextmanager
@@ -43,7 +42,7 @@ def atomic_file(target: FilePath) -> Generator[Path]:
     InputError
         When the place cannot be written to.
     """
-    target = _place(target)
+    target = place_of(target)
     if target.is_dir():
         raise InputError("is a folder, a file is to be written here", "give another name", target)
     with _told_as_input_error(target):
@@ -78,7 +77,7 @@ def atomic_folder(target: FilePath, own: Collection[str] | None = None, gone: Co
     InputError
         When the place cannot be written to, or holds a file.
     """
-    target = _place(target)
+    target = place_of(target)
     if target.exists() and not target.is_dir():
         raise InputError("is a file, a folder is to be written here", "give another name", target)
     with _told_as_input_error(target):
@@ -113,16 +112,11 @@ def room_beside(target: FilePath) -> Generator[Path]:
     InputError
         When the place cannot be written to.
     """
-    target = _place(target)
+    target = place_of(target)
     with _told_as_input_error(target):
         target.parent.mkdir(parents=True, exist_ok=True)
         with work_place(target) as place, _told_as_input_error(target):
             yield place
-
-
-def _place(target: FilePath) -> Path:
-    """The target with links followed, so that a link stays a link."""
-    return Path(target).resolve()
 
 
 @contextmanager
@@ -133,23 +127,11 @@ def _told_as_input_error(target: Path) -> Generator[None]:
         raise
     except Exception as error:
         # GDAL has errors of its own for a disk that is full
-        if getattr(error, "errno", None) in NO_SPACE or _is_full(target.parent):
-            raise InputError("the disk is full", "free some space, or choose another place", target) from error
+        if is_full(target.parent):
+            raise full_disk(target, error) from error
         if not isinstance(error, OSError):
             raise
-        raise InputError(
-            f"cannot be written: {error.strerror or error}",
-            "check permissions and free space, or choose another place",
-            target,
-        ) from error
-
-
-def _is_full(folder: Path) -> bool:
-    """Whether nothing more can be written there."""
-    try:
-        return shutil.disk_usage(folder).free < LEAST_ROOM
-    except OSError:
-        return False
+        raise not_written(target, error) from error
 
 
 def _refuse_full(target: Path) -> None:
@@ -159,7 +141,7 @@ def _refuse_full(target: Path) -> None:
     ------
     OSError
     """
-    if _is_full(target.parent):
+    if is_full(target.parent):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(target))
 
 

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.formats.files.places import not_written, refuse_impossible_place
 
 LOCK, OLDER, ENDING = "lock", ".older-result", ".aerotri.tmp"
 WAIT_S = 60.0
@@ -72,11 +73,11 @@ def held(target: FilePath) -> Generator[None]:
     InputError
         When another run writes there.
     """
-    place = Path(target).resolve()
+    place = refuse_impossible_place(target)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", "choose another place", place) from error
+        raise not_written(place, error) from error
     with work_place(place, wait_s=0.0):
         yield
 
@@ -107,13 +108,14 @@ def _opened(place: Path) -> int | None:
     """The locked file; −1 while another process holds it, None where this place cannot be used."""
     try:
         place.mkdir(exist_ok=True)
+    except FileExistsError:
+        return None
+    try:
         if place.is_symlink() or (any(place.iterdir()) and not (place / LOCK).is_file()):
             return None  # of somebody else
         lock = os.open(place / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
     except FileNotFoundError:
         return -1  # removed by its owner in this moment
-    except FileExistsError:
-        return None
     try:
         _lock(lock)
         if os.fstat(lock).st_ino == os.stat(place / LOCK).st_ino:

@@ -1,0 +1,182 @@
+"""Whether something can be written to a place, and what to say where it cannot."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from aerotri.conventions import LEAST_ROOM, FilePath, InputError
+
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+LONGEST_ADDITION = ".00000000.aerotri.tmp"
+"""What hidden names beside a target have more than its own, at most."""
+REMEDY = "choose another place"
+
+
+def refuse_impossible_place(target: FilePath) -> Path:
+    """As `place_of`, before any work is done.
+
+    An empty folder is made there for a moment: permissions alone do not tell whether that is possible.
+
+    Raises
+    ------
+    InputError
+        When nothing can be written there, with the reason.
+    """
+    place = place_of(target)
+    folder = existing_folder(place)
+    try:
+        os.rmdir(tempfile.mkdtemp(prefix=".", suffix=".aerotri.tmp", dir=folder))
+    except OSError as error:
+        if error.errno in NO_SPACE:
+            raise full_disk(target, error) from error
+        reason = f"nothing can be made in '{folder}' ({error.strerror})"
+        raise InputError(f"cannot be written: {reason}", REMEDY, target) from error
+    return place
+
+
+def place_of(target: FilePath) -> Path:
+    """The target with links followed, so that a link stays a link.
+
+    Parameters
+    ----------
+    target : file or folder to be; it and folders above it may be missing.
+
+    Raises
+    ------
+    InputError
+        When no file or folder can have this name.
+    """
+    given = Path(target)
+    try:
+        folder, missing = _nearest_folder(given)
+        for name in missing:
+            _length_of(folder / (name + LONGEST_ADDITION))
+        return given.resolve()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise not_written(given, error) from error
+
+
+def not_written(target: FilePath | None, error: Exception) -> InputError:
+    """The error to raise where a place could not be written to.
+
+    Parameters
+    ----------
+    target : file or folder; None where it is not known. error : what the system said.
+    """
+    code = getattr(error, "errno", None)
+    if code in NO_SPACE:
+        return full_disk(target, error)
+    reason = " ".join(str(getattr(error, "strerror", None) or error).split())
+    given = None if target is None else Path(target)
+    if code == errno.ELOOP:
+        reason = "its symbolic links form a loop"
+    elif given is not None and code == errno.ENAMETOOLONG:
+        reason = f"the name has {max(map(len, given.parts))} letters, which is too long"
+    elif given is not None and code in (errno.ENOTDIR, errno.EEXIST):
+        above = [place for place in given.parents if os.path.lexists(place) and not place.is_dir()]
+        reason = f"'{above[0]}' is no folder" if above else reason
+    return InputError(f"cannot be written: {reason}", REMEDY, target)
+
+
+def full_disk(target: FilePath | None, error: Exception | None = None) -> InputError:
+    """The error to raise where a disk is full, with the folder and what is free in it.
+
+    Parameters
+    ----------
+    target : what was to be written; None where it is not known. error : its file tells the place, where it is on
+        another disk than the target.
+    """
+    file = _on_another_disk(getattr(error, "filename", None), target)
+    reason = "the disk is full"
+    if getattr(error, "errno", None) == errno.EDQUOT:
+        reason = "the share of the disk that you may use (quota) is full"
+    elif getattr(error, "errno", None) == errno.EFBIG:
+        reason = "the file is larger than this disk, or the limit of the system, allows"
+    for folder in _full_folders() if file is None else (existing_folder(file),):
+        reason += f"; {_free_in_words(folder)} free in '{folder}'"
+    return InputError(reason, "free some space, or choose another place", file)
+
+
+def existing_folder(place: FilePath) -> Path:
+    """The folder nearest to a place, above it, that is there."""
+    return next(folder for folder in Path(place).absolute().parents if folder.is_dir())
+
+
+def _nearest_folder(target: Path) -> tuple[Path, list[str]]:
+    """The folder above a target that is there, and the names below it that are not, and of the target.
+
+    Raises
+    ------
+    OSError, RuntimeError
+    """
+    with contextlib.suppress(FileNotFoundError):
+        os.stat(target)
+    place = target.resolve()
+    if not place.name:
+        raise OSError(errno.EBUSY, "it is the root of the file system")
+    names = [place.name]
+    for folder in place.parents:
+        try:
+            os.stat(folder)
+        except FileNotFoundError:
+            names.append(folder.name)
+            continue
+        if not folder.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder))
+        return folder, names
+    raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(place))
+
+
+def _length_of(place: Path) -> None:
+    """Ask the file system whether a name, that need not be there, is too long.
+
+    Raises
+    ------
+    OSError
+    """
+    try:
+        os.lstat(place)
+    except FileNotFoundError:
+        return
+
+
+def _on_another_disk(file: FilePath | None, target: FilePath | None) -> FilePath | None:
+    """The file where it is on another disk than the target; else the target."""
+    if target is None or file is None:
+        return target or file
+    try:
+        same = os.stat(existing_folder(file)).st_dev == os.stat(existing_folder(target)).st_dev
+    except OSError:
+        return target
+    return target if same else file
+
+
+def _full_folders() -> Iterator[Path]:
+    """Folders that are written to without being named, where little is free."""
+    for name in dict.fromkeys((os.curdir, tempfile.gettempdir())):
+        folder = Path(name).absolute()
+        if is_full(folder):
+            yield folder
+
+
+def is_full(folder: Path) -> bool:
+    """Whether nothing more can be written there."""
+    try:
+        usage = shutil.disk_usage(folder)
+    except OSError:
+        return False
+    # what the system itself shows as files has no size
+    return usage.total > 0 and usage.free < LEAST_ROOM
+
+
+def _free_in_words(folder: Path) -> str:
+    try:
+        return f"{shutil.disk_usage(folder).free / 2**20:.3g} MiB"
+    except OSError:
+        return "unknown space"
