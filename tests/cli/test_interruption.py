@@ -74,7 +74,8 @@ def test_what_was_written_is_said(monkeypatch, tmp_path):
     [
         (ZeroDivisionError("x\ny"), 3, "unexpected ZeroDivisionError: x y — please report it"),
         (MemoryError("Unable to allocate 7 GiB"), 2, "not enough memory: Unable to allocate 7 GiB"),
-        (OSError(errno.ENOSPC, "No space left on device", "f.tif"), 2, "the disk is full (f.tif)"),
+        (OSError(errno.ENOSPC, "No space left on device", "f.tif"), 2, "f.tif: the disk is full; "),
+        (FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/tmp']"), 2, "TMPDIR"),
         (KeyboardInterrupt(), 130, "interrupted, nothing was written"),
         (BrokenPipeError(), 0, ""),
     ],

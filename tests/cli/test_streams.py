@@ -46,6 +46,21 @@ def test_a_closed_output_changes_no_exit_code(closed, argument, code):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device that is always full")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("arguments", [("--version",), ("explain", "sigma0"), ("parameters", "--json")])
+def test_what_cannot_be_printed_is_told(arguments, unbuffered):
+    """Whether Python notices at once or at the end."""
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "aerotri", *arguments], env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+            stdout=full, stderr=subprocess.PIPE, text=True, timeout=120, check=False,
+        )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.startswith("aerotri: what is printed cannot be written: No space left on device — ")
+    assert done.stderr.count("\n") == 1
+
+
 def test_a_signal_stays_ours_beside_pycolmap():
     done = subprocess.run([sys.executable, "-c", IN_A_THREAD], capture_output=True, text=True, timeout=120, check=False)
     assert done.stdout.split("\n") == ["ours", "goes on", ""], done.stderr

@@ -15,6 +15,7 @@ from typing import Any
 from aerotri.conventions import InputError
 from aerotri.formats.block.journal import ACTIONS, EDIT_COLUMNS, GIVEN, MARK, ON, REMOVE, UNDO, standing_rows
 from aerotri.formats.files.atomic import atomic_file
+from aerotri.formats.files.places import not_written
 from aerotri.formats.text.tables import read_table
 from aerotri.spreadsheet import plain_row
 
@@ -132,9 +133,7 @@ class Decisions:
         try:
             _append(self._path, row)
         except OSError as error:
-            raise InputError(
-                f"cannot be written: {error.strerror}", "check permissions and space", self._path
-            ) from None
+            raise not_written(self._path, error) from None
         self._rows.append(row)
         self._size = _size(self._path)
         return row

@@ -63,11 +63,9 @@ def main() -> None:
         # a second signal, or one that came between the two lines
         code = _told(interruption.message(), interruption.exit_code())
     interruption.afterwards()
-    try:
-        if sys.stdout is not None:
-            sys.stdout.flush()
-    except (OSError, ValueError):
-        _forget_output()
+    lost = _lost_output()
+    if lost is not None:
+        code = _told(_about_lost(lost), code or BAD_INPUT)
     _leave(code)
 
 
@@ -138,9 +136,18 @@ def _unexpected(error: Exception) -> int:
     if isinstance(error, MemoryError):
         text = f": {error}" if str(error) else ""
         return _told(f"aerotri: not enough memory{text} — give less at a time, or use a larger machine", BAD_INPUT)
+    if isinstance(error, OSError) and not error.filename:
+        lost = _lost_output(tried=True)
+        if lost is not None:
+            return _told(_about_lost(lost), BAD_INPUT)
     if isinstance(error, OSError) and error.errno in NO_SPACE:
-        place = f" ({error.filename})" if error.filename else ""
-        return _told(f"aerotri: the disk is full{place} — free some space, or choose another place", BAD_INPUT)
+        from aerotri.formats.files.places import full_disk
+
+        return _told(f"aerotri: {full_disk(error.filename, error)}", BAD_INPUT)
+    if isinstance(error, FileNotFoundError) and "temporary directory" in str(error):
+        # of tempfile, when none of its folders takes a file
+        remedy = "free some space on their disk, or let TMPDIR name another folder"
+        return _told(f"aerotri: {error.strerror}: nothing can be written there — {remedy}", BAD_INPUT)
     said = " ".join(str(error).split())[:500]
     text = f"aerotri: unexpected {type(error).__name__}: {said} — please report it; AEROTRI_DEBUG=1 tells where"
     return _told(text, BUG)
@@ -152,6 +159,31 @@ def _told(text: str, code: int) -> int:
         # with stderr closed, print writes nowhere
         print(text, file=sys.stderr, flush=True)
     return code
+
+
+def _lost_output(tried: bool = False) -> OSError | None:
+    """Why what was printed could not be written, None where all is well or nobody reads it; the rest goes nowhere.
+
+    Parameters
+    ----------
+    tried : whether writing somewhere has failed; an end of line tells then whether it was here, as what Python does not
+        keep back (PYTHONUNBUFFERED) is gone.
+    """
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+            if tried:
+                os.write(sys.stdout.fileno(), b"\n")
+    except (OSError, ValueError) as error:
+        _forget_output()
+        if isinstance(error, OSError) and not isinstance(error, (BrokenPipeError, ValueError)):
+            return error
+    return None
+
+
+def _about_lost(error: OSError) -> str:
+    remedy = "free some space, or let the output go elsewhere"
+    return f"aerotri: what is printed cannot be written: {error.strerror} — {remedy}"
 
 
 def _forget_output() -> None:

@@ -20,7 +20,7 @@ MOST_TRIES = 3
 """Times that a task is begun whose worker is lost; chosen [C]: once may be chance, three times is the task itself."""
 MOST_NAMED = 5
 """Failed tasks that a message names; the others are counted."""
-NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @dataclass(frozen=True, eq=False)

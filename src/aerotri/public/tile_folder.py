@@ -11,6 +11,7 @@ from typing import Any
 
 from aerotri.conventions import InputError
 from aerotri.formats.files.ownership import told_by
+from aerotri.formats.files.places import not_written
 from aerotri.version import __version__
 
 STATED = "tiles.json"
@@ -64,4 +65,4 @@ def open_tiles(folder: Path, stated: Mapping[str, Any]) -> None:
             path.unlink()
         there.write_text(mark, encoding="utf-8")
     except OSError as error:
-        raise InputError(f"cannot be written to: {error}", "give another place for the tiles", folder) from error
+        raise not_written(folder, error) from error

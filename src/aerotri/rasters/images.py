@@ -23,6 +23,7 @@ from rasterio.transform import Affine
 from aerotri.conventions import FilePath, InputError
 from aerotri.rasters.grids import window_of
 from aerotri.rasters.photograph_settings import COMPRESSION
+from aerotri.rasters.room import raise_full_disk
 
 DRIVERS = {b"II*\0": "GTiff", b"MM\0*": "GTiff", b"II+\0": "GTiff", b"MM\0+": "GTiff", b"\xff\xd8\xff": "JPEG"}
 """By the first bytes of a file, TIFF and BigTIFF in both byte orders, and JPEG."""
@@ -203,6 +204,7 @@ class RowWriter:
 
 
 def _unwritten(path: Path, error: BaseException) -> InputError:
+    raise_full_disk(path, error)
     return InputError(f"cannot be written: {error.__cause__ or error}", "check permissions and free space", path)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import shutil
 import warnings
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -13,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import LEAST_ROOM, InputError
+from aerotri.conventions import InputError
 from aerotri.rasters.grids import CACHE_BYTES, TILE, Grid, window_of
+from aerotri.rasters.room import raise_full_disk
 
 OPAQUE = {"uint8": 255, "uint16": 65535}
 """Of the last band, the mask: what a cell has that a photograph shows; the others have 0."""
@@ -78,9 +77,7 @@ def write_mosaic(
                 yield MosaicWriter(file)
             rasterio.shutil.copy(plain, path, driver="COG", **cloud)
     except (RasterioError, OSError) as error:
-        # GDAL closes a file that found no room without a word and fails when it reads it again
-        if shutil.disk_usage(plain.parent).free < LEAST_ROOM:
-            raise OSError(errno.ENOSPC, "No space left on device", str(plain)) from error
+        raise_full_disk(plain, error)
         raise InputError(
             f"cannot be written: {error.__cause__ or error}", "check permissions and free space", path
         ) from error

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import errno
-import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from aerotri.conventions import LEAST_ROOM, FilePath
+from aerotri.conventions import FilePath
 from aerotri.rasters.grids import NO_DATA, SIGMA, TILE, Grid, quietly, transform_of, window_of
+from aerotri.rasters.room import raise_full_disk
 
 
 def write_surface(path: FilePath, z: np.ndarray, sigma: np.ndarray, grid: Grid, crs: Any, text: str) -> None:
@@ -83,9 +82,7 @@ def _write_cog(
             predictor = "YES" if dtype.kind == "f" else "NO"
             rasterio.shutil.copy(plain, path, driver="COG", compress="DEFLATE", predictor=predictor)
     except Exception as error:
-        # GDAL closes a file that found no room without a word and fails when it reads it again
-        if shutil.disk_usage(plain.parent).free < LEAST_ROOM:
-            raise OSError(errno.ENOSPC, "No space left on device", str(plain)) from error
+        raise_full_disk(plain, error)
         raise
     finally:
         plain.unlink(missing_ok=True)

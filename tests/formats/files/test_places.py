@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
 from aerotri.conventions import InputError
+from aerotri.formats.files import places
 from aerotri.formats.files.atomic import atomic_file, atomic_folder
-from aerotri.formats.files.places import refuse_impossible_place
+from aerotri.formats.files.places import full_disk, not_written, refuse_impossible_place
 from aerotri.formats.files.work_place import held
 
 
@@ -56,3 +59,27 @@ def test_what_can_be_written_stays_as_it_is(tmp_path):
     assert refuse_impossible_place(tmp_path / "deep" / "below") == (tmp_path / "deep" / "below").resolve()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "old"]
     assert not any((tmp_path / "old").iterdir())
+
+
+def test_a_full_disk_is_told_with_its_folder_and_what_is_free(tmp_path):
+    free = shutil.disk_usage(tmp_path).free
+    error = OSError(errno.ENOSPC, "No space left on device", str(tmp_path / ".out.tmp" / "images.csv"))
+    said = str(full_disk(tmp_path / "missing" / "out", error))
+    assert f"out: the disk is full; {free / 2**20:.3g} MiB free in '{tmp_path}' — free some space" in said
+    assert ".out.tmp" not in said, "the place that the user has given"
+    assert "quota) is full" in str(not_written(tmp_path / "out", OSError(errno.EDQUOT, "Disk quota exceeded")))
+    assert "larger than" in str(not_written(tmp_path / "out", OSError(errno.EFBIG, "File too large")))
+
+
+def test_a_full_disk_elsewhere_is_named(tmp_path, monkeypatch):
+    """A temporary folder on another disk than the target; and where nothing is named, folders that are full."""
+    monkeypatch.setattr(places, "_device", lambda folder: str(folder))
+    (tmp_path / "tmp").mkdir()
+    error = OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "tmp" / "piece.tif"))
+    assert "piece.tif: the disk is full; " in str(full_disk(tmp_path / "out", error))
+    assert f"free in '{tmp_path / 'tmp'}'" in str(full_disk(tmp_path / "out", error))
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "tmp"))
+    monkeypatch.setattr(places, "is_full", lambda folder: folder == tmp_path / "tmp")
+    said = str(full_disk(None, OSError(errno.ENOSPC, "No space left on device")))
+    assert said.startswith("the disk is full; ")
+    assert f"free in '{tmp_path / 'tmp'}'" in said

@@ -11,11 +11,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from aerotri.conventions import LEAST_ROOM, FilePath, InputError
+from aerotri.execution.work import NO_SPACE
 
-NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 LONGEST_ADDITION = ".00000000.aerotri.tmp"
 """What hidden names beside a target have more than its own, at most."""
 REMEDY = "choose another place"
+FREE = f"free some space, or {REMEDY}"
 
 
 def refuse_impossible_place(target: FilePath) -> Path:
@@ -84,13 +85,13 @@ def not_written(target: FilePath | None, error: Exception) -> InputError:
     return InputError(f"cannot be written: {reason}", REMEDY, target)
 
 
-def full_disk(target: FilePath | None, error: Exception | None = None) -> InputError:
+def full_disk(target: FilePath | None, error: Exception | None = None, remedy: str = FREE) -> InputError:
     """The error to raise where a disk is full, with the folder and what is free in it.
 
     Parameters
     ----------
     target : what was to be written; None where it is not known. error : its file tells the place, where it is on
-        another disk than the target.
+        another disk than the target. remedy : what the user can do.
     """
     file = _on_another_disk(getattr(error, "filename", None), target)
     reason = "the disk is full"
@@ -100,7 +101,7 @@ def full_disk(target: FilePath | None, error: Exception | None = None) -> InputE
         reason = "the file is larger than this disk, or the limit of the system, allows"
     for folder in _full_folders() if file is None else (existing_folder(file),):
         reason += f"; {_free_in_words(folder)} free in '{folder}'"
-    return InputError(reason, "free some space, or choose another place", file)
+    return InputError(reason, remedy, file)
 
 
 def existing_folder(place: FilePath) -> Path:
@@ -151,18 +152,21 @@ def _on_another_disk(file: FilePath | None, target: FilePath | None) -> FilePath
     if target is None or file is None:
         return target or file
     try:
-        same = os.stat(existing_folder(file)).st_dev == os.stat(existing_folder(target)).st_dev
+        same = _device(existing_folder(file)) == _device(existing_folder(target))
     except OSError:
         return target
     return target if same else file
 
 
+def _device(folder: Path) -> int:
+    return os.stat(folder).st_dev
+
+
 def _full_folders() -> Iterator[Path]:
     """Folders that are written to without being named, where little is free."""
-    for name in dict.fromkeys((os.curdir, tempfile.gettempdir())):
-        folder = Path(name).absolute()
-        if is_full(folder):
-            yield folder
+    for name in dict.fromkeys((os.curdir, os.environ.get("TMPDIR", "/tmp"))):
+        if is_full(Path(name)):
+            yield Path(os.path.abspath(name))
 
 
 def is_full(folder: Path) -> bool:

@@ -9,7 +9,8 @@ import tempfile
 import weakref
 from pathlib import Path
 
-from aerotri.conventions import LEAST_ROOM, FilePath, InputError
+from aerotri.conventions import FilePath
+from aerotri.formats.files.places import full_disk, is_full
 
 
 class Spool:
@@ -33,8 +34,8 @@ class Spool:
         ------
         InputError
         """
-        if shutil.disk_usage(self.folder).free < LEAST_ROOM:
-            raise InputError("the disk is full", "free some space, or let TMPDIR name another place", self.folder)
+        if is_full(self.folder):
+            raise full_disk(self.folder, remedy="free some space, or let TMPDIR name another place")
 
     def give(self, name: str, target: Path) -> None:
         """Put a file where it is wanted.
