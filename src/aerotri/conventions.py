@@ -16,6 +16,7 @@ Systematic image error
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 from pathlib import Path
@@ -36,6 +37,8 @@ SIGMA_PER_MAD = 1.4826
 """Factor from a median absolute deviation to the σ of a normal distribution, 1/Φ⁻¹(0.75) [L: Höhle & Höhle 2009]."""
 LEAST_ROOM = 16384
 """Bytes below which a disk counts as full; chosen [C]: file systems keep a few blocks of 4096 bytes back."""
+LONGEST_NAME = 120
+"""Letters of the name of a file or folder in a message; of a longer one half of them."""
 FLIGHT_AXES = ("+x", "-x", "+y", "-y")
 FilePath = str | os.PathLike[str]
 """What names a file or a folder."""
@@ -48,7 +51,8 @@ class InputError(Exception):
     ----------
     message : what is wrong, naming the offending value.
     remedy : what the user can do.
-    file, line : where, when known. Lines count from 1.
+    file, line : where, when known. Lines count from 1. The message has the path as it is given, or from the current
+        folder where an absolute one is below it.
     """
 
     def __init__(self, message: str, remedy: str = "", file: FilePath | None = None, line: int | None = None):
@@ -56,7 +60,7 @@ class InputError(Exception):
         super().__init__(str(self))
 
     def __str__(self) -> str:
-        place = "" if self.file is None else Path(self.file).name
+        place = "" if self.file is None else _path_in_words(Path(self.file))
         if place and self.line is not None:
             place += f":{self.line}"
         text = f"{place}: {self.message}" if place else self.message
@@ -84,6 +88,19 @@ def stated_number(text: str) -> float:
     if not abs(value) <= LARGEST:
         raise ValueError(f"{text} is no number to compute with")
     return value
+
+
+def _path_in_words(path: Path) -> str:
+    """A path as it is given, or as it is seen from the current folder: several files of one name are told apart."""
+    if path.is_absolute():
+        with contextlib.suppress(OSError, ValueError):
+            # a current folder that is gone, or a path elsewhere
+            path = path.relative_to(Path.cwd())
+    return os.path.join(*(_shortened(part) for part in path.parts)) if path.name else str(path)
+
+
+def _shortened(name: str) -> str:
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME // 2]}…"
 
 
 def _printable(text: str) -> str:

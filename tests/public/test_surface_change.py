@@ -149,10 +149,22 @@ def test_surfaces_without_sigma_take_it_from_stable_ground(tmp_path):
         assert said in page.read_text(encoding="utf-8")
 
 
+def test_surfaces_of_one_name_are_told_apart(tmp_path):
+    for folder, left in (("old", 0.0), ("new", 1e4)):
+        (tmp_path / folder).mkdir()
+        flat = aerotri.Surface.of_array(np.full((9, 9), 1.0), left=left, top=0.0, cell=1.0)
+        flat.save(tmp_path / folder / "dsm.tif")
+    with pytest.raises(InputError, match=r"the surfaces old/dsm\.tif and new/dsm\.tif do not meet"):
+        aerotri.change(tmp_path / "old" / "dsm.tif", tmp_path / "new" / "dsm.tif")
+    (tmp_path / "new" / "dsm.tif").write_text("no raster")
+    with pytest.raises(InputError, match=r"new.dsm\.tif: is no raster"):
+        aerotri.change(tmp_path / "old" / "dsm.tif", tmp_path / "new" / "dsm.tif")
+
+
 def test_surfaces_that_do_not_meet():
     first = epochs(1)[0]
     away = aerotri.Surface.of_array(first.z, left=1e4, top=0.0, cell=1.0)
-    with pytest.raises(InputError, match="do not meet"):
+    with pytest.raises(InputError, match="the surfaces may and surface do not meet"):
         aerotri.change(first, away)
 
 

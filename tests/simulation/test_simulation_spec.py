@@ -70,7 +70,7 @@ def test_file_line_and_remedy_are_named(tmp_path):
     with pytest.raises(InputError) as caught:
         read_spec(path)
     assert caught.value.line == 8
-    assert str(caught.value) == "simulation.toml:8: unknown key 'flight.endlap' — did you mean 'end_lap'?"
+    assert str(caught.value) == f"{path}:8: unknown key 'flight.endlap' — did you mean 'end_lap'?"
 
 
 def test_files_that_are_none(tmp_path):

@@ -190,7 +190,7 @@ def test_photographs_that_say_nothing(files, tmp_path):
     alone = options(files, gcp="", check=())
     with pytest.raises(InputError, match="no two photographs have matches"):
         run_tiepoints(tmp_path / "black", tmp_path / "out", alone, True)
-    with pytest.raises(InputError, match=r"^1\.jpg: cannot be read"):
+    with pytest.raises(InputError, match=r"1\.jpg: cannot be read"):
         run_tiepoints(tmp_path / "cut", tmp_path / "out2", alone, True)
 
 

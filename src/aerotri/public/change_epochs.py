@@ -112,7 +112,8 @@ def pair_of(
     for one, stated in zip(epochs, (first, second), strict=True):
         check_crs(stated.record, epsg, one.surface.path or Path(one.surface.label))
     if not (np.isfinite(heights[0]) & np.isfinite(heights[1])).any():
-        raise InputError("the two surfaces have no cell in common", "check the CRS of both")
+        message = "the surfaces {} and {} have no cell in common".format(*names_of(epochs))
+        raise InputError(message, "check the CRS of both")
     # one result given twice is one adjustment, not two that have all in common
     records = (first.record, first.record if second.is_same(first) else second.record)
     return adjusted_pair(grid, heights, records)
@@ -157,7 +158,7 @@ def common_system(epochs: Epochs) -> tuple[str, str]:
     for one in epochs:
         with one.surface.reader() as reader:
             codes.append(reader.crs_code)
-    return system_of_both(codes, [one.surface.label for one in epochs])
+    return system_of_both(codes, names_of(epochs))
 
 
 def system_of_both(codes: Sequence[str], labels: Sequence[str]) -> tuple[str, str]:
@@ -198,7 +199,7 @@ def grid_of(epochs: Epochs) -> Grid:
     apart = left >= own.bounds[2] or right <= own.bounds[0] or bottom >= own.bounds[3] or top <= own.bounds[1]
     rows, columns = last_row - row + 1, last_column - column + 1
     if apart or rows < 3 or columns < 3:
-        raise InputError("the two surfaces do not meet", "check the CRS of both")
+        raise InputError("the surfaces {} and {} do not meet".format(*names_of(epochs)), "check the CRS of both")
     refuse_beyond_memory(
         float(BYTES_OF_CELL) * rows * columns,
         f"a change of {rows} × {columns} cells",

@@ -213,7 +213,7 @@ def compare(
         one, other = _sources(test, control, stack)
         if one.epsg is not None and other.epsg is not None and one.epsg != other.epsg:
             message = f"is in EPSG:{one.epsg}, the control in EPSG:{other.epsg}"
-            raise InputError(message, "bring them into one CRS", _name(test))
+            raise InputError(message, "bring them into one CRS", _file(test) or _name(test))
         grid = common_grid(one.area, other.area, cell or max(one.cell, other.cell))
         report.stage("comparing", None)
         found = differences(
