@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from aerotri.conventions import FilePath, counted
 from aerotri.formats.results.json_text import number_or_none
 from aerotri.observations import Block
+from aerotri.public.argument_types import with_checked_types
 
 if TYPE_CHECKING:
     from aerotri.diagnosis.inventory import CameraUse, Extent, GroundPointCounts, Inventory
@@ -104,6 +105,7 @@ class BlockCheck:
         return f"<div><b>{escape(self.block.name)}</b><ul>{rows}</ul></div>"
 
 
+@with_checked_types
 def check(block: Block | FilePath, *, control_prefix: str = "", geoid: FilePath | None = None) -> BlockCheck:
     """Read a block, count what it holds, and say what looks wrong and what an adjustment lacks; nothing is adjusted.
 

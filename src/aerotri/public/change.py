@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.public.argument_types import with_checked_types
 from aerotri.public.change_epochs import (
     common_system,
     doubts_of,
@@ -147,6 +148,7 @@ class MeasuredChange:
         return f"<div>{self.volumes.html()}</div>"
 
 
+@with_checked_types
 def change(
     first: SurfaceLike,
     second: SurfaceLike,

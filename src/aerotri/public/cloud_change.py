@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.public.argument_types import with_checked_types
 from aerotri.public.change_epochs import plan_code, system_of_both
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.projects import project_of
@@ -136,6 +137,7 @@ class MeasuredCloudChange:
         return f"<div>{self.distances.html()}</div>"
 
 
+@with_checked_types
 def cloud_change(
     first: FilePath | np.ndarray,
     second: FilePath | np.ndarray,

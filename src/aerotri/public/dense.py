@@ -14,6 +14,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.public.adjustment import Adjustment
+from aerotri.public.argument_types import with_checked_types
 from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
@@ -186,6 +187,7 @@ class DenseSurface:
         )
 
 
+@with_checked_types
 def dense_surface(
     result: Adjustment | FilePath,
     photographs: FilePath | Sequence[FilePath],

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerotri.conventions import InputError
+from aerotri.public.argument_types import with_checked_types
 
 if TYPE_CHECKING:
     from aerotri.observations import Block
@@ -18,6 +19,7 @@ EVERYWHERE = -1
 """Photograph of a decision about a whole point."""
 
 
+@with_checked_types
 def edit(
     block: Block,
     *,

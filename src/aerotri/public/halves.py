@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from aerotri.conventions import FilePath, InputError
 from aerotri.execution.choice import THREADS
 from aerotri.public.adjustment import Adjustment
+from aerotri.public.argument_types import with_checked_types
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.table import Table
@@ -138,6 +139,7 @@ class Halves:
         return f"<div>{self.tests.html()}{''.join(f'<p>{escape(one)}</p>' for one in self.conclusion)}</div>"
 
 
+@with_checked_types
 def halves(
     result: Adjustment | FilePath,
     divisions: Sequence[str] | None = None,

@@ -15,6 +15,7 @@ from aerotri.conventions import FilePath, InputError
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.execution.opening import opened
 from aerotri.public.adjustment import Adjustment
+from aerotri.public.argument_types import with_checked_types
 from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
@@ -120,6 +121,7 @@ class Orthophoto:
         )
 
 
+@with_checked_types
 def orthophoto(
     result: Adjustment | FilePath,
     photographs: FilePath | Sequence[FilePath],

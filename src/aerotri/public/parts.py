@@ -14,6 +14,7 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.execution.choice import THREADS, chosen
+from aerotri.public.argument_types import with_checked_types
 from aerotri.public.blocks import request_of
 from aerotri.public.progress import ProgressLike, stage_report
 
@@ -99,6 +100,7 @@ class PartsAdjustment:
         )
 
 
+@with_checked_types
 def divide(
     block: Block | FilePath, folder: FilePath, *, parts: int | None = None,
     tables: Literal["csv", "parquet"] = "parquet", progress: ProgressLike = None,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.adjustment import Adjustment
+from aerotri.public.argument_types import with_checked_types
 from aerotri.public.progress import ProgressLike, stage_report
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ Switch = Literal["off", "on"]
 Start = Literal["auto", "strips", "points"]
 
 
+@with_checked_types
 def adjust(
     block: Block | FilePath,
     *,
@@ -113,6 +115,7 @@ def adjust(
         return Adjustment(found, (*((note,) if note else ()), *unread))
 
 
+@with_checked_types
 def open_result(folder: FilePath, progress: ProgressLike = None) -> Adjustment:
     """A result that was saved: linearised and factorised once at its solution, never adjusted again.
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
+from aerotri.public.argument_types import with_checked_types
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.projects import project_of
@@ -160,6 +161,7 @@ class SurfaceComparison:
         )
 
 
+@with_checked_types
 def compare(
     test: SurfaceLike,
     control: SurfaceLike,

@@ -15,6 +15,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.public.adjustment import Adjustment
+from aerotri.public.argument_types import with_checked_types
 from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
@@ -193,6 +194,7 @@ class TerrainModel:
         )
 
 
+@with_checked_types
 def terrain(
     result: Adjustment | FilePath,
     photographs: FilePath | Sequence[FilePath],

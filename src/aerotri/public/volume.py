@@ -13,6 +13,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.files.spool import Spool
 from aerotri.observations.project import Project
+from aerotri.public.argument_types import with_checked_types
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.projects import project_of
 from aerotri.public.stated import StatedAdjustment
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from aerotri.volume.thickness import ThicknessMap
 
 
+@with_checked_types
 def volume(
     surface: SurfaceLike,
     boundary: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | None = None,

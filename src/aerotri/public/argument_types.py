@@ -1,0 +1,124 @@
+"""Arguments of a public function that are of another type than its annotation says are refused by name."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import numbers
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple, ParamSpec, TypeVar
+
+from aerotri.conventions import InputError
+
+P = ParamSpec("P")
+R = TypeVar("R")
+LONGEST_SHOWN = 40
+"""Letters of a wrong value in a message."""
+
+
+class Kind(NamedTuple):
+    """What an argument can be: whether a value is it, and it in words."""
+
+    holds: Callable[[Any], bool]
+    words: str
+
+
+def _of_class(name: str) -> Callable[[Any], bool]:
+    """By the name of the class, so that nothing is imported to ask."""
+
+    def holds(value: Any) -> bool:
+        return any(kind.__name__ == name for kind in type(value).__mro__)
+
+    return holds
+
+
+def _is_a(kind: type) -> Callable[[Any], bool]:
+    def holds(value: Any) -> bool:
+        return isinstance(value, kind)
+
+    return holds
+
+
+def _is_path(value: Any) -> bool:
+    return isinstance(value, str | os.PathLike)
+
+
+def _is_surface(value: Any) -> bool:
+    return (
+        _is_path(value) or _of_class("Surface")(value) or _of_class("DenseSurface")(value)
+        or (hasattr(value, "dsm") and hasattr(value, "dtm"))
+    )  # fmt: skip
+
+
+def _are_names(value: Any) -> bool:
+    """Texts, or pairs of them; of what can be read only once nothing is read."""
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) != 1:
+        return False
+    return not isinstance(value, list | tuple) or all(isinstance(one, str | tuple) for one in value)
+
+
+KINDS = {
+    "None": Kind(_of_class("NoneType"), ""),
+    "FilePath": Kind(_is_path, "the path of a file or folder"),
+    "Block": Kind(_of_class("Block"), "a block, as aerotri.read_block returns it"),
+    "Adjustment": Kind(_of_class("Adjustment"), "an adjustment, as aerotri.adjust or aerotri.open_result returns it"),
+    "SurfaceLike": Kind(
+        _is_surface,
+        "a surface: the path of a GeoTIFF or of a folder of aerotri, an aerotri.Surface, or what aerotri.terrain or "
+        "aerotri.dense_surface returns",
+    ),
+    "BaseGeometry": Kind(_of_class("BaseGeometry"), "a polygon of shapely"),
+    "Mapping[str, BaseGeometry]": Kind(_is_a(Mapping), "polygons by their names"),
+    "Table": Kind(_of_class("Table"), "an aerotri.Table"),
+    "np.ndarray": Kind(_of_class("ndarray"), "an array of numpy"),
+    "float": Kind(_is_a(numbers.Real), "a number"),
+    "int": Kind(_is_a(numbers.Integral), "a whole number"),
+    "str": Kind(_is_a(str), "a text"),
+    "Iterable[str]": Kind(_are_names, "a list of names"),
+    "Sequence[str]": Kind(_are_names, "a list of names"),
+    "Iterable[str | tuple[str, str]]": Kind(_are_names, "a list of names, or of pairs of names"),
+}
+"""By what stands in annotations; an argument with anything else in its annotation is left to the function."""
+ALTERNATIVE = re.compile(r"(?:\w[\w.]*)(?:\[.*?\]+)?(?= \||$)")
+"""A name in an annotation, with what stands in brackets behind it."""
+
+
+def with_checked_types(function: Callable[P, R]) -> Callable[P, R]:
+    """The function, which raises an `InputError` that names the argument and what it can be.
+
+    Parameters
+    ----------
+    function : in a module whose annotations are kept as texts.
+    """
+    signature = inspect.signature(function)
+    kinds = {
+        name: found for name, parameter in signature.parameters.items()
+        if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+        and (found := _kinds_of(str(parameter.annotation)))
+    }  # fmt: skip
+
+    @functools.wraps(function)
+    def checked(*given: P.args, **named: P.kwargs) -> R:
+        for name, value in signature.bind(*given, **named).arguments.items():
+            _refuse_other(name, value, kinds.get(name, ()))
+        return function(*given, **named)
+
+    return checked
+
+
+def _kinds_of(annotation: str) -> tuple[Kind, ...]:
+    """What an annotation allows; empty where it is not known."""
+    names = ALTERNATIVE.findall(annotation)
+    return tuple(KINDS[name] for name in names) if all(name in KINDS for name in names) else ()
+
+
+def _refuse_other(name: str, value: Any, kinds: tuple[Kind, ...]) -> None:
+    if not kinds or any(kind.holds(value) for kind in kinds):
+        return
+    shown = value if value is None or isinstance(value, numbers.Real) else f"'{value}'"
+    if not _is_path(value) and shown is not value:
+        shown = f"of the type {type(value).__name__}"
+    possible = " or ".join(kind.words for kind in kinds if kind.words)
+    raise InputError(f"{name} is {str(shown)[:LONGEST_SHOWN]}", f"give {possible}")
