@@ -44,6 +44,7 @@ GROUPS = {
     "folder of compare": ("compare", "Folder of `aerotri compare`"),
     "folder of volume": ("volume", "Folder of `aerotri volume`"),
     "folder of change": ("change", "Folder of `aerotri change`"),
+    "folder of divide": ("divide", "Block in parts, of `aerotri divide`"),
     "folder of run": ("run", "Folder of `aerotri run`"),
     "block of tiepoints": ("tiepoints", "Block of `aerotri tiepoints`"),
     "control_marks of tiepoints": ("tiepoints", "Folder control_marks"),

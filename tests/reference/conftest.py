@@ -226,7 +226,7 @@ def _written(folder: Path) -> Written:
         "truth of simulate": (tiny / "truth", rigged / "truth", rolling / "truth"),
         "photographs of simulate": (photographs,), "block of tiepoints": (project / "block",),
         "control_marks of tiepoints": (project / "block" / "control_marks",), "folder of run": (project,),
-        "folder of parameters": (folder / "drawn",),
+        "folder of parameters": (folder / "drawn",), "folder of divide": (folder / "in_parts", folder / "tiny_parts"),
     }  # fmt: skip
     return Written(folder, places, run.printed)
 

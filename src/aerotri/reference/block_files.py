@@ -1,4 +1,4 @@
-"""What simulate, tiepoints, convert and run write, and what a result holds beside tables and JSON."""
+"""What simulate, tiepoints, convert, divide and run write, and what a result holds beside tables and JSON."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from aerotri.reference.records import DescribedFile, Item, of_axes
 SIMULATED = "block of simulate"
 TRUTH, TIEPOINTS, RUN = "truth of simulate", "block of tiepoints", "folder of run"
 MARKS, PHOTOGRAPHS, PARAMETERS = "control_marks of tiepoints", "photographs of simulate", "folder of parameters"
-COMPARED = "folder of compare-parameters"
+COMPARED, DIVIDED = "folder of compare-parameters", "folder of divide"
 ANGLES = ("omega", "phi", "kappa")
 NAME = Item("image", "text", "Name of the photograph.")
 POINT = Item("point", "text", "Name of the point.")
@@ -146,6 +146,7 @@ PREDICTED = (
     Item("marked_column", "number?", "Column as marked; empty where it is not.", "px"),
     Item("marked_row", "number?", "Row as marked; empty where it is not.", "px"),
 )
+PARTS_JSON = (Item("parts[]", "text", "Names of the parts, which are folders in parts: 0000, 0001 and so on."),)
 RUN_JSON = (
     *HEAD,
     Item("source", "text", "What the run began with."),
@@ -163,7 +164,7 @@ RUN_JSON = (
 
 
 def block_files() -> tuple[DescribedFile, ...]:
-    """The files of simulate, tiepoints, run and parameters, and the rest of a result."""
+    """The files of simulate, tiepoints, divide, run and parameters, and the rest of a result."""
     return (
         *(
             DescribedFile(name, TRUTH, "table", text, items, TRUTH_WHEN.get(name, ""))
@@ -208,6 +209,15 @@ def block_files() -> tuple[DescribedFile, ...]:
         DescribedFile(
             "pieces", MARKS, "folder", "Pieces of the photographs around the predicted places.", when="with --gcp"
         ),
+        DescribedFile(
+            "parts.json",
+            DIVIDED,
+            "json",
+            "The parts of a block in parts, also of convert --parts and simulate --parts. A part that is listed and not there, "
+            "or there and not listed, stops adjust. Without this file every folder in parts is a part.",
+            PARTS_JSON,
+        ),
+        DescribedFile("parts", DIVIDED, "folder", "The parts, each a block folder under its name."),
         DescribedFile("run.json", RUN, "json", "The steps and how each ended.", RUN_JSON),
         DescribedFile("report.html", RUN, "page", "All steps on one page."),
         DescribedFile("block", RUN, "folder", "The block, as of tiepoints.", when="of photographs"),
