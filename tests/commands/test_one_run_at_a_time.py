@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+import aerotri
 from aerotri.commands.dsm import run_dsm
 from aerotri.commands.ortho import run_ortho
 from aerotri.conventions import InputError
@@ -43,3 +44,12 @@ def test_a_second_ortho_is_refused(taken):
     place = taken.parent
     with pytest.raises(InputError, match="out: another run is writing here — wait until it has ended"):
         run_ortho(place / "result", [], place / "dsm", "dsm", taken, OrthoSettings(), plots=False, as_json=True)
+
+
+def test_tiles_that_another_run_makes_are_refused(taken):
+    """In Python too, whatever folder they are in."""
+    place = taken.parent
+    with pytest.raises(InputError, match="out: another run is writing here — wait until it has ended"):
+        aerotri.dense_surface(place / "result", [], tiles=taken)
+    with pytest.raises(InputError, match="out: another run is writing here — wait until it has ended"):
+        aerotri.orthophoto(place / "result", [], place / "dsm.tif", place / "ortho", tiles=taken)

@@ -20,7 +20,7 @@ from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
 from aerotri.public.surfaces import Surface
 from aerotri.public.terrain import rows_and_files
-from aerotri.public.tile_folder import fingerprints, open_tiles
+from aerotri.public.tile_folder import fingerprints, held_tiles, open_tiles
 from aerotri.public.used_arguments import used_settings
 from aerotri.results.head import Head
 from aerotri.terrain.settings import DENSE_DEFAULTS, DenseSettings
@@ -217,7 +217,7 @@ def dense_surface(
     ground : filter the ground besides, without objects.
     widest_object : m, the widest object that is taken off it.
     tiles : folder for the tiles of the surface; a run that was ended goes on with those it finds there. None: a
-        temporary one. Workers on other machines have to see it.
+        temporary one. Workers on other machines have to see it. No other run may write there meanwhile.
     executor : where the tiles are measured: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'.
     progress : as of `aerotri.adjust`.
 
@@ -254,6 +254,16 @@ def measure_dense(
     ------
     InputError, TasksFailedError
     """
+    settings.check()
+    chosen(executor)
+    with held_tiles(tiles):
+        return _measured(result, photographs, settings, tiles, progress, executor)
+
+
+def _measured(
+    result: Adjustment | FilePath, photographs: Sequence[Path], settings: DenseSettings, tiles: Path | None,
+    progress: ProgressLike, executor: str,
+) -> DenseSurface:  # fmt: skip
     from aerotri.execution.opening import opened
     from aerotri.formats.files.spool import Spool
     from aerotri.terrain.dense.bare_ground import bare_ground
@@ -262,8 +272,6 @@ def measure_dense(
     from aerotri.terrain.pickets import Area
     from aerotri.volume.shared import adjustment_key
 
-    settings.check()
-    chosen(executor)
     record = (result if isinstance(result, Adjustment) else open_result(result)).record
     rows, paths = rows_and_files(record, photographs, chosen_rows(record, "all"))
     key = adjustment_key(record)

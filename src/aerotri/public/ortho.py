@@ -21,7 +21,7 @@ from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
 from aerotri.public.surfaces import as_surface
 from aerotri.public.terrain import ENDINGS
-from aerotri.public.tile_folder import fingerprints, open_tiles
+from aerotri.public.tile_folder import fingerprints, held_tiles, open_tiles
 from aerotri.public.used_arguments import used_settings
 from aerotri.results.head import Head
 from aerotri.terrain.ortho.settings import DEFAULTS, OrthoSettings, Sampling
@@ -161,7 +161,7 @@ def orthophoto(
     layer : surface of a terrain model: with objects (dsm) or without (dtm).
     plots : draw the orthophoto and the points in it.
     tiles : folder for the tiles of the orthophoto; a run that was ended goes on with those it finds there. None: they
-        are not kept.
+        are not kept. No other run may write there meanwhile.
     executor : where the tiles are made: 'threads', 'processes:N', 'dask:ADDRESS' or 'dask:local:N'.
     progress : as of `aerotri.adjust`.
 
@@ -204,13 +204,22 @@ def make_ortho(
     ------
     InputError, TasksFailedError
     """
+    settings.check()
+    chosen(executor)
+    refuse_foreign_folder(out, RECORD)
+    with held_tiles(tiles):
+        return _made(result, photographs, surface, out, settings, plots, tiles, progress, executor)
+
+
+def _made(
+    result: Adjustment | FilePath, photographs: Sequence[Path], surface: SurfaceLike, out: Path,
+    settings: OrthoSettings, plots: bool, tiles: Path | None, progress: ProgressLike, executor: str,
+) -> Orthophoto:  # fmt: skip
     from aerotri.formats.files.atomic import atomic_folder, room_beside
     from aerotri.rasters.grids import horizontal_crs
     from aerotri.terrain.ortho.make import make_orthophoto
 
-    settings.check()
     in_threads = chosen(executor).kind == "threads"
-    refuse_foreign_folder(out, RECORD)
     record = (result if isinstance(result, Adjustment) else open_result(result)).record
     taken = _photographs(record, photographs)
     ground = as_surface(surface, LAYER)

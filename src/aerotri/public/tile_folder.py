@@ -6,12 +6,14 @@ import hashlib
 import json
 import shutil
 from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
 from aerotri.conventions import InputError
 from aerotri.formats.files.ownership import told_by
 from aerotri.formats.files.places import not_written
+from aerotri.formats.files.work_place import held
 from aerotri.version import __version__
 
 STATED = "tiles.json"
@@ -21,6 +23,17 @@ SUFFIXES = (".npz", ".part", ".shared")
 def tiles_beside(target: Path) -> Path:
     """Where the tiles of a result are kept until it is written."""
     return target.with_name(f"{target.name}.tiles")
+
+
+def held_tiles(folder: Path | None) -> AbstractContextManager[None]:
+    """Keep other runs from the tiles while they are made; nothing is kept where there is no folder.
+
+    Raises
+    ------
+    InputError
+        When another run writes there.
+    """
+    return nullcontext() if folder is None else held(folder)
 
 
 def remove_tiles(folder: Path) -> None:

@@ -213,8 +213,8 @@ def block_files() -> tuple[DescribedFile, ...]:
             "parts.json",
             DIVIDED,
             "json",
-            "The parts of a block in parts, also of convert --parts and simulate --parts. A part that is listed and not there, "
-            "or there and not listed, stops adjust. Without this file every folder in parts is a part.",
+            "The parts of a block in parts, also of convert --parts and simulate --parts. If one is listed and not "
+            "there, or there and not listed, adjust stops. Without this file every folder in parts is a part.",
             PARTS_JSON,
         ),
         DescribedFile("parts", DIVIDED, "folder", "The parts, each a block folder under its name."),
