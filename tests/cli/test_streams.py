@@ -61,6 +61,18 @@ def test_what_cannot_be_printed_is_told(arguments, unbuffered):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere a folder in use stays")
+@pytest.mark.parametrize("arguments", [("adjust", "block"), ("compare", "a.tif", "b.tif"), ("simulate", "plan.toml")])
+def test_a_current_folder_that_is_gone_is_told(arguments, tmp_path):
+    words = [*arguments, "--out", "out"] if arguments[0] == "simulate" else arguments
+    (tmp_path / "gone").mkdir()
+    go = f"import os; os.chdir({str(tmp_path / 'gone')!r}); os.rmdir({str(tmp_path / 'gone')!r})"
+    done = ended(*words, before=go)
+    assert done.returncode == 2
+    said = "aerotri: the current folder is not there any more — change to another folder: cd FOLDER\n"
+    assert (done.stdout, done.stderr) == ("", said)
+
+
 def test_a_signal_stays_ours_beside_pycolmap():
     done = subprocess.run([sys.executable, "-c", IN_A_THREAD], capture_output=True, text=True, timeout=120, check=False)
     assert done.stdout.split("\n") == ["ours", "goes on", ""], done.stderr

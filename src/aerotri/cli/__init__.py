@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import errno
 import io
 import os
 import sys
@@ -136,7 +137,7 @@ def _unexpected(error: Exception) -> int:
     if isinstance(error, MemoryError):
         text = f": {error}" if str(error) else ""
         return _told(f"aerotri: not enough memory{text} — give less at a time, or use a larger machine", BAD_INPUT)
-    if isinstance(error, OSError) and not error.filename:
+    if isinstance(error, OSError) and not error.filename and error.errno in (*NO_SPACE, errno.EIO):
         lost = _lost_output(tried=True)
         if lost is not None:
             return _told(_about_lost(lost), BAD_INPUT)
@@ -144,6 +145,11 @@ def _unexpected(error: Exception) -> int:
         from aerotri.formats.files.places import full_disk
 
         return _told(f"aerotri: {full_disk(error.filename, error)}", BAD_INPUT)
+    if isinstance(error, FileNotFoundError) and not error.filename:
+        from aerotri.formats.files.places import is_current_folder_gone, not_written
+
+        if is_current_folder_gone():
+            return _told(f"aerotri: {not_written(None, error)}", BAD_INPUT)
     if isinstance(error, FileNotFoundError) and "temporary directory" in str(error):
         # of tempfile, when none of its folders takes a file
         remedy = "free some space on their disk, or let TMPDIR name another folder"

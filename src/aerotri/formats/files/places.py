@@ -75,6 +75,8 @@ def not_written(target: FilePath | None, error: Exception) -> InputError:
         return full_disk(target, error)
     reason = " ".join(str(getattr(error, "strerror", None) or error).split())
     given = None if target is None else Path(target)
+    if code == errno.ENOENT and (given is None or not given.is_absolute()) and is_current_folder_gone():
+        return InputError("the current folder is not there any more", "change to another folder: cd FOLDER")
     if code == errno.ELOOP:
         reason = "its symbolic links form a loop"
     elif given is not None and code == errno.ENAMETOOLONG:
@@ -102,6 +104,15 @@ def full_disk(target: FilePath | None, error: Exception | None = None, remedy: s
     for folder in _full_folders() if file is None else (existing_folder(file),):
         reason += f"; {_free_in_words(folder)} free in '{folder}'"
     return InputError(reason, remedy, file)
+
+
+def is_current_folder_gone() -> bool:
+    """Whether the folder that the program was started in was removed, so that relative paths lead nowhere."""
+    try:
+        os.getcwd()
+    except OSError:
+        return True
+    return False
 
 
 def existing_folder(place: FilePath) -> Path:
