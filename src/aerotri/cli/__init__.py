@@ -45,6 +45,8 @@ __all__ = [
 FAILED, BAD_INPUT, BUG = 1, 2, 3
 """Exit status for work without a result, for input that cannot be used, the same as typer's for a bad command line, and
 for an error of the program itself."""
+OUT_OF_MEMORY = ("failed to map segment", "annot allocate memory", "cannot create shared object descriptor")
+"""What the loader of glibc says of a library for which there is no room."""
 UsageError: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
 """What typer raises for a command line that cannot be read; where the class stands depends on its version."""
 
@@ -137,6 +139,9 @@ def _unexpected(error: Exception) -> int:
     if isinstance(error, MemoryError):
         text = f": {error}" if str(error) else ""
         return _told(f"aerotri: not enough memory{text} — give less at a time, or use a larger machine", BAD_INPUT)
+    library = _about_library(error)
+    if library:
+        return _told(library, BAD_INPUT)
     if isinstance(error, OSError) and not error.filename and error.errno in (*NO_SPACE, errno.EIO):
         lost = _lost_output(tried=True)
         if lost is not None:
@@ -165,6 +170,22 @@ def _told(text: str, code: int) -> int:
         # with stderr closed, print writes nowhere
         print(text, file=sys.stderr, flush=True)
     return code
+
+
+def _about_library(error: Exception) -> str:
+    """The line on a library that could not be loaded, '' where the error is another one or a module of ours."""
+    said, chain = " ".join(str(error).split())[:300], list[BaseException]()
+    link: BaseException | None = error
+    while link is not None and link not in chain:
+        chain.append(link)
+        link = link.__cause__ or link.__context__
+    is_library = isinstance(error, ImportError) or "shared object" in said
+    if not is_library or str(getattr(error, "name", "") or "").startswith("aerotri"):
+        return ""
+    if any(text in str(one) or isinstance(one, MemoryError) for one in chain for text in OUT_OF_MEMORY):
+        remedy = "close other programs, raise the limit of memory (ulimit -v), or use a larger machine"
+        return f"aerotri: not enough memory to load a library: {said} — {remedy}"
+    return f"aerotri: a library could not be loaded: {said} — install aerotri again into a new environment"
 
 
 def _lost_output(tried: bool = False) -> OSError | None:
