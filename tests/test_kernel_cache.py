@@ -155,12 +155,13 @@ def test_a_full_disk_keeps_nothing_and_stops_nobody(environment, tmp_path):
         assert begun(environment, CALL).communicate(timeout=120)[0].split() == ["12.0", misses]
 
 
-def test_an_index_that_cannot_be_read_or_replaced_stops_nobody(environment, tmp_path):
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+def test_a_file_that_cannot_be_read_or_replaced_stops_nobody(environment, tmp_path, ending):
     """A folder stands in its place: a file that may not be read would be one that root may read."""
     assert begun(environment, CALL).communicate(timeout=120)[0].split() == ["8.0", "1"]
-    (index,) = (tmp_path / "kept").rglob("here.twice*.nbi")
-    index.unlink()
-    index.mkdir()
+    (file,) = (tmp_path / "kept").rglob(f"here.twice*.{ending}")
+    file.unlink()
+    file.mkdir()
     process = subprocess.Popen(
         [sys.executable, "-c", CALL], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -168,6 +169,18 @@ def test_an_index_that_cannot_be_read_or_replaced_stops_nobody(environment, tmp_
     assert said.split() == ["begins", "8.0", "1"]
     # it cannot be replaced either
     assert "cannot be stored" in warned
+    assert os.name == "nt" or str(file) in warned
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links of a system")
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+def test_a_link_to_what_is_not_there_is_replaced(environment, tmp_path, ending):
+    assert begun(environment, CALL).communicate(timeout=120)[0].split() == ["8.0", "1"]
+    (file,) = (tmp_path / "kept").rglob(f"here.twice*.{ending}")
+    file.unlink()
+    file.symlink_to(tmp_path / "nowhere")
+    for misses in ("1", "0"):
+        assert begun(environment, CALL).communicate(timeout=120)[0].split() == ["8.0", misses]
 
 
 def test_the_digest_reads_every_module_that_kernels_import():

@@ -118,7 +118,9 @@ class SharedCache(FunctionCache):
         try:
             super().save_overload(sig, data)
         except OSError as error:
-            self._say_not_kept(error.strerror or str(error))
+            # of a file that was to take its name, where a folder has it
+            place = f": '{error.filename2}'" if isinstance(error, IsADirectoryError) and error.filename2 else ""
+            self._say_not_kept((error.strerror or str(error)) + place)
         finally:
             self._let_go()
 

@@ -24,6 +24,31 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
         fingerprints([tmp_path / "no_dsm"])
 
 
+@pytest.mark.parametrize("name", [STATED, "level0_0_0.npz"])
+def test_a_folder_in_place_of_a_file_is_named(tmp_path, name):
+    open_tiles(tmp_path, {"cell": 1.0})
+    (tmp_path / name).unlink(missing_ok=True)
+    (tmp_path / name).mkdir()
+    for cell in (1.0, 2.0):
+        with pytest.raises(InputError, match=f"{name}: is a folder, where files of tiles belong — remove it"):
+            open_tiles(tmp_path, {"cell": cell})
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links of a system")
+def test_links_to_what_is_not_there_are_replaced_or_told(tmp_path):
+    open_tiles(tmp_path / "tiles", {"cell": 1.0})
+    whole = (tmp_path / "tiles" / STATED).read_bytes()
+    for name in (STATED, "level0_0_0.npz"):
+        (tmp_path / "tiles" / name).unlink(missing_ok=True)
+        (tmp_path / "tiles" / name).symlink_to(tmp_path / "nowhere" / "x")
+    open_tiles(tmp_path / "tiles", {"cell": 1.0})
+    assert (tmp_path / "tiles" / STATED).read_bytes() == whole
+    assert [path.name for path in (tmp_path / "tiles").iterdir()] == [STATED]
+    (tmp_path / "lost").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="lost: cannot be written: it is a link to what is not there"):
+        open_tiles(tmp_path / "lost", {"cell": 1.0})
+
+
 @pytest.mark.parametrize("damage", [b"\xff\xfe\x80", b"{", b""])
 def test_tiles_whose_run_is_not_known_are_removed(tmp_path, damage):
     open_tiles(tmp_path, {"cell": 1.0})

@@ -69,6 +69,9 @@ def open_tiles(folder: Path, stated: Mapping[str, Any]) -> None:
     there = folder / STATED
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        blocked = next((path for path in folder.iterdir() if path.is_dir()), None)
+        if blocked is not None:
+            raise InputError("is a folder, where files of tiles belong", "remove it, or give another folder", blocked)
         held = [path for path in folder.iterdir() if path.name != STATED]
         if any(path.suffix not in SUFFIXES for path in held):
             raise InputError("holds other files than tiles", "give another folder for the tiles", folder)
@@ -76,6 +79,8 @@ def open_tiles(folder: Path, stated: Mapping[str, Any]) -> None:
             return
         for path in held:
             path.unlink()
+        # a link would be written through
+        there.unlink(missing_ok=True)
         there.write_text(mark, encoding="utf-8")
     except OSError as error:
         raise not_written(folder, error) from error

@@ -83,7 +83,8 @@ def not_written(target: FilePath | None, error: Exception) -> InputError:
         reason = f"the name has {max(map(len, given.parts))} letters, which is too long"
     elif given is not None and code in (errno.ENOTDIR, errno.EEXIST):
         above = [place for place in given.parents if os.path.lexists(place) and not place.is_dir()]
-        reason = f"'{above[0]}' is no folder" if above else reason
+        is_lost = os.path.islink(given) and not given.exists()
+        reason = "it is a link to what is not there" if is_lost else f"'{above[0]}' is no folder" if above else reason
     return InputError(f"cannot be written: {reason}", REMEDY, target)
 
 
