@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 
 import pytest
 
@@ -13,7 +14,7 @@ IN_A_THREAD = """
 import signal, threading
 signal.signal(signal.SIGTERM, lambda *_: print("ours", flush=True))
 def imported():
-    from aerotri.colmap_library import pycolmap
+    import {}
 thread = threading.Thread(target=imported)
 thread.start()
 thread.join()
@@ -73,6 +74,13 @@ def test_a_current_folder_that_is_gone_is_told(arguments, tmp_path):
     assert (done.stdout, done.stderr) == ("", said)
 
 
-def test_a_signal_stays_ours_beside_pycolmap():
-    done = subprocess.run([sys.executable, "-c", IN_A_THREAD], capture_output=True, text=True, timeout=120, check=False)
+@pytest.mark.parametrize(
+    ("library", "module"), [("pycolmap", "aerotri.colmap_library"), ("pyceres", "aerotri.crosscheck.ceres_solver")]
+)
+def test_a_signal_stays_ours_beside_a_library(library, module):
+    if find_spec(library) is None:
+        pytest.skip(f"{library} is not installed")
+    done = subprocess.run(
+        [sys.executable, "-c", IN_A_THREAD.format(module)], capture_output=True, text=True, timeout=120, check=False
+    )
     assert done.stdout.split("\n") == ["ours", "goes on", ""], done.stderr
