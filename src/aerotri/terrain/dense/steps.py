@@ -13,7 +13,7 @@ import numpy as np
 
 from aerotri.terrain.dense.cell_scale import CellScale, middle_height, square, sum_about
 
-STEP_SHARE, STRAIGHT_SHARE = 0.5, 0.25
+STEP_SHARE, STRAIGHT_SHARE = 0.55, 0.24
 """Of a step that is σ of the cells beside it, where steps about them run in all directions, as crowns of trees have
 them, and where they run straight, as at houses and walls; chosen [C] with the rest of this module on rendered houses,
 walls, trees and few photographs (tools/prove/dense_surface.py)."""
@@ -70,7 +70,7 @@ def others_seen(z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: C
 def step_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
     """(rows, columns) m, σ of a cell by the step that it lies beside; 0 where there is none.
 
-    A share of the step, half of it where the step runs straight and more than one pair saw the cell.
+    A share of the step, less than half of it where the step runs straight and more than one pair saw the cell.
     """
     known = np.isfinite(z)
     if not known.any():
