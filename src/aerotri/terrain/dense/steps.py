@@ -19,8 +19,8 @@ them, and where they run straight, as at houses and walls; chosen [C] with the r
 walls, trees and few photographs (tools/prove/dense_surface.py)."""
 CROOKED, STRAIGHT = 0.4, 0.8
 """Straightness up to which a step counts whole, and from which on as a straight one."""
-STEEPEST_PX = 2.0
-"""Of parallax from cell to cell; a higher step tells its direction no better."""
+FLATTEST_PX, STEEPEST_PX = 0.01, 2.0
+"""Of parallax from cell to cell: less is rounding; a higher step tells its direction no better."""
 LEAST_STEP_PX, LEAST_HIDDEN_PX = 0.9, 0.5
 """Of parallax, from which on heights differ by a step, and where a hole may hide the rest of it; chosen [C]."""
 LARGEST_STEP_PX = (np.inf, 6.0, 1.1)
@@ -85,8 +85,15 @@ def step_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -
 
 
 def spikes(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
-    """(rows, columns) which cells one pair alone saw, and stand out from all that is as wide as a window."""
-    least = np.maximum(SPIKE_PX * scale.pixel, SPIKE_SIGMAS * noise)
+    """(rows, columns) which cells one pair alone saw, and stand out from all that is as wide as a window.
+
+    By what the slope of the ground does over half a window they may stand out more: the ridge of a roof is no spike.
+    """
+    known = np.isfinite(z)
+    if not known.any():
+        return known
+    ridge = scale.lag * _slope(np.where(known, z - middle_height(z), 0.0).astype(np.float32), known)
+    least = np.maximum(SPIKE_PX * scale.pixel, SPIKE_SIGMAS * noise) + ridge
     return (seen.agreeing < 2) & (standing_out(z, scale.window) >= least)
 
 
@@ -110,23 +117,25 @@ def standing_out(z: np.ndarray, side: int) -> np.ndarray:
 
 
 def straightness(above: np.ndarray, known: np.ndarray, scale: CellScale) -> np.ndarray:
-    """(rows, columns) 0 where heights change in all directions alike, to 1 where they change in one.
+    """(rows, columns) 0 where steps run in all directions alike, to 1 where they run in one.
 
-    The coherence of the structure tensor, over two windows of the matching, of the change of heights from cell to cell.
+    The coherence of the structure tensor, over two windows of the matching, of the change of heights from cell to cell,
+    less the slope of the ground.
 
     Parameters
     ----------
     above : (rows, columns) float32 m, heights; those not known do not count.
     """
     whole = cv2.erode(known.view(np.uint8), square(3)) > 0
-    x, y = (
-        cv2.Sobel(above, cv2.CV_32F, *order, ksize=3, scale=1.0 / (8.0 * scale.pixel)) for order in ((1, 0), (0, 1))
+    y, x = (
+        cv2.Sobel(above, cv2.CV_32F, *order, ksize=3, scale=1.0 / (8.0 * scale.pixel)) - _median(change) / scale.pixel
+        for order, change in zip(((0, 1), (1, 0)), _changes(above, known), strict=True)
     )
     change = np.hypot(x, y)
     weight = np.where(whole, np.minimum(change, STEEPEST_PX) / np.maximum(change, 1e-9), 0.0).astype(np.float32)
     x, y = x * weight, y * weight
     xx, xy, yy = (cv2.blur(product, (scale.around, scale.around)) for product in (x * x, x * y, y * y))
-    return np.hypot(xx - yy, 2.0 * xy) / np.maximum(xx + yy, 1e-9)
+    return np.hypot(xx - yy, 2.0 * xy) / np.maximum(xx + yy, FLATTEST_PX**2)
 
 
 def _step(
@@ -163,15 +172,26 @@ def _slope(z: np.ndarray, known: np.ndarray) -> np.ndarray:
 
     The median of a square of 5 × 5 cells, which a wall does not change.
     """
-    total = np.zeros(z.shape, np.float32)
+    along_columns, along_rows = (_median(np.abs(change)) for change in _changes(z, known))
+    return along_columns + along_rows
+
+
+def _changes(z: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, columns) m, of heights to the next row, and to the next column; 0 where one of them is not known."""
+    found = []
     for axis in (0, 1):
         if z.shape[axis] < 2:
+            found.append(np.zeros(z.shape, np.float32))
             continue
         ahead, behind = (known[1:], known[:-1]) if axis == 0 else (known[:, 1:], known[:, :-1])
-        change = np.abs(np.diff(z, axis=axis)) * (ahead & behind)
-        change = np.concatenate([change, np.take(change, [-1], axis)], axis)
-        total += cv2.medianBlur(np.ascontiguousarray(change), 5)
-    return total
+        change = np.diff(z, axis=axis) * (ahead & behind)
+        found.append(np.concatenate([change, np.take(change, [-1], axis)], axis))
+    return found[0], found[1]
+
+
+def _median(values: np.ndarray) -> np.ndarray:
+    """(rows, columns) float32, of a square of 5 × 5 cells."""
+    return cv2.medianBlur(np.ascontiguousarray(values), 5)
 
 
 def _less(values: np.ndarray, level: np.ndarray | float) -> np.ndarray:
