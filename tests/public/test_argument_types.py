@@ -69,6 +69,16 @@ def test_other_arguments(flat):
         aerotri.edit(block, off=3)  # pyright: ignore[reportArgumentType]
     with pytest.raises(InputError, match=r"^check is 'C05' — give a list of names$"):
         aerotri.edit(block, check="C05")
+    with pytest.raises(InputError, match=r"^off is of the type list — give a list of names, or of pairs of names$"):
+        aerotri.edit(block, off=[("a",)])  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InputError, match=r"^photographs is 3 — give the path of a file or folder or a list of files"):
+        aerotri.dense_surface("result", 3)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InputError, match=r"^area is 3 — give four numbers$"):
+        aerotri.terrain("result", [], area=3)  # pyright: ignore[reportArgumentType]
+    rays = block.image_points
+    point, image = str(block.points[rays.point[0]]), str(block.images.names[rays.image[0]])
+    for off in ([[point, image]], np.array([[point, image]])):
+        assert aerotri.edit(block, off=off) is not None  # pyright: ignore[reportArgumentType]
 
 
 def test_every_alternative_is_let_through():
@@ -80,8 +90,8 @@ def test_every_alternative_is_let_through():
 
     checked: Any = with_checked_types(taking)
     for surface in ("a", Path("a"), SimpleNamespace(dsm=1, dtm=2)):
-        for cell in (None, 1, 1.5, np.float32(2), np.int64(3)):
+        for cell in (None, 1, 1.5, np.float32(2), np.int64(3), np.array(2.0)):
             for names in ((), ["a", ("b", "c")], np.array(["a"]), {"a"}, iter("a")):
                 assert checked(surface, cell, names=names, other=object(), further=3) is surface
-    with pytest.raises(TypeError, match="missing a required argument"):
+    with pytest.raises(TypeError, match="missing 1 required positional argument: 'surface'"):
         checked()

@@ -8,6 +8,7 @@ import numbers
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping
+from decimal import Decimal
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from aerotri.conventions import InputError
@@ -52,11 +53,32 @@ def _is_surface(value: Any) -> bool:
     )  # fmt: skip
 
 
+def _is_number(value: Any) -> bool:
+    return isinstance(value, numbers.Real | Decimal) or (_of_class("ndarray")(value) and value.ndim == 0)
+
+
+def _are_numbers(value: Any) -> bool:
+    return isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping)
+
+
 def _are_names(value: Any) -> bool:
-    """Texts, or pairs of them; of what can be read only once nothing is read."""
-    if isinstance(value, str | bytes) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) != 1:
+    """Texts; of what can be read only once nothing is read."""
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
         return False
-    return not isinstance(value, list | tuple) or all(isinstance(one, str | tuple) for one in value)
+    return not isinstance(value, list | tuple | set | frozenset) or all(isinstance(one, str) for one in value)
+
+
+def _are_names_or_pairs(value: Any) -> bool:
+    """Texts, or texts by two; of what can be read only once nothing is read."""
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+        return False
+    return not isinstance(value, list | tuple | set | frozenset) or all(
+        isinstance(one, str) or (isinstance(one, list | tuple) and len(one) == 2) for one in value
+    )
+
+
+def _are_paths(value: Any) -> bool:
+    return _are_numbers(value) and (not isinstance(value, list | tuple) or all(_is_path(one) for one in value))
 
 
 KINDS = {
@@ -73,12 +95,14 @@ KINDS = {
     "Mapping[str, BaseGeometry]": Kind(_is_a(Mapping), "polygons by their names"),
     "Table": Kind(_of_class("Table"), "an aerotri.Table"),
     "np.ndarray": Kind(_of_class("ndarray"), "an array of numpy"),
-    "float": Kind(_is_a(numbers.Real), "a number"),
+    "float": Kind(_is_number, "a number"),
     "int": Kind(_is_a(numbers.Integral), "a whole number"),
     "str": Kind(_is_a(str), "a text"),
     "Iterable[str]": Kind(_are_names, "a list of names"),
     "Sequence[str]": Kind(_are_names, "a list of names"),
-    "Iterable[str | tuple[str, str]]": Kind(_are_names, "a list of names, or of pairs of names"),
+    "Iterable[str | tuple[str, str]]": Kind(_are_names_or_pairs, "a list of names, or of pairs of names"),
+    "Sequence[FilePath]": Kind(_are_paths, "a list of files or folders"),
+    "tuple[float, float, float, float]": Kind(_are_numbers, "four numbers"),
 }
 """By what stands in annotations; an argument with anything else in its annotation is left to the function."""
 ALTERNATIVE = re.compile(r"(?:\w[\w.]*)(?:\[.*?\]+)?(?= \||$)")
@@ -101,7 +125,11 @@ def with_checked_types(function: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(function)
     def checked(*given: P.args, **named: P.kwargs) -> R:
-        for name, value in signature.bind(*given, **named).arguments.items():
+        try:
+            arguments = signature.bind(*given, **named).arguments
+        except TypeError:
+            return function(*given, **named)  # Python says what is missing, or too much
+        for name, value in arguments.items():
             _refuse_other(name, value, kinds.get(name, ()))
         return function(*given, **named)
 
@@ -117,8 +145,11 @@ def _kinds_of(annotation: str) -> tuple[Kind, ...]:
 def _refuse_other(name: str, value: Any, kinds: tuple[Kind, ...]) -> None:
     if not kinds or any(kind.holds(value) for kind in kinds):
         return
-    shown = value if value is None or isinstance(value, numbers.Real) else f"'{value}'"
-    if not _is_path(value) and shown is not value:
+    if value is None or isinstance(value, numbers.Real):
+        shown = str(value)
+    elif _is_path(value):
+        shown = f"'{str(os.fspath(value))[:LONGEST_SHOWN]}'"
+    else:
         shown = f"of the type {type(value).__name__}"
     possible = " or ".join(kind.words for kind in kinds if kind.words)
-    raise InputError(f"{name} is {str(shown)[:LONGEST_SHOWN]}", f"give {possible}")
+    raise InputError(f"{name} is {shown}", f"give {possible}")

@@ -19,5 +19,10 @@ def raise_full_disk(path: Path, error: BaseException) -> None:
     ------
     OSError
     """
-    if path.parent.is_dir() and shutil.disk_usage(path.parent).free < LEAST_ROOM:
+    try:
+        usage = shutil.disk_usage(path.parent)
+    except OSError:
+        return
+    # what the system itself shows as files has no size
+    if usage.total > 0 and usage.free < LEAST_ROOM:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path)) from error

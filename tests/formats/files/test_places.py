@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
+import re
 from pathlib import Path
 
 import pytest
@@ -62,13 +62,29 @@ def test_what_can_be_written_stays_as_it_is(tmp_path):
 
 
 def test_a_full_disk_is_told_with_its_folder_and_what_is_free(tmp_path):
-    free = shutil.disk_usage(tmp_path).free
     error = OSError(errno.ENOSPC, "No space left on device", str(tmp_path / ".out.tmp" / "images.csv"))
     said = str(full_disk(tmp_path / "missing" / "out", error))
-    assert f"out: the disk is full; {free / 2**20:.3g} MiB free in '{tmp_path}' — free some space" in said
+    assert re.search(
+        rf"out: the disk is full; [\d.]+ [MG]iB free in '{re.escape(str(tmp_path))}' — free some space", said
+    )
     assert ".out.tmp" not in said, "the place that the user has given"
     assert "quota) is full" in str(not_written(tmp_path / "out", OSError(errno.EDQUOT, "Disk quota exceeded")))
     assert "larger than" in str(not_written(tmp_path / "out", OSError(errno.EFBIG, "File too large")))
+    assert "the disk is full" in str(full_disk(tmp_path / "out", OSError(errno.ENOSPC, "No space", 7)))
+
+
+def test_a_folder_that_is_there_is_enough(tmp_path, monkeypatch):
+    """Files may go into it, where nothing can be made beside it, as in a container."""
+    (tmp_path / "out").mkdir()
+
+    def made(folder: Path) -> None:
+        if folder == tmp_path:
+            raise PermissionError(errno.EACCES, "Permission denied", str(folder))
+
+    monkeypatch.setattr(places, "_try_folder", made)
+    assert refuse_impossible_place(tmp_path / "out") == (tmp_path / "out").resolve()
+    with pytest.raises(InputError, match="Permission denied"):
+        refuse_impossible_place(tmp_path / "other")
 
 
 def test_a_full_disk_elsewhere_is_named(tmp_path, monkeypatch):

@@ -32,13 +32,28 @@ def refuse_impossible_place(target: FilePath) -> Path:
     place = place_of(target)
     folder = existing_folder(place)
     try:
-        os.rmdir(tempfile.mkdtemp(prefix=".", suffix=".aerotri.tmp", dir=folder))
+        try:
+            _try_folder(folder)
+        except PermissionError:
+            if not place.is_dir():
+                raise
+            _try_folder(place)  # files may go into a folder that cannot be exchanged for another
     except OSError as error:
         if error.errno in NO_SPACE:
             raise full_disk(target, error) from error
         reason = f"nothing can be made in '{folder}' ({error.strerror})"
         raise InputError(f"cannot be written: {reason}", REMEDY, target) from error
     return place
+
+
+def _try_folder(folder: Path) -> None:
+    """Make an empty folder in another, and remove it.
+
+    Raises
+    ------
+    OSError
+    """
+    os.rmdir(tempfile.mkdtemp(prefix=".", suffix=".aerotri.tmp", dir=folder))
 
 
 def place_of(target: FilePath) -> Path:
@@ -96,14 +111,17 @@ def full_disk(target: FilePath | None, error: Exception | None = None, remedy: s
     target : what was to be written; None where it is not known. error : its file tells the place, where it is on
         another disk than the target. remedy : what the user can do.
     """
-    file = _on_another_disk(getattr(error, "filename", None), target)
+    named = getattr(error, "filename", None)
+    file = _on_another_disk(named if isinstance(named, str | os.PathLike) else None, target)
+    code = getattr(error, "errno", None)
+    if code == errno.EDQUOT:
+        return InputError("the share of the disk that you may use (quota) is full", remedy, file)
+    if code == errno.EFBIG:
+        return InputError("the file is larger than this disk, or the limit of the system, allows", remedy, file)
     reason = "the disk is full"
-    if getattr(error, "errno", None) == errno.EDQUOT:
-        reason = "the share of the disk that you may use (quota) is full"
-    elif getattr(error, "errno", None) == errno.EFBIG:
-        reason = "the file is larger than this disk, or the limit of the system, allows"
-    for folder in _full_folders() if file is None else (existing_folder(file),):
-        reason += f"; {_free_in_words(folder)} free in '{folder}'"
+    with contextlib.suppress(OSError):  # the current folder may be gone
+        for folder in _full_folders() if file is None else (existing_folder(file),):
+            reason += f"; {_free_in_words(folder)} free in '{folder}'"
     return InputError(reason, remedy, file)
 
 
@@ -193,6 +211,7 @@ def is_full(folder: Path) -> bool:
 
 def _free_in_words(folder: Path) -> str:
     try:
-        return f"{shutil.disk_usage(folder).free / 2**20:.3g} MiB"
+        free = shutil.disk_usage(folder).free
     except OSError:
         return "unknown space"
+    return f"{free / 2**30:.1f} GiB" if free >= 2**30 else f"{free / 2**20:.1f} MiB"
