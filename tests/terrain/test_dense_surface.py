@@ -31,8 +31,6 @@ from aerotri.terrain.dense.steps import (
     STEP_SHARE,
     STRAIGHT_SHARE,
     others_seen,
-    spikes,
-    standing_out,
     step_sigma,
     straightness,
 )
@@ -381,47 +379,6 @@ def test_a_slope_beside_a_hole_is_no_straight_step():
         found = by_step(z, np.full(z.shape, 0.05), heights=np.repeat(z[None], 2, axis=0))
         shares.append(float(np.median(found[(far > 8.0) & (far < 10.0) & (found > 0.0)])))
     assert shares[1] == pytest.approx(shares[0], rel=0.25)
-
-
-def test_the_ridge_of_a_roof_is_no_spike():
-    columns = np.arange(60) + np.zeros((60, 1))
-    for slope in (0.5, 1.0, 2.0):  # pixels of parallax from cell to cell
-        z = 100.0 + slope * np.maximum(15.0 - np.abs(columns - 30.0), 0.0)
-        seen = others_seen(z, z[None], np.full((1, 60, 60), 0.05), SCALE)
-        assert not spikes(z, np.full(z.shape, 0.05), seen, SCALE).any()
-
-
-def test_what_is_narrower_than_a_square_stands_out_of_it():
-    rows, columns = np.mgrid[0:40, 0:40]
-    z = 100.0 + 0.5 * rows - 0.3 * columns
-    assert standing_out(z, 5) == pytest.approx(0.0, abs=1e-4)
-    step = 100.0 + 0.5 * rows + 9.0 * (columns > 30)
-    assert standing_out(step, 5) == pytest.approx(0.0, abs=1e-4)
-    z = np.full(rows.shape, 100.0)
-    z[10:14, 8:20] += 3.0  # four cells wide
-    z[25, 12] -= 6.0
-    found = standing_out(z, 5)
-    assert found[10:14, 8:20] == pytest.approx(3.0)
-    assert found[25, 12] == pytest.approx(6.0)
-    assert np.count_nonzero(found) == 4 * 12 + 1
-    assert np.count_nonzero(standing_out(z, 3)) == 1
-    z[5:9, 5:9] = np.nan
-    assert (standing_out(z, 5)[5:9, 5:9] == 0.0).all()
-    assert (standing_out(np.full((6, 6), np.nan), 5) == 0.0).all()
-
-
-def test_a_spike_is_what_one_pair_alone_saw():
-    z = np.full((30, 30), 100.0)
-    z[15, 15:17] += 4.0
-    pairs = np.full((2, 30, 30), 100.0)
-    pairs[:, 15, 15:17] = z[15, 15:17]
-    pairs[1, 15, 15] = 100.0  # the other pair sees the ground there
-    seen = others_seen(z, pairs, np.full(pairs.shape, 0.05), SCALE)
-    found = spikes(z, np.full(z.shape, 0.05), seen, SCALE)
-    assert found[15, 15]
-    assert found.sum() == 1
-    # as large as its noise it may be noise
-    assert not spikes(z, np.full(z.shape, 1.5), seen, SCALE).any()
 
 
 def test_a_hole_may_hide_a_step():

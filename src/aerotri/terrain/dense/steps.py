@@ -1,7 +1,7 @@
 """σ of cells beside steps: they may have the height of the other side, and windows of the matching blur low steps.
 
 Neither shows in the images that were matched: what they leave is small on the wrong side too. It shows in the heights
-themselves: in steps, in how straight they are, in what stands out from its surroundings, and in pairs that contradict.
+themselves: in steps, in how straight they are, and in pairs that contradict.
 """
 
 from __future__ import annotations
@@ -26,10 +26,6 @@ LEAST_STEP_PX, LEAST_HIDDEN_PX = 0.9, 0.5
 LARGEST_STEP_PX = (np.inf, 6.0, 1.1)
 """Of parallax, that count where one pair, two, three or more agree on a height; chosen [C]: what several pairs see
 alike is seldom the height of the other side, but a window across a step blurs it for all of them."""
-SPIKE_PX, SPIKE_SIGMAS = 1.0, 4.0
-"""Of parallax, and σ of its noise, by which a cell that one pair alone saw stands out when it is a spike; chosen [C]: a
-third to two thirds of those of rendered houses, walls and trees, and five of six with few photographs, are wrong by
-most of it."""
 STEP_SIGMAS = 6.0
 """σ of the noise that a step is larger than: the range of some twenty cells reaches five."""
 CONTRADICTED_SIGMAS = 4.0
@@ -82,38 +78,6 @@ def step_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -
     straight = np.clip((straightness(above, known, scale) - CROOKED) / (STRAIGHT - CROOKED), 0.0, 1.0)
     share = np.where(seen.agreeing < 2, STEP_SHARE, STEP_SHARE + (STRAIGHT_SHARE - STEP_SHARE) * straight)
     return np.where(known, share * np.minimum(step, most), 0.0)
-
-
-def spikes(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
-    """(rows, columns) which cells one pair alone saw, and stand out from all that is as wide as a window.
-
-    By what the slope of the ground does over half a window they may stand out more: the ridge of a roof is no spike.
-    """
-    known = np.isfinite(z)
-    if not known.any():
-        return known
-    ridge = scale.lag * _slope(np.where(known, z - middle_height(z), 0.0).astype(np.float32), known)
-    least = np.maximum(SPIKE_PX * scale.pixel, SPIKE_SIGMAS * noise) + ridge
-    return (seen.agreeing < 2) & (standing_out(z, scale.window) >= least)
-
-
-def standing_out(z: np.ndarray, side: int) -> np.ndarray:
-    """(rows, columns) m, by which a cell is above, or below, every square of `side` cells that it lies in.
-
-    It is the height less that of the morphological opening, or that of the closing less the height: 0 on a plane, at a
-    straight step between level grounds, and where there is no height.
-    """
-    found = np.zeros(z.shape, np.float32)
-    known = np.pad(np.isfinite(z), side)  # squares may reach beyond the edge
-    if not known.any():
-        return found
-    inside = (slice(side, -side),) * 2
-    for sign in (1.0, -1.0):
-        height = np.where(known, np.pad(sign * (z - middle_height(z)), side), UNKNOWN).astype(np.float32)
-        lowest = cv2.erode(height, square(side))
-        opened = cv2.dilate(np.where(lowest < UNKNOWN, lowest, -UNKNOWN), square(side))
-        np.maximum(found, (height - opened)[inside], out=found, where=known[inside])
-    return found
 
 
 def straightness(above: np.ndarray, known: np.ndarray, scale: CellScale) -> np.ndarray:

@@ -18,7 +18,7 @@ from aerotri.terrain.dense.height_range import HeightRange
 from aerotri.terrain.dense.pairs import Candidate, Pair, chosen_pairs, noise_correlation, pair_for_holes, possible_pairs
 from aerotri.terrain.dense.parallaxes import Parallaxes, parallaxes_of
 from aerotri.terrain.dense.place import Place, place_at
-from aerotri.terrain.dense.steps import others_seen, spikes
+from aerotri.terrain.dense.steps import others_seen
 from aerotri.terrain.photographs import Photographs
 
 LARGEST_JUMP_PX = 1.5
@@ -259,8 +259,7 @@ def _fused(
     seen = others_seen(z, heights, sigmas, scale)
     noise = sigma * factor
     sigma = cell_sigma(z, noise, seen, scale)
-    out |= spikes(z, noise, seen, scale)
-    z[out], sigma[out], members[out] = np.nan, np.nan, 0
+    members[out] = 0
     count, first = _seen_by(members, np.array(photographs))
     return z + height, sigma, count, first, factor, _shared_cells(level, sigmas)
 
