@@ -446,8 +446,7 @@ def test_a_pair_far_from_the_surface_contradicts_it():
     np.testing.assert_array_equal(seen.agreeing, [[2, 1, 0]])
     far = np.repeat(np.repeat(z, 20, axis=1), 20, axis=0)
     pairs = np.repeat(np.repeat(heights, 20, axis=2), 20, axis=1)
-    seen_far = others_seen(far, pairs, np.full(pairs.shape, 0.1), SCALE)
-    sigma = cell_sigma(far, np.full(far.shape, 0.07), seen_far, SCALE)
+    sigma = cell_sigma(far, np.full(far.shape, 0.07), pairs, np.full(pairs.shape, 0.1), SCALE)
     assert (sigma[:, 25:35] > 1.0).all()
     assert (sigma[:, :15] < 0.1).all()
 

@@ -10,6 +10,16 @@ from pathlib import Path
 from aerotri.conventions import LEAST_ROOM
 
 
+def is_full(folder: Path) -> bool:
+    """Whether nothing more can be written there."""
+    try:
+        usage = shutil.disk_usage(folder)
+    except OSError:
+        return False
+    # what the system itself shows as files has no size
+    return usage.total > 0 and usage.free < LEAST_ROOM
+
+
 def raise_full_disk(path: Path, error: BaseException) -> None:
     """Raise the error of a full disk in place of another one, where the disk of a file is full.
 
@@ -19,10 +29,5 @@ def raise_full_disk(path: Path, error: BaseException) -> None:
     ------
     OSError
     """
-    try:
-        usage = shutil.disk_usage(path.parent)
-    except OSError:
-        return
-    # what the system itself shows as files has no size
-    if usage.total > 0 and usage.free < LEAST_ROOM:
+    if is_full(path.parent):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path)) from error

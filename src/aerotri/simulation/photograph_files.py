@@ -13,6 +13,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.files.atomic import atomic_file
+from aerotri.formats.files.places import existing_folder
 from aerotri.formats.results.json_text import write_json
 from aerotri.observations import Block
 from aerotri.rasters.images import create_image
@@ -148,7 +149,7 @@ def _write_tiff(scene: Scene, image: int, path: Path, report: Report) -> None:
 def _refuse_without_room(scene: Scene, chosen: Sequence[int], folder: Path) -> None:
     """Photographs are as large as their pixels, 16 bit each."""
     needed = sum(2.0 * float(np.prod(scene.camera(image).nominal.size_px, dtype=float)) for image in chosen)
-    free = shutil.disk_usage(next(p for p in folder.resolve().parents if p.is_dir())).free
+    free = shutil.disk_usage(existing_folder(folder.resolve())).free
     if needed > free:
         raise InputError(
             f"{len(chosen)} photographs need {needed / 2**30:.3g} GiB, {free / 2**30:.3g} GiB of the disk are free",

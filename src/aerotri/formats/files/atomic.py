@@ -16,8 +16,9 @@ from pathlib import Path
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.formats.files.ownership import carry_over, record_files
-from aerotri.formats.files.places import full_disk, is_full, not_written, place_of
+from aerotri.formats.files.places import full_disk, not_written, place_of
 from aerotri.formats.files.work_place import OLDER, work_place, written
+from aerotri.rasters.room import is_full
 
 AT_FDCWD = -100
 """Of linux/fcntl.h: paths count from the working directory."""

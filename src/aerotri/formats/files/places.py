@@ -10,8 +10,9 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from aerotri.conventions import LEAST_ROOM, FilePath, InputError
+from aerotri.conventions import FilePath, InputError
 from aerotri.execution.work import NO_SPACE
+from aerotri.rasters.room import is_full
 
 LONGEST_ADDITION = ".00000000.aerotri.tmp"
 """What hidden names beside a target have more than its own, at most."""
@@ -197,16 +198,6 @@ def _full_folders() -> Iterator[Path]:
     for name in dict.fromkeys((os.curdir, os.environ.get("TMPDIR", "/tmp"))):
         if is_full(Path(name)):
             yield Path(os.path.abspath(name))
-
-
-def is_full(folder: Path) -> bool:
-    """Whether nothing more can be written there."""
-    try:
-        usage = shutil.disk_usage(folder)
-    except OSError:
-        return False
-    # what the system itself shows as files has no size
-    return usage.total > 0 and usage.free < LEAST_ROOM
 
 
 def _free_in_words(folder: Path) -> str:

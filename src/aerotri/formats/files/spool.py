@@ -10,7 +10,8 @@ import weakref
 from pathlib import Path
 
 from aerotri.conventions import FilePath
-from aerotri.formats.files.places import full_disk, is_full
+from aerotri.formats.files.places import full_disk
+from aerotri.rasters.room import is_full
 
 
 class Spool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.terrain.dense.cell_scale import CellScale, sum_about
-from aerotri.terrain.dense.steps import STEP_SIGMAS, Seen, step_sigma
+from aerotri.terrain.dense.steps import STEP_SIGMAS, others_seen, step_sigma
 
 NOISE_SHARE, ROUGH_SHARE = 0.81, 0.65
 """Of the σ of the matching, and of the scatter of heights about their neighbours, that are σ of a cell; chosen [C]: the
@@ -13,16 +13,18 @@ two that make errors of rendered scenes most likely, on smooth, noisy and rough 
 (tools/prove/dense_surface.py)."""
 
 
-def cell_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
+def cell_sigma(
+    z: np.ndarray, noise: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: CellScale
+) -> np.ndarray:
     """(rows, columns) m, σ of the cells of a surface.
 
     Parameters
     ----------
     z, noise : (rows, columns) m, heights, NaN where there is none, and their σ by the matching.
-    seen : what pairs saw in the cells.
+    heights, sigmas : (pairs, rows, columns) m of which they were fused.
     """
     rough = roughness(z, scale.lag, np.maximum(scale.pixel, np.sqrt(6.0) * STEP_SIGMAS * noise))
-    beside = step_sigma(z, noise, seen, scale)
+    beside = step_sigma(z, noise, others_seen(z, heights, sigmas, scale), scale)
     return np.sqrt((NOISE_SHARE * noise) ** 2 + (ROUGH_SHARE * rough) ** 2 + beside**2)
 
 

@@ -66,7 +66,7 @@ def others_seen(z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: C
 def step_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
     """(rows, columns) m, σ of a cell by the step that it lies beside; 0 where there is none.
 
-    A share of the step, less than half of it where the step runs straight and more than one pair saw the cell.
+    A share of the step; where it runs straight, and at least two pairs agree on the height, less than half of that.
     """
     known = np.isfinite(z)
     if not known.any():

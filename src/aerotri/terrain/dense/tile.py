@@ -18,7 +18,6 @@ from aerotri.terrain.dense.height_range import HeightRange
 from aerotri.terrain.dense.pairs import Candidate, Pair, chosen_pairs, noise_correlation, pair_for_holes, possible_pairs
 from aerotri.terrain.dense.parallaxes import Parallaxes, parallaxes_of
 from aerotri.terrain.dense.place import Place, place_at
-from aerotri.terrain.dense.steps import others_seen
 from aerotri.terrain.photographs import Photographs
 
 LARGEST_JUMP_PX = 1.5
@@ -251,15 +250,12 @@ def _fused(
     tolerance = AGREEING_PX * scale.pixel
     kernels.fuse(heights, sigmas, correlation, used, AGREEING_SIGMAS, tolerance, z, sigma, members, misfit)
     level = _levelled(heights, sigmas, z, tolerance)
-    again = (np.empty(shape), np.empty(shape), np.empty(shape, np.int64), misfit)
-    kernels.fuse(level, sigmas, correlation, used, AGREEING_SIGMAS, tolerance, *again)
+    out = (np.empty(shape), np.empty(shape), np.empty(shape, np.int64), misfit)
+    kernels.fuse(level, sigmas, correlation, used, AGREEING_SIGMAS, tolerance, *out)
     factor = _factor(misfit)
-    out = ~_in_patches(z, PATCH_STEP_PX * tolerance)
-    z[out], sigma[out] = np.nan, np.nan
-    seen = others_seen(z, heights, sigmas, scale)
-    noise = sigma * factor
-    sigma = cell_sigma(z, noise, seen, scale)
-    members[out] = 0
+    patched = _without_patches(z, PATCH_STEP_PX * tolerance)
+    z[~patched], sigma[~patched], members[~patched] = np.nan, np.nan, 0
+    sigma = cell_sigma(z, sigma * factor, heights, sigmas, scale)
     count, first = _seen_by(members, np.array(photographs))
     return z + height, sigma, count, first, factor, _shared_cells(level, sigmas)
 
@@ -280,7 +276,7 @@ def _seen_by(members: np.ndarray, photographs: np.ndarray) -> tuple[np.ndarray, 
     return count, first
 
 
-def _in_patches(z: np.ndarray, step: float) -> np.ndarray:
+def _without_patches(z: np.ndarray, step: float) -> np.ndarray:
     """(rows, columns) whether a height belongs to a patch that is large enough; step : m that bounds a patch."""
     known = np.isfinite(z)
     if not known.any():
