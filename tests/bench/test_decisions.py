@@ -88,7 +88,7 @@ def test_row_that_a_full_disk_did_not_take_is_told_and_leaves_nothing(tmp_path, 
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(InputError, match=r"the disk is full; .* MiB free in '"):
+    with pytest.raises(InputError, match=r"the disk is full; .* [MG]iB free in '"):
         decisions.add(Decision(MARK, "a", "p2", (1.0, 1.0)))
     assert len(decisions.rows) == 1
     assert (tmp_path / NAME).read_bytes() == before
