@@ -7,6 +7,8 @@ matching, and tells how much larger it is than its formal σ.
 
 from __future__ import annotations
 
+from math import gcd
+
 import cv2
 import numpy as np
 
@@ -23,6 +25,8 @@ ROUNDS, ROBUST_SIGMAS = 4, 1.5
 """Of the robust parabola, and σ from which on a shift counts less."""
 AROUND_PX = 41
 """Side of the square over which what the parabola leaves is averaged; chosen [C]: several windows wide."""
+EVERY = 2
+"""Row and column of which that mean is taken: shifts of neighbours come from almost the same window."""
 LARGEST_PX, LEAST_PX = 1.0, 0.02
 """In that mean: the largest shift that counts, and σ below which shifts do not count more."""
 
@@ -40,7 +44,7 @@ def parabola_across(across: np.ndarray, variance: np.ndarray, known: np.ndarray)
     """
     chosen = known & (variance > 0.0)
     found = np.zeros(6)
-    if chosen.sum() < FEWEST_TELL:
+    if np.count_nonzero(chosen) < FEWEST_TELL:
         return found
     at = _spread(chosen)
     v, sigma = across.ravel()[at].astype(float), np.sqrt(variance.ravel()[at].astype(float))
@@ -59,15 +63,18 @@ def parabola_across(across: np.ndarray, variance: np.ndarray, known: np.ndarray)
 def scatter_across(across: np.ndarray, variance: np.ndarray, known: np.ndarray, slow: np.ndarray) -> float:
     """By which shifts scatter more than their formal σ, about a parabola (6,) and the mean around; 1 at least."""
     chosen = known & (variance > 0.0)
-    if chosen.sum() < FEWEST_TELL:
+    if np.count_nonzero(chosen) < FEWEST_TELL:
         return 2.0
-    off = across - _over(slow, across.shape)
+    across, variance, chosen = (a[::EVERY, ::EVERY] for a in (across, variance, chosen))
+    off = across - _over(slow, known.shape, EVERY)
     usual = chosen & (np.abs(off) < LARGEST_PX)
     weight = np.where(usual, np.float32(1.0) / np.maximum(variance, np.float32(LEAST_PX**2)), np.float32(0.0))
-    size = AROUND_PX, AROUND_PX
-    total = cv2.boxFilter(weight * np.where(usual, off, np.float32(0.0)), -1, size, normalize=False)
-    weights = cv2.boxFilter(weight, -1, size, normalize=False)
+    side = AROUND_PX // EVERY + 1
+    total = cv2.boxFilter(weight * np.where(usual, off, np.float32(0.0)), -1, (side, side), normalize=False)
+    weights = cv2.boxFilter(weight, -1, (side, side), normalize=False)
     at = _spread(chosen)
+    if not len(at):
+        return 2.0
     mean = total.ravel()[at] / np.maximum(weights.ravel()[at], 1e-6)
     scaled = np.abs(off.ravel()[at] - mean) / np.sqrt(variance.ravel()[at])
     return max(float(np.median(scaled)) * SIGMA_PER_MAD, 1.0)
@@ -81,8 +88,10 @@ def median_across(slow: np.ndarray, known: np.ndarray) -> float:
 
 def _spread(chosen: np.ndarray) -> np.ndarray:
     """Places of some of the pixels that are chosen, spread over an image."""
-    at = np.flatnonzero(chosen)
-    return at[:: len(at) // MOST_TELL + 1]
+    step = np.count_nonzero(chosen) // MOST_TELL + 1
+    while gcd(step, chosen.shape[1]) > 1:  # else always the same columns
+        step += 1
+    return np.flatnonzero(chosen.ravel()[::step]) * step
 
 
 def _terms(at: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
@@ -92,9 +101,9 @@ def _terms(at: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     return np.stack([np.ones(len(at)), x, y, x * x, x * y, y * y], axis=1)
 
 
-def _over(slow: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """(rows, columns) float32 px, a parabola over an image."""
-    x, y = np.linspace(-1.0, 1.0, shape[1])[None], np.linspace(-1.0, 1.0, shape[0])[:, None]
+def _over(slow: np.ndarray, shape: tuple[int, int], every: int) -> np.ndarray:
+    """(rows, columns) float32 px, a parabola over an image of that shape, of every so many rows and columns of it."""
+    x, y = np.linspace(-1.0, 1.0, shape[1])[None, ::every], np.linspace(-1.0, 1.0, shape[0])[::every, None]
     along = (slow[0] + x * (slow[1] + x * slow[3])).astype(np.float32)
     down = (y * (slow[2] + y * slow[5])).astype(np.float32)
     return along + down + y.astype(np.float32) * (slow[4] * x).astype(np.float32)

@@ -227,5 +227,5 @@ def _resampled(
 
 def _mean_depth(g: EpipolarGeometry) -> float:
     """m, of the middle of the window."""
-    parallax = float(np.median(g.known)) + g.lowest + 0.5 * g.count
+    parallax = float(np.median(g.known[::LATTICE_PX, ::LATTICE_PX])) + g.lowest + 0.5 * g.count
     return g.f * g.base / max(parallax, 1e-6)

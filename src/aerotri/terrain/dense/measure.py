@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from aerotri.adjustment.parallel import blas_threads
 from aerotri.conventions import InputError
 from aerotri.execution.threads import Threads
 from aerotri.execution.work import Executor, Work
@@ -131,7 +132,12 @@ def measure_surface(
         if report is not None:
             report(stage, share)
 
-    executor = executor or Threads()
+    # its systems are small: threads of the linear algebra library wait for one another in a loop
+    with blas_threads(0.0):
+        return _measured(calibration, plan, tell, executor or Threads())
+
+
+def _measured(calibration: Adjustment, plan: DensePlan, tell: Report, executor: Executor) -> DenseOutcome:
     photographs = photographs_of(calibration, plan.rows, plan.paths, plan.ideal)
     block = calibration.local.block
     sizes = [block.cameras[c].size_px for c in block.images.camera[plan.rows].tolist()]

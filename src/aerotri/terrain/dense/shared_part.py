@@ -62,7 +62,14 @@ def shared_part(
     x, y = np.linspace(low[0], high[0], NODES), np.linspace(high[1], low[1], NODES)
     nodes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     near = NearestNDInterpolator(places[:, :2], six)(nodes)
-    if len(places) < 4 or np.linalg.matrix_rank(places[:, :2] - places[:, :2].mean(axis=0)) < 2:
+    if len(places) < 4 or _in_a_line(places[:, :2]):
         return SharedPart(x, y, near.reshape(NODES, NODES, 6))
     linear = LinearNDInterpolator(places[:, :2], six)(nodes)
     return SharedPart(x, y, np.where(np.isfinite(linear), linear, near).reshape(NODES, NODES, 6))
+
+
+def _in_a_line(xy: np.ndarray) -> bool:
+    """Whether no triangle can be made of places (n, 2) m."""
+    away = xy - xy.mean(axis=0)
+    # of two by two numbers: the linear algebra library gives a matrix of all places to threads that wait for each other
+    return bool(np.linalg.matrix_rank(away.T @ away) < 2)

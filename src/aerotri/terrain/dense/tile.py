@@ -44,6 +44,8 @@ SLOW_ROUNDS = 2
 """Means of what is left, one after the other: at the edge of a pair a mean alone leaves its slope."""
 FEWEST_MISFITS = 500
 """Cells measured twice of which the noise of a tile is taken."""
+MOST_MISFITS = 50_000
+"""That are looked at, spread over the tile."""
 LARGEST_FACTOR = 3.0
 STEP_UNITS, NO_HEIGHT = 8, -32000
 """Of the whole numbers in which heights are looked through for patches."""
@@ -315,9 +317,12 @@ def _slow(difference: np.ndarray, sigma: np.ndarray, most: np.ndarray) -> np.nda
 
 def _factor(misfit: np.ndarray) -> float:
     """By which heights of pairs scatter more than their σ say; 1 where too few cells were measured twice."""
-    told = misfit[np.isfinite(misfit)]
-    if len(told) < FEWEST_MISFITS:
+    known = np.isfinite(misfit)
+    count = np.count_nonzero(known)
+    if count < FEWEST_MISFITS:
         return 1.0
+    every = max(int(np.sqrt(count / MOST_MISFITS)), 1)  # row and column: neighbours share their noise
+    told = misfit[::every, ::every][known[::every, ::every]]
     # the median of chi-square of one degree of freedom is 1 / SIGMA_PER_MAD²; more pairs lie nearer to 1
     return float(np.clip(np.sqrt(np.median(told)) * SIGMA_PER_MAD, 1.0, LARGEST_FACTOR))
 
