@@ -13,19 +13,22 @@ import numpy as np
 
 from aerotri.terrain.dense.cell_scale import CellScale, middle_height, square, sum_about
 
-STEP_SHARE, STRAIGHT_SHARE = 0.55, 0.24
-"""Of a step that is σ of the cells beside it, where steps about them run in all directions, as crowns of trees have
-them, and where they run straight, as at houses and walls; chosen [C] with the rest of this module on rendered houses,
-walls, trees and few photographs (tools/prove/dense_surface.py)."""
+STEP_SHARE, STRAIGHT_SHARE, ALONE_SHARE = 0.48, 0.2, 0.36
+"""Of a step that is σ of the cells next to it, where steps about them run in all directions, as crowns of trees have
+them, where they run straight, as at houses and walls, and where one pair alone saw the cell, either way; chosen [C]
+with the rest of this module on rendered houses, walls, trees and few photographs (tools/prove/dense_surface.py)."""
+FAR_SHARE = 0.27
+"""The same of a step further away, where few pairs saw the cell, and of one that a hole may hide; chosen [C]: most such
+cells are right, some have the height of the other side."""
 CROOKED, STRAIGHT = 0.4, 0.8
 """Straightness up to which a step counts whole, and from which on as a straight one."""
 FLATTEST_PX, STEEPEST_PX = 0.01, 2.0
 """Of parallax from cell to cell: less is rounding; a higher step tells its direction no better."""
 LEAST_STEP_PX, LEAST_HIDDEN_PX = 0.9, 0.5
 """Of parallax, from which on heights differ by a step, and where a hole may hide the rest of it; chosen [C]."""
-LARGEST_STEP_PX = (np.inf, 6.0, 1.1)
-"""Of parallax, that count where one pair, two, three or more agree on a height; chosen [C]: what several pairs see
-alike is seldom the height of the other side, but a window across a step blurs it for all of them."""
+SEVERAL, BLURRED_STEP_PX = 3, 1.1
+"""Pairs that agree on a height, and the largest step, of parallax, that counts where so many do; chosen [C]: what they
+see alike is seldom the height of the other side, but a window across a step blurs it for all of them."""
 STEP_SIGMAS = 6.0
 """σ of the noise that a step is larger than: the range of some twenty cells reaches five."""
 CONTRADICTED_SIGMAS = 4.0
@@ -66,18 +69,18 @@ def others_seen(z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: C
 def step_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
     """(rows, columns) m, σ of a cell by the step that it lies beside; 0 where there is none.
 
-    A share of the step; where it runs straight, and at least two pairs agree on the height, less than half of that.
+    A share of the step: of one next to the cell by its direction and the pairs that agree on the height, of one further
+    away, or hidden by a hole, less.
     """
     known = np.isfinite(z)
     if not known.any():
         return np.zeros(z.shape)
     above = np.where(known, z - middle_height(z), 0.0).astype(np.float32)
-    hidden = cv2.erode(known.view(np.uint8), square(scale.window)) == 0
-    step = _step(z, above, noise, seen, scale, hidden)
-    most = scale.pixel * np.array(LARGEST_STEP_PX)[np.clip(seen.agreeing, 1, len(LARGEST_STEP_PX)) - 1]
+    next_to, far = _steps(z, above, noise, seen, scale)
     straight = np.clip((straightness(above, known, scale) - CROOKED) / (STRAIGHT - CROOKED), 0.0, 1.0)
-    share = np.where(seen.agreeing < 2, STEP_SHARE, STEP_SHARE + (STRAIGHT_SHARE - STEP_SHARE) * straight)
-    return np.where(known, share * np.minimum(step, most), 0.0)
+    share = np.where(seen.agreeing < 2, ALONE_SHARE, STEP_SHARE + (STRAIGHT_SHARE - STEP_SHARE) * straight)
+    most = np.where(seen.agreeing < SEVERAL, np.inf, BLURRED_STEP_PX * scale.pixel)
+    return np.where(known, np.maximum(share * np.minimum(next_to, most), FAR_SHARE * np.minimum(far, most)), 0.0)
 
 
 def straightness(above: np.ndarray, known: np.ndarray, scale: CellScale) -> np.ndarray:
@@ -102,20 +105,21 @@ def straightness(above: np.ndarray, known: np.ndarray, scale: CellScale) -> np.n
     return np.hypot(xx - yy, 2.0 * xy) / np.maximum(xx + yy, FLATTEST_PX**2)
 
 
-def _step(
-    z: np.ndarray, above: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale, hidden: np.ndarray
-) -> np.ndarray:
-    """(rows, columns) m, the step that a cell lies beside; 0 where there is none.
+def _steps(
+    z: np.ndarray, above: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale
+) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, columns) m, the step next to a cell, and one further away or behind a hole; 0 where there is none.
 
     A step is almost a pixel of parallax, from the lowest to the highest that any pair saw about a cell. The mean of the
     cells around is taken off first, so that a slope is none. That mean holds a wall some cells away: no step is
-    therefore larger than the range of the heights themselves plus the slope over that distance. Beside a hole, which
-    may hide the step, half a pixel counts, over twice the distance and without that limit; where, besides, one pair
-    alone saw the cell, the whole range of heights there counts.
+    therefore larger than the range of the heights themselves, next to a cell plus the slope over that distance. Further
+    away, within a window of the matching, steps count where few pairs agree on the height. Beside a hole, which may
+    hide the step, half a pixel counts, without that limit; where few pairs agree the whole range of heights over two
+    windows counts there, and for a cell that one pair alone saw holes are looked for as far.
 
     Parameters
     ----------
-    above : (rows, columns) float32 m, heights over their middle, 0 where not known. hidden : whether a hole is near.
+    above : (rows, columns) float32 m, heights over their middle, 0 where not known.
     """
     known, middle = np.isfinite(z), middle_height(z)
     mean = sum_about(above, scale.around)
@@ -123,12 +127,22 @@ def _step(
     left, whole = ((_less(seen.highest, level), _less(seen.lowest, level)) for level in (mean, middle))
     side = 2 * ((scale.lag + 1) // 2) + 1
     near = np.minimum(_range(*left, side), _range(*whole, side) + (side - 1) * _slope(above, known))
-    far = _range(*left, scale.window)
-    np.maximum(far, _range(*whole, scale.window), out=far, where=hidden & (seen.agreeing < 2))
+    in_window = _range(*left, scale.window)
+    few = seen.agreeing < SEVERAL
+    far = np.where(few, np.minimum(in_window, _range(*whole, scale.window)), 0.0)
+    hidden = np.where(few, np.maximum(in_window, _range(*whole, scale.around)), in_window)
+    hidden[~_by_a_hole(known, seen, scale)] = 0.0
+
     least = STEP_SIGMAS * noise
-    next_to = (near > LEAST_STEP_PX * scale.pixel) & (near > least)
-    behind = hidden & (far > LEAST_HIDDEN_PX * scale.pixel) & (far > least)
-    return np.maximum(np.where(next_to, near, 0.0), np.where(behind, far, 0.0))
+    for step, smallest in ((near, LEAST_STEP_PX), (far, LEAST_STEP_PX), (hidden, LEAST_HIDDEN_PX)):
+        step[(step <= smallest * scale.pixel) | (step <= least)] = 0.0
+    return near, np.maximum(far, hidden)
+
+
+def _by_a_hole(known: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
+    """(rows, columns) whether a hole is within a window of a cell, two of a cell that one pair alone saw."""
+    near, further = (cv2.erode(known.view(np.uint8), square(side)) == 0 for side in (scale.window, scale.around))
+    return near | (further & (seen.agreeing < 2))
 
 
 def _slope(z: np.ndarray, known: np.ndarray) -> np.ndarray:
