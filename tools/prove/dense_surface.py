@@ -20,24 +20,24 @@ Last result:
     | undulating | 0.987 | +0.003 | 0.090 | 0.373 | 0.085 | 1.00 | 1.01 | 0.02 % |  |  |
     | hill | 0.989 | -0.002 | 0.074 | 0.244 | 0.072 | 0.97 | 0.97 | 0.03 % |  |  |
     | quarry | 0.988 | +0.003 | 0.082 | 0.398 | 0.078 | 0.99 | 1.00 | 0.02 % |  |  |
-    | houses | 0.987 | +0.000 | 0.082 | 0.418 | 0.076 | 0.99 | 0.99 | 0.03 % | 0.92 | 0.46 % |
-    | few photographs | 0.983 | -0.008 | 0.112 | 0.534 | 0.127 | 0.97 | 0.97 | 0.06 % | 1.06 | 0.95 % |
-    | noisy | 0.986 | +0.004 | 0.582 | 0.531 | 0.586 | 0.95 | 0.97 | 0.01 % |  |  |
-    | weak texture | 0.969 | +0.004 | 1.197 | 1.006 | 1.185 | 0.97 | 0.97 | 0.00 % |  |  |
+    | houses | 0.987 | +0.000 | 0.082 | 0.418 | 0.076 | 0.99 | 0.99 | 0.03 % | 0.92 | 0.40 % |
+    | few photographs | 0.983 | -0.008 | 0.112 | 0.534 | 0.127 | 0.97 | 0.97 | 0.06 % | 0.91 | 0.43 % |
+    | noisy | 0.987 | +0.004 | 0.582 | 0.530 | 0.584 | 0.95 | 0.97 | 0.01 % |  |  |
+    | weak texture | 0.970 | +0.003 | 1.198 | 1.007 | 1.186 | 0.97 | 0.98 | 0.00 % |  |  |
     | no texture | no two photographs could be matched |
     | repeated texture | 1.000 | +0.011 | 0.045 | 0.194 | 0.040 | 1.07 | 1.09 | 0.02 % |  |  |
     | shadow | 1.000 | +0.013 | 0.270 | 0.397 | 0.297 | 0.95 | 0.97 | 0.00 % |  |  |
-    | water | 0.316 | +0.024 | 0.709 | 0.723 | 1.054 | 0.89 | 0.79 | 0.00 % |  |  |
+    | water | 0.320 | +0.008 | 0.789 | 1.019 | 1.106 | 0.93 | 0.82 | 0.02 % |  |  |
     | glass | 0.139 | +0.001 | 0.260 | 2.633 | 0.582 | 0.93 | 0.57 | 0.19 % |  |  |
-    | wall | 0.988 | +0.006 | 0.066 | 0.248 | 0.060 | 1.03 | 1.05 | 0.01 % | 0.90 | 0.41 % |
-    | trees | 0.986 | +0.003 | 0.089 | 0.395 | 0.084 | 0.99 | 1.00 | 0.02 % | 1.10 | 0.46 % |
+    | wall | 0.996 | +0.006 | 0.066 | 0.251 | 0.061 | 1.04 | 1.05 | 0.01 % | 0.91 | 0.34 % |
+    | trees | 0.987 | +0.003 | 0.091 | 0.384 | 0.088 | 0.99 | 1.00 | 0.02 % | 1.11 | 0.46 % |
     | tilted | 0.979 | +0.005 | 0.092 | 0.335 | 0.087 | 1.04 | 1.03 | 0.10 % |  |  |
     | y-parallax | 0.987 | +0.053 | 0.680 | 0.531 | 0.681 | 1.11 | 1.04 | 0.06 % |  |  |
 
-Houses, few photographs, wall, trees and glass are four draws. Scenes that are not named in the next sentence are of a
-version before. Those of houses, few photographs, wall and trees are of this one but for the slope of the ground, which
-is taken off steps and spikes since (by the stored heights of these draws .01 at most), noisy, water and weak texture
-of this version with nearly the same shares of steps. On
+Houses, few photographs, wall, trees, glass and water are four draws. The steep columns are of this version, computed
+with the heights of the same draws by the version before; the others, but for water, are of that version. Steep, of
+draws on which no constant was chosen (`--seed 5` and 6): houses 0.92, 0.94 (0.38, 0.50 %), few photographs 0.90, 0.92
+(0.39, 0.48 %), wall 1.04, 0.90 (0.50, 0.33 %), trees 0.94, 1.38 (0.52, 0.66 %). On
 noisy or weak texture semi-global matching alone scatters less: it smooths over more than a window. What is measured of
 the glass is its rim, whose windows see ground. With tie points of half a pixel σ holds the adjustment, which all cells
 of a draw share: std z is then the root mean square of z over all cells of twenty draws, on the same photographs, and
@@ -113,7 +113,7 @@ OTHER_SPEC: dict[str, dict[str, dict]] = {
 """What differs from the block of the other scenes."""
 TIE_SIGMA_MM, DRAWS = {"y-parallax": 0.015}, 20
 """Error of tie points, and of how many draws of it the errors of a scene are taken together."""
-SEEDS = {"houses": 4, "few photographs": 4, "wall": 4, "trees": 4, "glass": 4}
+SEEDS = {"houses": 4, "few photographs": 4, "wall": 4, "trees": 4, "glass": 4, "water": 4}
 """Flights and textures of a scene whose errors are taken together: where few cells tell, or a few gross errors do."""
 PATCH_M, PERIOD_NODES, SHADOW, WATER, CONTRAST = (60.0, 40.0), 12, 0.12, 0.02, 0.25
 """Half sides of the patch that is painted, nodes after which a texture repeats (a metre each), share of the light
