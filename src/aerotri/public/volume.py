@@ -206,6 +206,7 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     from aerotri.formats.results.volume import Sources, pile_json, volume_json
     from aerotri.rasters.grids import cache_limited
     from aerotri.volume.bases import PilesBase
+    from aerotri.volume.boundary import outline_notes
     from aerotri.volume.piles import total_of_piles
     from aerotri.volume.sections import chosen_profiles
 
@@ -239,15 +240,23 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     content = head.as_dict() | volume_json(volumes, base, boundary, sources, sigma, asked.density)
     content["piles"] = [pile_json(one, own, asked.density) for one, own in zip(piles, sigmas, strict=True)]
     content["settings"] = asked.settings
-    crs_notes = (reader.note, *(other.note for other in others), boundary.note)
+    outlines = outline_notes(boundary, min(reader.grid.cell_x, reader.grid.cell_y)) if _follows(asked.base) else ()
+    crs_notes = (reader.note, *(other.note for other in others), boundary.note, *outlines)
     content["warnings"] = [*(text for text in crs_notes if text), *content["warnings"]]
     profiles = chosen_profiles(reader, base, boundary, volumes.sections)
     return MeasuredVolume(volumes, boundary, content, thickness, profiles, spool, notes, head)
 
 
+def _follows(base: SurfaceLike | float) -> bool:
+    """Whether a base follows from the surface along the boundary."""
+    from aerotri.volume.bases import WORDS
+
+    return isinstance(base, str) and base in WORDS
+
+
 def _piles(asked: _Asked, base: Base, reader: Reader, boundary: Boundary) -> list[Pile]:
     """Every polygon of the boundary by itself; a base that follows from the boundary is each one's own."""
-    from aerotri.volume.bases import WORDS, parse_base
+    from aerotri.volume.bases import parse_base
     from aerotri.volume.boundary import boundary_of
     from aerotri.volume.compute import compute_volumes
     from aerotri.volume.piles import Pile
@@ -255,7 +264,7 @@ def _piles(asked: _Asked, base: Base, reader: Reader, boundary: Boundary) -> lis
     found: list[Pile] = []
     for name, polygon in boundary.piles:
         own = boundary_of(polygon, name)
-        below = parse_base(asked.base, reader, own) if isinstance(asked.base, str) and asked.base in WORDS else base
+        below = parse_base(str(asked.base), reader, own) if _follows(asked.base) else base
         try:
             volumes = compute_volumes(reader, below, own, asked.method, asked.plan)
         except InputError as error:

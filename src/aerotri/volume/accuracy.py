@@ -211,7 +211,7 @@ def base_variance(base: Base, boundary: Boundary, surface: Surface, options: Sig
     if not isinstance(base, SplineBase):
         return stated
     width = RING_SHARE * np.sqrt(boundary.area)
-    ring = boundary_of(shapely.difference(boundary.polygon.buffer(width), boundary.polygon), "ring")
+    ring = boundary_of(shapely.difference(boundary.outline.buffer(width), boundary.outline), "ring")
     row, column, rows, columns = cells_within(surface.grid, ring)
     if rows * columns > MOST_RING_CELLS:
         return stated

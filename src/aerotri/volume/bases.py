@@ -216,13 +216,15 @@ def fitted_plane(points: np.ndarray, boundary: Boundary) -> PlaneBase:
 def boundary_heights(surface: Surface, boundary: Boundary, most: int = MOST_NODES) -> np.ndarray:
     """(k, 3) m, the surface along the boundary, evenly spaced, at most `most` places; where it is not known, none.
 
+    Rings of holes are left out: what is cut out, as a hut on a slope, may stand on the pile.
+
     Raises
     ------
     InputError
         When hardly any is known.
     """
-    spacing = max(boundary.polygon.length / most, min(surface.grid.cell_x, surface.grid.cell_y))
-    xy = np.concatenate([_along(ring, spacing) for ring in boundary.rings])
+    spacing = max(boundary.outline.length / most, min(surface.grid.cell_x, surface.grid.cell_y))
+    xy = np.concatenate([_along(ring, spacing) for ring in boundary.outer_rings])
     z = sampled(surface, xy[:, 0], xy[:, 1])
     known = np.isfinite(z)
     if known.sum() < 3:

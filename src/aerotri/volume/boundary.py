@@ -19,6 +19,8 @@ from aerotri.vectors.polygons import VECTOR_ENDINGS, placed, polygon_features, p
 
 NAMES = ("name", "pile", "label", "title")
 """Attributes that name a polygon, in any case."""
+SHARED_CELLS, SHARED_REACH = 4.0, 0.1
+"""Cells of outline that two polygons share before the user is told, and how near the lines are, in cells [C]."""
 OVERLAP = 1e-9
 """Share of the area by which polygons may overlap: rounding of common corners."""
 
@@ -48,6 +50,19 @@ class Boundary:
         """Corners (n, 2) of every ring, the first one repeated at the end; outer rings run counter-clockwise."""
         parts = shapely.get_parts(shapely.orient_polygons(self.polygon))
         return [np.asarray(ring.coords)[:, :2] for part in parts for ring in (part.exterior, *part.interiors)]
+
+    @property
+    def outline(self) -> BaseGeometry:
+        """The polygon with its holes filled: a base runs along its rings."""
+        parts = shapely.get_parts(self.polygon)
+        if not shapely.get_num_interior_rings(parts).any():
+            return self.polygon
+        return shapely.normalize(shapely.union_all([shapely.Polygon(part.exterior) for part in parts]))
+
+    @property
+    def outer_rings(self) -> list[np.ndarray]:
+        """As `rings`, of the outline."""
+        return replace(self, polygon=self.outline).rings
 
     def coverage(self, grid: Grid) -> np.ndarray:
         """(rows, columns), which part of every cell lies inside, 0 … 1."""
@@ -113,6 +128,45 @@ def boundary_of_piles(
         said = f"its polygons overlap by {overlap:.4g} m²: they count together, not one by one"
         return replace(found, note="; ".join(text for text in (note, said) if text))
     return replace(found, piles=tuple(each))
+
+
+def outline_notes(boundary: Boundary, cell: float) -> tuple[str, ...]:
+    """Sentences about a base that follows from the surface along outlines which may lie on the pile itself.
+
+    Parameters
+    ----------
+    cell : m, of the surface.
+    """
+    polygons = [polygon for _, polygon in boundary.piles] or [boundary.polygon]
+    holes = sum(int(shapely.get_num_interior_rings(shapely.get_parts(one)).sum()) for one in polygons)
+    notes = []
+    if holes:
+        notes.append(
+            f"the boundary has {holes} hole{'s' if holes > 1 else ''}: the base runs through the outer outline alone; "
+            "what lies inside a hole is not in the volume"
+        )
+    notes += [
+        f"the outlines of {first} and {second} share {length:.4g} m: the base runs through the surface there, which is "
+        "the pile itself where the line crosses it; give a height or a surface as base, or draw one outline around both"
+        for first, second, length in _shared_outlines(boundary.piles, cell)
+    ]
+    return tuple(notes)
+
+
+def _shared_outlines(piles: Sequence[tuple[str, BaseGeometry]], cell: float) -> list[tuple[str, str, float]]:
+    """Names of two polygons and how much of their outlines lies side by side, m."""
+    polygons = [polygon for _, polygon in piles]
+    reach = SHARED_REACH * cell
+    if not polygons:
+        return []
+    near = shapely.STRtree(polygons).query(polygons, predicate="dwithin", distance=reach)
+    found = []
+    for first, second in sorted((int(a), int(b)) for a, b in near.T if a < b):
+        band = shapely.buffer(polygons[second].boundary, reach, quad_segs=2)
+        length = float(shapely.intersection(polygons[first].boundary, band).length)
+        if length > SHARED_CELLS * cell:
+            found.append((piles[first][0], piles[second][0], length))
+    return found
 
 
 def _named(attributes: Sequence[Mapping[str, Any]], polygons: list[BaseGeometry]) -> list[tuple[str, BaseGeometry]]:
