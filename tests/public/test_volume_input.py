@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import rasterio
 import shapely
 import shapely.affinity
+from rasterio import Affine
 
 import aerotri
+from aerotri import InputError
 
 LEFT, TOP, CELL, COUNT = 500000.0, 5600100.0, 0.5, 200
 RADIUS, HEIGHT = 12.0, 5.0
@@ -68,3 +71,40 @@ def test_outlines_that_share_a_line_are_told(cone):
     assert over.net == pytest.approx(CONE, rel=0.005)
     apart = {"west": west, "east": shapely.affinity.translate(east, 3.0)}
     assert not any("share" in text for text in aerotri.volume(cone, apart).warnings)
+
+
+def in_file(path, z, unit=None, crs=CRS, no_data=-9999.0):
+    """A raster of heights as other programs write it."""
+    place = Affine(CELL, 0.0, LEFT, 0.0, -CELL, TOP)
+    with rasterio.open(path, "w", driver="GTiff", height=COUNT, width=COUNT, count=1, dtype="float32", crs=crs,
+                       transform=place, nodata=no_data) as file:  # fmt: skip
+        file.write(z.astype(np.float32), 1)
+        if unit is not None:
+            file.units = [unit]
+    return path
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("cm", 0.01), ("Centimeters", 0.01), ("mm", 0.001), ("dm", 0.1),
+                                              ("km", 1000.0), ("metre", 1.0), (None, 1.0)])  # fmt: skip
+def test_heights_in_the_unit_of_their_band(tmp_path, unit, factor):
+    found = aerotri.volume(in_file(tmp_path / "z.tif", heights() / factor, unit), AROUND)
+    assert found.net == pytest.approx(CONE, rel=0.005)
+    assert any("multiplied by" in text for text in found.warnings) is (factor != 1.0)
+
+
+def test_a_unit_that_is_not_known_is_refused(tmp_path):
+    path = in_file(tmp_path / "z.tif", heights(), "fathom")
+    with pytest.raises(InputError, match="'fathom'") as refused:
+        aerotri.volume(path, AROUND)
+    assert refused.value.file == path
+    assert "gdal_edit.py -units" in refused.value.remedy
+
+
+def test_heights_that_land_does_not_have_are_told(tmp_path, cone):
+    z = heights()
+    z[100, 60] = -9999.0
+    said = "does the file state its value for no data"
+    found = aerotri.volume(in_file(tmp_path / "z.tif", z, no_data=None), AROUND)
+    assert any("from -9999 to" in text and said in text for text in found.warnings)
+    kept = aerotri.volume(in_file(tmp_path / "known.tif", z), AROUND)
+    assert not any(said in text for one in (kept, aerotri.volume(cone, AROUND)) for text in one.warnings)

@@ -22,12 +22,20 @@ if TYPE_CHECKING:
 
 METRE = 1.0
 """Factor of heights that are in metres already."""
-UNITS = {
-    "m": METRE, "metre": METRE, "metres": METRE, "meter": METRE, "meters": METRE, "ft": 0.3048, "foot": 0.3048,
-    "feet": 0.3048, "international foot": 0.3048, "us survey foot": 1200.0 / 3937.0, "us-ft": 1200.0 / 3937.0,
-    "ftus": 1200.0 / 3937.0, "us_survey_foot": 1200.0 / 3937.0,
-}  # fmt: skip
+_SPELLINGS = {
+    METRE: "m metre metres meter meters",
+    0.1: "dm decimetre decimetres decimeter decimeters",
+    0.01: "cm centimetre centimetres centimeter centimeters",
+    0.001: "mm millimetre millimetres millimeter millimeters",
+    1000.0: "km kilometre kilometres kilometer kilometers",
+    0.3048: "ft foot feet international_foot",
+    1200.0 / 3937.0: "us_survey_foot us-ft ftus us_survey_feet",
+}
+UNITS = {name.replace("_", mark): factor for factor, names in _SPELLINGS.items() for name in names.split()
+         for mark in "_ "}  # fmt: skip
 """Metres of the units a band may name."""
+NO_UNIT = ("", "unknown", "none")
+"""What a band says that states no unit."""
 UNIT_REMEDY = 'say it in the file: gdal_edit.py -units "US survey foot" FILE, or -units m'
 
 
@@ -134,23 +142,39 @@ class MetricReader(RasterReader):
 
 
 def units_of(reader: RasterReader) -> RasterUnits:
-    """What a raster counts in; one without a CRS counts in metres, as local blocks do."""
-    named = reader.stated_unit
-    of_band = UNITS.get(named)
+    """What a raster counts in; one without a CRS counts in metres, as local blocks do.
+
+    Raises
+    ------
+    InputError
+        When its heights count in a unit that is not known.
+    """
     if reader.crs is None:
+        of_band = _unit_of_band(reader)
         return RasterUnits("metre", METRE if of_band is None else of_band, "no CRS")
     whole = _crs_of(reader)
     if whole is None:
+        of_band = _unit_of_band(reader)
         return RasterUnits("metre", METRE if of_band is None else of_band, "a CRS of its own")
     flat = whole.sub_crs_list[0] if whole.is_compound else whole
     axis = flat.axis_info[0] if flat.axis_info else None
     plan = "metre" if axis is None or (axis.unit_name in UNITS and UNITS[axis.unit_name] == METRE) else axis.unit_name
     up = whole.axis_info[2:] if len(whole.axis_info) == 3 else []
-    height = up[0].unit_conversion_factor if up else of_band
+    height = up[0].unit_conversion_factor if up else _unit_of_band(reader)
     if height is None and (flat.is_geographic or plan == "metre"):
         height = METRE
     code = flat.to_epsg()
     return RasterUnits(plan, height, flat.name if code is None else f"EPSG:{code} ({flat.name})")
+
+
+def _unit_of_band(reader: RasterReader) -> float | None:
+    """Metres in the unit that the file states for its values, None where it states none."""
+    named = reader.stated_unit
+    if named in NO_UNIT:
+        return None
+    if named not in UNITS:
+        raise InputError(f"its values count in '{named}', a unit that is not known", UNIT_REMEDY, reader.path)
+    return UNITS[named]
 
 
 def refuse_other_units(reader: RasterReader) -> None:

@@ -19,6 +19,8 @@ DEFAULT_SECTIONS = 20
 """Intervals between sections where no spacing is given, along the boundary's extent; more where cells are finer."""
 SPREAD = 0.005
 """Share of cut + fill by which methods may differ before the user is told."""
+LOWEST_LAND, HIGHEST_LAND = -500.0, 9000.0
+"""m, heights of land and of open pits lie between; the user is told of others [C]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +75,8 @@ def compute_volumes(
     sections = cross_sections(surface, base, boundary, spacing, plan.azimuth, told("section"))
     found = (rasters.prisms, rasters.cells, *(section_volume(sections, rule) for rule in RULES))
     chosen = found[METHODS.index(method)]
-    warnings = [text for text in (no_data_note(chosen), _spread(found, chosen), _coarse(surface, boundary)) if text]
+    said = no_data_note(chosen), _impossible(rasters), _spread(found, chosen), _coarse(surface, boundary)
+    warnings = [text for text in said if text]
     return Volumes(chosen, found, sections, *_extremes(rasters), tuple(warnings))
 
 
@@ -101,6 +104,18 @@ def _spread(found: tuple[Volume, ...], chosen: Volume) -> str:
     return (
         f"the methods differ: {worst.method} gives {worst.net:.6g} m³ net, {chosen.method} {chosen.net:.6g} m³; "
         "sections closer together, or a finer surface, bring them together"
+    )
+
+
+def _impossible(rasters: RasterVolumes) -> str:
+    """What heights that land does not have may come from; '' where there are none."""
+    low, high = rasters.lowest_height, rasters.highest_height
+    if low >= LOWEST_LAND and high <= HIGHEST_LAND:
+        return ""
+    return (
+        f"the surface has heights from {low:.6g} to {high:.6g} m inside the boundary, and land lies between "
+        f"{LOWEST_LAND:g} and {HIGHEST_LAND:g} m: does the file state its value for no data (gdal_edit.py -a_nodata "
+        "VALUE FILE) and its unit?"
     )
 
 

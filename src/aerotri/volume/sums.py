@@ -39,13 +39,15 @@ class Window:
 
 @dataclass(frozen=True)
 class RasterVolumes:
-    """Volumes by both raster methods, and the extremes of the thickness inside the boundary, m."""
+    """Volumes by both raster methods, and the extremes of the thickness and of the surface inside the boundary, m."""
 
     cells: Volume
     prisms: Volume
     lowest: float
     highest: float
     without_heights_around: float
+    lowest_height: float
+    highest_height: float
 
 
 def cells_within(grid: Grid, boundary: Boundary) -> tuple[int, int, int, int]:
@@ -82,20 +84,25 @@ def raster_volumes(
     """
     cell_sums, prism = np.zeros(5), np.zeros(5)
     lowest, highest, covered = np.inf, -np.inf, 0.0
+    lowest_height, highest_height = np.inf, -np.inf
     grid = surface.grid
     todo = list(windows(grid, boundary, size))
     for done, (row, column, rows, columns) in enumerate(todo):
         wide = grid.window(row, column, min(rows + 1, grid.rows - row), min(columns + 1, grid.columns - column))
-        d = surface.read(row, column, wide.rows, wide.columns).astype(float) - base.on_grid(wide)
+        z = surface.read(row, column, wide.rows, wide.columns).astype(float)
+        d = z - base.on_grid(wide)
         own = wide.window(0, 0, rows, columns)
         part = boundary.coverage(own)
         thickness = d[:rows, :columns]
         _add_cells(thickness, part, own.cell_x * own.cell_y, cell_sums)
         covered += float(part.sum()) * own.cell_x * own.cell_y
         _add_prisms(d, wide, boundary, prism)
-        seen = thickness[(part > 0.0) & np.isfinite(thickness)]
-        if len(seen):
+        known = (part > 0.0) & np.isfinite(thickness)
+        if known.any():
+            seen, heights = thickness[known], z[:rows, :columns][known]
             lowest, highest = min(lowest, float(seen.min())), max(highest, float(seen.max()))
+            lowest_height = min(lowest_height, float(heights.min()))
+            highest_height = max(highest_height, float(heights.max()))
         if keep is not None:
             keep(Window(own, row, column, thickness, part))
         if progress is not None:
@@ -109,7 +116,7 @@ def raster_volumes(
     return RasterVolumes(
         Volume.of_sums("grid", cell_sums, "every cell with the height of its centre and its part inside the boundary"),
         Volume.of_sums("prisms", prism, "two triangles between the centres of every four cells, cut by the boundary"),
-        lowest, highest, outside,
+        lowest, highest, outside, lowest_height, highest_height,
     )  # fmt: skip
 
 
