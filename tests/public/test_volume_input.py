@@ -108,3 +108,26 @@ def test_heights_that_land_does_not_have_are_told(tmp_path, cone):
     assert any("from -9999 to" in text and said in text for text in found.warnings)
     kept = aerotri.volume(in_file(tmp_path / "known.tif", z), AROUND)
     assert not any(said in text for one in (kept, aerotri.volume(cone, AROUND)) for text in one.warnings)
+
+
+@pytest.mark.parametrize(("crs", "left", "top"), [("EPSG:3857", 1_000_000.0, 6_500_000.0),
+                                                  ("EPSG:3395", 1_000_000.0, 6_500_000.0)])  # fmt: skip
+def test_a_projection_that_stretches_areas_is_refused(tmp_path, crs, left, top):
+    z = 100.0 + np.zeros((40, 40))
+    held = aerotri.Surface.of_array(z, left=left, top=top, cell=1.0, crs=crs, name="mercator")
+    path = held.save(tmp_path / "mercator.tif")
+    for surface_like in (held, path):
+        with pytest.raises(InputError, match="1 m² of ground counts as 2") as refused:
+            aerotri.volume(surface_like, base=99.0)
+        assert "UTM" in refused.value.remedy
+    with pytest.raises(InputError, match="1 m² of ground counts as 2"):
+        aerotri.change(path, path, align="none")
+
+
+@pytest.mark.parametrize(("crs", "left", "top"), [
+    ("EPSG:3857", 1_000_000.0, 500_000.0), ("EPSG:25832+7837", LEFT, TOP), ("EPSG:25833", LEFT - 400_000.0, TOP),
+    ("EPSG:3035", 2_800_000.0, 1_800_000.0), ("EPSG:2056", 2_600_000.0, 1_200_000.0), (None, 0.0, 0.0),
+])  # fmt: skip
+def test_a_projection_that_keeps_areas_is_not(crs, left, top):
+    held = aerotri.Surface.of_array(100.0 + np.zeros((40, 40)), left=left, top=top, cell=1.0, crs=crs)
+    assert aerotri.volume(held, base=99.0).net == pytest.approx(39.0**2)

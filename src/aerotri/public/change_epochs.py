@@ -154,9 +154,12 @@ def common_system(epochs: Epochs) -> tuple[str, str]:
     InputError
         For surfaces in two systems.
     """
+    from aerotri.rasters.metric import refuse_stretched
+
     codes: list[str] = []
     for one in epochs:
         with one.surface.reader() as reader:
+            refuse_stretched(reader)
             codes.append(reader.crs_code)
     return system_of_both(codes, names_of(epochs))
 

@@ -205,6 +205,7 @@ def _stated(adjustment: Adjustment | FilePath | None) -> StatedAdjustment | None
 def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport) -> MeasuredVolume:
     from aerotri.formats.results.volume import Sources, pile_json, volume_json
     from aerotri.rasters.grids import cache_limited
+    from aerotri.rasters.metric import refuse_stretched
     from aerotri.volume.bases import PilesBase
     from aerotri.volume.boundary import outline_notes
     from aerotri.volume.piles import total_of_piles
@@ -213,6 +214,7 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     top, below = asked.top, asked.below
     stack.enter_context(cache_limited())
     reader = stack.enter_context(top.surface.reader(top.adjustment.crs if top.adjustment else None))
+    refuse_stretched(reader)
     boundary = _boundary(asked.boundary, reader)
     others: list[Reader] = []
     base = _base(asked.base, below, reader, boundary, stack, others)
@@ -294,6 +296,7 @@ def _base(
     others: list[Reader],
 ) -> Base:  # fmt: skip
     """The base; the raster of one that is a surface is open as long as the stack, in the CRS of the surface."""
+    from aerotri.rasters.metric import refuse_stretched
     from aerotri.volume.bases import SurfaceBase, level, parse_base
 
     if isinstance(stated, int | float):
@@ -304,6 +307,7 @@ def _base(
     if other.epsg is not None and reader.epsg is not None and other.epsg != reader.epsg:
         message = f"is in EPSG:{other.epsg}, the surface in EPSG:{reader.epsg}"
         raise InputError(message, "bring it into one CRS", other.path)
+    refuse_stretched(other)
     others.append(other)
     return SurfaceBase(below.surface.label, other)
 

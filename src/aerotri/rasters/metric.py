@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from pyproj import CRS
     from rasterio.windows import Window
 
+    from aerotri.rasters.held import HeldRaster
+
 METRE = 1.0
 """Factor of heights that are in metres already."""
 _SPELLINGS = {
@@ -36,6 +38,9 @@ UNITS = {name.replace("_", mark): factor for factor, names in _SPELLINGS.items()
 """Metres of the units a band may name."""
 NO_UNIT = ("", "unknown", "none")
 """What a band says that states no unit."""
+MOST_STRETCHED = 0.02
+"""Share by which a projection may change areas, 1 % in length [C]: UTM and national systems stay below 0.5 %, Web
+Mercator is beyond it from 8° of latitude on."""
 UNIT_REMEDY = 'say it in the file: gdal_edit.py -units "US survey foot" FILE, or -units m'
 
 
@@ -196,6 +201,39 @@ def refuse_other_units(reader: RasterReader) -> None:
         f"is in {units.crs}, which counts in {units.plan}",
         f"bring it to metres first: gdalwarp -r bilinear -t_srs {target} IN OUT", reader.path,
     )  # fmt: skip
+
+
+def refuse_stretched(reader: RasterReader | HeldRaster) -> None:
+    """Refuse a raster whose projection stretches areas, as Web Mercator does: volumes are in metres of the projection.
+
+    Raises
+    ------
+    InputError
+        When an area in the middle of the raster is wrong by more than `MOST_STRETCHED`.
+    """
+    from pyproj import CRS, Proj, Transformer
+    from pyproj.exceptions import CRSError, ProjError
+
+    if reader.crs is None:
+        return
+    try:
+        whole = CRS.from_user_input(reader.crs if isinstance(reader.crs, str) else reader.crs.to_wkt())
+        flat = whole.sub_crs_list[0] if whole.is_compound else whole
+        if not flat.is_projected:
+            return
+        left, bottom, right, top = reader.grid.bounds
+        place = Transformer.from_crs(flat, flat.geodetic_crs, always_xy=True).transform(
+            (left + right) / 2.0, (bottom + top) / 2.0
+        )
+        scale = float(Proj(flat).get_factors(*place).areal_scale)
+    except (CRSError, ProjError, AttributeError):
+        # local, or a system that PROJ cannot say this of
+        return
+    if np.isfinite(scale) and abs(scale - 1.0) > MOST_STRETCHED:
+        raise InputError(
+            f"is in {flat.name}, in which 1 m² of ground counts as {scale:.3g} m² here",
+            "bring it into UTM or a national system first: gdalwarp -r bilinear -t_srs EPSG:… IN OUT", reader.path,
+        )  # fmt: skip
 
 
 def metric_crs_for(reader: RasterReader) -> str:
