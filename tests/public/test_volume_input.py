@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from importlib.resources import files
+
+import jsonschema
 import numpy as np
 import pytest
 import rasterio
@@ -131,3 +135,49 @@ def test_a_projection_that_stretches_areas_is_refused(tmp_path, crs, left, top):
 def test_a_projection_that_keeps_areas_is_not(crs, left, top):
     held = aerotri.Surface.of_array(100.0 + np.zeros((40, 40)), left=left, top=top, cell=1.0, crs=crs)
     assert aerotri.volume(held, base=99.0).net == pytest.approx(39.0**2)
+
+
+def test_what_is_stated_counts_without_an_adjustment(cone):
+    """σ of the base times the area, that of a corner by ∮, that of the density times the volume."""
+    plain = aerotri.volume(cone, AROUND, base=100.0)
+    assert plain.summary["stated_sigma"] is None
+    found = aerotri.volume(cone, AROUND, base=100.0, base_sigma=0.05, density=1.8, density_sigma=0.1)
+    assert found.sigma is None
+    assert found.summary["mass"]["sigma_t"] is None
+    stated = found.summary["stated_sigma"]
+    assert stated["parts_m3"] == {"base": pytest.approx(0.05 * AROUND.area), "boundary": 0.0}
+    assert found.summary["mass"]["stated_sigma_t"] == pytest.approx(np.hypot(1.8 * 0.05 * AROUND.area, 0.1 * found.net))
+    assert any("errors of the surface are not in it" in text for text in found.warnings)
+    alone = aerotri.volume(cone, AROUND, density=1.8, density_sigma=0.1).summary
+    assert alone["stated_sigma"] is None
+    assert alone["mass"]["stated_sigma_t"] == pytest.approx(0.1 * alone["net_m3"])
+    # a step of 2 m at the edge: a corner that is off by σ moves half of its two edges
+    high = surface(np.full((COUNT, COUNT), 102.0))
+    square = shapely.box(LEFT + 20.0, TOP - 40.0, LEFT + 40.0, TOP - 20.0)
+    edge = aerotri.volume(high, square, base=100.0, boundary_sigma=0.2).summary["stated_sigma"]
+    assert edge["sigma_m3"] == pytest.approx(0.2 * 2.0 * np.sqrt(4 * 2 * 10.0**2), rel=1e-6)
+
+
+def test_what_is_stated_of_piles(cone, tmp_path):
+    piles = {"A": AROUND, "B": shapely.affinity.translate(AROUND, 40.0)}
+    found = aerotri.volume(cone, piles, base=98.0, base_sigma=0.05, boundary_sigma=0.1)
+    each = [one["stated_sigma_m3"] for one in found.summary["piles"]]
+    both = found.summary["stated_sigma"]["parts_m3"]
+    assert both["base"] == pytest.approx(0.05 * 2.0 * AROUND.area)
+    edges = [np.sqrt(one**2 - (0.05 * AROUND.area) ** 2) for one in each]
+    assert both["boundary"] == pytest.approx(np.hypot(*edges))
+    content = json.loads((found.save(tmp_path / "out") / "volume.json").read_text(encoding="utf-8"))
+    schema = json.loads(files("aerotri.reference").joinpath("schema_files/volume.schema.json").read_text("utf-8"))
+    jsonschema.validate(content, schema)
+
+
+@pytest.mark.parametrize(("options", "match"), [
+    ({"base_sigma": -0.5}, "base_sigma = -0.5 m"),
+    ({"boundary_sigma": float("nan")}, "boundary_sigma = nan"),
+    ({"matching_window": -1.0}, "matching_window = -1 m"),
+    ({"density": 1.8, "density_sigma": 5.0}, "larger than the density"),
+    ({"density_sigma": 0.1}, "belongs to a density"),
+])  # fmt: skip
+def test_impossible_sigmas_are_refused(cone, options, match):
+    with pytest.raises(InputError, match=match):
+        aerotri.volume(cone, AROUND, base=100.0, **options)

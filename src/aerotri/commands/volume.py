@@ -134,4 +134,6 @@ def _pile_line(pile: dict[str, Any]) -> str:
 
 def _tonnes(mass: dict[str, Any]) -> str:
     sure = "" if mass["sigma_t"] is None else f" ± {mass['sigma_t']:.4g}"
-    return f"{mass['net_t']:.6g}{sure} t"
+    stated = mass["stated_sigma_t"]
+    alone = "" if stated is None else f" (± {stated:.4g} t by what is stated alone)"
+    return f"{mass['net_t']:.6g}{sure} t{alone}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeGuard
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from aerotri.public.adjustment import Adjustment
     from aerotri.public.surfaces import Reader, SurfaceLike
     from aerotri.public.table import Table
-    from aerotri.volume.accuracy import VolumeSigma
+    from aerotri.volume.accuracy import StatedSigma, VolumeSigma
     from aerotri.volume.bases import Base
     from aerotri.volume.boundary import Boundary
     from aerotri.volume.compute import Volumes
@@ -92,7 +92,8 @@ def volume(
     method : the one that counts; all are computed.
     section_spacing : m between cross sections; a round number where None.
     azimuth : degrees from north, in which sections follow one another.
-    adjustment : result the surface was measured with; without it there is no σ.
+    adjustment : result the surface was measured with; without it there is no σ, only what the σ stated of base,
+        boundary and density make of it (`summary["stated_sigma"]`).
     pickets : pickets.parquet or its table; without, every cell is taken for a point that was measured.
     base_adjustment : result of a base that is a surface.
     base_pickets : pickets of a base that is a surface.
@@ -144,6 +145,8 @@ def volume(
         matching_sigma_um, matching_window, base_sigma=base_sigma, boundary_sigma=boundary_sigma, corrected=corrected,
         boundary_from=boundary_from,
     )  # fmt: skip
+    if density is None and density_sigma != 0.0:
+        raise InputError("density_sigma belongs to a density", "give the density, tonnes per cubic metre")
     known = None if density is None else Density(density, density_sigma)
     plan, whose = SectionPlan(section_spacing, azimuth), project_of(project, adjustment, surface)
     settings = used_arguments(
@@ -226,6 +229,7 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
         volumes = total_of_piles(volumes, piles)
     sigma, notes = None, ()
     sigmas: list[VolumeSigma | None] = [None] * len(piles)
+    each_stated, stated = _stated_alone(asked, base, reader, boundary, piles)
     if top.adjustment is not None:
         report.stage("σ of the volume", None)
         finder = SigmaOfVolumes(top, below, reader, asked.options, stack)
@@ -239,14 +243,31 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     measured_with = (top.adjustment.name, top.name_of_points) if top.adjustment else ("", "")
     sources = Sources(reader.path.name, crs, *measured_with)
     head = Head(asked.project, crs)
-    content = head.as_dict() | volume_json(volumes, base, boundary, sources, sigma, asked.density)
-    content["piles"] = [pile_json(one, own, asked.density) for one, own in zip(piles, sigmas, strict=True)]
+    content = head.as_dict() | volume_json(volumes, base, boundary, sources, sigma, asked.density, stated)
+    content["piles"] = [
+        pile_json(one, own, asked.density, own_stated)
+        for one, own, own_stated in zip(piles, sigmas, each_stated, strict=True)
+    ]
     content["settings"] = asked.settings
     outlines = outline_notes(boundary, min(reader.grid.cell_x, reader.grid.cell_y)) if _follows(asked.base) else ()
     crs_notes = (reader.note, *(other.note for other in others), boundary.note, *outlines)
     content["warnings"] = [*(text for text in crs_notes if text), *content["warnings"]]
     profiles = chosen_profiles(reader, base, boundary, volumes.sections)
     return MeasuredVolume(volumes, boundary, content, thickness, profiles, spool, notes, head)
+
+
+def _stated_alone(
+    asked: _Asked, base: Base, reader: Reader, boundary: Boundary, piles: list[Pile]
+) -> tuple[Sequence[StatedSigma | None], StatedSigma | None]:
+    """What is stated about base and boundary makes of σ, of every pile and of all; None with an adjustment."""
+    from aerotri.volume.accuracy import stated_sigma, stated_sum
+
+    if asked.top.adjustment is not None:
+        return [None] * len(piles), None
+    if not piles:
+        return [], stated_sigma(reader, base, boundary, asked.options)
+    each = [stated_sigma(reader, one.base, one.boundary, asked.options) for one in piles]
+    return each, stated_sum(each)
 
 
 def _follows(base: SurfaceLike | float) -> bool:

@@ -181,7 +181,12 @@ def _mass(of: str) -> tuple[Item, ...]:
         Item(f"{of}.fill_t", "number", "Tonnes below the base.", "t"),
         Item(f"{of}.net_t", "number", "Tonnes above less tonnes below.", "t"),
         Item(f"{of}.sigma_t", "number?", "Standard deviation of net_t; null without --adjustment.", "t"),
-    )
+        Item(
+            f"{of}.stated_sigma_t", "number?",
+            "What the stated σ of density, base and boundary alone make of it; null with --adjustment, or where none "
+            "is stated.", "t",
+        ),
+    )  # fmt: skip
 
 
 def _parts(of: str) -> list[Item]:
@@ -252,6 +257,17 @@ VOLUME_JSON = (
     Item("sigma.rays", "whole", "Image points behind them."),
     Item("sigma.adjustment", "text", "Folder of the adjustment."),
     Item("sigma.picket_file", "text", "File of the points; empty where every cell was taken for one."),
+    Item(
+        "stated_sigma",
+        "object?",
+        "Without --adjustment: what the σ stated of base and boundary make of σ of the "
+        "net volume, without the errors of the surface; null with --adjustment, or where none is stated.",
+    ),
+    Item("stated_sigma.meaning", "text", "What it is, in words."),
+    Item("stated_sigma.sigma_m3", "number", "Both together.", "m³"),
+    Item("stated_sigma.parts_m3", "object", "The parts, each alone.", "m³"),
+    Item("stated_sigma.parts_m3.base", "number", "Part of the base.", "m³"),
+    Item("stated_sigma.parts_m3.boundary", "number", "Part of the boundary.", "m³"),
     Item("mass", "object?", "Tonnes of the volume; null without --density."),
     *_mass("mass"),
     Item("piles[]", "object", "Every polygon by itself; empty where the boundary is one polygon."),
@@ -262,6 +278,7 @@ VOLUME_JSON = (
     Item("piles[].sigma_m3", "number?", "Standard deviation of its net volume; null without --adjustment.", "m³"),
     Item("piles[].parts_m3", "object?", "The parts of it, each alone.", "m³"),
     *_parts("piles[].parts_m3"),
+    Item("piles[].stated_sigma_m3", "number?", "As stated_sigma.sigma_m3, of the pile.", "m³"),
     Item("piles[].mass", "object?", "Its tonnes; null without --density."),
     *_mass("piles[].mass"),
     Item("warnings[]", "text", "Sentences to read."),

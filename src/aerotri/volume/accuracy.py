@@ -71,6 +71,30 @@ class VolumeSigma:
         return float(np.sqrt(sum(part**2 for part in self.parts.values())))
 
 
+@dataclass(frozen=True)
+class StatedSigma:
+    """What is stated about base and boundary makes of σ of a volume, m³; errors of the surface are not in it."""
+
+    base: float
+    boundary: float
+
+    @property
+    def total(self) -> float:
+        """m³, the root of the sum of squares."""
+        return float(np.hypot(self.base, self.boundary))
+
+
+def stated_sigma(surface: Surface, base: Base, boundary: Boundary, options: SigmaOptions) -> StatedSigma:
+    """Of a volume whose surface has no adjustment."""
+    edge = boundary_variance(surface, base, boundary, options.boundary_sigma)
+    return StatedSigma(options.base_sigma * boundary.area, float(np.sqrt(edge)))
+
+
+def stated_sum(each: Sequence[StatedSigma]) -> StatedSigma:
+    """Of several volumes: σ of the base is common to all, boundaries are each one's own."""
+    return StatedSigma(sum(one.base for one in each), float(np.sqrt(sum(one.boundary**2 for one in each))))
+
+
 def volume_sigma(
     surface: Surface, base: Base, boundary: Boundary, part: Part, base_part: Part | None, options: SigmaOptions
 ) -> VolumeSigma:

@@ -41,6 +41,11 @@ class SigmaOptions:
     boundary_sigma : m, of either coordinate of every corner. corrected : the photographs were corrected.
     boundary_from : 'survey', the boundary is fixed in space, or 'product', it was drawn on the surface or on an
         orthophoto of the same adjustment and moves with it.
+
+    Raises
+    ------
+    InputError
+        When a σ is negative or no number.
     """
 
     matching_sigma_um: float | None = None
@@ -51,6 +56,14 @@ class SigmaOptions:
     corrected: bool = True
     boundary_from: BoundaryFrom = "survey"
 
+    def __post_init__(self) -> None:
+        for name, value, unit in (
+            ("base_sigma", self.base_sigma, "m"), ("boundary_sigma", self.boundary_sigma, "m"),
+            ("matching_sigma_um", self.matching_sigma_um, "µm"), ("matching_window", self.matching_window_m, "m"),
+        ):  # fmt: skip
+            if value is not None and not 0.0 <= value < float("inf"):
+                raise InputError(f"{name} = {value:g} {unit} is not possible", "give a number that is not negative")
+
 
 @dataclass(frozen=True)
 class Density:
@@ -59,7 +72,7 @@ class Density:
     Raises
     ------
     InputError
-        When the density is not positive, or its σ negative.
+        When the density is not positive, or its σ negative or larger than the density.
     """
 
     t_per_m3: float
@@ -69,6 +82,11 @@ class Density:
         if not (0.0 < self.t_per_m3 < MOST_DENSE and 0.0 <= self.sigma < MOST_DENSE):
             raise InputError(
                 f"a density of {self.t_per_m3:g} ± {self.sigma:g} t/m³ is not possible", "give tonnes per cubic metre"
+            )
+        if self.sigma > self.t_per_m3:
+            raise InputError(
+                f"σ of the density, {self.sigma:g} t/m³, is larger than the density, {self.t_per_m3:g} t/m³",
+                "give σ in tonnes per cubic metre, not per cent",
             )
 
     def tonnes(self, volume: float) -> float:

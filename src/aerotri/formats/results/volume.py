@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.version import __version__
-from aerotri.volume.accuracy import VolumeSigma
+from aerotri.volume.accuracy import StatedSigma, VolumeSigma
 from aerotri.volume.bases import Base, PlaneBase
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.compute import Volumes
@@ -18,6 +18,7 @@ from aerotri.volume.settings import Density
 
 SYSTEMATIC = "change of the volume by image errors, wrong − true, were the photographs used uncorrected"
 
+STATED = "what is stated about base and boundary alone; the errors of the surface are not in it"
 CURVATURE = "ground expected beyond the straight lines between the heights; part of σ as interpolation"
 
 
@@ -33,11 +34,16 @@ class Sources:
 
 def volume_json(
     volumes: Volumes, base: Base, boundary: Boundary, sources: Sources, sigma: VolumeSigma | None,
-    density: Density | None = None,
+    density: Density | None = None, stated: StatedSigma | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """The content of volume.json; m, m², m³."""
+    """The content of volume.json; m, m², m³.
+
+    Parameters
+    ----------
+    stated : instead of σ, where there is no adjustment.
+    """
     v, s = volumes.chosen, volumes.sections
-    warnings = list(volumes.warnings) + ([] if sigma is None else list(sigma.notes))
+    warnings = [*volumes.warnings, *([] if sigma is None else sigma.notes), *_stated_in_words(v, stated, density)]
     return {
         "aerotri": __version__, "dtm": sources.dtm, "crs": sources.crs,
         "base": _base(base), "boundary": {"name": boundary.name, "area_m2": boundary.area},
@@ -46,28 +52,67 @@ def volume_json(
         "lowest_m": _finite(volumes.lowest), "highest_m": _finite(volumes.highest),
         "methods": [{"method": one.method, **_numbers(one), "note": one.note} for one in volumes.by_method],
         "sections": {"spacing_m": s.spacing, "azimuth_deg": s.azimuth, "count": len(s.station)},
-        "sigma": None if sigma is None else _sigma(sigma, v, sources), "mass": _mass(v, sigma, density),
-        "warnings": warnings,
+        "sigma": None if sigma is None else _sigma(sigma, v, sources), "stated_sigma": _stated(stated),
+        "mass": _mass(v, sigma, density, stated), "warnings": warnings,
     }  # fmt: skip
 
 
-def pile_json(pile: Pile, sigma: VolumeSigma | None, density: Density | None) -> dict[str, Any]:
+def pile_json(
+    pile: Pile, sigma: VolumeSigma | None, density: Density | None, stated: StatedSigma | None = None
+) -> dict[str, Any]:
     """A pile of volume.json: its volume, σ with its parts, tonnes."""
     v = pile.volumes.chosen
     return {
         "name": pile.name, "area_m2": pile.boundary.area, "base": pile.base.name, **_numbers(v),
         "sigma_m3": None if sigma is None else sigma.total,
-        "parts_m3": None if sigma is None else dict(sigma.parts), "mass": _mass(v, sigma, density),
+        "parts_m3": None if sigma is None else dict(sigma.parts),
+        "stated_sigma_m3": _total_stated(stated), "mass": _mass(v, sigma, density, stated),
     }  # fmt: skip
 
 
-def _mass(v: Volume, sigma: VolumeSigma | None, density: Density | None) -> dict[str, Any] | None:
+def _total_stated(stated: StatedSigma | None) -> float | None:
+    """m³; None where nothing is stated."""
+    return None if stated is None or stated.total <= 0.0 else stated.total
+
+
+def _stated(stated: StatedSigma | None) -> dict[str, Any] | None:
+    total = _total_stated(stated)
+    if stated is None or total is None:
+        return None
+    return {"meaning": STATED, "sigma_m3": total, "parts_m3": {"base": stated.base, "boundary": stated.boundary}}
+
+
+def _stated_tonnes(v: Volume, stated: StatedSigma | None, density: Density | None) -> float | None:
+    """t, σ of the net tonnes by what is stated alone; None where nothing is."""
+    if stated is None or density is None:
+        return None
+    return density.tonnes_sigma(v.net, stated.total) or None
+
+
+def _stated_in_words(v: Volume, stated: StatedSigma | None, density: Density | None) -> list[str]:
+    total, tonnes = _total_stated(stated), _stated_tonnes(v, stated, density)
+    parts = [] if stated is None or total is None else [
+        f"{total:.3g} m³ (base {stated.base:.3g} m³, boundary {stated.boundary:.3g} m³)"
+    ]  # fmt: skip
+    parts += [] if tonnes is None else [f"{tonnes:.3g} t of mass"]
+    if not parts:
+        return []
+    return [
+        f"σ of what is stated alone: {', '.join(parts)}; the errors of the surface are not in it (nor a σ band of its "
+        "file): give the adjustment that it was measured with"
+    ]
+
+
+def _mass(
+    v: Volume, sigma: VolumeSigma | None, density: Density | None, stated: StatedSigma | None
+) -> dict[str, Any] | None:
     if density is None:
         return None
     return {
         "density_t_per_m3": density.t_per_m3, "s_density_t_per_m3": density.sigma, "cut_t": density.tonnes(v.cut),
         "fill_t": density.tonnes(v.fill), "net_t": density.tonnes(v.net),
         "sigma_t": None if sigma is None else density.tonnes_sigma(v.net, sigma.total),
+        "stated_sigma_t": _stated_tonnes(v, stated, density),
     }  # fmt: skip
 
 
