@@ -181,3 +181,15 @@ def test_what_is_stated_of_piles(cone, tmp_path):
 def test_impossible_sigmas_are_refused(cone, options, match):
     with pytest.raises(InputError, match=match):
         aerotri.volume(cone, AROUND, base=100.0, **options)
+
+
+def test_infinities_are_no_data(tmp_path, cone):
+    z = heights()
+    z[100, 60], z[90, 62] = np.inf, -np.inf
+    left_out = 2.0 * CELL**2
+    for held in (surface(z), in_file(tmp_path / "z.tif", z), in_file(tmp_path / "none.tif", z, no_data=None)):
+        found = aerotri.volume(held, AROUND, method="grid")
+        assert found.summary["no_data_area_m2"] == pytest.approx(left_out)
+        assert np.isfinite(found.methods["net_m3"]).all()
+        assert found.net == pytest.approx(aerotri.volume(cone, AROUND).net, rel=0.01)
+        assert any("have no height" in text for text in found.warnings)

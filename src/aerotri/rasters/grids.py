@@ -229,7 +229,7 @@ class RasterReader:
         return str(self._file.tags().get(name, ""))
 
     def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
-        """A window, (rows, columns) of `dtype`; NaN where nothing is known and beyond the edges."""
+        """A window, (rows, columns) of `dtype`; NaN where nothing is known, beyond the edges and for infinities."""
         top, left = max(row, 0), max(column, 0)
         bottom, right = min(row + rows, self.grid.rows), min(column + columns, self.grid.columns)
         if bottom <= top or right <= left:
@@ -250,6 +250,8 @@ class RasterReader:
             values[mask == 0] = np.nan
         elif self.no_data is not None and not np.isnan(self.no_data):
             values[raw == float(self.no_data)] = np.nan
+        # a division by zero in another program is no height either
+        values[np.isinf(values)] = np.nan
         return values
 
     def sample(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ class HeldRaster:
 
     Parameters
     ----------
-    values : (rows, columns) m, NaN where not known.
+    values : (rows, columns) m, NaN or infinite where not known.
     crs : 'EPSG:n', None for a local one.
     name : stands for that of the file.
 
@@ -30,7 +30,8 @@ class HeldRaster:
 
     def __init__(self, values: np.ndarray, grid: Grid, crs: str | None, name: str):
         self.grid, self.crs, self.path = grid, crs, Path(name)
-        self.values, self.options = values.astype(np.float32), {}
+        heights = values.astype(np.float32)
+        self.values, self.options = np.where(np.isinf(heights), np.float32(np.nan), heights), {}
 
     @property
     def epsg(self) -> int | None:
