@@ -193,3 +193,33 @@ def test_infinities_are_no_data(tmp_path, cone):
         assert np.isfinite(found.methods["net_m3"]).all()
         assert found.net == pytest.approx(aerotri.volume(cone, AROUND).net, rel=0.01)
         assert any("have no height" in text for text in found.warnings)
+
+
+def test_two_systems_of_heights_are_refused(ground):
+    top, below = surface(heights(), "EPSG:25832+7837"), surface(ground.z, "EPSG:25832+5783", "base")
+    with pytest.raises(InputError, match=r"EPSG:5783.*EPSG:7837") as refused:
+        aerotri.volume(top, AROUND, base=below)
+    assert "one system of heights" in refused.value.remedy
+
+
+@pytest.mark.parametrize(("own", "other", "said"), [
+    ("EPSG:25832", "EPSG:25832+7837", ["cone does not say in which system"]),
+    ("EPSG:25832+7837", "EPSG:25832", ["base does not say in which system"]),
+    ("EPSG:25832", None, ["base has no CRS"]), (None, "EPSG:25832", ["cone has no CRS"]),
+    ("EPSG:25832+7837", None, ["base has no CRS", "base does not say in which system"]),
+    ("EPSG:25832", "EPSG:25832", []), ("EPSG:25832+7837", "EPSG:25832+7837", []), (None, None, []),
+])  # fmt: skip
+def test_a_system_that_one_does_not_say_is_told(ground, own, other, said):
+    found = aerotri.volume(surface(heights(), own), AROUND, base=surface(ground.z, other, "base"))
+    assert found.net == pytest.approx(CONE, rel=0.005)
+    told = [text for text in found.warnings if "does not say" in text or "has no CRS" in text]
+    assert len(told) == len(said)
+    assert all(any(text in one for one in told) for text in said)
+
+
+def test_heights_stay_in_their_system_when_degrees_are_brought_to_metres(tmp_path):
+    place = Affine(1e-5, 0.0, 9.0, 0.0, -1e-5, 50.5)
+    with rasterio.open(tmp_path / "z.tif", "w", driver="GTiff", height=COUNT, width=COUNT, count=1, dtype="float32",
+                       crs="EPSG:4326+5773", transform=place) as file:  # fmt: skip
+        file.write(np.full((COUNT, COUNT), 100.0, np.float32), 1)
+    assert aerotri.volume(tmp_path / "z.tif", base=99.0).summary["crs"] == "EPSG:32632+5773"

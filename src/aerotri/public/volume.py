@@ -221,6 +221,7 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     boundary = _boundary(asked.boundary, reader)
     others: list[Reader] = []
     base = _base(asked.base, below, reader, boundary, stack, others)
+    systems = [text for other in others for text in _systems_in_words(reader, other)]
     piles = _piles(asked, base, reader, boundary)
     if len({id(one.base) for one in piles}) > 1:
         base = PilesBase(tuple(one.boundary for one in piles), tuple(one.base for one in piles))
@@ -250,7 +251,7 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     ]
     content["settings"] = asked.settings
     outlines = outline_notes(boundary, min(reader.grid.cell_x, reader.grid.cell_y)) if _follows(asked.base) else ()
-    crs_notes = (reader.note, *(other.note for other in others), boundary.note, *outlines)
+    crs_notes = (reader.note, *(other.note for other in others), *systems, boundary.note, *outlines)
     content["warnings"] = [*(text for text in crs_notes if text), *content["warnings"]]
     profiles = chosen_profiles(reader, base, boundary, volumes.sections)
     return MeasuredVolume(volumes, boundary, content, thickness, profiles, spool, notes, head)
@@ -328,9 +329,26 @@ def _base(
     if other.epsg is not None and reader.epsg is not None and other.epsg != reader.epsg:
         message = f"is in EPSG:{other.epsg}, the surface in EPSG:{reader.epsg}"
         raise InputError(message, "bring it into one CRS", other.path)
+    heights, own = (one.crs_code.partition("+")[2] for one in (other, reader))
+    if heights and own and heights != own:
+        message = f"its heights are in EPSG:{heights}, those of {reader.path.name} in EPSG:{own}"
+        raise InputError(message, "bring them into one system of heights", other.path)
     refuse_stretched(other)
     others.append(other)
     return SurfaceBase(below.surface.label, other)
+
+
+def _systems_in_words(reader: Reader, other: Reader) -> list[str]:
+    """What is taken for granted where one of surface and base does not say its systems."""
+    said = []
+    for one, second in ((reader, other), (other, reader)):
+        if one.epsg is None and second.epsg is not None:
+            said.append(f"{one.path.name} has no CRS that is known; it is taken for EPSG:{second.epsg}, as "
+                        f"{second.path.name} is")  # fmt: skip
+        if "+" in second.crs_code and "+" not in one.crs_code:
+            said.append(f"{one.path.name} does not say in which system its heights are; they are taken for those of "
+                        f"{second.path.name}, {second.crs_code}")  # fmt: skip
+    return said
 
 
 def _volumes(

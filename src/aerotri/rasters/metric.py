@@ -86,7 +86,7 @@ class MetricReader(RasterReader):
         super().__init__(path, band)
         self._target = target
         self._source: Any = None
-        self._factor = METRE
+        self._factor, self._heights = METRE, ""
         try:
             self._bring_to_metres(target)
         except InputError:
@@ -95,6 +95,13 @@ class MetricReader(RasterReader):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return MetricReader, (self.path.absolute(), self.band, self._target)
+
+    @property
+    def crs_code(self) -> str:
+        """As of `RasterReader`; heights in metres stay in their system where the plan was brought to another one."""
+        own = super().crs_code
+        kept = own and "+" not in own and self._heights and self._factor == METRE
+        return f"{own}+{self._heights}" if kept else own
 
     def _bring_to_metres(self, target: str | None) -> None:
         units = units_of(self)
@@ -130,6 +137,7 @@ class MetricReader(RasterReader):
             warped = WarpedVRT(self._file, crs=target, resampling=Resampling.bilinear, nodata=no_data, dtype="float64")
         except RasterioError as error:
             raise InputError(f"cannot be brought to {target}: {error}", "check its CRS", self.path) from error
+        self._heights = super().crs_code.partition("+")[2]
         self._source, self._file = self._file, warped
         t = warped.transform
         self.grid = Grid(warped.height, warped.width, t.c, t.f, t.a, -t.e)
