@@ -11,6 +11,7 @@ import pytest
 import rasterio
 import shapely
 import shapely.affinity
+from pyproj import Transformer
 from rasterio import Affine
 
 import aerotri
@@ -223,3 +224,77 @@ def test_heights_stay_in_their_system_when_degrees_are_brought_to_metres(tmp_pat
                        crs="EPSG:4326+5773", transform=place) as file:  # fmt: skip
         file.write(np.full((COUNT, COUNT), 100.0, np.float32), 1)
     assert aerotri.volume(tmp_path / "z.tif", base=99.0).summary["crs"] == "EPSG:32632+5773"
+
+
+def collection(path, polygons, crs=CRS, **members):
+    """GeoJSON of polygons with their attributes."""
+    content = {"type": "FeatureCollection", "features": [
+        {"type": "Feature", "properties": own, "geometry": json.loads(shapely.to_geojson(polygon))}
+        for own, polygon in polygons
+    ]}  # fmt: skip
+    if crs is not None:
+        content["crs"] = {"type": "name", "properties": {"name": crs}}
+    path.write_text(json.dumps(content | members), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("base", ["boundary", 100.0])
+def test_a_boundary_beside_the_surface_is_told_by_place(tmp_path, cone, base):
+    away = shapely.affinity.translate(AROUND, 500.0)
+    with pytest.raises(
+        InputError, match=r"'away' does not meet the surface.*X 500516 to 500544.*EPSG:25832"
+    ) as refused:
+        aerotri.volume(cone, {"here": AROUND, "away": away}, base=base)
+    assert refused.value.file is not None
+    alone = collection(tmp_path / "out.geojson", [({}, away)])
+    with pytest.raises(InputError, match=r"'out.geojson' does not meet the surface"):
+        aerotri.volume(cone, alone, base=base)
+
+
+def test_a_pile_without_heights_along_its_outline_is_named(tmp_path):
+    z = heights()
+    z[:, 130:] = np.nan
+    hidden = shapely.affinity.translate(AROUND, 54.0)
+    path = in_file(tmp_path / "z.tif", z)
+    with pytest.raises(InputError, match=r"pile 'B': .*not known along the boundary 'B'") as refused:
+        aerotri.volume(path, {"A": AROUND, "B": hidden})
+    assert refused.value.file == path
+
+
+def test_a_boundary_of_another_kind_names_those_that_are_read(tmp_path, cone):
+    (tmp_path / "b.kml").write_text("<?xml version='1.0'?><kml/>", encoding="utf-8")
+    with pytest.raises(InputError, match="is no polygon") as refused:
+        aerotri.volume(cone, tmp_path / "b.kml")
+    assert all(kind in refused.value.remedy for kind in ("GeoPackage", "GeoJSON", "WKT"))
+
+
+def test_geojson_that_names_its_crs_by_name(tmp_path, cone):
+    forward = Transformer.from_crs(CRS, "EPSG:25833", always_xy=True)
+    there = shapely.transform(AROUND, lambda xy: np.column_stack(forward.transform(*xy.T)))
+    found = aerotri.volume(cone, collection(tmp_path / "named.geojson", [({}, there)], "ETRS89 / UTM zone 33N"))
+    assert found.net == pytest.approx(CONE, rel=0.005)
+    assert any("brought from EPSG:25833" in text for text in found.warnings)
+    unknown = aerotri.volume(cone, collection(tmp_path / "site.geojson", [({}, AROUND)], "site grid"))
+    assert any("names the CRS 'site grid', which is not known" in text for text in unknown.warnings)
+
+
+def test_a_second_band_that_is_no_sigma_is_refused_with_the_rule(tmp_path):
+    place = Affine(CELL, 0.0, LEFT, 0.0, -CELL, TOP)
+    with rasterio.open(tmp_path / "z.tif", "w", driver="GTiff", height=COUNT, width=COUNT, count=2, dtype="float32",
+                       crs=CRS, transform=place) as file:  # fmt: skip
+        file.write(heights().astype(np.float32), 1)
+        file.write(np.ones((COUNT, COUNT), np.float32), 2)
+    with pytest.raises(InputError, match="has 2 bands") as refused:
+        aerotri.volume(tmp_path / "z.tif")
+    assert "description begins with 'σ'" in refused.value.remedy
+
+
+@pytest.mark.parametrize("command", ["ortho", "dsm", "dtm"])
+def test_help_shows_four_numbers_as_they_are_typed(command):
+    from typer.testing import CliRunner
+
+    from aerotri.cli.app import app
+
+    shown = CliRunner().invoke(app, [command, "--help"], env={"COLUMNS": "200", "NO_COLOR": "1"}).output
+    assert "X Y X Y" in shown
+    assert "float,float" not in shown.lower()

@@ -20,7 +20,8 @@ def change(
     first: Annotated[
         Path,
         typer.Argument(
-            help="Earlier surface: GeoTIFF with σ as second band, or folder of dsm, dtm or run; or a LAS or LAZ cloud.",
+            help="Earlier surface: GeoTIFF (σ, if any, in a second band whose description begins with σ), or folder of "
+            "dsm, dtm or run; or a LAS or LAZ cloud.",
             rich_help_panel=ARGUMENTS,
         ),
     ],

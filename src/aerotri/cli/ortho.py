@@ -42,7 +42,9 @@ def ortho(
     ] = DEFAULTS.cell,
     area: Annotated[
         tuple[float, float, float, float] | None,
-        typer.Option(help="X Y of the lower left, X Y of the upper right corner, m.", rich_help_panel=OUTPUT),
+        typer.Option(
+            metavar="X Y X Y", help="X Y of the lower left, X Y of the upper right corner, m.", rich_help_panel=OUTPUT
+        ),
     ] = DEFAULTS.area,
     edge: Annotated[
         float,

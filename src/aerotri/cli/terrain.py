@@ -73,7 +73,9 @@ def dtm(
     ] = DEFAULTS.subset,
     area: Annotated[
         tuple[float, float, float, float] | None,
-        typer.Option(help="X Y of the lower left, X Y of the upper right corner, m.", rich_help_panel=GRID),
+        typer.Option(
+            metavar="X Y X Y", help="X Y of the lower left, X Y of the upper right corner, m.", rich_help_panel=GRID
+        ),
     ] = None,
     window: Annotated[
         int,
@@ -167,7 +169,9 @@ def dsm(
     ] = DENSE_DEFAULTS.resolution,
     area: Annotated[
         tuple[float, float, float, float] | None,
-        typer.Option(help="X Y of the lower left, X Y of the upper right corner, m.", rich_help_panel=GRID),
+        typer.Option(
+            metavar="X Y X Y", help="X Y of the lower left, X Y of the upper right corner, m.", rich_help_panel=GRID
+        ),
     ] = DENSE_DEFAULTS.area,
     most_pairs: Annotated[
         int,
@@ -278,7 +282,9 @@ def predict_picket_interval(
     area: Annotated[
         tuple[float, float, float, float] | None,
         typer.Option(
-            help="With --pilot: X Y of the lower left, X Y of the upper right corner, m.", rich_help_panel=PILOT
+            metavar="X Y X Y",
+            help="With --pilot: X Y of the lower left, X Y of the upper right corner, m.",
+            rich_help_panel=PILOT,
         ),
     ] = None,
     tolerance: Annotated[

@@ -186,12 +186,15 @@ def predict_attitude(
     base: Annotated[float, typer.Option(help="Distance between the photographs, m.", rich_help_panel=FLIGHT)] = 900.0,
     focal_length: Annotated[float, typer.Option(help="Focal length, mm.", rich_help_panel=FLIGHT)] = 153.0,
     site: Annotated[
-        tuple[float, float], typer.Option(help="Size along and across the base, m.", rich_help_panel=SITE)
+        tuple[float, float],
+        typer.Option(metavar="ALONG ACROSS", help="Size along and across the base, m.", rich_help_panel=SITE),
     ] = (400.0, 400.0),
     offset: Annotated[
         tuple[float, float],
         typer.Option(
-            help="Place of the site from the middle of the base, along and across it, m.", rich_help_panel=SITE
+            metavar="ALONG ACROSS",
+            help="Place of the site from the middle of the base, along and across it, m.",
+            rich_help_panel=SITE,
         ),
     ] = (0.0, 0.0),
     json_: Json = False,

@@ -219,11 +219,12 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     reader = stack.enter_context(top.surface.reader(top.adjustment.crs if top.adjustment else None))
     refuse_stretched(reader)
     boundary = _boundary(asked.boundary, reader)
+    _refuse_apart(boundary, reader)
     others: list[Reader] = []
     base = _base(asked.base, below, reader, boundary, stack, others)
     systems = [text for other in others for text in _systems_in_words(reader, other)]
     piles = _piles(asked, base, reader, boundary)
-    if len({id(one.base) for one in piles}) > 1:
+    if base is None:
         base = PilesBase(tuple(one.boundary for one in piles), tuple(one.base for one in piles))
     volumes, thickness = _volumes(reader, base, boundary, asked, spool, report)
     if piles:
@@ -278,8 +279,34 @@ def _follows(base: SurfaceLike | float) -> bool:
     return isinstance(base, str) and base in WORDS
 
 
-def _piles(asked: _Asked, base: Base, reader: Reader, boundary: Boundary) -> list[Pile]:
-    """Every polygon of the boundary by itself; a base that follows from the boundary is each one's own."""
+def _refuse_apart(boundary: Boundary, reader: Reader) -> None:
+    """Refuse polygons that lie beside the surface.
+
+    Raises
+    ------
+    InputError
+    """
+    import shapely
+
+    edges = reader.grid.bounds
+    for name, polygon in boundary.piles or ((boundary.name, boundary.polygon),):
+        if not shapely.intersects(polygon, shapely.box(*edges)):
+            where = f" ({reader.crs_code})" if reader.crs_code else ""
+            note = f"; {boundary.note}" if boundary.note else ""
+            raise InputError(
+                f"'{name}' does not meet the surface: it lies at {_place(polygon.bounds)}, the surface{where} at "
+                f"{_place(edges)}{note}", "check the CRS of both", reader.path,
+            )  # fmt: skip
+
+
+def _place(bounds: tuple[float, float, float, float]) -> str:
+    left, bottom, right, top = bounds
+    digits = 6 if max(abs(v) for v in bounds) <= 360.0 else 0
+    return f"X {left:.{digits}f} to {right:.{digits}f}, Y {bottom:.{digits}f} to {top:.{digits}f}"
+
+
+def _piles(asked: _Asked, base: Base | None, reader: Reader, boundary: Boundary) -> list[Pile]:
+    """Every polygon of the boundary by itself; base : of all, None where each has one that follows from its outline."""
     from aerotri.volume.bases import parse_base
     from aerotri.volume.boundary import boundary_of
     from aerotri.volume.compute import compute_volumes
@@ -288,11 +315,11 @@ def _piles(asked: _Asked, base: Base, reader: Reader, boundary: Boundary) -> lis
     found: list[Pile] = []
     for name, polygon in boundary.piles:
         own = boundary_of(polygon, name)
-        below = parse_base(str(asked.base), reader, own) if _follows(asked.base) else base
         try:
+            below = parse_base(str(asked.base), reader, own) if base is None else base
             volumes = compute_volumes(reader, below, own, asked.method, asked.plan)
         except InputError as error:
-            raise InputError(f"pile '{name}': {error.message}", error.remedy, error.file) from error
+            raise InputError(f"pile '{name}': {error.message}", error.remedy, error.file or reader.path) from error
         found.append(Pile(name, own, below, volumes))
     return found
 
@@ -316,15 +343,25 @@ def _boundary(stated: BaseGeometry | Mapping[str, BaseGeometry] | FilePath | Non
 def _base(
     stated: SurfaceLike | float, below: MeasuredSurface | None, reader: Reader, boundary: Boundary, stack: ExitStack,
     others: list[Reader],
-) -> Base:  # fmt: skip
-    """The base; the raster of one that is a surface is open as long as the stack, in the CRS of the surface."""
+) -> Base | None:  # fmt: skip
+    """The base, None where every pile has its own.
+
+    The raster of one that is a surface is open as long as the stack, in the CRS of the surface.
+    """
     from aerotri.rasters.metric import refuse_stretched
     from aerotri.volume.bases import SurfaceBase, level, parse_base
 
     if isinstance(stated, int | float):
         return level(float(stated))
+    if below is None and boundary.piles and _follows(stated):
+        return None
     if below is None:
-        return parse_base(str(stated), reader, boundary)
+        try:
+            return parse_base(str(stated), reader, boundary)
+        except InputError as error:
+            if not _follows(stated):
+                raise
+            raise InputError(error.message, error.remedy, reader.path) from error
     other = stack.enter_context(below.surface.reader(None if reader.epsg is None else f"EPSG:{reader.epsg}"))
     if other.epsg is not None and reader.epsg is not None and other.epsg != reader.epsg:
         message = f"is in EPSG:{other.epsg}, the surface in EPSG:{reader.epsg}"

@@ -33,6 +33,7 @@ TILE = 512
 files."""
 SIGMA = "σ"
 """The description of a band of σ begins with it."""
+BANDS_REMEDY = "give heights in one band, and their σ in a second one whose description begins with 'σ', if it has one"
 COMPOUND = ("COMPD_CS", "COMPOUNDCRS")
 """Beginnings of the WKT of a CRS with a system of heights."""
 DAMAGED = "write the file anew, it is damaged"
@@ -174,7 +175,7 @@ class RasterReader:
     def _check(self) -> None:
         file = self._file
         if file.count != 1 and not (file.count == 2 and str(file.descriptions[1]).startswith(SIGMA)):
-            raise InputError(f"has {file.count} bands", "give a raster with one band", self.path)
+            raise InputError(f"has {file.count} bands", BANDS_REMEDY, self.path)
         if self.band > file.count:
             raise InputError("has no σ", "give a surface of `aerotri dtm`", self.path)
         t = file.transform

@@ -85,14 +85,35 @@ def system_of_geojson(content: Mapping[str, Any], xy: np.ndarray, epsg: int | No
         found = vector_system(LON_LAT, epsg, name)
         note = f"{name} was brought from longitude and latitude, which GeoJSON has by RFC 7946, to EPSG:{epsg}"
         return VectorSystem(found.transformer, note)
+    named = _named_crs(content)
+    if named:
+        return VectorSystem(None, f"{name} names the CRS '{named}', which is not known: taken for EPSG:{epsg}")
     return VectorSystem(
         None, f"{name} names no CRS, and its coordinates are no longitudes and latitudes: taken for EPSG:{epsg}"
     )
 
 
 def stated_crs(content: Mapping[str, Any]) -> str | None:
-    """The CRS that the old member "crs" of GeoJSON names, None where there is none or it is null."""
+    """The CRS that the old member "crs" of GeoJSON names by code or name, None where there is none that is known."""
+    text = _named_crs(content)
+    found = CODE.search(text)
+    return _code_of_name(text) if found is None else f"{found[1].upper()}:{found[2].upper()}"
+
+
+def _named_crs(content: Mapping[str, Any]) -> str:
     member = content.get("crs")
-    text = str(((member or {}).get("properties") or {}).get("name", "")) if isinstance(member, Mapping) else ""
-    found = CODE.search(text.strip())
-    return None if found is None else f"{found[1].upper()}:{found[2].upper()}"
+    named = ((member or {}).get("properties") or {}).get("name", "") if isinstance(member, Mapping) else ""
+    return str(named).strip()
+
+
+def _code_of_name(text: str) -> str | None:
+    """'EPSG:25833' of 'ETRS89 / UTM zone 33N'; PROJ also answers to names that only look alike, which do not count."""
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError
+
+    try:
+        found = CRS.from_user_input(text) if text else None
+    except CRSError:
+        return None
+    code = None if found is None or found.name.lower() != text.lower() else found.to_authority()
+    return None if code is None else ":".join(code)

@@ -19,6 +19,7 @@ from aerotri.vectors.geopackage import read_geopackage
 VECTOR_ENDINGS = (".geojson", ".json", ".gpkg")
 KINDS = ("Polygon", "MultiPolygon")
 WKT_REMEDY = "give POLYGON ((X Y, …)) or MULTIPOLYGON"
+FILE_REMEDY = "give a GeoPackage (.gpkg), GeoJSON (.geojson, .json), or a text file with WKT: POLYGON ((X Y, …))"
 
 Feature = tuple[Mapping[str, Any], BaseGeometry]
 
@@ -73,7 +74,7 @@ def polygon_of_wkt(text: str, path: Path | None = None) -> BaseGeometry:
     """
     plain = text.partition(";")[2] if text.upper().lstrip().startswith("SRID=") else text
     if not plain.lstrip().upper().startswith(("POLYGON", "MULTIPOLYGON")):
-        raise InputError("is no polygon", WKT_REMEDY, path)
+        raise InputError("is no polygon", WKT_REMEDY if path is None else FILE_REMEDY, path)
     try:
         # numbers beyond all bounds are refused below
         with np.errstate(all="ignore"):

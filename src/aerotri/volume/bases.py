@@ -228,7 +228,10 @@ def boundary_heights(surface: Surface, boundary: Boundary, most: int = MOST_NODE
     z = sampled(surface, xy[:, 0], xy[:, 1])
     known = np.isfinite(z)
     if known.sum() < 3:
-        raise InputError("the surface is not known along the boundary", "choose another boundary or base")
+        raise InputError(
+            f"the surface is not known along the boundary '{boundary.name}'",
+            "check the CRS of both, or choose another boundary or base",
+        )
     return np.column_stack([xy[known], z[known]])
 
 

@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from aerotri.conventions import InputError
 from aerotri.rasters.grids import Grid, rasterise
 from aerotri.vectors.crs import vector_system
-from aerotri.vectors.polygons import VECTOR_ENDINGS, placed, polygon_features, polygon_of_wkt, srid_of_wkt
+from aerotri.vectors.polygons import FILE_REMEDY, VECTOR_ENDINGS, placed, polygon_features, polygon_of_wkt, srid_of_wkt
 
 NAMES = ("name", "pile", "label", "title")
 """Attributes that name a polygon, in any case."""
@@ -199,7 +199,7 @@ def read_boundary(source: str, epsg: int | None = None) -> Boundary:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read: {error}", "give GeoJSON, GeoPackage or WKT", path) from error
+        raise InputError(f"cannot be read: {error}", FILE_REMEDY, path) from error
     return _of_wkt(text, path.name, epsg, path)
 
 
