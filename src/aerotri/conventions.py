@@ -76,6 +76,13 @@ LARGEST = 1e12
 """No number that a user states is larger, whatever its unit; a larger one would overflow in a square."""
 
 
+def in_digits(value: float, digits: int) -> str:
+    """A number to so many digits, never as a power of ten: 302 → '300', 0.0123 → '0.012', both to two."""
+    import numpy as np
+
+    return np.format_float_positional(value, precision=digits, unique=False, fractional=False, trim="-")
+
+
 def stated_number(text: str) -> float:
     """The number that a text states.
 

@@ -16,6 +16,10 @@ from rasterio import Affine
 
 import aerotri
 from aerotri import InputError
+from aerotri.commands.volume import outcome_lines
+from aerotri.report.documents.volume import _base_name
+from aerotri.report.documents.words import Words
+from aerotri.report.pages.volume import volume_html
 
 LEFT, TOP, CELL, COUNT = 500000.0, 5600100.0, 0.5, 200
 RADIUS, HEIGHT = 12.0, 5.0
@@ -298,3 +302,69 @@ def test_help_shows_four_numbers_as_they_are_typed(command):
     shown = CliRunner().invoke(app, [command, "--help"], env={"COLUMNS": "200", "NO_COLOR": "1"}).output
     assert "X Y X Y" in shown
     assert "float,float" not in shown.lower()
+
+
+PILES = {"A": AROUND, "B": shapely.affinity.translate(AROUND, 40.0)}
+
+
+@pytest.mark.parametrize(("base", "name"), [
+    ("boundary", "a base for each of 2 piles: spline through its outline"),
+    ("lowest", "a base for each of 2 piles: lowest level along its outline"), ("plane", "plane fitted to the boundary"),
+])  # fmt: skip
+def test_the_base_of_several_piles_says_what_it_is(cone, base, name):
+    found = aerotri.volume(cone, PILES, base=base)
+    assert found.summary["base"]["name"] == name
+    assert found.net == pytest.approx(sum(aerotri.volume(cone, one, base=base).net for one in PILES.values()))
+    words = Words("de")
+    assert ("2 Haufwerken" in _base_name(found.summary, words)) is (base != "plane")
+    assert ("niedrigste" in _base_name(found.summary, words)) is (base == "lowest")
+
+
+def test_a_page_without_sigma_does_not_speak_of_it(cone):
+    found = aerotri.volume(cone, PILES, base=98.0)
+    page = volume_html(found.summary, {}, found.head)
+    assert "Every pile" in page
+    assert "σ of the sum" not in page
+    assert "system not named" in page
+    assert "above the ellipsoid" not in page
+
+
+@pytest.mark.parametrize(("attributes", "names", "said"), [
+    ([{"Bezeichnung": "Kies", "who": "me"}, {"Bezeichnung": "Sand", "who": "me"}], ["Kies", "Sand"], "Bezeichnung"),
+    ([{"who": "me", "NOM": "gravier"}, {"who": "me", "NOM": "sable"}], ["gravier", "sable"], "NOM"),
+    ([{"Name": "x", "t": "a"}, {"Name": "y", "t": "b"}], ["x", "y"], ""),
+    ([{"who": "me"}, {"who": "me"}], ["1", "2"], ""), ([{"n": 7}, {"n": 8}], ["1", "2"], ""),
+    ([{"t": "a"}, {"t": None}], ["1", "2"], ""),
+])  # fmt: skip
+def test_names_of_piles(tmp_path, cone, attributes, names, said):
+    path = collection(tmp_path / "b.geojson", zip(attributes, PILES.values(), strict=True))
+    found = aerotri.volume(cone, path, base=98.0)
+    assert [one["name"] for one in found.summary["piles"]] == names
+    told = [text for text in found.warnings if "names the polygons" in text]
+    assert told == ([f"b.geojson: the attribute '{said}' names the polygons"] if said else [])
+
+
+@pytest.mark.parametrize(("attributes", "name"), [
+    ({"name": "Kies"}, "Kies"), ({"Bezeichnung": "Kies"}, "Kies"), ({"a": "x", "b": "y"}, ""), ({}, ""),
+    ({"name": "alone"}, "alone"),
+])  # fmt: skip
+def test_the_name_of_a_single_polygon_is_kept(tmp_path, cone, attributes, name):
+    path = collection(tmp_path / "alone.geojson", [(attributes, AROUND)])
+    content = aerotri.volume(cone, path, base=98.0).summary
+    assert (content["boundary"]["name"], content["boundary"]["polygon"]) == ("alone.geojson", name)
+    line = outcome_lines(content, tmp_path)[0]
+    assert line.endswith("inside alone.geojson, polygon 'Kies'" if name == "Kies" else "inside alone.geojson")
+
+
+def test_text_has_no_powers_of_ten(cone, tmp_path):
+    content = aerotri.volume(cone, PILES, base=98.0).summary
+    large = {"net_m3": 12345678.0, "cut_m3": 12345678.0, "fill_m3": 0.00402402}
+    sigma = {"sigma_m3": 23456.7, "parts_m3": {"adjustment": 23456.7},
+             "curvature": {"value_m3": 887.4, "sigma_m3": 302.4},
+             "systematic": {"in_the_volume": False,
+                            "variants": [{"variant": "free", "value_m3": -26.02, "sigma_m3": 124.0}]}}  # fmt: skip
+    text = "\n".join(outcome_lines(content | large | {"sigma": sigma}, tmp_path))
+    assert "e+" not in text
+    assert "net 12345700 m³ ± 23460 (1 σ): cut 12345700, fill 0.00402402" in text
+    assert "+887 ± 302 m³" in text
+    assert "-26 ± 124 m³" in text

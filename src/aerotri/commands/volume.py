@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerotri.commands.console import Console
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, in_digits
 from aerotri.formats.results.json_text import json_text
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.volume.settings import LAYER
@@ -96,44 +97,53 @@ def run_volume(
 def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
     """What the user reads of the volume."""
     from aerotri.deformation.restitution import ORIENTED
+    from aerotri.formats.results.volume import boundary_in_words
 
     c, s = content, content["sigma"]
-    sure = "" if s is None else f" ± {s['sigma_m3']:.4g} (1 σ)"
+    sure = "" if s is None else f" ± {in_digits(s['sigma_m3'], 4)} (1 σ)"
     lines = [
-        f"net {c['net_m3']:.6g} m³{sure}: cut {c['cut_m3']:.6g}, fill {c['fill_m3']:.6g}; {c['method']}, over "
-        f"{c['base']['name']}, {c['boundary']['area_m2']:.6g} m² inside {c['boundary']['name']}"
+        f"net {in_digits(c['net_m3'], 6)} m³{sure}: cut {in_digits(c['cut_m3'], 6)}, fill "
+        f"{in_digits(c['fill_m3'], 6)}; {c['method']}, over "
+        f"{c['base']['name']}, {in_digits(c['boundary']['area_m2'], 6)} m² inside {boundary_in_words(c['boundary'])}"
     ]
     lines += [_pile_line(pile) for pile in c["piles"]]
     if c["mass"] is not None:
         lines.append(f"mass: {_tonnes(c['mass'])} at {c['mass']['density_t_per_m3']:g} t/m³")
     if s is not None:
-        lines.append("σ by part, m³: " + ", ".join(f"{name} {v:.4g}" for name, v in s["parts_m3"].items()))
+        lines.append("σ by part, m³: " + ", ".join(f"{name} {in_digits(v, 4)}" for name, v in s["parts_m3"].items()))
         if s["curvature"] is not None:
             lines.append(
-                f"ground expected beyond straight lines between heights: {s['curvature']['value_m3']:+.4g} ± "
-                f"{s['curvature']['sigma_m3']:.2g} m³, not in the volume, counted in σ as interpolation"
+                "ground expected beyond straight lines between heights: "
+                f"{_signed(s['curvature']['value_m3'], s['curvature']['sigma_m3'])} m³, not in the volume, counted in "
+                "σ as interpolation"
             )
         where = "in the volume:" if s["systematic"]["in_the_volume"] else "corrected; uncorrected they would add"
         for one in s["systematic"]["variants"]:
             lines.append(
-                f"systematic image errors, {ORIENTED[one['variant']]}: {where} {one['value_m3']:+.4g} ± "
-                f"{one['sigma_m3']:.2g} m³"
+                f"systematic image errors, {ORIENTED[one['variant']]}: {where} "
+                f"{_signed(one['value_m3'], one['sigma_m3'])} m³"
             )
-    lines += [f"  {one['method']:<24} net {one['net_m3']:.6g} m³" for one in c["methods"]]
+    lines += [f"  {one['method']:<24} net {in_digits(one['net_m3'], 6)} m³" for one in c["methods"]]
     return [*lines, *(f"note: {text}" for text in c["warnings"]), f"Written to {target}"]
 
 
+def _signed(value: float, sigma: float) -> str:
+    """'+2.579 ± 0.057': both to two digits of σ, no digits before the point rounded."""
+    digits = max(0, 1 - math.floor(math.log10(sigma))) if 0.0 < sigma < math.inf else 2
+    return f"{value:+.{digits}f} ± {sigma:.{digits}f}"
+
+
 def _pile_line(pile: dict[str, Any]) -> str:
-    sure = "" if pile["sigma_m3"] is None else f" ± {pile['sigma_m3']:.4g}"
+    sure = "" if pile["sigma_m3"] is None else f" ± {in_digits(pile['sigma_m3'], 4)}"
     mass = "" if pile["mass"] is None else f", {_tonnes(pile['mass'])}"
     return (
-        f"  {pile['name']}: net {pile['net_m3']:.6g} m³{sure}, cut {pile['cut_m3']:.6g}, fill {pile['fill_m3']:.6g}, "
-        f"on {pile['area_m2']:.6g} m²{mass}"
+        f"  {pile['name']}: net {in_digits(pile['net_m3'], 6)} m³{sure}, cut {in_digits(pile['cut_m3'], 6)}, "
+        f"fill {in_digits(pile['fill_m3'], 6)}, on {in_digits(pile['area_m2'], 6)} m²{mass}"
     )
 
 
 def _tonnes(mass: dict[str, Any]) -> str:
-    sure = "" if mass["sigma_t"] is None else f" ± {mass['sigma_t']:.4g}"
+    sure = "" if mass["sigma_t"] is None else f" ± {in_digits(mass['sigma_t'], 4)}"
     stated = mass["stated_sigma_t"]
-    alone = "" if stated is None else f" (± {stated:.4g} t by what is stated alone)"
-    return f"{mass['net_t']:.6g}{sure} t{alone}"
+    alone = "" if stated is None else f" (± {in_digits(stated, 4)} t by what is stated alone)"
+    return f"{in_digits(mass['net_t'], 6)}{sure} t{alone}"

@@ -223,6 +223,8 @@ class MeasuredVolume:
 
     def html(self) -> str:
         """The volume, as a notebook shows it."""
+        from aerotri.formats.results.volume import boundary_in_words
+
         s = self.summary
         sure = "" if self.sigma is None else f" ± {self.sigma:.4g} (1 σ)"
         warnings = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
@@ -230,7 +232,7 @@ class MeasuredVolume:
         parts = (self.piles.html() if s["piles"] else "") + parts
         return (
             f"<div><b>{escape(s['dtm'])}: net {self.net:.6g} m³{sure}</b>, cut {self.cut:.6g}, fill {self.fill:.6g} m³ "
-            f"over {escape(s['base']['name'])}, {self.area:.6g} m² inside {escape(s['boundary']['name'])}"
+            f"over {escape(s['base']['name'])}, {self.area:.6g} m² inside {escape(boundary_in_words(s['boundary']))}"
             f"{f'<ul>{warnings}</ul>' if warnings else ''}{parts}</div>"
         )
 

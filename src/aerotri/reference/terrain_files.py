@@ -217,6 +217,7 @@ VOLUME_JSON = (
     *ARGUMENTS,
     Item("boundary", "object", "The boundary."),
     Item("boundary.name", "text", "File or text it comes from."),
+    Item("boundary.polygon", "text", "Name that the file gives its only polygon; else empty."),
     Item("boundary.area_m2", "number", "Area inside.", "m²"),
     Item("method", "text", "The method that counts."),
     *(Item(name, "number", text, unit) for name, text, unit in VOLUMES),
@@ -271,7 +272,12 @@ VOLUME_JSON = (
     Item("mass", "object?", "Tonnes of the volume; null without --density."),
     *_mass("mass"),
     Item("piles[]", "object", "Every polygon by itself; empty where the boundary is one polygon."),
-    Item("piles[].name", "text", "Its name: attribute name, pile, label or title, else its number in the file."),
+    Item(
+        "piles[].name",
+        "text",
+        "Its name: attribute name, pile, label or title; else the first one that is a text and "
+        "different for all; else its number in the file.",
+    ),
     Item("piles[].area_m2", "number", "Area inside.", "m²"),
     Item("piles[].base", "text", "Its base, in words."),
     *(Item(f"piles[].{name}", "number", text, unit) for name, text, unit in VOLUMES),

@@ -19,6 +19,8 @@ LATTICE = 129
 """Nodes a side of the lattice on which a spline is kept for evaluation at any number of cells."""
 WORDS = ("plane", "boundary", "lowest")
 """Bases that follow from the surface along the boundary."""
+SPLINES, LEVELS = "spline through its outline", "lowest level along its outline"
+"""Bases of piles that have one of their own, in words."""
 PANELS = 24
 """Quadrature points across the boundary's extent for the integral of a spline."""
 
@@ -141,8 +143,11 @@ class PilesBase:
     @property
     def name(self) -> str:
         """In words."""
+        splines = all(isinstance(base, SplineBase) for base in self.bases)
         names = dict.fromkeys(base.name for base in self.bases)
-        return next(iter(names)) if len(names) == 1 else f"a base for each of {len(self.bases)} piles"
+        if len(names) == 1 and not splines:
+            return next(iter(names))
+        return f"a base for each of {len(self.bases)} piles: {SPLINES if splines else LEVELS}"
 
     def heights(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """(n,) m, of the pile that is nearest."""

@@ -33,12 +33,14 @@ class Boundary:
     ----------
     polygon : valid shapely geometry. name : where it came from. note : about its CRS, '' where there is nothing to say.
     piles : names and polygons that count one by one; empty where the boundary is one.
+    polygon_name : that a file gives its only polygon, '' where it gives none.
     """
 
     polygon: BaseGeometry
     name: str
     note: str = ""
     piles: tuple[tuple[str, BaseGeometry], ...] = ()
+    polygon_name: str = ""
 
     @property
     def area(self) -> float:
@@ -169,13 +171,25 @@ def _shared_outlines(piles: Sequence[tuple[str, BaseGeometry]], cell: float) -> 
     return found
 
 
-def _named(attributes: Sequence[Mapping[str, Any]], polygons: list[BaseGeometry]) -> list[tuple[str, BaseGeometry]]:
-    """Polygons with the names their attributes give, else with their numbers."""
+def _named(
+    attributes: Sequence[Mapping[str, Any]], polygons: list[BaseGeometry]
+) -> tuple[list[tuple[str, BaseGeometry]], str]:
+    """Polygons with the names their attributes give, else with their numbers; and which attribute was taken."""
+    stated = any(str(key).lower() in NAMES for own in attributes for key in own)
+    other = "" if stated else _attribute_of_names(attributes)
     found = []
     for number, (own, polygon) in enumerate(zip(attributes, polygons, strict=True), start=1):
-        stated = next((own[key] for key in own if str(key).lower() in NAMES and own[key] not in (None, "")), number)
-        found.append((str(stated), polygon))
-    return found
+        names = (own[key] for key in own if str(key).lower() in NAMES and own[key] not in (None, ""))
+        found.append((str(own[other] if other else next(names, number)), polygon))
+    return found, f"the attribute '{other}' names the polygons" if other else ""
+
+
+def _attribute_of_names(attributes: Sequence[Mapping[str, Any]]) -> str:
+    """The first attribute that is a text and different for all polygons; '' where there is none, or it is not told."""
+    texts = [key for key in attributes[0] if all(isinstance(own.get(key), str) and own[key] for own in attributes)]
+    if len(attributes) == 1 and len(texts) > 1:
+        return ""
+    return next((key for key in texts if len({own[key] for own in attributes}) == len(attributes)), "")
 
 
 def read_boundary(source: str, epsg: int | None = None) -> Boundary:
@@ -193,9 +207,12 @@ def read_boundary(source: str, epsg: int | None = None) -> Boundary:
         polygons = [polygon for _, polygon in features]
         if not polygons:
             raise InputError("has no polygons", "give the boundary of the volume", path)
+        named, said = _named([properties for properties, _ in features], polygons)
+        note = "; ".join(text for text in (note, said and f"{path.name}: {said}") if text)
         if len(polygons) == 1:
-            return boundary_of(polygons[0], path.name, note, path)
-        return boundary_of_piles(_named([properties for properties, _ in features], polygons), path.name, note, path)
+            title = "" if named[0][0] == "1" else named[0][0]
+            return replace(boundary_of(polygons[0], path.name, note, path), polygon_name=title)
+        return boundary_of_piles(named, path.name, note, path)
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from aerotri.conventions import in_digits
 from aerotri.version import __version__
 from aerotri.volume.accuracy import StatedSigma, VolumeSigma
 from aerotri.volume.bases import Base, PlaneBase
@@ -46,7 +49,8 @@ def volume_json(
     warnings = [*volumes.warnings, *([] if sigma is None else sigma.notes), *_stated_in_words(v, stated, density)]
     return {
         "aerotri": __version__, "dtm": sources.dtm, "crs": sources.crs,
-        "base": _base(base), "boundary": {"name": boundary.name, "area_m2": boundary.area},
+        "base": _base(base),
+        "boundary": {"name": boundary.name, "polygon": boundary.polygon_name, "area_m2": boundary.area},
         "method": v.method, **_numbers(v),
         "mean_thickness_m": v.net / v.area,
         "lowest_m": _finite(volumes.lowest), "highest_m": _finite(volumes.highest),
@@ -55,6 +59,12 @@ def volume_json(
         "sigma": None if sigma is None else _sigma(sigma, v, sources), "stated_sigma": _stated(stated),
         "mass": _mass(v, sigma, density, stated), "warnings": warnings,
     }  # fmt: skip
+
+
+def boundary_in_words(content: Mapping[str, Any]) -> str:
+    """Its file or text, and the name of its polygon where it has one of its own; `content` as in volume.json."""
+    name, own = str(content["name"]), str(content.get("polygon", ""))
+    return name if not own or own.lower() == Path(name).stem.lower() else f"{name}, polygon '{own}'"
 
 
 def pile_json(
@@ -92,9 +102,9 @@ def _stated_tonnes(v: Volume, stated: StatedSigma | None, density: Density | Non
 def _stated_in_words(v: Volume, stated: StatedSigma | None, density: Density | None) -> list[str]:
     total, tonnes = _total_stated(stated), _stated_tonnes(v, stated, density)
     parts = [] if stated is None or total is None else [
-        f"{total:.3g} m³ (base {stated.base:.3g} m³, boundary {stated.boundary:.3g} m³)"
+        f"{in_digits(total, 3)} m³ (base {in_digits(stated.base, 3)} m³, boundary {in_digits(stated.boundary, 3)} m³)"
     ]  # fmt: skip
-    parts += [] if tonnes is None else [f"{tonnes:.3g} t of mass"]
+    parts += [] if tonnes is None else [f"{in_digits(tonnes, 3)} t of mass"]
     if not parts:
         return []
     return [

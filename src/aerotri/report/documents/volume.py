@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from aerotri.formats.results.volume import boundary_in_words
 from aerotri.report.documents.figures import as_files
 from aerotri.report.documents.head import Context, document, signature_fields
 from aerotri.report.documents.messages import in_english, message_parts
@@ -13,6 +14,7 @@ from aerotri.report.documents.parts import Document, Part, heading, pairs, parag
 from aerotri.report.documents.used import argument_parts
 from aerotri.report.documents.words import NO_VALUE, Words, breakable, decimals
 from aerotri.report.plots.rendering import RenderedPlot
+from aerotri.volume.bases import LEVELS, SPLINES
 
 WIDE = 1.96
 """Standard deviations on either side within which 95 % of normally distributed values lie."""
@@ -115,7 +117,8 @@ def _piles(c: Mapping[str, Any], words: Words) -> Part:
 def _base_name(c: Mapping[str, Any], words: Words) -> str:
     name = str(c["base"]["name"])
     if name.startswith(OWN_BASES):
-        return words("volume.own_bases", number=len(c["piles"]))
+        kind = next((key for end, key in ((SPLINES, "splines"), (LEVELS, "levels")) if name.endswith(end)), "bases")
+        return words(f"volume.own_{kind}", number=len(c["piles"]))
     spline = SPLINE.fullmatch(name)
     return words("volume.spline", number=spline[1]) if spline else words.term("base", name)
 
@@ -135,7 +138,7 @@ def _measured(c: Mapping[str, Any], context: Context) -> list[tuple[str, str]]:
         (words("volume.base"), _base_name(c, words) + plane),
         (
             words("volume.boundary"),
-            f"{words.term('given', edge['name'])}, {amount(words, edge['area_m2'])} m²",
+            f"{words.term('given', boundary_in_words(edge))}, {amount(words, edge['area_m2'])} m²",
         ),
         (words("volume.method"), words.term("method", c["method"])),
         (words("volume.no_data"), f"{amount(words, c['no_data_area_m2'])} m²"),

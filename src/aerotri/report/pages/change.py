@@ -31,7 +31,7 @@ def write_change_page(content: Mapping[str, Any], plots: Mapping[str, RenderedPl
         cards=_cards(content["volumes"][-1]), warnings=[printable(text, 1000) for text in content["warnings"]],
         sure=_sure(content), rows=[_row(one) for one in content["volumes"]], unknowns=_unknowns(content),
         alignment=_alignment(content), plots=[data_address(plot) for plot in plots.values()], caption=CAPTION,
-        head=page_head(head), settings=settings_rows(content),
+        head=page_head(head, of_block=False), settings=settings_rows(content),
     )  # fmt: skip
     path.write_text(text, encoding="utf-8")
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from aerotri.formats.results.volume import boundary_in_words
 from aerotri.report.pages.adjustment import data_address
 from aerotri.report.pages.head import page_environment, page_head, settings_rows
 from aerotri.report.plots.rendering import RenderedPlot
@@ -35,7 +36,8 @@ def volume_html(content: Mapping[str, Any], plots: Mapping[str, RenderedPlot], h
     environment = page_environment()
     return environment.get_template("volume.html.j2").render(
         name=printable(content["dtm"]), base=printable(content["base"]["name"]),
-        boundary=printable(content["boundary"]["name"]), head=page_head(head), cards=_cards(content),
+        boundary=printable(boundary_in_words(content["boundary"])), head=page_head(head, of_block=False),
+        cards=_cards(content),
         warnings=[printable(text, 1000) for text in content["warnings"]], budget=_budget(content),
         methods=_methods(content), settings=settings_rows(content), piles=_piles(content), mass=_mass_words(content),
         plots=[{"name": name, "source": data_address(plot), "caption": CAPTIONS[name]}
