@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pyarrow as pa
@@ -12,7 +14,10 @@ from pyarrow import parquet
 
 import aerotri
 from aerotri import InputError
-from aerotri.formats.results.pickets import NUMBERS
+from aerotri.formats.results.pickets import NUMBERS, read_pickets
+from aerotri.public.terrain import TerrainModel
+from aerotri.public.terrain_noise import noise_of_terrain
+from aerotri.public.volume_sigma import MeasuredSurface
 from aerotri.rasters.surface_files import write_surface
 from aerotri.terrain.surface import grid_over, surface_of
 
@@ -96,3 +101,20 @@ def test_a_damaged_record_is_named(tmp_path):
     (pair[0] / "dtm.json").write_text('{"interval_m": -1, "sigma_Z_m": {"interpolation": 0.1}}', encoding="utf-8")
     with pytest.raises(InputError, match=r"dtm.json.*not possible"):
         aerotri.change(*pair)
+
+
+def test_a_model_in_memory_tells_the_same_as_its_folder(tmp_path):
+    folder = terrain_folder(tmp_path / "dtm", 1, "one")
+    table = read_pickets(folder / "pickets.parquet")
+    covariance = np.zeros((len(table.xyz), 3, 3))
+    covariance[:, 2, 2] = table.sigma_matching[:, 2] ** 2
+    pickets = SimpleNamespace(accepted=table.accepted, xyz=table.xyz, covariance=covariance)
+    record = SimpleNamespace(pickets=pickets, interval=INTERVAL, interpolation=INTERPOLATION)
+    held, read = (
+        noise_of_terrain(MeasuredSurface(given))
+        for given in (TerrainModel(cast(Any, record), "block", "EPSG:25832", "one"), folder)
+    )
+    assert held is not None
+    assert read is not None
+    grid = grid_over(table.xyz[:, :2], 1.0)
+    np.testing.assert_array_equal(held.sigma(grid), read.sigma(grid))

@@ -15,6 +15,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.results.pickets import read_pickets
+from aerotri.public.dense import DenseSurface
 from aerotri.public.terrain import PICKETS, RECORD, TerrainModel
 from aerotri.public.volume_sigma import MeasuredSurface
 from aerotri.rasters.grids import Grid
@@ -59,8 +60,11 @@ def noise_of_terrain(measured: MeasuredSurface) -> PicketNoise | None:
     InputError
         When dtm.json or pickets.parquet beside the surface cannot be read.
     """
-    if isinstance(measured.given, TerrainModel):
-        o = measured.given.record
+    given = measured.given
+    if isinstance(given, DenseSurface):
+        return None
+    if isinstance(given, TerrainModel):
+        o = given.record
         own = o.pickets.accepted & np.isfinite(o.pickets.covariance[:, 2, 2])
         return PicketNoise(o.pickets.xyz[own], o.pickets.covariance[own, 2, 2], o.interval, o.interpolation)
     path = measured.surface.path
