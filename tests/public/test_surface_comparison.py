@@ -118,3 +118,31 @@ def test_what_makes_no_sense(control, tmp_path):
     ):
         with pytest.raises(InputError, match=match):
             aerotri.compare(*pair, **options)
+
+
+@pytest.mark.parametrize("offset", [0.0, CELL / 2.0, 0.3])
+def test_rasters_of_the_same_cells_are_compared_cell_by_cell(control, offset):
+    """Wherever their edges lie, and beside holes too: nothing is a mean of neighbours."""
+    grid = replace(control.grid, left=control.grid.left + offset, top=control.grid.top - offset)
+    noise = np.random.default_rng(5).normal(0.0, 0.2, control.z.shape)
+    noise[20:23, 30:40] = np.nan
+    own = replace(control, source=replace(control.source, grid=grid))
+    found = aerotri.compare(raised(own, noise), own)
+    assert found.record.grid == grid
+    np.testing.assert_allclose(found.difference.z, noise, atol=2e-5)
+    assert found.statistics["count"][0] == np.isfinite(noise).sum()
+
+
+def test_of_two_rasters_the_part_in_common_is_compared(control):
+    """The test surface begins some cells further in, its edges off by a rounding of the file."""
+    z = control.z[7:60, 11:90] + np.arange(79) * 0.01
+    grid = control.grid.window(7, 11, 53, 79)
+    part = replace(control, source=replace(control.source, grid=replace(grid, left=grid.left + 1e-4), z=z,
+                                           sigma=np.full_like(z, np.nan)))  # fmt: skip
+    found = aerotri.compare(part, control)
+    assert found.record.grid == grid
+    np.testing.assert_allclose(found.difference.z, np.tile(np.arange(79) * 0.01, (53, 1)), atol=2e-5)
+    # a cell that is asked for, or an offset by a part of a cell, still needs interpolation
+    off = replace(part, source=replace(part.source, grid=replace(grid, left=grid.left + 0.7)))
+    for other, cell in ((part, 3.0), (off, None)):
+        assert aerotri.compare(other, control, cell=cell).record.grid != grid

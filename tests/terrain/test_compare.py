@@ -1,6 +1,7 @@
 """Comparison of surfaces: statistics of known differences, recovery of known motions, the command."""
 
 import json
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from aerotri.conventions import InputError
 from aerotri.formats.results.point_cloud import read_point_cloud, write_point_cloud
 from aerotri.rasters.grids import Grid, RasterReader, write_raster
 from aerotri.rasters.surface_files import write_surface
-from aerotri.terrain.compare import PointHeights, RasterHeights, compare, statistics_of
+from aerotri.terrain.compare import PointHeights, RasterHeights, compare, same_cells, statistics_of
 
 GRID = Grid(120, 150, 0.0, 240.0, 2.0, 2.0)
 
@@ -131,3 +132,14 @@ def test_point_clouds(tmp_path):
     (tmp_path / "b.laz").write_bytes(b"no cloud")
     with pytest.raises(InputError, match="is no LAS or LAZ file"):
         read_point_cloud(tmp_path / "b.laz")
+
+
+def test_a_long_side_takes_every_second_cell(monkeypatch):
+    monkeypatch.setattr(import_module("aerotri.terrain.compare"), "MOST_CELLS", 100)
+    z, rng = on_grid(hills), np.random.default_rng(2)
+    test, control = RasterHeights(GRID, z + rng.normal(0.0, 1.0, z.shape)), RasterHeights(GRID, z)
+    area = np.array([[1.0, 1.0], [299.0, 239.0]])
+    grid = same_cells(test, control, (area, area), None)
+    found = compare(test, control, grid)
+    assert (grid.rows, grid.columns, grid.cell_x) == (60, 75, 4.0)
+    np.testing.assert_allclose(found.difference, (test.z - z)[::2, ::2])

@@ -14,6 +14,7 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.argument_types import with_checked_types
+from aerotri.public.change_areas import notes_of_areas, refuse_unknown_areas, with_whole_areas
 from aerotri.public.change_epochs import (
     common_system,
     doubts_of,
@@ -236,7 +237,9 @@ def change(
         elif same:
             notes.append("both surfaces come from one adjustment: its errors cancel")
         parts = [(name, boundary.coverage(grid)) for name, boundary in areas.items()]
-        found = compute_change(grid, before, after, held, align, parts, pair)
+        found = with_whole_areas(compute_change(grid, before, after, held, align, parts, pair), areas)
+    refuse_unknown_areas(found, epochs)
+    notes += notes_of_areas(found, WHOLE)
     if ground is not None and noise_length is None and found.alignment.sharing == 0.0:
         notes.append("too little stable ground to tell over what length neighbouring cells share noise: --noise-length")
     if ground is not None and align == "none":

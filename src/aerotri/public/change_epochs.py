@@ -218,20 +218,46 @@ def epoch_of(
     from aerotri.volume.cell_noise import cells_sharing
     from aerotri.volume.change.compute import Epoch
 
-    heights, noise = given.surface.heights, given.noise(stack)
+    heights = given.surface.heights
     total = _on(heights, heights.sigma, grid)
-    own, adjustment, said = total, np.zeros_like(total), ""
+    own, used, said = _own_noise(given, total, grid, stack)
+    adjustment = np.zeros_like(total)
+    if own is None:
+        own = total
+        if not np.isfinite(total).any() or length is not None:
+            said = ""
+    elif not same:
+        adjustment = np.sqrt(np.maximum(total**2 - own**2, 0.0))
+    used = used if length is None else length
+    return Epoch(_on(heights, heights.z, grid), own, adjustment, cells_sharing(used, grid.cell_x * grid.cell_y)), said
+
+
+def _own_noise(
+    given: MeasuredSurface, total: np.ndarray, grid: Grid, stack: ExitStack
+) -> tuple[np.ndarray | None, float, str]:
+    """σ of the cells without what the adjustment adds, (rows, columns) m, None where it is not known apart.
+
+    Returns
+    -------
+    Besides: m, side of the square whose cells have one noise; a sentence where σ is not known apart.
+    """
+    from aerotri.public.terrain_noise import noise_of_terrain
+
+    heights, noise = given.surface.heights, given.noise(stack)
     if noise.sigma is not None:
         matching = noise.sigma.read(0, 0, heights.grid.rows, heights.grid.columns).astype(float)
-        own = _on(heights, matching, grid)
-        if not same:
-            adjustment = np.sqrt(np.maximum(total**2 - own**2, 0.0))
-    elif np.isfinite(total).any() and length is None:
-        said = (
-            f"{given.surface.label}: σ is taken for noise of the cells; what all of them share is told by stable ground"
-        )
-    used = noise.length_m if length is None else length
-    return Epoch(_on(heights, heights.z, grid), own, adjustment, cells_sharing(used, grid.cell_x * grid.cell_y)), said
+        return _on(heights, matching, grid), noise.length_m, ""
+    pickets = noise_of_terrain(given)
+    if pickets is not None and np.isfinite(total).any():
+        found = pickets.sigma(grid)
+        usual = float(np.nanmedian(found)) if np.isfinite(found).any() else 0.0
+        # breaklines have no pickets around; no part is larger than the whole
+        return np.minimum(np.where(np.isfinite(found), found, usual), total), pickets.interval, ""
+    said = (
+        f"{given.surface.label}: its σ does not tell noise of the cells from what all cells share; all of it is taken "
+        "for noise"
+    )
+    return None, noise.length_m, said
 
 
 def _on(heights: Heights, values: np.ndarray, grid: Grid) -> np.ndarray:

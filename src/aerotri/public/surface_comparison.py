@@ -73,10 +73,10 @@ class SurfaceComparison:
         """m, side of the square whose cells share one noise, from the differences; None where too few tell."""
         from aerotri.volume.change.noise import cells_of_one_noise
 
-        d, s = self.record.difference, self.record.statistics
+        d, s, grid = self.record.difference, self.record.statistics, self.record.grid
         usual = np.abs(d - s.median) <= GROSS * max(s.nmad, 1e-12)
         cells = cells_of_one_noise(np.where(usual, d - np.mean(d[usual]), np.nan)) if usual.any() else 0.0
-        return float(np.sqrt(cells)) * self.record.grid.cell_x if cells > 0.0 else None
+        return float(np.sqrt(cells * grid.cell_x * grid.cell_y)) if cells > 0.0 else None
 
     @property
     def bias_sigma(self) -> float | None:
@@ -174,6 +174,8 @@ def compare(
 ) -> SurfaceComparison:
     """Differences of two surfaces, both interpolated to the same places in the same way.
 
+    Rasters with the same cells are compared cell by cell, and nothing is interpolated.
+
     Parameters
     ----------
     test : surface to judge: GeoTIFF, LAZ, pickets.parquet, folder of `aerotri dtm`, or a surface in memory.
@@ -205,7 +207,7 @@ def compare(
     (0.25, 0.0)
     """
     from aerotri.rasters.grids import cache_limited
-    from aerotri.terrain.compare import common_grid
+    from aerotri.terrain.compare import common_grid, same_cells
     from aerotri.terrain.compare import compare as differences
 
     _check(method, align)
@@ -216,7 +218,9 @@ def compare(
         if one.epsg is not None and other.epsg is not None and one.epsg != other.epsg:
             message = f"is in EPSG:{one.epsg}, the control in EPSG:{other.epsg}"
             raise InputError(message, "bring them into one CRS", _file(test) or _name(test))
-        grid = common_grid(one.area, other.area, cell or max(one.cell, other.cell))
+        grid = same_cells(one.heights, other.heights, (one.area, other.area), cell)
+        if grid is None:
+            grid = common_grid(one.area, other.area, cell or max(one.cell, other.cell))
         report.stage("comparing", None)
         found = differences(
             one.heights, other.heights, grid, method, align, lambda k, n: report.counted("comparing", k, n)

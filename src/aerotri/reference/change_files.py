@@ -10,7 +10,7 @@ from aerotri.volume.change.compute import PARTS
 CHANGE, SURFACES = "folder of change", "of surfaces"
 AREAS = (
     ("area_m2", "Area with heights in both surfaces."),
-    ("no_data_area_m2", "Area without."),
+    ("no_data_area_m2", "Area without, also where it lies outside of a surface."),
     ("gained_area_m2", "Area that gained beyond the level of detection."),
     ("lost_area_m2", "Area that lost beyond the level of detection."),
 )

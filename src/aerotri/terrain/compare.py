@@ -2,8 +2,9 @@
 
 The method of Tran (2007): two surfaces become two rasters by one algorithm, Δ = test − control cell by cell,
 RMSE = √(mean Δ²). Rasters are sampled at the centres of the cells, points through their triangles, both linearly; or
-both by cubic splines. RMSE counts every cell; median, NMAD = 1.4826·median|Δ − median| and LE90, the 90 % quantile of
-|Δ|, are those of a distribution with gross errors [L: Höhle & Höhle 2009].
+both by cubic splines. Two rasters with the same cells are compared cell by cell, and nothing is interpolated: the mean
+of neighbours would have less noise than the cells. RMSE counts every cell; median, NMAD = 1.4826·median|Δ − median| and
+LE90, the 90 % quantile of |Δ|, are those of a distribution with gross errors [L: Höhle & Höhle 2009].
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.ndimage import map_coordinates
 
 from aerotri.conventions import SIGMA_PER_MAD, InputError, counted
+from aerotri.memory import refuse_beyond_memory
 from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.rasters.held import HeldRaster
 from aerotri.terrain.settings import ALIGNMENT, INTERPOLATION
@@ -44,6 +46,9 @@ AXES = np.eye(2)
 """Unit steps along X and Y, for slopes by differences."""
 MOST_CELLS = 10_000
 """A side of the grid of differences has at most so many, however fine the surfaces are."""
+SAME_PLACE = 2e-3
+"""Of a cell, by which cells of two rasters may lie apart and still be the same; chosen [C]: coordinates in the head of
+a file are rounded to millimetres."""
 BYTES_OF_CELL = 64
 """Of the grid of differences: places, heights of both, and what the statistics sort."""
 
@@ -97,6 +102,32 @@ class FileHeights:
             place = np.array([row[inside] - top, column[inside] - left])
             out[inside] = map_coordinates(z, place, order=1, mode="constant", cval=np.nan)
         return out
+
+
+@dataclass(frozen=True, eq=False)
+class CellHeights:
+    """Heights of the cells of a raster as they are, to be asked for at the centres of cells alone."""
+
+    grid: Grid
+    raster: RasterHeights | FileHeights
+
+    def at(self, xy: np.ndarray, method: str) -> np.ndarray:
+        """Of the cells at these places, NaN beyond the edges; nothing is interpolated, whatever the method."""
+        grid = self.grid
+        row, column = (np.rint(at).astype(np.int64) for at in (grid.row(xy[:, 1]), grid.column(xy[:, 0])))
+        out = np.full(len(xy), np.nan)
+        inside = (row >= 0) & (row < grid.rows) & (column >= 0) & (column < grid.columns)
+        if inside.any():
+            row, column = row[inside], column[inside]
+            top, left = int(row.min()), int(column.min())
+            size = int(row.max()) - top + 1, int(column.max()) - left + 1
+            out[inside] = self._window(top, left, *size)[row - top, column - left]
+        return out
+
+    def _window(self, top: int, left: int, rows: int, columns: int) -> np.ndarray:
+        if isinstance(self.raster, FileHeights):
+            return self.raster.reader.read(top, left, rows, columns).astype(float)
+        return self.raster.z[top : top + rows, left : left + columns]
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,6 +233,66 @@ def common_grid(one: np.ndarray, other: np.ndarray, cell: float) -> Grid:
     return grid_over(np.array([low, high]), max(cell, float((high - low).max()) / MOST_CELLS), BYTES_OF_CELL)
 
 
+def _cells_of(surface: Heights) -> Grid | None:
+    """The cells of a raster, None of points."""
+    if isinstance(surface, RasterHeights):
+        return surface.grid
+    return surface.reader.grid if isinstance(surface, FileHeights) else None
+
+
+def _at_centres(own: Grid, grid: Grid) -> bool:
+    """Whether the centres of `grid` are centres of cells of `own`, or would be if it went on."""
+    for at, count in (
+        (own.column(grid.x([0, grid.columns - 1])), grid.columns),
+        (own.row(grid.y([0, grid.rows - 1])), grid.rows),
+    ):
+        whole = np.rint(at)
+        if np.abs(at - whole).max() > SAME_PLACE or (count > 1 and (whole[1] - whole[0]) % (count - 1) != 0.0):
+            return False
+    return True
+
+
+def same_cells(
+    test: Heights, control: Heights, areas: tuple[np.ndarray, np.ndarray], cell: float | None
+) -> Grid | None:
+    """The cells that two rasters have in common, where their cells are the same; None otherwise.
+
+    Parameters
+    ----------
+    areas : (2, 2) m of both. cell : m that is asked for; that of the rasters where None.
+
+    Returns
+    -------
+    Cells of the control raster where both areas reach; of a side with more than `MOST_CELLS` every second, third, …
+
+    Raises
+    ------
+    InputError
+        When the grid does not fit into memory.
+    """
+    own, other = _cells_of(control), _cells_of(test)
+    if own is None or other is None:
+        return None
+    asked = cell is None or bool(np.allclose([own.cell_x, own.cell_y], cell, rtol=1e-6))
+    low, high = np.maximum(areas[0][0], areas[1][0]), np.minimum(areas[0][1], areas[1][1])
+    left, top = (int(np.ceil(at - SAME_PLACE)) for at in (own.column(low[0]), own.row(high[1])))
+    right, bottom = (int(np.floor(at + SAME_PLACE)) for at in (own.column(high[0]), own.row(low[1])))
+    rows, columns = bottom - top + 1, right - left + 1
+    if rows < 1 or columns < 1 or not asked:
+        return None
+    window = own.window(top, left, rows, columns)
+    alike = np.allclose([other.cell_x, other.cell_y], [own.cell_x, own.cell_y], rtol=SAME_PLACE)
+    if not (alike and _at_centres(other, window)):
+        return None
+    step = -(-max(rows, columns) // MOST_CELLS)
+    rows, columns = -(-rows // step), -(-columns // step)
+    refuse_beyond_memory(
+        float(BYTES_OF_CELL) * rows * columns, f"{rows} × {columns} cells of {own.cell_x:g} m", "give a larger --cell"
+    )
+    across, down = step * own.cell_x, step * own.cell_y
+    return Grid(rows, columns, float(window.x(0)) - across / 2.0, float(window.y(0)) + down / 2.0, across, down)
+
+
 def statistics_of(difference: np.ndarray) -> Statistics:
     """Of all that is known.
 
@@ -239,6 +330,8 @@ def compare(
     InputError
     """
     files = [surface for surface in (test, control) if isinstance(surface, FileHeights)]
+    if alignment == "none":
+        test, control = _as_cells(test, control, grid)
     if files and alignment != "none":
         raise InputError("is too large to be aligned", "cut out the part in common", files[0].reader.path)
     if files:
@@ -252,6 +345,17 @@ def compare(
     known = np.isfinite(z)
     covered = float(np.isfinite(difference[known]).mean()) if known.any() else 0.0
     return Comparison(grid, difference.reshape(grid.rows, grid.columns), statistics_of(difference), covered, moved)
+
+
+def _as_cells(test: Heights, control: Heights, grid: Grid) -> tuple[Heights, Heights]:
+    """Both rasters without interpolation where the cells of the grid are theirs; as they are otherwise."""
+    both: list[Heights] = []
+    for one in (test, control):
+        own = _cells_of(one)
+        if own is None or not isinstance(one, RasterHeights | FileHeights) or not _at_centres(own, grid):
+            return test, control
+        both.append(CellHeights(own, one))
+    return both[0], both[1]
 
 
 def _by_parts(

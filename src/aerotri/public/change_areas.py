@@ -1,0 +1,57 @@
+"""Areas of a change: what of them is not known, measured against the whole polygon."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from aerotri.conventions import InputError
+from aerotri.public.change_epochs import Epochs, names_of
+
+if TYPE_CHECKING:
+    from aerotri.volume.boundary import Boundary
+    from aerotri.volume.change.compute import Change
+
+LEAST_UNKNOWN = 1e-6
+"""Share of an area below which nothing is missing: rounding of corners and of cells."""
+
+
+def with_whole_areas(found: Change, areas: Mapping[str, Boundary]) -> Change:
+    """The change with areas without heights that count what of a polygon lies outside of the surfaces too."""
+    volumes = []
+    for one, boundary in zip(found.volumes, areas.values(), strict=True):
+        missing = boundary.area - one.area
+        volumes.append(replace(one, no_data_area=missing if missing > LEAST_UNKNOWN * boundary.area else 0.0))
+    return replace(found, volumes=tuple(volumes))
+
+
+def refuse_unknown_areas(found: Change, epochs: Epochs) -> None:
+    """Refuse a change of which nothing is known in an area.
+
+    Raises
+    ------
+    InputError
+    """
+    for one in found.volumes:
+        if not one.area > 0.0:
+            message = "'{}': the surfaces {} and {} have no height with σ in common there".format(
+                one.name, *names_of(epochs)
+            )
+            raise InputError(message, "draw the area inside both surfaces, in their CRS, or leave it out")
+
+
+def notes_of_areas(found: Change, whole: str) -> list[str]:
+    """A sentence for every area that is not known as a whole.
+
+    Parameters
+    ----------
+    whole : name of all that both surfaces have in common, which has holes and edges of its own.
+    """
+    named = found.volumes[:-1] if len(found.volumes) > 1 else found.volumes
+    return [
+        f"{one.name}: {one.no_data_area:.6g} m² ({100.0 * one.no_data_area / (one.area + one.no_data_area):.2g} %) of "
+        "the area have no height in both surfaces and are in no volume"
+        for one in named
+        if one.name != whole and one.no_data_area > 0.0
+    ]
