@@ -210,3 +210,41 @@ def test_arguments_stand_in_the_file():
         "stable": ("Polygon", "given"), "align": ("shift", "default"), "area": ("heap", "given"),
         "noise_length": (None, "default"),
     }  # fmt: skip
+
+
+def notes(**asked):
+    return "\n".join(aerotri.change(**asked).summary["warnings"])
+
+
+def test_stable_ground_that_is_none_is_told():
+    first, second, _ = epochs(1)
+    good = notes(first=first, second=second, stable=STABLE, align="tilt", area=AREA)
+    assert "stable ground" not in good
+    assert "dZ" not in good
+    # what changed is stated to be stable
+    said = notes(first=first, second=second, stable=AREA, align="height", area=AREA)
+    assert "100 % of" in said
+    assert "times what their σ says" in said
+    # everywhere, where no area is asked for, is no contradiction
+    assert "% of" not in notes(first=first, second=second, stable=STABLE, align="tilt")
+
+
+def test_a_lift_between_systems_of_heights_is_told():
+    first, second, _ = epochs(2)
+    raised = aerotri.Surface.of_array(
+        second.z + 47.3, left=0.0, top=SIDE, cell=1.0, sigma=second.sigma, name="above the ellipsoid"
+    )
+    said = notes(first=first, second=raised, stable=STABLE, align="tilt", area=AREA)
+    assert "dZ -47." in said or "dZ +47." in said
+    assert "ellipsoid" in said
+
+
+@pytest.mark.parametrize("wrong", [0.0, -0.03])
+@pytest.mark.parametrize("stable", [None, STABLE])
+def test_no_sigma_is_refused(wrong, stable):
+    first, second, _ = epochs(3)
+    sigma = second.sigma.copy()
+    sigma[3, 4:6] = wrong
+    second = aerotri.Surface.of_array(second.z, left=0.0, top=SIDE, cell=1.0, sigma=sigma, name="june")
+    with pytest.raises(InputError, match=r"june.*2 cells with a height have a σ of zero or less"):
+        aerotri.change(first, second, stable=stable, align="none", area=AREA)

@@ -15,6 +15,7 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.change_areas import notes_of_areas, refuse_unknown_areas, with_whole_areas
+from aerotri.public.change_doubts import doubts_of_stable_ground
 from aerotri.public.change_epochs import (
     common_system,
     doubts_of,
@@ -166,8 +167,9 @@ def change(
 
     Parameters
     ----------
-    first : the earlier surface: GeoTIFF with σ as second band, folder of `dsm` or `dtm`, or what these returned; or a
-        folder of `run`, whose dense surface (else its terrain) and adjustment are taken.
+    first : the earlier surface: GeoTIFF with σ as second band (its description begins with σ), folder of `dsm` or
+        `dtm`, or what these returned; or a folder of `run`, whose dense surface (else its terrain) and adjustment are
+        taken.
     second : the later surface.
     stable : ground that did not change: GeoPackage, GeoJSON or WKT file, WKT text, or a shapely polygon. The second
         surface is aligned on it, and it tells the noise.
@@ -242,6 +244,8 @@ def change(
     notes += notes_of_areas(found, WHOLE)
     if ground is not None and noise_length is None and found.alignment.sharing == 0.0:
         notes.append("too little stable ground to tell over what length neighbouring cells share noise: --noise-length")
+    if ground is not None:
+        notes += doubts_of_stable_ground(found.alignment, ground, {} if area is None else areas)
     if ground is not None and align == "none":
         notes.append("nothing was moved: a mean difference on stable ground is in the volumes and not in σ")
     by = dict(zip(found.alignment.names, found.alignment.values.tolist(), strict=True))

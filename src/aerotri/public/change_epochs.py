@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, counted
 from aerotri.public.models import check_crs
 from aerotri.public.run_steps import DSM, DTM, RESULT
 from aerotri.public.saving import RECORD
@@ -219,6 +219,7 @@ def epoch_of(
     from aerotri.volume.change.compute import Epoch
 
     heights = given.surface.heights
+    _refuse_no_sigma(given, heights)
     total = _on(heights, heights.sigma, grid)
     own, used, said = _own_noise(given, total, grid, stack)
     adjustment = np.zeros_like(total)
@@ -230,6 +231,22 @@ def epoch_of(
         adjustment = np.sqrt(np.maximum(total**2 - own**2, 0.0))
     used = used if length is None else length
     return Epoch(_on(heights, heights.z, grid), own, adjustment, cells_sharing(used, grid.cell_x * grid.cell_y)), said
+
+
+def _refuse_no_sigma(given: MeasuredSurface, heights: Heights) -> None:
+    """A σ of zero or less is none.
+
+    Raises
+    ------
+    InputError
+    """
+    wrong = int(np.count_nonzero(np.isfinite(heights.z) & (heights.sigma <= 0.0)))
+    if wrong:
+        raise InputError(
+            f"{counted(wrong, 'cell')} with a height have a σ of zero or less",
+            "give σ as it is, or a raster without a σ band and ground that did not change (--stable)",
+            given.surface.path or given.surface.label,
+        )
 
 
 def _own_noise(
