@@ -101,9 +101,11 @@ def parallaxes_of(images: EpipolarImages) -> Parallaxes:
     Coarse levels are treated as the finest: the tests of least squares take out what matched by chance, in water and
     leaves, which would make the range of heights too wide for the finest level to find anything.
     """
-    found = semi_global(images)
-    value = cv2.medianBlur(np.nan_to_num(found, nan=INVALID), 3)
-    value[np.isnan(found)] = INVALID
+    value = semi_global(images)
+    unknown = np.isnan(value)
+    cv2.patchNaNs(value, INVALID)
+    value = cv2.medianBlur(value, 3)
+    np.copyto(value, INVALID, where=unknown)
     return _refined(images, value)
 
 
@@ -138,7 +140,7 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
         shift_windows(left, aligned, level, known, shift, across, variance, of_across, correlation)
         known &= np.abs(shift, out=room) < LARGEST_SHIFT_PX
         value += shift
-        value[~known] = INVALID
+        np.copyto(value, INVALID, where=~known)
         left_slow = parabola_across(across, of_across, known)
         slow = slow + left_slow
     factor = scatter_across(across, of_across, known, left_slow)
@@ -156,9 +158,8 @@ def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
     variance += LEAST_SIGMA_PX**2
     sigma = np.sqrt(variance)
     known &= sigma < LARGEST_SIGMA_PX
-    nothing = np.float32(np.nan)
-    value[~known] = nothing
-    sigma[~known] = nothing
+    for one in (value, sigma):
+        np.copyto(one, np.nan, where=~known)
     return Parallaxes(value, sigma, median_across(slow, known), factor)
 
 

@@ -77,10 +77,15 @@ def step_sigma(z: np.ndarray, noise: np.ndarray, seen: Seen, scale: CellScale) -
         return np.zeros(z.shape)
     above = np.where(known, z - middle_height(z), 0.0).astype(np.float32)
     next_to, far = _steps(z, above, noise, seen, scale)
-    straight = np.clip((straightness(above, known, scale) - CROOKED) / (STRAIGHT - CROOKED), 0.0, 1.0)
-    share = np.where(seen.agreeing < 2, ALONE_SHARE, STEP_SHARE + (STRAIGHT_SHARE - STEP_SHARE) * straight)
+    share = _share_of_next(above, known, seen, scale) if next_to.any() else np.zeros(())
     most = np.where(seen.agreeing < SEVERAL, np.inf, BLURRED_STEP_PX * scale.pixel)
     return np.where(known, np.maximum(share * np.minimum(next_to, most), FAR_SHARE * np.minimum(far, most)), 0.0)
+
+
+def _share_of_next(above: np.ndarray, known: np.ndarray, seen: Seen, scale: CellScale) -> np.ndarray:
+    """(rows, columns) of a step next to a cell, by its direction and whether one pair alone saw the cell."""
+    straight = np.clip((straightness(above, known, scale) - CROOKED) / (STRAIGHT - CROOKED), 0.0, 1.0)
+    return np.where(seen.agreeing < 2, ALONE_SHARE, STEP_SHARE + (STRAIGHT_SHARE - STEP_SHARE) * straight)
 
 
 def straightness(above: np.ndarray, known: np.ndarray, scale: CellScale) -> np.ndarray:

@@ -219,8 +219,8 @@ def _heights(place: Place, g: EpipolarGeometry, found: Parallaxes, grid: Grid) -
         g.f, g.base, g.first, g.known, np.ascontiguousarray(g.centre), np.ascontiguousarray(g.rotation), to_grid,
         place.reach,
     )  # fmt: skip
-    place_of = np.empty((3, *found.value.shape))
-    per_pixel = np.empty(found.value.shape)
+    place_of = np.empty((3, *found.value.shape), np.float32)
+    per_pixel = np.empty(found.value.shape, np.float32)
     kernels.place_of_pixels(rays, found.value, place_of, per_pixel)
     z, sigma = (np.full((grid.rows, grid.columns), np.nan) for _ in range(2))
     kernels.lay_mesh(place_of, found.sigma, per_pixel, found.value, LARGEST_JUMP_PX, z, sigma)
