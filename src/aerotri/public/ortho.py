@@ -17,6 +17,7 @@ from aerotri.execution.opening import opened
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.folders import paths_of, refuse_foreign_folder
+from aerotri.public.ground_of_block import off_the_ground
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
 from aerotri.public.surfaces import as_surface
@@ -227,6 +228,8 @@ def _made(
         open_tiles(tiles, _stated(record, taken[1], ground, settings))
     with ExitStack() as stack, stage_report(progress) as report:
         heights, sigma, notes = _opened(ground, horizontal_crs(record.result.block.crs), stack)
+        far = off_the_ground(heights, record)
+        notes += (far,) if far else ()
         folder = stack.enter_context(atomic_folder(out, own=OWN_NAMES))
         workers = None if in_threads else stack.enter_context(opened(executor, report.said))
         room = tiles if in_threads or tiles is not None else stack.enter_context(room_beside(out))

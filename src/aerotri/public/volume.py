@@ -14,6 +14,7 @@ from aerotri.conventions import FilePath, InputError
 from aerotri.formats.files.spool import Spool
 from aerotri.observations.project import Project
 from aerotri.public.argument_types import with_checked_types
+from aerotri.public.ground_of_block import off_the_ground
 from aerotri.public.progress import ProgressLike, StageReport, stage_report
 from aerotri.public.projects import project_of
 from aerotri.public.stated import StatedAdjustment
@@ -223,6 +224,11 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
     others: list[Reader] = []
     base = _base(asked.base, below, reader, boundary, stack, others)
     systems = [text for other in others for text in _systems_in_words(reader, other)]
+    systems += [
+        off_the_ground(one, side.adjustment.record)
+        for one, side in zip((reader, *others), (top, below), strict=False)
+        if side is not None and side.adjustment is not None
+    ]
     piles = _piles(asked, base, reader, boundary)
     if base is None:
         base = PilesBase(tuple(one.boundary for one in piles), tuple(one.base for one in piles))
