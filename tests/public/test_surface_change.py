@@ -194,6 +194,14 @@ def test_system_of_heights_that_one_surface_states_alone_is_told(tmp_path):
     assert any("epoch_1.tif does not say in which system its heights are" in text for text in found.warnings)
 
 
+def test_a_surface_without_a_system_is_told(tmp_path):
+    said = "epoch_1.tif does not say its coordinate system; taken for EPSG:25832"
+    assert any(said in text for text in aerotri.change(*in_systems(tmp_path, "EPSG:25832", ""), align="none").warnings)
+    (tmp_path / "plain").mkdir()
+    plain = aerotri.change(*in_systems(tmp_path / "plain", "", ""), align="none").warnings
+    assert not any("coordinate system" in text for text in plain)
+
+
 @pytest.mark.parametrize(
     ("systems", "said"),
     [(("EPSG:25832", "EPSG:25833"), "in EPSG:25833"), (("EPSG:25832+7837", "EPSG:25832+5783"), "heights of epoch_1")],

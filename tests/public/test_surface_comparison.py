@@ -12,6 +12,7 @@ from pyproj import Transformer
 
 import aerotri
 from aerotri import InputError
+from aerotri.formats.results.point_cloud import write_point_cloud
 
 LEFT, TOP, CELL = 499_999.0, 5_450_001.0, 2.0
 """m; centres of cells are multiples of the cell, as those of the differences."""
@@ -146,3 +147,31 @@ def test_of_two_rasters_the_part_in_common_is_compared(control):
     off = replace(part, source=replace(part.source, grid=replace(grid, left=grid.left + 0.7)))
     for other, cell in ((part, 3.0), (off, None)):
         assert aerotri.compare(other, control, cell=cell).record.grid != grid
+
+
+def cloud(path, crs):
+    x, y = np.meshgrid(LEFT + 4.0 * np.arange(40), TOP - 4.0 * np.arange(40))
+    xyz = np.column_stack([x.ravel(), y.ravel(), hills(x, y).ravel()])
+    sigma = np.full(len(xyz), 0.02)
+    write_point_cloud(path, xyz, sigma, np.ones(len(xyz), bool), crs)
+    return path
+
+
+def test_systems_of_clouds_are_compared(tmp_path, control):
+    here, there = cloud(tmp_path / "here.laz", "EPSG:25832"), cloud(tmp_path / "there.laz", "EPSG:25833")
+    with pytest.raises(InputError, match=r"here\.laz: is in EPSG:25832, the control in EPSG:25833"):
+        aerotri.compare(here, there)
+    old, new = (cloud(tmp_path / f"{code}.laz", f"EPSG:25832+{code}") for code in (5783, 7837))
+    assert any("in EPSG:5783, of the control in EPSG:7837" in note for note in aerotri.compare(old, new).notes)
+    assert aerotri.compare(new, new).notes == ()
+    assert any("here.laz does not say in which system its heights" in note for note in aerotri.compare(here, new).notes)
+
+
+@pytest.mark.parametrize("silent", [0, 1])
+def test_a_surface_without_a_system_is_told(tmp_path, control, silent):
+    plain = replace(control, crs=None, name="plain")
+    said = aerotri.compare(*((plain, control) if silent == 0 else (control, plain))).notes
+    assert said == ("plain does not say its coordinate system; taken for EPSG:32632",)
+    assert aerotri.compare(plain, plain).notes == ()
+    bare = cloud(tmp_path / "bare.laz", None)
+    assert any("bare.laz does not say its coordinate system" in note for note in aerotri.compare(bare, control).notes)

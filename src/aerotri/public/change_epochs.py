@@ -179,6 +179,9 @@ def system_of_both(codes: Sequence[str], labels: Sequence[str]) -> tuple[str, st
         message = f"heights of {labels[1]} are in EPSG:{heights[1]}, of {labels[0]} in EPSG:{heights[0]}"
         raise InputError(message, "bring them into one system of heights")
     system = max(codes, key=lambda code: (bool(code), "+" in code))
+    unknown = [label for label, own in zip(labels, plan, strict=True) if not own]
+    if len(unknown) == 1:
+        return system, f"{unknown[0]} does not say its coordinate system; taken for {system}"
     silent = [label for label, own in zip(labels, heights, strict=True) if not own]
     note = f"{silent[0]} does not say in which system its heights are" if len(silent) == 1 else ""
     return system, note

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -226,7 +227,9 @@ def compare(
             one.heights, other.heights, grid, method, align, lambda k, n: report.counted("comparing", k, n)
         )
     epsg = one.epsg or other.epsg
-    notes = tuple(source.note for source in (one, other) if source.note) + _of_heights(one, other)
+    notes = tuple(source.note for source in (one, other) if source.note) + _systems_in_words(
+        (one, other), (test, control)
+    )
     crs = None if epsg is None else f"EPSG:{epsg}"
     head = Head(project_of(project, test, control), max(one.crs, other.crs, key=len))
     used = used_arguments(compare, {"method": method, "align": align, "cell": cell}, {"cell": "m"})
@@ -239,14 +242,23 @@ def _check(method: str, align: str) -> None:
             raise InputError(f"there is no {name} '{value}'", f"choose one of {', '.join(known)}")
 
 
-def _of_heights(test: HeightSource, control: HeightSource) -> tuple[str, ...]:
-    """What the user should know of the systems of the heights."""
-    own, other = (source.crs.partition("+")[2] for source in (test, control))
-    if not own or not other or own == other:
-        return ()
-    return (
-        f"heights of the test surface are in EPSG:{own}, of the control in EPSG:{other}: this is in the differences",
-    )
+def _systems_in_words(both: Sequence[HeightSource], given: Sequence[SurfaceLike]) -> tuple[str, ...]:
+    """What the user should know of the systems of test and control; ground points (pickets) never state theirs."""
+    said = []
+    for k, one in enumerate(both):
+        other, file = both[1 - k].crs, _file(given[k])
+        if file is not None and file.suffix == ".parquet":
+            continue
+        if other and not one.crs:
+            said.append(f"{_name(given[k])} does not say its coordinate system; taken for {other}")
+        elif "+" in other and "+" not in one.crs:
+            said.append(f"{_name(given[k])} does not say in which system its heights are")
+    own, other = (one.crs.partition("+")[2] for one in both)
+    if own and other and own != other:
+        said.append(
+            f"heights of the test surface are in EPSG:{own}, of the control in EPSG:{other}: this is in the differences"
+        )
+    return tuple(said)
 
 
 def _name(surface: SurfaceLike) -> str:

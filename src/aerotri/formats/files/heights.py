@@ -10,7 +10,7 @@ import numpy as np
 
 from aerotri.conventions import InputError
 from aerotri.formats.results.pickets import read_pickets
-from aerotri.formats.results.point_cloud import read_point_cloud, refuse_cloud_units
+from aerotri.formats.results.point_cloud import read_point_cloud, refuse_cloud_units, system_of_cloud
 from aerotri.rasters.grids import RasterReader
 from aerotri.rasters.held import HeldRaster
 from aerotri.rasters.metric import MetricReader, metric_crs_for, units_of
@@ -75,7 +75,7 @@ def heights_of_file(path: Path, stack: ExitStack, crs: str | None) -> HeightSour
     InputError
         When the file is missing, of no known kind, or holds no surface.
     """
-    path = file_of_surface(path)
+    path, system = file_of_surface(path), ""
     if not path.is_file():
         raise InputError("there is no such file", KINDS, path)
     if path.suffix.lower() in RASTERS:
@@ -83,6 +83,7 @@ def heights_of_file(path: Path, stack: ExitStack, crs: str | None) -> HeightSour
     if path.suffix.lower() in CLOUDS:
         xyz = read_point_cloud(path)[0]
         refuse_cloud_units(path)
+        system = system_of_cloud(path)
     elif path.suffix.lower() == ".parquet":
         table = read_pickets(path)
         xyz = table.xyz[table.accepted]
@@ -93,7 +94,9 @@ def heights_of_file(path: Path, stack: ExitStack, crs: str | None) -> HeightSour
     except InputError as error:
         raise InputError(error.message, error.remedy, path) from error
     area = np.array([xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)])
-    return HeightSource(surface, area, float(np.sqrt(np.prod(area[1] - area[0]) / len(xyz))))
+    cell = float(np.sqrt(np.prod(area[1] - area[0]) / len(xyz)))
+    plan = system.partition("+")[0].removeprefix("EPSG:")
+    return HeightSource(surface, area, cell, int(plan) if plan else None, "", system)
 
 
 def heights_of_raster(reader: MetricReader | HeldRaster) -> HeightSource:

@@ -15,6 +15,7 @@ from aerotri.vectors.geojson import LARGEST_M
 
 if TYPE_CHECKING:
     from laspy import LasHeader
+    from pyproj import CRS
 
     from aerotri.formats.results.copc import Octree
     from aerotri.terrain.dense.points import SurfacePoints
@@ -149,15 +150,40 @@ def read_precise_cloud(path: Path) -> tuple[np.ndarray, np.ndarray | None, str]:
         crs = cloud.header.parse_crs()
     except Exception as error:  # as above
         raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
-    systems = [] if crs is None else [one.to_epsg() for one in (crs.sub_crs_list if crs.is_compound else [crs])]
-    known = [str(code) for code in systems if code is not None] if systems and systems[0] is not None else []
-    system = f"EPSG:{'+'.join(known)}" if known else ""
+    system = _code_of(crs)
     if not {"sigma_x", "sigma_y", "sigma_z"} <= there:
         return xyz, None, system
     covariance = np.column_stack([*(column**2 for column in columns[:3]), *columns[3:]])
     if not np.isfinite(covariance).all():
         raise InputError("has points whose σ is no number", "write the cloud anew", path)
     return xyz, covariance, system
+
+
+def _code_of(crs: CRS | None) -> str:
+    systems = [] if crs is None else [one.to_epsg() for one in (crs.sub_crs_list if crs.is_compound else [crs])]
+    known = [str(code) for code in systems if code is not None] if systems and systems[0] is not None else []
+    return f"EPSG:{'+'.join(known)}" if known else ""
+
+
+def system_of_cloud(path: Path) -> str:
+    """'EPSG:n' of a LAS or LAZ file, 'EPSG:n+m' where a height system is stated, '' without a code.
+
+    Raises
+    ------
+    InputError
+    """
+    return _code_of(_crs_of(path))
+
+
+def _crs_of(path: Path) -> CRS | None:
+    import laspy
+
+    check_las(path)
+    try:
+        with laspy.open(path) as file:
+            return file.header.parse_crs()
+    except Exception as error:  # as above
+        raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
 
 
 def refuse_cloud_units(path: Path) -> None:
@@ -167,14 +193,7 @@ def refuse_cloud_units(path: Path) -> None:
     ------
     InputError
     """
-    import laspy
-
-    check_las(path)
-    try:
-        with laspy.open(path) as file:
-            crs = file.header.parse_crs()
-    except Exception as error:  # as above
-        raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
+    crs = _crs_of(path)
     if crs is None:
         return
     for axis in crs.axis_info:
