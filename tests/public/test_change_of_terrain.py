@@ -118,3 +118,24 @@ def test_a_model_in_memory_tells_the_same_as_its_folder(tmp_path):
     assert read is not None
     grid = grid_over(table.xyz[:, :2], 1.0)
     np.testing.assert_array_equal(held.sigma(grid), read.sigma(grid))
+
+
+def test_ground_has_no_noise_of_points_on_objects(tmp_path):
+    """dtm.tif is made without them: under an object σ is that of what is bridged."""
+    folder = terrain_folder(tmp_path / "built", 1, "one")
+    table = read_pickets(folder / "pickets.parquet")
+    on = (np.abs(table.xyz[:, :2] - 30.0) < 7.0).all(axis=1)
+    ground = surface_of(
+        table.xyz[~on], table.sigma_matching[~on, 2] ** 2, 18.0, grid_over(table.xyz[:, :2], 1.0), (), INTERPOLATION
+    )
+    write_surface(folder / "dtm.tif", ground.z, ground.sigma, ground.grid, "EPSG:25832", "DTM Z, m")
+    content = parquet.read_table(folder / "pickets.parquet")
+    raised = pa.array(np.where(on, table.xyz[:, 2] + 6.0, table.xyz[:, 2]))
+    parquet.write_table(content.set_column(content.column_names.index("Z"), "Z", raised), folder / "pickets.parquet")
+    for name, expected in (("dtm.tif", int((~on).sum())), ("dsm.tif", len(on))):
+        noise = noise_of_terrain(MeasuredSurface(folder / name))
+        assert noise is not None
+        assert len(noise.xyz) == expected
+    noise = noise_of_terrain(MeasuredSurface(folder / "dtm.tif"))
+    assert noise is not None
+    np.testing.assert_allclose(noise.sigma(ground.grid), ground.sigma, rtol=1e-6)

@@ -240,7 +240,7 @@ def change(
             notes.append("both surfaces come from one adjustment: its errors cancel")
         parts = [(name, boundary.coverage(grid)) for name, boundary in areas.items()]
         found = with_whole_areas(compute_change(grid, before, after, held, align, parts, pair), areas)
-    refuse_unknown_areas(found, epochs)
+    refuse_unknown_areas(found, epochs, WHOLE)
     notes += notes_of_areas(found, WHOLE)
     if ground is not None and noise_length is None and found.alignment.sharing == 0.0:
         notes.append("too little stable ground to tell over what length neighbouring cells share noise: --noise-length")

@@ -26,8 +26,12 @@ def with_whole_areas(found: Change, areas: Mapping[str, Boundary]) -> Change:
     return replace(found, volumes=tuple(volumes))
 
 
-def refuse_unknown_areas(found: Change, epochs: Epochs) -> None:
+def refuse_unknown_areas(found: Change, epochs: Epochs, whole: str) -> None:
     """Refuse a change of which nothing is known in an area.
+
+    Parameters
+    ----------
+    whole : name of all that both surfaces have in common.
 
     Raises
     ------
@@ -35,10 +39,13 @@ def refuse_unknown_areas(found: Change, epochs: Epochs) -> None:
     """
     for one in found.volumes:
         if not one.area > 0.0:
-            message = "'{}': the surfaces {} and {} have no height with σ in common there".format(
-                one.name, *names_of(epochs)
+            names = "the surfaces {} and {}".format(*names_of(epochs))
+            if one.name == whole:
+                raise InputError(f"{names} have no height with σ in common", "check the CRS of both")
+            raise InputError(
+                f"'{one.name}': {names} have no height with σ in common there",
+                "draw the area inside both surfaces, in their CRS, or leave it out",
             )
-            raise InputError(message, "draw the area inside both surfaces, in their CRS, or leave it out")
 
 
 def notes_of_areas(found: Change, whole: str) -> list[str]:

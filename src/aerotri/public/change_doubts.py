@@ -41,7 +41,8 @@ def doubts_of_stable_ground(found: Alignment, ground: Boundary, areas: Mapping[s
     lift = dict(zip(found.names, found.values.tolist(), strict=True)).get("dZ", 0.0)
     if abs(lift) > LARGEST_LIFT_M:
         said.append(
-            f"the second surface was moved by dZ {lift:+.2f} m: check that both have heights of one system (above the "
-            "ellipsoid or above sea level)"
+            f"the second surface lies {abs(lift):.2f} m {'higher' if lift > 0.0 else 'lower'} than the first on the "
+            f"stable ground and was {'lowered' if lift > 0.0 else 'raised'} by that: check that both have heights of "
+            "one system (above the ellipsoid or above sea level)"
         )
     return said

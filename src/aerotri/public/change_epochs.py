@@ -281,9 +281,11 @@ def _own_noise(
 
 
 def _on(heights: Heights, values: np.ndarray, grid: Grid) -> np.ndarray:
-    """(rows, columns) of a surface's values, bilinear where its cells are others."""
-    from aerotri.terrain.compare import RasterHeights
+    """(rows, columns) of a surface's values, as they are where its cells are the same, else bilinear."""
+    from aerotri.terrain.compare import CellHeights, RasterHeights, at_centres
 
     x, y = np.meshgrid(grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows)))
-    found = RasterHeights(heights.grid, values).at(np.column_stack([x.ravel(), y.ravel()]), "linear")
-    return found.reshape(grid.rows, grid.columns)
+    raster = RasterHeights(heights.grid, values)
+    # rounding of places would take away the cells at the edge and beside holes
+    source = CellHeights(heights.grid, raster) if at_centres(heights.grid, grid) else raster
+    return source.at(np.column_stack([x.ravel(), y.ravel()]), "linear").reshape(grid.rows, grid.columns)

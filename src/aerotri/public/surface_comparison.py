@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from aerotri.formats.files.heights import HeightSource
     from aerotri.public.surfaces import SurfaceLike
+    from aerotri.rasters.grids import Grid
     from aerotri.terrain.compare import Comparison
 
 RECORD = "compare.json"
@@ -219,9 +220,8 @@ def compare(
         if one.epsg is not None and other.epsg is not None and one.epsg != other.epsg:
             message = f"is in EPSG:{one.epsg}, the control in EPSG:{other.epsg}"
             raise InputError(message, "bring them into one CRS", _file(test) or _name(test))
-        grid = same_cells(one.heights, other.heights, (one.area, other.area), cell)
-        if grid is None:
-            grid = common_grid(one.area, other.area, cell or max(one.cell, other.cell))
+        same = same_cells(one.heights, other.heights, (one.area, other.area), cell)
+        grid = same or common_grid(one.area, other.area, cell or max(one.cell, other.cell))
         report.stage("comparing", None)
         found = differences(
             one.heights, other.heights, grid, method, align, lambda k, n: report.counted("comparing", k, n)
@@ -230,6 +230,8 @@ def compare(
     notes = tuple(source.note for source in (one, other) if source.note) + _systems_in_words(
         (one, other), (test, control)
     )
+    if same is not None and align == "none":
+        notes += (_of_cells(same, one, method),)
     crs = None if epsg is None else f"EPSG:{epsg}"
     head = Head(project_of(project, test, control), max(one.crs, other.crs, key=len))
     used = used_arguments(compare, {"method": method, "align": align, "cell": cell}, {"cell": "m"})
@@ -240,6 +242,16 @@ def _check(method: str, align: str) -> None:
     for name, value, known in (("method", method, INTERPOLATIONS), ("alignment", align, ALIGNMENTS)):
         if value not in known:
             raise InputError(f"there is no {name} '{value}'", f"choose one of {', '.join(known)}")
+
+
+def _of_cells(grid: Grid, source: HeightSource, method: str) -> str:
+    """That nothing was interpolated, and which of the cells were compared."""
+    from aerotri.terrain.compare import MOST_CELLS
+
+    every = round(grid.cell_x / source.cell)
+    some = "" if every <= 1 else f", every {every} rows and columns one, so that no side has more than {MOST_CELLS}"
+    unused = "" if method == INTERPOLATION else f" (method '{method}' is not used)"
+    return f"both surfaces have the same cells, which are compared as they are{unused}{some}"
 
 
 def _systems_in_words(both: Sequence[HeightSource], given: Sequence[SurfaceLike]) -> tuple[str, ...]:

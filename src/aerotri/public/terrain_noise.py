@@ -19,10 +19,13 @@ from aerotri.public.dense import DenseSurface
 from aerotri.public.terrain import PICKETS, RECORD, TerrainModel
 from aerotri.public.volume_sigma import MeasuredSurface
 from aerotri.rasters.grids import Grid
+from aerotri.terrain.compare import RasterHeights
 from aerotri.terrain.settings import WIDEST_OBJECT_M
-from aerotri.terrain.surface import surface_of
+from aerotri.terrain.surface import Surface, surface_of
 
 SURFACES = ("dsm.tif", "dtm.tif")
+OBJECT_SIGMAS = 4.0
+"""Of matching and interpolation, by which a ground point lies off the surface without objects where it is on one."""
 FEWEST = 3
 """Pickets that make a surface."""
 BESIDE = "give the folder that `aerotri dtm` wrote"
@@ -42,6 +45,15 @@ class PicketNoise:
     variance: np.ndarray
     interval: float
     interpolation: float
+
+    def on_ground(self, ground: Surface) -> PicketNoise | None:
+        """Without those on objects, which the surface without objects does not have."""
+        height = RasterHeights(ground.grid, ground.z).at(self.xyz[:, :2], "linear")
+        off = np.abs(self.xyz[:, 2] - height)
+        own = off <= OBJECT_SIGMAS * np.sqrt(self.variance + self.interpolation**2)
+        if own.sum() < FEWEST:
+            return None
+        return PicketNoise(self.xyz[own], self.variance[own], self.interval, self.interpolation)
 
     def sigma(self, grid: Grid) -> np.ndarray:
         """(rows, columns) m, of matching and interpolation; NaN where no pickets are around.
@@ -66,12 +78,16 @@ def noise_of_terrain(measured: MeasuredSurface) -> PicketNoise | None:
     if isinstance(given, TerrainModel):
         o = given.record
         own = o.pickets.accepted & np.isfinite(o.pickets.covariance[:, 2, 2])
+        own &= o.ground if measured.layer == "dtm" else True
         return PicketNoise(o.pickets.xyz[own], o.pickets.covariance[own, 2, 2], o.interval, o.interpolation)
     path = measured.surface.path
     if path is None or path.name not in SURFACES:
         return None
     record, pickets = path.with_name(RECORD), path.with_name(PICKETS)
-    return _of_files(record, pickets) if record.is_file() and pickets.is_file() else None
+    if not (record.is_file() and pickets.is_file()):
+        return None
+    found = _of_files(record, pickets)
+    return found.on_ground(measured.surface.heights) if found and path.name == "dtm.tif" else found
 
 
 def _of_files(record: Path, pickets: Path) -> PicketNoise | None:

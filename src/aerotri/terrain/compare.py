@@ -240,7 +240,7 @@ def _cells_of(surface: Heights) -> Grid | None:
     return surface.reader.grid if isinstance(surface, FileHeights) else None
 
 
-def _at_centres(own: Grid, grid: Grid) -> bool:
+def at_centres(own: Grid, grid: Grid) -> bool:
     """Whether the centres of `grid` are centres of cells of `own`, or would be if it went on."""
     for at, count in (
         (own.column(grid.x([0, grid.columns - 1])), grid.columns),
@@ -282,7 +282,7 @@ def same_cells(
         return None
     window = own.window(top, left, rows, columns)
     alike = np.allclose([other.cell_x, other.cell_y], [own.cell_x, own.cell_y], rtol=SAME_PLACE)
-    if not (alike and _at_centres(other, window)):
+    if not (alike and at_centres(other, window)):
         return None
     step = -(-max(rows, columns) // MOST_CELLS)
     rows, columns = -(-rows // step), -(-columns // step)
@@ -352,7 +352,7 @@ def _as_cells(test: Heights, control: Heights, grid: Grid) -> tuple[Heights, Hei
     both: list[Heights] = []
     for one in (test, control):
         own = _cells_of(one)
-        if own is None or not isinstance(one, RasterHeights | FileHeights) or not _at_centres(own, grid):
+        if own is None or not isinstance(one, RasterHeights | FileHeights) or not at_centres(own, grid):
             return test, control
         both.append(CellHeights(own, one))
     return both[0], both[1]
