@@ -17,6 +17,7 @@ from rasterio import Affine
 import aerotri
 from aerotri import InputError
 from aerotri.commands.volume import outcome_lines
+from aerotri.rasters.metric import MetricReader
 from aerotri.report.documents.volume import _base_name
 from aerotri.report.documents.words import Words
 from aerotri.report.pages.volume import volume_html
@@ -101,12 +102,43 @@ def test_heights_in_the_unit_of_their_band(tmp_path, unit, factor):
     assert any("multiplied by" in text for text in found.warnings) is (factor != 1.0)
 
 
-def test_a_unit_that_is_not_known_is_refused(tmp_path):
-    path = in_file(tmp_path / "z.tif", heights(), "fathom")
+@pytest.mark.parametrize("crs", [CRS, f"{CRS}+7837"])
+def test_a_unit_that_is_not_known_is_refused(tmp_path, crs):
+    path = in_file(tmp_path / "z.tif", heights(), "fathom", crs)
     with pytest.raises(InputError, match="'fathom'") as refused:
         aerotri.volume(path, AROUND)
     assert refused.value.file == path
     assert "gdal_edit.py -units" in refused.value.remedy
+
+
+@pytest.mark.parametrize(("vertical", "unit", "factor", "agree"), [
+    ("7837", "cm", 0.01, False), ("7837", "m", 1.0, True), ("7837", None, 1.0, True),
+    ("8228", "ft", 0.3048, True), ("8228", None, 0.3048, True), ("8228", "US survey foot", 0.3048, True),
+    ("8228", "m", 0.3048, False), ("6360", "feet", 1200.0 / 3937.0, True),
+])  # fmt: skip
+def test_the_units_of_band_and_crs_have_to_agree(tmp_path, vertical, unit, factor, agree):
+    path = in_file(tmp_path / "z.tif", heights() / factor, unit, f"{CRS}+{vertical}")
+    if agree:
+        assert aerotri.volume(path, AROUND).net == pytest.approx(CONE, rel=0.005)
+        return
+    with pytest.raises(InputError, match=f"'{unit}' by the unit of the band, and in '(metre|foot)' by its CRS") as told:
+        aerotri.volume(path, AROUND)
+    assert told.value.file == path
+    assert "gdal_edit.py -units" in told.value.remedy
+
+
+@pytest.mark.parametrize("units", [("cm", ""), ("cm", "cm"), ("", ""), ("", "cm")])
+def test_a_sigma_counts_in_the_unit_of_the_heights_unless_it_states_its_own(tmp_path, units):
+    place = Affine(CELL, 0.0, LEFT, 0.0, -CELL, TOP)
+    with rasterio.open(tmp_path / "z.tif", "w", driver="GTiff", height=COUNT, width=COUNT, count=2, dtype="float32",
+                       crs=CRS, transform=place) as file:  # fmt: skip
+        file.write(np.full((2, COUNT, COUNT), [[[12345.0]], [[2.0]]], np.float32))
+        file.set_band_description(2, "σ, as the heights")
+        file.units = units
+    own = units[0], units[1] or units[0]
+    for band, (value, unit) in enumerate(zip((12345.0, 2.0), own, strict=True), start=1):
+        with MetricReader(tmp_path / "z.tif", band) as reader:
+            assert reader.read(3, 3, 1, 1)[0, 0] == pytest.approx(value * (0.01 if unit == "cm" else 1.0))
 
 
 def test_heights_that_land_does_not_have_are_told(tmp_path, cone):

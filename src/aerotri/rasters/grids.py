@@ -222,8 +222,9 @@ class RasterReader:
 
     @property
     def stated_unit(self) -> str:
-        """What the file says its values count in, in lower case; '' where it does not."""
-        return (self._file.units[self.band - 1] or "").strip().lower()
+        """What the file says its values count in, in lower case, of a σ what it says of the heights; '' if nothing."""
+        units = [(unit or "").strip().lower() for unit in self._file.units]
+        return units[self.band - 1] or units[0]
 
     def tag(self, name: str) -> str:
         """What the file says under a name in its metadata; '' where it says nothing."""

@@ -1,7 +1,8 @@
 """Rasters of heights brought to metres: out of degrees or feet, by bilinear interpolation.
 
 What is in metres already is read as it is. Heights count in what the vertical part of the CRS says, else in what the
-file calls the unit of its band, else in metres; a plan in feet leaves that open, and the file has to say it.
+file calls the unit of its band, else in metres; a plan in feet leaves that open, and the file has to say it. Where both
+say it, they have to agree.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ NO_UNIT = ("", "unknown", "none")
 MOST_STRETCHED = 0.02
 """Share by which a projection may change areas, 1 % in length [C]: UTM and national systems stay below 0.5 %, Web
 Mercator is beyond it from 8° of latitude on."""
+SAME_UNIT = 1e-5
+"""Share by which two units may differ that are taken for one: files say 'ft' of both feet, 2e-6 apart [C]."""
 UNIT_REMEDY = 'say it in the file: gdal_edit.py -units "US survey foot" FILE, or -units m'
 
 
@@ -173,11 +176,24 @@ def units_of(reader: RasterReader) -> RasterUnits:
     axis = flat.axis_info[0] if flat.axis_info else None
     plan = "metre" if axis is None or (axis.unit_name in UNITS and UNITS[axis.unit_name] == METRE) else axis.unit_name
     up = whole.axis_info[2:] if len(whole.axis_info) == 3 else []
-    height = up[0].unit_conversion_factor if up else _unit_of_band(reader)
+    height = _unit_of_heights(reader, up[0].unit_name, up[0].unit_conversion_factor) if up else _unit_of_band(reader)
     if height is None and (flat.is_geographic or plan == "metre"):
         height = METRE
     code = flat.to_epsg()
     return RasterUnits(plan, height, flat.name if code is None else f"EPSG:{code} ({flat.name})")
+
+
+def _unit_of_heights(reader: RasterReader, name: str, metres: float) -> float:
+    """Metres in the unit of heights of a CRS, name and metres; the band, where it states one, has to agree."""
+    # files bring along the unit of their CRS as that of the band, whatever it is called
+    of_band = metres if reader.stated_unit == name.lower() else _unit_of_band(reader)
+    if of_band is not None and abs(of_band / metres - 1.0) > SAME_UNIT:
+        raise InputError(
+            f"its values count in '{reader.stated_unit}' by the unit of the band, and in '{name}' by its CRS",
+            f'where the CRS is right, say so: gdal_edit.py -units "{name}" FILE; where the band is right, bring the '
+            "values into the unit of the CRS first: gdal_calc.py", reader.path,
+        )  # fmt: skip
+    return metres
 
 
 def _unit_of_band(reader: RasterReader) -> float | None:
