@@ -144,11 +144,24 @@ def test_a_sigma_counts_in_the_unit_of_the_heights_unless_it_states_its_own(tmp_
 def test_heights_that_land_does_not_have_are_told(tmp_path, cone):
     z = heights()
     z[100, 60] = -9999.0
-    said = "does the file state its value for no data"
+    said = "does its file state its value for no data"
     found = aerotri.volume(in_file(tmp_path / "z.tif", z, no_data=None), AROUND)
     assert any("from -9999 to" in text and said in text for text in found.warnings)
     kept = aerotri.volume(in_file(tmp_path / "known.tif", z), AROUND)
     assert not any(said in text for one in (kept, aerotri.volume(cone, AROUND)) for text in one.warnings)
+
+
+def test_heights_of_the_base_that_land_does_not_have_are_told(tmp_path, cone):
+    z = heights(with_cone=False)
+    z[95:105, 55:65] = -9999.0
+    said = "the base (hole.tif) has heights from -9999 to"
+    found = aerotri.volume(cone, AROUND, base=in_file(tmp_path / "hole.tif", z, no_data=None))
+    assert [text for text in found.warnings if said in text and "does its file state its value for no data" in text]
+    assert not any("the surface has heights" in text for text in found.warnings)
+    known = aerotri.volume(cone, AROUND, base=in_file(tmp_path / "known.tif", z))
+    assert not any("has heights from" in text for text in known.warnings)
+    level = aerotri.volume(cone, AROUND, base=10_000.0).warnings
+    assert any("has heights from 10000 to 10000 m" in text and "are they right" in text for text in level)
 
 
 @pytest.mark.parametrize(("crs", "left", "top"), [("EPSG:3857", 1_000_000.0, 6_500_000.0),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerotri.conventions import InputError
-from aerotri.volume.bases import Base, Surface
+from aerotri.volume.bases import Base, Surface, SurfaceBase
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.quantity import Volume, no_data_note
 from aerotri.volume.sections import Sections, cross_sections, section_volume
@@ -75,7 +75,11 @@ def compute_volumes(
     sections = cross_sections(surface, base, boundary, spacing, plan.azimuth, told("section"))
     found = (rasters.prisms, rasters.cells, *(section_volume(sections, rule) for rule in RULES))
     chosen = found[METHODS.index(method)]
-    said = no_data_note(chosen), _impossible(rasters), _spread(found, chosen), _coarse(surface, boundary)
+    said = (
+        no_data_note(chosen), _impossible(rasters.of_surface, "the surface"),
+        _impossible(rasters.of_base, f"the base ({base.name})", isinstance(base, SurfaceBase)),
+        _spread(found, chosen), _coarse(surface, boundary),
+    )  # fmt: skip
     warnings = [text for text in said if text]
     return Volumes(chosen, found, sections, *_extremes(rasters), tuple(warnings))
 
@@ -107,15 +111,20 @@ def _spread(found: tuple[Volume, ...], chosen: Volume) -> str:
     )
 
 
-def _impossible(rasters: RasterVolumes) -> str:
-    """What heights that land does not have may come from; '' where there are none."""
-    low, high = rasters.lowest_height, rasters.highest_height
+def _impossible(heights: tuple[float, float], what: str, is_raster: bool = True) -> str:
+    """What heights that land does not have may come from; '' where there are none.
+
+    Parameters
+    ----------
+    heights : m, lowest and highest inside the boundary. what : surface or base, in words.
+    """
+    low, high = heights
     if low >= LOWEST_LAND and high <= HIGHEST_LAND:
         return ""
+    file = "does its file state its value for no data (gdal_edit.py -a_nodata VALUE FILE) and its unit?"
     return (
-        f"the surface has heights from {low:.6g} to {high:.6g} m inside the boundary, and land lies between "
-        f"{LOWEST_LAND:g} and {HIGHEST_LAND:g} m: does the file state its value for no data (gdal_edit.py -a_nodata "
-        "VALUE FILE) and its unit?"
+        f"{what} has heights from {low:.6g} to {high:.6g} m inside the boundary, and land lies between "
+        f"{LOWEST_LAND:g} and {HIGHEST_LAND:g} m: {file if is_raster else 'are they right, and in metres?'}"
     )
 
 

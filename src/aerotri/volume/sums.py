@@ -39,15 +39,21 @@ class Window:
 
 @dataclass(frozen=True)
 class RasterVolumes:
-    """Volumes by both raster methods, and the extremes of the thickness and of the surface inside the boundary, m."""
+    """Volumes by both raster methods, and the extremes inside the boundary, m.
+
+    Parameters
+    ----------
+    lowest, highest : of the thickness. of_surface, of_base : lowest and highest of their heights.
+    without_heights_around : m², of the boundary beyond the cells.
+    """
 
     cells: Volume
     prisms: Volume
     lowest: float
     highest: float
     without_heights_around: float
-    lowest_height: float
-    highest_height: float
+    of_surface: tuple[float, float]
+    of_base: tuple[float, float]
 
 
 def cells_within(grid: Grid, boundary: Boundary) -> tuple[int, int, int, int]:
@@ -84,13 +90,14 @@ def raster_volumes(
     """
     cell_sums, prism = np.zeros(5), np.zeros(5)
     lowest, highest, covered = np.inf, -np.inf, 0.0
-    lowest_height, highest_height = np.inf, -np.inf
+    of_surface = of_base = np.inf, -np.inf
     grid = surface.grid
     todo = list(windows(grid, boundary, size))
     for done, (row, column, rows, columns) in enumerate(todo):
         wide = grid.window(row, column, min(rows + 1, grid.rows - row), min(columns + 1, grid.columns - column))
         z = surface.read(row, column, wide.rows, wide.columns).astype(float)
-        d = z - base.on_grid(wide)
+        below = base.on_grid(wide)
+        d = z - below
         own = wide.window(0, 0, rows, columns)
         part = boundary.coverage(own)
         thickness = d[:rows, :columns]
@@ -99,10 +106,9 @@ def raster_volumes(
         _add_prisms(d, wide, boundary, prism)
         known = (part > 0.0) & np.isfinite(thickness)
         if known.any():
-            seen, heights = thickness[known], z[:rows, :columns][known]
-            lowest, highest = min(lowest, float(seen.min())), max(highest, float(seen.max()))
-            lowest_height = min(lowest_height, float(heights.min()))
-            highest_height = max(highest_height, float(heights.max()))
+            lowest, highest = _widest((lowest, highest), thickness[known])
+            of_surface = _widest(of_surface, z[:rows, :columns][known])
+            of_base = _widest(of_base, below[:rows, :columns][known])
         if keep is not None:
             keep(Window(own, row, column, thickness, part))
         if progress is not None:
@@ -116,8 +122,12 @@ def raster_volumes(
     return RasterVolumes(
         Volume.of_sums("grid", cell_sums, "every cell with the height of its centre and its part inside the boundary"),
         Volume.of_sums("prisms", prism, "two triangles between the centres of every four cells, cut by the boundary"),
-        lowest, highest, outside, lowest_height, highest_height,
+        lowest, highest, outside, of_surface, of_base,
     )  # fmt: skip
+
+
+def _widest(extremes: tuple[float, float], values: np.ndarray) -> tuple[float, float]:
+    return min(extremes[0], float(values.min())), max(extremes[1], float(values.max()))
 
 
 def _add_cells(d: np.ndarray, part: np.ndarray, area: float, sums: np.ndarray) -> None:
