@@ -245,6 +245,24 @@ def test_infinities_are_no_data(tmp_path, cone):
         assert any("have no height" in text for text in found.warnings)
 
 
+@pytest.mark.parametrize("method", ["prisms", "simpson"])
+def test_heights_without_neighbours_are_told_and_count_by_cells(method):
+    gaps = np.full((COUNT, COUNT), 102.0)
+    gaps[:, 1::2] = np.nan
+    with pytest.raises(InputError, match=f"no four neighbouring cells .* and method '{method}'") as refused:
+        aerotri.volume(surface(gaps), AROUND, base=100.0, method=method)
+    assert "--method grid" in refused.value.remedy
+    found = aerotri.volume(surface(gaps), AROUND, base=100.0, method="grid")
+    assert found.net == pytest.approx(AROUND.area, rel=0.01)
+
+
+def test_a_surface_of_one_row_counts_by_cells():
+    row, strip = surface(np.full((1, COUNT), 102.0)), shapely.box(LEFT + 5.0, TOP - 0.4, LEFT + 20.0, TOP - 0.1)
+    with pytest.raises(InputError, match="no four neighbouring cells"):
+        aerotri.volume(row, strip, base=100.0)
+    assert aerotri.volume(row, strip, base=100.0, method="grid").net == pytest.approx(2.0 * strip.area)
+
+
 def test_two_systems_of_heights_are_refused(ground):
     top, below = surface(heights(), "EPSG:25832+7837"), surface(ground.z, "EPSG:25832+5783", "base")
     with pytest.raises(InputError, match=r"EPSG:5783.*EPSG:7837") as refused:

@@ -60,7 +60,7 @@ def compute_volumes(
     Raises
     ------
     InputError
-        When there is nothing inside the boundary.
+        When there is nothing inside the boundary, or nothing by the method that counts.
     """
     if method not in METHODS:
         raise InputError(f"there is no method '{method}'", f"choose one of {', '.join(METHODS)}")
@@ -75,6 +75,11 @@ def compute_volumes(
     sections = cross_sections(surface, base, boundary, spacing, plan.azimuth, told("section"))
     found = (rasters.prisms, rasters.cells, *(section_volume(sections, rule) for rule in RULES))
     chosen = found[METHODS.index(method)]
+    if chosen.area <= 0.0:
+        raise InputError(
+            f"no four neighbouring cells inside the boundary have heights of surface and base, and method '{method}' "
+            "needs them", "take the method grid (--method grid), which counts every cell by itself, or fill the holes",
+        )  # fmt: skip
     said = (
         no_data_note(chosen), _impossible(rasters.of_surface, "the surface"),
         _impossible(rasters.of_base, f"the base ({base.name})", isinstance(base, SurfaceBase)),
