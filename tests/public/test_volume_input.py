@@ -181,6 +181,8 @@ def test_a_projection_that_stretches_areas_is_refused(tmp_path, crs, left, top):
 @pytest.mark.parametrize(("crs", "left", "top"), [
     ("EPSG:3857", 1_000_000.0, 500_000.0), ("EPSG:25832+7837", LEFT, TOP), ("EPSG:25833", LEFT - 400_000.0, TOP),
     ("EPSG:3035", 2_800_000.0, 1_800_000.0), ("EPSG:2056", 2_600_000.0, 1_200_000.0), (None, 0.0, 0.0),
+    ("EPSG:27572", 650_000.0, 2_627_000.0), ("EPSG:2154", 1_200_000.0, 6_100_000.0),
+    ("EPSG:27700", 400_000.0, 300_000.0), ("EPSG:3003", 1_500_000.0, 4_700_000.0),
 ])  # fmt: skip
 def test_a_projection_that_keeps_areas_is_not(crs, left, top):
     held = aerotri.Surface.of_array(100.0 + np.zeros((40, 40)), left=left, top=top, cell=1.0, crs=crs)

@@ -235,7 +235,7 @@ def refuse_stretched(reader: RasterReader | HeldRaster) -> None:
     InputError
         When an area in the middle of the raster is wrong by more than `MOST_STRETCHED`.
     """
-    from pyproj import CRS, Proj, Transformer
+    from pyproj import CRS, Proj
     from pyproj.exceptions import CRSError, ProjError
 
     if reader.crs is None:
@@ -246,10 +246,10 @@ def refuse_stretched(reader: RasterReader | HeldRaster) -> None:
         if not flat.is_projected:
             return
         left, bottom, right, top = reader.grid.bounds
-        place = Transformer.from_crs(flat, flat.geodetic_crs, always_xy=True).transform(
-            (left + right) / 2.0, (bottom + top) / 2.0
-        )
-        scale = float(Proj(flat).get_factors(*place).areal_scale)
+        projection = Proj(flat)
+        # its own inverse: degrees from Greenwich, whatever meridian and unit the system counts from and in
+        place = projection((left + right) / 2.0, (bottom + top) / 2.0, inverse=True)
+        scale = float(projection.get_factors(*place).areal_scale)
     except (CRSError, ProjError, AttributeError):
         # local, or a system that PROJ cannot say this of
         return
