@@ -272,6 +272,42 @@ def test_two_systems_of_heights_are_refused(ground):
     assert "one system of heights" in refused.value.remedy
 
 
+def in_plan_of_feet(path, vertical, feet=1200.0 / 3937.0):
+    """10 m of height over San Francisco, in the state plane of California with heights in feet."""
+    place = Affine(10.0, 0.0, 6.0e6, 0.0, -10.0, 2.1e6)
+    with rasterio.open(path, "w", driver="GTiff", height=60, width=60, count=1, dtype="float32",
+                       crs=f"EPSG:2227+{vertical}", transform=place) as file:  # fmt: skip
+        file.write(np.full((60, 60), 10.0 / feet, np.float32), 1)
+    return path
+
+
+def over_the_same_place(base, vertical):
+    """A surface of 12 m in UTM over the middle of a base."""
+    with MetricReader(base, target="EPSG:26910") as reader:
+        left, bottom, right, top = reader.grid.bounds
+    left, top = (left + right) / 2.0 - 20.0, (bottom + top) / 2.0 + 20.0
+    crs = f"EPSG:26910+{vertical}"
+    return aerotri.Surface.of_array(np.full((40, 40), 12.0), left=left, top=top, cell=1.0, crs=crs, name="top")
+
+
+@pytest.mark.parametrize("vertical", ["6360", "8228"])
+def test_heights_in_feet_are_in_the_system_of_their_datum(tmp_path, vertical):
+    feet = 0.3048 if vertical == "8228" else 1200.0 / 3937.0
+    base = in_plan_of_feet(tmp_path / "base.tif", vertical, feet)
+    found = aerotri.volume(over_the_same_place(base, "5703"), base=base)
+    assert found.net == pytest.approx(2.0 * 39.0**2, rel=1e-5)
+    assert not any("in which system" in text for text in found.warnings)
+    plain = in_file(tmp_path / "z.tif", heights() / feet, crs=f"{CRS}+{vertical}")
+    assert aerotri.volume(plain, AROUND).summary["crs"] == f"{CRS}+5703"
+
+
+def test_heights_in_feet_of_another_datum_are_refused(tmp_path):
+    base = in_plan_of_feet(tmp_path / "base.tif", "5702")
+    with pytest.raises(InputError, match=r"EPSG:7968 \(NGVD29 height \(m\)\).*EPSG:5703 \(NAVD88 height\)") as refused:
+        aerotri.volume(over_the_same_place(base, "5703"), base=base)
+    assert refused.value.file == base
+
+
 @pytest.mark.parametrize(("own", "other", "said"), [
     ("EPSG:25832", "EPSG:25832+7837", ["cone does not say in which system"]),
     ("EPSG:25832+7837", "EPSG:25832", ["base does not say in which system"]),

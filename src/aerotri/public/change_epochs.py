@@ -176,7 +176,10 @@ def system_of_both(codes: Sequence[str], labels: Sequence[str]) -> tuple[str, st
     if all(plan) and plan[0] != plan[1]:
         raise InputError(f"{labels[1]} is in {plan[1]}, {labels[0]} in {plan[0]}", "bring them into one CRS")
     if all(heights) and heights[0] != heights[1]:
-        message = f"heights of {labels[1]} are in EPSG:{heights[1]}, of {labels[0]} in EPSG:{heights[0]}"
+        from aerotri.rasters.height_systems import height_system_in_words
+
+        own, other = (height_system_in_words(code) for code in heights)
+        message = f"heights of {labels[1]} are in {other}, of {labels[0]} in {own}"
         raise InputError(message, "bring them into one system of heights")
     system = max(codes, key=lambda code: (bool(code), "+" in code))
     unknown = [label for label, own in zip(labels, plan, strict=True) if not own]

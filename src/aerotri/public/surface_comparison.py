@@ -267,8 +267,11 @@ def _systems_in_words(both: Sequence[HeightSource], given: Sequence[SurfaceLike]
             said.append(f"{_name(given[k])} does not say in which system its heights are")
     own, other = (one.crs.partition("+")[2] for one in both)
     if own and other and own != other:
+        from aerotri.rasters.height_systems import height_system_in_words
+
         said.append(
-            f"heights of the test surface are in EPSG:{own}, of the control in EPSG:{other}: this is in the differences"
+            f"heights of the test surface are in {height_system_in_words(own)}, of the control in "
+            f"{height_system_in_words(other)}: this is in the differences"
         )
     return tuple(said)
 

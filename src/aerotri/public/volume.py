@@ -354,6 +354,7 @@ def _base(
 
     The raster of one that is a surface is open as long as the stack, in the CRS of the surface.
     """
+    from aerotri.rasters.height_systems import height_system_in_words
     from aerotri.rasters.metric import refuse_stretched
     from aerotri.volume.bases import SurfaceBase, level, parse_base
 
@@ -374,7 +375,8 @@ def _base(
         raise InputError(message, "bring it into one CRS", other.path)
     heights, own = (one.crs_code.partition("+")[2] for one in (other, reader))
     if heights and own and heights != own:
-        message = f"its heights are in EPSG:{heights}, those of {reader.path.name} in EPSG:{own}"
+        message = (f"its heights are in {height_system_in_words(heights)}, those of {reader.path.name} in "
+                   f"{height_system_in_words(own)}")  # fmt: skip
         raise InputError(message, "bring them into one system of heights", other.path)
     refuse_stretched(other)
     others.append(other)

@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 
 from aerotri.rasters.grids import Grid, bilinear
+from aerotri.rasters.height_systems import metric_height_system
 
 
 class HeldRaster:
@@ -42,9 +43,10 @@ class HeldRaster:
 
     @property
     def crs_code(self) -> str:
-        """'EPSG:n', 'EPSG:n+m' where a height system is stated; '' without a code."""
+        """'EPSG:n', 'EPSG:n+m' where a height system is stated, m in metres as the heights are; '' without a code."""
         heights = (self.crs or "").partition("+")[2]
-        return "" if self.epsg is None else f"EPSG:{self.epsg}" + (f"+{heights}" if heights.isdigit() else "")
+        up = f"+{metric_height_system(heights)}" if heights.isdigit() else ""
+        return "" if self.epsg is None else f"EPSG:{self.epsg}{up}"
 
     def read(self, row: int, column: int, rows: int, columns: int) -> np.ndarray:
         """A window, (rows, columns) float32; NaN where nothing is known and beyond the edges."""

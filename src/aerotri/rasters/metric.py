@@ -16,6 +16,7 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.rasters.grids import NO_DATA, Grid, RasterReader
+from aerotri.rasters.height_systems import metric_height_system
 
 if TYPE_CHECKING:
     from pyproj import CRS
@@ -101,10 +102,10 @@ class MetricReader(RasterReader):
 
     @property
     def crs_code(self) -> str:
-        """As of `RasterReader`; heights in metres stay in their system where the plan was brought to another one."""
-        own = super().crs_code
-        kept = own and "+" not in own and self._heights and self._factor == METRE
-        return f"{own}+{self._heights}" if kept else own
+        """As of `RasterReader`; heights stay on their datum where they, or the plan, were brought to metres."""
+        plan, _, heights = super().crs_code.partition("+")
+        heights = heights or self._heights
+        return f"{plan}+{metric_height_system(heights)}" if plan and heights else plan
 
     def _bring_to_metres(self, target: str | None) -> None:
         units = units_of(self)
