@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from importlib.resources import files
+from types import SimpleNamespace
 
 import jsonschema
 import numpy as np
@@ -17,10 +19,13 @@ from rasterio import Affine
 import aerotri
 from aerotri import InputError
 from aerotri.commands.volume import outcome_lines
+from aerotri.public.change_areas import notes_of_areas
 from aerotri.rasters.metric import MetricReader
 from aerotri.report.documents.volume import _base_name
 from aerotri.report.documents.words import Words
 from aerotri.report.pages.volume import volume_html
+from aerotri.volume.accuracy import _model_in_words, _notes
+from aerotri.volume.settings import SigmaOptions
 
 LEFT, TOP, CELL, COUNT = 500000.0, 5600100.0, 0.5, 200
 RADIUS, HEIGHT = 12.0, 5.0
@@ -468,4 +473,39 @@ def test_text_has_no_powers_of_ten(cone, tmp_path):
     assert "e+" not in text
     assert "net 12345700 m³ ± 23460 (1 σ): cut 12345700, fill 0.00402402" in text
     assert "+887 ± 302 m³" in text
-    assert "-26 ± 124 m³" in text
+    assert "−26 ± 124 m³" in text
+
+
+POWER = re.compile(r"\de[+-]?\d")
+
+
+def test_what_is_told_of_large_surfaces_has_no_powers_of_ten(tmp_path):
+    """20 km with a hole, heights that land does not have, piles that overlap and that touch."""
+    z = 1e3 * np.random.default_rng(1).normal(size=(COUNT, COUNT)) + 2e7
+    z[80:120, 30:70] = np.nan
+    held = aerotri.Surface.of_array(z, left=LEFT, top=TOP, cell=100.0, crs=CRS, name="large")
+    west, east, over = (shapely.box(LEFT + a, TOP - 1.85e4, LEFT + b, TOP - 5e2)
+                        for a, b in ((1e3, 9e3), (9e3, 1.8e4), (8e3, 1.8e4)))  # fmt: skip
+    apart = aerotri.volume(held, {"west": west, "east": east}, base="plane", method="trapezoidal")
+    both = aerotri.volume(held, {"west": west, "over": over}, base=2e7)
+    said = "\n".join([*apart.warnings, *both.warnings, *both.methods["note"], both.html(), repr(both)])
+    for words in ("share 18020 m", "overlap by 18000000 m²", "the methods differ", "have no height", "the surface has"):
+        assert words in said
+    assert not POWER.search(said)
+    hole = shapely.box(LEFT + 3e3, TOP - 1.2e4, LEFT + 7e3, TOP - 7_940.0)
+    assert any("16198800 m² (100 %) inside" in text for text in aerotri.volume(held, hole, base=2e7).warnings)
+
+
+def test_what_is_told_of_large_areas_of_a_change_has_no_powers_of_ten():
+    volumes = [SimpleNamespace(name="pit", area=1.0, no_data_area=1234567.0), SimpleNamespace(name="whole")]
+    (said,) = notes_of_areas(SimpleNamespace(volumes=volumes), "whole")
+    assert said.startswith("pit: 1234570 m² (100 %) of the area")
+
+
+def test_what_is_told_of_large_parts_of_sigma_has_no_powers_of_ten():
+    part = SimpleNamespace(unseen=1234567.0, between=None, calibration=SimpleNamespace(
+        local=SimpleNamespace(model_part=None)))  # fmt: skip
+    unseen = _notes(part, None, SimpleNamespace(name=""), 0.0, SigmaOptions())[0]
+    assert unseen.startswith("1235000 m² are seen by too few")
+    assert "4e" not in _model_in_words(part, {"adjustment": 30000.0, "model": 40000.0})
+    assert "50000 m³ instead of 30000 m³" in _model_in_words(part, {"adjustment": 30000.0, "model": 40000.0})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -98,6 +97,7 @@ def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
     """What the user reads of the volume."""
     from aerotri.deformation.restitution import ORIENTED
     from aerotri.formats.results.volume import boundary_in_words
+    from aerotri.report.quality import with_sigma
 
     c, s = content, content["sigma"]
     sure = "" if s is None else f" ± {in_digits(s['sigma_m3'], 4)} (1 σ)"
@@ -112,25 +112,17 @@ def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
     if s is not None:
         lines.append("σ by part, m³: " + ", ".join(f"{name} {in_digits(v, 4)}" for name, v in s["parts_m3"].items()))
         if s["curvature"] is not None:
+            beyond = with_sigma(s["curvature"]["value_m3"], s["curvature"]["sigma_m3"], signed=True)
             lines.append(
-                "ground expected beyond straight lines between heights: "
-                f"{_signed(s['curvature']['value_m3'], s['curvature']['sigma_m3'])} m³, not in the volume, counted in "
-                "σ as interpolation"
+                f"ground expected beyond straight lines between heights: {beyond} m³, not in the volume, counted in σ "
+                "as interpolation"
             )
         where = "in the volume:" if s["systematic"]["in_the_volume"] else "corrected; uncorrected they would add"
         for one in s["systematic"]["variants"]:
-            lines.append(
-                f"systematic image errors, {ORIENTED[one['variant']]}: {where} "
-                f"{_signed(one['value_m3'], one['sigma_m3'])} m³"
-            )
+            added = with_sigma(one["value_m3"], one["sigma_m3"], signed=True)
+            lines.append(f"systematic image errors, {ORIENTED[one['variant']]}: {where} {added} m³")
     lines += [f"  {one['method']:<24} net {in_digits(one['net_m3'], 6)} m³" for one in c["methods"]]
     return [*lines, *(f"note: {text}" for text in c["warnings"]), f"Written to {target}"]
-
-
-def _signed(value: float, sigma: float) -> str:
-    """'+2.579 ± 0.057': both to two digits of σ, no digits before the point rounded."""
-    digits = max(0, 1 - math.floor(math.log10(sigma))) if 0.0 < sigma < math.inf else 2
-    return f"{value:+.{digits}f} ± {sigma:.{digits}f}"
 
 
 def _pile_line(pile: dict[str, Any]) -> str:

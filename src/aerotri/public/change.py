@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, in_digits
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.change_areas import notes_of_areas, refuse_unknown_areas, with_whole_areas
 from aerotri.public.change_doubts import doubts_of_stable_ground
@@ -140,7 +140,7 @@ class MeasuredChange:
 
     def __repr__(self) -> str:
         v = self.summary["volumes"][0]
-        return f"<aerotri change: net {v['net_m3']:.6g} ± {v['sigma_net_m3']:.3g} m³>"
+        return f"<aerotri change: net {in_digits(v['net_m3'], 6)} ± {in_digits(v['sigma_net_m3'], 3)} m³>"
 
     def _repr_html_(self) -> str:
         return self.html()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, in_digits
 from aerotri.public.change_epochs import Epochs, names_of
 
 if TYPE_CHECKING:
@@ -57,8 +57,9 @@ def notes_of_areas(found: Change, whole: str) -> list[str]:
     """
     named = found.volumes[:-1] if len(found.volumes) > 1 else found.volumes
     return [
-        f"{one.name}: {one.no_data_area:.6g} m² ({100.0 * one.no_data_area / (one.area + one.no_data_area):.2g} %) of "
-        "the area have no height in both surfaces and are in no volume"
+        f"{one.name}: {in_digits(one.no_data_area, 6)} m² "
+        f"({in_digits(100.0 * one.no_data_area / (one.area + one.no_data_area), 2)} %) of the area have no height in "
+        "both surfaces and are in no volume"
         for one in named
         if one.name != whole and one.no_data_area > 0.0
     ]

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, in_digits
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.surfaces import Surface
 from aerotri.public.table import Table
@@ -215,8 +215,8 @@ class MeasuredVolume:
         return target
 
     def __repr__(self) -> str:
-        sure = "" if self.sigma is None else f" ± {self.sigma:.4g}"
-        return f"<aerotri volume of {self.summary['dtm']!r}: net {self.net:.6g}{sure} m³>"
+        sure = "" if self.sigma is None else f" ± {in_digits(self.sigma, 4)}"
+        return f"<aerotri volume of {self.summary['dtm']!r}: net {in_digits(self.net, 6)}{sure} m³>"
 
     def _repr_html_(self) -> str:
         return self.html()
@@ -226,13 +226,14 @@ class MeasuredVolume:
         from aerotri.formats.results.volume import boundary_in_words
 
         s = self.summary
-        sure = "" if self.sigma is None else f" ± {self.sigma:.4g} (1 σ)"
+        sure = "" if self.sigma is None else f" ± {in_digits(self.sigma, 4)} (1 σ)"
         warnings = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
         parts = "" if self.sigma is None else self.parts.html()
         parts = (self.piles.html() if s["piles"] else "") + parts
         return (
-            f"<div><b>{escape(s['dtm'])}: net {self.net:.6g} m³{sure}</b>, cut {self.cut:.6g}, fill {self.fill:.6g} m³ "
-            f"over {escape(s['base']['name'])}, {self.area:.6g} m² inside {escape(boundary_in_words(s['boundary']))}"
+            f"<div><b>{escape(s['dtm'])}: net {in_digits(self.net, 6)} m³{sure}</b>, cut {in_digits(self.cut, 6)}, "
+            f"fill {in_digits(self.fill, 6)} m³ over {escape(s['base']['name'])}, {in_digits(self.area, 6)} m² inside "
+            f"{escape(boundary_in_words(s['boundary']))}"
             f"{f'<ul>{warnings}</ul>' if warnings else ''}{parts}</div>"
         )
 

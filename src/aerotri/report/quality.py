@@ -19,10 +19,11 @@ def printable(name: object, longest: int = 200) -> str:
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
-def with_sigma(value: float, sigma: float) -> str:
-    """'8 308 ± 20': both to two digits of σ, no digits before the point rounded."""
+def with_sigma(value: float, sigma: float, signed: bool = False) -> str:
+    """'8 308 ± 20', signed '+8 308 ± 20': both to two digits of σ, no digits before the point rounded."""
     digits = 0 if sigma <= 0.0 or not np.isfinite(sigma) else max(0, 1 - int(np.floor(np.log10(sigma))))
-    return f"{value:,.{digits}f} ± {sigma:,.{digits}f}".replace(",", "\u2009").replace("-", "−")
+    plus = "+" if signed and value > 0.0 else ""
+    return f"{plus}{value:,.{digits}f} ± {sigma:,.{digits}f}".replace(",", "\u2009").replace("-", "−")
 
 
 def two_digits(value: float) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
+from aerotri.conventions import in_digits
 from aerotri.volume.bases import Base, PlaneBase, SplineBase, Surface, quadrature_of, sampled
 from aerotri.volume.boundary import Boundary, boundary_of
 from aerotri.volume.parts import Part
@@ -184,7 +185,7 @@ def _one_adjustment(once: float) -> str:
     if once > 1.0 - 1e-9:
         return f"{said}; all heights are the same measurements"
     if once > 0.0:
-        said += f", among them those of {100.0 * once:.3g} % of the area, which has the same heights in both"
+        said += f", among them those of {in_digits(100.0 * once, 3)} % of the area, which has the same heights in both"
     return f"{said}; matching and interpolation are taken for independent where the heights differ"
 
 
@@ -195,7 +196,7 @@ def _model_in_words(part: Part, parts: dict[str, float]) -> str:
     noise, total = parts["adjustment"], np.hypot(parts["adjustment"], parts[MODEL])
     return (
         f"the errors of the photographs change {change}, more than noise explains: with this model part the "
-        f"adjustment's share of σ is {total:.4g} m³ instead of {noise:.4g} m³"
+        f"adjustment's share of σ is {in_digits(total, 4)} m³ instead of {in_digits(noise, 4)} m³"
     )
 
 
@@ -257,7 +258,8 @@ def base_variance(base: Base, boundary: Boundary, surface: Surface, options: Sig
 def _notes(part: Part, base_part: Part | None, base: Base, ground: float, options: SigmaOptions) -> tuple[str, ...]:
     notes = []
     if part.unseen > 0.0:
-        notes.append(f"{part.unseen:.4g} m² are seen by too few photographs of the block and are not included in σ")
+        unseen = f"{in_digits(part.unseen, 4)} m² are seen by too few photographs of the block"
+        notes.append(f"{unseen} and are not included in σ")
     if part.between is None:
         notes.append("too few heights to tell how rough the ground is: interpolation is left out")
     if base_part is None and not isinstance(base, PlaneBase | SplineBase) and options.base_sigma <= 0.0:

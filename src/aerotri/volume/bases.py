@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from scipy.interpolate import RectBivariateSpline
 
-from aerotri.conventions import InputError, stated_number
+from aerotri.conventions import InputError, in_digits, stated_number
 from aerotri.rasters.grids import Grid
 from aerotri.volume.boundary import Boundary
 
@@ -188,7 +188,7 @@ def _cells_around(grid: Grid, bounds: tuple[float, float, float, float]) -> tupl
 
 def level(height: float) -> PlaneBase:
     """A level."""
-    return PlaneBase(f"level {height:g} m", height)
+    return PlaneBase(f"level {in_digits(height, 6)} m", height)
 
 
 def plane_through(points: np.ndarray, name: str = "plane") -> PlaneBase:

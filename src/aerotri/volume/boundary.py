@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, in_digits
 from aerotri.rasters.grids import Grid, rasterise
 from aerotri.vectors.crs import vector_system
 from aerotri.vectors.polygons import FILE_REMEDY, VECTOR_ENDINGS, placed, polygon_features, polygon_of_wkt, srid_of_wkt
@@ -127,7 +127,7 @@ def boundary_of_piles(
         return found
     overlap = sum(polygon.area for _, polygon in each) - whole.area
     if overlap > OVERLAP * whole.area:
-        said = f"its polygons overlap by {overlap:.4g} m²: they count together, not one by one"
+        said = f"its polygons overlap by {in_digits(overlap, 4)} m²: they count together, not one by one"
         return replace(found, note="; ".join(text for text in (note, said) if text))
     return replace(found, piles=tuple(each))
 
@@ -148,8 +148,9 @@ def outline_notes(boundary: Boundary, cell: float) -> tuple[str, ...]:
             "what lies inside a hole is not in the volume"
         )
     notes += [
-        f"the outlines of {first} and {second} share {length:.4g} m: the base runs through the surface there, which is "
-        "the pile itself where the line crosses it; give a height or a surface as base, or draw one outline around both"
+        f"the outlines of {first} and {second} share {in_digits(length, 4)} m: the base runs through the surface "
+        "there, which is the pile itself where the line crosses it; give a height or a surface as base, or draw one "
+        "outline around both"
         for first, second, length in _shared_outlines(boundary.piles, cell)
     ]
     return tuple(notes)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, in_digits
 from aerotri.volume.bases import Base, Surface, SurfaceBase
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.quantity import Volume, no_data_note
@@ -111,8 +111,8 @@ def _spread(found: tuple[Volume, ...], chosen: Volume) -> str:
     if abs(worst.net - chosen.net) <= SPREAD * size:
         return ""
     return (
-        f"the methods differ: {worst.method} gives {worst.net:.6g} m³ net, {chosen.method} {chosen.net:.6g} m³; "
-        "sections closer together, or a finer surface, bring them together"
+        f"the methods differ: {worst.method} gives {in_digits(worst.net, 6)} m³ net, {chosen.method} "
+        f"{in_digits(chosen.net, 6)} m³; sections closer together, or a finer surface, bring them together"
     )
 
 
@@ -128,8 +128,8 @@ def _impossible(heights: tuple[float, float], what: str, is_raster: bool = True)
         return ""
     file = "does its file state its value for no data (gdal_edit.py -a_nodata VALUE FILE) and its unit?"
     return (
-        f"{what} has heights from {low:.6g} to {high:.6g} m inside the boundary, and land lies between "
-        f"{LOWEST_LAND:g} and {HIGHEST_LAND:g} m: {file if is_raster else 'are they right, and in metres?'}"
+        f"{what} has heights from {in_digits(low, 6)} to {in_digits(high, 6)} m inside the boundary, and land lies "
+        f"between {LOWEST_LAND:g} and {HIGHEST_LAND:g} m: {file if is_raster else 'are they right, and in metres?'}"
     )
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerotri.conventions import in_digits
+
 
 @dataclass(frozen=True)
 class Volume:
@@ -48,5 +50,5 @@ def no_data_note(volume: Volume) -> str:
     whole = volume.area + volume.no_data_area
     if volume.no_data_area <= 1e-9 * whole:
         return ""
-    part = 100.0 * volume.no_data_area / whole
-    return f"{volume.no_data_area:.6g} m² ({part:.2g} %) inside the boundary have no height and are in no volume"
+    area, part = in_digits(volume.no_data_area, 6), in_digits(100.0 * volume.no_data_area / whole, 2)
+    return f"{area} m² ({part} %) inside the boundary have no height and are in no volume"

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from aerotri.conventions import InputError
+from aerotri.conventions import InputError, in_digits
 from aerotri.volume import _kernels
 from aerotri.volume.bases import Base, Surface, sampled
 from aerotri.volume.boundary import Boundary
@@ -88,14 +88,14 @@ def cross_sections(
     low, high = (corners @ along).min(), (corners @ along).max()
     if not 0.0 < spacing <= high - low:
         raise InputError(
-            f"sections every {spacing:g} m do not fit a boundary {high - low:.6g} m long",
+            f"sections every {spacing:g} m do not fit a boundary {in_digits(high - low, 6)} m long",
             "choose a smaller --section-spacing",
         )
     length = high - low
     if length / spacing > MOST_SECTIONS:
         raise InputError(
-            f"sections every {spacing:g} m would be {length / spacing:.3g}, {MOST_SECTIONS} at most are cut",
-            f"choose a --section-spacing of at least {length / MOST_SECTIONS:.2g} m",
+            f"sections every {spacing:g} m would be {in_digits(length / spacing, 3)}, {MOST_SECTIONS} at most are cut",
+            f"choose a --section-spacing of at least {in_digits(length / MOST_SECTIONS, 2)} m",
         )
     station = spacing * np.arange(int(np.floor(length / spacing * (1.0 + 1e-12))) + 1)
     if length - station[-1] > 1e-9 * length:
@@ -212,7 +212,7 @@ def _equal_intervals(station: np.ndarray) -> int:
 
 
 def _note(rule: str, used: int, intervals: int, sections: Sections) -> str:
-    text = f"{intervals + 1} sections every {sections.spacing:.4g} m, azimuth {sections.azimuth:g}°"
+    text = f"{intervals + 1} sections every {in_digits(sections.spacing, 4)} m, azimuth {sections.azimuth:g}°"
     if rule != "trapezoidal" and used < intervals:
         text += f"; {intervals - used} of {intervals} intervals by the trapezoid"
     return text

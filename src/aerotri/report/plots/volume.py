@@ -149,8 +149,7 @@ def plot_budget(content: Mapping[str, Any]) -> Figure:
     axes.set_xlabel("σ [m³]")
     if apart:
         below = axes_at(figure, 4.15, 0.6, WIDTH - 5.35, lower)
-        texts = [("+" if one["value_m3"] > 0.0 else "") + with_sigma(one["value_m3"], one["sigma_m3"])
-                 for _, one in apart]  # fmt: skip
+        texts = [with_sigma(one["value_m3"], one["sigma_m3"], signed=True) for _, one in apart]
         hatched = {"color": "white", "edgecolor": INK, "hatch": "////", "lw": 0.8}
         _bars(below, [name for name, _ in apart], [one["value_m3"] for _, one in apart], texts, hatched)
         below.set_xlabel("change of the volume [m³]")
