@@ -452,14 +452,14 @@ def test_names_of_piles(tmp_path, cone, attributes, names, said):
 
 @pytest.mark.parametrize(("attributes", "name"), [
     ({"name": "Kies"}, "Kies"), ({"Bezeichnung": "Kies"}, "Kies"), ({"a": "x", "b": "y"}, ""), ({}, ""),
-    ({"name": "alone"}, "alone"),
+    ({"name": "alone"}, "alone"), ({"name": "1"}, "1"), ({"Name": 1}, "1"), ({"name": None}, ""),
 ])  # fmt: skip
 def test_the_name_of_a_single_polygon_is_kept(tmp_path, cone, attributes, name):
     path = collection(tmp_path / "alone.geojson", [(attributes, AROUND)])
     content = aerotri.volume(cone, path, base=98.0).summary
     assert (content["boundary"]["name"], content["boundary"]["polygon"]) == ("alone.geojson", name)
     line = outcome_lines(content, tmp_path)[0]
-    assert line.endswith("inside alone.geojson, polygon 'Kies'" if name == "Kies" else "inside alone.geojson")
+    assert line.endswith(f"inside alone.geojson, polygon '{name}'" if name in ("Kies", "1") else "inside alone.geojson")
 
 
 def test_text_has_no_powers_of_ten(cone, tmp_path):

@@ -172,16 +172,14 @@ def _shared_outlines(piles: Sequence[tuple[str, BaseGeometry]], cell: float) -> 
     return found
 
 
-def _named(
-    attributes: Sequence[Mapping[str, Any]], polygons: list[BaseGeometry]
-) -> tuple[list[tuple[str, BaseGeometry]], str]:
-    """Polygons with the names their attributes give, else with their numbers; and which attribute was taken."""
+def _named(attributes: Sequence[Mapping[str, Any]]) -> tuple[list[str], str]:
+    """Names that attributes give their polygons, '' where they give none; and a sentence about which was taken."""
     stated = any(str(key).lower() in NAMES for own in attributes for key in own)
     other = "" if stated else _attribute_of_names(attributes)
     found = []
-    for number, (own, polygon) in enumerate(zip(attributes, polygons, strict=True), start=1):
+    for own in attributes:
         names = (own[key] for key in own if str(key).lower() in NAMES and own[key] not in (None, ""))
-        found.append((str(own[other] if other else next(names, number)), polygon))
+        found.append(str(own[other] if other else next(names, "")))
     return found, f"the attribute '{other}' names the polygons" if other else ""
 
 
@@ -208,12 +206,12 @@ def read_boundary(source: str, epsg: int | None = None) -> Boundary:
         polygons = [polygon for _, polygon in features]
         if not polygons:
             raise InputError("has no polygons", "give the boundary of the volume", path)
-        named, said = _named([properties for properties, _ in features], polygons)
+        names, said = _named([properties for properties, _ in features])
         note = "; ".join(text for text in (note, said and f"{path.name}: {said}") if text)
         if len(polygons) == 1:
-            title = "" if named[0][0] == "1" else named[0][0]
-            return replace(boundary_of(polygons[0], path.name, note, path), polygon_name=title)
-        return boundary_of_piles(named, path.name, note, path)
+            return replace(boundary_of(polygons[0], path.name, note, path), polygon_name=names[0])
+        numbered = [own or str(number) for number, own in enumerate(names, start=1)]
+        return boundary_of_piles(list(zip(numbered, polygons, strict=True)), path.name, note, path)
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
