@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import jsonschema
 import numpy as np
+import pyproj
 import pytest
 import rasterio
 import shapely
@@ -191,6 +192,22 @@ def test_a_projection_that_stretches_areas_is_refused(tmp_path, crs, left, top):
 ])  # fmt: skip
 def test_a_projection_that_keeps_areas_is_not(crs, left, top):
     held = aerotri.Surface.of_array(100.0 + np.zeros((40, 40)), left=left, top=top, cell=1.0, crs=crs)
+    assert aerotri.volume(held, base=99.0).net == pytest.approx(39.0**2)
+
+
+@pytest.mark.parametrize(("crs", "lon", "lat", "percent"), [
+    ("EPSG:32632", 9.0, 50.0, -0.08), ("EPSG:32632", 12.0, 0.0, 0.20), ("EPSG:32632", 15.0, 0.0, 1.03),
+    ("EPSG:32632", 15.0, 45.0, 0.47), ("EPSG:32632", 15.0, 60.0, 0.19), ("EPSG:2154", 9.2, 41.4, 0.58),
+])  # fmt: skip
+def test_how_far_projections_change_areas(crs, lon, lat, percent):
+    """What the page of the theory states, by the area of a square of 100 m on the ellipsoid; none is refused."""
+    x, y = Transformer.from_crs("EPSG:4326", crs, always_xy=True).transform(lon, lat)
+    to_degrees = Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
+    square = shapely.transform(shapely.box(x - 50.0, y - 50.0, x + 50.0, y + 50.0),
+                               lambda xy: np.column_stack(to_degrees.transform(*xy.T)))  # fmt: skip
+    on_ellipsoid = abs(pyproj.CRS.from_user_input(crs).get_geod().geometry_area_perimeter(square)[0])
+    assert 100.0 * (1e4 / on_ellipsoid - 1.0) == pytest.approx(percent, abs=0.006)
+    held = aerotri.Surface.of_array(np.full((40, 40), 100.0), left=x - 20.0, top=y + 20.0, cell=1.0, crs=crs)
     assert aerotri.volume(held, base=99.0).net == pytest.approx(39.0**2)
 
 
