@@ -320,7 +320,12 @@ def test_heights_in_feet_are_in_the_system_of_their_datum(tmp_path, vertical):
     assert found.net == pytest.approx(2.0 * 39.0**2, rel=1e-5)
     assert not any("in which system" in text for text in found.warnings)
     plain = in_file(tmp_path / "z.tif", heights() / feet, crs=f"{CRS}+{vertical}")
-    assert aerotri.volume(plain, AROUND).summary["crs"] == f"{CRS}+5703"
+    metric = aerotri.volume(plain, AROUND)
+    assert metric.summary["crs"] == f"{CRS}+5703"
+    with MetricReader(metric.thickness.path) as reader:
+        assert reader.note == ""
+        assert reader.crs_code == f"{CRS}+5703"
+    assert np.nanmax(metric.thickness.z) == pytest.approx(HEIGHT, abs=0.3)
 
 
 def test_heights_in_feet_of_another_datum_are_refused(tmp_path):

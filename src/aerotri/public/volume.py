@@ -410,7 +410,9 @@ def _volumes(
         raise InputError("the boundary does not meet the surface", "check the CRS of both", reader.path)
     part = reader.grid.window(row, column, rows, columns)
     means = ThicknessMeans(part)
-    with RasterWriter(spool.folder / THICKNESS, part, crs=reader.crs, options={"compress": "deflate"}) as writer:
+    # heights that the file has in feet are in metres here
+    crs = reader.crs_code if "+" in reader.crs_code else reader.crs
+    with RasterWriter(spool.folder / THICKNESS, part, crs=crs, options={"compress": "deflate"}) as writer:
         writer.describe("surface − base, m")
 
         def keep(window: Window) -> None:
