@@ -531,3 +531,12 @@ def test_what_is_told_of_large_parts_of_sigma_has_no_powers_of_ten():
     assert unseen.startswith("1235000 m² are seen by too few")
     assert "4e" not in _model_in_words(part, {"adjustment": 30000.0, "model": 40000.0})
     assert "50000 m³ instead of 30000 m³" in _model_in_words(part, {"adjustment": 30000.0, "model": 40000.0})
+
+
+def test_a_surface_in_memory_in_a_system_in_feet_is_saved_in_metres(tmp_path):
+    """Its heights are metres; read from the file they would else be brought from feet once more."""
+    surface = aerotri.Surface.of_array(
+        np.full((5, 5), 100.0), left=500000.0, top=4000000.0, cell=1.0, crs="EPSG:26910+8228"
+    )
+    path = surface.save(tmp_path / "surface.tif")
+    np.testing.assert_allclose(aerotri.Surface(path).z, 100.0)

@@ -210,8 +210,12 @@ class Surface:
         return target
 
     def _crs_text(self) -> str | None:
+        """With the system of heights in metres, as the heights are."""
+        from aerotri.rasters.height_systems import metric_height_system
+
         if isinstance(self.source, Heights):
-            return self.crs
+            plan, _, heights = (self.crs or "").partition("+")
+            return f"{plan}+{metric_height_system(heights)}" if heights.isdigit() else self.crs
         with self.reader() as reader:
             return reader.crs_code or None
 
