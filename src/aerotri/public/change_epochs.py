@@ -182,12 +182,22 @@ def system_of_both(codes: Sequence[str], labels: Sequence[str]) -> tuple[str, st
         message = f"heights of {labels[1]} are in {other}, of {labels[0]} in {own}"
         raise InputError(message, "bring them into one system of heights")
     system = max(codes, key=lambda code: (bool(code), "+" in code))
-    unknown = [label for label, own in zip(labels, plan, strict=True) if not own]
-    if len(unknown) == 1:
-        return system, f"{unknown[0]} does not say its coordinate system; taken for {system}"
-    silent = [label for label, own in zip(labels, heights, strict=True) if not own]
-    note = f"{silent[0]} does not say in which system its heights are" if len(silent) == 1 else ""
-    return system, note
+    return system, silent_in_words(codes, labels)
+
+
+def silent_in_words(codes: Sequence[str], labels: Sequence[str]) -> str:
+    """Which of two surfaces does not state a system that the other one states; '' where both are alike in that.
+
+    Parameters
+    ----------
+    codes : 'EPSG:n', 'EPSG:n+m' or ''. labels : their names.
+    """
+    for own, other, label in zip(codes, reversed(codes), labels, strict=True):
+        if other and not own:
+            return f"{label} does not say its coordinate system; taken for {other}"
+        if "+" in other and "+" not in own:
+            return f"{label} does not say in which system its heights are"
+    return ""
 
 
 def grid_of(epochs: Epochs) -> Grid:

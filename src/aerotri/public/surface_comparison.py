@@ -15,6 +15,7 @@ import numpy as np
 
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.argument_types import with_checked_types
+from aerotri.public.change_epochs import silent_in_words
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.projects import project_of
@@ -256,15 +257,9 @@ def _of_cells(grid: Grid, source: HeightSource, method: str) -> str:
 
 def _systems_in_words(both: Sequence[HeightSource], given: Sequence[SurfaceLike]) -> tuple[str, ...]:
     """What the user should know of the systems of test and control; ground points (pickets) never state theirs."""
-    said = []
-    for k, one in enumerate(both):
-        other, file = both[1 - k].crs, _file(given[k])
-        if file is not None and file.suffix == ".parquet":
-            continue
-        if other and not one.crs:
-            said.append(f"{_name(given[k])} does not say its coordinate system; taken for {other}")
-        elif "+" in other and "+" not in one.crs:
-            said.append(f"{_name(given[k])} does not say in which system its heights are")
+    points = [file is not None and file.suffix == ".parquet" for file in map(_file, given)]
+    silent = "" if any(points) else silent_in_words([one.crs for one in both], [_name(one) for one in given])
+    said = [silent] if silent else []
     own, other = (one.crs.partition("+")[2] for one in both)
     if own and other and own != other:
         from aerotri.rasters.height_systems import height_system_in_words

@@ -29,7 +29,7 @@ class HeightSource:
     Parameters
     ----------
     heights : to be asked. area : (2, 2) m, lower left and upper right corner of what it covers.
-    cell : m, its typical cell. epsg : code of its CRS, None where not known.
+    cell : m, its typical cell.
     crs : 'EPSG:n', 'EPSG:n+m' where a system of the heights is stated, '' where not known.
     note : what was done to bring it to metres, '' for nothing.
     """
@@ -37,9 +37,14 @@ class HeightSource:
     heights: Heights
     area: np.ndarray
     cell: float
-    epsg: int | None = None
     note: str = ""
     crs: str = ""
+
+    @property
+    def epsg(self) -> int | None:
+        """Code of its CRS, None where not known."""
+        plan = self.crs.partition("+")[0]
+        return int(plan.removeprefix("EPSG:")) if plan else None
 
 
 def file_of_surface(path: Path) -> Path:
@@ -94,9 +99,7 @@ def heights_of_file(path: Path, stack: ExitStack, crs: str | None) -> HeightSour
     except InputError as error:
         raise InputError(error.message, error.remedy, path) from error
     area = np.array([xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)])
-    cell = float(np.sqrt(np.prod(area[1] - area[0]) / len(xyz)))
-    plan = system.partition("+")[0].removeprefix("EPSG:")
-    return HeightSource(surface, area, cell, int(plan) if plan else None, "", system)
+    return HeightSource(surface, area, float(np.sqrt(np.prod(area[1] - area[0]) / len(xyz))), "", system)
 
 
 def heights_of_raster(reader: MetricReader | HeldRaster) -> HeightSource:
@@ -111,11 +114,11 @@ def heights_of_raster(reader: MetricReader | HeldRaster) -> HeightSource:
     if g.rows * g.columns > LARGEST_HELD:
         left, bottom, right, top = g.bounds
         area = np.array([[left, bottom], [right, top]])
-        return HeightSource(FileHeights(reader), area, g.cell_x, reader.epsg, reader.note, reader.crs_code)
+        return HeightSource(FileHeights(reader), area, g.cell_x, reader.note, reader.crs_code)
     z = reader.read(0, 0, g.rows, g.columns).astype(float)
     known_rows, known_columns = np.isfinite(z).any(axis=1), np.isfinite(z).any(axis=0)
     if not known_rows.any():
         raise InputError("has no data", "give a raster with heights", reader.path)
     rows, columns = np.flatnonzero(known_rows)[[0, -1]], np.flatnonzero(known_columns)[[0, -1]]
     area = np.array([[g.x(columns[0]), g.y(rows[1])], [g.x(columns[1]), g.y(rows[0])]], dtype=float)
-    return HeightSource(RasterHeights(g, z), area, g.cell_x, reader.epsg, reader.note, reader.crs_code)
+    return HeightSource(RasterHeights(g, z), area, g.cell_x, reader.note, reader.crs_code)
