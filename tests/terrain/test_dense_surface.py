@@ -14,7 +14,8 @@ from aerotri.rasters.grids import Grid
 from aerotri.rasters.images import create_image
 from aerotri.terrain.dense import _mesh_kernels as kernels
 from aerotri.terrain.dense import parallaxes
-from aerotri.terrain.dense._resampling_kernels import resample
+from aerotri.terrain.dense._refinement_kernels import shift_windows
+from aerotri.terrain.dense._resampling_kernels import align, move_rows, resample
 from aerotri.terrain.dense.cell_scale import CellScale
 from aerotri.terrain.dense.cell_sigma import cell_sigma, roughness
 from aerotri.terrain.dense.colours import Colours
@@ -232,12 +233,57 @@ def test_sigma_grows_where_only_a_part_of_the_window_matches():
 
 def test_resampling_keeps_straight_lines_and_parabolas():
     row, column = np.mgrid[:40, :50].astype(float)
-    x, y = np.random.default_rng(6).uniform(3.0, 36.0, (2, 30, 30))
+    x, y = np.random.default_rng(6).uniform(3.0, 36.0, (2, 30, 30)).astype(np.float32)
     out = np.empty((30, 30), np.float32)
     for grey in (3.0 * column - 2.0 * row, 0.1 * column**2 - 0.3 * row**2 + row * column):
         resample(grey, x, y, np.ones((30, 30), np.bool_), out)
         true = 3.0 * x - 2.0 * y if grey[0, 1] == 3.0 else 0.1 * x**2 - 0.3 * y**2 + x * y
         np.testing.assert_allclose(out, true, rtol=1e-6, atol=1e-4)
+
+
+def test_rows_are_moved_by_what_changes_over_the_image():
+    # across the base: 1.3 − .8x + .6y + .4x² + .3xy − .7y², in rows, which no constant follows
+    across, parallax = np.array([1.3, -0.8, 0.6, 0.4, 0.3, -0.7]), 6.5
+    row, column = np.mgrid[:50, :70].astype(float)
+    out = np.empty((50, 70), np.float32)
+    move_rows((0.2 * row**2 - 3.0 * row).astype(np.float32), across, parallax, out)
+    x, y = 2.0 * (column + parallax) / 69.0 - 1.0, 2.0 * row / 49.0 - 1.0
+    at = row + np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1) @ across
+    inside = (at >= 1.0) & (at < 47.0)
+    assert inside.mean() > 0.8
+    assert len(np.unique(np.floor(at - row))) > 2
+    np.testing.assert_allclose(out[inside], (0.2 * at**2 - 3.0 * at)[inside], rtol=1e-5, atol=1e-3)
+
+
+def test_pixels_are_aligned_by_their_parallaxes():
+    column = np.arange(60.0)
+    right = np.tile(0.1 * column**2 - column, (4, 1)).astype(np.float32)
+    value = np.random.default_rng(2).uniform(-9.0, 9.0, (4, 60)).astype(np.float32)
+    value[:, 20], value[:, 21] = 5.0, -10_000.0
+    known = value > -1000.0
+    left, out = np.full((4, 60), 7.0, np.float32), np.empty((4, 60), np.float32)
+    align(right, value, known, left, out)
+    at = column - value
+    inside = known & (at >= 1.0) & (at < 58.0)
+    np.testing.assert_allclose(out[inside], (0.1 * at**2 - at)[inside], rtol=1e-5, atol=1e-4)
+    assert (out[~inside] == 7.0).all()
+    assert not inside[:, 21].any()
+
+
+def test_windows_are_solved_wherever_a_pixel_is_known():
+    rng = np.random.default_rng(9)
+    left, right = (cv2.GaussianBlur(rng.normal(size=(40, 330)).astype(np.float32), (0, 0), 1.5) * 99 for _ in range(2))
+    whole, part = (np.empty((5, 40, 330), np.float32) for _ in range(2))
+    known = np.ones((40, 330), np.bool_)
+    shift_windows(left, right, np.float32(right.mean()), known, *whole)
+    known[:11], known[33:], known[:, :8], known[:, 300:] = False, False, False, False
+    shift_windows(left, right, np.float32(right.mean()), known, *part)
+    assert np.isfinite(whole).mean() > 0.7
+    np.testing.assert_allclose(part[:, known], whole[:, known], rtol=1e-4, atol=1e-4)
+    assert np.isnan(part[:, ~known]).all()
+    known[:] = False
+    shift_windows(left, right, np.float32(0.0), known, *part)
+    assert np.isnan(part).all()
 
 
 def test_sigma_follows_the_noise():

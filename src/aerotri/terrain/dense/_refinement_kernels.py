@@ -36,16 +36,19 @@ def shift_windows(left, right, level, known, shift, across, variance, variance_a
     means = np.zeros((SUMS, PART))
     for out in (shift, across, variance, variance_across, correlation):
         out[:] = np.nan
-    for first in range(HALF + 1, columns - HALF - 1, PART):
-        n = min(PART, columns - HALF - 1 - first)
+    above, below, start, end = _known_part(known)
+    above, below = max(above - HALF, 1), min(below + HALF, rows - 1)
+    end = min(end, columns - HALF - 1)
+    for first in range(max(start, HALF + 1), end, PART):
+        n = min(PART, end - first)
         part = slice(first, first + n)
         sums[:] = 0.0
         kept[:] = 0.0
-        for i in range(1, rows - 1):
+        for i in range(above, below):
             new, old = kept[i % KEPT_ROWS], kept[(i - side) % KEPT_ROWS]
             _signals(left, right, level, i, first - HALF, n + 2 * HALF, new)
             _move_sums(new, old, n + 2 * HALF, sums)
-            if i < side:
+            if i < above + side - 1:
                 continue
             _means(sums, n, means)
             at = i - HALF
@@ -53,6 +56,25 @@ def shift_windows(left, right, level, known, shift, across, variance, variance_a
                 known[at, part], means, shift[at, part], across[at, part], variance[at, part],
                 variance_across[at, part], correlation[at, part],
             )  # fmt: skip
+
+
+@leaf_kernel
+def _known_part(known):
+    """First row and the one after the last that have a pixel that is known, and first and last columns."""
+    rows, columns = known.shape
+    above, below, start, end = rows, 0, columns, 0
+    for i in range(rows):
+        first = 0
+        while first < columns and not known[i, first]:
+            first += 1
+        if first == columns:
+            continue
+        last = columns - 1
+        while not known[i, last]:
+            last -= 1
+        above, below = min(above, i), i + 1
+        start, end = min(start, first), max(end, last + 1)
+    return above, below, start, end
 
 
 @leaf_kernel

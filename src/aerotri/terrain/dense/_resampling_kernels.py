@@ -10,16 +10,19 @@ import numpy as np
 
 from aerotri.compiled import kernel, leaf_kernel
 
+ONE, HALF, SQUARE, CUBE = (np.float32(number) for number in (1.0, 0.5, 2.5, 1.5))
+"""Numbers of the weights, in single precision: places of pixels are known no better."""
+
 
 @leaf_kernel
 def _weights(t):
-    """Of the four pixels around, the place being t beyond the second."""
-    s = 1.0 - t
+    """Of the four pixels around, the place being t (float32) beyond the second."""
+    s = ONE - t
     return (
-        -0.5 * t * s * s,
-        1.0 + t * t * (1.5 * t - 2.5),
-        1.0 + s * s * (1.5 * s - 2.5),
-        -0.5 * s * t * t,
+        -HALF * t * s * s,
+        ONE + t * t * (CUBE * t - SQUARE),
+        ONE + s * s * (CUBE * s - SQUARE),
+        -HALF * s * t * t,
     )
 
 
@@ -27,7 +30,7 @@ def _weights(t):
 def resample(pixels, x, y, known, out):
     """Grey values at places, column x and row y of pixel centres; at the edge its pixels go on. Unknown ones are 0.
 
-    pixels : (·, ·). x, y, known, out : (rows, columns); out of float32.
+    pixels : (·, ·). x, y, known, out : (rows, columns); x, y and out of float32.
     """
     last_row, last_column = pixels.shape[0] - 1, pixels.shape[1] - 1
     for i in range(out.shape[0]):
@@ -35,14 +38,15 @@ def resample(pixels, x, y, known, out):
             out[i, j] = 0.0
             if not known[i, j]:
                 continue
-            column, row = int(np.floor(x[i, j])), int(np.floor(y[i, j]))
-            a, b, c, d = _weights(x[i, j] - column)
-            across = _weights(y[i, j] - row)
-            total = 0.0
+            left, above = np.floor(x[i, j]), np.floor(y[i, j])
+            column, row = int(left), int(above)
+            a, b, c, d = _weights(x[i, j] - left)
+            across = _weights(y[i, j] - above)
+            total = np.float32(0.0)
             if 1 <= column < last_column - 1 and 1 <= row < last_row - 1:
                 for k in range(4):
                     line = pixels[row - 1 + k]
-                    value = a * line[column - 1] + b * line[column] + c * line[column + 1] + d * line[column + 2]
+                    value = (a * line[column - 1] + b * line[column]) + (c * line[column + 1] + d * line[column + 2])
                     total += across[k] * value
             else:
                 for k in range(4):
@@ -67,33 +71,61 @@ def within(x, y, low, high, known):
 
 
 @kernel
-def align(right, value, across, known, left, out):
-    """The right epipolar image where the left one's pixels have their parallaxes; the left one's where not known.
+def move_rows(right, across, parallax, out):
+    """The right epipolar image moved across the base, so that its rows are those of the left one.
 
-    value : (rows, columns) px, left column − right column. across : (6,) px, right row − left row: coefficients of 1,
-    x, y, x², xy, y², x and y from −1 to 1 over columns and rows. out : float32.
+    across : (6,) px, right row − left row: coefficients of 1, x, y, x², xy, y², x and y from −1 to 1 over columns and
+    rows of the left image. parallax : px, left column − right column, of all pixels: `across` changes slowly enough.
+    out : (rows, columns) float32.
     """
     rows, columns = out.shape
+    down = np.empty(columns, np.float32)
     for i in range(rows):
         y = 2.0 * i / (rows - 1.0) - 1.0
         level, slope, bend = across[0] + y * (across[2] + y * across[5]), across[1] + y * across[4], across[3]
         for j in range(columns):
-            out[i, j] = left[i, j]
-            if not known[i, j]:
-                continue
-            place = j - value[i, j]
-            column = int(np.floor(place))
-            if not (1 <= column < columns - 2):
-                continue
-            x = 2.0 * j / (columns - 1.0) - 1.0
-            down = i + level + x * (slope + x * bend)
-            row = int(np.floor(down))
-            a, b, c, d = _weights(place - column)
-            vertical = _weights(down - row)
-            total = 0.0
-            for k in range(4):
-                line = right[min(max(row - 1 + k, 0), rows - 1)]
-                total += vertical[k] * (
-                    a * line[column - 1] + b * line[column] + c * line[column + 1] + d * line[column + 2]
-                )
-            out[i, j] = total
+            x = 2.0 * (j + parallax) / (columns - 1.0) - 1.0
+            down[j] = level + x * (slope + x * bend)
+        first = 0
+        while first < columns:  # columns whose four rows are the same
+            whole = np.floor(down[first])
+            end = first + 1
+            while end < columns and np.floor(down[end]) == whole:
+                end += 1
+            row, last, part = i + int(whole), rows - 1, slice(first, end)
+            _between_rows(
+                right[min(max(row - 1, 0), last), part], right[min(max(row, 0), last), part],
+                right[min(max(row + 1, 0), last), part], right[min(max(row + 2, 0), last), part],
+                down[part], whole, out[i, part],
+            )  # fmt: skip
+            first = end
+
+
+@leaf_kernel
+def _between_rows(above, upper, lower, below, down, whole, out):
+    for j in range(len(out)):
+        a, b, c, d = _weights(down[j] - whole)
+        out[j] = (a * above[j] + b * upper[j]) + (c * lower[j] + d * below[j])
+
+
+@kernel
+def align(right, value, known, left, out):
+    """The right epipolar image where the left one's pixels have their parallaxes; the left one's where not known.
+
+    value : (rows, columns) float32 px, left column − right column. out : float32.
+    """
+    for i in range(out.shape[0]):
+        _align_row(right[i], value[i], known[i], left[i], out[i])
+
+
+@leaf_kernel
+def _align_row(right, value, known, left, out):
+    """Without a branch: so several pixels are worked at once."""
+    for j in range(len(out)):
+        whole = np.ceil(value[j])
+        place = j - int(whole)
+        inside = known[j] and place >= 1 and place < len(out) - 2
+        column = place if inside else 1
+        a, b, c, d = _weights(whole - value[j])
+        found = (a * right[column - 1] + b * right[column]) + (c * right[column + 1] + d * right[column + 2])
+        out[j] = found if inside else left[j]

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from aerotri.terrain.dense._refinement_kernels import HALF, keep_seen, shift_windows
-from aerotri.terrain.dense._resampling_kernels import align
+from aerotri.terrain.dense._resampling_kernels import align, move_rows
 from aerotri.terrain.dense._smoothing_kernels import smooth
 from aerotri.terrain.dense.across_base import median_across, parabola_across, scatter_across
 from aerotri.terrain.dense.epipolar import EpipolarImages
@@ -130,12 +130,15 @@ def _bytes(grey: np.ndarray) -> np.ndarray:
 def _refined(images: EpipolarImages, value: np.ndarray) -> Parallaxes:
     known = value > INVALID / 2
     left, right = images.left, images.right
-    aligned, start, shift, across, variance, of_across, correlation, room = _scratch.take(8, value.shape)
+    aligned, start, shift, across, variance, of_across, correlation, room, moved = _scratch.take(9, value.shape)
     start[:] = value
     slow = left_slow = np.zeros(6)
     for _ in range(ROUNDS):
         value = _smoothed(value, known)
-        align(right, value, slow, known, left, aligned)
+        if slow.any():
+            move_rows(images.right, slow, images.geometry.lowest + 0.5 * images.geometry.count, moved)
+            right = moved
+        align(right, value, known, left, aligned)
         level = np.float32(aligned.mean())
         shift_windows(left, aligned, level, known, shift, across, variance, of_across, correlation)
         known &= np.abs(shift, out=room) < LARGEST_SHIFT_PX
