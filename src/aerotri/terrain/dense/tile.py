@@ -251,9 +251,11 @@ def _fused(
     members = np.zeros(shape, np.int64)
     tolerance = AGREEING_PX * scale.pixel
     kernels.fuse(heights, sigmas, correlation, used, AGREEING_SIGMAS, tolerance, z, sigma, members, misfit)
-    level = _levelled(heights, sigmas, z, tolerance)
-    out = (np.empty(shape), np.empty(shape), np.empty(shape, np.int64), misfit)
-    kernels.fuse(level, sigmas, correlation, used, AGREEING_SIGMAS, tolerance, *out)
+    level = heights
+    if len(pairs) > 1:
+        level = _levelled(heights, sigmas, z, tolerance)
+        out = (np.empty(shape), np.empty(shape), np.empty(shape, np.int64), misfit)
+        kernels.fuse(level, sigmas, correlation, used, AGREEING_SIGMAS, tolerance, *out)
     factor = _factor(misfit)
     patched = _without_patches(z, PATCH_STEP_PX * tolerance)
     z[~patched], sigma[~patched], members[~patched] = np.nan, np.nan, 0
