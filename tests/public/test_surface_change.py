@@ -111,6 +111,24 @@ def test_the_folder(tmp_path):
                                                      ".aerotri-files"}  # fmt: skip
 
 
+def test_nothing_has_no_sigma(tmp_path):
+    from typer.testing import CliRunner
+
+    from aerotri.cli import app
+
+    z = ground(X, Y)
+    for name, more in (("may", 0.0), ("june", 1.0)):
+        surface(z + more, np.random.default_rng(3), name).save(tmp_path / f"{name}.tif")
+    files = [str(tmp_path / f"{name}.tif") for name in ("may", "june")]
+    done = CliRunner().invoke(app, ["change", *files, "--align", "none", "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    told = done.output
+    assert "nothing lost" in told
+    assert "gained 14" in told
+    assert "0 ± 0" not in told + (tmp_path / "out" / "change.html").read_text()
+    assert "no cell is beyond the level of detection" in (tmp_path / "out" / "change.html").read_text()
+
+
 @pytest.mark.parametrize(
     ("settings", "says"),
     [({"align": "turn"}, "not known"), ({"noise_length": -1.0}, "not possible"), ({}, "has no σ"),

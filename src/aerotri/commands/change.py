@@ -75,11 +75,14 @@ def _summary(c: dict[str, Any]) -> list[str]:
         f"the median, {c['beyond_level_percent']:.1f} % of the cells beyond it"
     ]
     for v in c["volumes"]:
-        lines.append(
-            f"{v['name']}: gained {v['gained_m3']:.6g} ± {v['sigma_gained_m3']:.3g} m³, lost {v['lost_m3']:.6g} ± "
-            f"{v['sigma_lost_m3']:.3g} m³, net {v['net_m3']:.6g} ± {v['sigma_net_m3']:.3g} m³ (1 σ)"
-        )
+        lines.append(f"{v['name']}: {', '.join(_amount(v, of) for of in ('gained', 'lost', 'net'))} (1 σ)")
     if c["alignment"] is not None:
         moved = ", ".join(f"{u['name']} {u['value']:+.3g} ± {u['sigma']:.2g}" for u in c["alignment"]["unknowns"])
         lines.append(f"aligned on {c['alignment']['cells_used']} stable cells: {moved or 'nothing moved'}")
     return [*lines, *(f"note: {text}" for text in c["warnings"])]
+
+
+def _amount(volume: dict[str, Any], of: str) -> str:
+    """Without σ where no cell is beyond the level of detection: of nothing there is none."""
+    value, sigma = volume[f"{of}_m3"], volume[f"sigma_{of}_m3"]
+    return f"nothing {of}" if value == 0.0 and sigma == 0.0 else f"{of} {value:.6g} ± {sigma:.3g} m³"

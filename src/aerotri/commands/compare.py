@@ -39,6 +39,8 @@ def run_compare(
 
 
 def _summary(found: SurfaceComparison) -> list[str]:
+    from aerotri.report.quality import two_digits
+
     c = found.record
     s = c.statistics
     lines = [
@@ -48,5 +50,5 @@ def _summary(found: SurfaceComparison) -> list[str]:
         f"LE90 {s.le90:.3f}, largest {s.max:.3f} m",
     ]
     if found.bias_sigma is not None:
-        lines.append(f"σ of the bias {found.bias_sigma:.3f} m; noise length {found.noise_length:.3g} m")
+        lines.append(f"σ of the bias {two_digits(1e3 * found.bias_sigma)} mm; noise length {found.noise_length:.3g} m")
     return [*lines, *([c.alignment_text] if c.alignment_text else [])]

@@ -186,8 +186,8 @@ def _window_cells(
     places = np.stack([together(size * v, factor)[used] / total[used] for v in (x, y, z)], axis=-1)
     sums = [together(v, factor)[used] for v in (*in_plan, weight)]
     gradient = np.stack(sums, axis=-1)
-    with np.errstate(divide="ignore"):
-        share = np.where(gradient[:, 2] != 0.0, squares[used] / gradient[:, 2] ** 2, 1.0)
+    height = gradient[:, 2]
+    share = np.divide(squares[used], height**2, out=np.ones(len(height)), where=height != 0.0)
     noise = np.zeros(len(share)) if sigma is None else together((weight * _noise(sigma, window)) ** 2, factor)[used]
     return places, gradient, share, noise
 

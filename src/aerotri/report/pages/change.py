@@ -16,6 +16,7 @@ CAPTION = (
     "Left: difference of the surfaces where it is beyond the level of detection; brown is gained, blue (hatched) is "
     "lost, grey cannot be told from noise. Right: σ of the difference."
 )
+NOTHING = "no cell is beyond the level of detection"
 PARTS = {"adjustment": "adjustments", "model": "model part of the adjustments"}
 UNKNOWNS = {
     "dZ": ("height", 1e3, "mm"), "dX": ("X", 1e3, "mm"), "dY": ("Y", 1e3, "mm"),
@@ -40,13 +41,19 @@ def _cards(v: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     said = {"gained": "of cells beyond the level of detection", "lost": "of cells beyond the level of detection",
             "net": "of all cells"}  # fmt: skip
     return [
-        (of.capitalize(), f"{with_sigma(v[f'{of}_m3'], v[f'sigma_{of}_m3'])} m³", f"{text}, one standard deviation")
+        (of.capitalize(), f"{_amount(v, of)} m³", f"{text}, one standard deviation" if v[f"sigma_{of}_m3"] else NOTHING)
         for of, text in said.items()
     ]
 
 
+def _amount(v: Mapping[str, Any], of: str) -> str:
+    """m³; without σ where no cell is beyond the level of detection: of nothing there is none."""
+    value, sigma = v[f"{of}_m3"], v[f"sigma_{of}_m3"]
+    return "0" if value == 0.0 and sigma == 0.0 else with_sigma(value, sigma)
+
+
 def _row(v: Mapping[str, Any]) -> tuple[str, ...]:
-    numbers = (with_sigma(v[f"{of}_m3"], v[f"sigma_{of}_m3"]) for of in ("gained", "lost", "net"))
+    numbers = (_amount(v, of) for of in ("gained", "lost", "net"))
     return printable(v["name"]), f"{v['area_m2']:.0f}", *numbers, f"{v['no_data_area_m2']:.0f}"
 
 

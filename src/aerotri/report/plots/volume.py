@@ -42,9 +42,10 @@ ONE_SIDED = 0.02
 """Share of the largest height from which both cut and fill are shown [C]: with less the other is noise at the edge."""
 ZERO_LINE = (0, (1, 1.2))
 # light in the middle and equally dark at both ends: in black and white the zero line tells the sides apart
-COLOURS = LinearSegmentedColormap.from_list("cut_and_fill", [FILL, "#8fb4d6", "#ffffff", "#dfa684", CUT])
 # cells without a value: clear white, because clear black shows as a thin line where a PDF scales the picture
-COLOURS.set_bad((1.0, 1.0, 1.0, 0.0))
+COLOURS = LinearSegmentedColormap.from_list("cut_and_fill", [FILL, "#8fb4d6", "#ffffff", "#dfa684", CUT]).with_extremes(
+    bad=(1.0, 1.0, 1.0, 0.0)
+)
 WORDS = {
     "adjustment": "adjustment (orientation, self-calibration; all heights correlated)",
     MODEL: "errors that groups of photographs share",
