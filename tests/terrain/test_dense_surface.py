@@ -429,7 +429,8 @@ def test_a_slope_beside_a_hole_is_no_straight_step():
         z[(far >= 5.0) & (far < 8.0)] = np.nan
         found = by_step(z, np.full(z.shape, 0.05), heights=np.repeat(z[None], 2, axis=0))
         shares.append(float(np.median(found[(far > 8.0) & (far < 10.0) & (found > 0.0)])))
-    assert shares[1] == pytest.approx(shares[0], rel=0.25)
+    # the slope over two windows, 3.2 m, is taken off what the hole may hide
+    assert 0.6 * shares[0] < shares[1] < 1.05 * shares[0]
 
 
 def test_a_hole_may_hide_a_step():
@@ -448,7 +449,7 @@ def test_a_hole_may_hide_a_step():
     assert (both == 0.0).all()
     # what one pair saw in the hole is a step as well
     pair = np.full(z.shape, np.nan)
-    pair[:, 13] = 130.0
+    pair[:, 13:15] = 130.0
     assert (by_step(z, noise, heights=pair[None])[:, 12] > 29.0 * FAR_SHARE).all()
 
 
@@ -490,18 +491,39 @@ def test_roughness_is_the_noise_of_heights_on_a_plane(lag):
 
 
 def test_a_pair_far_from_the_surface_contradicts_it():
-    z = np.array([[10.0, 10.0, np.nan]])
-    heights = np.array([[[10.1, 10.0, np.nan]], [[9.9, 18.0, 12.0]]])
+    z, one, other = (np.repeat([values], 6, axis=0).repeat(6, axis=1) for values in (
+        [10.0, 10.0, np.nan], [10.1, 10.0, np.nan], [9.9, 18.0, 12.0]))  # fmt: skip
+    heights = np.stack([one, other])
     sigmas = np.full(heights.shape, 0.1)
     seen = others_seen(z, heights, sigmas, SCALE)
-    np.testing.assert_allclose(seen.highest, [[10.0, 18.0, 12.0]])
-    np.testing.assert_allclose(seen.lowest, [[10.0, 10.0, 12.0]])
-    np.testing.assert_array_equal(seen.agreeing, [[2, 1, 0]])
-    far = np.repeat(np.repeat(z, 20, axis=1), 20, axis=0)
-    pairs = np.repeat(np.repeat(heights, 20, axis=2), 20, axis=1)
+    np.testing.assert_allclose(seen.highest[:, [2, 8, 14]], np.tile([10.0, 18.0, 12.0], (6, 1)))
+    np.testing.assert_allclose(seen.lowest[:, [2, 8, 14]], np.tile([10.0, 10.0, 12.0], (6, 1)))
+    np.testing.assert_array_equal(seen.agreeing[:, [2, 8, 14]], np.tile([2, 1, 0], (6, 1)))
+    far = np.repeat(np.repeat(z, 4, axis=1), 4, axis=0)
+    pairs = np.repeat(np.repeat(heights, 4, axis=2), 4, axis=1)
     sigma = cell_sigma(far, np.full(far.shape, 0.07), pairs, np.full(pairs.shape, 0.1), SCALE)
-    assert (sigma[:, 25:35] > 1.0).all()
+    assert (sigma[:, 30:40] > 1.0).all()
     assert (sigma[:, :15] < 0.1).all()
+
+
+@pytest.mark.parametrize("cells", [1, 6, 9, 25])
+def test_a_few_cells_that_a_pair_has_elsewhere_are_chance(cells):
+    """Six cells of a window at most: what is larger is a surface that others do not see."""
+    z = np.full((30, 30), 100.0)
+    heights = np.stack([z, z])
+    side = int(np.ceil(np.sqrt(cells)))
+    for n in range(cells):
+        heights[1, 14 + n // side, 14 + n % side] = 140.0
+    found = by_step(z, np.full(z.shape, 0.05), heights=heights)
+    assert (found > 5.0).any() == (cells > 6)
+
+
+def test_a_slope_at_the_edge_is_no_step():
+    """Where the surface ends one pair alone sees the cells: a slope there hides nothing."""
+    rows, columns = np.mgrid[0:40, 0:40]
+    z = 100.0 + 0.5 * columns + 0.3 * rows
+    z[:, 25:] = np.nan
+    assert by_step(z, np.full(z.shape, 0.05)).max() < 0.35 * FAR_SHARE * 6.4  # m over two windows
 
 
 def test_pairs_that_share_a_photograph_share_its_noise(hill):

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from aerotri.conventions import InputError, stated_number
-from aerotri.public.dense import MATCHING, SURFACE, DenseSurface
-from aerotri.rasters.grids import RasterReader
+from aerotri.public.dense import COUNT, MATCHING, SURFACE, DenseSurface
+from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.rasters.held import HeldRaster
 from aerotri.volume.cell_noise import NO_NOISE, CellNoise
 
@@ -21,13 +21,14 @@ BESIDE = "give dsm.tif in the folder that `aerotri dsm` wrote"
 def noise_of_dense(dense: DenseSurface) -> CellNoise:
     """Of a dense surface in memory."""
     o, length = dense.record, dense.summary["noise_length_m"]
-    sigma = np.full((o.grid.rows, o.grid.columns), np.nan, np.float32)
+    sigma, count = (np.full((o.grid.rows, o.grid.columns), np.nan, np.float32) for _ in range(2))
     for window, tile in o.files.read_all(list(o.windows)):
         place = np.s_[
             window.row : window.row + tile.sigma.shape[0], window.column : window.column + tile.sigma.shape[1]
         ]
-        sigma[place] = tile.sigma
-    return CellNoise(HeldRaster(sigma, o.grid, None, MATCHING), 0.0 if length is None else length)
+        sigma[place], count[place] = tile.sigma, tile.count
+    noise, photographs = HeldRaster(sigma, o.grid, None, MATCHING), HeldRaster(count, o.grid, None, COUNT)
+    return CellNoise(noise, 0.0 if length is None else length, photographs)
 
 
 def noise_of_file(path: Path | None, stack: ExitStack) -> CellNoise:
@@ -35,24 +36,31 @@ def noise_of_file(path: Path | None, stack: ExitStack) -> CellNoise:
 
     Parameters
     ----------
-    stack : keeps the raster of σ open.
+    stack : keeps the rasters beside it open.
 
     Raises
     ------
     InputError
-        When its noise length is no length, or the raster of σ beside it belongs to another surface.
+        When its noise length is no length, or a raster beside it belongs to another surface.
     """
     if path is None or not path.is_file():
         return NO_NOISE
     with RasterReader(path) as reader:
         length, grid = _length(reader.tag(NOISE_LENGTH), path), reader.grid
-    beside = path.with_name(MATCHING)
-    if path.name != SURFACE or not beside.is_file():
+    if path.name != SURFACE:
         return CellNoise(None, length)
-    sigma = stack.enter_context(RasterReader(beside))
-    if sigma.grid != grid:
+    return CellNoise(_beside(path, MATCHING, grid, stack), length, _beside(path, COUNT, grid, stack))
+
+
+def _beside(path: Path, name: str, grid: Grid, stack: ExitStack) -> RasterReader | None:
+    """A raster in the folder of a dense surface, None where there is none."""
+    beside = path.with_name(name)
+    if not beside.is_file():
+        return None
+    reader = stack.enter_context(RasterReader(beside))
+    if reader.grid != grid:
         raise InputError(f"has other cells than {path.name} beside it", BESIDE, beside)
-    return CellNoise(sigma, length)
+    return reader
 
 
 def _length(text: str, path: Path) -> float:

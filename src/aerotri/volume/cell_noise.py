@@ -1,4 +1,4 @@
-"""Noise of the cells of a dense surface: its σ, and how far neighbours share it."""
+"""What a dense surface says of its cells: σ of their noise, how far they share it, by how many photographs measured."""
 
 from __future__ import annotations
 
@@ -23,10 +23,12 @@ class CellNoise:
     """sigma : σ of every cell from matching alone, m, on the cells of the surface; None where not known.
 
     length_m : side of the square whose cells have one noise; 0 where neighbours share none.
+    photographs : number that measured a cell, on the cells of the surface; None where not known.
     """
 
     sigma: Surface | None = None
     length_m: float = 0.0
+    photographs: Surface | None = None
 
 
 NO_NOISE = CellNoise()
@@ -35,6 +37,18 @@ NO_NOISE = CellNoise()
 def cells_sharing(length_m: float, cell: float) -> float:
     """How many cells of `cell` m² have one noise, at least 1."""
     return max(1.0, length_m**2 / cell)
+
+
+def photographs_at(photographs: Surface, xyz: np.ndarray) -> np.ndarray:
+    """(k,) number of photographs that measured the cells at places (k, 3) m, 0 where none is known."""
+    grid, out = photographs.grid, np.zeros(len(xyz), np.int64)
+    for first in range(0, len(xyz), AT_A_TIME):
+        some = xyz[first : first + AT_A_TIME]
+        row, column = (np.rint(at).astype(int) for at in (grid.row(some[:, 1]), grid.column(some[:, 0])))
+        top, left = int(row.min()), int(column.min())
+        read = photographs.read(top, left, int(np.ptp(row)) + 1, int(np.ptp(column)) + 1)
+        out[first : first + AT_A_TIME] = np.nan_to_num(read[row - top, column - left])
+    return out
 
 
 def shares_of_noise(calibration: Adjustment, pickets: Pickets, functional: Functional) -> np.ndarray:

@@ -11,7 +11,7 @@ from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume.bases import Base, Surface
 from aerotri.volume.boundary import Boundary
-from aerotri.volume.cell_noise import NO_NOISE, CellNoise, cells_sharing, shares_of_noise
+from aerotri.volume.cell_noise import NO_NOISE, CellNoise, cells_sharing, photographs_at, shares_of_noise
 from aerotri.volume.functionals import Functional, cell_volume, tin_volume, triangulated
 from aerotri.volume.pickets import (
     MeasuredPickets,
@@ -76,6 +76,8 @@ def part_of_cells(
 ) -> Part:  # fmt: skip
     """The share of a surface whose cells are taken for its pickets, measured in the photographs nearest to them.
 
+    In as many as measured them where the surface says so; else in two.
+
     Parameters
     ----------
     noise : what the surface says of its cells; a σ or a window that the options state counts instead.
@@ -83,8 +85,10 @@ def part_of_cells(
     own = noise.sigma if options.matching_sigma_um is None else None
     functional = cell_volume(surface, boundary, base, own, options.boundary_from == "product")
     length = noise.length_m if options.matching_window_m is None else options.matching_window_m
+    of_cells = noise.photographs
+    per_point = options.per_point if of_cells is None else photographs_at(of_cells, functional.xyz)
     pickets, seen = pickets_where_seen(
-        calibration, functional.xyz, matching_sigma_mm(calibration, options), options.per_point, functional.noise_share
+        calibration, functional.xyz, matching_sigma_mm(calibration, options), per_point, functional.noise_share
     )
     if not seen.any():
         raise InputError("no photograph of the adjustment sees the surface", "check the CRS of surface and block")

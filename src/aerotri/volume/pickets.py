@@ -12,7 +12,7 @@ from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.observations import Block
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume import _response_kernels as _kernels
-from aerotri.volume.settings import PER_POINT
+from aerotri.volume.settings import MOST_PER_POINT, PER_POINT
 
 CANDIDATES_EVERY = 64
 """Points of a row that share one list of photographs to look into."""
@@ -89,7 +89,7 @@ def pickets_of_names(block: Block, xyz: np.ndarray, names: list[list[str]], sigm
 
 
 def pickets_where_seen(
-    calibration: Adjustment, xyz: np.ndarray, sigma_mm: float, per_point: int = PER_POINT,
+    calibration: Adjustment, xyz: np.ndarray, sigma_mm: float, per_point: int | np.ndarray = PER_POINT,
     noise_share: np.ndarray | None = None,
 ) -> tuple[Pickets, np.ndarray]:  # fmt: skip
     """Pickets at places of a surface, in the photographs nearest to them that see them.
@@ -97,10 +97,11 @@ def pickets_where_seen(
     Parameters
     ----------
     xyz : (k, 3) m in the CRS of the block, neighbours in the list near one another.
+    per_point : photographs of all, or (k,) of each: of the nearest so many as see it, and eight at most.
 
     Returns
     -------
-    Pickets, and (k,) bool which places are seen by `per_point` photographs.
+    Pickets, and (k,) bool which places are seen by enough photographs: by `per_point` of all, or by two.
     """
     local = xyz if calibration.frame is None else calibration.frame.to_local(xyz)
     orientation = calibrated_orientation(calibration)
@@ -109,7 +110,9 @@ def pickets_where_seen(
     known = np.flatnonzero(orientation.known)
     number = np.arange(len(local)) // CANDIDATES_EVERY
     first, candidate = _candidates(local, number, orientation, half, known)
-    chosen = np.empty((len(local), per_point), np.int64)
+    each = isinstance(per_point, np.ndarray)
+    wanted = np.clip(per_point, PER_POINT, MOST_PER_POINT) if each else np.full(len(local), per_point)
+    chosen = np.empty((len(local), int(wanted.max(initial=PER_POINT))), np.int64)
     _kernels.nearest_photographs(
         local, number, first, candidate,
         _kernels.Views(
@@ -118,9 +121,10 @@ def pickets_where_seen(
         ),
         chosen,
     )  # fmt: skip
-    seen = chosen[:, -1] >= 0
-    image = chosen[seen].ravel()
-    start = per_point * np.arange(int(seen.sum()) + 1, dtype=np.int64)
+    used = np.minimum((chosen >= 0).sum(axis=1), wanted)
+    seen = used >= (PER_POINT if each else per_point)
+    image = chosen[seen][np.arange(chosen.shape[1]) < used[seen, None]]
+    start = np.concatenate([[0], np.cumsum(used[seen])]).astype(np.int64)
     share = np.ones(len(local)) if noise_share is None else noise_share
     return Pickets(xyz[seen], start, image, np.full(len(image), sigma_mm), share[seen]), seen
 

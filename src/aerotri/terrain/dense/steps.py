@@ -33,6 +33,10 @@ STEP_SIGMAS = 6.0
 """σ of the noise that a step is larger than: the range of some twenty cells reaches five."""
 CONTRADICTED_SIGMAS = 4.0
 """σ of a pair from which on its height contradicts the surface."""
+LEAST_OF_WINDOW = 0.25
+"""Share of the cells about one, as far as a window of the matching reaches, at which a pair has to contradict the
+surface for that to count; chosen [C]: matches by chance are patches of up to six cells of 25, a surface that other
+photographs see is larger."""
 UNKNOWN = np.float32(1e9)
 
 
@@ -53,13 +57,14 @@ class Seen:
 
 
 def others_seen(z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: CellScale) -> Seen:
-    """What pairs saw besides the heights that count."""
+    """What pairs saw besides the heights that count; what a pair has elsewhere in a few cells was matched by chance."""
     known = np.isfinite(z)
     highest, lowest = np.where(known, z, -UNKNOWN), np.where(known, z, UNKNOWN)
     agreeing = np.zeros(z.shape, np.uint8)
     for height, sigma in zip(heights, sigmas, strict=True):
         agrees = np.abs(height - z) <= scale.pixel + CONTRADICTED_SIGMAS * sigma
         other = np.isfinite(height) & ~agrees
+        other &= sum_about(other.astype(np.float32), scale.window) > LEAST_OF_WINDOW * scale.window**2
         np.maximum(highest, height, out=highest, where=other)
         np.minimum(lowest, height, out=lowest, where=other)
         agreeing += agrees
@@ -119,8 +124,8 @@ def _steps(
     cells around is taken off first, so that a slope is none. That mean holds a wall some cells away: no step is
     therefore larger than the range of the heights themselves, next to a cell plus the slope over that distance. Further
     away, within a window of the matching, steps count where few pairs agree on the height. Beside a hole, which may
-    hide the step, half a pixel counts, without that limit; where few pairs agree the whole range of heights over two
-    windows counts there, and for a cell that one pair alone saw holes are looked for as far.
+    hide the step, half a pixel counts, without that limit; where few pairs agree the range of heights over two windows,
+    less the slope, counts there, and for a cell that one pair alone saw holes are looked for as far.
 
     Parameters
     ----------
@@ -131,11 +136,13 @@ def _steps(
     mean = mean / np.maximum(sum_about(known.astype(np.float32), scale.around), 1.0) + middle
     left, whole = ((_less(seen.highest, level), _less(seen.lowest, level)) for level in (mean, middle))
     side = 2 * ((scale.lag + 1) // 2) + 1
-    near = np.minimum(_range(*left, side), _range(*whole, side) + (side - 1) * _slope(above, known))
+    slope = _slope(above, known)
+    near = np.minimum(_range(*left, side), _range(*whole, side) + (side - 1) * slope)
     in_window = _range(*left, scale.window)
     few = seen.agreeing < SEVERAL
     far = np.where(few, np.minimum(in_window, _range(*whole, scale.window)), 0.0)
-    hidden = np.where(few, np.maximum(in_window, _range(*whole, scale.around)), in_window)
+    over_two = _range(*whole, scale.around) - (scale.around - 1) * slope
+    hidden = np.where(few, np.maximum(in_window, over_two), in_window)
     hidden[~_by_a_hole(known, seen, scale)] = 0.0
 
     least = STEP_SIGMAS * noise
