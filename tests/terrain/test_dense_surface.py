@@ -180,9 +180,8 @@ def textured_pair(shift: float, across: float | np.ndarray, noise: float, seed: 
             grey += np.cos(fx * (column + du) + fy * (row + dv) + phase)
         images.append((128.0 + 2.5 * grey + rng.normal(scale=noise, size=grey.shape)).astype(np.float32))
     whole = np.ones((240, 320), np.bool_)
-    g = EpipolarGeometry(
-        0, 1, 0, 1000.0, 100.0, np.eye(3), np.zeros(3), (0, 0), (240, 320), np.zeros((240, 320), np.float32), -8, 16
-    )
+    known = np.zeros((240, 320), np.float32)
+    g = EpipolarGeometry(0, 1, 0, 1e3, 100.0, np.eye(3), np.zeros(3), (0, 0), known.shape, known, -8, 16, known[:1, :1])
     return EpipolarImages(g, images[0], images[1], whole, whole)
 
 

@@ -51,6 +51,8 @@ class EpipolarGeometry:
     first : column and row, about the principal point, of the window's first pixel. shape : rows, columns.
     known : (rows, columns) float32 px, the parallaxes P taken out of the right image.
     lowest, count : parallaxes that are tried beyond them.
+    bend : (·, ·) px, P at the nodes of the lattice, between which `known` is bilinear as the places of pixels are:
+        what was taken out is what is added again.
     """
 
     left: int
@@ -65,6 +67,7 @@ class EpipolarGeometry:
     known: np.ndarray
     lowest: int
     count: int
+    bend: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +92,8 @@ def epipolar_geometry(
     """
     seen = np.zeros(len(ground), np.bool_)
     for places in (ground, low, high):
-        seen |= place.seen(left, places) & place.seen(right, places)
+        rest = np.flatnonzero(~seen)
+        seen[rest] = place.seen(left, places[rest]) & place.seen(right, places[rest])
     if not seen.any():
         return None
     ground, low, high = ground[seen], low[seen], high[seen]
@@ -122,9 +126,25 @@ def epipolar_geometry(
     shape = last[1] - first[1], last[0] - first[0]
     if shape[0] * shape[1] > MOST_PIXELS:
         return None
-    return EpipolarGeometry(
-        left, right, level, f, base, rotation, a, first, shape, field.over(first, shape), lowest, count
+    bend = field.at(*np.meshgrid(*_lattice(first, shape)))
+    known = np.ascontiguousarray(_between_nodes(bend.astype(np.float32), shape))
+    return EpipolarGeometry(left, right, level, f, base, rotation, a, first, shape, known, lowest, count, bend)
+
+
+def _lattice(first: tuple[int, int], shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Columns and rows of nodes in the middle of squares of pixels, one square more around a window."""
+    s = LATTICE_PX
+    columns, rows = (
+        start + s * np.arange(-1, -(-n // s) + 1) + 0.5 * (s - 1) for start, n in zip(first, shape[::-1], strict=True)
     )
+    return columns, rows
+
+
+def _between_nodes(nodes: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """(rows, columns, …) bilinear between the nodes of the lattice."""
+    s = LATTICE_PX
+    whole = cv2.resize(nodes, (s * nodes.shape[1], s * nodes.shape[0]), interpolation=cv2.INTER_LINEAR)
+    return whole[s : s + shape[0], s : s + shape[1]]
 
 
 def _epipolar(from_centre: np.ndarray, rotation: np.ndarray, f: float, base: float) -> tuple[np.ndarray, ...]:
@@ -155,13 +175,6 @@ class _Field:
         for _ in range(FIELD_ROUNDS):
             found = parallax - self.at(column - found, row)
         return found
-
-    def over(self, first: tuple[int, int], shape: tuple[int, int]) -> np.ndarray:
-        """(rows, columns) float32 px over a window."""
-        column = np.clip((first[0] + np.arange(shape[1]) - self.first[0]) / self.step, 0, self.nodes.shape[1] - 1)
-        row = np.clip((first[1] + np.arange(shape[0]) - self.first[1]) / self.step, 0, self.nodes.shape[0] - 1)
-        x, y = (np.ascontiguousarray(a, np.float32) for a in np.broadcast_arrays(column[None], row[:, None]))
-        return cv2.remap(self.nodes.astype(np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 def _smooth_field(column: np.ndarray, row: np.ndarray, parallax: np.ndarray) -> _Field:
@@ -199,22 +212,14 @@ def _resampled(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(rows, columns) float32 of photograph k in the window, and where it is known."""
     rows, columns = g.shape
-    s = LATTICE_PX
-    # nodes in the middle of squares of s × s pixels, one square more around
-    c = g.first[0] + s * np.arange(-1, -(-columns // s) + 1) + 0.5 * (s - 1)
-    r = g.first[1] + s * np.arange(-1, -(-rows // s) + 1) + 0.5 * (s - 1)
-    column, row = np.meshgrid(c, r)
-    column, row = column.ravel(), row.ravel()
-    if bent:
-        at = np.clip(np.stack([column - g.first[0], row - g.first[1]]).T, 0, np.array([columns - 1, rows - 1]))
-        column = column - map_coordinates(g.known, at.T[::-1], order=1)
+    column, row = np.meshgrid(*_lattice(g.first, g.shape))
+    size = column.shape
+    column, row = (column - g.bend if bent else column).ravel(), row.ravel()
     depth = _mean_depth(g)
     u = np.column_stack([column, -row, np.full(len(row), -g.f)]) * (depth / g.f)
     pixel = place.project(k, centre + u @ g.rotation.T) * 0.5**g.level - 0.5
     pixels = store.level(k, g.level)
-    nodes = np.nan_to_num(pixel, nan=-1e6).astype(np.float32).reshape(len(r), len(c), 2)
-    whole = cv2.resize(nodes, (s * len(c), s * len(r)), interpolation=cv2.INTER_LINEAR)
-    place_of = whole[s : s + rows, s : s + columns]
+    place_of = _between_nodes(np.nan_to_num(pixel, nan=-1e6).astype(np.float32).reshape(*size, 2), g.shape)
     edge = place.view.edge * np.array([pixels.shape[1], pixels.shape[0]])
     x, y = place_of[:, :, 0], place_of[:, :, 1]
     known = np.empty((rows, columns), np.bool_)
