@@ -8,7 +8,9 @@ points have half a pixel, that of all. Repeated texture, shadow, water and glass
 120 m × 80 m, and the wall is the ground within 20 m of it: only there errors are looked at. z is error over σ; NMAD is
 in pixels on the ground, beside the NMAD of semi-global matching (SGM) alone (OpenCV's, without least squares and
 without σ) on the same pairs.
-Steep: cells within four of a step of more than 3 m, six pixels, such as walls of houses.
+Steep: cells within four of a step of more than 3 m, six pixels, such as walls of houses. RMS σ / error is the root
+mean square of σ over that of the errors. The second table has the root mean square of sums of errors over squares of
+cells of a metre, over their σ by the noise length that the surface states.
 
     python tools/prove/dense_surface.py [FOLDER] [--scenes hill …]
 
@@ -153,20 +155,26 @@ def painted(name: str, lattice: Lattice) -> Lattice:
     return replace(lattice, values=np.where(inside, other, values).astype(np.float32))
 
 
+SIDES = (5, 10, 20, 40, 80)
+"""Cells along a side of the squares over which errors are added up."""
 HEAD = (
-    "| scene | coverage | median px | NMAD px | SGM px | σ px | std z | NMAD z | beyond 4 σ | steep std z |"
-    " steep > 4 σ |\n|---|---|---|---|---|---|---|---|---|---|---|"
+    "| scene | coverage | median px | NMAD px | SGM px | σ px | std z | NMAD z | beyond 4 σ | RMS σ / error |"
+    " steep std z | steep > 4 σ | RMS σ / error |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|"
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Errors and σ, m, of the cells that have a height; whether each is steep; share of those that could have one."""
+    """Errors and σ, m, of the cells that have a height; whether each is steep; share of those that could have one.
+
+    sums : by side, the sums of the errors over squares over their σ, by the noise that neighbours share.
+    """
 
     error: np.ndarray
     sigma: np.ndarray
     steep: np.ndarray
     coverage: float
+    sums: dict[int, np.ndarray]
 
 
 def main() -> None:
@@ -177,28 +185,36 @@ def main() -> None:
     arguments = parser.parse_args()
     folder = arguments.folder or Path(tempfile.mkdtemp())
     print(HEAD, flush=True)
+    added = []
     for name in arguments.scenes:
         seeds = list(range(1, SEEDS.get(name, 1) + 1)) if arguments.seed is None else [arguments.seed]
-        print(row(folder / name.replace(" ", "_"), name, seeds), flush=True)
+        try:
+            found = [measured(folder / name.replace(" ", "_") / f"seed_{seed}", name, seed) for seed in seeds]
+        except aerotri.InputError as error:
+            print(f"| {name} | {str(error).partition(' — ')[0]} |", flush=True)
+            continue
+        own, alone = (together([pair[k] for pair in found]) for k in (0, 1))
+        print(row(name, own, alone), flush=True)
+        added.append(f"| {name} | " + " | ".join(f"{rms(own.sums[side]):.2f}" for side in SIDES) + " |")
+    print("\n| sums over squares of, cells | " + " | ".join(map(str, SIDES)) + " |\n|---|---|---|---|---|---|")
+    print(*added, sep="\n")
 
 
-def row(folder: Path, name: str, seeds: list[int]) -> str:
+def row(name: str, own: Cells, alone: Cells) -> str:
     """A line of the table."""
-    try:
-        found = [measured(folder / f"seed_{seed}", name, seed) for seed in seeds]
-    except aerotri.InputError as error:
-        return f"| {name} | {str(error).partition(' — ')[0]} |"
-    own, alone = (together([pair[k] for pair in found]) for k in (0, 1))
     if len(own.error) < FEWEST:
         return f"| {name} | {own.coverage:.3f} |"
     flat, z = ~own.steep, own.error / own.sigma
     steep = z[own.steep]
-    beside = (f"{np.std(steep):.2f}", f"{share_beyond(steep):.2f} %") if len(steep) > FEWEST else ("", "")
+    beside = ("", "", "")
+    if len(steep) > FEWEST:
+        ratio = rms(own.sigma[own.steep]) / rms(own.error[own.steep])
+        beside = (f"{np.std(steep):.2f}", f"{share_beyond(steep):.2f} %", f"{ratio:.2f}")
     numbers = (
         f"{own.coverage:.3f}", f"{np.median(own.error[flat]) / GSD_M:+.3f}", f"{nmad(own.error[flat]) / GSD_M:.3f}",
         f"{nmad(alone.error[~alone.steep]) / GSD_M:.3f}", f"{np.median(own.sigma[flat]) / GSD_M:.3f}",
         f"{rms(z[flat]) if name in TIE_SIGMA_MM else np.std(z[flat]):.2f}", f"{nmad(z[flat]):.2f}",
-        f"{share_beyond(z[flat]):.2f} %", *beside,
+        f"{share_beyond(z[flat]):.2f} %", f"{rms(own.sigma[flat]) / rms(own.error[flat]):.2f}", *beside,
     )  # fmt: skip
     return f"| {name} | " + " | ".join(numbers) + " |"
 
@@ -227,7 +243,8 @@ def blocks(block: aerotri.Block, name: str, seed: int) -> list[aerotri.Block]:
 def together(draws: list[Cells]) -> Cells:
     """The cells of several draws as if they were one."""
     error, sigma, steep = (np.concatenate([getattr(d, of) for d in draws]) for of in ("error", "sigma", "steep"))
-    return Cells(error, sigma, steep, float(np.mean([d.coverage for d in draws])))
+    sums = {side: np.concatenate([d.sums[side] for d in draws]) for side in SIDES}
+    return Cells(error, sigma, steep, float(np.mean([d.coverage for d in draws])), sums)
 
 
 def render(folder: Path, flight, name: str, look: dict) -> Path:
@@ -273,6 +290,8 @@ def cells_of(found: DenseSurface, flight, name: str) -> Cells:
     """The cells of a surface against the true ground, where a scene is judged."""
     o = found.record
     errors, sigmas, steeps, able, measured = [], [], [], 0, 0
+    sums: dict[int, list[float]] = {side: [] for side in SIDES}
+    length = found.summary["noise_length_m"] or 0.0
     for window, part in o.files.read_all(list(o.windows)):
         grid = o.grid.window(window.row, window.column, window.rows, window.columns)
         truth = truth_on(grid, flight)
@@ -290,7 +309,25 @@ def cells_of(found: DenseSurface, flight, name: str) -> Cells:
         sigma = np.hypot(part.sigma, o.shared.over(grid)) if name in TIE_SIGMA_MM else part.sigma
         sigmas.append(sigma[known])
         steeps.append(steep[known])
-    return Cells(np.concatenate(errors), np.concatenate(sigmas), np.concatenate(steeps), measured / max(able, 1))
+        sharing = max(1.0, length**2 / (grid.cell_x * grid.cell_y))
+        for side in SIDES:
+            sums[side] += sums_over_squares(part.z - truth, np.sqrt(sharing) * sigma, known & ~steep, side)
+    return Cells(
+        np.concatenate(errors), np.concatenate(sigmas), np.concatenate(steeps), measured / max(able, 1),
+        {side: np.array(own) for side, own in sums.items()},
+    )  # fmt: skip
+
+
+def sums_over_squares(error: np.ndarray, sigma: np.ndarray, judged: np.ndarray, side: int) -> list[float]:
+    """Sums of errors over σ, of the squares of which nearly all cells are judged."""
+    found = []
+    for i in range(0, error.shape[0] - side + 1, side):
+        for j in range(0, error.shape[1] - side + 1, side):
+            own = np.s_[i : i + side, j : j + side]
+            if judged[own].mean() > 0.95:
+                total = error[own][judged[own]].sum()
+                found.append(float(total / np.sqrt((sigma[own][judged[own]] ** 2).sum())))
+    return found
 
 
 def truth_on(grid: Grid, flight) -> np.ndarray:

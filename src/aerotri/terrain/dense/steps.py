@@ -64,13 +64,10 @@ def others_seen(z: np.ndarray, heights: np.ndarray, sigmas: np.ndarray, scale: C
     for height, sigma in zip(heights, sigmas, strict=True):
         agrees = np.abs(height - z) <= scale.pixel + CONTRADICTED_SIGMAS * sigma
         other = np.isfinite(height) & ~agrees
-        if not other.any():
-            agreeing += agrees
-            continue
-        share = cv2.blur(
-            other.view(np.uint8) * np.uint8(200), (scale.window, scale.window), borderType=cv2.BORDER_CONSTANT
-        )
-        other &= share > 200 * LEAST_OF_WINDOW
+        if other.any():
+            size = scale.window, scale.window
+            share = cv2.blur(200 * other.view(np.uint8), size, borderType=cv2.BORDER_CONSTANT)
+            other &= share > 200 * LEAST_OF_WINDOW
         np.maximum(highest, height, out=highest, where=other)
         np.minimum(lowest, height, out=lowest, where=other)
         agreeing += agrees
