@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import aerotri
 from aerotri.cli import app
 from aerotri.cli.app import invoke
 from places import PROJECT
@@ -96,6 +97,13 @@ def test_from_photographs_to_the_true_volume(place, run_once):
     assert measured["sigma"]["sigma_m3"] < 0.01 * truth
     assert invoke(commands()["compare"]) == 0
     assert abs(read(place / "difference" / "compare.json")["difference_m"]["bias"]) < 0.1
+    # the whole surface against the true one, and what the one page shows of it
+    dense = aerotri.compare(place / "drone_project" / "dsm", SITE / "truth" / "surface.tif").record
+    assert dense.coverage > 0.75
+    assert abs(dense.statistics.bias) < 0.1
+    assert dense.statistics.nmad < 0.05
+    page = (place / "drone_project" / "report.html").read_text(encoding="utf-8")
+    assert all(text in page for text in ("Orthophoto", "Dense surface", "Volume: height over the base"))
 
 
 def test_photographs_are_those_of_the_plan(place):

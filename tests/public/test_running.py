@@ -52,6 +52,7 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
     project = aerotri.run(
         photographs, out, control="gcp_list.txt", check=["K1"], control_sigma_m=(0.02, 0.02, 0.03), control_prefix="G",
         focal_length_mm=8.8, seed=4, interval=5.0, boundary="pile.gpkg", base="lowest",
+        boundary_from="product", density=1.8, density_sigma=0.05,
         further={"tie_points": {"features": 2000}, "volume": {"plots": False}},
     )  # fmt: skip
     tie, adjust, terrain, volume, dense, ortho = fakes.called
@@ -66,6 +67,8 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
     assert volume[1] == (str(out / "dtm"),)
     assert (volume[2]["boundary"], volume[2]["base"]) == ("pile.gpkg", "lowest")
     assert volume[2]["adjustment"] == out / "result"
+    assert (volume[2]["boundary_from"], volume[2]["density"], volume[2]["density_sigma"]) == ("product", 1.8, 0.05)
+    assert "boundary_sigma" not in volume[2]  # nothing was stated
     assert dense == ("dense", (str(out / "result"), str(photographs)), {"tiles": out / "dsm.tiles"})
     assert ortho[1] == (str(out / "result"), str(photographs), str(out / "dsm"), str(out / "ortho"))
     lines = [step["arguments"] for step in json.loads((out / "run.json").read_text())["steps"]]
@@ -76,7 +79,10 @@ def test_steps_follow_one_another(fakes, photographs, tmp_path):
     ]  # fmt: skip
     assert lines[1] == ["adjust", str(out / "block"), "--out", str(out / "result"), "--parameters", "auto"]
     assert lines[4][:4] == ["volume", str(out / "dtm"), "--adjustment", str(out / "result")]
-    assert lines[4][-7:] == ["--boundary", "pile.gpkg", "--base", "lowest", "--layer", "dtm", "--no-plots"]
+    assert lines[4][4:] == [
+        "--out", str(out / "volume"), "--boundary", "pile.gpkg", "--base", "lowest", "--layer", "dtm",
+        "--boundary-from", "product", "--density", "1.8", "--density-sigma", "0.05", "--no-plots",
+    ]  # fmt: skip
     assert lines[2] == ["accuracy", str(out / "result"), "--out", str(out / "accuracy")]
     assert lines[5] == ["dsm", str(out / "result"), str(photographs), "--out", str(out / "dsm")]
     assert lines[6] == ["ortho", str(out / "result"), str(photographs), str(out / "dsm"), "--out", str(out / "ortho")]

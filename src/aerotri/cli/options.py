@@ -140,9 +140,27 @@ SurfaceLayer = Annotated[
     str,
     typer.Option(
         "--layer",
-        help="Which surface of `aerotri dtm`: dsm with objects (piles are objects), or dtm, the ground alone.",
+        help="Which surface of a folder of `aerotri dtm` or `aerotri dsm`: dsm with objects (piles are objects), or "
+        "dtm, the ground alone.",
         rich_help_panel=SURFACE,
     ),
+]
+BoundarySigma = Annotated[
+    float, typer.Option(min=0.0, help="σ of a corner of the boundary, m.", rich_help_panel=SIGMAS)
+]
+BoundaryOrigin = Annotated[
+    str,
+    typer.Option(
+        help="survey: the boundary is known in space; product: it was drawn on this surface or its orthophoto and "
+        "moves with it.",
+        rich_help_panel=SIGMAS,
+    ),
+]
+DensityOf = Annotated[
+    float | None, typer.Option(min=1e-3, help="Mass of a cubic metre, t/m³: gives tonnes.", rich_help_panel=METHOD)
+]
+DensitySigma = Annotated[
+    float, typer.Option(min=0.0, help="σ of the density, t/m³, common to all piles.", rich_help_panel=SIGMAS)
 ]
 ProjectOf = Annotated[
     Path | None,

@@ -15,10 +15,14 @@ from aerotri.cli.options import (
     METHOD,
     OUTPUT,
     SURFACE,
+    BoundaryOrigin,
+    BoundarySigma,
     CameraFile,
     CheckPoints,
     ControlPrefix,
     ControlSigma,
+    DensityOf,
+    DensitySigma,
     FocalLength,
     GeoidGrid,
     Json,
@@ -33,7 +37,7 @@ from aerotri.cli.options import (
 )
 from aerotri.execution.choice import THREADS
 from aerotri.tie_points.settings import DEFAULTS
-from aerotri.volume.settings import RUN_LAYER
+from aerotri.volume.settings import RUN_LAYER, SIGMA
 
 
 @app.command(
@@ -80,6 +84,10 @@ def run(
         str, typer.Option(help="Base of the volume, as aerotri volume takes it.", rich_help_panel=SURFACE)
     ] = "",
     layer: SurfaceLayer = RUN_LAYER,
+    boundary_from: BoundaryOrigin = SIGMA.boundary_from,
+    boundary_sigma: BoundarySigma = SIGMA.boundary_sigma,
+    density: DensityOf = None,
+    density_sigma: DensitySigma = 0.0,
     dense: Annotated[
         bool, typer.Option(help="The dense surface and the orthophoto as well.", rich_help_panel=SURFACE)
     ] = True,
@@ -111,7 +119,9 @@ def run(
         "positions": positions, "camera": camera, "focal_length_mm": focal_length_mm, "pixel_um": pixel_um, "crs": crs,
         "geoid": geoid, "seed": seed, "parameters": parameters,
         "interval": metres_or_auto(interval) if interval else None,
-        "boundary": boundary, "base": base, "layer": layer, "dense": dense, "plots": plots, "go_on": go_on,
+        "boundary": boundary, "base": base, "layer": layer, "boundary_from": boundary_from,
+        "boundary_sigma": boundary_sigma, "density": density, "density_sigma": density_sigma,
+        "dense": dense, "plots": plots, "go_on": go_on,
         "unmarked": stop_or_continue(unmarked),
         "executor": executor, "project": project,
     }  # fmt: skip

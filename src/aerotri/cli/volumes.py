@@ -8,7 +8,22 @@ from typing import Annotated, Any, cast
 import typer
 
 from aerotri.cli.app import app, predict
-from aerotri.cli.options import ARGUMENTS, METHOD, OUTPUT, SIGMAS, SURFACE, TERRAIN, Json, ProjectOf, Seed, SurfaceLayer
+from aerotri.cli.options import (
+    ARGUMENTS,
+    METHOD,
+    OUTPUT,
+    SIGMAS,
+    SURFACE,
+    TERRAIN,
+    BoundaryOrigin,
+    BoundarySigma,
+    DensityOf,
+    DensitySigma,
+    Json,
+    ProjectOf,
+    Seed,
+    SurfaceLayer,
+)
 from aerotri.volume.settings import BASE, LAYER, SECTIONS, SIGMA, SectionPlan, SigmaOptions
 from aerotri.volume.settings import METHOD as VOLUME_METHOD
 
@@ -101,17 +116,8 @@ def volume(
         float,
         typer.Option(min=0.0, help="σ of the base's height, m, common to all of it.", rich_help_panel=SIGMAS),
     ] = SIGMA.base_sigma,
-    boundary_sigma: Annotated[
-        float, typer.Option(min=0.0, help="σ of a corner of the boundary, m.", rich_help_panel=SIGMAS)
-    ] = SIGMA.boundary_sigma,
-    boundary_from: Annotated[
-        str,
-        typer.Option(
-            help="survey: the boundary is known in space; product: it was drawn on this surface or its orthophoto and "
-            "moves with it.",
-            rich_help_panel=SIGMAS,
-        ),
-    ] = SIGMA.boundary_from,
+    boundary_sigma: BoundarySigma = SIGMA.boundary_sigma,
+    boundary_from: BoundaryOrigin = SIGMA.boundary_from,
     uncorrected: Annotated[
         bool,
         typer.Option(
@@ -120,13 +126,8 @@ def volume(
             rich_help_panel=SIGMAS,
         ),
     ] = False,
-    density: Annotated[
-        float | None,
-        typer.Option(min=1e-3, help="Mass of a cubic metre, t/m³: gives tonnes.", rich_help_panel=METHOD),
-    ] = None,
-    density_sigma: Annotated[
-        float, typer.Option(min=0.0, help="σ of the density, t/m³, common to all piles.", rich_help_panel=SIGMAS)
-    ] = 0.0,
+    density: DensityOf = None,
+    density_sigma: DensitySigma = 0.0,
     project: ProjectOf = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default NAME_volume here.", rich_help_panel=OUTPUT)

@@ -38,7 +38,7 @@ from aerotri.public.run_steps import (
 from aerotri.results.failure import AdjustmentFailedError
 from aerotri.results.head import Head, now
 from aerotri.tie_points.settings import DEFAULTS
-from aerotri.volume.settings import RUN_LAYER, Layer
+from aerotri.volume.settings import RUN_LAYER, SIGMA, BoundaryFrom, Layer
 
 if TYPE_CHECKING:
     from aerotri.observations import Block
@@ -157,6 +157,10 @@ def run(
     boundary: Any = None,
     base: Any = None,
     layer: Layer = RUN_LAYER,
+    boundary_from: BoundaryFrom = SIGMA.boundary_from,
+    boundary_sigma: float = SIGMA.boundary_sigma,
+    density: float | None = None,
+    density_sigma: float = 0.0,
     dense: bool = True,
     plots: bool = True,
     go_on: bool = False,
@@ -191,6 +195,11 @@ def run(
     base : of the volume, see `aerotri.volume`.
     layer : surface of the volume: 'dtm', within the boundary all that was measured, beside it the ground without
         objects; or 'dsm', with objects everywhere.
+    boundary_from : 'survey', where the boundary is known in space, or 'product', where it was drawn on the surface or
+        the orthophoto of this run, see `aerotri.volume`.
+    boundary_sigma : m, σ of either coordinate of a corner of the boundary.
+    density : t/m³, of all that is inside the boundary: gives tonnes.
+    density_sigma : t/m³, its σ, common to all piles.
     dense : the dense surface and the orthophoto as well.
     plots : draw the plots of the adjustment.
     go_on : go on after an adjustment that was rejected.
@@ -225,6 +234,9 @@ def run(
     marked, names = not is_missing(control), {"check": tuple(check)}
     from_block = is_block(Path(source))
     elsewhere = None if chosen(executor).kind == "threads" else executor
+    said = ("boundary_from", boundary_from, SIGMA.boundary_from), ("boundary_sigma", boundary_sigma, 0.0)
+    of_mass = ("density", density, None), ("density_sigma", density_sigma, 0.0)
+    sure = {name: value for name, value, usual in (*said, *of_mass) if value != usual}
     settings: dict[Verb, dict[str, Any]] = {
         "tie_points": {
             "control": control, "control_sigma_m": control_sigma_m, "control_prefix": control_prefix if marked else "",
@@ -238,7 +250,7 @@ def run(
             "plots": plots, **(names if from_block else {}),
         },
         "terrain": {"interval": interval, "ground_within": boundary, "executor": elsewhere},
-        "volume": {"boundary": boundary, "base": base, "layer": layer} if not is_missing(boundary) else {},
+        "volume": {} if is_missing(boundary) else {"boundary": boundary, "base": base, "layer": layer, **sure},
         "dense": {"executor": elsewhere}, "orthophoto": {"executor": elsewhere}, "accuracy": {},
     }  # fmt: skip
     for verb, more in (further or {}).items():

@@ -12,6 +12,7 @@ import numpy as np
 
 from aerotri.conventions import counted
 from aerotri.report.pages.head import page_environment, page_head
+from aerotri.report.pages.volume import tonnes
 from aerotri.report.quality import printable, two_digits
 from aerotri.results.head import Head
 
@@ -88,6 +89,9 @@ def _results(of_step: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
         found += [(f"Volume of {printable(str(one['name']))}, net", _net(one, one["sigma_m3"])) for one in piles]
         name = "Volume of all piles, net" if piles else "Volume, net"
         found.append((name, _net(volume, (volume.get("sigma") or {}).get("sigma_m3"))))
+        if mass := volume.get("mass"):
+            text = f"{tonnes(mass)} t at {mass['density_t_per_m3']:g} t/m³"
+            found.append(("Mass of all piles, net" if piles else "Mass, net", text))
     if surface := of_step.get("dsm"):
         sigma = surface["sigma_Z_m"]["median"]
         found.append(

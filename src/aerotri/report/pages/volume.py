@@ -102,12 +102,13 @@ def _piles(c: Mapping[str, Any]) -> list[tuple[str, ...]]:
     return [
         (printable(one["name"]), _number(one["area_m2"]), _number(one["cut_m3"]), _number(one["fill_m3"]),
          _number(one["net_m3"]) if one["sigma_m3"] is None else with_sigma(one["net_m3"], one["sigma_m3"]),
-         _tonnes(one["mass"]))
+         tonnes(one["mass"]))
         for one in (*c["piles"], whole)
     ]  # fmt: skip
 
 
-def _tonnes(mass: Mapping[str, Any] | None) -> str:
+def tonnes(mass: Mapping[str, Any] | None) -> str:
+    """t with their σ; '' where no density was stated."""
     if mass is None:
         return ""
     return _number(mass["net_t"]) if mass["sigma_t"] is None else with_sigma(mass["net_t"], mass["sigma_t"])
@@ -120,7 +121,7 @@ def _mass_words(c: Mapping[str, Any]) -> str:
         return ""
     known = f" ± {mass['s_density_t_per_m3']:g}" if mass["s_density_t_per_m3"] else ""
     sure = "; its σ counts that of the volume and of the density" if mass["sigma_t"] is not None else ""
-    return f"At {mass['density_t_per_m3']:g}{known} t/m³ the net volume has a mass of {_tonnes(mass)} t{sure}."
+    return f"At {mass['density_t_per_m3']:g}{known} t/m³ the net volume has a mass of {tonnes(mass)} t{sure}."
 
 
 def _methods(c: Mapping[str, Any]) -> list[tuple[str, ...]]:
