@@ -66,7 +66,7 @@ def errors(folder, **block):
     return error, sigma, len(error) / count, high
 
 
-@pytest.mark.parametrize(("change", "least"), [(shadow, 0.95), (water, 0.0), (repeated, 0.0)])
+@pytest.mark.parametrize(("change", "least"), [(shadow, 0.95), (water, 0.0), (repeated, 0.9)])
 def test_patches_that_are_hard_to_match_have_no_gross_errors(tmp_path, change, least):
     error, sigma, coverage, _ = errors(tmp_path, paint=painted(change), **UNDULATING)
     z = error / sigma
@@ -83,6 +83,8 @@ def test_the_ground_behind_a_wall_is_not_lifted(tmp_path):
     z = error / sigma
     assert coverage > 0.7
     assert (high > 5.0).sum() > 20  # its crest is found
+    assert abs(np.median(z)) < 0.3
+    assert abs(np.median(error[high < 1.0])) < 0.1  # of a pixel of 1 m
     assert (np.abs(z) > 4.0).mean() < 0.02
     assert z.std() < 1.5
 
@@ -103,12 +105,21 @@ def test_errors_of_the_orientation_are_no_noise_of_the_matching(tmp_path):
     noise = np.random.default_rng(4).normal(scale=0.09, size=rays.xy.shape)  # mm, half a pixel
     noisy = replace(found.block, image_points=replace(rays, xy=rays.xy + noise))
     area = Area(np.array([-60.0, -60.0]), np.array([60.0, 60.0]))
-    sigmas, shifts = [], []
+    sigmas, shifts, surfaces = [], [], []
     for name, calibration in (("exact", found.calibration), ("noisy", adjust_keeping_system(noisy))):
         (tmp_path / name).mkdir()
         o = measure_surface(calibration, DensePlan(np.arange(4), found.paths, tmp_path / name, area=area))
         tiles = [part for _, part in o.files.read_all(list(o.windows))]
         sigmas.append(np.nanmedian(np.concatenate([part.sigma.ravel() for part in tiles])))
         shifts.append(np.abs(o.across_px).max())
+        surfaces.append(np.vstack([part.z for part in tiles]))
     assert shifts[1] > 0.05  # pairs of the noisy block have y-parallaxes
     assert sigmas[1] < 1.5 * sigmas[0]  # four to six times as much where they count as noise
+    # they bend the surface, and do nothing else to it
+    apart = surfaces[1] - surfaces[0]
+    known = np.isfinite(apart)
+    row, column = (at[known] / 60.0 - 1.0 for at in np.indices(apart.shape))
+    terms = np.stack([np.ones_like(row), row, column, row * row, row * column, column * column], axis=1)
+    left = apart[known] - terms @ np.linalg.lstsq(terms, apart[known], rcond=None)[0]
+    assert known.mean() > 0.8
+    assert np.median(np.abs(left)) < 1.5 * sigmas[0]

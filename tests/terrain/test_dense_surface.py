@@ -13,7 +13,7 @@ from aerotri.conventions import InputError
 from aerotri.rasters.grids import Grid
 from aerotri.rasters.images import create_image
 from aerotri.terrain.dense import _mesh_kernels as kernels
-from aerotri.terrain.dense import parallaxes
+from aerotri.terrain.dense import epipolar, parallaxes
 from aerotri.terrain.dense._refinement_kernels import shift_windows
 from aerotri.terrain.dense._resampling_kernels import align, move_rows, resample
 from aerotri.terrain.dense.cell_scale import CellScale
@@ -166,6 +166,20 @@ def test_pixels_with_their_parallax_lie_where_they_were_projected_from(hill):
         kernels.place_of_pixels(rays, value[k], xyz, per_pixel)
         np.testing.assert_allclose(xyz[:, i, j], q[k], atol=2e-2)
         assert np.isnan(xyz[:, 0, 0]).all()
+
+
+def test_what_is_bent_out_is_what_is_added_again(hill):
+    """The columns at which the bent image was taken are those that the parallaxes taken out say, between nodes too."""
+    place = place_at(hill.photographs(), np.array([0.0, 0.0, 100.0]), 300.0, 0.02)
+    x, y = np.meshgrid(np.linspace(-60.0, 60.0, 50), np.linspace(-60.0, 60.0, 50))
+    ground = np.column_stack([x.ravel(), y.ravel(), 20.0 * np.exp(-(x**2 + y**2) / 1500.0).ravel()])
+    pair = chosen_pairs(possible_pairs(place, ground), 1)[0]
+    g = epipolar_geometry(place, pair.left, pair.right, 0, ground, ground - 1.0, ground + 1.0)
+    assert np.ptp(g.known) > 5.0
+    column, _ = np.meshgrid(*epipolar._lattice(g.first, g.shape))
+    taken = epipolar._between_nodes((column - g.bend).astype(np.float32), g.shape)
+    of_pixels = g.first[0] + np.arange(g.shape[1])
+    np.testing.assert_allclose(taken, of_pixels - g.known, atol=1e-3)
 
 
 def textured_pair(shift: float, across: float | np.ndarray, noise: float, seed: int) -> EpipolarImages:
