@@ -38,6 +38,9 @@ MOST_CELLS = 1200
 """Cells drawn along a side, the others skipped; chosen [C]: about the pixels of the picture."""
 SHADE_CELLS = 1.0
 """σ of the smoothing of a surface before it is lit, cells; chosen [C]: noise of single cells would hide the shapes."""
+CONTOUR_CELLS, CONTOUR_SMOOTHED = 300, 4.0
+"""Cells along a side from which on contours are drawn through some of them, smoothed, and σ of that, in cells that are
+drawn; chosen [C]: on level ground a contour through noise is a cloud of dots."""
 OUTLYING = 0.002
 """Share of the measured cells at each side of a picture that may lie beyond it [C]: a few far cells would shrink it."""
 ERROR_MARKS = {
@@ -226,12 +229,12 @@ def _every(values: np.ndarray) -> int:
     return max(1, -(-max(values.shape) // MOST_CELLS))
 
 
-def _smoothed(z: np.ndarray) -> np.ndarray:
-    """Heights without the noise of single cells, for shading alone; holes filled by what is around them."""
+def _smoothed(z: np.ndarray, cells: float = SHADE_CELLS) -> np.ndarray:
+    """Heights without the noise of single cells, for drawing alone; holes filled by what is around them."""
     known = np.isfinite(z)
-    weight = gaussian_filter(known.astype(float), SHADE_CELLS)
+    weight = gaussian_filter(known.astype(float), cells)
     middle = float(np.nanmedian(z))
-    mean = gaussian_filter(np.where(known, z - middle, 0.0), SHADE_CELLS) / np.maximum(weight, 1e-9)
+    mean = gaussian_filter(np.where(known, z - middle, 0.0), cells) / np.maximum(weight, 1e-9)
     return np.where(weight > 1e-6, mean, 0.0) + middle
 
 
@@ -242,8 +245,11 @@ def _exaggeration(z: np.ndarray) -> float:
 
 
 def _contours(axes: Axes, grid: Grid, z: np.ndarray) -> None:
-    every = max(1, max(z.shape) // 300)
-    shown = np.ma.masked_invalid(z[::every, ::every])
+    every = max(1, max(z.shape) // CONTOUR_CELLS)
+    heights = z[::every, ::every]
+    if max(z.shape) > CONTOUR_CELLS and np.isfinite(heights).any():
+        heights = np.where(np.isfinite(heights), _smoothed(heights, CONTOUR_SMOOTHED), np.nan)
+    shown = np.ma.masked_invalid(heights)
     if min(shown.shape) < 2 or shown.count() < 4 or float(np.ptp(shown.compressed())) < 1e-6:
         return
     x, y = grid.x(np.arange(0, grid.columns, every)), grid.y(np.arange(0, grid.rows, every))
