@@ -56,9 +56,7 @@ def main() -> None:
             volumes[base].append([one["net_m3"] for one in own])
             for by, summaries in (("own", own), ("two", two)):
                 found[base, by].append([one["sigma"]["parts_m3"]["adjustment"] for one in summaries])
-    print(
-        "| base | photographs of a cell | scatter over σ, nine areas together | smallest | largest |\n|---|---|---|---|---|"
-    )
+    print("| base | photographs of a cell | scatter over σ, all areas | smallest | largest |\n|---|---|---|---|---|")
     for (base, by), sigmas in found.items():
         ratio = np.std(volumes[base], axis=0, ddof=1) / rms_of_flights(sigmas)
         print(f"| {base} | {by} | {rms(ratio):.2f} | {ratio.min():.2f} | {ratio.max():.2f} |")
