@@ -16,7 +16,7 @@ cells of a metre, over their σ by the noise length that the surface states.
 
 Last result:
 
-    | scene | cover | median px | NMAD px | SGM px | σ px | std z | NMAD z | > 4 σ | σ / e | steep std z | > 4 σ | σ / e |
+    | scene | cover | median px | NMAD px | SGM px | σ px | std z | NMAD z | > 4 σ | σ / e | steep z | > 4 σ | σ / e |
     |---|---|---|---|---|---|---|---|---|---|---|---|---|
     | plain | 0.989 | +0.001 | 0.072 | 0.115 | 0.071 | 0.96 | 0.96 | 0.02 % | 1.07 |  |  |  |
     | undulating | 0.987 | +0.003 | 0.077 | 0.371 | 0.079 | 0.95 | 0.94 | 0.01 % | 1.17 |  |  |  |
@@ -174,7 +174,7 @@ def painted(name: str, lattice: Lattice) -> Lattice:
 SIDES = (5, 10, 20, 40, 80)
 """Cells along a side of the squares over which errors are added up."""
 HEAD = (
-    "| scene | cover | median px | NMAD px | SGM px | σ px | std z | NMAD z | > 4 σ | σ / e | steep std z | > 4 σ |"
+    "| scene | cover | median px | NMAD px | SGM px | σ px | std z | NMAD z | > 4 σ | σ / e | steep z | > 4 σ |"
     " σ / e |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|"
 )
 
