@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import aerotri
 from aerotri import InputError
 from aerotri.commands.volume import VolumeInput, run_volume
 from aerotri.formats.block.folder import write_block
-from aerotri.rasters.grids import Grid
+from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.rasters.surface_files import write_raster_parts, write_surface_parts
 from aerotri.volume.settings import SectionPlan, SigmaOptions
 from small_blocks import small_block
@@ -62,6 +63,31 @@ def test_noise_of_a_dense_surface_counts_with_its_length(place):
     other = measured(place, polygon, base=100.0, matching_window=14.0)
     assert other.parts["sigma_m3"][1] == pytest.approx(2.0 * found.parts["sigma_m3"][1], rel=1e-6)
     assert other.parts["sigma_m3"][0] == pytest.approx(found.parts["sigma_m3"][0], rel=1e-12)
+
+
+def test_a_cell_counts_in_as_many_photographs_as_measured_it(place, tmp_path):
+    """photographs.tif beside the surface says in how many; where it says nothing, two."""
+    folder = shutil.copytree(place[0] / "dsm", tmp_path / "dsm")
+    with RasterReader(folder / "dsm.tif") as reader:
+        grid = reader.grid
+    count = np.full((COUNT, COUNT), 3.0)
+    count[:, : COUNT // 2] = 0.0
+    write_raster_parts(folder / "photographs.tif", [(0, 0, count)], grid, None, "photographs", np.dtype("u1"), 0.0)
+    own, before = (
+        {name: aerotri.volume(dsm, polygon, base=100.0, adjustment=place[0] / "result").summary["sigma"]
+         for name, polygon in place[1].items()} for dsm in (folder, place[0] / "dsm")
+    )  # fmt: skip
+    assert own["A"]["rays"] == 2 * own["A"]["pickets"] == before["A"]["rays"]
+    assert own["B"]["rays"] == 3 * own["B"]["pickets"]
+    parts = [one["B"]["parts_m3"] for one in (own, before)]
+    assert parts[0]["matching"] == pytest.approx(parts[1]["matching"], rel=1e-6)  # σ of the cells says that
+    assert parts[0]["adjustment"] != pytest.approx(parts[1]["adjustment"], rel=1e-3)
+    write_raster_parts(
+        folder / "photographs.tif", [(0, 0, count[1:])], grid.window(1, 0, COUNT - 1, COUNT), None, "photographs",
+        np.dtype("u1"), 0.0,
+    )  # fmt: skip
+    with pytest.raises(InputError, match=r"has other cells than dsm\.tif beside it"):
+        aerotri.volume(folder, place[1]["A"], base=100.0, adjustment=place[0] / "result")
 
 
 def test_piles_add_up_with_what_they_share(place):

@@ -207,6 +207,22 @@ def test_a_million_cells(calibration):
     assert together.noise == pytest.approx(fine.noise, rel=0.02)
 
 
+def test_every_place_has_as_many_photographs_as_it_was_measured_in(calibration):
+    middle = np.nanmedian(calibration.result.points.xyz, axis=0)
+    xyz = middle + np.random.default_rng(3).uniform(-40.0, 40.0, (60, 3)) * (1.0, 1.0, 0.0)
+    most, _ = pickets_where_seen(calibration, xyz, 0.003, np.full(60, 20))
+    available = np.diff(most.start)
+    assert available.max() <= 8  # the nearest count, however many measured a cell
+    assert available.max() > 2
+    wanted = np.resize([0, 2, 3, 4], 60)
+    pickets, seen = pickets_where_seen(calibration, xyz, 0.003, wanted)
+    assert seen.all()
+    np.testing.assert_array_equal(np.diff(pickets.start), np.minimum(np.maximum(wanted, 2), available))
+    for n in range(60):
+        own, all_of = (p.image[p.start[n] : p.start[n + 1]] for p in (pickets, most))
+        np.testing.assert_array_equal(own, all_of[: len(own)])
+
+
 def test_inner_datum_leaves_what_moves_the_block_out(hill):
     """In the inner datum the variance of a mean height is below that in a minimal one, and independent of the held
     coordinates: the S-transformation of the dense case."""

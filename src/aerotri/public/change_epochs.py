@@ -116,7 +116,8 @@ def pair_of(
         raise InputError(message, "check the CRS of both")
     # one result given twice is one adjustment, not two that have all in common
     records = (first.record, first.record if second.is_same(first) else second.record)
-    return adjusted_pair(grid, heights, records)
+    with ExitStack() as stack:
+        return adjusted_pair(grid, heights, records, tuple(one.noise(stack).photographs for one in epochs))
 
 
 def doubts_of(epochs: Epochs) -> list[str]:

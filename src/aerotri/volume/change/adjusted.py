@@ -19,11 +19,14 @@ from scipy.spatial import KDTree
 from aerotri.conventions import InputError
 from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
+from aerotri.volume.bases import Surface
+from aerotri.volume.cell_noise import photographs_at
 from aerotri.volume.change.alignment import Alignment, slopes_of
 from aerotri.volume.functionals import together
 from aerotri.volume.parts import Measured, Part
 from aerotri.volume.pickets import Pickets, pickets_where_seen
 from aerotri.volume.response import respond
+from aerotri.volume.settings import PER_POINT
 from aerotri.volume.shared import (
     difference_part,
     same_adjustment,
@@ -153,13 +156,15 @@ class AlignedPair:
 
 
 def adjusted_pair(
-    grid: Grid, heights: tuple[np.ndarray, np.ndarray], calibrations: tuple[Adjustment, Adjustment]
-) -> AdjustedPair:
+    grid: Grid, heights: tuple[np.ndarray, np.ndarray], calibrations: tuple[Adjustment, Adjustment],
+    photographs: tuple[Surface | None, ...] = (None, None),
+) -> AdjustedPair:  # fmt: skip
     """Two surfaces on the same cells with their adjustments.
 
     Parameters
     ----------
     heights : of the first and the second, (rows, columns) m, NaN where not known.
+    photographs : number that measured a cell, on the cells of each surface itself; None where not known.
 
     Raises
     ------
@@ -169,15 +174,16 @@ def adjusted_pair(
     known = np.isfinite(heights[0]) & np.isfinite(heights[1])
     factor = max(1, int(np.ceil(max(known.shape) / MOST_BLOCKS)))
     first, second = (
-        _epoch(grid, z, known, factor, calibration, name)
-        for z, calibration, name in zip(heights, calibrations, NAMES, strict=True)
+        _epoch(grid, z, known, factor, calibration, of_cells, name)
+        for z, calibration, of_cells, name in zip(heights, calibrations, photographs, NAMES, strict=True)
     )
     return AdjustedPair(first, second, factor, known)
 
 
 def _epoch(
-    grid: Grid, z: np.ndarray, known: np.ndarray, factor: int, calibration: Adjustment, name: str
-) -> AdjustedEpoch:
+    grid: Grid, z: np.ndarray, known: np.ndarray, factor: int, calibration: Adjustment, photographs: Surface | None,
+    name: str,
+) -> AdjustedEpoch:  # fmt: skip
     x, y = np.meshgrid(grid.x(np.arange(grid.columns)), grid.y(np.arange(grid.rows)))
     share = known.astype(float)
     count = together(share, factor).ravel()
@@ -185,7 +191,9 @@ def _epoch(
     for axis, values in enumerate((x, y, np.where(known, z, 0.0))):
         np.divide(together(share * values, factor).ravel(), count, out=places[:, axis], where=count > 0.0)
     filled = count > 0.0
-    pickets, seen = pickets_where_seen(calibration, places[filled], 1e-3 * calibration.local.outcome.sigma0_um)
+    own = places[filled]
+    per_point = PER_POINT if photographs is None else photographs_at(photographs, own)
+    pickets, seen = pickets_where_seen(calibration, own, 1e-3 * calibration.local.outcome.sigma0_um, per_point)
     if not seen.any():
         raise InputError(f"no photograph of its adjustment sees {name}", "check which result belongs to it")
     every = np.zeros(len(count), bool)
