@@ -27,7 +27,7 @@ def ortho(
     surface: Annotated[
         Path,
         typer.Argument(
-            help="Heights with what stands on the ground: the folder of dtm, or a GeoTIFF in metres.",
+            help="Heights with what stands on the ground: the folder of dsm or dtm, or a GeoTIFF in metres.",
             rich_help_panel=ARGUMENTS,
         ),
     ],

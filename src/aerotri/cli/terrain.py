@@ -227,7 +227,7 @@ def compare(
     test: Annotated[
         Path,
         typer.Argument(
-            help="Surface to judge: GeoTIFF, LAZ, pickets.parquet, or the folder that dtm wrote.",
+            help="Surface to judge: GeoTIFF, LAZ, pickets.parquet, or the folder that dtm or dsm wrote.",
             rich_help_panel=ARGUMENTS,
         ),
     ],
