@@ -10,7 +10,14 @@ are taken from the surface (as many of the nearest as measured it); beside it wh
 
 Last result:
 
-LAST
+    | base | photographs of a cell | scatter over σ, all areas | smallest | largest |
+    |---|---|---|---|---|
+    | level:0 | own | 1.04 | 0.91 | 1.45 |
+    | level:0 | two | 0.80 | 0.59 | 1.09 |
+    | boundary | own | 1.01 | 0.35 | 1.49 |
+    | boundary | two | 0.71 | 0.14 | 1.74 |
+
+    99 % band of one area with 20 flights: 0.60 … 1.43
 """
 
 from __future__ import annotations
