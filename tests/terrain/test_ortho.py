@@ -3,6 +3,7 @@
 import itertools
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from rendered_blocks import CAMERA, Rendered, rendered_block, write_photograph
@@ -14,6 +15,7 @@ from aerotri.pipeline import adjust_keeping_system
 from aerotri.rasters.bridging import BridgedReader
 from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.rasters.held import HeldRaster
+from aerotri.rasters.images import open_photograph
 from aerotri.rasters.mosaics import read_mosaic
 from aerotri.rasters.surface_files import write_surface
 from aerotri.simulation import _rendering_kernels as rendering
@@ -23,9 +25,11 @@ from aerotri.simulation.rendering import RenderOptions
 from aerotri.terrain.adjustment_part import plan_variances
 from aerotri.terrain.ortho import _seam_kernels as kernels
 from aerotri.terrain.ortho._sight_kernels import centres_for, is_hidden, look, place_of
+from aerotri.terrain.ortho.candidates import Candidates
 from aerotri.terrain.ortho.ground import ground_surface, tile_ground
 from aerotri.terrain.ortho.make import make_orthophoto
 from aerotri.terrain.ortho.settings import OrthoSettings
+from aerotri.terrain.ortho.sharpness import blur_of, sharper_first
 from aerotri.terrain.ortho.tile_files import OrthoTiles
 from aerotri.terrain.ortho.tiles import Tile
 from small_blocks import small_spec, with_adjustment
@@ -103,6 +107,45 @@ def hills(tmp_path_factory):
     found = adjust_keeping_system(with_adjustment(made.block, additional_parameters=(("brown", ("K1", "P1")),)))
     made = replace(made, calibration=found)
     return made, true_surface(made, folder / "surface.tif", 2.0, 200.0), folder
+
+
+def test_a_blurred_photograph_is_left_where_others_are_sharp(hills, tmp_path):
+    made, surface, _ = hills
+    blurred = list(made.paths)
+    with open_photograph(made.paths[1]) as photograph:
+        pixels = photograph.read(0, photograph.rows)[0]
+    blurred[1] = write_photograph(tmp_path / made.paths[1].name, cv2.GaussianBlur(pixels, (0, 0), 3.0))
+    sharp, _ = make(made, surface, tmp_path / "sharp")
+    other, _ = make(replace(made, paths=tuple(blurred)), surface, tmp_path / "blurred")
+    np.testing.assert_array_equal(sharp.blur, 1.0)
+    assert other.blur[1] > 1.5
+    np.testing.assert_array_equal(np.delete(other.blur, 1), 1.0)
+    alone = (other.candidates.found == 1).any(axis=0) & ((other.candidates.found >= 0).sum(axis=0) == 1)
+    assert other.choice.number[alone].size == 0 or (other.choice.number[alone] == 1).all()
+    assert sharp.cells[1] > 0.15 * sharp.cells.sum()
+    assert other.cells[1] < 0.2 * sharp.cells[1]
+    assert other.cells.sum() == pytest.approx(sharp.cells.sum(), rel=0.01)
+
+
+def test_detail_is_compared_where_two_show_the_same_ground(hills):
+    """Of three photographs one shows half of the detail; ground with little detail does not make one blurred."""
+    made, _, _ = hills
+    photographs, shape = made.photographs(), (3, 20, 30)
+    rng = np.random.default_rng(1)
+    ground = np.where(np.arange(30) < 15, 1.0, 0.05) * np.exp(0.2 * rng.normal(size=(20, 30)))
+    found = np.stack(
+        [np.where(np.arange(30) < 15, 0, 2) + np.zeros((20, 1)), np.full((20, 30), 1), np.full((20, 30), 3)]
+    )
+    of = np.array([1.0, 1.0, 1.0, 0.5])
+    none, found = np.zeros(shape, np.float32), found.astype(np.int32)
+    detail = (ground * of[found]).astype(np.float32)
+    c = Candidates(Grid(20, 30, 0.0, 20.0, 1.0, 1.0), 8, found, none, none, none, none[:, None], detail, none[0])
+    blur = blur_of(photographs, c)
+    np.testing.assert_array_equal(blur[:3], 1.0)
+    assert blur[3] == pytest.approx(2.0, rel=0.05)
+    better = sharper_first(replace(c, cost=np.arange(3.0)[::-1, None, None] * 0.1 + none), photographs, 1.0, blur)
+    assert (better.found[2] == 3).all()  # it was the best one
+    assert (np.diff(better.cost, axis=0) >= 0.0).all()
 
 
 @pytest.mark.parametrize("cell", [3.0, 0.7])

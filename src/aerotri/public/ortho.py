@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerotri.conventions import FilePath, InputError
+from aerotri.conventions import FilePath, InputError, counted
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.execution.opening import opened
 from aerotri.public.adjustment import Adjustment
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 RECORD, SEAMS = "ortho.json", "seams.gpkg"
 OWN_NAMES = (RECORD, SEAMS, "ortho.tif", "photographs.tif", "sigma.tif", "plots")
+MOST_NAMED = 5
+"""Photographs that a note names."""
 LAYER: Layer = "dsm"
 """Of a folder of `aerotri dtm`: with roofs and trees, so that they stand where they are."""
 
@@ -234,6 +236,7 @@ def _made(
         workers = None if in_threads else stack.enter_context(opened(executor, report.said))
         room = tiles if in_threads or tiles is not None else stack.enter_context(room_beside(out))
         made = make_orthophoto(record, taken, (heights, sigma), settings, folder, report.stage, room, workers)
+        notes += _blurred(made.blur, taken[1])
         outcome, summary, points = _described(record, made, ground.label, settings, folder)
         if plots:
             from aerotri.report.plots.rendering import save_plots
@@ -300,6 +303,20 @@ def _photographs(record: Record, given: Sequence[Path]) -> tuple[np.ndarray, tup
         where = ", ".join(str(path) for path in given) or "nothing"
         raise InputError(f"no photograph of the block is in {where}", "give the folder that holds them")
     return rows, tuple(path_of[int(r)] for r in rows)
+
+
+def _blurred(blur: np.ndarray, paths: Sequence[Path]) -> tuple[str, ...]:
+    """A sentence on photographs that show less detail than others."""
+    worst = [int(k) for k in np.argsort(-blur, kind="stable") if blur[k] > 1.0]
+    if not worst:
+        return ()
+    named = ", ".join(f"{paths[k].name} ({100.0 / blur[k]:.0f} %)" for k in worst[:MOST_NAMED])
+    more = ", and others" if len(worst) > MOST_NAMED else ""
+    said = "shows" if len(worst) == 1 else "show"
+    return (
+        f"{counted(len(worst), 'photograph')} {said} less detail than others of the same ground, as blurred ones do: "
+        f"{named}{more}; sharper ones are taken where there are any",
+    )
 
 
 def _opened(surface: Any, crs: str | None, stack: ExitStack) -> tuple[Any, Any, tuple[str, ...]]:

@@ -138,13 +138,13 @@ def _solved(n: int, a: np.ndarray, b: np.ndarray, sums: np.ndarray) -> tuple[np.
     va, vb = np.maximum(aa - ma * ma, NOISE**2), np.maximum(bb - mb * mb, NOISE**2)
     common = ab - ma * mb
     unlike = 1.0 - np.clip(common**2 / (va * vb), 0.0, 1.0) + NOISE**2 / np.minimum(va, vb)
-    gain = np.exp(_levelled(n, a, b, 0.5 * np.log(vb / va), unlike / cells, GAIN_SIGMA))
+    gain = np.exp(levelled(n, a, b, 0.5 * np.log(vb / va), unlike / cells, GAIN_SIGMA))
     difference = gain[a] ** 2 * va + gain[b] ** 2 * vb - 2.0 * gain[a] * gain[b] * common
     variance = np.maximum(difference, NOISE**2) / cells
-    return gain, _levelled(n, a, b, gain[b] * mb - gain[a] * ma, variance, OFFSET_SIGMA)
+    return gain, levelled(n, a, b, gain[b] * mb - gain[a] * ma, variance, OFFSET_SIGMA)
 
 
-def _levelled(
+def levelled(
     n: int, a: np.ndarray, b: np.ndarray, difference: np.ndarray, variance: np.ndarray, sigma: float
 ) -> np.ndarray:
     """(n,) x with x_a − x_b = difference ± √variance and x = 0 ± sigma, their mean 0: a net of height differences."""

@@ -34,6 +34,7 @@ class Candidates:
     grid : of the coarse cells. step : cells of the orthophoto along their side.
     found : int32 photographs, −1 for none. cost : as of `offer`. column, row : px where they show the middle.
     value : (q, b, r, c) float32 colours, 0 … 1, NaN where there is none.
+    detail : float32, how much neighbouring pixels differ there, NaN where not known.
     z : (r, c) m, heights of the middles.
     """
 
@@ -44,6 +45,7 @@ class Candidates:
     column: np.ndarray
     row: np.ndarray
     value: np.ndarray
+    detail: np.ndarray
     z: np.ndarray
 
 
@@ -85,7 +87,8 @@ def candidates_of(
             )  # fmt: skip
 
     in_threads(one, list(tiles_of(coarse, max(TILE // step, 1))), share)
-    return Candidates(coarse, step, found, cost, column, row, np.zeros((CANDIDATES, 0, *z.shape), np.float32), z)
+    value, detail = np.zeros((CANDIDATES, 0, *z.shape), np.float32), np.full(shape, np.nan, np.float32)
+    return Candidates(coarse, step, found, cost, column, row, value, detail, z)
 
 
 def in_threads(work: Callable[[Any], Any], items: list[Any], share: Share) -> None:
@@ -105,13 +108,14 @@ def results_in_threads(work: Callable[[Any], Any], items: list[Any], share: Shar
 
 
 def coloured(candidates: Candidates, photographs: Photographs, pixels: PixelStore, share: Share) -> Candidates:
-    """With the colours: means over about the ground of a coarse cell."""
+    """With the colours and the detail: means over about the ground of a coarse cell."""
     flat = candidates.found.ravel()
     order = np.argsort(flat, kind="stable")
     numbers, first = np.unique(flat[order], return_index=True)
     last = np.append(first[1:], len(order))
     shape = candidates.found.shape
     value = np.full((shape[0], pixels.bands, *shape[1:]), np.nan, np.float32)
+    detail = np.full(shape, np.nan, np.float32)
     jobs = [(int(n), order[a:b]) for n, a, b in zip(numbers, first, last, strict=True) if n >= 0]
 
     def one(job: tuple[int, np.ndarray]) -> None:
@@ -119,20 +123,19 @@ def coloured(candidates: Candidates, photographs: Photographs, pixels: PixelStor
         times = candidates.grid.cell_x / float(photographs.gsd[number])
         q, i, j = np.unravel_index(at, shape)
         column, row = candidates.column.ravel()[at], candidates.row.ravel()[at]
-        value[q, :, i, j] = _means(pixels, photographs, number, times, column, row)
+        half = photographs.sensor[number]
+        value[q, :, i, j] = _at(pixels.reduced(number, times), half, column, row) / np.float32(pixels.white)
+        if (fine := pixels.detail(number, times)) is not None:
+            detail[q, i, j] = _at(fine[:, :, None], half, column, row)[:, 0]
 
     in_threads(one, jobs, share)
-    return replace(candidates, value=value)
+    return replace(candidates, value=value, detail=detail)
 
 
-def _means(
-    pixels: PixelStore, photographs: Photographs, number: int, times: float, column: np.ndarray, row: np.ndarray
-) -> np.ndarray:
-    """(n, bands) 0 … 1 at places of a photograph, each over `times` pixels along a side."""
+def _at(small: np.ndarray, half: np.ndarray, column: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """(n, bands) of a reduced photograph at places (n,) of the whole one; half : of its size, px, both ways."""
     import cv2
 
-    small = pixels.reduced(number, times)
-    half = photographs.sensor[number]
     across, along = small.shape[1] / (2.0 * half[0]), small.shape[0] / (2.0 * half[1])
     rows = -(-len(column) // REMAP_COLUMNS)
     places = np.zeros((2, rows * REMAP_COLUMNS), np.float32)
@@ -142,7 +145,7 @@ def _means(
         cv2.remap(np.ascontiguousarray(small[:, :, b]), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         for b in range(small.shape[2])
     ]
-    return np.stack([band.ravel()[: len(column)] for band in bands], axis=1) / np.float32(pixels.white)
+    return np.stack([band.ravel()[: len(column)] for band in bands], axis=1)
 
 
 def covered(candidates: Candidates) -> tuple[Candidates, tuple[int, int]]:
@@ -158,6 +161,6 @@ def covered(candidates: Candidates) -> tuple[Candidates, tuple[int, int]]:
     own = np.s_[:, *part]
     cut = replace(
         c, grid=grid, found=c.found[own].copy(), cost=c.cost[own].copy(), column=c.column[own].copy(),
-        row=c.row[own].copy(), value=c.value[:, :, *part].copy(), z=c.z[part].copy(),
+        row=c.row[own].copy(), value=c.value[:, :, *part].copy(), detail=c.detail[own].copy(), z=c.z[part].copy(),
     )  # fmt: skip
     return cut, (int(i[0]), int(j[0]))

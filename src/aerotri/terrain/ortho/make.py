@@ -30,6 +30,7 @@ from aerotri.terrain.ortho.ground import TILE, GroundSurface, ground_surface, ti
 from aerotri.terrain.ortho.pixels import PixelStore
 from aerotri.terrain.ortho.seams import Choice, choose
 from aerotri.terrain.ortho.settings import OrthoSettings
+from aerotri.terrain.ortho.sharpness import blur_of, sharper_first
 from aerotri.terrain.ortho.tile_files import OrthoTiles
 from aerotri.terrain.ortho.tile_work import OrthoWork, Place, do_tiles, kept_tile
 from aerotri.terrain.ortho.tiles import Sources, Tile, make_tile
@@ -53,7 +54,7 @@ class OrthoOutcome:
     ----------
     grid : its cells. photographs : all that were given. gsd : m, their median.
     bands, dtype : of the colours.
-    candidates, choice, balance, accuracy : of the coarse cells.
+    candidates, choice, balance, accuracy : of the coarse cells. blur : (n,) by how much less detail photographs show.
     cells : (n,) cells of every photograph. heights : cells with a height. hidden : those among them that the
         photograph chosen for their place does not see. bridged : cells of the image over bridged holes of the surface.
     resumed : tiles that an earlier run had made.
@@ -65,6 +66,7 @@ class OrthoOutcome:
     bands: int
     dtype: str
     candidates: Candidates
+    blur: np.ndarray
     choice: Choice
     balance: Balance
     accuracy: PlanAccuracy
@@ -111,6 +113,8 @@ def make_orthophoto(
         grid = _grid(photographs, ground, settings, rounded(gsd))
         candidates, grid = _candidates(photographs, ground, grid, settings, report)
         candidates = coloured(candidates, photographs, pixels, lambda share: report("colours", share))
+        blur = blur_of(photographs, candidates)
+        candidates = sharper_first(candidates, photographs, gsd, blur)
         report("seams", 0.0)
         balance = (balance_of if settings.balance else no_balance)(len(photographs), candidates)
         choice = choose(candidates, balanced(candidates, balance), settings.seams)
@@ -126,7 +130,8 @@ def make_orthophoto(
         writer.describe("σ of X and Y, m")
         writer.write(0, 0, accuracy.total.astype(np.float32))
     return OrthoOutcome(
-        grid, photographs, gsd, pixels.bands, pixels.dtype.name, candidates, choice, balance, accuracy, cells, *counts,
+        grid, photographs, gsd, pixels.bands, pixels.dtype.name, candidates, blur, choice, balance, accuracy, cells,
+        *counts,
     )  # fmt: skip
 
 

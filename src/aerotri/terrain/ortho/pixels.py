@@ -18,6 +18,8 @@ CACHE_BYTES = 512 << 20
 LARGEST_HELD = 192 << 20
 """Bytes of a photograph that is kept whole [C]; of a larger one only windows are read, again and again."""
 TYPES = ("uint8", "uint16")
+GREEN = 1
+"""Band of a colour photograph whose detail is looked at: the sharpest of most sensors."""
 
 
 class PixelStore:
@@ -111,6 +113,20 @@ class PixelStore:
             return np.concatenate([part.reshape(rows, columns, -1) for part in parts], axis=2)
         with open_photograph(self._paths[k]) as photograph:
             return by_pixel(photograph.reduced(rows, columns))
+
+    def detail(self, k: int, times: float) -> np.ndarray | None:
+        """(rows, columns) float32 mean change between pixels, of twice their size, of the whole photograph k, about so
+        many times smaller; None of one that is too large to be held."""
+        import cv2
+
+        whole = self._whole(k)
+        if whole is None:
+            return None
+        columns, rows = (max(int(side / max(times, 1.0)), 1) for side in self._sizes[k])
+        band = np.ascontiguousarray(whole[:, :, min(self.bands - 1, GREEN)])
+        half = cv2.resize(band, (max(band.shape[1] // 2, 1), max(band.shape[0] // 2, 1)), interpolation=cv2.INTER_AREA)
+        change = np.abs(cv2.Laplacian(half, cv2.CV_32F))
+        return cv2.resize(change, (columns, rows), interpolation=cv2.INTER_AREA)
 
     def _whole(self, k: int) -> np.ndarray | None:
         columns, rows = self._sizes[k]

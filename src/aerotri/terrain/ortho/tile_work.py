@@ -66,5 +66,8 @@ def _without_colours(sources: Sources) -> Sources:
     c = sources.candidates
     none = np.zeros((0, 0, 0), np.float32)
     return replace(
-        sources, candidates=replace(c, cost=none, column=none, row=none, value=none[None], z=none.reshape(0, 0))
+        sources,
+        candidates=replace(
+            c, cost=none, column=none, row=none, value=none[None], detail=none, z=none.reshape(0, 0)
+        ),
     )  # fmt: skip
