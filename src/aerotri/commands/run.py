@@ -16,8 +16,8 @@ MOST_NAMED = 10
 
 if TYPE_CHECKING:
     from aerotri.public.adjustment import Adjustment
+    from aerotri.public.run_project import Project
     from aerotri.public.run_steps import Step
-    from aerotri.public.running import Project
 
 
 def run_all(source: Path, out: Path, settings: Mapping[str, Any], as_json: bool) -> int:
