@@ -85,4 +85,6 @@ def _summary(c: dict[str, Any]) -> list[str]:
 def _amount(volume: dict[str, Any], of: str) -> str:
     """Without σ where no cell is beyond the level of detection: of nothing there is none."""
     value, sigma = volume[f"{of}_m3"], volume[f"sigma_{of}_m3"]
-    return f"nothing {of}" if value == 0.0 and sigma == 0.0 else f"{of} {value:.6g} ± {sigma:.3g} m³"
+    if value == 0.0 and sigma == 0.0:
+        return f"nothing {of} beyond the level of detection"
+    return f"{of} {value:.6g} ± {sigma:.3g} m³"
