@@ -68,7 +68,7 @@ def outcome_lines(found: Orthophoto) -> list[str]:
         lines.append(f"tiles made before: {s['tiles_resumed']}")
     if area["bridged"] > 0.0:
         lines.append(f"{area['bridged']:.0f} m² of it over bridged holes of the surface: σ is not known there")
-    same = sigma["of_one_adjustment"]
+    same = s["of_one_adjustment"]
     adjustment = "adjustment" if same else "orientation"
     parts = [f"{adjustment} {sigma['orientation']['median']:.3f}", f"image {sigma['image']['median']:.3f}"]
     if sigma["surface"] is not None:

@@ -58,7 +58,7 @@ def ortho_json(outcome: OrthoOutcome, block: Block, surface: str, resampling: st
     return {
         "aerotri": __version__, "block": str(block.name), "crs": block.crs, "surface": surface, "cell_m": g.cell_x,
         "columns": g.columns, "rows": g.rows, "bands": o.bands, "pixel_type": o.dtype, "gsd_m": o.gsd,
-        "resampling": resampling, "tiles_resumed": o.resumed,
+        "resampling": resampling, "tiles_resumed": o.resumed, "of_one_adjustment": a.same,
         "area_m2": {
             "surface": o.heights * area, "orthophoto": covered * area,
             "without_photograph": (o.heights - covered) * area, "other_photograph": o.hidden * area,
@@ -67,7 +67,6 @@ def ortho_json(outcome: OrthoOutcome, block: Block, surface: str, resampling: st
         "sigma_m": {
             "total": _quantiles(a.total), "surface": None if a.surface is None else _quantiles(a.surface),
             "orientation": _quantiles(a.orientation), "image": _quantiles(a.image),
-            "of_one_adjustment": a.same,
         },
         "viewing_angle_deg": _quantiles(np.degrees(np.arctan(a.tangent))),
         "seams": {
