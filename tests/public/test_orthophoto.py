@@ -67,6 +67,9 @@ def test_files(made):
     assert all(isinstance(figure, Figure) for figure in found.plot.all().values())
     assert (here / "out" / "plots" / "points.png").stat().st_size > 10_000
     assert "cells of 2 m" in repr(found)
+    marks = found.plot.orthophoto().axes[0].collections[1:]
+    drawn = np.concatenate([np.asarray(one.get_offsets()) for one in marks])
+    assert sorted(map(tuple, drawn.tolist())) == sorted((p["X"], p["Y"]) for p in found.summary["points"])
 
 
 def test_accuracy_has_its_parts(made):

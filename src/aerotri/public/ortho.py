@@ -59,10 +59,10 @@ class OrthoPlots:
     block: str
 
     def orthophoto(self) -> Figure:
-        """The orthophoto with its seams, and σ of its positions."""
+        """The orthophoto with its seams and points, and σ of its positions."""
         from aerotri.report.plots.ortho import plot_orthophoto
 
-        return plot_orthophoto(self.record, self.folder, self.block)
+        return plot_orthophoto(self.record, self.folder, self.block, self.points)
 
     def points_in_it(self) -> Figure:
         """The ground around control and check points, with a cross where their coordinates are.
