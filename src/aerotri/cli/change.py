@@ -85,15 +85,18 @@ def change(
     first_adjustment: Annotated[
         Path | None,
         typer.Option(
-            help="Result of `aerotri adjust` that the first surface or cloud was measured with. With both, σ takes into "
-            "account how the errors of each adjustment bend its surface, and errors that both share (same control "
-            "points, same camera) cancel.",
+            help="Result of `aerotri adjust` that the first surface or cloud was measured with. With both, "
+            "σ takes into account how the errors of each adjustment bend its surface, and errors that both share "
+            "(same control points, same camera) cancel.",
             rich_help_panel=SIGMAS,
         ),
     ] = None,
     second_adjustment: Annotated[
         Path | None,
-        typer.Option(help="The same of the second surface or cloud; the same folder if both come from one adjustment.", rich_help_panel=SIGMAS),
+        typer.Option(
+            help="The same of the second surface or cloud; the same folder if both come from one adjustment.",
+            rich_help_panel=SIGMAS,
+        ),
     ] = None,
     project: ProjectOf = None,
     out: Annotated[

@@ -247,7 +247,6 @@ def cloud_change(
     origin = "adjustments" if adjusted is not None else "points" if before.covariance is not None else "scatter"
     summary = head.as_dict() | {"first": names[0], "second": names[1]}
     summary |= cloud_change_json(found, (before, after), adjusted, settings, origin)
-    summary |= {
-        "warnings": notes, "settings": used_arguments(cloud_change, asked, dict.fromkeys(asked.keys() - {"stable"}, "m"))
-    }  # fmt: skip
+    of_arguments = used_arguments(cloud_change, asked, dict.fromkeys(asked.keys() - {"stable"}, "m"))
+    summary |= {"warnings": notes, "settings": of_arguments}
     return MeasuredCloudChange(found, summary, head)

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerotri.conventions import FilePath, InputError
-from aerotri.public.change_epochs import plan_code
 from aerotri.public.dense import RECORD as DENSE
 from aerotri.public.models import check_crs
 from aerotri.public.stated import StatedAdjustment

@@ -155,6 +155,6 @@ def change_files() -> tuple[DescribedFile, ...]:
             CLOUD_TABLE,
             when="of point clouds",
         ),
-        DescribedFile("plots", CHANGE, "folder", "Map of the change and of σ, of clouds a histogram too, PNG and SVG.", when=plots),
+        DescribedFile("plots", CHANGE, "folder", "Map of the change and σ; histogram of distances.", when=plots),
         DescribedFile("change.html", CHANGE, "page", "The change on one page.", when=plots),
     )

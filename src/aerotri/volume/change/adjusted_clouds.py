@@ -108,9 +108,7 @@ def _places(found: CloudDistances) -> np.ndarray:
     return rows[np.unique(KDTree(plan).query(wanted)[1])]
 
 
-def _measured(
-    xyz: np.ndarray, cloud: Cloud, calibration: Adjustment, name: str
-) -> tuple[Pickets, np.ndarray]:
+def _measured(xyz: np.ndarray, cloud: Cloud, calibration: Adjustment, name: str) -> tuple[Pickets, np.ndarray]:
     """Points (p, 3) as measured in photographs of an adjustment, and which of them are seen (p,)."""
     per_point: int | np.ndarray = PER_POINT
     if cloud.photographs is not None:

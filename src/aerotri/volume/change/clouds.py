@@ -142,10 +142,8 @@ def normals(tree: KDTree, xyz: np.ndarray, core: np.ndarray, radius: float) -> n
     return out
 
 
-def _along(
-    tree: KDTree, cloud: Cloud, core: np.ndarray, normal: np.ndarray, scales: Scales
-) -> tuple[np.ndarray, ...]:
-    """Number, mean, scatter, variance of the mean and that of matching (k,) of the points in cylinders along the axes."""
+def _along(tree: KDTree, cloud: Cloud, core: np.ndarray, normal: np.ndarray, scales: Scales) -> tuple[np.ndarray, ...]:
+    """Number, mean, scatter, variance of the mean and that of matching (k,) of the points in the cylinders."""
     k, half = len(core), 0.5 * scales.cylinder
     slices = int(np.ceil(scales.reach / scales.cylinder))
     # the cylinder in pieces as long as wide, each of which a ball about its middle holds
@@ -168,15 +166,15 @@ def _along(
             ]  # fmt: skip
             sums[rows] += np.column_stack([np.bincount(place, term, n) for term in terms])
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean, square, quadratic, matching = (sums / count[:, None]).T
+        mean, square, of_points, of_matching = (sums / count[:, None]).T
         scatter = np.sqrt(np.maximum(square - mean**2, 0.0) * count / np.maximum(count - 1, 1))
-        variance = scatter**2 / count if cloud.covariance is None else quadratic
-        noise = np.full(k, np.nan) if cloud.matching is None else matching * _left(cloud, count, normal, scales)
+        variance = scatter**2 / count if cloud.covariance is None else of_points
+        noise = np.full(k, np.nan) if cloud.matching is None else of_matching * _left(cloud, count, normal, scales)
     return count, mean, scatter, variance, noise
 
 
 def _left(cloud: Cloud, count: np.ndarray, normal: np.ndarray, scales: Scales) -> np.ndarray:
-    """(k,) share of the noise of a point that a mean over a cylinder has left; 1 where the noise length is not known."""
+    """(k,) share of a point's noise that a mean over a cylinder has left; 1 where the noise length is not known."""
     if cloud.noise_length is None:
         return np.ones(len(count))
     area = 0.25 * np.pi * scales.cylinder**2 * np.maximum(normal[:, 2], 1e-9)
