@@ -14,10 +14,10 @@ from aerotri.results.head import Head
 
 CAPTIONS = {
     "distances": "Left: distance of the second cloud from the first, along the normal of the ground, where it is "
-    "beyond the level of detection; brown is gained (the second lies above), blue with a white line is lost, grey "
+    "beyond the level of detection; brown is gained (the second lies above), blue (hatched) is lost, grey "
     "cannot be told from noise. Right: σ of the distance.",
-    "histogram": "Number of places by their distance. Each place is held against its own level of detection; the "
-    "broken lines are the median of all.",
+    "histogram": "Number of places by their distance. The scale of counts is logarithmic, so that few places are seen "
+    "beside many. Each place is held against its own level of detection; the broken lines are the median of all.",
 }
 SIGMA_FROM = {
     "adjustments": "It has the noise of the points and what the errors of both adjustments leave in a distance; what "
@@ -54,7 +54,7 @@ def _millimetres(metres: float) -> str:
 
 
 def _metres(value: float) -> str:
-    return f"{value:+.3f}".replace("-", "−")
+    return f"{round(value, 3) + 0.0:+.3f}".replace("-", "−")
 
 
 def _sure(c: Mapping[str, Any]) -> str:

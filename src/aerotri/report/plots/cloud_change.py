@@ -6,21 +6,21 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator
 
 from aerotri.report.plots.canvas import INK, WIDTH, axes_at, new_figure, plain, styled, value_text
-from aerotri.report.plots.change import finish_map
+from aerotri.report.plots.change import HATCH, finish_map, hatch_lost
 from aerotri.report.plots.volume import COLOURS
 from aerotri.volume.change.clouds import CloudDistances
 
 HIGHEST, QUIET, BINS = 4.6, "#d8d8d8", 60
-STRIPE = 0.12
-"""Of the side of a mark, the width of the white line across those that were lost: in black and white they are as dark
-as what was gained."""
+SHARE = 0.5
+"""Of the places of a square, those lost at least where it is hatched; chosen [C]."""
 GAINED, LOST, SAME = "gained", "lost", "within the level of detection"
 
 
@@ -41,7 +41,7 @@ def plot_distances(found: CloudDistances, content: Mapping[str, Any]) -> Figure:
         "beyond it"
     )
     figure = new_figure(height + 2.1, "Distances of two point clouds", subtitle)
-    size = max((72.0 * width / np.sqrt(max(len(found.core), 1))) ** 2 * 0.6, 0.5)
+    size = max((72.0**2 * width * height / max(len(found.core), 1)) * 1.3, 0.5)
     largest = float(np.percentile(np.abs(found.distance[beyond if beyond.any() else known]), 99.0))
     most = float(np.percentile(found.sigma[known], 99.0))
     maps: tuple[tuple[np.ndarray, np.ndarray, dict[str, Any], str], ...] = (
@@ -56,16 +56,28 @@ def plot_distances(found: CloudDistances, content: Mapping[str, Any]) -> Figure:
             axes.scatter(*found.core[known & ~beyond, :2].T, s=size, c=QUIET, marker="s", lw=0)
         image = axes.scatter(*found.core[rows, :2].T, s=size, c=values[rows], marker="s", lw=0, **style)
         if k == 0:
-            lost = beyond & (found.distance < 0.0)
-            axes.scatter(*found.core[lost, :2].T, s=size, c="white", marker="_", lw=STRIPE * np.sqrt(size))
+            _hatch_lost(axes, found, beyond, (left, right, bottom, top), content["spacing_m"])
         finish_map(figure, axes, image, label, (left, bottom, right, top), k == 0, content["crs"])
     handles = [
         Patch(facecolor=COLOURS(0.85), label=GAINED),
-        Patch(facecolor=COLOURS(0.15), edgecolor="white", hatch="---", lw=0.0, label=LOST),
+        Patch(facecolor=COLOURS(0.15), edgecolor="white", hatch=HATCH, lw=0.0, label=LOST),
         Patch(facecolor=QUIET, label=SAME),
     ]
     figure.legend(handles=handles, loc="center left", bbox_to_anchor=(0.9 / WIDTH, 0.25 / (height + 2.1)), ncols=3)
     return figure
+
+
+def _hatch_lost(
+    axes: Axes, found: CloudDistances, beyond: np.ndarray, extent: tuple[float, float, float, float], spacing: float
+) -> None:
+    """Hatch squares most of whose places were lost: in black and white they are as dark as what was gained."""
+    left, right, bottom, top = extent
+    known = np.isfinite(found.distance)
+    edges = [np.linspace(low, high, max(2, int(np.clip((high - low) / (1.5 * spacing), 6, 300))))
+             for low, high in ((bottom, top), (left, right))]  # fmt: skip
+    of = [np.histogram2d(found.core[rows, 1], found.core[rows, 0], edges)[0]
+          for rows in (known & beyond & (found.distance < 0.0), known)]  # fmt: skip
+    hatch_lost(axes, (of[0] > SHARE * of[1])[::-1], extent)
 
 
 @styled
@@ -84,17 +96,19 @@ def plot_histogram(found: CloudDistances, content: Mapping[str, Any]) -> Figure:
     low, high = (float(v) for v in np.percentile(d, [0.5, 99.5]))
     edges = np.linspace(min(low, -1.5 * usual), max(high, 1.5 * usual), BINS + 1)
     shown = np.clip(d, edges[0], edges[-1])
-    kinds = ((d < -level, COLOURS(0.15), "---", LOST), (np.abs(d) <= level, QUIET, "", SAME),
+    kinds = ((np.abs(d) <= level, QUIET, "", SAME), (d < -level, COLOURS(0.15), HATCH, LOST),
              (d > level, COLOURS(0.85), "", GAINED))  # fmt: skip
-    axes.hist([shown[own] for own, *_ in kinds], bins=edges.tolist(), stacked=True, color=[kind[1] for kind in kinds])
-    for (_, _, hatch, _), bars in zip(kinds, axes.containers, strict=True):
-        for bar in bars:
-            bar.set(hatch=hatch, edgecolor="white", linewidth=0.2)
+    for own, colour, hatch, _ in kinds:
+        counts = np.histogram(shown[own], edges)[0]
+        axes.stairs(counts, edges, fill=True, facecolor=colour, hatch=hatch, edgecolor="white", lw=0.3)
+    axes.set_yscale("log")
     for sign in (-1.0, 1.0):
         axes.axvline(sign * usual, color=INK, lw=0.9, ls=(0, (5, 3)))
     axes.set_xlim(edges[0], edges[-1])
     axes.spines[["top", "right"]].set_visible(False)
-    axes.yaxis.set_major_locator(MaxNLocator(4, integer=True))
+    axes.set_ylim(0.7, None)
+    axes.yaxis.set_major_locator(LogLocator())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0f}"))
     axes.xaxis.set_major_formatter(FuncFormatter(value_text))
     axes.set_xlabel("distance [m]")
     axes.set_ylabel("places [count]")
