@@ -78,9 +78,9 @@ def _of_file(path: Path) -> CloudEpoch:
         raise InputError("is no point cloud", "give a LAS or LAZ file", path)
     read = read_precise_cloud(path)
     content = _beside(path) if read.matching is not None else {}
-    length = content.get("noise_length_m")
-    known = isinstance(length, int | float) and 0.0 <= length < np.inf
-    cloud = Cloud(read.xyz, read.covariance, read.matching, read.photographs, float(length) if known else None)
+    stated = content.get("noise_length_m")
+    length = float(stated) if isinstance(stated, int | float) and 0.0 <= stated < np.inf else None
+    cloud = Cloud(read.xyz, read.covariance, read.matching, read.photographs, length)
     return CloudEpoch(cloud, read.crs, path.name, str(content.get("adjustment", "")))
 
 

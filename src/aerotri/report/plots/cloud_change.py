@@ -11,7 +11,7 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, StrMethodFormatter
 
 from aerotri.report.plots.canvas import INK, WIDTH, axes_at, new_figure, plain, styled, value_text
 from aerotri.report.plots.change import HATCH, finish_map, hatch_lost
@@ -108,7 +108,7 @@ def plot_histogram(found: CloudDistances, content: Mapping[str, Any]) -> Figure:
     axes.spines[["top", "right"]].set_visible(False)
     axes.set_ylim(0.7, None)
     axes.yaxis.set_major_locator(LogLocator())
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0f}"))
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:.0f}"))
     axes.xaxis.set_major_formatter(FuncFormatter(value_text))
     axes.set_xlabel("distance [m]")
     axes.set_ylabel("places [count]")
