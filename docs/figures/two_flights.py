@@ -13,7 +13,7 @@ def main(change: Path, clouds: Path) -> None:
     """The map of the change of surfaces, map and histogram of the change of clouds."""
     save(Image.open(change / "plots" / "difference.png"), "two_flights_change")
     save(Image.open(clouds / "plots" / "distances.png"), "two_flights_clouds")
-    save(Image.open(clouds / "plots" / "histogram.png"), "two_flights_histogram", 24)
+    save(Image.open(clouds / "plots" / "histogram.png"), "two_flights_histogram")
 
 
 if __name__ == "__main__":
