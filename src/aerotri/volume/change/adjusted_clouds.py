@@ -65,21 +65,19 @@ def adjusted_distances(
     # the points of a cloud that its adjustment sees are counted without those that it does not
     at = [(np.cumsum(own) - 1)[seen] for _, own in epochs]
     values = np.empty((int(seen.sum()), 3, len(DIRECTIONS)))
-    parts: tuple[Part, Part] | None = None
+    words = ""
     for k in range(len(values)):
         for d, direction in enumerate(DIRECTIONS):
             one, two = (
                 _part(calibration, pickets.take(np.array([own[k]])), direction)
                 for calibration, (pickets, _), own in zip(calibrations, epochs, at, strict=True)
             )
-            parts = one, two
-            values[k, :, d] = sum(variances_of_difference(one, two)), *(p.response.variance + p.response.model
-                                                                       for p in parts)  # fmt: skip
-    assert parts is not None
+            alone = [part.response.variance + part.response.model for part in (one, two)]
+            values[k, :, d] = sum(variances_of_difference(one, two)), *alone
+            words = words or in_common(one, two, NAMES)
     covariance = _between(found.core[rows][seen], _elements(values).reshape(len(values), -1), found.core)
-    difference, *alone = (quadratic(own, found.normal) for own in np.split(covariance, 3, axis=1))
-    words = in_common(*parts, NAMES)
-    return AdjustedDistances(np.maximum(difference, 0.0), np.maximum(np.stack(alone, axis=1), 0.0), words)
+    difference, *own = (quadratic(part, found.normal) for part in np.split(covariance, 3, axis=1))
+    return AdjustedDistances(np.maximum(difference, 0.0), np.maximum(np.stack(own, axis=1), 0.0), words)
 
 
 def with_adjustments(found: CloudDistances, clouds: tuple[Cloud, Cloud], adjusted: AdjustedDistances) -> CloudDistances:
