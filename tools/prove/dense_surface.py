@@ -78,7 +78,9 @@ from aerotri.public.dense import DenseSurface
 from aerotri.rasters.grids import Grid
 from aerotri.simulation.rendering_texture import Lattice, Texture
 from aerotri.terrain.dense import tile
+from aerotri.terrain.dense.lasting import lasting_errors
 from aerotri.terrain.dense.parallaxes import Parallaxes, semi_global
+from aerotri.volume.lasting import Lasting, lasting_variance_of_cells
 
 GSD_M, STEEP_M, FEWEST = 0.5, 1.5, 100
 SPEC = {
@@ -171,6 +173,8 @@ def painted(name: str, lattice: Lattice) -> Lattice:
     return replace(lattice, values=np.where(inside, other, values).astype(np.float32))
 
 
+SLOPES = {"to 10 %": (0.0, 0.1), "10 to 30 %": (0.1, 0.3), "above 30 %": (0.3, np.inf)}
+"""Classes of the slope of the true ground."""
 SIDES = (5, 10, 20, 40, 80)
 """Cells along a side of the squares over which errors are added up."""
 HEAD = (
@@ -183,12 +187,14 @@ HEAD = (
 class Cells:
     """Errors and σ, m, of the cells that have a height; whether each is steep; share of those that could have one.
 
-    sums : by side, the sums of the errors over squares over their σ, by the noise that neighbours share.
+    slope : of the true ground, metres a metre.
+    sums : by side, the sums of the errors over squares over their σ, by what neighbours share.
     """
 
     error: np.ndarray
     sigma: np.ndarray
     steep: np.ndarray
+    slope: np.ndarray
     coverage: float
     sums: dict[int, np.ndarray]
 
@@ -201,7 +207,7 @@ def main() -> None:
     arguments = parser.parse_args()
     folder = arguments.folder or Path(tempfile.mkdtemp())
     print(HEAD, flush=True)
-    added = []
+    added, by_slope = [], []
     for name in arguments.scenes:
         seeds = list(range(1, SEEDS.get(name, 1) + 1)) if arguments.seed is None else [arguments.seed]
         try:
@@ -212,8 +218,17 @@ def main() -> None:
         own, alone = (together([pair[k] for pair in found]) for k in (0, 1))
         print(row(name, own, alone), flush=True)
         added.append(f"| {name} | " + " | ".join(f"{rms(own.sums[side]):.2f}" for side in SIDES) + " |")
+        by_slope.append(f"| {name} | " + " | ".join(of_slope(own, *bounds) for bounds in SLOPES.values()) + " |")
+    print("\n| std z by slope, and beyond 4 σ | " + " | ".join(SLOPES) + " |\n|---|---|---|---|")
+    print(*by_slope, sep="\n")
     print("\n| sums over squares of, cells | " + " | ".join(map(str, SIDES)) + " |\n|---|---|---|---|---|---|")
     print(*added, sep="\n")
+
+
+def of_slope(own: Cells, low: float, high: float) -> str:
+    """std z and share beyond 4 σ of the cells off steps whose ground has that slope."""
+    z = (own.error / own.sigma)[~own.steep & (own.slope >= low) & (own.slope < high)]
+    return f"{np.std(z):.2f} ({share_beyond(z):.2f} %)" if len(z) > FEWEST else ""
 
 
 def row(name: str, own: Cells, alone: Cells) -> str:
@@ -258,9 +273,10 @@ def blocks(block: aerotri.Block, name: str, seed: int) -> list[aerotri.Block]:
 
 def together(draws: list[Cells]) -> Cells:
     """The cells of several draws as if they were one."""
-    error, sigma, steep = (np.concatenate([getattr(d, of) for d in draws]) for of in ("error", "sigma", "steep"))
+    names = "error", "sigma", "steep", "slope"
+    cells = (np.concatenate([getattr(d, of) for d in draws]) for of in names)
     sums = {side: np.concatenate([d.sums[side] for d in draws]) for side in SIDES}
-    return Cells(error, sigma, steep, float(np.mean([d.coverage for d in draws])), sums)
+    return Cells(*cells, float(np.mean([d.coverage for d in draws])), sums)
 
 
 def render(folder: Path, flight, name: str, look: dict) -> Path:
@@ -305,9 +321,10 @@ def semi_global_surface(result: aerotri.Adjustment, photographs: Path) -> DenseS
 def cells_of(found: DenseSurface, flight, name: str) -> Cells:
     """The cells of a surface against the true ground, where a scene is judged."""
     o = found.record
-    errors, sigmas, steeps, able, measured = [], [], [], 0, 0
+    errors, sigmas, steeps, slopes, able, measured = [], [], [], [], 0, 0
     sums: dict[int, list[float]] = {side: [] for side in SIDES}
     length = found.summary["noise_length_m"] or 0.0
+    lasting = Lasting(*lasting_errors(o.pixel, float(np.median(o.photographs.gsd)) * 2**o.level))
     for window, part in o.files.read_all(list(o.windows)):
         grid = o.grid.window(window.row, window.column, window.rows, window.columns)
         truth = truth_on(grid, flight)
@@ -325,24 +342,34 @@ def cells_of(found: DenseSurface, flight, name: str) -> Cells:
         sigma = np.hypot(part.sigma, o.shared.over(grid)) if name in TIE_SIGMA_MM else part.sigma
         sigmas.append(sigma[known])
         steeps.append(steep[known])
+        slopes.append(np.hypot(*np.gradient(truth, grid.cell_x))[known])
         sharing = max(1.0, length**2 / (grid.cell_x * grid.cell_y))
         for side in SIDES:
-            sums[side] += sums_over_squares(part.z - truth, np.sqrt(sharing) * sigma, known & ~steep, side)
+            whole = lasting_variance_of_cells(np.ones((side, side)), (grid.cell_x, grid.cell_y), lasting)
+            sums[side] += sums_over_squares(part.z - truth, np.sqrt(sharing) * sigma, known & ~steep, side, whole)
     return Cells(
-        np.concatenate(errors), np.concatenate(sigmas), np.concatenate(steeps), measured / max(able, 1),
+        *(np.concatenate(part) for part in (errors, sigmas, steeps, slopes)), measured / max(able, 1),
         {side: np.array(own) for side, own in sums.items()},
     )  # fmt: skip
 
 
-def sums_over_squares(error: np.ndarray, sigma: np.ndarray, judged: np.ndarray, side: int) -> list[float]:
-    """Sums of errors over σ, of the squares of which nearly all cells are judged."""
+def sums_over_squares(
+    error: np.ndarray, sigma: np.ndarray, judged: np.ndarray, side: int, lasting: float
+) -> list[float]:
+    """Sums of errors over σ, of the squares of which nearly all cells are judged.
+
+    Parameters
+    ----------
+    lasting : m², variance of the sum of a whole square by the errors that do not average out.
+    """
     found = []
     for i in range(0, error.shape[0] - side + 1, side):
         for j in range(0, error.shape[1] - side + 1, side):
             own = np.s_[i : i + side, j : j + side]
-            if judged[own].mean() > 0.95:
+            share = judged[own].mean()
+            if share > 0.95:
                 total = error[own][judged[own]].sum()
-                found.append(float(total / np.sqrt((sigma[own][judged[own]] ** 2).sum())))
+                found.append(float(total / np.sqrt((sigma[own][judged[own]] ** 2).sum() + share**2 * lasting)))
     return found
 
 
