@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from aerotri.terrain.dense.bare_ground import BRIDGED, MEASURED, BareGround
+from aerotri.terrain.dense.lasting import LASTING_PX, lasting_errors
 from aerotri.terrain.dense.measure import DenseOutcome
 from aerotri.version import __version__
 
@@ -16,9 +17,11 @@ def dense_json(outcome: DenseOutcome, block: str, crs: str, ground: BareGround |
     o = outcome
     sigma, matching, shared, count = (np.concatenate(part) for part in zip(*_samples(o), strict=True))
     noise = o.shared_cells * o.grid.cell_x if np.isfinite(o.shared_cells) else None
+    gsd = float(np.median(o.photographs.gsd))
+    lasting, length = lasting_errors(o.pixel, gsd * 2**o.level)
     return {
         "aerotri": __version__, "block": block, "crs": crs, "photographs": len(o.photographs),
-        "gsd_m": float(np.median(o.photographs.gsd)), "cell_m": o.grid.cell_x,
+        "gsd_m": gsd, "cell_m": o.grid.cell_x,
         "cells": {"all": o.grid.rows * o.grid.columns, "measured": o.cells},
         "area_m2": o.cells * o.grid.cell_x * o.grid.cell_y,
         "pairs": len(np.unique(np.sort(o.pairs, axis=1), axis=0)), "tiles": len(o.windows), "tiles_resumed": o.resumed,
@@ -28,6 +31,7 @@ def dense_json(outcome: DenseOutcome, block: str, crs: str, ground: BareGround |
             "adjustment": float(np.median(shared)),
         },
         "noise_length_m": noise,
+        "matching_shared": {"sigma_Z_m": lasting, "length_m": length, "parallax_px": LASTING_PX},
         "y_parallax_px": {
             "median": float(np.median(np.abs(o.across_px))), "largest": float(np.abs(o.across_px).max(initial=0.0)),
         },
