@@ -89,8 +89,15 @@ DSM_JSON = (
         "Side of the square whose cells have one noise, as neighbours share it; null where no two pairs overlap.",
         "m",
     ),
-    Item("matching_shared", "object", "Errors of the matching that neighbouring cells share and that do not average out."),
-    Item("matching_shared.sigma_Z_m", "number", "Standard deviation of a height by them; it is part of that of matching.", "m"),
+    Item(
+        "matching_shared", "object", "Errors of the matching that neighbouring cells share and that do not average out."
+    ),
+    Item(
+        "matching_shared.sigma_Z_m",
+        "number",
+        "Standard deviation of a height by them; it is part of that of matching.",
+        "m",
+    ),
     Item("matching_shared.length_m", "number", "Distance over which their correlation falls to 1/e.", "m"),
     Item("matching_shared.parallax_px", "number", "Their RMS as a parallax.", "px"),
     Item("y_parallax_px", "object", "Shift across the base of a pair, its median over a tile, without sign.", "px"),

@@ -73,7 +73,10 @@ def _budget(c: Mapping[str, Any]) -> str:
     if s is None:
         return ""
     largest = max(s["parts_m3"], key=s["parts_m3"].get)
-    shared = {MODEL: "errors that groups of photographs share", LASTING: "matching errors that neighbouring cells share"}
+    shared = {
+        MODEL: "errors that groups of photographs share",
+        LASTING: "matching errors that neighbouring cells share",
+    }
     largest = shared.get(largest, largest)
     known, wide = two_digits(s["sigma_m3"]), two_digits(1.96 * s["sigma_m3"])
     text = (

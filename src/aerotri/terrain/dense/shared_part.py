@@ -40,7 +40,10 @@ class SharedPart:
 
 
 def shared_part(
-    calibration: Adjustment, photographs: Photographs, rows: np.ndarray, places: np.ndarray,
+    calibration: Adjustment,
+    photographs: Photographs,
+    rows: np.ndarray,
+    places: np.ndarray,
     measured: list[np.ndarray],
 ) -> SharedPart:
     """Of the surface through places (n, 3) m in the CRS.
