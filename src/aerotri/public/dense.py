@@ -278,6 +278,8 @@ def _write(target: Path, dense: DenseSurface, plots: bool) -> None:
     o, crs = dense.record, horizontal_crs(dense.crs)
     of_heights, noise = crs_of_heights(dense.crs), dense.summary["noise_length_m"]
     tags = {} if noise is None else {"NOISE_LENGTH_M": f"{noise:.4g}"}
+    lasting = dense.summary["matching_shared"]
+    tags |= {"SHARED_SIGMA_M": f"{lasting['sigma_Z_m']:.4g}", "SHARED_LENGTH_M": f"{lasting['length_m']:.4g}"}
     windows = list(o.windows)
     with atomic_folder(target, own=OWN_NAMES) as folder:
         write_surface_parts(folder / SURFACE, _surface_parts(o), o.grid, of_heights, "DSM Z, m", tags)

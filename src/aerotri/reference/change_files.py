@@ -25,6 +25,8 @@ PART_WORDS = {
     "adjustment": "What the adjustments add: by their equations where both are given; else to all cells alike, 0 with "
     "an alignment or one adjustment.",
     "model": "Its model part, where groups of photographs share errors; 0 where the adjustments are not given.",
+    "matching_shared": "Matching errors that neighbouring cells of dense surfaces share and that do not average out; 0 "
+    "of other surfaces.",
 }
 
 

@@ -13,6 +13,7 @@ from aerotri.volume.bases import Base, Surface
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.cell_noise import NO_NOISE, CellNoise, cells_sharing, photographs_at, shares_of_noise
 from aerotri.volume.functionals import Functional, cell_volume, tin_volume, triangulated
+from aerotri.volume.lasting import NO_LASTING, Lasting, lasting_variance
 from aerotri.volume.pickets import (
     MeasuredPickets,
     Pickets,
@@ -59,6 +60,7 @@ class Part:
     calibration, response : of its adjustment. between : the ground between its heights, None where not known.
     unseen : m², area no photographs were found for.
     measured : what the surface was measured from; None where nobody asks for it.
+    lasting : errors of its heights that do not average out.
     """
 
     calibration: Adjustment
@@ -68,6 +70,13 @@ class Part:
     rays: int
     unseen: float
     measured: Measured | None = None
+    lasting: Lasting = NO_LASTING
+
+    @property
+    def lasting_variance(self) -> float:
+        """m⁶, of the volume by errors that do not average out."""
+        m = self.measured
+        return 0.0 if m is None else lasting_variance(m.pickets.xyz[:, :2], m.gradient[:, 2], self.lasting)
 
 
 def part_of_cells(
@@ -98,7 +107,8 @@ def part_of_cells(
     unseen = float(np.abs(functional.gradient[~seen, 2]).sum())
     between = _between_cells(surface, boundary)
     measured = Measured(pickets, functional.gradient[seen])
-    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen, measured)
+    lasting = noise.lasting if options.matching_sigma_um is None else NO_LASTING
+    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen, measured, lasting)
 
 
 def part_of_pickets(
