@@ -171,7 +171,7 @@ def _over(roughness: Roughness, xyz: np.ndarray, triangles: np.ndarray, noise: f
     at = xyz[near][:, :, :2] - middle[:, None, :2]
     size = np.abs(at).max(axis=(1, 2))
     at = at / size[:, None, None]
-    inside, other = (_places(PARTS, rule) @ (corners - middle[:, None])[:, :, :2] / size[:, None, None]
+    inside, other = (places_within(PARTS, rule) @ (corners - middle[:, None])[:, :, :2] / size[:, None, None]
                      for rule in RULES)  # fmt: skip
     unit = Roughness(1.0, roughness.exponent)
     gap = np.linalg.norm(at[:, :, None] - at[:, None], axis=-1)
@@ -185,9 +185,9 @@ def _over(roughness: Roughness, xyz: np.ndarray, triangles: np.ndarray, noise: f
     system[:, :AROUND, :AROUND] = share[:, None, None] * unit.covariance(gap) + (
         np.where(level > 0.0, 1.0 - share, 1.0)[:, None, None] * np.eye(AROUND)
     )
-    system[:, :AROUND, AROUND:] = _terms(at)
+    system[:, :AROUND, AROUND:] = terms_of_second_order(at)
     system[:, AROUND:, :AROUND] = np.swapaxes(system[:, :AROUND, AROUND:], 1, 2)
-    right = np.concatenate([share[:, None] * to_inside, _terms(inside).mean(axis=1)], axis=1)
+    right = np.concatenate([share[:, None] * to_inside, terms_of_second_order(inside).mean(axis=1)], axis=1)
     weights = np.linalg.solve(system, right[..., None])[:, :AROUND, 0]
     area = areas(corners[:, :, :2])
     heights = xyz[near, 2] - middle[:, 2:]
@@ -226,7 +226,7 @@ def patch_variances(
     size = np.abs(at - middle).max()
     sides = []
     for rule in RULES:
-        inside = _places(PARTS, rule) @ xyz[triangles][:, :, :2]
+        inside = places_within(PARTS, rule) @ xyz[triangles][:, :, :2]
         share = np.repeat(over.area / inside.shape[1], inside.shape[1])
         sides.append((np.concatenate([inside.reshape(-1, 2), at]), np.concatenate([share, of_pickets]) / area))
     (first, own), (second, other) = sides
@@ -236,7 +236,7 @@ def patch_variances(
     return float(over.variance.sum()), max(sum_, 0.0) * level * area**2
 
 
-def _places(n: int, within: tuple[float, float, float]) -> np.ndarray:
+def places_within(n: int, within: tuple[float, float, float]) -> np.ndarray:
     """(3n², 3) barycentric coordinates: three places in every one of n² equal parts of a triangle."""
     own = np.array([np.roll(within, k) for k in range(3)])
     out = []
@@ -255,7 +255,7 @@ def _likeliest(xy: np.ndarray, z: np.ndarray, noise: float, smoothest: float) ->
     at = xy - xy.mean(axis=1, keepdims=True)
     size = float(np.median(np.abs(at).max(axis=(1, 2))))
     at = at / size
-    left = np.linalg.qr(_terms(at), mode="complete").Q[:, :, 6:]
+    left = np.linalg.qr(terms_of_second_order(at), mode="complete").Q[:, :, 6:]
     contrasts = np.einsum("nmi,nm->ni", np.broadcast_to(left, (len(z), *left.shape[1:])), z - z.mean(axis=1)[:, None])
     gap = np.linalg.norm(at[:, :, None] - at[:, None], axis=-1)
     # what rounding leaves of heights is no roughness
@@ -293,7 +293,7 @@ def _not_whole(exponent: float) -> float:
     return exponent if abs(off) >= NEAR_WHOLE else whole + (NEAR_WHOLE if off >= 0.0 else -NEAR_WHOLE)
 
 
-def _terms(xy: np.ndarray) -> np.ndarray:
+def terms_of_second_order(xy: np.ndarray) -> np.ndarray:
     """(…, 6) of a surface of second order at places (…, 2)."""
     x, y = np.moveaxis(xy, -1, 0)
     return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
