@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from aerotri.volume.rectified import BEYOND, covariance_above, expected_above
+from aerotri.volume.rectified import covariance_above, expected_above
 from aerotri.volume.roughness import (
     AROUND,
     CHUNK,
-    MOST_TRIANGLES,
     PARTS,
     RULES,
     Roughness,

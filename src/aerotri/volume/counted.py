@@ -51,6 +51,10 @@ class Counted:
         """(rows, columns) m over the other, NaN where something is not known."""
         return z - self.other.on_grid(grid)
 
+    def spread_of_cells(self, sigma: np.ndarray | None) -> np.ndarray | float:
+        """m, σ of the heights of cells over the other: what they share, and their own noise (rows, columns)."""
+        return self.spread if sigma is None else np.hypot(self.spread, np.nan_to_num(sigma))
+
     def share(self, d: np.ndarray, spread: np.ndarray | float) -> np.ndarray:
         """0 … 1 of places with heights over the other, 0 where one is not known; spread : m, σ of the heights."""
         if self.sign == 0:

@@ -87,17 +87,12 @@ def region_of_cells(surface: Surface, boundary: Boundary, counted: Counted, nois
         d = counted.heights_of_cells(surface.read(row, column, rows, columns).astype(float), grid)
         area = boundary.coverage(grid) * cell * np.isfinite(d)
         sigma = None if noise.sigma is None else noise.sigma.read(row, column, rows, columns).astype(float)
-        weight = area * counted.share(d, spread_of_cells(counted, sigma))
+        weight = area * counted.share(d, counted.spread_of_cells(sigma))
         lattice.add(*_placed(grid, weight))
         if counted.sign:
             line += line_of_shared(d.ravel(), area.ravel(), counted.spread)
             line += Line() if sigma is None else Line(noise=_added_by_noise(d, area, sigma, block))
     return lattice.region(counted.sign, line)
-
-
-def spread_of_cells(counted: Counted, sigma: np.ndarray | None) -> np.ndarray | float:
-    """m, σ of the heights of cells over the other: what they share and their own noise (rows, columns)."""
-    return counted.spread if sigma is None else np.hypot(counted.spread, np.nan_to_num(sigma))
 
 
 def _added_by_noise(d: np.ndarray, area: np.ndarray, sigma: np.ndarray, block: int) -> float:
