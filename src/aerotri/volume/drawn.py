@@ -63,9 +63,14 @@ def drawn_cells(around: Grid, z: np.ndarray, weight: np.ndarray, base: Base) -> 
 def slopes_of_cells(z: np.ndarray, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Slopes along X and Y of the inner cells of (rows, columns) m; of cells beside a hole by their other neighbour."""
     known, filled = np.isfinite(z), _known(z)
-    along = sum(c * v for c, v in zip(_stencil(known), _shifted(filled), strict=True)) / grid.cell_x
-    across = sum(c * v for c, v in zip(_stencil(known.T), _shifted(filled.T), strict=True)).T / grid.cell_y
+    along, across = _differences(filled, known) / grid.cell_x, _differences(filled.T, known.T).T / grid.cell_y
     return along[1:-1, 1:-1], -across[1:-1, 1:-1]
+
+
+def _differences(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Differences along the rows of (rows, columns), for one step."""
+    before, own, after = (c * v for c, v in zip(_stencil(known), _shifted(values), strict=True))
+    return before + own + after
 
 
 def _by_motion(held: np.ndarray, known: np.ndarray, step: float) -> np.ndarray:

@@ -68,9 +68,11 @@ class Line:
     moved: float = 0.0
     spread: float = 0.0
     noise: float = 0.0
+    between: float = 0.0
 
     def __add__(self, other: Line) -> Line:
-        return Line(self.moved + other.moved, self.spread + other.spread, self.noise + other.noise)
+        return Line(self.moved + other.moved, self.spread + other.spread, self.noise + other.noise,
+                    self.between + other.between)  # fmt: skip
 
     @property
     def mean_square(self) -> float:
@@ -78,10 +80,13 @@ class Line:
         return self.moved**2 + 0.5 * self.spread**2 + self.noise**2
 
 
+NO_LINE = Line()
+
+
 def line_of_shared(d: np.ndarray, area: np.ndarray, spread: float) -> Line:
     """Of an error of σ `spread`, m, that places with heights d (n,) m over the line and areas (n,) m² share."""
     near = np.isfinite(d) & (np.abs(d) < BEYOND * spread)
     if not near.any():
-        return Line()
+        return NO_LINE
     h, a = d[near], area[near]
     return Line(float(a @ excess(h, np.full(len(h), spread))), float(a @ density(h / spread)) * spread)

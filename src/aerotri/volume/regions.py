@@ -15,7 +15,7 @@ from aerotri.volume.bases import PANELS, Base, Nodes, PlaneBase, SplineBase, Sur
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.cell_noise import CellNoise
 from aerotri.volume.counted import PLACES, Counted, near_the_line
-from aerotri.volume.rectified import Line, expected_above, line_of_shared
+from aerotri.volume.rectified import NO_LINE, Line, expected_above, line_of_shared
 from aerotri.volume.sums import windows
 from aerotri.volume.triangles import Pieces
 
@@ -37,7 +37,7 @@ class Region:
     places: np.ndarray
     weight: np.ndarray
     sign: int = 0
-    line: Line = Line()
+    line: Line = NO_LINE
 
     @property
     def area(self) -> float:
@@ -63,12 +63,13 @@ def base_over(base: Base | None, region: Region | None) -> Base | None:
 
 
 def region_of_pieces(
-    boundary: Boundary, xyz: np.ndarray, triangles: np.ndarray, pieces: Pieces, counted: Counted, all_pieces: Pieces
+    boundary: Boundary, xyz: np.ndarray, triangles: np.ndarray, pieces: Pieces, of: tuple[Counted, Pieces]
 ) -> Region:
-    """Of parts of triangles that count; all_pieces : those inside the boundary, for the line between cut and fill."""
+    """Of parts of triangles that count; of : what counts, and of which parts, all those inside the boundary."""
+    counted, all_pieces = of
     lattice = _Lattice(boundary)
     lattice.add(np.einsum("nk,nkc->nc", pieces.weights, xyz[triangles[pieces.triangle]][:, :, :2]), pieces.area)
-    line = Line()
+    line = NO_LINE
     if counted.sign and counted.spread > 0.0:
         corners = xyz[triangles[all_pieces.triangle]]
         near = near_the_line(counted, corners, counted.spread)
@@ -77,9 +78,9 @@ def region_of_pieces(
     return lattice.region(counted.sign, line)
 
 
-def region_of_cells(surface: Surface, boundary: Boundary, counted: Counted, noise: CellNoise) -> Region:
-    """Of the cells of a surface, read once more."""
-    lattice, line = _Lattice(boundary), Line()
+def region_of_cells(surface: Surface, boundary: Boundary, counted: Counted, noise: CellNoise, within: float) -> Region:
+    """Of the cells of a surface, read once more; within : m, σ of the ground at a place between their centres."""
+    lattice, line = _Lattice(boundary), NO_LINE
     cell = surface.grid.cell_x * surface.grid.cell_y
     block = max(BLOCK, int(np.ceil(BLOCK_LENGTHS * noise.length_m / np.sqrt(cell))))
     for row, column, rows, columns in windows(surface.grid, boundary):
@@ -91,7 +92,8 @@ def region_of_cells(surface: Surface, boundary: Boundary, counted: Counted, nois
         lattice.add(*_placed(grid, weight))
         if counted.sign:
             line += line_of_shared(d.ravel(), area.ravel(), counted.spread)
-            line += Line() if sigma is None else Line(noise=_added_by_noise(d, area, sigma, block))
+            line += Line(between=line_of_shared(d.ravel(), area.ravel(), within).moved)
+            line += NO_LINE if sigma is None else Line(noise=_added_by_noise(d, area, sigma, block))
     return lattice.region(counted.sign, line)
 
 

@@ -124,7 +124,46 @@ def curvature_of_cells(z: np.ndarray, grid: Grid) -> float:
 def ground_between(
     roughness: Roughness, xyz: np.ndarray, triangles: np.ndarray, share: np.ndarray, noise: float, seed: int = 0
 ) -> Between:
-    """What straight triangles over pickets leave out.
+    """What straight triangles over pickets leave out; arguments as of `ground_of`."""
+    ground = ground_of(roughness, xyz, triangles, share, noise, seed)
+    return Between() if ground is None else ground.between(ground.more, ground.variance)
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """The ground between pickets, over triangles that stand for all of them.
+
+    Parameters
+    ----------
+    xyz : (k, 3) m. triangles : (t, 3) corners, share : (t,) which part of each counts, area : (t,) m².
+    more : (t,) m³, ground expected beyond the straight triangle. variance : (t,) m⁶.
+    noise : m², variance of a height that is its own alone.
+    number : of all the triangles. factor : by which neighbours make the variance of the sum larger.
+    """
+
+    roughness: Roughness
+    xyz: np.ndarray
+    triangles: np.ndarray
+    share: np.ndarray
+    area: np.ndarray
+    more: np.ndarray
+    variance: np.ndarray
+    noise: float
+    number: int
+    factor: float
+
+    def between(self, more: np.ndarray, variance: np.ndarray) -> Between:
+        """Of all triangles, from what is expected (t,) m³ of these, and its variance (t,) m⁶."""
+        few, own = len(self.triangles), more * self.share
+        scale = self.number / few
+        sampling = self.number**2 * (1.0 - 1.0 / scale) * float(np.var(own)) / few
+        return Between(scale * float(own.sum()), scale * float(variance @ self.share) * self.factor + sampling)
+
+
+def ground_of(
+    roughness: Roughness, xyz: np.ndarray, triangles: np.ndarray, share: np.ndarray, noise: float, seed: int = 0
+) -> Ground | None:
+    """The ground between pickets; None where there is none.
 
     Parameters
     ----------
@@ -133,17 +172,18 @@ def ground_between(
     """
     own = np.flatnonzero(share > 0.0)
     if not len(own) or len(xyz) < AROUND:
-        return Between()
+        return None
     rng = np.random.default_rng(seed)
     few = own if len(own) <= MOST_TRIANGLES else rng.choice(own, MOST_TRIANGLES, replace=False)
     tree = KDTree(xyz[:, :2])
-    part = [_over(roughness, xyz, triangles[few[k : k + CHUNK]], noise, tree) for k in range(0, len(few), CHUNK)]
-    more = np.concatenate([one.more for one in part]) * share[few]
-    scale = len(own) / len(few)
-    sampling = len(own) ** 2 * (1.0 - 1.0 / scale) * float(np.var(more)) / len(few)
-    single = scale * float(np.concatenate([one.variance for one in part]) @ share[few])
+    parts = [_over(roughness, xyz, triangles[few[k : k + CHUNK]], noise, tree) for k in range(0, len(few), CHUNK)]
+    area, more, variance = (
+        np.concatenate(part) for part in zip(*((one.area, one.more, one.variance) for one in parts), strict=True)
+    )
     factor = _neighbours(roughness, xyz, triangles[own], noise, tree, rng)
-    return Between(scale * float(more.sum()), single * factor + sampling)
+    return Ground(
+        roughness, xyz, triangles[few], share[few], area, more, variance, noise, len(own), factor
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
