@@ -16,7 +16,7 @@ BEYOND = 4.0
 """Standard deviations from the line at which a height counts as wholly on its side: what is left is 1e-5 of σ."""
 
 
-LINE = "zero line"
+LINE = "zero_line"
 """The part of σ of a cut or a fill that comes from the line between them: errors move it."""
 
 

@@ -22,6 +22,7 @@ from aerotri.volume.settings import Density
 SYSTEMATIC = "change of the volume by image errors, wrong − true, were the photographs used uncorrected"
 
 STATED = "what is stated about base and boundary alone; the errors of the surface are not in it"
+BEYOND = "what it is expected to hold beyond that of the surface as given; not in it, counted in its σ"
 CURVATURE = "ground expected beyond the straight lines between the heights; part of σ as interpolation"
 
 
@@ -74,10 +75,32 @@ def pile_json(
     v = pile.volumes.chosen
     return {
         "name": pile.name, "area_m2": pile.boundary.area, "base": pile.base.name, **_numbers(v),
-        "sigma_m3": None if sigma is None else sigma.total,
+        "sigma_m3": None if sigma is None else sigma.total, **sides_json(sigma),
         "parts_m3": None if sigma is None else dict(sigma.parts),
         "stated_sigma_m3": _total_stated(stated), "mass": _mass(v, sigma, density, stated),
     }  # fmt: skip
+
+
+def sides_json(sigma: VolumeSigma | None) -> dict[str, float | None]:
+    """σ of cut and of fill, m³; None where not known."""
+    sides = (None, None) if sigma is None or sigma.sides is None else sigma.sides
+    return {
+        f"sigma_{name}_m3": None if one is None else one.total for name, one in zip(("cut", "fill"), sides, strict=True)
+    }
+
+
+def _sides_with_parts(sigma: VolumeSigma) -> dict[str, Any]:
+    """σ of cut and of fill with its parts."""
+    if sigma.sides is None:
+        return {"cut": None, "fill": None}
+    return {
+        name: {
+            "sigma_m3": one.total,
+            "parts_m3": dict(one.parts),
+            "beyond": {"meaning": BEYOND, "value_m3": one.beyond},
+        }
+        for name, one in zip(("cut", "fill"), sigma.sides, strict=True)
+    }
 
 
 def _total_stated(stated: StatedSigma | None) -> float | None:
@@ -145,7 +168,7 @@ def _sigma(sigma: VolumeSigma, volume: Volume, sources: Sources) -> dict[str, An
     return {
         "sigma_m3": sigma.total,
         "sigma_mean_height_m": sigma.total / volume.area,
-        "parts_m3": dict(sigma.parts),
+        "parts_m3": dict(sigma.parts), **_sides_with_parts(sigma),
         "curvature": None if sigma.curvature is None else {
             "meaning": CURVATURE, "in_the_volume": False, "value_m3": sigma.curvature[0],
             "sigma_m3": sigma.curvature[1],
