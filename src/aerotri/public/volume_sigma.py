@@ -205,15 +205,33 @@ class SigmaOfVolumes:
         area = boundary.area if region is None else region.area
         return PileSigma(*shares, area, volume_sigma(self.reader, base, boundary, *shares, self.options))
 
-    def _side(self, net: PileSigma, base: Base, boundary: Boundary, sign: int) -> PileSigma:
-        """Of the cut (1) or the fill (−1)."""
-        from aerotri.volume.accuracy import PileSigma, volume_sigma
-        from aerotri.volume.bases import SurfaceBase
+    def _side(self, net: PileSigma, base: Base, boundary: Boundary, of: tuple[int, float]) -> PileSigma:
+        """Of the cut (1) or the fill (−1), with σ of the height along the line between them."""
         from aerotri.volume.counted import Counted
 
-        known = self.reader if self.top.points is not None and net.part.region is not None else None
-        spread = float(np.hypot(net.spread, self.options.base_sigma))
-        counted = Counted(base, sign, spread, known)
+        sign, spread = of
+        return self._counting(net, Counted(base, sign, spread, self._known_of(net)), boundary)
+
+    def _spread(self, net: PileSigma, base: Base, boundary: Boundary) -> float:
+        """m, σ of the height over the base along the line between cut and fill, the same error all along it."""
+        from aerotri.volume.counted import Counted
+
+        along = net
+        if net.spread > 0.0:
+            found = self._counting(net, Counted(base, known=self._known_of(net), band=net.spread), boundary)
+            along = found if found.area > 0.0 else net
+        return float(np.hypot(along.spread, self.options.base_sigma))
+
+    def _known_of(self, net: PileSigma) -> Reader | None:
+        """Where a surface of points has heights, if not everywhere."""
+        return self.reader if self.top.points is not None and net.part.region is not None else None
+
+    def _counting(self, net: PileSigma, counted: Counted, boundary: Boundary) -> PileSigma:
+        """What of a volume counts."""
+        from aerotri.volume.accuracy import PileSigma, volume_sigma
+        from aerotri.volume.bases import SurfaceBase
+
+        base = counted.other
         if net.part.side is None:
             raise ValueError("what counts of a part was asked for already")
         part, other = net.part.side(counted), None
@@ -227,7 +245,8 @@ class SigmaOfVolumes:
         """Of the net volume, and of cut and fill; None where there is none."""
         net = self._net(base, boundary, volume)
         if volume.cut > 0.0 and volume.fill > 0.0:
-            return net, [self._side(net, base, boundary, sign) for sign in (1, -1)]
+            spread = self._spread(net, base, boundary)
+            return net, [self._side(net, base, boundary, (sign, spread)) for sign in (1, -1)]
         return net, [net, None] if volume.cut > 0.0 else [None, net]
 
     def of_one(self, base: Base, boundary: Boundary, volume: Volume) -> VolumeSigma:

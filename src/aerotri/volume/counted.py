@@ -26,12 +26,14 @@ class Counted:
     other : what the heights are compared with. sign : 1 what lies above it, −1 what lies below, 0 both.
     spread : m, σ of the height over it that all places have in common.
     known : where it has no height, nothing counts; None: known everywhere.
+    band : m, beside the line: places within it count alone, by exp(−½·(h/band)²); 0: all.
     """
 
     other: Base
     sign: int = 0
     spread: float = 0.0
     known: Surface | None = None
+    band: float = 0.0
 
     def on_side(self, sign: int, spread: float) -> Counted:
         """What of it lies on one side."""
@@ -58,7 +60,8 @@ class Counted:
     def share(self, d: np.ndarray, spread: np.ndarray | float) -> np.ndarray:
         """0 … 1 of places with heights over the other, 0 where one is not known; spread : m, σ of the heights."""
         if self.sign == 0:
-            return np.isfinite(d).astype(float)
+            near = np.exp(-0.5 * np.square(np.nan_to_num(d) / self.band)) if self.band > 0.0 else 1.0
+            return np.isfinite(d) * near
         above = self.sign * np.where(np.isfinite(d), d, 0.0)
         wide = np.maximum(spread, 1e-300)
         return np.where(np.isfinite(d), ndtr(np.clip(above / wide, -40.0, 40.0)), 0.0)

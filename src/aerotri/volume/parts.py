@@ -171,7 +171,7 @@ def _counted_in(tin: _Tin, counted: Counted | None) -> tuple[Region | None, Func
 def _side_of_pickets(tin: _Tin, ground: Ground | None, counted: Counted) -> Part:
     """The share of a cut or a fill."""
     region, functional, response = _counted_in(tin, counted)
-    between = None if ground is None else between_on_side(ground, counted)
+    between = None if ground is None or not counted.sign else between_on_side(ground, counted)
     pickets, measured = tin.pickets, Measured(tin.pickets, functional.gradient)
     rays = len(pickets.image)
     return Part(tin.calibration, response, between, len(pickets), rays, 0.0, measured, region)

@@ -19,7 +19,7 @@ from aerotri.volume.rectified import NO_LINE, Line, expected_above, line_of_shar
 from aerotri.volume.sums import windows
 from aerotri.volume.triangles import Pieces
 
-BLOCK, BLOCK_LENGTHS = 8, 3.0
+BLOCK, BLOCK_LENGTHS = 16, 6.0
 """Cells a side, and noise lengths, of the squares within which relief is told from noise; chosen [C]: several cells
 that have a noise of their own, and not much more ground than that."""
 
