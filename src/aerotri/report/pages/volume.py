@@ -113,9 +113,10 @@ def _piles(c: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Rows of the table of piles, the last one all together."""
     if not c["piles"]:
         return []
-    sigma = None if c["sigma"] is None else c["sigma"]["sigma_m3"]
+    s = c["sigma"]
+    sigma = None if s is None else s["sigma_m3"]
     whole: dict[str, Any] = {**c, "name": "all together", "area_m2": c["boundary"]["area_m2"], "sigma_m3": sigma}
-    whole |= {f"sigma_{of}_m3": None if sigma is None else c["sigma"][of]["sigma_m3"] for of in ("cut", "fill")}
+    whole |= {f"sigma_{of}_m3": None if s is None else s[of]["sigma_m3"] for of in ("cut", "fill")}
     return [
         (printable(one["name"]), _number(one["area_m2"]), _with(one["cut_m3"], one["sigma_cut_m3"]),
          _with(one["fill_m3"], one["sigma_fill_m3"]), _with(one["net_m3"], one["sigma_m3"]),
