@@ -96,12 +96,12 @@ def run_volume(
 def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
     """What the user reads of the volume."""
     from aerotri.deformation.restitution import ORIENTED
-    from aerotri.formats.results.volume import boundary_in_words
+    from aerotri.formats.results.volume import beyond_of_side, boundary_in_words, sigma_of_side
     from aerotri.report.quality import with_sigma
 
     c, s = content, content["sigma"]
     sure = "" if s is None else f" ± {in_digits(s['sigma_m3'], 4)} (1 σ)"
-    of_cut, of_fill = ("", "") if s is None else (_sure(s[name]["sigma_m3"]) for name in ("cut", "fill"))
+    of_cut, of_fill = (_sure(sigma_of_side(c, name)) for name in ("cut", "fill"))
     lines = [
         f"net {in_digits(c['net_m3'], 6)} m³{sure}: cut {in_digits(c['cut_m3'], 6)}{of_cut}, fill "
         f"{in_digits(c['fill_m3'], 6)}{of_fill}; {c['method']}, over "
@@ -112,11 +112,11 @@ def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
         lines.append(f"mass: {_tonnes(c['mass'])} at {c['mass']['density_t_per_m3']:g} t/m³")
     if s is not None:
         lines.append("σ by part, m³: " + ", ".join(f"{name} {in_digits(v, 4)}" for name, v in s["parts_m3"].items()))
-        if c["cut_m3"] > 0.0 and c["fill_m3"] > 0.0:
-            beyond = [in_digits(s[name]["beyond"]["value_m3"], 4) for name in ("cut", "fill")]
+        beyond = [beyond_of_side(c, name) for name in ("cut", "fill")]
+        if beyond[0] is not None and beyond[1] is not None:
             lines.append(
-                f"where the base cuts the ground: cut is expected to hold {beyond[0]} m³ more than the surface shows, "
-                f"fill {beyond[1]} m³; not in them, counted in their σ"
+                f"where the base cuts the ground: cut is expected to hold {in_digits(beyond[0], 4)} m³ more than the "
+                f"surface shows, fill {in_digits(beyond[1], 4)} m³; not in them, counted in their σ"
             )
         if s["curvature"] is not None:
             beyond = with_sigma(s["curvature"]["value_m3"], s["curvature"]["sigma_m3"], signed=True)
@@ -137,7 +137,7 @@ def _pile_line(pile: dict[str, Any]) -> str:
     mass = "" if pile["mass"] is None else f", {_tonnes(pile['mass'])}"
     return (
         f"  {pile['name']}: net {in_digits(pile['net_m3'], 6)} m³{sure}, cut {in_digits(pile['cut_m3'], 6)}"
-        f"{_sure(pile['sigma_cut_m3'])}, fill {in_digits(pile['fill_m3'], 6)}{_sure(pile['sigma_fill_m3'])}, "
+        f"{_sure(pile.get('sigma_cut_m3'))}, fill {in_digits(pile['fill_m3'], 6)}{_sure(pile.get('sigma_fill_m3'))}, "
         f"on {in_digits(pile['area_m2'], 6)} m²{mass}"
     )
 

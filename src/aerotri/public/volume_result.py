@@ -137,11 +137,15 @@ class MeasuredVolume:
     @property
     def cut_sigma(self) -> float | None:
         """m³, one standard deviation of cut; None without an adjustment."""
+        from aerotri.formats.results.volume import sigma_of_side
+
         return sigma_of_side(self.summary, "cut")
 
     @property
     def fill_sigma(self) -> float | None:
         """m³, one standard deviation of fill; None without an adjustment."""
+        from aerotri.formats.results.volume import sigma_of_side
+
         return sigma_of_side(self.summary, "fill")
 
     @property
@@ -251,18 +255,14 @@ class MeasuredVolume:
         )
 
 
-def sigma_of_side(summary: dict[str, Any], name: str) -> float | None:
-    """m³, σ of the 'cut' or the 'fill'; None where not known."""
-    found = None if summary["sigma"] is None else summary["sigma"][name]
-    return None if found is None else found["sigma_m3"]
-
-
 PILE_UNITS = {"_m2": "m²", "_m3": "m³", "_t": "t"}
 
 
 def _of_all(summary: dict[str, Any]) -> dict[str, Any]:
     """The sum of the piles, as one of them."""
     sigma = None if summary["sigma"] is None else summary["sigma"]["sigma_m3"]
+    from aerotri.formats.results.volume import sigma_of_side
+
     sides = {f"sigma_{name}_m3": sigma_of_side(summary, name) for name in ("cut", "fill")}
     return summary | sides | {"name": ALL_PILES, "area_m2": summary["boundary"]["area_m2"], "sigma_m3": sigma}
 

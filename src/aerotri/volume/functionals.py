@@ -210,7 +210,7 @@ def _window_cells(
     sums = [together(v, factor)[used] for v in (*in_plan, weight)]
     gradient = np.stack(sums, axis=-1)
     height = gradient[:, 2]
-    share = np.divide(squares[used], height**2, out=np.ones(len(height)), where=height != 0.0)
+    share = np.divide(squares[used], height**2, out=np.ones(len(height)), where=height**2 > 0.0)
     sigma = cells.sigma
     noise = np.zeros(len(share)) if sigma is None else together((weight * _noise(sigma, window)) ** 2, factor)[used]
     return places, gradient, share, noise

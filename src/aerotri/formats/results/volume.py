@@ -103,6 +103,20 @@ def _sides_with_parts(sigma: VolumeSigma) -> dict[str, Any]:
     }
 
 
+def sigma_of_side(content: Mapping[str, Any], name: str) -> float | None:
+    """m³, σ of the 'cut' or the 'fill' of volume.json; None where not known, as in files of earlier versions."""
+    sigma: Mapping[str, Any] = content.get("sigma") or {}
+    return (sigma.get(name) or {}).get("sigma_m3")
+
+
+def beyond_of_side(content: Mapping[str, Any], name: str) -> float | None:
+    """m³ that the 'cut' or the 'fill' is expected to hold beyond what the surface shows; None where the base does not
+    cut it, or where it is not known."""
+    side = (content.get("sigma") or {}).get(name)
+    cuts = content["cut_m3"] > 0.0 and content["fill_m3"] > 0.0
+    return side["beyond"]["value_m3"] if side and cuts else None
+
+
 def _total_stated(stated: StatedSigma | None) -> float | None:
     """m³; None where nothing is stated."""
     return None if stated is None or stated.total <= 0.0 else stated.total

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from aerotri.formats.results.volume import boundary_in_words
+from aerotri.formats.results.volume import boundary_in_words, sigma_of_side
 from aerotri.report.documents.figures import as_files
 from aerotri.report.documents.head import Context, document, signature_fields
 from aerotri.report.documents.messages import in_english, message_parts
@@ -98,20 +98,18 @@ def _result(c: Mapping[str, Any], words: Words) -> list[tuple[str, str]]:
 
 def _side(c: Mapping[str, Any], of: str, words: Words) -> str:
     """Cut or fill with its σ where it is known."""
-    found = None if c["sigma"] is None else c["sigma"][of]
-    value = c[f"{of}_m3"]
-    return amount(words, value) if found is None else words.with_sigma(value, found["sigma_m3"])
+    return _of_pile({**c, f"sigma_{of}_m3": sigma_of_side(c, of)}, of, words)
 
 
 def _of_pile(pile: Mapping[str, Any], of: str, words: Words) -> str:
     """Cut or fill of a pile, as `_side`."""
-    value, sigma = pile[f"{of}_m3"], pile[f"sigma_{of}_m3"]
+    value, sigma = pile[f"{of}_m3"], pile.get(f"sigma_{of}_m3")
     return amount(words, value) if sigma is None else words.with_sigma(value, sigma)
 
 
 def _piles(c: Mapping[str, Any], words: Words) -> Part:
     whole: dict[str, Any] = {**c, "name": "", "area_m2": c["boundary"]["area_m2"], "sigma_m3": _total(c)}
-    whole |= {f"sigma_{of}_m3": None if c["sigma"] is None else c["sigma"][of]["sigma_m3"] for of in ("cut", "fill")}
+    whole |= {f"sigma_{of}_m3": sigma_of_side(c, of) for of in ("cut", "fill")}
     with_mass = c["mass"] is not None
     rows: list[tuple[str, ...]] = []
     for one in (*c["piles"], whole):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from aerotri.formats.results.volume import boundary_in_words
+from aerotri.formats.results.volume import beyond_of_side, boundary_in_words, sigma_of_side
 from aerotri.report.pages.adjustment import data_address
 from aerotri.report.pages.head import page_environment, page_head, settings_rows
 from aerotri.report.plots.rendering import RenderedPlot
@@ -69,8 +69,7 @@ def _cards(c: Mapping[str, Any]) -> list[tuple[str, str, str]]:
 
 def _side(c: Mapping[str, Any], name: str) -> str:
     """Cut or fill, with its σ where it is known."""
-    s = c["sigma"]
-    return _with(c[f"{name}_m3"], None if s is None else s[name]["sigma_m3"])
+    return _with(c[f"{name}_m3"], sigma_of_side(c, name))
 
 
 def _with(value: float, sigma: float | None) -> str:
@@ -98,8 +97,9 @@ def _budget(c: Mapping[str, Any]) -> str:
             f"{with_sigma(abs(bent['value_m3']), bent['sigma_m3'])} m³ {side}. The volume is that of the surface as "
             "given, so this is not in it; its σ counts it as ground between the pickets."
         )
-    if c["cut_m3"] > 0.0 and c["fill_m3"] > 0.0:
-        more = [_number(s[name]["beyond"]["value_m3"]) for name in ("cut", "fill")]
+    beyond = [beyond_of_side(c, name) for name in ("cut", "fill")]
+    if beyond[0] is not None and beyond[1] is not None:
+        more = [_number(beyond[0]), _number(beyond[1])]
         text += (
             f" The base cuts the ground: beyond what the surface shows, cut is expected to hold {more[0]} m³ and fill "
             f"{more[1]} m³. This is not in them; their σ counts it."
@@ -116,10 +116,10 @@ def _piles(c: Mapping[str, Any]) -> list[tuple[str, ...]]:
     s = c["sigma"]
     sigma = None if s is None else s["sigma_m3"]
     whole: dict[str, Any] = {**c, "name": "all together", "area_m2": c["boundary"]["area_m2"], "sigma_m3": sigma}
-    whole |= {f"sigma_{of}_m3": None if s is None else s[of]["sigma_m3"] for of in ("cut", "fill")}
+    whole |= {f"sigma_{of}_m3": sigma_of_side(c, of) for of in ("cut", "fill")}
     return [
-        (printable(one["name"]), _number(one["area_m2"]), _with(one["cut_m3"], one["sigma_cut_m3"]),
-         _with(one["fill_m3"], one["sigma_fill_m3"]), _with(one["net_m3"], one["sigma_m3"]),
+        (printable(one["name"]), _number(one["area_m2"]), _with(one["cut_m3"], one.get("sigma_cut_m3")),
+         _with(one["fill_m3"], one.get("sigma_fill_m3")), _with(one["net_m3"], one["sigma_m3"]),
          tonnes(one["mass"]))
         for one in (*c["piles"], whole)
     ]  # fmt: skip
