@@ -96,14 +96,15 @@ def run_volume(
 def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
     """What the user reads of the volume."""
     from aerotri.deformation.restitution import ORIENTED
-    from aerotri.formats.results.volume import boundary_in_words
+    from aerotri.formats.results.volume import beyond_of_side, boundary_in_words, sigma_of_side
     from aerotri.report.quality import with_sigma
 
     c, s = content, content["sigma"]
     sure = "" if s is None else f" ± {in_digits(s['sigma_m3'], 4)} (1 σ)"
+    of_cut, of_fill = (_sure(sigma_of_side(c, name)) for name in ("cut", "fill"))
     lines = [
-        f"net {in_digits(c['net_m3'], 6)} m³{sure}: cut {in_digits(c['cut_m3'], 6)}, fill "
-        f"{in_digits(c['fill_m3'], 6)}; {c['method']}, over "
+        f"net {in_digits(c['net_m3'], 6)} m³{sure}: cut {in_digits(c['cut_m3'], 6)}{of_cut}, fill "
+        f"{in_digits(c['fill_m3'], 6)}{of_fill}; {c['method']}, over "
         f"{c['base']['name']}, {in_digits(c['boundary']['area_m2'], 6)} m² inside {boundary_in_words(c['boundary'])}"
     ]
     lines += [_pile_line(pile) for pile in c["piles"]]
@@ -111,6 +112,12 @@ def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
         lines.append(f"mass: {_tonnes(c['mass'])} at {c['mass']['density_t_per_m3']:g} t/m³")
     if s is not None:
         lines.append("σ by part, m³: " + ", ".join(f"{name} {in_digits(v, 4)}" for name, v in s["parts_m3"].items()))
+        beyond = [beyond_of_side(c, name) for name in ("cut", "fill")]
+        if beyond[0] is not None and beyond[1] is not None:
+            lines.append(
+                f"where the base cuts the ground: cut is expected to hold {in_digits(beyond[0], 4)} m³ more than the "
+                f"surface shows, fill {in_digits(beyond[1], 4)} m³; not in them, counted in their σ"
+            )
         if s["curvature"] is not None:
             beyond = with_sigma(s["curvature"]["value_m3"], s["curvature"]["sigma_m3"], signed=True)
             lines.append(
@@ -126,12 +133,17 @@ def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
 
 
 def _pile_line(pile: dict[str, Any]) -> str:
-    sure = "" if pile["sigma_m3"] is None else f" ± {in_digits(pile['sigma_m3'], 4)}"
+    sure = _sure(pile["sigma_m3"])
     mass = "" if pile["mass"] is None else f", {_tonnes(pile['mass'])}"
     return (
-        f"  {pile['name']}: net {in_digits(pile['net_m3'], 6)} m³{sure}, cut {in_digits(pile['cut_m3'], 6)}, "
-        f"fill {in_digits(pile['fill_m3'], 6)}, on {in_digits(pile['area_m2'], 6)} m²{mass}"
+        f"  {pile['name']}: net {in_digits(pile['net_m3'], 6)} m³{sure}, cut {in_digits(pile['cut_m3'], 6)}"
+        f"{_sure(pile.get('sigma_cut_m3'))}, fill {in_digits(pile['fill_m3'], 6)}{_sure(pile.get('sigma_fill_m3'))}, "
+        f"on {in_digits(pile['area_m2'], 6)} m²{mass}"
     )
+
+
+def _sure(sigma: float | None) -> str:
+    return "" if sigma is None else f" ± {in_digits(sigma, 4)}"
 
 
 def _tonnes(mass: dict[str, Any]) -> str:

@@ -242,10 +242,10 @@ def _compute(asked: _Asked, spool: Spool, stack: ExitStack, report: StageReport)
         report.stage("σ of the volume", None)
         finder = SigmaOfVolumes(top, below, reader, asked.options, stack)
         if piles:
-            each, sigma = finder.of_piles([(one.base, one.boundary) for one in piles])
+            each, sigma = finder.of_piles(piles)
             sigmas = [*each]
         else:
-            sigma = finder.of_one(base, boundary)
+            sigma = finder.of_one(base, boundary, volumes.chosen)
         notes = finder.doubts
     crs = reader.crs_code
     measured_with = (top.adjustment.name, top.name_of_points) if top.adjustment else ("", "")

@@ -135,6 +135,20 @@ class MeasuredVolume:
         return None if self.summary["sigma"] is None else self.summary["sigma"]["sigma_m3"]
 
     @property
+    def cut_sigma(self) -> float | None:
+        """m³, one standard deviation of cut; None without an adjustment."""
+        from aerotri.formats.results.volume import sigma_of_side
+
+        return sigma_of_side(self.summary, "cut")
+
+    @property
+    def fill_sigma(self) -> float | None:
+        """m³, one standard deviation of fill; None without an adjustment."""
+        from aerotri.formats.results.volume import sigma_of_side
+
+        return sigma_of_side(self.summary, "fill")
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What else the user should read, in sentences."""
         return tuple(self.summary["warnings"])
@@ -176,7 +190,9 @@ class MeasuredVolume:
         """
         s = self.summary
         rows = [*s["piles"], _of_all(s)] if s["piles"] else []
-        names = ("area_m2", "cut_m3", "fill_m3", "net_m3", "sigma_m3", "no_data_area_m2")
+        names = (
+            "area_m2", "cut_m3", "sigma_cut_m3", "fill_m3", "sigma_fill_m3", "net_m3", "sigma_m3", "no_data_area_m2",
+        )  # fmt: skip
         columns: dict[str, Any] = {"name": [row["name"] for row in rows]}
         columns |= {name: [_known(row[name]) for row in rows] for name in names}
         masses = [row["mass"] or {} for row in rows]
@@ -231,8 +247,9 @@ class MeasuredVolume:
         parts = "" if self.sigma is None else self.parts.html()
         parts = (self.piles.html() if s["piles"] else "") + parts
         return (
-            f"<div><b>{escape(s['dtm'])}: net {in_digits(self.net, 6)} m³{sure}</b>, cut {in_digits(self.cut, 6)}, "
-            f"fill {in_digits(self.fill, 6)} m³ over {escape(s['base']['name'])}, {in_digits(self.area, 6)} m² inside "
+            f"<div><b>{escape(s['dtm'])}: net {in_digits(self.net, 6)} m³{sure}</b>, cut {in_digits(self.cut, 6)}"
+            f"{_sure(self.cut_sigma)}, fill {in_digits(self.fill, 6)}{_sure(self.fill_sigma)} m³ "
+            f"over {escape(s['base']['name'])}, {in_digits(self.area, 6)} m² inside "
             f"{escape(boundary_in_words(s['boundary']))}"
             f"{f'<ul>{warnings}</ul>' if warnings else ''}{parts}</div>"
         )
@@ -244,7 +261,14 @@ PILE_UNITS = {"_m2": "m²", "_m3": "m³", "_t": "t"}
 def _of_all(summary: dict[str, Any]) -> dict[str, Any]:
     """The sum of the piles, as one of them."""
     sigma = None if summary["sigma"] is None else summary["sigma"]["sigma_m3"]
-    return summary | {"name": ALL_PILES, "area_m2": summary["boundary"]["area_m2"], "sigma_m3": sigma}
+    from aerotri.formats.results.volume import sigma_of_side
+
+    sides = {f"sigma_{name}_m3": sigma_of_side(summary, name) for name in ("cut", "fill")}
+    return summary | sides | {"name": ALL_PILES, "area_m2": summary["boundary"]["area_m2"], "sigma_m3": sigma}
+
+
+def _sure(sigma: float | None) -> str:
+    return "" if sigma is None else f" ± {in_digits(sigma, 4)}"
 
 
 def _known(value: float | None) -> float:

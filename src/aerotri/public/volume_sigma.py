@@ -11,6 +11,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.dense import RECORD as DENSE
 from aerotri.public.dense import DenseSurface
@@ -25,12 +27,15 @@ from aerotri.volume.settings import LAYER, Layer
 if TYPE_CHECKING:
     from aerotri.public.surfaces import Reader, SurfaceLike
     from aerotri.results.adjustment import Adjustment as Record
-    from aerotri.volume.accuracy import VolumeSigma
-    from aerotri.volume.bases import Base
+    from aerotri.volume.accuracy import PileSigma, VolumeSigma
+    from aerotri.volume.bases import Base, SurfaceBase
     from aerotri.volume.bases import Surface as Heights
     from aerotri.volume.boundary import Boundary
     from aerotri.volume.cell_noise import CellNoise
+    from aerotri.volume.counted import Counted
     from aerotri.volume.parts import Part
+    from aerotri.volume.piles import Pile
+    from aerotri.volume.quantity import Volume
     from aerotri.volume.settings import SigmaOptions
 
 
@@ -169,44 +174,120 @@ class SigmaOfVolumes:
             return (f"{self.top.surface.label} was measured with another adjustment than the one stated", *notes)
         return notes
 
-    def _shares(self, base: Base, boundary: Boundary) -> tuple[Part, Part | None]:
+    def _shares(self, base: Base, boundary: Boundary, counted: Counted | None) -> tuple[Part, Part | None]:
         from aerotri.volume.bases import SurfaceBase
 
         noise, options = self._noise, self.options
-        part = surface_part(self.record, self.reader, self.top.points, boundary, base, options, noise[0])
+        part = surface_part((self.record, self.reader, self.top.points), boundary, base, options, noise[0], counted)
         if self.below is None or not isinstance(base, SurfaceBase) or self._below[0] is None:
             return part, None
-        other = surface_part(self._below[0], base.surface, self.below.points, boundary, None, options, noise[1])
-        return part, other
+        lower = (self._below[0], base.surface, self.below.points)
+        of_lower = None if counted is None else self._counted_below(counted, base)
+        return part, surface_part(lower, boundary, None, options, noise[1], of_lower)
 
-    def of_one(self, base: Base, boundary: Boundary) -> VolumeSigma:
-        """σ of the volume inside a boundary.
+    def _counted_below(self, counted: Counted, base: SurfaceBase) -> Counted:
+        """What counts, of the surface that is the base."""
+        from aerotri.volume.bases import SurfaceBase
+        from aerotri.volume.counted import Counted
+
+        known = None if self.below is None or self.below.points is None else base.surface
+        return Counted(SurfaceBase(self.reader.path.name, self.reader), -counted.sign, counted.spread, known)
+
+    def _net(self, base: Base, boundary: Boundary, volume: Volume) -> PileSigma:
+        """Of all that is known inside a boundary."""
+        from aerotri.volume.accuracy import PileSigma, volume_sigma
+        from aerotri.volume.counted import Counted
+
+        holes = volume.no_data_area > 0.0
+        counted = Counted(base, known=self.reader if self.top.points is not None else None) if holes else None
+        shares = self._shares(base, boundary, counted)
+        region = shares[0].region
+        area = boundary.area if region is None else region.area
+        return PileSigma(*shares, area, volume_sigma(self.reader, base, boundary, *shares, self.options))
+
+    def _side(self, net: PileSigma, base: Base, boundary: Boundary, of: tuple[int, float]) -> PileSigma:
+        """Of the cut (1) or the fill (−1), with σ of the height along the line between them."""
+        from aerotri.volume.counted import Counted
+
+        sign, spread = of
+        return self._counting(net, Counted(base, sign, spread, self._known_of(net)), boundary)
+
+    def _spread(self, net: PileSigma, base: Base, boundary: Boundary) -> float:
+        """m, σ of the height over the base along the line between cut and fill, the same error all along it."""
+        from aerotri.volume.counted import Counted
+
+        along = net
+        if net.spread > 0.0:
+            found = self._counting(net, Counted(base, known=self._known_of(net), band=net.spread), boundary)
+            along = found if found.area > 0.0 else net
+        return float(np.hypot(along.spread, self.options.base_sigma))
+
+    def _known_of(self, net: PileSigma) -> Reader | None:
+        """Where a surface of points has heights, if not everywhere."""
+        return self.reader if self.top.points is not None and net.part.region is not None else None
+
+    def _counting(self, net: PileSigma, counted: Counted, boundary: Boundary) -> PileSigma:
+        """What of a volume counts."""
+        from aerotri.volume.accuracy import PileSigma, volume_sigma
+        from aerotri.volume.bases import SurfaceBase
+
+        base = counted.other
+        if net.part.side is None:
+            raise ValueError("what counts of a part was asked for already")
+        part, other = net.part.side(counted), None
+        if net.base_part is not None and net.base_part.side is not None and isinstance(base, SurfaceBase):
+            other = net.base_part.side(self._counted_below(counted, base))
+        region = part.region
+        area = 0.0 if region is None else region.area
+        return PileSigma(part, other, area, volume_sigma(self.reader, base, boundary, part, other, self.options))
+
+    def _all(self, base: Base, boundary: Boundary, volume: Volume) -> tuple[PileSigma, list[PileSigma | None]]:
+        """Of the net volume, and of cut and fill; None where there is none."""
+        net = self._net(base, boundary, volume)
+        if volume.cut > 0.0 and volume.fill > 0.0:
+            spread = self._spread(net, base, boundary)
+            return net, [self._side(net, base, boundary, (sign, spread)) for sign in (1, -1)]
+        return net, [net, None] if volume.cut > 0.0 else [None, net]
+
+    def of_one(self, base: Base, boundary: Boundary, volume: Volume) -> VolumeSigma:
+        """σ of the volume inside a boundary, and of its cut and fill.
 
         Raises
         ------
         InputError
         """
-        from aerotri.volume.accuracy import volume_sigma
-
-        found = volume_sigma(self.reader, base, boundary, *self._shares(base, boundary), self.options)
+        net, sides = self._all(base, boundary, volume)
+        found = _with_sides(net.sigma, [None if one is None else one.sigma for one in sides])
         return replace(found, notes=(*self._notes, *found.notes))
 
-    def of_piles(self, piles: Sequence[tuple[Base, Boundary]]) -> tuple[list[VolumeSigma], VolumeSigma]:
-        """σ of every volume, and of their sum.
+    def of_piles(self, piles: Sequence[Pile]) -> tuple[list[VolumeSigma], VolumeSigma]:
+        """σ of every volume, and of their sum; of cut and fill too.
 
         Raises
         ------
         InputError
         """
-        from aerotri.volume.accuracy import PileSigma, sum_sigma, volume_sigma
+        from aerotri.volume.accuracy import sum_sigma
 
-        each: list[PileSigma] = []
-        for base, boundary in piles:
-            shares = self._shares(base, boundary)
-            sigma = volume_sigma(self.reader, base, boundary, *shares, self.options)
-            each.append(PileSigma(*shares, boundary.area, sigma))
-        total = sum_sigma(each, self.options)
-        return [one.sigma for one in each], replace(total, notes=(*self._notes, *total.notes))
+        found = [self._all(one.base, one.boundary, one.volumes.chosen) for one in piles]
+        each = [_with_sides(net.sigma, [None if one is None else one.sigma for one in sides]) for net, sides in found]
+        total = sum_sigma([net for net, _ in found], self.options)
+        of_sides: list[VolumeSigma | None] = []
+        for k in range(2):
+            own = [sides[k] for _, sides in found]
+            some = [one for one in own if one is not None]
+            same = all(one is net for one, (net, _) in zip(own, found, strict=True))
+            of_sides.append(total if same else sum_sigma(some, self.options) if some else None)
+        total = _with_sides(total, of_sides)
+        return each, replace(total, notes=(*self._notes, *total.notes))
+
+
+def _with_sides(net: VolumeSigma, sides: Sequence[VolumeSigma | None]) -> VolumeSigma:
+    """σ of a net volume with those of its cut and its fill."""
+    from aerotri.volume.accuracy import SideSigma
+
+    cut, fill = (SideSigma.of(one, net) for one in sides)
+    return replace(net, sides=(cut, fill))
 
 
 def adjustment_of_base(
@@ -239,14 +320,15 @@ def adjustment_of_base(
 
 
 def surface_part(
-    record: Record, heights: Heights, points: FilePath | Table | None, boundary: Boundary, base: Base | None,
-    options: SigmaOptions, noise: CellNoise,
+    of: tuple[Record, Heights, FilePath | Table | None], boundary: Boundary, base: Base | None, options: SigmaOptions,
+    noise: CellNoise, counted: Counted | None = None,
 ) -> Part:  # fmt: skip
     """The share of a surface in σ: of the points it was measured at where they are known, else of all its cells.
 
     Parameters
     ----------
-    noise : what is known of that of the cells.
+    of : its adjustment, its heights and its points, None where not known.
+    noise : what is known of that of the cells. counted : what of it counts; None: all.
 
     Raises
     ------
@@ -257,10 +339,11 @@ def surface_part(
     from aerotri.formats.text.parquet import load_parquet
     from aerotri.volume.parts import part_of_cells, part_of_measured
 
+    record, heights, points = of
     if points is None:
-        return part_of_cells(record, heights, boundary, base, options, noise)
+        return part_of_cells(record, heights, boundary, base, options, noise, counted)
     if isinstance(points, Table):
         measured = measured_pickets(points.to_arrow())
     else:
         measured = measured_pickets(load_parquet(Path(points)), Path(points))
-    return part_of_measured(record, measured, boundary, base, options)
+    return part_of_measured(record, measured, boundary, base, options, counted)

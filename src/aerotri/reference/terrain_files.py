@@ -223,6 +223,24 @@ def _parts(of: str) -> list[Item]:
     ]
 
 
+def _side(of: str, name: str) -> tuple[Item, ...]:
+    """σ of a cut or of a fill."""
+    return (
+        Item(of, "object", f"How sure the {name} is."),
+        Item(f"{of}.sigma_m3", "number", f"Standard deviation of the {name}.", "m³"),
+        Item(f"{of}.parts_m3", "object", "The parts of it, each alone.", "m³"),
+        *_parts(f"{of}.parts_m3"),
+        Item(
+            f"{of}.parts_m3.zero_line", "number",
+            "Part of the line between cut and fill: errors move it, and noise alone makes both larger. 0 where the "
+            "base does not cut the surface.", "m³",
+        ),
+        Item(f"{of}.beyond", "object", "What it is expected to hold beyond what the surface shows."),
+        Item(f"{of}.beyond.meaning", "text", "What it is, in words."),
+        Item(f"{of}.beyond.value_m3", "number", "Its expected size.", "m³"),
+    )  # fmt: skip
+
+
 VOLUME_JSON = (
     *HEAD,
     Item("dtm", "text", "File of the surface."),
@@ -256,6 +274,7 @@ VOLUME_JSON = (
     Item("sigma.sigma_mean_height_m", "number", "The same over the area: of the mean height.", "m"),
     Item("sigma.parts_m3", "object", "The parts of the standard deviation, each alone.", "m³"),
     *_parts("sigma.parts_m3"),
+    *(item for name in ("cut", "fill") for item in _side(f"sigma.{name}", name)),
     Item("sigma.curvature", "object?", "Terrain between the measured points, listed separately; null where not known."),
     Item("sigma.curvature.meaning", "text", "What it is, in words."),
     Item("sigma.curvature.in_the_volume", "yes/no", "Whether the volume contains it."),
@@ -301,6 +320,8 @@ VOLUME_JSON = (
     Item("piles[].base", "text", "Its base, in words."),
     *(Item(f"piles[].{name}", "number", text, unit) for name, text, unit in VOLUMES),
     Item("piles[].sigma_m3", "number?", "Standard deviation of its net volume; null without --adjustment.", "m³"),
+    Item("piles[].sigma_cut_m3", "number?", "The same of its cut.", "m³"),
+    Item("piles[].sigma_fill_m3", "number?", "The same of its fill.", "m³"),
     Item("piles[].parts_m3", "object?", "The parts of it, each alone.", "m³"),
     *_parts("piles[].parts_m3"),
     Item("piles[].stated_sigma_m3", "number?", "As stated_sigma.sigma_m3, of the pile.", "m³"),
@@ -312,7 +333,9 @@ PILES = (
     Item("name", "text", "The pile; the last row is all together."),
     Item("area_m2", "number", "Area inside.", "m²"),
     Item("cut_m3", "number", "Volume above the base.", "m³"),
+    Item("sigma_cut_m3", "number?", "Standard deviation of the cut.", "m³"),
     Item("fill_m3", "number", "Volume below the base.", "m³"),
+    Item("sigma_fill_m3", "number?", "Standard deviation of the fill.", "m³"),
     Item("net_m3", "number", "Cut less fill.", "m³"),
     Item("sigma_m3", "number?", "Standard deviation of the net volume.", "m³"),
     Item("no_data_area_m2", "number", "Area without heights.", "m²"),

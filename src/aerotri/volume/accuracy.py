@@ -9,9 +9,11 @@ import numpy as np
 import shapely
 
 from aerotri.conventions import in_digits
-from aerotri.volume.bases import Base, PlaneBase, SplineBase, Surface, quadrature_of, sampled
+from aerotri.volume.bases import Base, PlaneBase, SplineBase, Surface, integral_of_spline, quadrature_of, sampled
 from aerotri.volume.boundary import Boundary, boundary_of
 from aerotri.volume.parts import Part
+from aerotri.volume.rectified import LINE, NO_LINE, Line
+from aerotri.volume.regions import Region
 from aerotri.volume.response import Systematic, systematic
 from aerotri.volume.roughness import Between, roughness_of_cells
 from aerotri.volume.settings import SigmaOptions
@@ -45,6 +47,33 @@ LASTING = "matching_shared"
 
 
 @dataclass(frozen=True)
+class SideSigma:
+    """σ of a cut or of a fill, m³.
+
+    Parameters
+    ----------
+    parts : as of `VolumeSigma`, and what moving the line between cut and fill does (`LINE`).
+    beyond : m³ that it is expected to hold beyond that of the surface as given; not in the volume, its square in σ.
+    """
+
+    parts: dict[str, float]
+    beyond: float
+
+    @property
+    def total(self) -> float:
+        """m³, the root of the sum of squares."""
+        return float(np.sqrt(sum(part**2 for part in self.parts.values())))
+
+    @classmethod
+    def of(cls, sigma: VolumeSigma | None, like: VolumeSigma) -> SideSigma:
+        """From σ of the volume on one side, None where there is none; like : of the net volume."""
+        if sigma is None:
+            return cls(dict.fromkeys((*like.parts, LINE), 0.0), 0.0)
+        curvature = 0.0 if sigma.curvature is None else sigma.curvature[0]
+        return cls(sigma.parts | {LINE: sigma.parts.get(LINE, 0.0)}, curvature - sigma.noise_on_line)
+
+
+@dataclass(frozen=True)
 class VolumeSigma:
     """σ of a volume, m³.
 
@@ -57,6 +86,8 @@ class VolumeSigma:
     corrected : whether the photographs were corrected, so that the systematic part is none.
     pickets, rays : behind the adjustment's part. notes : how it was found, sentences.
     beside : those of the notes that are about base, boundary and ground.
+    noise_on_line : m³, of a cut or a fill: what noise alone adds to it.
+    sides : of the cut and of the fill; None where not asked for.
     """
 
     parts: dict[str, float]
@@ -67,6 +98,8 @@ class VolumeSigma:
     rays: int
     notes: tuple[str, ...] = field(default=())
     beside: tuple[str, ...] = ()
+    noise_on_line: float = 0.0
+    sides: tuple[SideSigma, SideSigma] | None = None
 
     @property
     def total(self) -> float:
@@ -109,10 +142,13 @@ def volume_sigma(
         adjustment by the difference of the responses; control points and values of a camera that two adjustments
         share, by name and value, by their covariance.
     """
-    ground = base_variance(base, boundary, surface, options)
-    edge = boundary_variance(surface, base, boundary, options.boundary_sigma)
+    region = part.region
+    ground = base_variance(base, boundary, surface, options, region)
+    sign = 0 if region is None else region.sign
+    edge = boundary_variance(surface, base, boundary, options.boundary_sigma, sign)
     notes = _notes(part, base_part, base, ground, options)
-    return _assembled(part, base_part, _Beside(ground, edge, notes), options)
+    beside = _Beside(ground, edge, notes, region.line if region is not None and sign else None)
+    return _assembled(part, base_part, beside, options)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +159,18 @@ class PileSigma:
     base_part: Part | None
     area: float
     sigma: VolumeSigma
+
+    @property
+    def line(self) -> Line | None:
+        """Of a cut or a fill."""
+        region = self.part.region
+        return None if region is None or not region.sign else region.line
+
+    @property
+    def spread(self) -> float:
+        """m, σ of the heights over the base that all places have in common."""
+        parts = self.sigma.parts
+        return float(np.hypot(parts["adjustment"], parts.get(MODEL, 0.0))) / max(self.area, 1e-300)
 
 
 def sum_sigma(piles: Sequence[PileSigma], options: SigmaOptions) -> VolumeSigma:
@@ -138,16 +186,22 @@ def sum_sigma(piles: Sequence[PileSigma], options: SigmaOptions) -> VolumeSigma:
     ground = max(own, 0.0) + (options.base_sigma * sum(one.area for one in piles)) ** 2
     edge = sum(one.sigma.parts["boundary"] ** 2 for one in piles)
     notes = dict.fromkeys(text for one in piles for text in one.sigma.beside)
-    return _assembled(part, base_part, _Beside(ground, edge, tuple(notes)), options)
+    lines = [one.line for one in piles if one.line is not None]
+    line = sum(lines, NO_LINE) if lines else None
+    return _assembled(part, base_part, _Beside(ground, edge, tuple(notes), line), options)
 
 
 @dataclass(frozen=True)
 class _Beside:
-    """What does not come from the measurements: variances of base and boundary, m⁶, and sentences."""
+    """What does not come from the measurements: variances of base and boundary, m⁶, and sentences.
+
+    line : between cut and fill, of one of them.
+    """
 
     ground: float
     edge: float
     notes: tuple[str, ...]
+    line: Line | None = None
 
 
 def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: SigmaOptions) -> VolumeSigma:
@@ -174,6 +228,8 @@ def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: Sig
         said += [_model_in_words(one, parts) for one in both if one.response.model > 0.0]
     if any(one.lasting.sigma_m > 0.0 for one in (part, base_part) if one is not None):
         parts[LASTING] = np.sqrt(lasting)
+    if beside.line is not None:
+        parts[LINE] = np.sqrt(beside.line.mean_square)
     first = both[0]
     found = tuple(systematic(first.calibration, first.response, variant) for variant in ("free", "absorbed")
                   if len(first.response.by_parameters))  # fmt: skip
@@ -181,6 +237,7 @@ def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: Sig
         {name: float(value) for name, value in parts.items()},
         None if between is None else (between.curvature, float(np.sqrt(between.variance))), found, options.corrected,
         sum(one.pickets for one in both), sum(one.rays for one in both), (*said, *beside.notes), beside.notes,
+        0.0 if beside.line is None else beside.line.noise,
     )  # fmt: skip
 
 
@@ -205,8 +262,10 @@ def _model_in_words(part: Part, parts: dict[str, float]) -> str:
     )
 
 
-def boundary_variance(surface: Surface, base: Base, boundary: Boundary, sigma: float) -> float:
+def boundary_variance(surface: Surface, base: Base, boundary: Boundary, sigma: float, sign: int = 0) -> float:
     """m⁶, from corners of the boundary that are each off by σ in either coordinate, independently.
+
+    sign : 1 of the cut alone, −1 of the fill.
 
     [D] ∂V/∂corner = ∮ (z − base)·φ·n ds over its two edges, φ falling linearly from 1 to 0, n the outer normal.
     """
@@ -219,6 +278,7 @@ def boundary_variance(surface: Surface, base: Base, boundary: Boundary, sigma: f
         edges = np.diff(ring, axis=0)
         at = (ring[:-1, None] + t[None, :, None] * edges[:, None]).reshape(-1, 2)
         d = sampled(surface, at[:, 0], at[:, 1]) - base.heights(at[:, 0], at[:, 1])
+        d = np.maximum(sign * d, 0.0) if sign else d
         d = np.where(np.isfinite(d), d, 0.0).reshape(len(edges), ALONG_EDGE)
         normal = np.column_stack([edges[:, 1], -edges[:, 0]])
         from_start, from_end = d @ (simpson * (1.0 - t)), d @ (simpson * t)
@@ -235,9 +295,14 @@ def _difference(between: list[Between | None]) -> Between | None:
     return Between(sum(sign * one.curvature for sign, one in known), sum(one.variance for _, one in known))
 
 
-def base_variance(base: Base, boundary: Boundary, surface: Surface, options: SigmaOptions) -> float:
-    """m⁶, of the base: what is stated for it, and for a spline how rough the ground around suggests it is below."""
-    stated = (options.base_sigma * boundary.area) ** 2
+def base_variance(
+    base: Base, boundary: Boundary, surface: Surface, options: SigmaOptions, region: Region | None = None
+) -> float:
+    """m⁶, of the base: what is stated for it, and for a spline how rough the ground around suggests it is below.
+
+    region : what counts of the boundary; None: all.
+    """
+    stated = (options.base_sigma * (boundary.area if region is None else region.area)) ** 2
     if not isinstance(base, SplineBase):
         return stated
     width = RING_SHARE * np.sqrt(boundary.area)
@@ -255,9 +320,10 @@ def base_variance(base: Base, boundary: Boundary, surface: Surface, options: Sig
         roughness = roughness_of_cells(z, surface.grid, step, SMOOTHEST_BELOW)
     if roughness is None:
         return stated
-    places, weight = quadrature_of(boundary)
+    places, weight = quadrature_of(boundary) if region is None else (region.places, region.weight)
+    integral = base.integral if region is None else integral_of_spline(base, places, weight)
     xy = np.concatenate([places, base.xy])
-    return stated + max(float(roughness.contrast_variance(xy, np.concatenate([weight, -base.integral]))), 0.0)
+    return stated + max(float(roughness.contrast_variance(xy, np.concatenate([weight, -integral]))), 0.0)
 
 
 def _notes(part: Part, base_part: Part | None, base: Base, ground: float, options: SigmaOptions) -> tuple[str, ...]:

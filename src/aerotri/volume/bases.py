@@ -247,12 +247,7 @@ def spline_through(surface: Surface, boundary: Boundary) -> SplineBase:
     its integral has 5 to 25 times the noise of this one [D: a boundary of 57 600 m², 60 and 400 nodes].
     """
     nodes = boundary_heights(surface, boundary)
-    middle = nodes[:, :2].mean(axis=0)
-    size = float(np.abs(nodes[:, :2] - middle).max())
-    at = (nodes[:, :2] - middle) / size
-    system = np.zeros((len(at) + 3, len(at) + 3))
-    system[: len(at)] = _spline_terms(at, at)
-    system[len(at) :, : len(at)] = system[: len(at), len(at) :].T
+    middle, size, at, system = _spline_system(nodes[:, :2])
     right = np.concatenate([nodes[:, 2] - nodes[:, 2].mean(), np.zeros(3)])
     coefficients = np.linalg.lstsq(system, right, rcond=1e-14)[0]
 
@@ -260,14 +255,30 @@ def spline_through(surface: Surface, boundary: Boundary) -> SplineBase:
     x, y = np.linspace(left, right_edge, LATTICE), np.linspace(bottom, top, LATTICE)
     places = (np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2) - middle) / size
     values = nodes[:, 2].mean() + _spline_terms(places, at) @ coefficients
-    quadrature, weight = quadrature_of(boundary)
-    terms = weight @ _spline_terms((quadrature - middle) / size, at)
-    # the spline takes the mean of z out first: it gives a constant back as it is, so the weights are the same
-    integral = np.linalg.lstsq(system.T, terms, rcond=1e-14)[0][: len(at)]
-    return SplineBase(
-        f"spline through {len(at)} places of the boundary", nodes[:, :2], nodes[:, 2], integral,
+    base = SplineBase(
+        f"spline through {len(at)} places of the boundary", nodes[:, :2], nodes[:, 2], np.zeros(len(at)),
         RectBivariateSpline(x, y, values.reshape(LATTICE, LATTICE)),
     )  # fmt: skip
+    return replace(base, integral=integral_of_spline(base, *quadrature_of(boundary)))
+
+
+def integral_of_spline(base: SplineBase, places: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """(k,) m², ∫ of the spline over places (q, 2) with weights (q,) m², by the heights it goes through."""
+    middle, size, at, system = _spline_system(base.xy)
+    terms = weight @ _spline_terms((places - middle) / size, at)
+    # the spline takes the mean of z out first: it gives a constant back as it is, so the weights are the same
+    return np.linalg.lstsq(system.T, terms, rcond=1e-14)[0][: len(at)]
+
+
+def _spline_system(xy: np.ndarray) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
+    """Middle and size of places (k, 2), these in their units, and the system (k + 3, k + 3) of the spline."""
+    middle = xy.mean(axis=0)
+    size = float(np.abs(xy - middle).max())
+    at = (xy - middle) / size
+    system = np.zeros((len(at) + 3, len(at) + 3))
+    system[: len(at)] = _spline_terms(at, at)
+    system[len(at) :, : len(at)] = system[: len(at), len(at) :].T
+    return middle, size, at, system
 
 
 def quadrature_of(boundary: Boundary, panels: int = PANELS) -> tuple[np.ndarray, np.ndarray]:

@@ -12,20 +12,20 @@ from __future__ import annotations
 import numpy as np
 
 from aerotri.rasters.grids import Grid
-from aerotri.volume.bases import Base, PlaneBase, SplineBase, Surface, nodes_of
-from aerotri.volume.boundary import Boundary
-from aerotri.volume.triangles import cut_to
+from aerotri.volume.bases import Base, PlaneBase, SplineBase, nodes_of
+from aerotri.volume.triangles import Pieces
 
 STEP = 0.1
 """m over which the slope of a base is taken."""
+DRAWN_MARGIN = 2
+"""Cells around a window that the motion of its own depends on."""
 
 
-def drawn_in_plan(xyz: np.ndarray, triangles: np.ndarray, boundary: Boundary, base: Base) -> np.ndarray:
+def drawn_in_plan(xyz: np.ndarray, triangles: np.ndarray, pieces: Pieces, base: Base) -> np.ndarray:
     """(k, 2) m², ∂V/∂(X, Y) of the pickets (k, 3) of a TIN whose boundary moves with them, the nodes of its base apart.
 
-    Nodes have s·∫φ_k, see `slope_of_nodes`.
+    Nodes have s·∫φ_k, see `slope_of_nodes`. pieces : the parts of its triangles that count.
     """
-    pieces = cut_to(boundary.polygon, xyz[triangles][:, :, :2])
     corners = triangles[pieces.triangle]
     at = np.einsum("nk,nkc->nc", pieces.weights, xyz[corners])
     h = _known(at[:, 2] - base.heights(at[:, 0], at[:, 1]))
@@ -38,21 +38,64 @@ def drawn_in_plan(xyz: np.ndarray, triangles: np.ndarray, boundary: Boundary, ba
     return out
 
 
-def drawn_cells(
-    surface: Surface, boundary: Boundary, base: Base, window: tuple[int, int, int, int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """∂V/∂X and ∂V/∂Y of cells of a window (row, column, rows, columns), m², by differences of neighbours."""
-    row, column, rows, columns = window
-    around = surface.grid.window(row - 1, column - 1, rows + 2, columns + 2)
-    z = surface.read(row - 1, column - 1, rows + 2, columns + 2).astype(float)
+def drawn_cells(around: Grid, z: np.ndarray, weight: np.ndarray, base: Base) -> tuple[np.ndarray, np.ndarray]:
+    """∂V/∂X and ∂V/∂Y of cells, m², by differences of neighbours; beside a hole by those on one side of it.
+
+    A cell moves by δ, and h·div δ takes the differences of δ that `slopes_of_cells` takes of heights: so a shift of
+    all cells cancels whatever holes there are.
+
+    Parameters
+    ----------
+    around : the cells and `DRAWN_MARGIN` around them. z : m, NaN where not known. weight : m² that count.
+    """
     below = base.on_grid(around)
-    weight = boundary.coverage(around) * np.isfinite(z) * around.cell_x * around.cell_y
-    held = _known(z - below) * weight
-    by_x = (held[1:-1, :-2] - held[1:-1, 2:]) / (2.0 * around.cell_x)
-    by_y = (held[2:, 1:-1] - held[:-2, 1:-1]) / (2.0 * around.cell_y)
-    slope_x, slope_y = _grid_slopes(below, around) if nodes_of(base) is None else slope_of_nodes(base)
-    inner = weight[1:-1, 1:-1]
+    held, known, m = _known(z - below) * weight, np.isfinite(z), DRAWN_MARGIN
+    by_x = _by_motion(held, known, around.cell_x)[m:-m, m:-m]
+    by_y = -_by_motion(held.T, known.T, around.cell_y).T[m:-m, m:-m]
+    inner = weight[m:-m, m:-m]
+    if nodes_of(base) is None:
+        slope_x, slope_y = (v[m - 1 : 1 - m, m - 1 : 1 - m] for v in slopes_of_cells(below, around))
+    else:
+        slope_x, slope_y = slope_of_nodes(base)
     return by_x - inner * slope_x, by_y - inner * slope_y
+
+
+def slopes_of_cells(z: np.ndarray, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Slopes along X and Y of the inner cells of (rows, columns) m; of cells beside a hole by their other neighbour."""
+    known, filled = np.isfinite(z), _known(z)
+    along, across = _differences(filled, known) / grid.cell_x, _differences(filled.T, known.T).T / grid.cell_y
+    return along[1:-1, 1:-1], -across[1:-1, 1:-1]
+
+
+def _differences(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Differences along the rows of (rows, columns), for one step."""
+    before, own, after = (c * v for c, v in zip(_stencil(known), _shifted(values), strict=True))
+    return before + own + after
+
+
+def _by_motion(held: np.ndarray, known: np.ndarray, step: float) -> np.ndarray:
+    """∂/∂δ of Σ held·∂δ, differences along the rows: every cell gives its weight to those its difference is of."""
+    before, own, after = (c * held / step for c in _stencil(known))
+    out = own
+    out[:, :-1] += before[:, 1:]
+    out[:, 1:] += after[:, :-1]
+    return out
+
+
+def _stencil(known: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Factors of the cell before, of the cell itself and of that after it in the difference of every cell of a row."""
+    before, _, after = _shifted(known)
+    both, none = before & after, ~(before | after)
+    one = known & ~both & ~none
+    factor = np.where(known & both, 0.5, one.astype(float))
+    return -factor * before, one * (before.astype(float) - after.astype(float)), factor * after
+
+
+def _shifted(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of the cell before, the cell, the cell after in every row; 0 beyond the edge."""
+    before, after = np.zeros_like(values), np.zeros_like(values)
+    before[:, 1:], after[:, :-1] = values[:, :-1], values[:, 1:]
+    return before, values, after
 
 
 def slope_of_nodes(base: Base | None) -> np.ndarray:
@@ -63,12 +106,6 @@ def slope_of_nodes(base: Base | None) -> np.ndarray:
         return np.zeros(2)
     design = np.column_stack([np.ones(len(base.xy)), base.xy - base.xy.mean(axis=0)])
     return np.linalg.lstsq(design, base.z, rcond=None)[0][1:]
-
-
-def _grid_slopes(z: np.ndarray, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """Slopes along X and Y of the inner cells."""
-    along = (z[1:-1, 2:] - z[1:-1, :-2]) / (2.0 * grid.cell_x)
-    return _known(along), _known((z[:-2, 1:-1] - z[2:, 1:-1]) / (2.0 * grid.cell_y))
 
 
 def _slopes(base: Base, at: np.ndarray) -> np.ndarray:

@@ -16,9 +16,10 @@ from aerotri.rasters.grids import Grid
 from aerotri.terrain.tin import corners_in_plan
 from aerotri.volume.bases import Base, Nodes, Surface, nodes_of
 from aerotri.volume.boundary import Boundary
-from aerotri.volume.drawn import drawn_cells, drawn_in_plan, slope_of_nodes
+from aerotri.volume.counted import Counted
+from aerotri.volume.drawn import DRAWN_MARGIN, drawn_cells, drawn_in_plan, slope_of_nodes, slopes_of_cells
 from aerotri.volume.sums import cells_within, windows
-from aerotri.volume.triangles import barycentric, corner_weights
+from aerotri.volume.triangles import Pieces, barycentric, cut_to
 
 NEXT_TO = 1e-9
 """Weight of cells outside a boundary that moves, which count by their motion alone."""
@@ -65,8 +66,9 @@ def triangle_slopes(xyz: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def tin_volume(
-    xyz: np.ndarray, triangles: np.ndarray, boundary: Boundary, base: Base | None = None, drawn: bool = False
-) -> tuple[float, Functional]:
+    xyz: np.ndarray, triangles: np.ndarray, boundary: Boundary, base: Base | None = None, drawn: bool = False,
+    pieces: Pieces | None = None,
+) -> tuple[float, Functional]:  # fmt: skip
     """Volume under a TIN over the height 0 (less that of the base's own nodes), and its gradient.
 
     Parameters
@@ -74,16 +76,17 @@ def tin_volume(
     xyz : (k, 3) m. triangles : (t, 3).
     base : matters where it hangs on the surface itself, as a spline through the boundary, and where `drawn`.
     drawn : the boundary was drawn on the surface and moves with it; needs the base.
+    pieces : the parts of triangles that count; None: all inside the boundary.
     """
-    inside, weight = corner_weights(boundary, xyz[triangles][:, :, :2])
-    value, gradient = _of_weights(xyz, triangles[inside], weight)
+    pieces = cut_to(boundary.polygon, xyz[triangles][:, :, :2]) if pieces is None else pieces
+    value, gradient = _of_weights(xyz, triangles[pieces.triangle], pieces.area[:, None] * pieces.weights)
     nodes, moved = nodes_of(base), np.zeros_like(gradient)
     if nodes is not None:
         of_base, base_weight = barycentric_weights(xyz, triangles, nodes.xy, -nodes.integral)
         more, moved = _of_weights(xyz, triangles[of_base], base_weight)
         value, gradient = value + more, gradient + moved
     if drawn and base is not None:
-        gradient[:, :2] = drawn_in_plan(xyz, triangles, boundary, base)
+        gradient[:, :2] = drawn_in_plan(xyz, triangles, pieces, base)
         if nodes is not None:
             gradient[:, :2] -= moved[:, 2:] * slope_of_nodes(base)
     return value, Functional(xyz, gradient, np.ones(len(xyz)))
@@ -126,6 +129,7 @@ def cell_volume(
     base: Base | None = None,
     sigma: Surface | None = None,
     drawn: bool = False,
+    counted: Counted | None = None,
 ) -> Functional:
     """The gradient of a volume by the cells of a surface, every cell a picket; many cells are put together.
 
@@ -134,60 +138,80 @@ def cell_volume(
     Parameters
     ----------
     sigma : m, σ of the noise of every cell, on the same cells; None where not known.
-    drawn : as of `tin_volume`.
+    drawn : as of `tin_volume`. counted : which cells count; None: all that have a height.
     """
     rows, columns = cells_within(surface.grid, boundary)[2:]
     factor = max(1, int(np.ceil(np.sqrt(rows * columns / MOST_CELLS))))
     size = max(factor, 1024 // factor * factor)
     extra = _node_cells(surface.grid, nodes_of(base))
-    moving = base if drawn else None
-    parts = [
-        _window_cells(surface, boundary, extra, window, factor, sigma, moving)
-        for window in windows(surface.grid, boundary, size)
-    ]
+    cells = _Cells(surface, boundary, extra, factor, sigma, base if drawn else None, counted)
+    parts = [_window_cells(cells, window) for window in windows(surface.grid, boundary, size)]
     xyz, gradient, share, noise = (np.concatenate([part[k] for part in parts]) for k in range(4))
     return Functional(xyz, gradient, share, None if sigma is None else noise)
 
 
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """What the cells of a volume are taken from; `factor` × `factor` of them count together."""
+
+    surface: Surface
+    boundary: Boundary
+    extra: dict[tuple[int, int], float]
+    factor: int
+    sigma: Surface | None
+    moving: Base | None
+    counted: Counted | None
+
+    def heights(self, window: tuple[int, int, int, int], margin: int) -> tuple[Grid, np.ndarray, np.ndarray]:
+        """A window and some cells around it, heights with NaN where not known, and m² of every cell that count."""
+        row, column, rows, columns = window
+        place = (row - margin, column - margin, rows + 2 * margin, columns + 2 * margin)
+        grid = self.surface.grid.window(*place)
+        z = self.surface.read(*place).astype(float)
+        weight = self.boundary.coverage(grid) * grid.cell_x * grid.cell_y
+        if self.counted is not None:
+            noise = None if self.sigma is None else self.sigma.read(*place).astype(float)
+            d = self.counted.heights_of_cells(z, grid)
+            weight *= self.counted.share(d, self.counted.spread_of_cells(noise))
+        weight[~np.isfinite(z)] = 0.0
+        return grid, z, weight
+
+
 def _window_cells(
-    surface: Surface,
-    boundary: Boundary,
-    extra: dict[tuple[int, int], float],
-    window: tuple[int, int, int, int],
-    factor: int,
-    sigma: Surface | None,
-    moving: Base | None,
+    cells: _Cells, window: tuple[int, int, int, int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Places, gradient, noise share and noise of the cells of a window, `factor` × `factor` of them together."""
+    """Places, gradient, noise share and noise of the cells of a window."""
     row, column, rows, columns = window
-    grid = surface.grid.window(row, column, rows, columns)
-    z = surface.read(row - 1, column - 1, rows + 2, columns + 2).astype(float)
-    slope_x = (z[1:-1, 2:] - z[1:-1, :-2]) / (2.0 * grid.cell_x)
-    slope_y = (z[:-2, 1:-1] - z[2:, 1:-1]) / (2.0 * grid.cell_y)
+    margin = 0 if cells.moving is None else DRAWN_MARGIN
+    around, z_around, weight_around = cells.heights(window, margin)
+    z = cells.surface.read(row - 1, column - 1, rows + 2, columns + 2).astype(float)
+    grid = cells.surface.grid.window(row, column, rows, columns)
+    slope_x, slope_y = slopes_of_cells(z, grid)
     z = z[1:-1, 1:-1]
-    weight = boundary.coverage(grid) * grid.cell_x * grid.cell_y
+    weight = weight_around[margin : margin + rows, margin : margin + columns]
     of_nodes = np.zeros_like(weight)
-    for (i, j), value in extra.items():
+    for (i, j), value in cells.extra.items():
         if row <= i < row + rows and column <= j < column + columns:
             of_nodes[i - row, j - column] += value
-    weight += of_nodes
+    weight = weight + of_nodes
     weight[~np.isfinite(z)] = 0.0
-    z, slope_x, slope_y = (np.where(np.isfinite(v), v, 0.0) for v in (z, slope_x, slope_y))
     x, y = np.meshgrid(grid.x(np.arange(columns)), grid.y(np.arange(rows)))
     in_plan = (-slope_x * weight, -slope_y * weight)
     size = np.abs(weight)
-    if moving is not None:
-        slope = slope_of_nodes(moving)
-        by_x, by_y = drawn_cells(surface, boundary, moving, window)
+    if cells.moving is not None:
+        slope = slope_of_nodes(cells.moving)
+        by_x, by_y = drawn_cells(around, z_around, weight_around, cells.moving)
         in_plan = (by_x - of_nodes * slope[0], by_y - of_nodes * slope[1])
-        size = size + NEXT_TO * np.hypot(*in_plan) * (z != 0.0)
+        size = size + NEXT_TO * np.hypot(*in_plan) * np.isfinite(z)
+    z, factor = np.where(np.isfinite(z), z, 0.0), cells.factor
     total, squares = together(size, factor), together(weight**2, factor)
     used = total > 0.0
     places = np.stack([together(size * v, factor)[used] / total[used] for v in (x, y, z)], axis=-1)
     sums = [together(v, factor)[used] for v in (*in_plan, weight)]
     gradient = np.stack(sums, axis=-1)
     height = gradient[:, 2]
-    share = np.divide(squares[used], height**2, out=np.ones(len(height)), where=height != 0.0)
+    share = np.divide(squares[used], height**2, out=np.ones(len(height)), where=height**2 > 0.0)
+    sigma = cells.sigma
     noise = np.zeros(len(share)) if sigma is None else together((weight * _noise(sigma, window)) ** 2, factor)[used]
     return places, gradient, share, noise
 

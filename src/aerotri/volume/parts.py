@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -10,8 +12,10 @@ from aerotri.conventions import InputError
 from aerotri.rasters.grids import Grid
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume.bases import Base, Surface
+from aerotri.volume.between_sides import between_on_side, sigma_at_places
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.cell_noise import NO_NOISE, CellNoise, cells_sharing, photographs_at, shares_of_noise
+from aerotri.volume.counted import Counted, counted_pieces
 from aerotri.volume.functionals import Functional, cell_volume, tin_volume, triangulated
 from aerotri.volume.lasting import NO_LASTING, Lasting, lasting_variance
 from aerotri.volume.pickets import (
@@ -21,18 +25,20 @@ from aerotri.volume.pickets import (
     pickets_where_seen,
     with_height_sigmas,
 )
+from aerotri.volume.regions import Region, base_over, region_of_cells, region_of_pieces
 from aerotri.volume.response import Response, respond
 from aerotri.volume.roughness import (
     Between,
+    Ground,
     Roughness,
     curvature_of_cells,
-    ground_between,
+    ground_of,
     roughness_of_cells,
     roughness_of_pickets,
 )
 from aerotri.volume.settings import SigmaOptions
 from aerotri.volume.sums import cells_within
-from aerotri.volume.triangles import areas, cut_to
+from aerotri.volume.triangles import Pieces, areas, cut_to
 
 LATTICE_PATCH = 16
 """Nodes a side of the patch that stands for all cells of a raster; chosen [C]: two rows at its edge do not count, and
@@ -61,6 +67,8 @@ class Part:
     unseen : m², area no photographs were found for.
     measured : what the surface was measured from; None where nobody asks for it.
     lasting : errors of its heights that do not average out.
+    region : what of the boundary counts; None where all does.
+    side : gives the share of what of it counts: of a cut or a fill alone.
     """
 
     calibration: Adjustment
@@ -71,6 +79,8 @@ class Part:
     unseen: float
     measured: Measured | None = None
     lasting: Lasting = NO_LASTING
+    region: Region | None = None
+    side: Callable[[Counted], Part] | None = None
 
     @property
     def lasting_variance(self) -> float:
@@ -81,7 +91,7 @@ class Part:
 
 def part_of_cells(
     calibration: Adjustment, surface: Surface, boundary: Boundary, base: Base | None, options: SigmaOptions,
-    noise: CellNoise = NO_NOISE,
+    noise: CellNoise = NO_NOISE, counted: Counted | None = None,
 ) -> Part:  # fmt: skip
     """The share of a surface whose cells are taken for its pickets, measured in the photographs nearest to them.
 
@@ -90,10 +100,17 @@ def part_of_cells(
     Parameters
     ----------
     noise : what the surface says of its cells; a σ or a window that the options state counts instead.
+    counted : which cells count; None: all, which have heights.
     """
     own = noise.sigma if options.matching_sigma_um is None else None
-    functional = cell_volume(surface, boundary, base, own, options.boundary_from == "product")
     length = noise.length_m if options.matching_window_m is None else options.matching_window_m
+    used = replace(noise, sigma=own, length_m=length)
+    ground = _ground_of_cells(surface, boundary)
+    within = 0.0 if ground is None else ground.sigma
+    region = None if counted is None else region_of_cells(surface, boundary, counted, used, within)
+    functional = cell_volume(
+        surface, boundary, base_over(base, region), own, options.boundary_from == "product", counted
+    )  # fmt: skip
     of_cells = noise.photographs
     per_point = options.per_point if of_cells is None else photographs_at(of_cells, functional.xyz)
     pickets, seen = pickets_where_seen(
@@ -105,36 +122,77 @@ def part_of_cells(
     pickets = replace(pickets, noise_share=sharing * shares_of_noise(calibration, pickets, functional.take(seen)))
     response = respond(calibration, pickets, functional.gradient[seen], options.corrected)
     unseen = float(np.abs(functional.gradient[~seen, 2]).sum())
-    between = _between_cells(surface, boundary)
+    between = _between_cells(ground, boundary.area, region)
     measured = Measured(pickets, functional.gradient[seen])
     lasting = noise.lasting if options.matching_sigma_um is None else NO_LASTING
-    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen, measured, lasting)
+    side = partial(part_of_cells, calibration, surface, boundary, base, options, noise)
+    return Part(
+        calibration, response, between, len(pickets), len(pickets.image), unseen, measured, lasting, region, side
+    )
 
 
 def part_of_pickets(
     calibration: Adjustment, pickets: Pickets, triangles: np.ndarray, boundary: Boundary, base: Base | None,
-    options: SigmaOptions,
+    options: SigmaOptions, counted: Counted | None = None,
 ) -> Part:  # fmt: skip
-    """The share of a TIN of pickets whose photographs are known."""
-    functional = tin_volume(pickets.xyz, triangles, boundary, base, options.boundary_from == "product")[1]
-    response = respond(calibration, pickets, functional.gradient, options.corrected)
-    corners = pickets.xyz[triangles][:, :, :2]
-    pieces = cut_to(boundary.polygon, corners)
-    own = corners[pieces.triangle]
+    """The share of a TIN of pickets whose photographs are known; counted : what of it counts, None: all."""
+    all_pieces = cut_to(boundary.polygon, pickets.xyz[triangles][:, :, :2])
+    tin = _Tin(calibration, pickets, triangles, boundary, base, options, all_pieces)
+    region, functional, response = _counted_in(tin, counted)
     noise = _height_noise(response, functional)
-    share = pieces.area / np.maximum(areas(own), 1e-300)
+    pieces = counted_pieces(pickets.xyz, triangles, all_pieces, counted)
+    share = pieces.area / np.maximum(areas(pickets.xyz[triangles[pieces.triangle]][:, :, :2]), 1e-300)
     used = triangles[pieces.triangle]
     roughness = roughness_of_pickets(pickets.xyz, noise, np.unique(used))
-    between = None if roughness is None else ground_between(roughness, pickets.xyz, used, share, noise)
-    unseen = boundary.area - float(pieces.area.sum())
+    ground = None if roughness is None else ground_of(roughness, pickets.xyz, used, share, noise)
+    between = None if roughness is None else Between()
+    if ground is not None:
+        between = ground.between(ground.more, ground.variance)
+    unseen = boundary.area - float(all_pieces.area.sum())
     unseen = unseen if unseen > ROUNDING * boundary.area else 0.0
-    measured = Measured(pickets, functional.gradient)
-    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen, measured)
+    measured, side = Measured(pickets, functional.gradient), partial(_side_of_pickets, tin, ground)
+    rays = len(pickets.image)
+    return Part(calibration, response, between, len(pickets), rays, unseen, measured, region, side)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tin:
+    """A TIN of pickets within a boundary; pieces : the parts of its triangles inside."""
+
+    calibration: Adjustment
+    pickets: Pickets
+    triangles: np.ndarray
+    boundary: Boundary
+    base: Base | None
+    options: SigmaOptions
+    pieces: Pieces
+
+
+def _counted_in(tin: _Tin, counted: Counted | None) -> tuple[Region | None, Functional, Response]:
+    """What counts of a TIN, the gradient of its volume, and its response."""
+    xyz, region = tin.pickets.xyz, None
+    pieces = counted_pieces(xyz, tin.triangles, tin.pieces, counted)
+    if counted is not None:
+        region = region_of_pieces(tin.boundary, xyz, tin.triangles, pieces, (counted, tin.pieces))
+    drawn = tin.options.boundary_from == "product"
+    base = base_over(tin.base, region)
+    functional = tin_volume(xyz, tin.triangles, tin.boundary, base, drawn, pieces)[1]
+    return region, functional, respond(tin.calibration, tin.pickets, functional.gradient, tin.options.corrected)
+
+
+def _side_of_pickets(tin: _Tin, ground: Ground | None, counted: Counted) -> Part:
+    """The share of a cut or a fill."""
+    region, functional, response = _counted_in(tin, counted)
+    between = None if ground is None or not counted.sign else between_on_side(ground, counted)
+    pickets, measured = tin.pickets, Measured(tin.pickets, functional.gradient)
+    rays = len(pickets.image)
+    return Part(tin.calibration, response, between, len(pickets), rays, 0.0, measured, region)
 
 
 def part_of_measured(
-    calibration: Adjustment, measured: MeasuredPickets, boundary: Boundary, base: Base | None, options: SigmaOptions
-) -> Part:
+    calibration: Adjustment, measured: MeasuredPickets, boundary: Boundary, base: Base | None, options: SigmaOptions,
+    counted: Counted | None = None,
+) -> Part:  # fmt: skip
     """The share of a TIN of pickets as measured; their stated σ counts unless the options state one.
 
     Raises
@@ -147,7 +205,7 @@ def part_of_measured(
     )
     if options.matching_sigma_um is None and measured.sigma_z is not None:
         pickets = with_height_sigmas(calibration, pickets, measured.sigma_z)
-    return part_of_pickets(calibration, pickets, triangulated(pickets.xyz), boundary, base, options)
+    return part_of_pickets(calibration, pickets, triangulated(pickets.xyz), boundary, base, options, counted)
 
 
 def matching_sigma_mm(calibration: Adjustment, options: SigmaOptions) -> float:
@@ -161,7 +219,16 @@ def _height_noise(response: Response, functional: Functional) -> float:
     return response.noise / max(float(np.sum(functional.gradient[:, 2] ** 2)), 1e-300)
 
 
-def _between_cells(surface: Surface, boundary: Boundary) -> Between | None:
+@dataclass(frozen=True)
+class _CellGround:
+    """Ground between the centres of cells: m of curvature, m⁶ per m² of variance, m of σ at a place."""
+
+    curvature: float
+    variance: float
+    sigma: float
+
+
+def _ground_of_cells(surface: Surface, boundary: Boundary) -> _CellGround | None:
     """For triangles between the centres of cells, from the middle of the boundary."""
     grid = surface.grid
     row, column, rows, columns = cells_within(grid, boundary)
@@ -173,10 +240,20 @@ def _between_cells(surface: Surface, boundary: Boundary) -> Between | None:
     if roughness is None:
         return None
     patch, area = _lattice_patch(roughness, grid)
-    return Between(curvature_of_cells(z, grid) * boundary.area, patch.variance * boundary.area / area)
+    variance = patch.between(patch.more, patch.variance).variance
+    return _CellGround(curvature_of_cells(z, grid), variance / area, sigma_at_places(patch))
 
 
-def _lattice_patch(roughness: Roughness, grid: Grid) -> tuple[Between, float]:
+def _between_cells(ground: _CellGround | None, area: float, region: Region | None) -> Between | None:
+    """Over what counts of an area, m²."""
+    if ground is None:
+        return None
+    counts, sign = (area, 1) if region is None else (region.area, region.sign or 1)
+    beyond = 0.0 if region is None else region.line.between
+    return Between(sign * ground.curvature * counts + beyond, ground.variance * counts)
+
+
+def _lattice_patch(roughness: Roughness, grid: Grid) -> tuple[Ground, float]:
     """A patch of cells amid others, and its area."""
     n = LATTICE_PATCH
     x, y = np.meshgrid(np.arange(n) * grid.cell_x, np.arange(n) * grid.cell_y)
@@ -186,5 +263,6 @@ def _lattice_patch(roughness: Roughness, grid: Grid) -> tuple[Between, float]:
     row, column = np.divmod(first, n)
     inner = np.tile((np.minimum(row, column) >= 2) & (np.maximum(row, column) < n - 3), 2)
     xyz = np.column_stack([x.ravel(), y.ravel(), np.zeros(n * n)])
-    between = ground_between(roughness, xyz, triangles, inner.astype(float), 0.0)
-    return between, 0.5 * float(inner.sum()) * grid.cell_x * grid.cell_y
+    ground = ground_of(roughness, xyz, triangles, inner.astype(float), 0.0)
+    assert ground is not None, "a patch has pickets and triangles"
+    return ground, 0.5 * float(inner.sum()) * grid.cell_x * grid.cell_y

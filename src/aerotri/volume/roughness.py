@@ -124,7 +124,46 @@ def curvature_of_cells(z: np.ndarray, grid: Grid) -> float:
 def ground_between(
     roughness: Roughness, xyz: np.ndarray, triangles: np.ndarray, share: np.ndarray, noise: float, seed: int = 0
 ) -> Between:
-    """What straight triangles over pickets leave out.
+    """What straight triangles over pickets leave out; arguments as of `ground_of`."""
+    ground = ground_of(roughness, xyz, triangles, share, noise, seed)
+    return Between() if ground is None else ground.between(ground.more, ground.variance)
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """The ground between pickets, over triangles that stand for all of them.
+
+    Parameters
+    ----------
+    xyz : (k, 3) m. triangles : (t, 3) corners, share : (t,) which part of each counts, area : (t,) m².
+    more : (t,) m³, ground expected beyond the straight triangle. variance : (t,) m⁶.
+    noise : m², variance of a height that is its own alone.
+    number : of all the triangles. factor : by which neighbours make the variance of the sum larger.
+    """
+
+    roughness: Roughness
+    xyz: np.ndarray
+    triangles: np.ndarray
+    share: np.ndarray
+    area: np.ndarray
+    more: np.ndarray
+    variance: np.ndarray
+    noise: float
+    number: int
+    factor: float
+
+    def between(self, more: np.ndarray, variance: np.ndarray) -> Between:
+        """Of all triangles, from what is expected (t,) m³ of these, and its variance (t,) m⁶."""
+        few, own = len(self.triangles), more * self.share
+        scale = self.number / few
+        sampling = self.number**2 * (1.0 - 1.0 / scale) * float(np.var(own)) / few
+        return Between(scale * float(own.sum()), scale * float(variance @ self.share) * self.factor + sampling)
+
+
+def ground_of(
+    roughness: Roughness, xyz: np.ndarray, triangles: np.ndarray, share: np.ndarray, noise: float, seed: int = 0
+) -> Ground | None:
+    """The ground between pickets; None where there is none.
 
     Parameters
     ----------
@@ -133,17 +172,18 @@ def ground_between(
     """
     own = np.flatnonzero(share > 0.0)
     if not len(own) or len(xyz) < AROUND:
-        return Between()
+        return None
     rng = np.random.default_rng(seed)
     few = own if len(own) <= MOST_TRIANGLES else rng.choice(own, MOST_TRIANGLES, replace=False)
     tree = KDTree(xyz[:, :2])
-    part = [_over(roughness, xyz, triangles[few[k : k + CHUNK]], noise, tree) for k in range(0, len(few), CHUNK)]
-    more = np.concatenate([one.more for one in part]) * share[few]
-    scale = len(own) / len(few)
-    sampling = len(own) ** 2 * (1.0 - 1.0 / scale) * float(np.var(more)) / len(few)
-    single = scale * float(np.concatenate([one.variance for one in part]) @ share[few])
+    parts = [_over(roughness, xyz, triangles[few[k : k + CHUNK]], noise, tree) for k in range(0, len(few), CHUNK)]
+    area, more, variance = (
+        np.concatenate(part) for part in zip(*((one.area, one.more, one.variance) for one in parts), strict=True)
+    )
     factor = _neighbours(roughness, xyz, triangles[own], noise, tree, rng)
-    return Between(scale * float(more.sum()), single * factor + sampling)
+    return Ground(
+        roughness, xyz, triangles[few], share[few], area, more, variance, noise, len(own), factor
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +211,7 @@ def _over(roughness: Roughness, xyz: np.ndarray, triangles: np.ndarray, noise: f
     at = xyz[near][:, :, :2] - middle[:, None, :2]
     size = np.abs(at).max(axis=(1, 2))
     at = at / size[:, None, None]
-    inside, other = (_places(PARTS, rule) @ (corners - middle[:, None])[:, :, :2] / size[:, None, None]
+    inside, other = (places_within(PARTS, rule) @ (corners - middle[:, None])[:, :, :2] / size[:, None, None]
                      for rule in RULES)  # fmt: skip
     unit = Roughness(1.0, roughness.exponent)
     gap = np.linalg.norm(at[:, :, None] - at[:, None], axis=-1)
@@ -185,9 +225,9 @@ def _over(roughness: Roughness, xyz: np.ndarray, triangles: np.ndarray, noise: f
     system[:, :AROUND, :AROUND] = share[:, None, None] * unit.covariance(gap) + (
         np.where(level > 0.0, 1.0 - share, 1.0)[:, None, None] * np.eye(AROUND)
     )
-    system[:, :AROUND, AROUND:] = _terms(at)
+    system[:, :AROUND, AROUND:] = terms_of_second_order(at)
     system[:, AROUND:, :AROUND] = np.swapaxes(system[:, :AROUND, AROUND:], 1, 2)
-    right = np.concatenate([share[:, None] * to_inside, _terms(inside).mean(axis=1)], axis=1)
+    right = np.concatenate([share[:, None] * to_inside, terms_of_second_order(inside).mean(axis=1)], axis=1)
     weights = np.linalg.solve(system, right[..., None])[:, :AROUND, 0]
     area = areas(corners[:, :, :2])
     heights = xyz[near, 2] - middle[:, 2:]
@@ -226,7 +266,7 @@ def patch_variances(
     size = np.abs(at - middle).max()
     sides = []
     for rule in RULES:
-        inside = _places(PARTS, rule) @ xyz[triangles][:, :, :2]
+        inside = places_within(PARTS, rule) @ xyz[triangles][:, :, :2]
         share = np.repeat(over.area / inside.shape[1], inside.shape[1])
         sides.append((np.concatenate([inside.reshape(-1, 2), at]), np.concatenate([share, of_pickets]) / area))
     (first, own), (second, other) = sides
@@ -236,7 +276,7 @@ def patch_variances(
     return float(over.variance.sum()), max(sum_, 0.0) * level * area**2
 
 
-def _places(n: int, within: tuple[float, float, float]) -> np.ndarray:
+def places_within(n: int, within: tuple[float, float, float]) -> np.ndarray:
     """(3n², 3) barycentric coordinates: three places in every one of n² equal parts of a triangle."""
     own = np.array([np.roll(within, k) for k in range(3)])
     out = []
@@ -255,7 +295,7 @@ def _likeliest(xy: np.ndarray, z: np.ndarray, noise: float, smoothest: float) ->
     at = xy - xy.mean(axis=1, keepdims=True)
     size = float(np.median(np.abs(at).max(axis=(1, 2))))
     at = at / size
-    left = np.linalg.qr(_terms(at), mode="complete").Q[:, :, 6:]
+    left = np.linalg.qr(terms_of_second_order(at), mode="complete").Q[:, :, 6:]
     contrasts = np.einsum("nmi,nm->ni", np.broadcast_to(left, (len(z), *left.shape[1:])), z - z.mean(axis=1)[:, None])
     gap = np.linalg.norm(at[:, :, None] - at[:, None], axis=-1)
     # what rounding leaves of heights is no roughness
@@ -293,7 +333,7 @@ def _not_whole(exponent: float) -> float:
     return exponent if abs(off) >= NEAR_WHOLE else whole + (NEAR_WHOLE if off >= 0.0 else -NEAR_WHOLE)
 
 
-def _terms(xy: np.ndarray) -> np.ndarray:
+def terms_of_second_order(xy: np.ndarray) -> np.ndarray:
     """(…, 6) of a surface of second order at places (…, 2)."""
     x, y = np.moveaxis(xy, -1, 0)
     return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)

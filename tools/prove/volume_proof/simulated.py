@@ -93,7 +93,7 @@ def run(site: Site, seed: int, on: frozenset[str] = ALL) -> Run:
     error = value - wanted
     if "base" in on:
         error += float(rng.normal(0.0, BASE_SIGMA)) * boundary(site).area
-    surface = _TinSurface(found.xyz)
+    surface = TinSurface(found.xyz)
     if "boundary" in on:
         error += _boundary_error(boundary(site), found.xyz, triangles, value, rng)
     parts = {
@@ -179,7 +179,7 @@ def _boundary_error(boundary: Boundary, xyz, triangles, value: float, rng: np.ra
     return tin_volume(xyz, triangles, moved)[0] - LEVEL * moved.area - (value - LEVEL * boundary.area)
 
 
-class _TinSurface:
+class TinSurface:
     """A TIN, sampled."""
 
     def __init__(self, xyz: np.ndarray):

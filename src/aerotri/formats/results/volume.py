@@ -22,6 +22,7 @@ from aerotri.volume.settings import Density
 SYSTEMATIC = "change of the volume by image errors, wrong − true, were the photographs used uncorrected"
 
 STATED = "what is stated about base and boundary alone; the errors of the surface are not in it"
+BEYOND = "what it is expected to hold beyond that of the surface as given; not in it, counted in its σ"
 CURVATURE = "ground expected beyond the straight lines between the heights; part of σ as interpolation"
 
 
@@ -74,10 +75,46 @@ def pile_json(
     v = pile.volumes.chosen
     return {
         "name": pile.name, "area_m2": pile.boundary.area, "base": pile.base.name, **_numbers(v),
-        "sigma_m3": None if sigma is None else sigma.total,
+        "sigma_m3": None if sigma is None else sigma.total, **sides_json(sigma),
         "parts_m3": None if sigma is None else dict(sigma.parts),
         "stated_sigma_m3": _total_stated(stated), "mass": _mass(v, sigma, density, stated),
     }  # fmt: skip
+
+
+def sides_json(sigma: VolumeSigma | None) -> dict[str, float | None]:
+    """σ of cut and of fill, m³; None where not known."""
+    sides = (None, None) if sigma is None or sigma.sides is None else sigma.sides
+    return {
+        f"sigma_{name}_m3": None if one is None else one.total for name, one in zip(("cut", "fill"), sides, strict=True)
+    }
+
+
+def _sides_with_parts(sigma: VolumeSigma) -> dict[str, Any]:
+    """σ of cut and of fill with its parts."""
+    if sigma.sides is None:
+        return {"cut": None, "fill": None}
+    return {
+        name: {
+            "sigma_m3": one.total,
+            "parts_m3": dict(one.parts),
+            "beyond": {"meaning": BEYOND, "value_m3": one.beyond},
+        }
+        for name, one in zip(("cut", "fill"), sigma.sides, strict=True)
+    }
+
+
+def sigma_of_side(content: Mapping[str, Any], name: str) -> float | None:
+    """m³, σ of the 'cut' or the 'fill' of volume.json; None where not known, as in files of earlier versions."""
+    sigma: Mapping[str, Any] = content.get("sigma") or {}
+    return (sigma.get(name) or {}).get("sigma_m3")
+
+
+def beyond_of_side(content: Mapping[str, Any], name: str) -> float | None:
+    """m³ that the 'cut' or the 'fill' is expected to hold beyond what the surface shows; None where the base does not
+    cut it, or where it is not known."""
+    side = (content.get("sigma") or {}).get(name)
+    cuts = content["cut_m3"] > 0.0 and content["fill_m3"] > 0.0
+    return side["beyond"]["value_m3"] if side and cuts else None
 
 
 def _total_stated(stated: StatedSigma | None) -> float | None:
@@ -145,7 +182,7 @@ def _sigma(sigma: VolumeSigma, volume: Volume, sources: Sources) -> dict[str, An
     return {
         "sigma_m3": sigma.total,
         "sigma_mean_height_m": sigma.total / volume.area,
-        "parts_m3": dict(sigma.parts),
+        "parts_m3": dict(sigma.parts), **_sides_with_parts(sigma),
         "curvature": None if sigma.curvature is None else {
             "meaning": CURVATURE, "in_the_volume": False, "value_m3": sigma.curvature[0],
             "sigma_m3": sigma.curvature[1],

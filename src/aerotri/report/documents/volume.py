@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from aerotri.formats.results.volume import boundary_in_words
+from aerotri.formats.results.volume import boundary_in_words, sigma_of_side
 from aerotri.report.documents.figures import as_files
 from aerotri.report.documents.head import Context, document, signature_fields
 from aerotri.report.documents.messages import in_english, message_parts
@@ -84,7 +84,7 @@ def _result(c: Mapping[str, Any], words: Words) -> list[tuple[str, str]]:
     rows = [
         (words("volume.net"), known_to(words, c["net_m3"], _total(c), "m³")),
         *((words(f"volume.{of}"),
-           words("volume.on", volume=amount(words, c[f"{of}_m3"]), area=amount(words, c[f"{of}_area_m2"])))
+           words("volume.on", volume=_side(c, of, words), area=amount(words, c[f"{of}_area_m2"])))
           for of in ("cut", "fill")),
         (words("volume.thickness"), f"{words.number(c['mean_thickness_m'], 3)} m"),
     ]  # fmt: skip
@@ -96,14 +96,26 @@ def _result(c: Mapping[str, Any], words: Words) -> list[tuple[str, str]]:
     return rows
 
 
+def _side(c: Mapping[str, Any], of: str, words: Words) -> str:
+    """Cut or fill with its σ where it is known."""
+    return _of_pile({**c, f"sigma_{of}_m3": sigma_of_side(c, of)}, of, words)
+
+
+def _of_pile(pile: Mapping[str, Any], of: str, words: Words) -> str:
+    """Cut or fill of a pile, as `_side`."""
+    value, sigma = pile[f"{of}_m3"], pile.get(f"sigma_{of}_m3")
+    return amount(words, value) if sigma is None else words.with_sigma(value, sigma)
+
+
 def _piles(c: Mapping[str, Any], words: Words) -> Part:
     whole: dict[str, Any] = {**c, "name": "", "area_m2": c["boundary"]["area_m2"], "sigma_m3": _total(c)}
+    whole |= {f"sigma_{of}_m3": sigma_of_side(c, of) for of in ("cut", "fill")}
     with_mass = c["mass"] is not None
     rows: list[tuple[str, ...]] = []
     for one in (*c["piles"], whole):
         sigma, mass = one["sigma_m3"], one["mass"]
         cells = [breakable(one["name"]) if one is not whole else words("volume.together"),
-                 amount(words, one["area_m2"]), amount(words, one["cut_m3"]), amount(words, one["fill_m3"]),
+                 amount(words, one["area_m2"]), _of_pile(one, "cut", words), _of_pile(one, "fill", words),
                  words.with_sigma(one["net_m3"], sigma).partition(" ±")[0], two(words, sigma),
                  two(words, None if sigma is None else WIDE * sigma)]  # fmt: skip
         if with_mass:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from aerotri.formats.results.volume import boundary_in_words
+from aerotri.formats.results.volume import beyond_of_side, boundary_in_words, sigma_of_side
 from aerotri.report.pages.adjustment import data_address
 from aerotri.report.pages.head import page_environment, page_head, settings_rows
 from aerotri.report.plots.rendering import RenderedPlot
@@ -61,10 +61,19 @@ def _cards(c: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     net = _number(c["net_m3"]) if s is None else with_sigma(c["net_m3"], s["sigma_m3"])
     return [
         ("Net", f"{net} m³", "cut less fill" + ("" if s is None else ", one standard deviation")),
-        ("Cut", _number(c["cut_m3"]) + " m³", f"above the base, on {_number(c['cut_area_m2'])} m²"),
-        ("Fill", _number(c["fill_m3"]) + " m³", f"below the base, on {_number(c['fill_area_m2'])} m²"),
+        ("Cut", _side(c, "cut") + " m³", f"above the base, on {_number(c['cut_area_m2'])} m²"),
+        ("Fill", _side(c, "fill") + " m³", f"below the base, on {_number(c['fill_area_m2'])} m²"),
         ("Area", _number(c["boundary"]["area_m2"]) + " m²", f"{_number(c['no_data_area_m2'])} m² of it not known"),
     ]
+
+
+def _side(c: Mapping[str, Any], name: str) -> str:
+    """Cut or fill, with its σ where it is known."""
+    return _with(c[f"{name}_m3"], sigma_of_side(c, name))
+
+
+def _with(value: float, sigma: float | None) -> str:
+    return _number(value) if sigma is None else with_sigma(value, sigma)
 
 
 def _budget(c: Mapping[str, Any]) -> str:
@@ -92,6 +101,13 @@ def _budget(c: Mapping[str, Any]) -> str:
             f"{with_sigma(abs(bent['value_m3']), bent['sigma_m3'])} m³ {side}. The volume is that of the surface as "
             "given, so this is not in it; its σ counts it as ground between the pickets."
         )
+    beyond = [beyond_of_side(c, name) for name in ("cut", "fill")]
+    if beyond[0] is not None and beyond[1] is not None:
+        more = [_number(beyond[0]), _number(beyond[1])]
+        text += (
+            f" The base cuts the ground: beyond what the surface shows, cut is expected to hold {more[0]} m³ and fill "
+            f"{more[1]} m³. This is not in them; their σ counts it."
+        )
     if not s["systematic"]["variants"]:
         return text + " No image errors were estimated, so what they do to the volume is not known."
     return text
@@ -101,11 +117,13 @@ def _piles(c: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Rows of the table of piles, the last one all together."""
     if not c["piles"]:
         return []
-    sigma = None if c["sigma"] is None else c["sigma"]["sigma_m3"]
+    s = c["sigma"]
+    sigma = None if s is None else s["sigma_m3"]
     whole: dict[str, Any] = {**c, "name": "all together", "area_m2": c["boundary"]["area_m2"], "sigma_m3": sigma}
+    whole |= {f"sigma_{of}_m3": sigma_of_side(c, of) for of in ("cut", "fill")}
     return [
-        (printable(one["name"]), _number(one["area_m2"]), _number(one["cut_m3"]), _number(one["fill_m3"]),
-         _number(one["net_m3"]) if one["sigma_m3"] is None else with_sigma(one["net_m3"], one["sigma_m3"]),
+        (printable(one["name"]), _number(one["area_m2"]), _with(one["cut_m3"], one.get("sigma_cut_m3")),
+         _with(one["fill_m3"], one.get("sigma_fill_m3")), _with(one["net_m3"], one["sigma_m3"]),
          tonnes(one["mass"]))
         for one in (*c["piles"], whole)
     ]  # fmt: skip
