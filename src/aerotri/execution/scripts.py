@@ -95,7 +95,8 @@ def _load(script: Script) -> None:
             return
         _refuse_another(script)
         spec = spec_from_file_location(script.module, script.path)
-        assert spec is not None and spec.loader is not None
+        assert spec is not None
+        assert spec.loader is not None
         module = module_from_spec(spec)
         sys.modules[script.module] = module
         try:
