@@ -100,7 +100,7 @@ def pair_of(result: aerotri.Adjustment, x: str, y: str) -> np.ndarray:
 
 
 def single_blunder(_: None, seed: int) -> list[int]:
-    """Of one block: values w tested, false alarms, errors, of these beyond the limit and removed; rays and rays lost."""
+    """Of one block: w tested, false alarms, errors, of these beyond the limit and removed; rays and rays lost."""
     rng = np.random.default_rng([1, seed])
     block = aerotri.simulate(SMALL, seed).block
     clean, snooped = adjust(block), adjust(block, "data-snooping")
