@@ -58,7 +58,7 @@ def parcels(work: Work[Any, Any, Any]) -> Generator[list[bytes]]:
                 raise
             raise InputError(f"cannot be written to: {error}", "choose another place", work.folder) from error
         tasks = [pickle.dumps((work.function, path, mark, task), pickle.HIGHEST_PROTOCOL) for task in work.tasks]
-        script = script_of([content, *tasks])
+        script = script_of([content, *tasks], work.function)
         del content
         yield [pickle.dumps((__version__, pickle.dumps((script, task)))) for task in tasks]
     finally:

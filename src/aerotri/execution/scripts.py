@@ -20,7 +20,8 @@ from typing import Any
 
 from aerotri.conventions import InputError
 
-MAIN = "__main__"
+MAIN, OURS = "__main__", "aerotri."
+"""Names of the module that a script is where it runs, and of what every worker has."""
 _lock = RLock()
 
 
@@ -42,12 +43,18 @@ class Script:
         return f"_script_{self.path.stem}_{self.mark}"
 
 
-def script_of(pickled: Sequence[bytes]) -> Script | None:
-    """The script that runs here, where pickled content may speak of what it defines; else None."""
+def script_of(pickled: Sequence[bytes], function: Any) -> Script | None:
+    """The script that runs here, where tasks may need it; else None.
+
+    Parameters
+    ----------
+    pickled : what tasks share, and tasks. function : that does them: of the script, or of a module beside it.
+    """
     main: Any = sys.modules[MAIN]
     file = getattr(main, "__file__", None)
+    is_ours = str(getattr(function, "__module__", OURS)).startswith(OURS)
     named = any(MAIN.encode() in content for content in pickled)
-    if not named or file is None or not Path(file).is_file():
+    if (is_ours and not named) or file is None or not Path(file).is_file():
         return None
     path = Path(file).resolve()
     script = Script(path, _mark_of(path))
