@@ -15,6 +15,7 @@ import argparse
 import csv
 import json
 import os
+import shlex
 import shutil
 import sqlite3
 import statistics
@@ -42,12 +43,12 @@ SAME_NAME = (".json", ".csv", ".tif", ".gpkg", ".parquet", ".npz", ".laz", ".geo
 """Endings of the files that are compared."""
 
 
-def commands(photographs: Path, folder: Path, resolution: str) -> dict[str, tuple[str, ...]]:
+def commands(photographs: Path, folder: Path, resolution: str, tying: Sequence[str] = ()) -> dict[str, tuple[str, ...]]:
     """The words of every command without its folder and executor; later ones need the folders of earlier ones."""
     cell = ("--resolution", resolution) if resolution else ()
     block, result, dsm = (str(folder / name) for name in ("block", "result", "threads_dsm"))
     return {
-        "tiepoints": ("tiepoints", str(photographs)),
+        "tiepoints": ("tiepoints", str(photographs), *tying),
         "dtm": ("dtm", result, str(photographs), "--no-plots"),
         "dsm": ("dsm", result, str(photographs), "--no-plots", *cell),
         "ortho": ("ortho", result, str(photographs), dsm, "--no-plots"),
@@ -108,12 +109,12 @@ def without(value: Any) -> Any:
     return [without(one) for one in value] if isinstance(value, list) else value
 
 
-def prepare(photographs: Path, folder: Path) -> None:
+def prepare(photographs: Path, folder: Path, tying: Sequence[str] = ()) -> None:
     """Make what commands need beside photographs: a block, its result, and the block in parts."""
     folder.mkdir(parents=True, exist_ok=True)
     block, result, in_parts = str(folder / "block"), str(folder / "result"), folder / "in_parts"
     if not (folder / "result").is_dir():
-        run(["tiepoints", str(photographs), "--out", block])
+        run(["tiepoints", str(photographs), *tying, "--out", block])
         run(["adjust", block, "--parameters", "brown:K1+K2", "--out", result, "--no-plots"])
     if not in_parts.is_dir():
         plan = aerotri.example_flight()
@@ -145,13 +146,15 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="to work in")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--commands", nargs="+", help="all where not given")
+    parser.add_argument("--tying", default="", help="further words of tiepoints, such as '--focal-length-mm 8.8'")
     parser.add_argument("--resolution", default="", help="cell of dsm, m; two GSD where not given")
     options = parser.parse_args()
     folder = options.folder
-    prepare(options.photographs, folder)
+    tying = shlex.split(options.tying)
+    prepare(options.photographs, folder, tying)
     print(f"# Executors ({os.cpu_count()} processors, runs of every command: {options.repeats}, medians)\n")
     print(HEAD + "\n|" + "---|" * (HEAD.count("|") - 1), flush=True)
-    for name, words in commands(options.photographs, folder, options.resolution).items():
+    for name, words in commands(options.photographs, folder, options.resolution, tying).items():
         if not options.commands or name in options.commands:
             print(measured(name, words, folder, options.repeats), flush=True)
 

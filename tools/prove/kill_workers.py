@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import os
 import random
+import shlex
 import shutil
 import signal
 import subprocess
@@ -116,14 +117,16 @@ def main() -> int:
     parser.add_argument("folder", type=Path, help="to work in")
     parser.add_argument("--runs", type=int, default=3, help="of every command with each executor")
     parser.add_argument("--commands", nargs="+", help="all where not given")
+    parser.add_argument("--tying", default="", help="further words of tiepoints, such as '--focal-length-mm 8.8'")
     parser.add_argument("--seed", type=int, default=1, help="of the moments")
     options = parser.parse_args()
-    prepare(options.photographs, options.folder)
+    tying = shlex.split(options.tying)
+    prepare(options.photographs, options.folder, tying)
     print(f"# Workers killed in mid-run (tools/prove/kill_workers.py), {options.runs} runs of every command\n")
     print("| command | files compared | " + " | ".join(f"{one}: killed | the same files" for one in KILLING) + " |")
     print("|" + "---|" * 6, flush=True)
     chance, failures = random.Random(options.seed), []
-    for name, words in commands(options.photographs, options.folder, "").items():
+    for name, words in commands(options.photographs, options.folder, "", tying).items():
         if not options.commands or name in options.commands:
             line, wrong = row(name, words, options.folder, options.runs, chance)
             failures += wrong
