@@ -1,16 +1,9 @@
 """`aerotri adjust --executor`: what is said of folders that are no block in parts, and of executors that are none."""
 
+import subprocess
+import sys
+
 import pytest
-
-import aerotri
-from aerotri.cli import main
-
-
-def said(words, capsys, monkeypatch):
-    monkeypatch.setattr("sys.argv", ["aerotri", "adjust", *map(str, words)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return ended.value.code, capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -22,9 +15,9 @@ def said(words, capsys, monkeypatch):
         ("nothing", "processes:2", "there is no such file or folder"),
     ],
 )
-def test_what_is_wrong_is_said(folder, executor, text, tmp_path, capsys, monkeypatch):
-    if folder == "block":
-        aerotri.simulate(aerotri.example_flight(), seed=1).save(tmp_path / folder)
-    code, err = said([tmp_path / folder, "--executor", executor], capsys, monkeypatch)
-    assert code == 2
-    assert text in err
+def test_what_is_wrong_is_said(folder, executor, text, tmp_path):
+    (tmp_path / "block").mkdir()
+    line = [sys.executable, "-m", "aerotri", "adjust", tmp_path / folder, "--executor", executor]
+    done = subprocess.run(line, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert text in done.stderr
