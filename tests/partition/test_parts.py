@@ -176,21 +176,27 @@ def divided(tmp_path):
 
 
 def tables_of(folder):
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*.csv"))}
+    """Contents of the tables by name."""
+    found = {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*.csv"))}
+    of_rays = sorted(folder.rglob("*.parquet"))
+    return found | {str(path.relative_to(folder)): repr(pq.read_table(path).to_pydict()) for path in of_rays}
 
 
 def test_files_are_the_same_wherever_parts_are_computed(divided, tmp_path):
     pytest.importorskip("distributed")
     aerotri.adjust_parts(divided, tmp_path / "threads", plots=False)
     expected = tables_of(tmp_path / "threads")
-    assert len(expected) == 4 + 3 * 5 + 3
+    assert len([name for name in expected if name.endswith(".csv")]) == 4 + 3 * 5 + 3
+    assert len([name for name in expected if name.endswith(".parquet")]) == 3
     for executor in ("processes:2", "dask:local:2"):
         aerotri.adjust_parts(divided, tmp_path / executor, executor=executor, plots=False)
         assert tables_of(tmp_path / executor) == expected
 
 
-def test_a_worker_killed_in_mid_run_changes_nothing(divided, tmp_path, monkeypatch):
+@pytest.mark.parametrize("executor", ["processes:2", "dask:local:2"])
+def test_a_worker_killed_in_mid_run_changes_nothing(executor, divided, tmp_path, monkeypatch):
     """Of every kind of task one is killed, in the same run."""
+    pytest.importorskip("distributed")
     aerotri.adjust_parts(divided, tmp_path / "threads", plots=False)
     marks = tmp_path / "marks"
     marks.mkdir()
@@ -198,7 +204,7 @@ def test_a_worker_killed_in_mid_run_changes_nothing(divided, tmp_path, monkeypat
     for name, function in killed_parts.KILLED.items():
         place = next(module for module in (course, joints, adjusting) if hasattr(module, name))
         monkeypatch.setattr(place, name, function)
-    aerotri.adjust_parts(divided, tmp_path / "killed_result", executor="processes:2", plots=False)
+    aerotri.adjust_parts(divided, tmp_path / "killed_result", executor=executor, plots=False)
     assert {path.name for path in marks.iterdir()} == set(killed_parts.KILLED)
     assert tables_of(tmp_path / "killed_result") == tables_of(tmp_path / "threads")
 

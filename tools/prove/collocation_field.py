@@ -24,17 +24,20 @@ Example: python tools/prove/collocation_field.py --seeds 5
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 import numpy as np
 
 import aerotri
+from runs_elsewhere import add_executor, runs_of
 
 SETS = (
     "none", "bluh:1-12", "ultracam_d:42-73", "bluh:1-12,ultracam_d:42-73", "brown", "ebner", "gruen", "legendre:5x5",
     "collocation:13x9", "collocation:19x13", "ultracam_d:42-73,collocation:19x13",
 )  # fmt: skip
 TRUE_MODEL = "bluh:1-12,ultracam_d:42-73"
-RMS_UM = 4.0
+RMS_UM, FIRST = 4.0, 100
+"""Of the image errors; seed of the first block."""
 
 
 def spec() -> dict:
@@ -84,10 +87,16 @@ def block(truth: str, seed: int) -> aerotri.Block:
     return aerotri.simulate(content, seed).block
 
 
-def table(truth: str, found: list) -> list[str]:
+def compared(truth: str, seed: int) -> Any:
+    """The comparison of the sets on one block, without the block."""
+    found = aerotri.compare_parameters(block(truth, seed), SETS)
+    return found.choice, found.record.outcomes
+
+
+def table(truth: str, found: list[Any]) -> list[str]:
     """Lines of the means over the seeds."""
-    chosen, comparisons = [c.choice for c in found], [c.record for c in found]
-    rms = np.array([[o.check.rms for o in c.outcomes] for c in comparisons])
+    chosen, comparisons = zip(*found, strict=True)
+    rms = np.array([[o.check.rms for o in outcomes] for outcomes in comparisons])
     mean = np.sqrt(np.mean(rms**2, axis=0))
     least = min(mean[k, 2] for k, name in enumerate(SETS) if "collocation" not in name)
     lines = [
@@ -96,7 +105,7 @@ def table(truth: str, found: list) -> list[str]:
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for k, name in enumerate(SETS):
-        own = [c.outcomes[k] for c in comparisons]
+        own = [outcomes[k] for outcomes in comparisons]
         number, sigma0 = np.mean([o.effective for o in own]), np.mean([o.sigma0_um for o in own])
         field = ""
         if np.isfinite(own[0].sigma_um):
@@ -104,7 +113,7 @@ def table(truth: str, found: list) -> list[str]:
         xyz = " | ".join(f"{v:.4f}" for v in mean[k])
         times = chosen.count(own[0].name)
         lines.append(f"| {name} | {number:.0f} | {sigma0:.2f} | {xyz} | {mean[k, 2] / least:.2f} | {field} | {times} |")
-    taken = np.array([next(o.check.rms[2] for o in c.record.outcomes if o.name == c.choice) for c in found])
+    taken = np.array([next(o.check.rms[2] for o in outcomes if o.name == choice) for choice, outcomes in found])
     lines.append(f"auto: Z {np.sqrt(np.mean(taken**2)):.4f}, {np.sqrt(np.mean(taken**2)) / least:.2f} of the best set")
     return lines
 
@@ -112,10 +121,12 @@ def table(truth: str, found: list) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=5)
-    seeds = parser.parse_args().seeds
-    for truth in TRUTHS:
-        comparisons = [aerotri.compare_parameters(block(truth, 100 + k), SETS) for k in range(seeds)]
-        print("\n".join([*table(truth, comparisons), ""]), flush=True)
+    add_executor(parser)
+    options = parser.parse_args()
+    with runs_of(options) as runs:
+        for truth in TRUTHS:
+            comparisons = runs(compared, truth, range(FIRST, FIRST + options.seeds))
+            print("\n".join([*table(truth, comparisons), ""]), flush=True)
 
 
 if __name__ == "__main__":

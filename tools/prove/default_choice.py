@@ -14,11 +14,8 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from collections import Counter, defaultdict
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +23,7 @@ import numpy as np
 
 import aerotri
 from aerotri import observations
+from runs_elsewhere import add_executor, runs_of
 
 SETS = ("auto", "none", "brown:K1+K2+K3+P1+P2", "bluh:1-12", "legendre:5x5")
 HALF = (17.5, 11.66)
@@ -171,7 +169,7 @@ def simulated(seed: int, kind: str, layout: str) -> observations.Block:
     return held(replace(block, image_points=replace(rays, xy=rays.xy + d)), layout)
 
 
-def run(job: tuple[int, str, str]) -> dict[str, Found | str]:
+def run(_: None, job: tuple[int, str, str]) -> dict[str, Found | str]:
     block = simulated(*job)
     return {spec: adjusted(block, spec) for spec in (SETS if job[1] != KNOWN else ("auto", "bluh:1-12"))}
 
@@ -180,7 +178,7 @@ def kept(folder: Path, job: tuple[int, str, str]) -> dict[str, Found | str]:
     """As `run`; what an earlier run has left in the folder is read."""
     file = folder / f"{job[0]}.json"
     if not file.is_file():
-        found = {spec: one if isinstance(one, str) else asdict(one) for spec, one in run(job).items()}
+        found = {spec: one if isinstance(one, str) else asdict(one) for spec, one in run(None, job).items()}
         file.with_suffix(".part").write_text(json.dumps(found))
         file.with_suffix(".part").rename(file)
     read = json.loads(file.read_text())
@@ -203,18 +201,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--blocks", type=int, default=200, help="blocks with errors that no set contains")
     parser.add_argument("--known", type=int, default=24, help="blocks whose errors are a known set")
-    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    add_executor(parser)
     parser.add_argument("--keep", type=Path, help="folder for the outcomes, from which a later run goes on")
     options = parser.parse_args()
     work = run
     if options.keep is not None:
         options.keep.mkdir(parents=True, exist_ok=True)
-        work = partial(kept, options.keep)
+        options.keep, work = options.keep.resolve(), kept
     layouts = list(LAYOUTS)
     jobs = [(s, KINDS[s % 6], layouts[s // 6 % 4]) for s in range(1, options.blocks + 1)]
     known = [(1000 + s, KNOWN, layouts[s % 4]) for s in range(options.known)]
-    with ProcessPoolExecutor(options.processes) as pool:
-        outcomes = list(pool.map(work, jobs + known))
+    with runs_of(options) as runs:
+        outcomes = runs(work, options.keep, jobs + known)
     of_unknown, of_known = outcomes[: len(jobs)], outcomes[len(jobs) :]
     print(f"# Default parameters, {len(jobs)} simulated blocks (tools/prove/default_choice.py)\n")
     print("Mean of (error/σ)² at check points and its standard error; 1 is right. RMS of heights in cm.\n")

@@ -62,7 +62,6 @@ mean square of z over all cells of twenty draws, on the same photographs, and se
 from __future__ import annotations
 
 import argparse
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -78,6 +77,7 @@ from aerotri.terrain.dense import tile
 from aerotri.terrain.dense.lasting import lasting_errors
 from aerotri.terrain.dense.parallaxes import Parallaxes, semi_global
 from aerotri.volume.lasting import Lasting, lasting_variance_of_cells
+from runs_elsewhere import add_executor, folder_of, runs_of
 
 GSD_M, STEEP_M, FEWEST = 0.5, 1.5, 100
 SPEC = {
@@ -172,6 +172,8 @@ def painted(name: str, lattice: Lattice) -> Lattice:
 
 SLOPES = {"to 10 %": (0.0, 0.1), "10 to 30 %": (0.1, 0.3), "above 30 %": (0.3, np.inf)}
 """Classes of the slope of the true ground."""
+BYTES_OF_SEED = 2_000_000_000
+"""Memory of a flight with its photographs and surface; chosen [C]."""
 SIDES = (5, 10, 20, 40, 80)
 """Cells along a side of the squares over which errors are added up."""
 HEAD = (
@@ -201,21 +203,23 @@ def main() -> None:
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--scenes", nargs="+", choices=list(SCENES), default=list(SCENES))
     parser.add_argument("--seed", type=int, help="one flight and texture; 1 and those that follow where not given")
+    add_executor(parser)
     arguments = parser.parse_args()
-    folder = arguments.folder or Path(tempfile.mkdtemp())
+    folder = folder_of(arguments.folder, arguments)
     print(HEAD, flush=True)
     added, by_slope = [], []
-    for name in arguments.scenes:
-        seeds = list(range(1, SEEDS.get(name, 1) + 1)) if arguments.seed is None else [arguments.seed]
-        try:
-            found = [measured(folder / name.replace(" ", "_") / f"seed_{seed}", name, seed) for seed in seeds]
-        except aerotri.InputError as error:
-            print(f"| {name} | {str(error).partition(' — ')[0]} |", flush=True)
-            continue
-        own, alone = (together([pair[k] for pair in found]) for k in (0, 1))
-        print(row(name, own, alone), flush=True)
-        added.append(f"| {name} | " + " | ".join(f"{rms(own.sums[side]):.2f}" for side in SIDES) + " |")
-        by_slope.append(f"| {name} | " + " | ".join(of_slope(own, *bounds) for bounds in SLOPES.values()) + " |")
+    with runs_of(arguments) as runs:
+        for name in arguments.scenes:
+            seeds = list(range(1, SEEDS.get(name, 1) + 1)) if arguments.seed is None else [arguments.seed]
+            try:
+                found = runs(of_seed, (folder, name), seeds, BYTES_OF_SEED)
+            except aerotri.InputError as error:
+                print(f"| {name} | {str(error).partition(' — ')[0]} |", flush=True)
+                continue
+            own, alone = (together([pair[k] for pair in found]) for k in (0, 1))
+            print(row(name, own, alone), flush=True)
+            added.append(f"| {name} | " + " | ".join(f"{rms(own.sums[side]):.2f}" for side in SIDES) + " |")
+            by_slope.append(f"| {name} | " + " | ".join(of_slope(own, *bounds) for bounds in SLOPES.values()) + " |")
     print("\n| std z by slope, and beyond 4 σ | " + " | ".join(SLOPES) + " |\n|---|---|---|---|")
     print(*by_slope, sep="\n")
     print("\n| sums over squares of, cells | " + " | ".join(map(str, SIDES)) + " |\n|---|---|---|---|---|---|")
@@ -245,6 +249,12 @@ def row(name: str, own: Cells, alone: Cells) -> str:
         f"{share_beyond(z[flat]):.2f} %", f"{rms(own.sigma[flat]) / rms(own.error[flat]):.2f}", *beside,
     )  # fmt: skip
     return f"| {name} | " + " | ".join(numbers) + " |"
+
+
+def of_seed(shared: tuple[Path, str], seed: int) -> tuple[Cells, Cells]:
+    """`measured` of a scene, in a folder of its own."""
+    folder, name = shared
+    return measured(folder / name.replace(" ", "_") / f"seed_{seed}", name, seed)
 
 
 def measured(folder: Path, name: str, seed: int) -> tuple[Cells, Cells]:

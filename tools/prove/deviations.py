@@ -32,6 +32,7 @@ from aerotri.results.deviations import Deviations
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
+from runs_elsewhere import Runs, add_executor, runs_of
 from small_blocks import small_block, with_adjustment
 
 FLIGHT = {"gsd_m": 0.1, "strips": 10, "images_per_strip": 5, "end_lap": 0.6, "side_lap": 0.4, "heading_deg": 30.0,
@@ -116,21 +117,37 @@ def of_values(found: AdjustedBlock, deviations: Deviations, values: Mapping[str,
     return float(np.mean(total)) if total else float("nan")
 
 
-def measured(name: str, case: Case, blocks: int) -> tuple[list[str], str, tuple[float, ...]]:
+@dataclass(frozen=True)
+class Shown:
+    """What one block showed: p without changes, whether a change was found, sizes by parameter, mean squares."""
+
+    quiet: float
+    needed: bool
+    sizes: Mapping[str, float]
+    squares: tuple[float, ...]
+
+
+def of_block(name: str, seed: int) -> Shown:
+    """One block of a case."""
+    case = CASES[name]
+    still, truth = small_block(seed, case.parameters, flight=FLIGHT, **case.beside)
+    still = with_free_interior(still) if "interior" in case.parameters else still
+    quiet = adjusted(still, case)[1].p
+    block, values = with_changes(still, case, seed)
+    (found, deviations), other = adjusted(block, case), one_set(block, case)
+    sizes = {one.name: one.sigma_um for one in deviations.found}
+    heights = [mean_square(r.points.xyz[:, 2] - truth.points[:, 2], r.points.sigma[:, 2]) for r in (found, other)]
+    return Shown(quiet, bool(deviations.needed), sizes, (of_values(found, deviations, values), *heights))
+
+
+def measured(name: str, blocks: int, runs: Runs) -> tuple[list[str], str, tuple[float, ...]]:
     """Rows of sizes, the row of errors over σ, and probabilities of the blocks without changes."""
-    sizes: dict[str, list[float]] = {}
-    squares, quiet, needed = [], [], 0
-    for seed in range(1, blocks + 1):
-        still, truth = small_block(seed, case.parameters, flight=FLIGHT, **case.beside)
-        still = with_free_interior(still) if "interior" in case.parameters else still
-        quiet.append(adjusted(still, case)[1].p)
-        block, values = with_changes(still, case, seed)
-        (found, deviations), other = adjusted(block, case), one_set(block, case)
-        needed += deviations.needed
-        for one in deviations.found:
-            sizes.setdefault(one.name, []).append(one.sigma_um)
-        heights = [mean_square(r.points.xyz[:, 2] - truth.points[:, 2], r.points.sigma[:, 2]) for r in (found, other)]
-        squares.append((of_values(found, deviations, values), *heights))
+    case, sizes = CASES[name], dict[str, list[float]]()
+    shown: list[Shown] = runs(of_block, name, range(1, blocks + 1))
+    for one in shown:
+        for parameter, size in one.sizes.items():
+            sizes.setdefault(parameter, []).append(size)
+    squares, quiet, needed = [one.squares for one in shown], [one.quiet for one in shown], sum(o.needed for o in shown)
     of_sizes = [
         f"| {name} | {parameter} | {case.sizes.get(parameter, 0.0):.1f} | {np.mean(s):.2f} | {np.std(s, ddof=1):.2f} |"
         for parameter, s in sizes.items()
@@ -144,8 +161,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--blocks", type=int, default=20)
     parser.add_argument("--cases", nargs="+", choices=list(CASES), default=list(CASES))
+    add_executor(parser)
     options = parser.parse_args()
-    found = {name: measured(name, CASES[name], options.blocks) for name in options.cases}
+    with runs_of(options) as runs:
+        found = {name: measured(name, options.blocks, runs) for name in options.cases}
     print(f"# Parameters that change, {options.blocks} blocks of each case (tools/prove/deviations.py)\n")
     print("| case | parameter | true σ µm | found, mean | scatter |\n|---|---|---|---|---|")
     print("\n".join(line for rows, _, _ in found.values() for line in rows))

@@ -11,13 +11,13 @@ Example: python tools/prove/gnss_in_time.py --blocks 24 > tools/results/gnss_in_
 from __future__ import annotations
 
 import argparse
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 import aerotri
+from runs_elsewhere import Runs, add_executor, runs_of
 
 CASES: dict[str, tuple[float, float, float]] = {
     "correlation time 30 s": (0.05, 0.075, 30.0),
@@ -62,28 +62,38 @@ class Sums:
     centres: list[np.ndarray] = field(default_factory=list)
     found: list[Any] = field(default_factory=list)
 
-    def add(self, result: aerotri.Adjustment, truth: Any) -> None:
-        """One adjusted block."""
-        adjusted = result.adjusted
-        check = adjusted.check
-        given = {int(point): k for k, point in enumerate(adjusted.block.control.point)}
-        sigma = adjusted.block.control.sigma[[given[int(point)] for point in check.point]]
-        self.points.append(np.mean(check.difference**2 / (check.sigma**2 + sigma**2), axis=0))
-        error = adjusted.images.centre - truth.centre
-        self.centres.append(np.nanmean((error / adjusted.images.sigma[:, :3]) ** 2, axis=0))
-        self.found.append(adjusted.position_errors)
+
+def shown(result: aerotri.Adjustment, truth: Any) -> tuple[np.ndarray, np.ndarray, Any]:
+    """Mean of (error/σ)² of check points and of projection centres of one block, and the errors that were found."""
+    adjusted = result.adjusted
+    check = adjusted.check
+    given = {int(point): k for k, point in enumerate(adjusted.block.control.point)}
+    sigma = adjusted.block.control.sigma[[given[int(point)] for point in check.point]]
+    of_points = np.mean(check.difference**2 / (check.sigma**2 + sigma**2), axis=0)
+    error = adjusted.images.centre - truth.centre
+    of_centres = np.nanmean((error / adjusted.images.sigma[:, :3]) ** 2, axis=0)
+    return of_points, of_centres, adjusted.position_errors
 
 
-def run(case: tuple[float, float, float], blocks: int) -> dict[str, Sums]:
+def one(case: tuple[float, float, float], seed: int) -> dict[str, tuple[np.ndarray, np.ndarray, Any]]:
+    """One block of a case, by model."""
+    flown = aerotri.simulate(flight(*case), seed=seed)
+    control = flown.block.points[flown.block.control.point].astype(str).tolist()
+    block, out = aerotri.edit(flown.block, check=control), {}
+    for model in MODELS[: 3 if any(case[:2]) else 2]:
+        used = aerotri.with_settings(block, gnss=settings(model, case), model_part="off")
+        out[model] = shown(aerotri.adjust(used, explain=False), flown.truth)
+    return out
+
+
+def run(case: tuple[float, float, float], blocks: int, runs: Runs) -> dict[str, Sums]:
     """All blocks of a case."""
     sums = {model: Sums() for model in MODELS}
-    for seed in range(1, blocks + 1):
-        flown = aerotri.simulate(flight(*case), seed=seed)
-        control = flown.block.points[flown.block.control.point].astype(str).tolist()
-        block = aerotri.edit(flown.block, check=control)
-        for model in MODELS[: 3 if any(case[:2]) else 2]:
-            used = aerotri.with_settings(block, gnss=settings(model, case), model_part="off")
-            sums[model].add(aerotri.adjust(used, explain=False), flown.truth)
+    for found in runs(one, case, range(1, blocks + 1)):
+        for model, (of_points, of_centres, errors) in found.items():
+            sums[model].points.append(of_points)
+            sums[model].centres.append(of_centres)
+            sums[model].found.append(errors)
     return sums
 
 
@@ -102,11 +112,11 @@ def quartiles(values: list[float], scale: float = 1.0) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--blocks", type=int, default=24, help="simulated blocks of each case")
-    parser.add_argument("--processes", type=int, default=1, help="cases computed at the same time")
+    add_executor(parser)
     options = parser.parse_args()
     blocks = options.blocks
-    with ProcessPoolExecutor(options.processes) as pool:
-        outcomes = dict(zip(CASES, pool.map(run, CASES.values(), [blocks] * len(CASES)), strict=True))
+    with runs_of(options) as runs:
+        outcomes = {name: run(case, blocks, runs) for name, case in CASES.items()}
     print(f"# GNSS errors that stay for seconds to minutes, {blocks} simulated blocks of each kind "
           "(tools/prove/gnss_in_time.py)\n")  # fmt: skip
     print("Errors found: medians and the middle half of the blocks. Warned: adjusted as independent, and warned of.\n")

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import aerotri
+from runs_elsewhere import Runs, add_executor, runs_of
 
 
 @dataclass(frozen=True)
@@ -23,46 +24,73 @@ class Line:
 
     control: str
     left_out: str
-    result: aerotri.Adjustment | None
-    reason: str = ""
+    numbers: tuple[str, ...] = ("",) * 6
+    warnings: tuple[str, ...] = ()
 
     def cells(self) -> list[str]:
-        if self.result is None:
-            return [self.control, self.left_out, self.reason, "", "", "", "", ""]
-        check = self.result.adjusted.check
-        difference = check.difference if len(check) == 1 else np.nanmean(check.difference, axis=0, keepdims=True)
-        sigma = check.sigma if len(check) == 1 else np.nanmean(check.sigma, axis=0, keepdims=True)
-        total = check.total_sigma if len(check) == 1 else np.nanmean(check.total_sigma, axis=0, keepdims=True)
-        parameters = self.result.adjusted.parameters
-        focal = np.flatnonzero(parameters.names == "focal_length_mm")
-        c = f"{parameters.value[focal[0]]:.4f} ± {parameters.sigma[focal[0]]:.4f}" if len(focal) else "held"
-        numbers = [f"{d:+.3f} ± {s:.3f}" for d, s in zip(difference[0], sigma[0], strict=True)]
-        return [self.control, self.left_out, *numbers, f"{total[0, 2]:.3f}", c, f"{self.result.sigma0_um:.2f}"]
+        return [self.control, self.left_out, *self.numbers]
 
 
-def line(name: str, block: aerotri.Block, left_out: str, full: aerotri.Adjustment) -> Line:
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """The block with the orientation of its full adjustment to start from, and the points there."""
+
+    block: aerotri.Block
+    points: np.ndarray
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What is left out: names of control points, as the table calls them, with or without GNSS."""
+
+    control: str
+    left_out: str
+    check: tuple[str, ...]
+    uses_gnss: bool
+
+    def __str__(self) -> str:
+        return f"without {self.left_out}, {self.control}"
+
+
+def numbers_of(result: aerotri.Adjustment) -> tuple[str, ...]:
+    """Cells on the check points, the principal distance and σ0."""
+    check = result.adjusted.check
+    difference = check.difference if len(check) == 1 else np.nanmean(check.difference, axis=0, keepdims=True)
+    sigma = check.sigma if len(check) == 1 else np.nanmean(check.sigma, axis=0, keepdims=True)
+    total = check.total_sigma if len(check) == 1 else np.nanmean(check.total_sigma, axis=0, keepdims=True)
+    parameters = result.adjusted.parameters
+    focal = np.flatnonzero(parameters.names == "focal_length_mm")
+    c = f"{parameters.value[focal[0]]:.4f} ± {parameters.sigma[focal[0]]:.4f}" if len(focal) else "held"
+    numbers = [f"{d:+.3f} ± {s:.3f}" for d, s in zip(difference[0], sigma[0], strict=True)]
+    return *numbers, f"{total[0, 2]:.3f}", c, f"{result.sigma0_um:.2f}"
+
+
+def line(whole: Whole, variant: Variant) -> Line:
     """Adjust one variant from the orientation of the full adjustment."""
-    start = full.adjusted
-    images = replace(block.images, centre=start.images.centre, angles=start.images.angles)
+    block = aerotri.edit(whole.block, check=list(variant.check))
+    if not variant.uses_gnss:
+        block = replace(block, gnss_ins=None)
     try:
-        return Line(name, left_out, aerotri.adjust(replace(block, images=images), points=start.points.xyz))
+        found = aerotri.adjust(block, points=whole.points)
     except aerotri.AdjustmentFailedError as failure:
-        return Line(name, left_out, None, failure.outcome.message)
+        return Line(variant.control, variant.left_out, (failure.outcome.message, "", "", "", "", ""))
+    return Line(variant.control, variant.left_out, numbers_of(found), tuple(found.warnings))
 
 
-def lines(block: aerotri.Block) -> list[Line]:
-    """All lines of the table."""
-    full = aerotri.adjust(block, explain=False)
+def variants_of(block: aerotri.Block) -> list[Variant]:
+    """All that is left out, in turn."""
     names = block.points[block.control.point[~block.control.is_check]].astype(str).tolist()
-    variants = [("control and GNSS", block)] if block.gnss_ins is not None else []
-    variants.append(("control alone", replace(block, gnss_ins=None)))
-    table = []
-    for variant, reduced in variants:
-        for name in names:
-            table.append(line(variant, aerotri.edit(reduced, check=[name]), name, full))
-    if block.gnss_ins is not None:
-        table.append(line("GNSS alone", aerotri.edit(block, check=names), "all (mean)", full))
-    return table
+    has_gnss = block.gnss_ins is not None
+    kinds = [("control and GNSS", True)] if has_gnss else []
+    out = [Variant(kind, name, (name,), gnss) for kind, gnss in (*kinds, ("control alone", False)) for name in names]
+    return [*out, Variant("GNSS alone", "all (mean)", tuple(names), True)] if has_gnss else out
+
+
+def lines(block: aerotri.Block, runs: Runs) -> list[Line]:
+    """All lines of the table."""
+    full = aerotri.adjust(block, explain=False).adjusted
+    images = replace(block.images, centre=full.images.centre, angles=full.images.angles)
+    return runs(line, Whole(replace(block, images=images), full.points.xyz), variants_of(block))
 
 
 def main() -> None:
@@ -70,13 +98,16 @@ def main() -> None:
     parser.add_argument("block", type=Path, help="block folder")
     parser.add_argument("--parameters", help="additional parameters, in place of block.toml's")
     parser.add_argument("--robust", help="robust estimator, in place of block.toml's")
+    add_executor(parser)
     options = parser.parse_args()
-    table = lines(aerotri.with_settings(options.block, parameters=options.parameters, robust=options.robust))
+    block = aerotri.with_settings(options.block, parameters=options.parameters, robust=options.robust)
+    with runs_of(options) as runs:
+        table = lines(block, runs)
     print("| datum | left out | dX m | dY m | dZ m | tZ m | c mm | σ0 µm |\n|---|---|---|---|---|---|---|---|")
     for entry in table:
         print("| " + " | ".join(entry.cells()) + " |")
     print()
-    for warning in table[-1].result.warnings if table[-1].result else ():
+    for warning in table[-1].warnings:
         print(f"- {table[-1].control}: {warning}")
 
 

@@ -35,6 +35,7 @@ from aerotri.volume.response import respond
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
+from runs_elsewhere import Runs, add_executor, runs_of
 from small_blocks import with_adjustment
 from statistics_blocks import with_changing_strips
 
@@ -124,22 +125,30 @@ def same_without_moving_errors(flight: Mapping[str, Any], seed: int) -> bool:
     )
 
 
-def rows_of(name: str, flight: Mapping[str, Any], blocks: int) -> tuple[list[str], str]:
+def one(flight: Mapping[str, Any], seed: int) -> tuple[str, dict[str, tuple[float, float]], bool]:
+    """The scheme found, mean squares of errors over σ and over total σ, and whether nothing changes where none move."""
+    block, truth = simulated(flight, seed, MOVING_UM)
+    found = adjust_keeping_system(block)
+    part = found.result.model_part
+    squares = {
+        what: (float(np.nanmean(stated**2)), float(np.nanmean(total**2)))
+        for what, (stated, total) in errors_over_sigma(found, truth).items()
+    }
+    return "" if part is None else part.scheme, squares, same_without_moving_errors(flight, 500 + seed)
+
+
+def rows_of(name: str, flight: Mapping[str, Any], blocks: int, runs: Runs) -> tuple[list[str], str]:
     """Rows of the table of one layout, and a sentence about the test."""
     squares: dict[str, list[tuple[float, float]]] = defaultdict(list)
-    schemes: list[str] = []
-    for seed in range(1, blocks + 1):
-        block, truth = simulated(flight, seed, MOVING_UM)
-        found = adjust_keeping_system(block)
-        part = found.result.model_part
-        schemes.append("" if part is None else part.scheme)
-        for what, (stated, total) in errors_over_sigma(found, truth).items():
-            squares[what].append((float(np.nanmean(stated**2)), float(np.nanmean(total**2))))
+    schemes, of_blocks, same_of = zip(*runs(one, flight, range(1, blocks + 1)), strict=True)
+    for of_block in of_blocks:
+        for what, pair in of_block.items():
+            squares[what].append(pair)
     rows = []
     for what, values in squares.items():
         stated, total = np.sqrt(np.mean(values, axis=0))
         rows.append(f"| {name} | {what} | {stated:.2f} | {total:.2f} |")
-    same = sum(same_without_moving_errors(flight, 500 + seed) for seed in range(1, blocks + 1))
+    same = sum(same_of)
     found_in = ", ".join(f"{scheme} {schemes.count(scheme)}" for scheme in sorted(set(schemes)) if scheme) or "none"
     said = f"{name}: found in {sum(map(bool, schemes))} of {blocks} blocks ({found_in})"
     return rows, f"- {said}; without moving errors {same} of {blocks} are the same with the model part on and off."
@@ -149,15 +158,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--blocks", type=int, default=24)
     parser.add_argument("--layouts", nargs="+", choices=list(FLIGHTS), default=list(FLIGHTS))
+    add_executor(parser)
     options = parser.parse_args()
     print(f"# Total σ against the truth, {options.blocks} blocks of each layout (tools/prove/model_part.py)\n")
     print("Lens errors of 2 µm RMS that change from strip to strip. 1 is right.\n")
     print("| block | of | RMS of error over σ | over total σ |\n|---|---|---|---|")
     said = []
-    for name in options.layouts:
-        rows, sentence = rows_of(name, FLIGHTS[name], options.blocks)
-        print("\n".join(rows), flush=True)
-        said.append(sentence)
+    with runs_of(options) as runs:
+        for name in options.layouts:
+            rows, sentence = rows_of(name, FLIGHTS[name], options.blocks, runs)
+            print("\n".join(rows), flush=True)
+            said.append(sentence)
     print("\n" + "\n".join(said))
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.stats import chi2
 
 import aerotri
+from runs_elsewhere import add_executor, runs_of
 
 SETS = ("brown:K1+K2+K3+P1+P2", "bluh:1-12", "legendre:4x4", "lens:k1+k2+k3+p1+p2")
 FEWEST_RAYS = 5
@@ -71,16 +72,21 @@ def errors_over_sigma(block: aerotri.Block, parameters: str, position: str) -> l
     return z[np.isfinite(z)].tolist()
 
 
+def one(keys: list[tuple[str, str]], seed: int) -> list[list[float]]:
+    """Errors over σ of a flight, by parameters and position."""
+    block = held_by_six(aerotri.simulate(flight(), seed=seed).block)
+    return [errors_over_sigma(block, *key) for key in keys]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=60)
     parser.add_argument("--sets", nargs="+", default=list(SETS))
+    add_executor(parser)
     options = parser.parse_args()
-    found: dict[tuple[str, str], list[list[float]]] = {(s, p): [] for s in options.sets for p in POSITIONS}
-    for seed in range(1, options.seeds + 1):
-        block = held_by_six(aerotri.simulate(flight(), seed=seed).block)
-        for key in found:
-            found[key].append(errors_over_sigma(block, *key))
+    keys = [(s, p) for s in options.sets for p in POSITIONS]
+    with runs_of(options) as runs:
+        found = zip(keys, zip(*runs(one, keys, range(1, options.seeds + 1)), strict=True), strict=True)
     n = options.seeds
     low, high = np.sqrt(chi2.ppf([0.0005, 0.9995], n) / n)
     print(f"# Where additional parameters are evaluated, {n} simulated flights (tools/prove/parameter_position.py)\n")
@@ -88,7 +94,7 @@ def main() -> None:
     print(f"{low:.2f} … {high:.2f}.\n")
     print("| parameters | evaluated at the | mean, middle | mean, border | RMS, middle | RMS, border |")
     print("|---|---|---|---|---|---|")
-    for (parameters, position), values in found.items():
+    for (parameters, position), values in found:
         z = np.array(values)
         mean, rms = z.mean(axis=0), np.sqrt(np.mean(z**2, axis=0))
         cells = [parameters, f"{position} point", *(f"{v:+.2f}" for v in mean), *(f"{v:.2f}" for v in rms)]

@@ -14,12 +14,14 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 import aerotri
 from aerotri import observations
 from default_choice import LAYOUTS, flight, held, simulated
+from runs_elsewhere import add_executor, runs_of
 
 KINDS = ("film", "matching", "noise alone")
 PARAMETERS = "legendre:4x4"
@@ -52,19 +54,25 @@ def measured(block: observations.Block, correlated: str) -> tuple[list[float], b
     return [float(number) for number in numbers], found is not None and found.counts
 
 
+def one(shared: tuple[str, str], seed: int) -> tuple[list[float], bool]:
+    """`measured` of a block of a kind."""
+    kind, correlated = shared
+    return measured(block_of(kind, seed), correlated)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--blocks", type=int, default=24, help="of each kind")
+    add_executor(parser)
     options = parser.parse_args()
     print(
         f"# Smooth errors of single photographs, {options.blocks} blocks of a kind (tools/prove/photograph_fields.py)"
     )
     print("\n| errors | correlated | found | X, Y, total σ | Z, total σ | RMS Z cm | σ0 µm | s |")
     print("|---|---|---|---|---|---|---|---|")
-    for kind in KINDS:
-        blocks = [block_of(kind, seed) for seed in range(1, options.blocks + 1)]
-        for correlated in ("off", "on"):
-            rows, found = zip(*(measured(block, correlated) for block in blocks), strict=True)
+    with runs_of(options) as runs:
+        for kind, correlated in product(KINDS, ("off", "on")):
+            rows, found = zip(*runs(one, (kind, correlated), range(1, options.blocks + 1)), strict=True)
             values = np.array(rows)
             mean, error = values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(len(values))
             cells = [f"{mean[k]:.2f} ± {error[k]:.2f}" for k in range(2)]

@@ -32,6 +32,7 @@ import numpy as np
 
 import aerotri
 from aerotri import geometry
+from runs_elsewhere import add_executor, folder_of, runs_of
 
 SPEC = {
     "name": "rendered",
@@ -46,6 +47,8 @@ SPEC = {
     "control": {"distance_bases": 1.5, "sigma_m": [0.01, 0.01, 0.02], "check_points": 20},
 }  # fmt: skip
 AXES = ("X", "Y", "Z")
+BYTES_OF_SEED = 1_000_000_000
+"""Memory of a seed with its photographs; chosen [C]."""
 
 
 def write_files(folder: Path, seed: int, plan: dict = SPEC) -> tuple[str, ...]:
@@ -76,6 +79,14 @@ def rendered(folder: Path, seed: int) -> tuple[aerotri.Adjustment, np.ndarray, n
     result = tied_and_adjusted(folder, seed, 6.0, check)
     d, w = (np.column_stack([result.check[f"{what}{axis}"] for axis in AXES]) for what in ("d", "w"))
     return result, d, w
+
+
+def of_seed(out: Path, seed: int) -> tuple[float, np.ndarray, np.ndarray]:
+    """σ0 of a block from its photographs, d and w of its check points."""
+    folder = out / f"rendered_{seed}"
+    shutil.rmtree(folder, ignore_errors=True)
+    result, d, w = rendered(folder, seed)
+    return result.sigma0, d, w
 
 
 def tied_and_adjusted(folder: Path, seed: int, focal_length_mm: float, check: tuple[str, ...]) -> aerotri.Adjustment:
@@ -115,16 +126,17 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    add_executor(parser)
     arguments = parser.parse_args()
-    every, lines = [], []
-    for seed in range(1, arguments.seeds + 1):
-        folder = arguments.out / f"rendered_{seed}"
-        shutil.rmtree(folder, ignore_errors=True)
-        result, d, w = rendered(folder, seed)
+    arguments.out = folder_of(arguments.out, arguments)
+    every, lines, seeds = [], [], range(1, arguments.seeds + 1)
+    with runs_of(arguments) as runs:
+        found = runs(of_seed, arguments.out, seeds, BYTES_OF_SEED)
+    for seed, (sigma0, d, w) in zip(seeds, found, strict=True):
         every.append(w)
         rms = [np.sqrt((values**2).mean(axis=0)) for values in (d, w)]
         lines.append(
-            f"| {seed} | {len(w)} | {result.sigma0:.2f} | "
+            f"| {seed} | {len(w)} | {sigma0:.2f} | "
             + " | ".join(" ".join(f"{v:.3f}" if k == 0 else f"{v:.2f}" for v in rms[k]) for k in (0, 1))
             + f" | {np.abs(w).max():.1f} |"
         )

@@ -29,7 +29,6 @@ allows for the curvature of the ground within a window, which the y-parallaxes t
 from __future__ import annotations
 
 import argparse
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,6 +39,7 @@ from scipy.stats import chi2
 import aerotri
 from photographs_to_block import SPEC as OF_FILES
 from photographs_to_block import rendered
+from runs_elsewhere import add_executor, folder_of, runs_of
 
 SPEC = {
     "name": "pickets",
@@ -57,6 +57,8 @@ NOISE = 50.0
 EDGE, MOST = 0.10, 5
 """Share of the format at its edge that is not used, and photographs of a picket."""
 INTERVAL_M, SLOPE_STEP_M = 10.0, 0.05
+BYTES_OF_SEED = 1_000_000_000
+"""Memory of a seed with its photographs; chosen [C]."""
 GROSS_PX, GROSS_SIGMA = 1.0, 6.0
 """A picket is off grossly by more than this parallax and this many σ."""
 
@@ -81,15 +83,14 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=200)
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--from-files", type=int, default=0, help="seeds with tie points found in the photographs")
+    add_executor(parser)
     arguments = parser.parse_args()
-    folder = arguments.folder or Path(tempfile.mkdtemp())
-    folder.mkdir(parents=True, exist_ok=True)
-    runs = []
-    for seed in range(arguments.first, arguments.first + arguments.seeds):
-        runs.append(of_seed(folder, seed))
-        if len(runs) % 20 == 0:
-            print("\n".join(table(f"{len(runs)} seeds, tie points simulated", runs)), flush=True)
-    files = [from_files(folder, seed) for seed in range(1, arguments.from_files + 1)]
+    folder = folder_of(arguments.folder, arguments)
+    with runs_of(arguments) as runs:
+        found = runs(of_seed, folder, range(arguments.first, arguments.first + arguments.seeds), BYTES_OF_SEED)
+        if found:
+            print("\n".join(table(f"{len(found)} seeds, tie points simulated", found)), flush=True)
+        files = runs(from_files, folder, range(1, arguments.from_files + 1), BYTES_OF_SEED)
     if files:
         print("\n".join(table(f"{len(files)} seeds, tie points found in the photographs", files)), flush=True)
 
@@ -97,7 +98,7 @@ def main() -> None:
 def of_seed(folder: Path, seed: int) -> Run:
     """A block of its own, matched with its adjusted orientation."""
     flight, grain = aerotri.simulate(SPEC, seed), float(np.random.default_rng(seed).uniform(*GRAIN))
-    photographs = flight.save(folder / "flown", photographs=True, noise=grain) / "photographs"
+    photographs = flight.save(folder / f"flown_{seed}", photographs=True, noise=grain) / "photographs"
     return matched(aerotri.adjust(flight.block, explain=False), photographs, flight, INTERVAL_M, grain)
 
 

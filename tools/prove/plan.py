@@ -18,6 +18,7 @@ import numpy as np
 from scipy.stats import chi2
 
 import aerotri
+from runs_elsewhere import Runs, add_executor, runs_of
 
 AREA = "POLYGON ((0 0, 320 20, 300 210, 60 180, 0 0))"
 PLANS: dict[str, dict[str, Any]] = {
@@ -35,19 +36,24 @@ CELLS = 5
 """Of the map along each side, in the table."""
 
 
-def normalised(plan: Any, flights: int, first: int = 1) -> np.ndarray:
-    """(flights, g, 3) errors of the ground points over their predicted σ."""
+def planned(name: str) -> Any:
+    """One of the plans."""
+    piles = PILES if name in PILE_PLANS else None
+    return aerotri.plan_flight(
+        AREA, camera="p1", gsd=0.03, ground=100.0, tie_points=100, forward_overlap=0.7, side_overlap=0.5,
+        piles=piles, **PLANS[name],
+    )  # fmt: skip
+
+
+def normalised(plan: Any, seed: int) -> np.ndarray:
+    """(g, 3) errors of the ground points of a flight over their predicted σ."""
     table = plan.ground_points
     truth = np.column_stack([table[axis] for axis in "XYZ"])
     sigma = np.column_stack([table[f"s{axis}"] for axis in "XYZ"])
-    found = []
-    for seed in range(first, first + flights):
-        result = aerotri.adjust(plan.fly(seed))
-        row = {name: k for k, name in enumerate(result.points["point"].tolist())}
-        own = [row[name] for name in table["point"].tolist()]
-        xyz = np.column_stack([result.points[axis] for axis in "XYZ"])[own]
-        found.append((xyz - truth) / sigma)
-    return np.array(found)
+    result = aerotri.adjust(plan.fly(seed))
+    row = {name: k for k, name in enumerate(result.points["point"].tolist())}
+    own = [row[name] for name in table["point"].tolist()]
+    return (np.column_stack([result.points[axis] for axis in "XYZ"])[own] - truth) / sigma
 
 
 def cell_numbers(xy: np.ndarray) -> np.ndarray:
@@ -85,17 +91,26 @@ def lines_of(name: str, plan: Any, errors: np.ndarray) -> list[str]:
     return [*out, ""]
 
 
-def pile_errors(plan: Any, flights: int, first: int = 1) -> np.ndarray:
-    """(flights, piles) errors of the volumes, m³: size of a pile times the mean error of its places, as measured."""
+def pile_errors(plan: Any, seed: int) -> list[float]:
+    """Errors of the volumes of a flight, m³: size of a pile times the mean error of its places, as measured."""
     block, record = plan.expected_block, plan.record
     at = {name: k for k, name in enumerate(block.points.tolist())}
-    found = []
-    for seed in range(first, first + flights):
-        result = aerotri.adjust(plan.fly(seed), explain=False, model_part="off")
-        z = dict(zip(result.points["point"].tolist(), result.points["Z"].tolist(), strict=True))
-        found.append([one.area * np.mean([z[name] - record.expected.xyz[at[name], 2] for name in one.points])
-                      for one in record.piles])  # fmt: skip
-    return np.array(found)
+    result = aerotri.adjust(plan.fly(seed), explain=False, model_part="off")
+    z = dict(zip(result.points["point"].tolist(), result.points["Z"].tolist(), strict=True))
+    return [
+        float(one.area * np.mean([z[name] - record.expected.xyz[at[name], 2] for name in one.points]))
+        for one in record.piles
+    ]
+
+
+def errors_of(name: str, seed: int) -> np.ndarray:
+    """`normalised` of a plan by its name."""
+    return normalised(planned(name), seed)
+
+
+def pile_errors_of(name: str, seed: int) -> list[float]:
+    """`pile_errors` of a plan by its name."""
+    return pile_errors(planned(name), seed)
 
 
 def pile_lines(name: str, plan: Any, errors: np.ndarray) -> list[str]:
@@ -123,21 +138,25 @@ def main() -> None:
     parser.add_argument("--piles-only", action="store_true", help="the σ of single piles alone")
     parser.add_argument("--only", help="name of one of the plans")
     parser.add_argument("--out", type=Path)
+    add_executor(parser)
     given = parser.parse_args()
+    with runs_of(given) as runs:
+        _print_plans(given, runs)
+
+
+def _print_plans(given: argparse.Namespace, runs: Runs) -> None:
+    seeds = range(given.first_seed, given.first_seed + given.flights)
     lines = ["# Predicted σ of planned flights against simulated flights", "",
              "The ground points of one flight share their errors, so the numbers of neighbouring cells move together.",
              ""]  # fmt: skip
-    for name, asked in PLANS.items():
+    for name in PLANS:
         if given.only not in (None, name):
             continue
-        plan = aerotri.plan_flight(
-            AREA, camera="p1", gsd=0.03, ground=100.0, tie_points=100, forward_overlap=0.7, side_overlap=0.5,
-            piles=PILES if name in PILE_PLANS else None, **asked,
-        )  # fmt: skip
+        plan = planned(name)
         if not given.piles_only:
-            lines += lines_of(name, plan, normalised(plan, given.flights, given.first_seed))
+            lines += lines_of(name, plan, np.array(runs(errors_of, name, seeds)))
         if name in PILE_PLANS:
-            lines += pile_lines(name, plan, pile_errors(plan, given.flights, given.first_seed))
+            lines += pile_lines(name, plan, np.array(runs(pile_errors_of, name, seeds)))
         print("\n".join(lines), flush=True)
         if given.out is not None:
             given.out.write_text("\n".join(lines), encoding="utf-8")

@@ -13,6 +13,7 @@ Example
 from __future__ import annotations
 
 import argparse
+import getpass
 import json
 import os
 import subprocess
@@ -24,7 +25,9 @@ from pathlib import Path
 
 import numpy as np
 
+from aerotri import __version__
 from defects_proof.looks import Look, looks
+from runs_elsewhere import Runs, add_executor, runs_of
 
 PROCESSORS = {
     "this processor": {},
@@ -38,11 +41,11 @@ def main() -> None:
     """Look on every processor, print the table, write it."""
     arguments = _arguments()
     if arguments.child:
-        found = [asdict(look) for look in looks(range(1, arguments.seeds + 1))]
+        found = [asdict(look) for look in looks(range(arguments.first, arguments.first + arguments.seeds))]
         arguments.child.write_text(json.dumps(found), encoding="utf-8")
         return
-    with tempfile.TemporaryDirectory(prefix="aerotri_defects_") as folder:
-        found = {name: _on(name, arguments.seeds, Path(folder)) for name in PROCESSORS}
+    with runs_of(arguments) as runs:
+        found = {name: _on(name, arguments.seeds, runs) for name in PROCESSORS}
     table = markdown(found, arguments.seeds)
     print(table)
     if arguments.out:
@@ -57,17 +60,26 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seeds", type=int, default=3, help="blocks of every case with other random numbers")
     parser.add_argument("--out", type=Path, help="folder for prove_defects.md")
     parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--first", type=int, default=1, help=argparse.SUPPRESS)
+    add_executor(parser)
     return parser.parse_args()
 
 
-def _on(processor: str, seeds: int, folder: Path) -> list[Look]:
-    """All looks in a process of their own."""
+def _on(processor: str, seeds: int, runs: Runs) -> list[Look]:
+    """All looks, each seed in a process of its own."""
     print(f"looking on {processor}", file=sys.stderr, flush=True)
-    out = folder / "looks.json"
-    own = {"NUMBA_CACHE_DIR": str(folder / processor), "OPENBLAS_NUM_THREADS": "1", "AEROTRI_THREADS": "1"}
-    environment = os.environ | PROCESSORS[processor] | own
-    subprocess.run([sys.executable, __file__, "--child", out, "--seeds", str(seeds)], env=environment, check=True)
-    return [Look(**look) for look in json.loads(out.read_text(encoding="utf-8"))]
+    return [look for found in runs(_of_seed, processor, range(1, seeds + 1)) for look in found]
+
+
+def _of_seed(processor: str, seed: int) -> list[Look]:
+    """The looks of one seed; the kernels of a processor are kept on the machine for the next one."""
+    cache = Path(tempfile.gettempdir()) / f"aerotri_defects_{getpass.getuser()}_{__version__}" / processor
+    own = {"NUMBA_CACHE_DIR": str(cache), "OPENBLAS_NUM_THREADS": "1", "AEROTRI_THREADS": "1"}
+    with tempfile.TemporaryDirectory(prefix="aerotri_defects_") as folder:
+        out = Path(folder) / "looks.json"
+        line = [sys.executable, __file__, "--child", out, "--seeds", "1", "--first", str(seed)]
+        subprocess.run(line, env=os.environ | PROCESSORS[processor] | own, check=True)
+        return [Look(**look) for look in json.loads(out.read_text(encoding="utf-8"))]
 
 
 def markdown(found: dict[str, list[Look]], seeds: int) -> str:

@@ -26,7 +26,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import ca502
 import rigs
+from runs_elsewhere import Runs, add_executor, runs_of
 
+BYTES_OF_RUN, BYTES_A_RAY = 300_000_000, 6_000
+"""Memory of an adjustment, as `halves` counts it."""
 ITERATIONS = 150
 """At most; a block that four points hold takes more than the usual 30."""
 MEASURED = {"parameter_position": "measured"}
@@ -120,12 +123,12 @@ def errors(block: aerotri.Block, left_out: tuple[str, ...]) -> tuple[np.ndarray,
     return check.difference, check.sigma, check.total_sigma
 
 
-def row(case: Case, name: str) -> str:
+def row(case: Case, name: str, runs: Runs) -> str:
     """One line of the table."""
     parameters, settings = SETS[name]
     begun = time.perf_counter()
     block = aerotri.with_settings(case.block, parameters=parameters, max_iterations=ITERATIONS, **settings)
-    found = [errors(block, left_out) for left_out in case.left_out]
+    found = runs(errors, block, case.left_out, BYTES_OF_RUN + BYTES_A_RAY * len(block.image_points))
     there = [one for one in found if not isinstance(one, str)]
     if not there:
         return f"| {case.name} | {name} | {found[0]} | | | | | | |"
@@ -147,18 +150,19 @@ def main() -> None:
     parser.add_argument("--sets", nargs="+", choices=list(SETS), default=list(SETS))
     parser.add_argument("--singles", action="store_true", help="no pairs")
     parser.add_argument("--pairs", action="store_true", help="pairs alone")
+    add_executor(parser)
     options = parser.parse_args()
     print("# Control left out of real blocks (tools/prove/real_check_points.py)\n")
     print("| block | parameters | adjusted | RMS dZ m | dZ/σ | dZ/total σ | RMS dX dY m | over σ | over total σ | s |")
     print("|---|---|---|---|---|---|---|---|---|---|")
-    for name in options.blocks:
-        for case in CASES[name](options.data):
+    with runs_of(options) as runs:
+        for case in (case for name in options.blocks for case in CASES[name](options.data)):
             if options.singles:
                 case = replace(case, left_out=tuple(one for one in case.left_out if len(one) != 2))
             if options.pairs:
                 case = replace(case, left_out=tuple(one for one in case.left_out if len(one) == 2))
             for chosen in options.sets:
-                print(row(case, chosen), flush=True)
+                print(row(case, chosen, runs), flush=True)
 
 
 if __name__ == "__main__":

@@ -35,11 +35,21 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "adjustme
 
 from test_statistical_truth import CASES, PREPARED, normalised_errors
 
+from runs_elsewhere import Runs, add_executor, runs_of
 
-def row(case: str, seeds: int) -> str:
-    """One line of the table."""
+FIRST = 5000
+"""Seed of the first run."""
+
+
+def one(case: str, seed: int) -> tuple[dict[str, float], float, float]:
+    """What the test of a case gives for a seed."""
     parameters, changes = CASES[case]
-    runs = [normalised_errors(parameters, changes, 5000 + k, PREPARED.get(case)) for k in range(seeds)]
+    return normalised_errors(parameters, changes, seed, PREPARED.get(case))
+
+
+def row(case: str, seeds: int, computed: Runs) -> str:
+    """One line of the table."""
+    runs = computed(one, case, range(FIRST, FIRST + seeds))
     z = np.array([list(run[0].values()) for run in runs])
     names = list(runs[0][0])
     bias, spread = np.abs(z.mean(axis=0)) * np.sqrt(seeds), np.mean(z**2, axis=0)
@@ -60,11 +70,14 @@ def row(case: str, seeds: int) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=200)
-    seeds = parser.parse_args().seeds
+    add_executor(parser)
+    options = parser.parse_args()
+    seeds = options.seeds
     print(f"{seeds} seeds; a bias is below 3.3 in 99.9 % of the cases")
     print("| case | unknowns | largest bias | mean z² | 99.9 % band | σ0² |\n|---|---|---|---|---|---|")
-    for case in CASES:
-        print(row(case, seeds), flush=True)
+    with runs_of(options) as computed:
+        for case in CASES:
+            print(row(case, seeds, computed), flush=True)
 
 
 if __name__ == "__main__":

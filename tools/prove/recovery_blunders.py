@@ -40,7 +40,7 @@ from __future__ import annotations
 import argparse
 import time
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -48,6 +48,7 @@ import numpy as np
 from scipy.stats import binom, norm
 
 import aerotri
+from runs_elsewhere import Runs, add_executor, runs_of
 
 DEMO = Path(__file__).parents[2] / "blocks" / "frederiksstad_ultracam" / "simulation.toml"
 METHODS = ("data-snooping", "adaptive", "danish", "cauchy", "huber")
@@ -98,21 +99,25 @@ def pair_of(result: aerotri.Adjustment, x: str, y: str) -> np.ndarray:
     return np.column_stack([result.rays[x], result.rays[y]])
 
 
-def single_blunders(seeds: Iterable[int]) -> list[str]:
+def single_blunder(_: None, seed: int) -> list[int]:
+    """Of one block: w tested, false alarms, errors, of these beyond the limit and removed; rays and rays lost."""
+    rng = np.random.default_rng([1, seed])
+    block = aerotri.simulate(SMALL, seed).block
+    clean, snooped = adjust(block), adjust(block, "data-snooping")
+    foul, rows, axes = with_single_errors(block, clean, rng)
+    found, plain = adjust(foul, "data-snooping"), adjust(foul)
+    w = pair_of(clean, "wx", "wy")[pair_of(clean, "rx", "ry") > 1e-3]
+    limit = norm.ppf(1.0 - ALPHA / 2.0)
+    return [
+        w.size, int(np.sum(np.abs(w) > limit)), len(rows),
+        int(np.sum(np.abs(pair_of(plain, "wx", "wy")[rows, axes]) > limit)),
+        int(flagged(found)[rows].sum()), len(block.image_points), int(flagged(snooped).sum()),
+    ]  # fmt: skip
+
+
+def single_blunders(seeds: Iterable[int], runs: Runs) -> list[str]:
     """Lines of the table on single errors."""
-    rng, counts = np.random.default_rng(1), np.zeros(7, dtype=int)
-    for seed in seeds:
-        block = aerotri.simulate(SMALL, seed).block
-        clean, snooped = adjust(block), adjust(block, "data-snooping")
-        foul, rows, axes = with_single_errors(block, clean, rng)
-        found, plain = adjust(foul, "data-snooping"), adjust(foul)
-        w = pair_of(clean, "wx", "wy")[pair_of(clean, "rx", "ry") > 1e-3]
-        limit = norm.ppf(1.0 - ALPHA / 2.0)
-        counts += [
-            w.size, np.sum(np.abs(w) > limit), len(rows),
-            np.sum(np.abs(pair_of(plain, "wx", "wy")[rows, axes]) > limit),
-            flagged(found)[rows].sum(), len(block.image_points), flagged(snooped).sum(),
-        ]  # fmt: skip
+    counts = np.sum(runs(single_blunder, None, seeds), axis=0)
     tested, alarms, errors, beyond, removed, rays, lost = counts.tolist()
     low, high = binom.ppf([0.0005, 0.9995], errors, POWER) / errors
     return [
@@ -165,14 +170,28 @@ def bulk(clean: aerotri.Block, flight, method: str) -> Bulk:
     )  # fmt: skip
 
 
-def bulk_line(name: str, blocks: Iterable[Callable[[], tuple]], method: str) -> str:
+@dataclass(frozen=True)
+class Case:
+    """A plan, the method, and what differs in the control of the flights with gross errors."""
+
+    plan: dict
+    method: str
+    control: dict | None = None
+
+
+def one_bulk(case: Case, seed: int) -> Bulk:
+    """Counts of one block of a case."""
+    return bulk(*pair(case.plan, seed, case.control), case.method)
+
+
+def bulk_line(name: str, case: Case, seeds: Iterable[int], computed: Runs) -> str:
     """One line of the table on gross errors in bulk."""
-    runs = [bulk(*make(), method) for make in blocks]
+    runs: list[Bulk] = computed(one_bulk, case, seeds)
     total = {key: sum(getattr(run, key) for run in runs) for key in ("above", "flagged", "keepable", "lost", "good")}
     lost_of_good = sum(run.lost_of_good for run in runs)
     off, seconds = max(run.off for run in runs), float(np.median([run.seconds for run in runs]))
     return (
-        f"| {name} | {method} | {len(runs)} | {100 * total['flagged'] / total['above']:.2f} % | "
+        f"| {name} | {case.method} | {len(runs)} | {100 * total['flagged'] / total['above']:.2f} % | "
         f"{100 * total['lost'] / total['keepable']:.2f} % ({100 * lost_of_good / total['good']:.2f} %) | {off:.2f} | "
         f"{sum(run.named for run in runs)} | {seconds:.2f} |"
     )
@@ -188,23 +207,24 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=200, help="of the small block")
     parser.add_argument("--demo-seeds", type=int, default=20, help="of the sample block")
+    add_executor(parser)
     arguments = parser.parse_args()
     small, demo = range(1, arguments.seeds + 1), range(1, arguments.demo_seeds + 1)
     plan = tomllib.loads(DEMO.read_text(encoding="utf-8"))
     print("| single errors | found | expected |\n|---|---|---|")
-    print("\n".join(single_blunders(range(1001, 1001 + arguments.seeds))), flush=True)
+    with runs_of(arguments) as runs:
+        print("\n".join(single_blunders(range(1001, 1001 + arguments.seeds), runs)), flush=True)
+        _print_bulk(small, demo, plan, runs)
+
+
+def _print_bulk(small: Iterable[int], demo: Iterable[int], plan: dict, runs: Runs) -> None:
     print("\n| block | method | seeds | above ∇0 flagged | good lost (of all) | max off, σ | control named | s |")
     print("|---|---|---|---|---|---|---|---|")
-    wrong = {"blunders": [{"point": "C03", "error_m": [0.0, 0.0, 10.0]}]}
-    for method in METHODS:
-        print(bulk_line("29 photographs", [lambda s=s: pair(SMALL, s) for s in small], method), flush=True)
-    made = [lambda s=s: pair(SMALL, s, wrong) for s in small]
-    print(bulk_line("the same, C03 10 m off", made, METHODS[0]), flush=True)
-    for method in METHODS:
-        print(bulk_line("sample block, 132", [lambda s=s: pair(plan, s) for s in demo], method), flush=True)
-    wrong = {"blunders": [{"point": "C05", "error_m": [0.0, 0.0, 10.0]}]}
-    made = [lambda s=s: pair(plan, s, wrong) for s in demo]
-    print(bulk_line("the same, C05 10 m off", made, METHODS[0]), flush=True)
+    for name, own, point, seeds in (("29 photographs", SMALL, "C03", small), ("sample block, 132", plan, "C05", demo)):
+        wrong = {"blunders": [{"point": point, "error_m": [0.0, 0.0, 10.0]}]}
+        for method in METHODS:
+            print(bulk_line(name, Case(own, method), seeds, runs), flush=True)
+        print(bulk_line(f"the same, {point} 10 m off", Case(own, METHODS[0], wrong), seeds, runs), flush=True)
 
 
 if __name__ == "__main__":

@@ -28,9 +28,11 @@ from scipy.stats import binom
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
 import aerotri
+from runs_elsewhere import Runs, add_executor, runs_of
 from small_blocks import small_block
 
-ZERO_RATE = 0.6827
+ZERO_RATE, FIRST = 0.6827, 9000
+"""Probability of t < 1 where a parameter is zero, and the seed of the first block."""
 TRUE = {"bluh.1": 3e-5, "bluh.2": -3e-5, "bluh.9": -6e-9}
 """Parameters that are not zero in the second experiment, each of about 2 µm at the edge of the format."""
 
@@ -40,21 +42,24 @@ def adjusted(block: aerotri.Block, **settings):
     return aerotri.adjust(aerotri.with_settings(block, **settings), explain=False).adjusted
 
 
-def rates(parameters: str, seeds: int, errors: dict[str, float]) -> str:
+def counts(shared: tuple[str, dict[str, float]], seed: int) -> tuple[int, ...]:
+    """Of one block: zero parameters, with t < 1 at once, removed by t, removed by the rule; true ones lost."""
+    parameters, errors = shared
+    block = small_block(seed, parameters, camera={"ucd": {"preset": "ultracam_d", "errors": {"parameters": errors}}})[0]
+    p = adjusted(block).parameters
+    zero = ~np.isin(p.names.astype(str), list(errors))
+    only_t = adjusted(block, parameter_selection="on", correlation_limit=1.0).removals
+    removed = adjusted(block, parameter_selection="on").removals
+    return (
+        int(zero.sum()), int((p.t[zero] < 1.0).sum()), sum(r.name not in errors for r in only_t),
+        sum(r.name not in errors for r in removed), sum(r.name in errors for r in removed),
+    )  # fmt: skip
+
+
+def rates(parameters: str, seeds: int, errors: dict[str, float], runs: Runs) -> str:
     """One line of the table."""
-    camera = {"ucd": {"preset": "ultracam_d", "errors": {"parameters": errors}}}
-    at_once = by_t = by_rule = lost = count = 0
-    for seed in range(9000, 9000 + seeds):
-        block = small_block(seed, parameters, camera=camera)[0]
-        p = adjusted(block).parameters
-        zero = ~np.isin(p.names.astype(str), list(errors))
-        count += int(zero.sum())
-        at_once += int((p.t[zero] < 1.0).sum())
-        only_t = adjusted(block, parameter_selection="on", correlation_limit=1.0).removals
-        by_t += sum(r.name not in errors for r in only_t)
-        removed = adjusted(block, parameter_selection="on").removals
-        by_rule += sum(r.name not in errors for r in removed)
-        lost += sum(r.name in errors for r in removed)
+    found = runs(counts, (parameters, errors), range(FIRST, FIRST + seeds))
+    count, at_once, by_t, by_rule, lost = np.sum(found, axis=0).tolist()
     low, high = binom.ppf([0.0005, 0.9995], count, ZERO_RATE) / count
     share = f"{lost} of {len(errors) * seeds}" if errors else "–"
     return (
@@ -66,12 +71,14 @@ def rates(parameters: str, seeds: int, errors: dict[str, float]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=60)
-    seeds = parser.parse_args().seeds
+    add_executor(parser)
+    options = parser.parse_args()
     print("| set | zero parameters | t < 1 at once (99.9 % band) | removed by t | by the full rule | true ones lost |")
     print("|---|---|---|---|---|---|")
     both = "bluh:1-12,ultracam_d:42-73"
-    for parameters, errors in (("ebner", {}), ("bluh:1-12", {}), ("bluh:1-12", TRUE), (both, {})):
-        print(rates(parameters, seeds, errors), flush=True)
+    with runs_of(options) as runs:
+        for parameters, errors in (("ebner", {}), ("bluh:1-12", {}), ("bluh:1-12", TRUE), (both, {})):
+            print(rates(parameters, options.seeds, errors, runs), flush=True)
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from scipy.stats import binom, chi2
 
 import aerotri
 from aerotri import geometry, observations
+from runs_elsewhere import Runs, add_executor, runs_of
 
 Z = dict[tuple[str, str], float]
 LETTERS = ("x", "y", "z", "omega", "phi", "kappa")
@@ -125,18 +126,21 @@ HEAD_OF_ERRORS = (
 )
 
 
-def rigid(seeds: Iterable[int], names: Iterable[str]) -> dict[str, list[Any]]:
+def of_rigid(name: str, seed: int) -> tuple[Z, Any, Any]:
+    """z, outcome and tests of rigidity of a flight."""
+    flight = flown(KINDS[name], seed)
+    found = adjusted(flight.block)
+    return normalised(found, flight.truth), found.outcome, found.rigidity
+
+
+def rigid(seeds: Iterable[int], names: Iterable[str], runs: Runs) -> dict[str, list[Any]]:
     """Rigs that are rigid: table of z; the tests of rigidity of every flight, by kind."""
     print(f"## Rigid\n\n{HEAD_OF_ERRORS}")
     out = {}
     for name in names:
-        kind, runs, out[name] = KINDS[name], [], []
-        for seed in seeds:
-            flight = flown(kind, seed)
-            found = adjusted(flight.block)
-            runs.append((normalised(found, flight.truth), found.outcome))
-            out[name].append(found.rigidity)
-        print(row_of_errors(name, runs), flush=True)
+        found = runs(of_rigid, name, seeds)
+        out[name] = [rigidity for _, _, rigidity in found]
+        print(row_of_errors(name, [(z, outcome) for z, outcome, _ in found]), flush=True)
     return out
 
 
@@ -160,29 +164,45 @@ def false_alarms(tests: dict[str, list[Any]]) -> None:
               f"{p.mean(axis=0).max():.2f} |")  # fmt: skip
 
 
-def power(tests: dict[str, list[Any]], seeds: Iterable[int], rigs: tuple[str, ...]) -> None:
+@dataclass(frozen=True, eq=False)
+class Before:
+    """A flight that did not move: its seed, and what its tests of rigidity said."""
+
+    seed: int
+    tests: Any
+
+    def __str__(self) -> str:
+        return f"with seed {self.seed}"
+
+
+def of_moving(name: str, before: Before) -> tuple[tuple[float, ...], tuple[bool, ...]]:
+    """Sizes that the tests state for a flight, and which movements of these sizes are found."""
+    kind, seed, tests = KINDS[name], before.seed, before.tests
+    camera, limit = kind.heads[0], tests.alpha / (2 * len(tests.heads))
+    turn, shift = (tests.head("frame", camera, what) for what in ("rotation", "position"))
+    axis = np.random.default_rng(seed).normal(size=3)
+    axis /= np.linalg.norm(axis)
+    one = tests.station_detectable["frame", camera]
+    turning = {"play_rotation_deg": float(np.degrees(turn.movement_detectable))}
+    shifting = {"play_position_m": shift.movement_detectable}
+    drifting = {"drift_rotation_deg": np.degrees(turn.drift_detectable * axis).tolist()}
+    return (turn.movement_detectable, shift.movement_detectable, turn.drift_detectable, one), (
+        _head(kind, seed, camera, turning).movement_p < limit,
+        _head(kind, seed, camera, shifting, "position").movement_p < limit,
+        _head(kind, seed, camera, drifting).drift_p < limit,
+        _single(kind, seed, camera, one * axis, tests.alpha),
+    )
+
+
+def power(tests: dict[str, list[Any]], seeds: Iterable[int], rigs: tuple[str, ...], runs: Runs) -> None:
     """How often movements of the size said to be detectable are found: the flights again, with a camera that moves."""
     print("\n## Movements of the detectable size\n\nOne mounted camera moves by the size that the tests state for "
           "this flight. Drifts and single turns are about any axis; their stated size is that of the worst axis.\n\n"
           "| rig | what moves | median size | found | stated power | 99.9 % band |\n" + "|---" * 6 + "|")  # fmt: skip
     for name in rigs:
-        kind, alpha, stated = KINDS[name], tests[name][0].alpha, tests[name][0].power
-        camera, count = kind.heads[0], 2 * len(tests[name][0].heads)
-        turned, moved, drifted, single = [], [], [], []
-        sizes = []
-        for seed, before in zip(seeds, tests[name], strict=True):
-            turn, shift = (before.head("frame", camera, what) for what in ("rotation", "position"))
-            axis = np.random.default_rng(seed).normal(size=3)
-            axis /= np.linalg.norm(axis)
-            one = before.station_detectable["frame", camera]
-            sizes.append((turn.movement_detectable, shift.movement_detectable, turn.drift_detectable, one))
-            plays = {"play_rotation_deg": float(np.degrees(turn.movement_detectable))}
-            turned.append(_head(kind, seed, camera, plays).movement_p < alpha / count)
-            plays = {"play_position_m": shift.movement_detectable}
-            moved.append(_head(kind, seed, camera, plays, "position").movement_p < alpha / count)
-            plays = {"drift_rotation_deg": np.degrees(turn.drift_detectable * axis).tolist()}
-            drifted.append(_head(kind, seed, camera, plays).drift_p < alpha / count)
-            single.append(_single(kind, seed, camera, one * axis, alpha))
+        stated, jobs = tests[name][0].power, [Before(seed, each) for seed, each in zip(seeds, tests[name], strict=True)]
+        sizes, hits_of = zip(*runs(of_moving, name, jobs), strict=True)
+        turned, moved, drifted, single = zip(*hits_of, strict=True)
         n = len(turned)
         low, high = binom.ppf([0.0005, 0.9995], n, stated) / n
         median = np.median(np.array(sizes), axis=0) * np.array([np.degrees(3600.0), 1e3, *np.degrees([3600.0] * 2)])
@@ -224,23 +244,24 @@ def _single(kind: Kind, seed: int, camera: str, turn: np.ndarray, alpha: float) 
     return bool(tests.p[tests.image == row][0] < alpha / len(tests))
 
 
-def weighted(seeds: Iterable[int], rigs: tuple[str, ...]) -> None:
+def of_weighted(name: str, seed: int) -> tuple[tuple[Z, Any], tuple[Z, Any], Any]:
+    """z and outcome of a flight with σ of the movements stated, and estimated; the movements that were found."""
+    flight = flown(KINDS[name], seed, play_rotation_deg=PLAY_DEG, constraint="weighted")
+    stated = adjusted(with_movement(flight.block, float(np.radians(PLAY_DEG))))
+    estimated = adjusted(flight.block)
+    pairs = [(normalised(found, flight.truth), found.outcome) for found in (stated, estimated)]
+    return pairs[0], pairs[1], estimated.rig_movements
+
+
+def weighted(seeds: Iterable[int], rigs: tuple[str, ...], runs: Runs) -> None:
     """Rigs whose cameras turn: with σ of the movements stated, and estimated."""
     print(f"\n## Weighted\n\nEvery mounted camera turns by σ {3600 * PLAY_DEG:.1f}″ between exposures."
           f"\n\n{HEAD_OF_ERRORS}")  # fmt: skip
     estimates = {}
     for name in rigs:
-        kind = KINDS[name]
-        stated, estimated, sizes = [], [], []
-        for seed in seeds:
-            flight = flown(kind, seed, play_rotation_deg=PLAY_DEG, constraint="weighted")
-            found = adjusted(with_movement(flight.block, float(np.radians(PLAY_DEG))))
-            stated.append((normalised(found, flight.truth), found.outcome))
-            found = adjusted(flight.block)
-            estimated.append((normalised(found, flight.truth), found.outcome))
-            sizes.append(found.rig_movements)
-        print(row_of_errors(f"{name}, movements stated", stated), flush=True)
-        print(row_of_errors(f"{name}, movements estimated", estimated), flush=True)
+        stated, estimated, sizes = zip(*runs(of_weighted, name, seeds), strict=True)
+        print(row_of_errors(f"{name}, movements stated", list(stated)), flush=True)
+        print(row_of_errors(f"{name}, movements estimated", list(estimated)), flush=True)
         estimates[name] = sizes
     print("\n| rig | camera | true σ | found, RMS | scatter of the found ones | their σ, mean | found 0 |\n"
           + "|---" * 7 + "|")  # fmt: skip
@@ -266,16 +287,18 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=200)
     parser.add_argument("--rigs", nargs="*", default=list(KINDS), help="these alone")
     parser.add_argument("--rigid", action="store_true", help="no weighted rigs")
+    add_executor(parser)
     options = parser.parse_args()
     seeds, rigs = range(FIRST, FIRST + options.seeds), tuple(options.rigs)
     begun = time.process_time()
     print(f"# Rigs flown and adjusted: {len(seeds)} flights a row\n")
-    tests = rigid(seeds, rigs)
-    false_alarms(tests)
-    power(tests, seeds, tuple(name for name in rigs if name in TESTED))
-    if not options.rigid:
-        weighted(seeds, tuple(name for name in rigs if name in FLOWN))
-    print(f"\n{time.process_time() - begun:.0f} s")
+    with runs_of(options) as runs:
+        tests = rigid(seeds, rigs, runs)
+        false_alarms(tests)
+        power(tests, seeds, tuple(name for name in rigs if name in TESTED), runs)
+        if not options.rigid:
+            weighted(seeds, tuple(name for name in rigs if name in FLOWN), runs)
+    print(f"\n{time.process_time() - begun:.0f} s of the processor in this process")
 
 
 if __name__ == "__main__":

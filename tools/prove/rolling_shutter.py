@@ -12,13 +12,14 @@ from __future__ import annotations
 import argparse
 import copy
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 import aerotri
 from aerotri import observations
+from runs_elsewhere import Runs, add_executor, runs_of
 
 TRUE_MS = 30.0
 Change = Callable[[aerotri.Block], aerotri.Block]
@@ -71,24 +72,33 @@ def columns(table: object, letter: str) -> np.ndarray:
     return np.column_stack([table[f"{letter}{axis}"] for axis in AXES])
 
 
-def case(
-    name: str, seeds: int, readout_ms: float, change: Change | None = None, flat: bool = False, **shutter: object
-) -> str:
+@dataclass(frozen=True)
+class Flown:
+    """How the flights of a row are flown and changed before they are adjusted."""
+
+    readout_ms: float
+    change: Change | None = None
+    flat: bool = False
+    shutter: Mapping[str, object] = field(default_factory=dict)
+
+
+def one(flown: Flown, seed: int) -> tuple[float, np.ndarray, np.ndarray, tuple[float, float] | None, str]:
+    """Of one flight: σ0, w and d of check points, readout time and its σ where estimated, verdict of the test."""
+    block = aerotri.simulate(spec(flown.readout_ms, flown.flat, **flown.shutter), seed).block
+    result = aerotri.adjust(block if flown.change is None else flown.change(block))
+    shutters = result.adjusted.rolling_shutters
+    estimated = shutters is not None and shutters.readouts[0].sigma_ms > 0.0
+    verdict = "" if shutters is None or shutters.test is None else shutters.test.verdict
+    time = readout(result) if estimated else None
+    return result.sigma0, columns(result.check, "w"), columns(result.check, "d"), time, verdict
+
+
+def case(name: str, seeds: int, flown: Flown, runs: Runs) -> str:
     """A row of the table: readout times, errors at check points and verdicts over the seeds."""
-    w, sigma, sigma0, check_w, check_d, verdicts = [], [], [], [], [], Counter()
-    for seed in range(1, seeds + 1):
-        block = aerotri.simulate(spec(readout_ms, flat, **shutter), seed).block
-        result = aerotri.adjust(block if change is None else change(block))
-        sigma0.append(result.sigma0)
-        check_w.append(columns(result.check, "w"))
-        check_d.append(columns(result.check, "d"))
-        shutters = result.adjusted.rolling_shutters
-        if shutters is not None and shutters.readouts[0].sigma_ms > 0.0:
-            value, s = readout(result)
-            w.append((value - readout_ms) / s)
-            sigma.append(s)
-        if shutters is not None and shutters.test is not None:
-            verdicts[shutters.test.verdict] += 1
+    sigma0, check_w, check_d, times, said_of = zip(*runs(one, flown, range(1, seeds + 1)), strict=True)
+    found = [time for time in times if time is not None]
+    w, sigma = [(value - flown.readout_ms) / s for value, s in found], [s for _, s in found]
+    verdicts = Counter(verdict for verdict in said_of if verdict)
     of_w = f"{np.mean(w):+.2f} | {np.sqrt(np.mean(np.square(w))):.2f} | {np.median(sigma):.3f}" if w else "– | – | –"
     rms = " ".join(f"{1e3 * v:.0f}" for v in np.sqrt(np.mean(np.concatenate(check_d) ** 2, axis=0)))
     said = ", ".join(f"{what} {count}" for what, count in verdicts.most_common()) or "–"
@@ -96,27 +106,38 @@ def case(
     return f"| {name} | {np.mean(sigma0):.2f} | {of_w} | {rms} | {whole:.2f} | {said} |"
 
 
-def simulated(seeds: int) -> None:
-    """All cases."""
+def by_photograph(block: aerotri.Block) -> aerotri.Block:
+    """30 ± 1 ms, and a motion and a rotation of every photograph."""
     own = observations.RollingShutter(observations.Prior(TRUE_MS, 1.0), motion="photograph", rotation="photograph")
+    return with_shutter(block, own)
+
+
+def simulated(seeds: int, runs: Runs) -> None:
+    """All cases."""
     none = {"stated": {"value": 0.0, "fixed": True}}
     head = "σ0 | readout: mean w | RMS w | σ ms | check points: RMS X Y Z mm | RMS w | verdict of the test"
     few = min(seeds, FEW)
     print(f"{seeds} flights each, the last three {few}\n\n| flight | {head} |\n|" + "---|" * 9)
-    print(case("all rows at once, adjusted so", seeds, 0.0, **none), flush=True)
-    print(case("all rows at once, readout time free", seeds, 0.0), flush=True)
-    print(case("30 ms, ignored", seeds, TRUE_MS, **none), flush=True)
-    print(case("30 ms, readout time free", seeds, TRUE_MS), flush=True)
-    print(case("30 ms, times in whole seconds", few, TRUE_MS, whole_seconds), flush=True)
-    print(case("30 ms, turning by 3 °/s, motion by photograph, 30 ± 1 ms", few, TRUE_MS,
-               lambda block: with_shutter(block, own), rotation_rate_sigma_deg_s=3.0), flush=True)  # fmt: skip
-    print(case("30 ms, strips in one direction over a plane, no tilts", few, TRUE_MS, flat=True), flush=True)
+    turning = Flown(TRUE_MS, by_photograph, shutter={"rotation_rate_sigma_deg_s": 3.0})
+    for name, count, flown in (
+        ("all rows at once, adjusted so", seeds, Flown(0.0, shutter=none)),
+        ("all rows at once, readout time free", seeds, Flown(0.0)),
+        ("30 ms, ignored", seeds, Flown(TRUE_MS, shutter=none)),
+        ("30 ms, readout time free", seeds, Flown(TRUE_MS)),
+        ("30 ms, times in whole seconds", few, Flown(TRUE_MS, whole_seconds)),
+        ("30 ms, turning by 3 °/s, motion by photograph, 30 ± 1 ms", few, turning),
+        ("30 ms, strips in one direction over a plane, no tilts", few, Flown(TRUE_MS, flat=True)),
+    ):
+        print(case(name, count, flown, runs), flush=True)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=20)
-    simulated(parser.parse_args().seeds)
+    add_executor(parser)
+    options = parser.parse_args()
+    with runs_of(options) as runs:
+        simulated(options.seeds, runs)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from aerotri.execution.choice import THREADS
 from aerotri.execution.opening import opened
@@ -22,8 +22,24 @@ from aerotri.execution.work import Executor, Work
 
 BYTES_OF_RUN = 500_000_000
 """Memory of a process with its libraries and a block of some hundred photographs; chosen [C]."""
-Runs = Callable[[Callable[[Any, int], Any], Any, Iterable[int]], list[Any]]
-"""Takes a function of a module, what all runs share, and the seeds; gives what the function gave for each."""
+LONGEST_NAME = 60
+"""Letters of what is not a seed, where a message names a run."""
+
+
+class Runs(Protocol):
+    """Computes runs."""
+
+    def __call__(
+        self, function: Callable[[Any, Any], Any], shared: Any, jobs: Iterable[Any], bytes_each: int = BYTES_OF_RUN
+    ) -> list[Any]:
+        """What the function gives for each job, in their order.
+
+        Parameters
+        ----------
+        function : of a module, takes what all runs share and a job. jobs : seeds, or records that say what to run.
+        bytes_each : memory of a run.
+        """
+        ...
 
 
 def add_executor(parser: argparse.ArgumentParser) -> None:
@@ -41,6 +57,8 @@ def add_executor(parser: argparse.ArgumentParser) -> None:
 @contextmanager
 def runs_of(options: argparse.Namespace) -> Generator[Runs]:
     """What computes runs, as the options of the tool say."""
+    if options.scratch is not None:
+        options.scratch.mkdir(parents=True, exist_ok=True)
     with (
         opened(options.executor, partial(print, file=sys.stderr)) as executor,
         tempfile.TemporaryDirectory(prefix="runs_", dir=options.scratch) as folder,
@@ -48,9 +66,31 @@ def runs_of(options: argparse.Namespace) -> Generator[Runs]:
         yield partial(_computed, executor, Path(folder))
 
 
+def folder_of(given: Path | None, options: argparse.Namespace) -> Path:
+    """The folder to work in: the given one, or a new one that all machines see; absolute."""
+    if given is None:
+        return Path(tempfile.mkdtemp(dir=options.scratch)).resolve()
+    given.mkdir(parents=True, exist_ok=True)
+    return given.resolve()
+
+
 def _computed(
-    executor: Executor, folder: Path, function: Callable[[Any, int], Any], shared: Any, seeds: Iterable[int]
-) -> list[Any]:
-    tasks: Sequence[int] = list(seeds)
-    names = [f"the run with seed {seed}" for seed in tasks]
-    return executor.run(Work(function, shared, tasks, names, "runs", folder, BYTES_OF_RUN, at_once=1))
+    executor: Executor, folder: Path, function: Callable[[Any, Any], Any], shared: Any, jobs: Iterable[Any],
+    bytes_each: int = BYTES_OF_RUN,
+) -> list[Any]:  # fmt: skip
+    tasks: Sequence[Any] = list(jobs)
+    names = [_name(task) for task in tasks]
+    return executor.run(Work(function, shared, tasks, names, "runs", folder, bytes_each, at_once=1), _told)
+
+
+def _name(task: Any) -> str:
+    if isinstance(task, int):
+        return f"the run with seed {task}"
+    text = str(task)
+    return f"the run {text[:LONGEST_NAME]}{'…' if len(text) > LONGEST_NAME else ''}"
+
+
+def _told(share: float) -> None:
+    """The share that is done, on a terminal."""
+    if sys.stderr.isatty():
+        print(f"\rruns: {100.0 * share:.0f} %", end="\n" if share >= 1.0 else "", file=sys.stderr, flush=True)

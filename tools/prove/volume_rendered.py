@@ -30,7 +30,8 @@ import shapely
 from scipy.stats import chi2
 
 import aerotri
-from photographs_to_block import SPEC, tied_and_adjusted, write_files
+from photographs_to_block import BYTES_OF_SEED, SPEC, tied_and_adjusted, write_files
+from runs_elsewhere import add_executor, folder_of, runs_of
 
 PLAN = SPEC | {
     "name": "stockpile",
@@ -80,8 +81,9 @@ def true_volume(seed: int, boundary: shapely.Polygon) -> float:
     return float(weight[weight > 0.0] @ (ground - LEVEL))
 
 
-def one(folder: Path, seed: int, boundary: shapely.Polygon) -> Outcome:
+def one(whole: Path, seed: int) -> Outcome:
     """From photographs to the volume, files in between."""
+    folder, boundary = whole / f"rendered_{seed}", site()
     shutil.rmtree(folder, ignore_errors=True)
     write_files(folder, seed, PLAN)
     tied_and_adjusted(folder, seed, 4.8, ())
@@ -100,6 +102,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="to work in")
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--out", type=Path)
+    add_executor(parser)
     options = parser.parse_args()
     boundary = site()
     lines = [
@@ -108,10 +111,10 @@ def main() -> None:
         "|---|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
     print("\n".join(lines), flush=True)
-    found = []
-    for seed in range(1, options.seeds + 1):
-        o = one(options.folder / f"rendered_{seed}", seed, boundary)
-        found.append(o)
+    seeds = range(1, options.seeds + 1)
+    with runs_of(options) as runs:
+        found: list[Outcome] = runs(one, folder_of(options.folder, options), seeds, BYTES_OF_SEED)
+    for seed, o in zip(seeds, found, strict=True):
         parts = " | ".join(f"{o.parts[name]:.2f}" for name in ("adjustment", "matching", "interpolation"))
         lines.append(f"| {seed} | {o.pickets} | {o.truth:.1f} | {o.volume:.1f} | {o.volume - o.truth:+.1f} | "
                      f"{o.sigma:.1f} | {parts} | {o.z:+.2f} |")  # fmt: skip

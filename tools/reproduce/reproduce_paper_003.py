@@ -22,6 +22,10 @@ from paper_003.reports import write_reports
 from paper_003.runs import days_over_seeds, over_cameras, read_plan, rows_of, two_days, with_navigation
 from paper_003.table import Answer, markdown
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "prove"))
+
+from runs_elsewhere import Runs, add_executor, runs_of
+
 DAY_CHANGES_UM = (0.0, 0.5)
 
 
@@ -34,10 +38,11 @@ def main() -> None:
             print(path)
         return
     answers, figures = [], {}
-    for case in cases:
-        answer, drawn = _answer(case, options.seeds, options.cameras)
-        answers.append(answer)
-        figures |= drawn
+    with runs_of(options) as runs:
+        for case in cases:
+            answer, drawn = _answer(case, options.seeds, options.cameras, runs)
+            answers.append(answer)
+            figures |= drawn
     figures["paper_003_check_points"] = check_points_figure([(a.case, a.rows) for a in answers])
     seeds = f"Frederiksstad mean squares of {options.seeds} simulations, DSK-Saar one"
     text = markdown(answers, seeds)
@@ -49,9 +54,10 @@ def main() -> None:
             figure.savefig(options.out / f"{name}.png", dpi=100)
 
 
-def _answer(case: Case, seeds: int, cameras: int) -> tuple[Answer, dict[str, Figure]]:
+def _answer(case: Case, seeds: int, cameras: int, runs: Runs) -> tuple[Answer, dict[str, Figure]]:
     plan, large = read_plan(case.plan_path), case is DSK
-    rows = rows_of(case, plan, range(1, 2 if large else seeds + 1), _say)
+    _say(case.title)
+    rows = rows_of(case, plan, range(1, 2 if large else seeds + 1), runs)
     drawn = {}
     if case.special:
         drawn[f"paper_003_figure_{case.figures[0]}"] = averaged_figure(case, rows)
@@ -61,8 +67,8 @@ def _answer(case: Case, seeds: int, cameras: int) -> tuple[Answer, dict[str, Fig
         days = [two_days(case, plan, change_um) for change_um in DAY_CHANGES_UM]
         drawn["paper_003_figure_11"] = days_figure(case, days[0])
         return Answer(case, rows, days=days, navigation=with_navigation(case, plan)), drawn
-    drawn_anew = over_cameras(case, plan, cameras, _say) if case.special and cameras else None
-    day_tests = days_over_seeds(case, plan, range(1, cameras + 1)) if case.special == ULTRACAM else ()
+    drawn_anew = over_cameras(case, plan, cameras, runs) if case.special and cameras else None
+    day_tests = days_over_seeds(case, plan, range(1, cameras + 1), runs) if case.special == ULTRACAM else ()
     return Answer(case, rows, drawn_anew, day_tests=day_tests), drawn
 
 
@@ -78,6 +84,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--seeds", type=int, default=3, help="simulations of each block of Frederiksstad")
     parser.add_argument("--cameras", type=int, default=10, help="cameras drawn at random, two-day flights; 0: none")
     parser.add_argument("--without-dsk", action="store_true", help="leave the block of 2282 photographs out")
+    add_executor(parser)
     return parser.parse_args()
 
 

@@ -23,6 +23,7 @@ from aerotri.adjustment.panels import DOUBLE, SINGLE
 from aerotri.adjustment.parallel import blas_threads
 from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for
 from aerotri.adjustment.secants import Secants
+from aerotri.adjustment.settled_points import needs_settling, settled_points
 from aerotri.adjustment.single_precision import first_precision, precise_enough
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.steps import (
@@ -206,6 +207,7 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
             at, settled, last_decrement, scale_changes = fresh, False, np.inf, scale_changes + 1
             secants = Secants() if secants is not None else None
         if settled:
+            at = _with_settled_points(system, at, redundancy)
             return replace(course.ended("converged", at), step_tolerance=stage.step_tolerance)
         if _is_stopped(system, at, options, course.iteration - stage.done):
             return course.ended(INTERRUPTED, at)
@@ -255,6 +257,14 @@ def _checked(
     if defects:
         return None, Solution("rank deficient", at.state, at.equations, at.estimator, 0, (), tuple(defects))
     return (replace(step, factor=factor) if step and factor else step), None
+
+
+def _with_settled_points(system: NormalSystem, at: Place, redundancy: int) -> Place:
+    """The place with all points at their minimum, where its estimator leaves some behind."""
+    if not needs_settling(at.estimator):
+        return at
+    variance = max(at.equations.cost, 1e-30) / max(redundancy, 1)
+    return place_at(system, settled_points(system, at.state, at.estimator, variance), at.estimator)
 
 
 def _is_stopped(system: NormalSystem, at: Place, options: SolveOptions, iteration: int, suspect: bool = False) -> bool:

@@ -38,7 +38,7 @@ def is_settled(at: Place, step: Trial, redundancy: int, robust_tolerance: float 
 
     The decrement of the next step is foretold from how the last pair of undamped steps contracted. Re-weighting
     converges linearly, and a point whose two rays contradict each other creeps along a flat valley for ever: robust,
-    the orientations and shared parameters have to stand, and the cost.
+    the orientations and shared parameters have to stand, and the cost. Points go on alone then (`settled_points`).
 
     Parameters
     ----------

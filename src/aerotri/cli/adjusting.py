@@ -24,7 +24,7 @@ from aerotri.cli.options import (
     Workers,
 )
 from aerotri.conventions import InputError
-from aerotri.execution.choice import THREADS
+from aerotri.execution.choice import THREADS, chosen
 
 
 @app.command(
@@ -100,7 +100,10 @@ def adjust(
         }  # fmt: skip
         raise typer.Exit(run_adjust_parts(block, out, robust, geoid, executor, json_, plots, **others))
     if executor != THREADS:
-        raise InputError(f"--executor {executor} for a block in one piece", "divide it first: aerotri divide")
+        chosen(executor)
+        # a folder that is not there is told below
+        if block.exists():
+            raise InputError(f"--executor {executor} for a block in one piece", "divide it first: aerotri divide")
     raise typer.Exit(
         run_adjust(
             block,

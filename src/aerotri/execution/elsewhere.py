@@ -18,6 +18,7 @@ from threading import Lock
 from typing import Any
 
 from aerotri.conventions import InputError
+from aerotri.execution.scripts import Script, script_of, unpickled
 from aerotri.execution.work import NO_SPACE, Outcome, Work, outcome_of
 from aerotri.version import __version__
 
@@ -30,7 +31,7 @@ ONE_THREAD = {
 """Environment of a process that does one task at a time beside others."""
 KEPT = 2
 """Shared parts that a process keeps."""
-_kept: OrderedDict[str, Any] = OrderedDict()
+_kept: OrderedDict[tuple[str, Script | None], Any] = OrderedDict()
 _lock = Lock()
 
 
@@ -56,11 +57,10 @@ def parcels(work: Work[Any, Any, Any]) -> Generator[list[bytes]]:
             if error.errno in NO_SPACE:
                 raise
             raise InputError(f"cannot be written to: {error}", "choose another place", work.folder) from error
+        tasks = [pickle.dumps((work.function, path, mark, task), pickle.HIGHEST_PROTOCOL) for task in work.tasks]
+        script = script_of([content, *tasks], work.function)
         del content
-        yield [
-            pickle.dumps((__version__, pickle.dumps((work.function, path, mark, task), pickle.HIGHEST_PROTOCOL)))
-            for task in work.tasks
-        ]
+        yield [pickle.dumps((__version__, pickle.dumps((script, task)))) for task in tasks]
     finally:
         for one in (path, part):
             one.unlink(missing_ok=True)
@@ -89,21 +89,23 @@ def _done(parcel: bytes) -> Any:
             f"the worker on {socket.gethostname()} has aerotri {__version__}, this is aerotri {version}",
             "install the same version on all machines",
         )
-    function, path, mark, task = pickle.loads(content)
-    shared = _shared(path, mark)
+    script, content = pickle.loads(content)
+    function, path, mark, task = unpickled(content, script)
+    shared = _shared(path, mark, script)
     with threadpool_limits(1, "blas"):
         return function(shared, task)
 
 
-def _shared(path: Path, mark: str) -> Any:
+def _shared(path: Path, mark: str, script: Script | None) -> Any:
     """What the tasks of one work share, read once by a process."""
+    key = mark, script
     with _lock:
-        if mark not in _kept:
-            _kept[mark] = pickle.loads(_content(path, mark))
-        _kept.move_to_end(mark)
+        if key not in _kept:
+            _kept[key] = unpickled(_content(path, mark), script)
+        _kept.move_to_end(key)
         while len(_kept) > KEPT:
             _kept.popitem(last=False)
-        return _kept[mark]
+        return _kept[key]
 
 
 def _content(path: Path, mark: str) -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from aerotri.partition.part_results import Ending, Written, measure_part, write_
 from aerotri.partition.part_system import refuse_robust
 from aerotri.partition.part_tasks import PartTask, Setting, prepare_part
 from aerotri.partition.placing import Place, place_of
+from aerotri.partition.telling import Say, Told
 from aerotri.partition.whole import PARTS, Whole, whole_of
 from aerotri.results.adjusted_block import Outcome
 from aerotri.statistics.summarise import parameters_of
@@ -31,7 +32,6 @@ WORK = "work"
 """Folder of what the tasks exchange, while they run."""
 BYTES_A_RAY = 3000
 """Memory of a part's task beside its factor [C]: tables, partials and pairs of a ray."""
-Say = Callable[[str, float | None], None]
 
 
 @dataclass(frozen=True)
@@ -67,23 +67,25 @@ def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSet
     try:
         names, origin, place = _shared_photographs(sources, settings.geoid)
         tasks = [PartTask(p.name, p.resolve(), (work / p.name).resolve()) for p in sources]
-        say("reading the parts", None)
-        facts = executor.run(_reading(Setting(names, origin, place), tasks, work))
+        told = Told(executor, say)
+        told.stage = "reading"
+        facts = told.run(_reading(Setting(names, origin, place), tasks, work))
         first = read_block(sources[0], rays_needed=False)
         common = _common_of(facts, tasks)
-        joints = Joints(common, tasks, executor, work)
+        joints = Joints(common, tasks, told, work)
         observations = sum(part.observations for part in facts) + common.priors.count
         unknowns = sum(part.unknowns for part in facts) + 6 * len(common.images) + len(common.labels)
         asked, chosen = first.settings.adjustment, settings
         limit = asked.max_iterations if chosen.max_iterations is None else chosen.max_iterations
         course = Course(
-            joints, common, executor, work, observations - unknowns, unknowns,
+            joints, common, told, work, observations - unknowns, unknowns,
             max(part.bytes_needed + BYTES_A_RAY * part.rays for part in facts) + LEAST_BYTES,
-            lambda iteration, sigma0: say(f"iteration {iteration}: σ0 {sigma0:.4g}", None),
+            lambda iteration, sigma0: _tell_iteration(told, say, iteration, sigma0),
         )  # fmt: skip
+        told.stage = "iteration 1"
         ended = course.minimise(chosen.robust or asked.robust, limit)
         solved = time.perf_counter()
-        say("standard deviations", None)
+        told.stage = "standard deviations"
         photographs = sum(part.images for part in facts) + len(common.images)
         every = max(1, sum(part.rays for part in facts) // SAMPLE_RAYS)
         whole = _with_sigma(course, ended, first, out, observations, unknowns, photographs, every, place)
@@ -95,6 +97,12 @@ def adjust_parts(folder: Path, out: Path, executor: Executor, settings: PartsSet
         return replace(whole, record=replace(whole.record, outcome=outcome))
     finally:
         shutil.rmtree(work, ignore_errors=True)
+
+
+def _tell_iteration(told: Told, say: Say, iteration: int, sigma0: float) -> None:
+    """What an iteration led to; the tasks that follow belong to the next."""
+    say(f"iteration {iteration}: σ0 {sigma0:.4g}", None)
+    told.stage = f"iteration {iteration + 1}"
 
 
 def _with_sigma(

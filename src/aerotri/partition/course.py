@@ -17,6 +17,7 @@ import numpy as np
 from aerotri.adjustment.adjusted_positions import MOST_ROUNDS, STANDING
 from aerotri.adjustment.damping import LAST_DAMPING, Damping
 from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for
+from aerotri.adjustment.settled_points import needs_settling
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.adjustment.steps import COST_TOLERANCE
 from aerotri.adjustment.stopping import (
@@ -38,6 +39,7 @@ from aerotri.partition.part_tasks import (
     move_part,
     reduce_part,
     refuse_fault,
+    settle_part,
 )
 
 MOST_SCALES = 20
@@ -158,7 +160,7 @@ class Course:
             if fresh is not place:
                 place, settled, scales = fresh, False, scales + 1
             if settled:
-                return Ended("converged", place, self._iteration)
+                return Ended("converged", self._with_settled_points(place), self._iteration)
             if place.is_bare:
                 place = self._reduced(place.at)
         return Ended("not converged", place, self._iteration)
@@ -178,8 +180,7 @@ class Course:
                 self._drop(damped.at)
             if there.cost <= place.cost * (1.0 + COST_TOLERANCE):
                 self._drop(place.at)
-                for task in self.tasks:
-                    task.files.drop(f"state_{place.at.state}")
+                self._drop_state(place.at)
                 ratio = min((place.cost - there.cost) / max(decrement, 1e-300), 1.0)
                 return there, decrement, damping.lowered(ratio, heeds_curvature=False)
             self._drop(there.at)
@@ -220,6 +221,17 @@ class Course:
         cost = sum(part.cost for part in found) + of_priors
         return Place(at, cost, sum(part.decrement for part in found), sum(part.of_points for part in found))
 
+    def _with_settled_points(self, place: Place) -> Place:
+        """The place with all points at their minimum, where its estimator leaves some behind."""
+        if not needs_settling(place.at.estimator):
+            return place
+        at = replace(place.at, state=self._next_state(), tag=self._next_tag())
+        variance = max(place.cost, 1e-30) / max(self.redundancy, 1)
+        there = self._place(at, self.run(settle_part, Move(place.at, at, variance=variance)))
+        self._drop(place.at)
+        self._drop_state(place.at)
+        return there
+
     def _reweighted(self, place: Place, name: str) -> Place:
         """The place with the estimator that the residuals of all parts ask for; itself where the estimator stands."""
         fresh = LEAST_SQUARES if name == "off" else self._estimator(place, name)
@@ -248,6 +260,10 @@ class Course:
         self.joints.drop(at.tag)
         for task in self.tasks:
             task.files.drop_place(at.tag)
+
+    def _drop_state(self, at: At) -> None:
+        for task in self.tasks:
+            task.files.drop(f"state_{at.state}")
 
     def _next_state(self) -> int:
         self._states += 1

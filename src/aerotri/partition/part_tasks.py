@@ -10,6 +10,7 @@ import numpy as np
 from aerotri.adjustment.adjusted_positions import at_adjusted_positions, positions_moved
 from aerotri.adjustment.partial_factor import eliminate_inner, restored
 from aerotri.adjustment.robust import Estimator
+from aerotri.adjustment.settled_points import settled_points
 from aerotri.adjustment.sparse_cholesky import NotPositiveDefiniteError
 from aerotri.conventions import InputError
 from aerotri.coordinates.blocks import transform_block
@@ -93,11 +94,13 @@ class Move:
     Parameters
     ----------
     last : whether nothing but the cost is wanted there, because the equations are taken elsewhere next.
+    variance : σ̂0², where points are led to a share of their σ.
     """
 
     start: At
     end: At
     last: bool = False
+    variance: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -166,6 +169,15 @@ def move_part(move: Move, task: PartTask) -> Reduced:
     if move.last:
         there = files.state(move.end.state, move.end.shared[task.shared])
         return Reduced(part.system.right_side(there, move.end.estimator).cost)
+    return _reduced(part, move.end, task)
+
+
+def settle_part(move: Move, task: PartTask) -> Reduced:
+    """Lead the points to where their rays want them, and the equations there."""
+    files, at = task.files, move.start
+    part = files.system(at.positions)
+    state = files.state(at.state, at.shared[task.shared])
+    files.keep_state(settled_points(part.system, state, at.estimator, move.variance), move.end.state)
     return _reduced(part, move.end, task)
 
 

@@ -34,6 +34,10 @@ NO_MODEL_PART = (
     "σ holds for independent errors of the image points. What photographs of a strip, a direction of flight or a day "
     "have in common (the model part of σ) is not in it, because the block was adjusted in parts"
 )
+NOT_LOOKED_FOR = (
+    "Not looked for, because the block was adjusted in parts: weak points to be set aside, GNSS errors that stay for "
+    "seconds to minutes, the effect of additional parameters on check points"
+)
 PARTS = "parts"
 """Folder of the parts in a block and in a result."""
 MOST_BLUNDERS, MOST_REASONS = 100, 10
@@ -105,7 +109,7 @@ def whole_of(
             outcome,
             verdict=worst,
             reasons=tuple(reasons[:MOST_REASONS]),
-            notes=(note,),
+            notes=(note, NOT_LOOKED_FOR),
             warnings=_said_first(first, names, written),
         ),
         images=ImageResults(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 6, 6)), nothing),

@@ -152,7 +152,7 @@ def part_of_pickets(
     unseen = unseen if unseen > ROUNDING * boundary.area else 0.0
     measured, side = Measured(pickets, functional.gradient), partial(_side_of_pickets, tin, ground)
     rays = len(pickets.image)
-    return Part(calibration, response, between, len(pickets), rays, unseen, measured, region, side)
+    return Part(calibration, response, between, len(pickets), rays, unseen, measured, region=region, side=side)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +186,7 @@ def _side_of_pickets(tin: _Tin, ground: Ground | None, counted: Counted) -> Part
     between = None if ground is None or not counted.sign else between_on_side(ground, counted)
     pickets, measured = tin.pickets, Measured(tin.pickets, functional.gradient)
     rays = len(pickets.image)
-    return Part(tin.calibration, response, between, len(pickets), rays, 0.0, measured, region)
+    return Part(tin.calibration, response, between, len(pickets), rays, 0.0, measured, region=region)
 
 
 def part_of_measured(

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -165,13 +166,15 @@ class _Run:
     z_point: np.ndarray
 
 
-def run(case: Case, seeds: Iterable[int], photographs: int = PHOTOGRAPHS) -> Precision:
-    """Simulate and adjust a case; theoretical and practical precision of its pass points."""
-    try:
-        runs = [_run(case, seed, photographs) for seed in ((1,) if case.exact else seeds)]
-    except aerotri.AdjustmentFailedError as failure:
+def run(case: Case, seeds: Iterable[int], computed: Any, photographs: int = PHOTOGRAPHS) -> Precision:
+    """Simulate and adjust a case, where `computed` computes runs; theoretical and practical precision of its pass
+    points."""
+    found = computed(_run_or_failure, (case, photographs), (1,) if case.exact else seeds)
+    failures = [one for one in found if isinstance(one, str)]
+    if failures:
         nothing = np.full(3, np.nan)
-        return Precision(nothing, nothing, nothing, np.nan, np.zeros(0), np.zeros((0, 3)), str(failure))
+        return Precision(nothing, nothing, nothing, np.nan, np.zeros(0), np.zeros((0, 3)), failures[0])
+    runs: list[_Run] = found
     squares = np.array([one.square for one in runs])
     return Precision(
         theoretical=np.sqrt(np.mean([one.variance for one in runs], axis=0)),
@@ -181,6 +184,15 @@ def run(case: Case, seeds: Iterable[int], photographs: int = PHOTOGRAPHS) -> Pre
         z_roll=np.array([one.z_roll for one in runs]),
         z_point=np.array([one.z_point for one in runs]),
     )
+
+
+def _run_or_failure(shared: tuple[Case, int], seed: int) -> _Run | str:
+    """One simulation, or why there is no result."""
+    case, photographs = shared
+    try:
+        return _run(case, seed, photographs)
+    except aerotri.AdjustmentFailedError as failure:
+        return str(failure)
 
 
 def _run(case: Case, seed: int, photographs: int) -> _Run:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +15,8 @@ import aerotri
 from aerotri import parameters as patterns
 from paper_003.cases import Case
 
+BYTES_OF_SEED = 2_000_000_000
+"""Memory of a run of the largest block; chosen [C]."""
 Plan = dict[str, Any]
 """The tables of simulation.toml."""
 
@@ -158,28 +160,33 @@ class Row:
         return 1e3 * float(np.mean([run.averaged.rms_of_noise for run in self.runs]))
 
 
-def rows_of(case: Case, plan: Plan, seeds: Iterable[int], say: Callable[[str], None]) -> list[Row]:
-    """Every set of a case over the seeds."""
-    found: list[list[Run]] = [[] for _ in case.sets]
-    true = []
-    for seed in seeds:
-        flight = aerotri.simulate(plan, seed)
-        true.append(flight.true_image_errors().field)
-        for runs, (heading, parameters) in zip(found, case.sets, strict=True):
-            say(f"{case.title}, seed {seed}, {heading}")
-            runs.append(measured(adjusted(flight.block, parameters), flight.truth, case.special))
-    return [Row(heading, tuple(runs), true[0]) for (heading, _), runs in zip(case.sets, found, strict=True)]
+def of_seed(shared: tuple[Case, Plan], seed: int) -> tuple[Any, list[Run]]:
+    """The true image errors of a simulation, and every set of its case."""
+    case, plan = shared
+    flight = aerotri.simulate(plan, seed)
+    found = [measured(adjusted(flight.block, spec), flight.truth, case.special) for _, spec in case.sets]
+    return flight.true_image_errors().field, found
 
 
-def over_cameras(case: Case, plan: Plan, cameras: int, say: Callable[[str], None]) -> np.ndarray:
+def rows_of(case: Case, plan: Plan, seeds: Iterable[int], runs: Any) -> list[Row]:
+    """Every set of a case over the seeds, which `runs` computes."""
+    true, found = zip(*runs(of_seed, (case, plan), seeds, BYTES_OF_SEED), strict=True)
+    sets = zip(*found, strict=True)
+    return [Row(heading, own, true[0]) for (heading, _), own in zip(case.sets, sets, strict=True)]
+
+
+def of_camera(shared: tuple[Case, Plan], seed: int) -> list[tuple[float, float]]:
+    """Plan and height, m, of every set for a camera drawn anew."""
+    case, plan = shared
+    other = changed(plan, {f"camera.{next(iter(plan['camera']))}.errors.physical": {"seed": seed}})
+    true, found = of_seed((case, other), 1)
+    rows = [Row(heading, (run,), true) for (heading, _), run in zip(case.sets, found, strict=True)]
+    return [(row.horizontal_m, float(row.rms[2])) for row in rows]
+
+
+def over_cameras(case: Case, plan: Plan, cameras: int, runs: Any) -> np.ndarray:
     """(cameras, sets, 2) m, plan (of a coordinate) and height at check points, for cameras drawn anew."""
-    name = next(iter(plan["camera"]))
-    found = np.zeros((cameras, len(case.sets), 2))
-    for k in range(cameras):
-        other = changed(plan, {f"camera.{name}.errors.physical": {"seed": 101 + k}})
-        row = rows_of(case, other, [1], lambda text, k=k: say(f"camera {k + 1}: {text}"))
-        found[k] = [(one.horizontal_m, one.rms[2]) for one in row]
-    return found
+    return np.array(runs(of_camera, (case, plan), range(101, 101 + cameras), BYTES_OF_SEED))
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,14 +207,15 @@ def two_days(case: Case, plan: Plan, change_um: float) -> Days:
     return Days(change_um, result.change_between("1", "2"), (one, two))
 
 
-def days_over_seeds(case: Case, plan: Plan, seeds: Iterable[int]) -> list:
+def of_days(shared: tuple[Case, Plan], seed: int) -> Any:
+    """The test of no change between two days of one simulation."""
+    case, flown = shared
+    return adjusted(aerotri.simulate(flown, seed).block, case.sets[3][1], "day").change_between("1", "2")
+
+
+def days_over_seeds(case: Case, plan: Plan, seeds: Iterable[int], runs: Any) -> list:
     """The test of no change between two days of a camera that stays, block after block."""
-    flown = changed(plan, {"flight": {"days": 2}})
-    found = []
-    for seed in seeds:
-        result = adjusted(aerotri.simulate(flown, seed).block, case.sets[3][1], "day")
-        found.append(result.change_between("1", "2"))
-    return found
+    return runs(of_days, (case, changed(plan, {"flight": {"days": 2}})), seeds, BYTES_OF_SEED)
 
 
 @dataclass(frozen=True, eq=False)
