@@ -72,7 +72,7 @@ def _packs(part: Any) -> bool:
 
 
 def _words(part: Any) -> int:
-    """Eight-byte words that a field takes: who holds an array, its parent, items, item size, address, shape, strides."""
+    """Words that a field takes: who holds an array, its parent, items, item size, address, shape, strides."""
     if isinstance(part, RecordType):
         return part.words
     return 5 + 2 * part.ndim if isinstance(part, types.Array) else 1

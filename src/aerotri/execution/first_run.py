@@ -88,7 +88,8 @@ def _number(one: Any, types: dict[str, int]) -> int:
     from numba import types as nb
 
     if isinstance(one, RecordType):
-        stated: list[Any] = ["record", f"{one.of.__module__}:{one.of.__qualname__}", *(_number(part, types) for part in one.parts)]
+        name = f"{one.of.__module__}:{one.of.__qualname__}"
+        stated: list[Any] = ["record", name, *(_number(part, types) for part in one.parts)]
     elif isinstance(one, nb.Array):
         stated = ["array", str(one.dtype), one.ndim, one.layout, not one.mutable, one.aligned]
     elif isinstance(one, nb.BaseTuple):
