@@ -358,7 +358,9 @@ def terrain_files() -> tuple[DescribedFile, ...]:
             "sigma_y, sigma_z, m, "
             "cov_xy, cov_xz, cov_yz, m², sigma_z_matching and photographs. Class 2 is ground.",
         ),
-        DescribedFile("plots", DSM, "folder", "The surface and its standard deviation, PNG and SVG.", when=plots),
+        DescribedFile(
+            "plots", DSM, "folder", "The surface, its standard deviation and its colours, PNG and SVG.", when=plots
+        ),
         DescribedFile("compare.json", COMPARE, "json", "Statistics of the differences of two surfaces.", COMPARE_JSON),
         DescribedFile("difference.tif", COMPARE, "raster", "Differences test − control, m."),
         DescribedFile("plots", COMPARE, "folder", "Map and histogram, PNG and SVG.", when=plots),
