@@ -23,7 +23,7 @@ PATIENCE_S = 60.0
 """For another process to compile a kernel, before it is compiled here; chosen [C]: ten times what the longest takes."""
 LOOK_S = 0.02
 """Between two looks whether the lock is free."""
-KERNEL_FILES = ("compiled.py", "_*kernels.py", "kernel_records.py", "picket_status.py")
+KERNEL_FILES = ("compiled.py", "compiled_records.py", "_*kernels.py", "kernel_records.py", "picket_status.py")
 """Modules whose code, constants and order of fields are compiled in."""
 UNREADABLE = (
     OSError,

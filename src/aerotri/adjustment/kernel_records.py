@@ -10,7 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aerotri.compiled_records import record
 
+
+@record
 class RayArrays(NamedTuple):
     """The rays.
 
@@ -34,6 +37,7 @@ class RayArrays(NamedTuple):
     ap_value: np.ndarray
 
 
+@record
 class Pairs(NamedTuple):
     """The blocks of pairs of photographs: `start` (P + 1,) first pair of every point, `block` its number.
 
@@ -44,6 +48,7 @@ class Pairs(NamedTuple):
     block: np.ndarray
 
 
+@record
 class Table(NamedTuple):
     """What is estimated.
 
@@ -62,6 +67,7 @@ class Table(NamedTuple):
     kept: np.ndarray
 
 
+@record
 class Scans(NamedTuple):
     """Photographs whose rows are exposed one after the other; arrays of length 0 where there is none.
 
@@ -79,6 +85,7 @@ class Scans(NamedTuple):
     columns: np.ndarray
 
 
+@record
 class Values(NamedTuple):
     """Where the unknowns but the points stand: rotation (n, 3, 3), centre (n, 3), interior (L, 24), shared (s,).
 
@@ -92,6 +99,7 @@ class Values(NamedTuple):
     scans: Scans
 
 
+@record
 class Points(NamedTuple):
     """The points: where they stand and what is known of them beforehand.
 
@@ -106,6 +114,7 @@ class Points(NamedTuple):
     free: np.ndarray
 
 
+@record
 class Weighting(NamedTuple):
     """How rays are weighted, and the residuals and weights that they get.
 
@@ -121,6 +130,7 @@ class Weighting(NamedTuple):
     weight: np.ndarray
 
 
+@record
 class Problem(NamedTuple):
     """All that the equations of a point depend on.
 
@@ -137,6 +147,7 @@ class Problem(NamedTuple):
     damping: float
 
 
+@record
 class Work(NamedTuple):
     """Room of one thread for one point of up to q rays, see `_point_kernels.scratch`.
 
@@ -167,6 +178,7 @@ class Work(NamedTuple):
     turned: np.ndarray
 
 
+@record
 class Sums(NamedTuple):
     """Normal equations of a range of points, over the ni photographs and no pairs of them that it touches.
 
@@ -187,6 +199,7 @@ class Sums(NamedTuple):
     squares_shared: np.ndarray
 
 
+@record
 class Directions(NamedTuple):
     """Steps, right sides or solutions: images (n, 6, ·), shared (s, ·), points (P, 3, ·)."""
 
@@ -195,6 +208,7 @@ class Directions(NamedTuple):
     points: np.ndarray
 
 
+@record
 class Inverse(NamedTuple):
     """The inverse on the pattern of the reduced normal matrix: blocks (nb, 6, 6), border (n, s, 6), corner (s, s)."""
 
@@ -203,6 +217,7 @@ class Inverse(NamedTuple):
     corner: np.ndarray
 
 
+@record
 class Elimination(NamedTuple):
     """Of one point: lower (3, 3), the Cholesky factor L of its normals, and misclosure (3,), L⁻¹·(right side)."""
 
@@ -210,6 +225,7 @@ class Elimination(NamedTuple):
     misclosure: np.ndarray
 
 
+@record
 class Pattern(NamedTuple):
     """Which photographs see a point: the rays' `start` and `image`, and the pairs of photographs; see above."""
 
@@ -219,6 +235,7 @@ class Pattern(NamedTuple):
     pair_block: np.ndarray
 
 
+@record
 class Coupling(NamedTuple):
     """Of one point: H transposed over its photographs (q, 3, 6), H over shared parameters (s, 3), and Q_pp (3, 3)."""
 
@@ -227,6 +244,7 @@ class Coupling(NamedTuple):
     q_pp: np.ndarray
 
 
+@record
 class Datum(NamedTuple):
     """The S-transformation to an inner datum of d motions: G and the columns Q·Aᵀ; d = 0 in other datums.
 
@@ -241,6 +259,7 @@ class Datum(NamedTuple):
     qa_points: np.ndarray
 
 
+@record
 class Scale(NamedTuple):
     """What effects are measured by.
 
@@ -256,6 +275,7 @@ class Scale(NamedTuple):
     per_point: np.ndarray
 
 
+@record
 class Effects(NamedTuple):
     """Of every ray, out: size (m, 2) of the largest effect over σ, which unknown (m, 2), height (m, 2) m.
 
@@ -267,6 +287,7 @@ class Effects(NamedTuple):
     height: np.ndarray
 
 
+@record
 class RowPlace(NamedTuple):
     """One coordinate of a ray: the ray's number within its point, 0 for x or 1 for y, the point, the photograph."""
 
@@ -276,6 +297,7 @@ class RowPlace(NamedTuple):
     image: int
 
 
+@record
 class FrontBlocks(NamedTuple):
     """The matrix blocks that begin in a front, and their places there; see `sparse_cholesky`."""
 
@@ -285,6 +307,7 @@ class FrontBlocks(NamedTuple):
     flipped: np.ndarray
 
 
+@record
 class MatrixBlocks(NamedTuple):
     """Blocks (nb, 6, 6) of a matrix, their photographs, and the scale (n, 6) of its rows and columns."""
 
@@ -294,6 +317,7 @@ class MatrixBlocks(NamedTuple):
     scale: np.ndarray
 
 
+@record
 class Front(NamedTuple):
     """A dense front: its two flat panels in Fortran order, and how many rows each has."""
 

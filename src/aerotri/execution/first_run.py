@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from aerotri.compiled import compiled_ahead
+from aerotri.compiled_records import RecordType
 from aerotri.execution.elsewhere import ONE_THREAD
 from aerotri.execution.threads import thread_count
 
@@ -86,8 +87,11 @@ def _number(one: Any, types: dict[str, int]) -> int:
     """Number of a type in the list, where it is put behind those that it is made of."""
     from numba import types as nb
 
-    if isinstance(one, nb.Array):
-        stated: list[Any] = ["array", str(one.dtype), one.ndim, one.layout, not one.mutable, one.aligned]
+    if isinstance(one, RecordType):
+        name = f"{one.of.__module__}:{one.of.__qualname__}"
+        stated: list[Any] = ["record", name, *(_number(part, types) for part in one.parts)]
+    elif isinstance(one, nb.Array):
+        stated = ["array", str(one.dtype), one.ndim, one.layout, not one.mutable, one.aligned]
     elif isinstance(one, nb.BaseTuple):
         parts: Any = one
         of: Any = getattr(one, "instance_class", None)
@@ -109,6 +113,9 @@ def _type_of(stated: list[Any], types: list[Any]) -> Any:
     if kind == "array":
         dtype, ndim, layout, readonly, aligned = rest
         return nb.Array(getattr(nb, dtype), ndim, layout, readonly=readonly, aligned=aligned)
+    if kind == "record":
+        name, *parts = rest
+        return RecordType(_found(name), tuple(types[k] for k in parts))
     if kind == "tuple":
         name, *parts = rest
         return nb.BaseTuple.from_types([types[k] for k in parts], _found(name) if name else None)

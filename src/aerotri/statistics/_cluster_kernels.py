@@ -12,8 +12,10 @@ import numpy as np
 from aerotri.adjustment._point_kernels import E, linearise_point, reduce_point
 from aerotri.adjustment.kernel_records import Elimination
 from aerotri.compiled import kernel, leaf_kernel
+from aerotri.compiled_records import record
 
 
+@record
 class Sides(NamedTuple):
     """Right sides of clusters with the points eliminated, added to; column c·k + f is side f of cluster c.
 
@@ -27,6 +29,7 @@ class Sides(NamedTuple):
     own: np.ndarray
 
 
+@record
 class Scores(NamedTuple):
     """Of every photograph, added to: scores (n, k) of k directions y, Σ yᵀaᵀPv, and products (n, k, k), yᵀaᵀPay."""
 
