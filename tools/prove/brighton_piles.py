@@ -1,7 +1,7 @@
 """Two raised areas of Brighton's dense surface, their outlines fixed in space and drawn on the surface.
 
-The flight has no control and GNSS of metres: an outline that is fixed in space stays where it is when the block errs, one
-that was drawn on the surface moves with it (`boundary_from`). Circles over a base through them. Prints Markdown.
+The flight has no control and GNSS of metres: an outline that is fixed in space stays where it is when the block errs,
+one that was drawn on the surface moves with it (`boundary_from`). Circles over a base through them. Prints Markdown.
 
     python tools/prove/brighton_piles.py OUT --data ../shared/data/brighton > tools/results/brighton_piles.md
 """
