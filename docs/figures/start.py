@@ -32,6 +32,18 @@ def beside(*pictures: Image.Image, height: int) -> Image.Image:
     return row
 
 
+def below(*pictures: Image.Image) -> Image.Image:
+    """Pictures under one another, of the width of the first."""
+    width = pictures[0].width
+    scaled = [p.convert("RGB").resize((width, round(p.height * width / p.width))) for p in pictures]
+    column = Image.new("RGB", (width, sum(p.height for p in scaled) + GAP * (len(scaled) - 1)), "white")
+    top = 0
+    for picture in scaled:
+        column.paste(picture, (0, top))
+        top += picture.height + GAP
+    return column
+
+
 def save(picture: Image.Image, name: str, colours: int = COLOURS) -> None:
     """A picture of few colours, below 150 kB."""
     FOLDER.mkdir(parents=True, exist_ok=True)
@@ -58,7 +70,7 @@ def main(project: Path, deformation: Path, ortho: Path | None = None) -> None:
     save(beside(*(Image.open(SITE / f"2_00{k}.jpg") for k in (1, 2, 3)), height=240), "drone_photographs", 24)
     save(Image.open(project / "dtm" / "plots" / "surface.png"), "drone_surface")
     volume = project / "volume" / "plots"
-    save(beside(*(Image.open(volume / f"{name}.png") for name in ("thickness", "budget")), height=700), "drone_volume")
+    save(below(*(Image.open(volume / f"{name}.png") for name in ("thickness", "budget"))), "drone_volume")
     save(Image.open(project / "ortho" / "plots" / "orthophoto.png"), "drone_ortho")
     save(Image.open(deformation / "plots" / "contours.png"), "deformation")
     if ortho is not None:

@@ -76,7 +76,7 @@ def test_step_that_nothing_shortens_is_damped():
     """Uphill in any length: the caller has to damp."""
     valley = Valley(lambda x: 1.0 + abs(x - 1.0), lambda x: 2.0)
     at, step = tried(valley, 1.0, -1.0)
-    valley.factorise = lambda equations: SimpleNamespace(solve=lambda right: right, smallest_pivot=1.0)
+    valley.factorise = lambda equations, precision: SimpleNamespace(solve=lambda right: right, smallest_pivot=1.0)
     found, damping = until_better(valley, at, step, Damping(), Secants())
     assert found is None
     assert damping.value > 0.0

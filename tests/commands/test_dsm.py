@@ -64,6 +64,7 @@ def test_files_hold_the_same_surface(made):
     xyz, _ = read_point_cloud(here / "dsm" / "dsm.laz")
     np.testing.assert_allclose(np.sort(xyz[:, 2]), np.sort(z[known]), atol=6e-4)
     assert (here / "dsm" / "plots" / "surface.png").is_file()
+    assert (here / "dsm" / "plots" / "colours.png").is_file()
     assert not (here / "dsm.tiles").exists()
 
 

@@ -67,6 +67,9 @@ def test_files(made):
     assert all(isinstance(figure, Figure) for figure in found.plot.all().values())
     assert (here / "out" / "plots" / "points.png").stat().st_size > 10_000
     assert "cells of 2 m" in repr(found)
+    marks = found.plot.orthophoto().axes[0].collections[1:]
+    drawn = np.concatenate([np.asarray(one.get_offsets()) for one in marks])
+    assert sorted(map(tuple, drawn.tolist())) == sorted((p["X"], p["Y"]) for p in found.summary["points"])
 
 
 def test_accuracy_has_its_parts(made):
@@ -219,6 +222,12 @@ def test_surfaces_that_do_not_fit_are_refused(made, tmp_path):
     ):
         with pytest.raises(InputError, match=match):
             aerotri.orthophoto(result, photographs, surface, tmp_path / "out")
+    in_feet = surface_at(tmp_path / "in feet.tif", -150.0, 300.0)
+    with rasterio.open(in_feet, "r+") as file:
+        file.units = ("ft",)
+    with pytest.raises(InputError, match="but in 'ft'") as refused:
+        aerotri.orthophoto(result, photographs, in_feet, tmp_path / "out")
+    assert "A*0.3048" in str(refused.value)
     empty = write_nothing(tmp_path / "empty.tif")
     with pytest.raises(InputError, match="no heights"):
         aerotri.orthophoto(result, photographs, empty, tmp_path / "out")

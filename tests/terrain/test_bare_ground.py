@@ -16,8 +16,8 @@ from aerotri.terrain.dense.bare_ground import (
     bridged_heights,
 )
 from aerotri.terrain.dense.measure import DensePlan, measure_surface
-from aerotri.terrain.dense.tile import TileSurface
 from aerotri.terrain.dense.tile_files import TileFiles, tile_windows
+from aerotri.terrain.dense.tile_surface import TileSurface
 from aerotri.terrain.pickets import Area
 
 SIDE, CELL, NOISE_M = 480, 0.25, 0.05
@@ -31,8 +31,8 @@ def outcome_of(folder, z):
         part = z[w.row : w.row + w.rows, w.column : w.column + w.columns]
         known = np.isfinite(part)
         sigma = np.where(known, NOISE_M, np.nan)
-        empty = np.zeros((0, 2), int), np.zeros(0), np.nan
-        tile = TileSurface(part, sigma, known.astype(np.int16), np.where(known, 0, -1).astype(np.int32), 1.0, *empty)
+        empty = np.zeros((0, 2), int), np.zeros(0), np.nan, np.nan
+        tile = TileSurface(part, sigma, known.astype(np.uint64), np.array([0]), 1.0, *empty)
         files.write(w, tile)
     return SimpleNamespace(grid=grid, files=files, windows=tuple(windows))
 

@@ -1,5 +1,6 @@
 """The whole surface by dense matching: geometry of epipolar images, parallaxes with σ, fusion, tiles."""
 
+import tracemalloc
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,8 +11,10 @@ from rendered_blocks import rendered_block, write_photograph
 from scipy.ndimage import gaussian_filter
 
 from aerotri.conventions import InputError
+from aerotri.formats.results import dense as dense_file
 from aerotri.rasters.grids import Grid
 from aerotri.rasters.images import create_image
+from aerotri.terrain.adjustment_part import covariances_at
 from aerotri.terrain.dense import _mesh_kernels as kernels
 from aerotri.terrain.dense import epipolar, parallaxes
 from aerotri.terrain.dense._refinement_kernels import shift_windows
@@ -27,6 +30,7 @@ from aerotri.terrain.dense.pairs import Candidate, Pair, chosen_pairs, noise_cor
 from aerotri.terrain.dense.parallaxes import parallaxes_of
 from aerotri.terrain.dense.place import place_at
 from aerotri.terrain.dense.points import normals
+from aerotri.terrain.dense.shared_part import SharedPart, shared_part
 from aerotri.terrain.dense.steps import (
     ALONE_SHARE,
     BLURRED_STEP_PX,
@@ -37,8 +41,8 @@ from aerotri.terrain.dense.steps import (
     step_sigma,
     straightness,
 )
-from aerotri.terrain.dense.tile import TileSurface
 from aerotri.terrain.dense.tile_files import TileFiles, TileWindow
+from aerotri.terrain.dense.tile_surface import TileSurface
 from aerotri.terrain.pickets import Area
 
 
@@ -85,6 +89,69 @@ def test_heights_are_those_of_the_ground_within_their_sigma(surface, hill):
     assert np.median(sigma) < 0.4
 
 
+def test_cells_are_counted_in_the_photographs_that_measured_them(surface, hill):
+    """Each shows the cell, and the adjustment's share is that of a point intersected from these alone."""
+    outcome, plan = surface
+    photographs = outcome.photographs
+    places, measured = [], []
+    for window, tile in outcome.files.read_all(list(outcome.windows)):
+        row, column = np.nonzero(np.isfinite(tile.z))
+        assert (tile.count[row, column] >= 2).all()
+        assert (tile.count[np.isnan(tile.z)] == 0).all()
+        for n in range(0, len(row), max(len(row) // 20, 1)):
+            own = tile.measured_by(row[n], column[n])
+            assert len(own) == tile.count[row[n], column[n]]
+            assert own[0] == tile.shown_by[row[n], column[n]]
+            x, y = outcome.grid.x(window.column + column[n]), outcome.grid.y(window.row + row[n])
+            places.append([x, y, tile.z[row[n], column[n]]])
+            measured.append(own)
+    xyz = np.array(places)
+    place = place_at(photographs, xyz.mean(axis=0), 300.0, plan.edge)
+    shows = np.column_stack([place.seen(k, place.from_crs(xyz)) for k in range(len(photographs))])
+    assert all(shows[n, own].all() for n, own in enumerate(measured))
+    found = shared_part(hill.calibration, photographs, plan.rows, xyz, measured)
+    n = int(np.argmin([len(own) for own in measured]))
+    alone = covariances_at(hill.calibration, photographs.restitution, plan.rows, xyz[n : n + 1], measured[n][None])
+    few = shared_part(hill.calibration, photographs, plan.rows, xyz[n : n + 1], [measured[n]])
+    np.testing.assert_allclose(few.covariance[0, 0, 5], alone[0, 2, 2])
+    assert np.isfinite(found.covariance).all()
+
+
+def test_medians_keep_few_cells_in_memory(monkeypatch):
+    """Of a large surface, of tiles that are made as they are asked for, the record needs a share of the cells."""
+    side, count = 500, 60
+    shape = side, side
+    grid = Grid(side, side * count, 0.0, 0.0, 1.0, 1.0)
+
+    def tiles(windows):
+        for n, window in enumerate(windows):
+            z, members = np.full(shape, 100.0), np.full(shape, 3, np.uint8)
+            sigma = np.full(shape, 0.1 if n % 3 else 0.2)
+            pairs = np.array([[0, 1]])
+            yield window, TileSurface(z, sigma, members, pairs[0], 1.0, pairs, np.zeros(1), 2.0, 3.0)
+
+    nodes = np.zeros((2, 2, 6))
+    nodes[:, :, 5] = 0.05**2
+    o = SimpleNamespace(
+        files=SimpleNamespace(read_all=tiles), windows=[TileWindow(0, side * n, side, side) for n in range(count)],
+        grid=grid, shared=SharedPart(np.array([0.0, 1e6]), np.array([0.0, -1e6]), nodes),
+        photographs=SimpleNamespace(gsd=np.array([0.5])), cells=side * side * count, shared_cells=2.0,
+        across_px=np.zeros(1), pairs=np.array([[0, 1]]), resumed=0, pixel=3.0, level=0,
+    )  # fmt: skip
+    monkeypatch.setattr(dense_file, "MOST_SAMPLES", 20_000)
+    tracemalloc.start()
+    samples = dense_file._samples(o)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    sigma, matching, shared, photographs = (np.concatenate(part) for part in zip(*samples, strict=True))
+    assert 10_000 < len(sigma) <= 20_000 + count
+    assert peak < 100.0 * side * side  # of one tile; all of them are sixty times as much
+    assert np.median(matching) == 0.1
+    np.testing.assert_allclose(shared, 0.05)
+    np.testing.assert_allclose(sigma, np.hypot(matching, shared))
+    assert (photographs == 2).all()
+
+
 def test_nothing_hangs_between_roof_and_ground(surface, hill):
     error, _, off = cells(surface[0], hill)
     assert (np.abs(error[off]) > 3.0).mean() < 1e-3
@@ -109,7 +176,7 @@ def test_no_damage_of_a_kept_tile_outlives_the_next_run(tmp_path):
     """Whatever byte is wrong, the tile counts as not there, or is what it was."""
     rng = np.random.default_rng(2)
     z, count = rng.normal(100.0, 1.0, (3, 4)), rng.integers(0, 5, (3, 4))
-    tile = TileSurface(z, z / 1e3, count, count, 1.5, count[:, :2], z[0], 2.5)
+    tile = TileSurface(z, z / 1e3, count, count[0], 1.5, count[:, :2], z[0], 2.5, 0.7)
     files, window = TileFiles(tmp_path, 0), TileWindow(0, 0, 3, 4)
     files.write(window, tile)
     whole = files.path(window).read_bytes()
@@ -121,7 +188,7 @@ def test_no_damage_of_a_kept_tile_outlives_the_next_run(tmp_path):
         if read is not None:
             np.testing.assert_array_equal(read.z, tile.z)
             np.testing.assert_array_equal(read.pairs, tile.pairs)
-            assert (read.factor, read.shared_cells) == (1.5, 2.5)
+            assert (read.factor, read.shared_cells, read.pixel) == (1.5, 2.5, 0.7)
     assert refused > 0.5 * len(whole)
 
 

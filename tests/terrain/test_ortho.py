@@ -22,9 +22,10 @@ from aerotri.simulation import _rendering_kernels as rendering
 from aerotri.simulation import parse_spec, simulate
 from aerotri.simulation.projection import Rays, measured_rays, project
 from aerotri.simulation.rendering import RenderOptions
-from aerotri.terrain.adjustment_part import plan_variances
+from aerotri.terrain.adjustment_part import plan_covariances
 from aerotri.terrain.ortho import _seam_kernels as kernels
 from aerotri.terrain.ortho._sight_kernels import centres_for, is_hidden, look, place_of
+from aerotri.terrain.ortho.accuracy import HeightSigma
 from aerotri.terrain.ortho.candidates import Candidates
 from aerotri.terrain.ortho.ground import ground_surface, tile_ground
 from aerotri.terrain.ortho.make import make_orthophoto
@@ -60,7 +61,7 @@ def make(made: Rendered, surface, folder, rows=None, **settings):
     with RasterReader(surface) as heights, RasterReader(surface, band=2) as sigma:
         chosen = rows, tuple(made.paths[k] for k in rows)
         found = make_orthophoto(
-            made.calibration, chosen, (heights, sigma), OrthoSettings(**settings), folder, nothing
+            made.calibration, chosen, heights, HeightSigma(sigma), OrthoSettings(**settings), folder, nothing
         )  # fmt: skip
     return found, read_mosaic(folder / "ortho.tif")
 
@@ -419,10 +420,10 @@ def test_plan_position_is_as_good_as_stated():
             true, used = _ray(made.centre[image], _rotation(block, made.angles[image])), restitution.true
             place = true(20.0)
             found = _ray(used.centre[image], used.rotation[image])(20.0)
-            variance = plan_variances(
+            covariance = plan_covariances(
                 calibration, restitution, np.arange(len(block.images)), place[None], np.array([image])
             )[0]  # fmt: skip
-            normalised.append((found - place)[:2] / np.sqrt(variance))
+            normalised.append((found - place)[:2] / np.sqrt(np.diagonal(covariance)))
     assert 0.6 < np.sqrt(np.mean(np.square(normalised))) < 1.5
 
 

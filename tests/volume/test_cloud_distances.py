@@ -105,9 +105,8 @@ def test_command_reads_covariances_and_writes(tmp_path):
     assert beyond[away < 2.0].all()
     assert not beyond[away > 4.5].any()
     assert (tmp_path / "out" / "plots" / "distances.png").stat().st_size > 10_000
-    with pytest.raises(
-        InputError, match="--area, --noise-length, --first-adjustment, --second-adjustment: of surfaces"
-    ):
+    assert "beyond the level of detection" in (tmp_path / "out" / "change.html").read_text(encoding="utf-8")
+    with pytest.raises(InputError, match="--area, --noise-length: of surfaces"):
         invoke(["change", *given, "--area", stable, "--out", str(tmp_path / "other")])
     with pytest.raises(InputError, match="--spacing: of point clouds"):
         invoke(["change", str(tmp_path / "a.tif"), str(tmp_path / "b.tif"), "--spacing", "1"])

@@ -46,47 +46,63 @@ main()
 def main() -> None:
     """Render, measure and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--photographs", type=int, default=4)
+    parser.add_argument("--photographs", type=int, default=4, help="of a strip")
+    parser.add_argument("--strips", type=int, default=1)
+    parser.add_argument("--size", type=int, nargs=2, default=SIZE, help="columns and rows of a photograph")
+    parser.add_argument("--commands", nargs="+", choices=("dsm", "ortho"), default=("dsm", "ortho"))
+    parser.add_argument("--folder", type=Path, help="to keep the block in, and to take it from where it is there")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--side", type=float, default=300.0, help="of the square that dsm measures, m")
     arguments = parser.parse_args()
     os.environ["AEROTRI_THREADS"] = str(arguments.threads)
+    if arguments.folder is not None:
+        _measure(arguments.folder, arguments)
+        return
     with tempfile.TemporaryDirectory(prefix="aerotri_memory_") as folder:
         _measure(Path(folder), arguments)
 
 
 def _measure(folder: Path, arguments: argparse.Namespace) -> None:
-    (folder / "plan.toml").write_text(_plan(arguments.photographs), encoding="utf-8")
-    _run(folder, "simulate", "plan.toml", "--out", "block", "--seed", "1", "--render")
+    if not (folder / "surface.tif").exists():
+        _make_block(folder, arguments)
     photographs = sorted((folder / "block" / "photographs").glob("*.tif"))
-    for path in photographs:
-        _in_colour(path)
-    _run(folder, "adjust", "block", "--out", "result", "--no-plots")
-    middle, low, high = _extent(folder)
+    middle, _, _ = _extent(folder)
     half = arguments.side / 2.0
     square = [f"{value:.1f}" for value in (*(middle[:2] - half), *(middle[:2] + half))]
-    _write_surface(folder / "surface.tif", middle[2], low, high)
-    print("# Memory with large photographs\n")
-    print(
-        f"{len(photographs)} photographs of {SIZE[0]} × {SIZE[1]} pixels, 3 × 8 bits, {arguments.threads} thread(s)\n"
-    )
+    columns, rows = arguments.size
+    print(f"\n{len(photographs)} photographs of {columns} × {rows} pixels, 3 × 8 bits, {arguments.threads} thread(s)\n")
     print(HEAD, flush=True)
     commands = {
         "dsm": ["--out", "dsm", "--no-plots", "--area", *square],
         "ortho": ["surface.tif", "--out", "ortho", "--no-plots", "--cell", str(GSD_M)],
     }
-    for name, rest in commands.items():
+    for name in arguments.commands:
+        rest = commands[name]
         seconds, peak = _run(folder, name, "result", "block/photographs", *rest)
         with rasterio.open(folder / name / f"{name}.tif") as file:
             cells = file.width * file.height / 1e6
         print(f"| `{name}` | {cells:.0f} | {len(photographs)} | {seconds:.0f} | {peak / 1e9:.2f} |", flush=True)
 
 
-def _plan(photographs: int) -> str:
+def _make_block(folder: Path, arguments: argparse.Namespace) -> None:
+    """Photographs, their adjustment and a surface."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "plan.toml").write_text(_plan(arguments), encoding="utf-8")
+    _run(folder, "simulate", "plan.toml", "--out", "block", "--seed", "1", "--render")
+    for path in sorted((folder / "block" / "photographs").glob("*.tif")):
+        _in_colour(path)
+    _run(folder, "adjust", "block", "--out", "result", "--no-plots")
+    middle, low, high = _extent(folder)
+    _write_surface(folder / "surface.tif", middle[2], low, high)
+
+
+def _plan(arguments: argparse.Namespace) -> str:
+    columns, rows = arguments.size
+    strips, photographs = arguments.strips, arguments.photographs
     return f"""
 name = "large"
-camera.cam = {{ preset = "ultracam_d", size_px = [{SIZE[0]}, {SIZE[1]}], pixel_um = 9.0 }}
-flight = {{ gsd_m = {GSD_M}, strips = 1, images_per_strip = {photographs}, end_lap = {LAP} }}
+camera.cam = {{ preset = "ultracam_d", size_px = [{columns}, {rows}], pixel_um = {9.0 * SIZE[0] / columns} }}
+flight = {{ gsd_m = {GSD_M}, strips = {strips}, images_per_strip = {photographs}, end_lap = {LAP}, side_lap = 0.3 }}
 terrain = {{ kind = "undulating", height_m = 100.0, relief_rms_m = 5.0, wavelength_m = 400.0 }}
 tie_points = {{ per_image = 60, sigma_um = 2.0 }}
 control = {{ distance_bases = 1.0, sigma_m = [0.02, 0.02, 0.02] }}

@@ -27,7 +27,7 @@ SHOWN = 6
 
 def checked_factor(
     system: NormalSystem, state: State, equations: NormalEquations, estimator: Estimator, factor: Factor | None = None,
-    suspect: bool | None = None,
+    suspect: bool | None = None, is_sure: bool = False,
 ) -> tuple[Factor | None, list[str]]:  # fmt: skip
     """The factor of the equations and sentences naming what is free: none where the matrix has full rank.
 
@@ -35,6 +35,7 @@ def checked_factor(
     ----------
     equations : undamped, at `state`. factor : of them, where there is one already.
     suspect : what `is_suspect` says of the factor, where it was asked already.
+    is_sure : the factor shows by itself that nothing is free.
 
     Returns
     -------
@@ -43,6 +44,8 @@ def checked_factor(
     dead = _dead_columns(system, equations)
     if dead:
         return None, [f"no ray depends on {_listed(dead)}"]
+    if is_sure and factor is not None:
+        return factor, []
     factor = factor or _factor(system, equations)
     motions = unnoticed_motions(system, state, equations.diagonal)
     if suspect is None:

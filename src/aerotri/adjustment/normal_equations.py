@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from aerotri.adjustment.kernel_records import (
     Weighting,
     Work,
 )
+from aerotri.adjustment.panels import DOUBLE
 from aerotri.adjustment.parallel import chunk_bounds, run_chunks
 from aerotri.adjustment.rig_reduction import RigFactor, RigReduction
 from aerotri.adjustment.rig_ties import TieRows
@@ -379,16 +380,18 @@ class NormalSystem:
         other.priors = self.priors.without(u.kept_columns[control_off[u.kept_rows]])
         return other
 
-    def factorise(self, equations: NormalEquations) -> Factor:
-        """Factor of the reduced matrix; valid until the next one."""
-        return self.factorise_like(equations, equations.matrix)
+    def factorise(self, equations: NormalEquations, precision: np.dtype[Any] = DOUBLE) -> Factor:
+        """Factor of the reduced matrix; valid until the next one. See `Symbolic.factorise` on the precision."""
+        return self.factorise_like(equations, equations.matrix, precision)
 
-    def factorise_like(self, equations: NormalEquations, matrix: BorderedMatrix) -> Factor:
+    def factorise_like(
+        self, equations: NormalEquations, matrix: BorderedMatrix, precision: np.dtype[Any] = DOUBLE
+    ) -> Factor:
         """Factor of another matrix over the unknowns of some equations; valid until the next one."""
         if self._reduction is None or equations.chain is None:
-            return self.symbolic.factorise(matrix)
+            return self.symbolic.factorise(matrix, precision)
         reduced = self._reduction.reduced(matrix, equations.chain)
-        return RigFactor(self.symbolic.factorise(reduced), self._reduction, equations.chain)
+        return RigFactor(self.symbolic.factorise(reduced, precision), self._reduction, equations.chain)
 
     def own_blocks(self, equations: NormalEquations) -> np.ndarray:
         """(n, 6, 6) of the photographs, or of the stations where there are rigid rigs, all others known."""

@@ -16,6 +16,7 @@ from aerotri.adjustment.kernel_records import FrontBlocks
 from aerotri.adjustment.parallel import refuse_more_than_there_is
 from aerotri.adjustment.subtrees import schedule
 
+DOUBLE, SINGLE = np.dtype(np.float64), np.dtype(np.float32)
 B = 6
 """Unknowns of a photograph."""
 
@@ -52,7 +53,7 @@ class Panels:
     last : (·,) photographs that are eliminated last, together; chosen by the dissection where None.
 
     `children` of every supernode; `times_factorised` counts the matrices factorised here; `corner_factor` (s, s) is the
-    triangle of the last border.
+    triangle of the last border, and `precision` the type of the numbers that stand here.
     """
 
     def __init__(
@@ -76,7 +77,7 @@ class Panels:
 
     def __getstate__(self) -> dict[str, Any]:
         # the numbers of a factor stay where they are: only the plan travels
-        rooms = ("_panels", "_stacks", "corner_factor")
+        rooms = ("_room", "_panels", "_stacks", "_views", "corner_factor")
         return {name: value for name, value in self.__dict__.items() if name not in rooms}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -91,7 +92,7 @@ class Panels:
     @property
     def factor_entries(self) -> int:
         """Numbers stored in the factor."""
-        return len(self._panels)
+        return self._spans[-1][2] if self._spans else 0
 
     @cached_property
     def flops(self) -> float:
@@ -155,9 +156,21 @@ class Panels:
             self._stack_updates(branch, room)
         self.bytes_needed = 8 * (ends[-1] + sum(room) + self._inverse_entries())
         refuse_more_than_there_is(self.bytes_needed, f"the normal equations of {self.n} photographs")
-        self._panels = np.empty(ends[-1])
-        self._stacks = [np.empty(size) for size in room]
-        self.corner_factor = np.empty((self.n_border, self.n_border), order="F")
+        self._room = [np.empty(size) for size in (ends[-1], *room, self.n_border**2)]
+        self._take(DOUBLE)
+
+    def begin(self, precision: np.dtype[Any]) -> None:
+        """Make room for another factor, of numbers of a precision: what stands here is lost."""
+        self.times_factorised += 1
+        self._take(precision)
+
+    def _take(self, precision: np.dtype[Any]) -> None:
+        if "_views" in self.__dict__ and precision == self.precision:
+            return
+        self.precision = precision
+        self._panels, *self._stacks, corner = (part.view(precision)[: len(part)] for part in self._room)
+        self._views = [self._view(k) for k in range(len(self.fronts))]
+        self.corner_factor = corner.reshape(self.n_border, self.n_border, order="F")
 
     def _stack_updates(self, branch: range, room: list[int]) -> None:
         """Places of a branch's update matrices on two stacks, for even and odd depths; their sizes go into `room`."""
@@ -185,6 +198,9 @@ class Panels:
 
     def panel(self, k: int) -> tuple[np.ndarray, np.ndarray]:
         """L of supernode k: its own triangle and the rows below, Fortran order."""
+        return self._views[k]
+
+    def _view(self, k: int) -> tuple[np.ndarray, np.ndarray]:
         a, b, c = self._spans[k]
         own = B * self.fronts[k].n_own
         return (

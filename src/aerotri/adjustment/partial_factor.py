@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg.blas import dtrsm  # pyright: ignore[reportAttributeAccessIssue]
 
 from aerotri.adjustment.kernel_records import Inverse
+from aerotri.adjustment.panels import DOUBLE
 from aerotri.adjustment.sparse_cholesky import (
     BorderedMatrix,
     Buffers,
@@ -135,7 +136,7 @@ def eliminate_inner(symbolic: Symbolic, matrix: BorderedMatrix) -> tuple[Partial
     NotPositiveDefiniteError
         When a pivot is not positive or drowns in rounding.
     """
-    symbolic.times_factorised += 1
+    symbolic.begin(DOUBLE)
     scale = _scale_of(symbolic, matrix)
     n = symbolic.n
     by_image = np.ascontiguousarray(scale[: B * n].reshape(n, B)[symbolic.rank])
@@ -160,7 +161,7 @@ def eliminate_inner(symbolic: Symbolic, matrix: BorderedMatrix) -> tuple[Partial
 
 def restored(symbolic: Symbolic, numbers: Eliminated) -> PartialFactor:
     """The factor that the numbers were taken from."""
-    symbolic.times_factorised += 1
+    symbolic.begin(DOUBLE)
     symbolic.eliminated[:] = numbers.panels
     return PartialFactor(symbolic, numbers.scale)
 

@@ -2,7 +2,8 @@
 
 `minimise` reads as the algorithm; it knows normal equations and steps, not photographs. Its parts: `steps` solves for a
 step and makes it lead downhill, `damping` says how much, `secants` learn the curvature that the normal matrix misses,
-`stopping` says when to end, `chord_steps` takes the last steps with an old factor, `robust` gives the weights.
+`stopping` says when to end, `chord_steps` takes the last steps with an old factor, `single_precision` the first with
+one of fewer digits, `robust` gives the weights.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +19,11 @@ from aerotri.adjustment.chord_steps import follow
 from aerotri.adjustment.damping import Damping
 from aerotri.adjustment.defects import checked_factor, is_suspect
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem
+from aerotri.adjustment.panels import DOUBLE, SINGLE
 from aerotri.adjustment.parallel import blas_threads
 from aerotri.adjustment.robust import LEAST_SQUARES, STAGES, Estimator, estimator_for
 from aerotri.adjustment.secants import Secants
+from aerotri.adjustment.single_precision import first_precision, precise_enough
 from aerotri.adjustment.sparse_cholesky import Factor
 from aerotri.adjustment.steps import (
     Place,
@@ -28,7 +32,6 @@ from aerotri.adjustment.steps import (
     lengthened,
     place_at,
     stretched,
-    take_step,
     until_better,
 )
 from aerotri.adjustment.stopping import (
@@ -169,13 +172,14 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
     """Gauss-Newton with the estimator of one stage."""
     at = _reweighted(system, place_at(system, state, LEAST_SQUARES), stage.name, redundancy)
     course = _Course(stage.done, options.report, redundancy, [at.equations.cost])
-    last_iteration = stage.done + options.max_iterations
+    last_iteration, precision = stage.done + options.max_iterations, first_precision(system, stage.is_robust)
     damping, secants, scale_changes, last_decrement = Damping(), None, 0, np.inf
     while course.iteration < last_iteration:
         course.iteration += 1
-        step = take_step(system, at, damping.value, secants)
-        if course.iteration == 1:
-            step, refused = _checked(system, at, step, options)
+        is_first = course.iteration == 1
+        step, precision = precise_enough(system, at, damping.value, secants, precision, is_first)
+        if is_first:
+            step, refused = _checked(system, at, step, options, precision)
             if refused is not None:
                 return replace(refused, costs=tuple(course.costs))
         step, damping = until_better(system, at, step, damping, secants)
@@ -193,6 +197,7 @@ def _descend(system: NormalSystem, state: State, redundancy: int, options: Solve
         course.add(step.equations.cost, damping.value)
         if is_plain and not (stage.is_robust or settled) and step.is_within_scatter:
             at, last_decrement, settled = _followed(system, step, redundancy, last_iteration, course)
+            precision = DOUBLE
         else:
             at = assembled(system, step.place)
         may_change = at.estimator.is_robust and scale_changes < MAX_SCALE_CHANGES
@@ -234,15 +239,19 @@ def _heeding(
 
 
 def _checked(
-    system: NormalSystem, at: Place, step: Trial | None, options: SolveOptions
+    system: NormalSystem, at: Place, step: Trial | None, options: SolveOptions, precision: np.dtype[Any]
 ) -> tuple[Trial | None, Solution | None]:
-    """The first step with a factor that is valid, or what ends the adjustment before it: a rank defect, or a wish."""
-    suspect = step is None or is_suspect(step.factor, at.equations)
+    """The first step with a factor that is valid, or what ends the adjustment before it: a rank defect, or a wish.
+
+    A factor in single precision that serves shows that nothing is free.
+    """
+    is_sure = precision == SINGLE
+    suspect = step is None or (not is_sure and is_suspect(step.factor, at.equations))
     if _is_stopped(system, at, options, 0, suspect):
         return None, Solution(INTERRUPTED, at.state, at.equations, at.estimator, 0)
     # who inspects something suspect factorises
     known: Factor | None = None if suspect or step is None else step.factor
-    factor, defects = checked_factor(system, at.state, at.equations, at.estimator, known, suspect)
+    factor, defects = checked_factor(system, at.state, at.equations, at.estimator, known, suspect, is_sure)
     if defects:
         return None, Solution("rank deficient", at.state, at.equations, at.estimator, 0, (), tuple(defects))
     return (replace(step, factor=factor) if step and factor else step), None

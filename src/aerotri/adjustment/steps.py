@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from aerotri.adjustment.damping import LAST_DAMPING, Damping
 from aerotri.adjustment.normal_equations import NormalEquations, NormalSystem, RightSide
+from aerotri.adjustment.panels import DOUBLE
 from aerotri.adjustment.robust import Estimator
 from aerotri.adjustment.secants import Secants
 from aerotri.adjustment.sparse_cholesky import Factor, NotPositiveDefiniteError
@@ -100,11 +102,13 @@ class Trial:
         return min((before.cost - self.equations.cost) / max(self.decrement, 1e-300), 1.0)
 
 
-def take_step(system: NormalSystem, at: Place, damping: float, secants: Secants | None) -> Trial | None:
-    """Solve for a step and go there; None where the equations are singular."""
+def take_step(
+    system: NormalSystem, at: Place, damping: float, secants: Secants | None, precision: np.dtype[Any] = DOUBLE
+) -> Trial | None:
+    """Solve for a step, with a factor of a precision, and go there; None where the equations are singular."""
     damped = at.equations if damping == 0.0 else system.assemble(at.state, damping, at.estimator)
     try:
-        factor = system.factorise(damped)
+        factor = system.factorise(damped, precision)
     except NotPositiveDefiniteError:
         return None
     return _tried(system, replace(at, equations=damped), factor, damping, secants)

@@ -350,9 +350,17 @@ def _sort_rays(block: Block, active: np.ndarray, centre: np.ndarray):
     points = points[np.argsort(first_image[points], kind="stable")]
     rank = np.empty(len(block.points), dtype=np.int64)
     rank[points] = np.arange(len(points))
-    order = np.argsort(rank[ray_point] * len(images) + ray_image, kind="stable")
+    order = _order_of(rank[ray_point] * len(images) + ray_image)
     row_start = np.concatenate([[0], np.cumsum(counts[points])]).astype(np.int64)
     return rows[order], images, points, ray_image[order], row_start
+
+
+def _order_of(key: np.ndarray) -> np.ndarray:
+    """Where the numbers, none of them negative, stand in order: 16 bits at a time, which NumPy sorts in one pass."""
+    order = np.argsort((key & 0xFFFF).astype(np.uint16), kind="stable")
+    for shift in range(16, int(key.max(initial=0)).bit_length(), 16):
+        order = order[np.argsort((key[order] >> shift & 0xFFFF).astype(np.uint16), kind="stable")]
+    return order
 
 
 def _ties(on_rigs: OnRigs, block: np.ndarray) -> Ties:

@@ -85,14 +85,18 @@ def change(
     first_adjustment: Annotated[
         Path | None,
         typer.Option(
-            help="Result that the first surface was measured with. With both, σ knows what bends the surfaces and "
-            "what they share: control, camera.",
+            help="Result of `aerotri adjust` that the first surface or cloud was measured with. With both, "
+            "σ takes into account how the errors of each adjustment bend its surface, and errors that both share "
+            "(same control points, same camera) cancel.",
             rich_help_panel=SIGMAS,
         ),
     ] = None,
     second_adjustment: Annotated[
         Path | None,
-        typer.Option(help="Result of the second surface; the same one if they share it.", rich_help_panel=SIGMAS),
+        typer.Option(
+            help="The same of the second surface or cloud; the same folder if both come from one adjustment.",
+            rich_help_panel=SIGMAS,
+        ),
     ] = None,
     project: ProjectOf = None,
     out: Annotated[
@@ -104,17 +108,15 @@ def change(
     """What changed between two surfaces: every cell against its σ, volumes gained and lost; distances of clouds."""
     from aerotri.commands.change import run_change, run_cloud_change
     from aerotri.conventions import InputError
-    from aerotri.public.cloud_change import is_cloud
+    from aerotri.public.cloud_epochs import is_cloud
 
     sizes = {"cylinder": cylinder, "normal": normal, "reach": reach, "spacing": spacing, "registration": registration}
     if is_cloud(first) and is_cloud(second):
-        of_surfaces = (area, noise_length, first_adjustment, second_adjustment)
-        if any(one is not None for one in of_surfaces):
-            raise InputError(
-                "--area, --noise-length, --first-adjustment, --second-adjustment: of surfaces, and clouds were given",
-                "leave them out",
-            )
-        run_cloud_change(first, second, sizes, stable, project, out, plots, json_)
+        if area is not None or noise_length is not None:
+            raise InputError("--area, --noise-length: of surfaces, and clouds were given", "leave them out")
+        run_cloud_change(
+            first, second, sizes, stable, (first_adjustment, second_adjustment), project, out, plots, json_
+        )
         return
     given = [f"--{name}" for name, value in sizes.items() if value is not None]
     if given:

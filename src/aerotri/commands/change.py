@@ -37,8 +37,8 @@ def run_change(
 
 
 def run_cloud_change(
-    first: Path, second: Path, sizes: dict[str, float | None], stable: str | None, project: Path | None,
-    out: Path | None, plots: bool, as_json: bool,
+    first: Path, second: Path, sizes: dict[str, float | None], stable: str | None,
+    adjustments: tuple[Path | None, Path | None], project: Path | None, out: Path | None, plots: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """The same of point clouds; `sizes` as of `aerotri.cloud_change`."""
     from aerotri.public.cloud_change import RECORD, cloud_change
@@ -46,7 +46,10 @@ def run_cloud_change(
     console = Console(quiet=as_json)
     target = out or Path(f"{second.resolve().stem}_change")
     refuse_foreign_folder(target, RECORD)
-    found = cloud_change(first, second, stable=stable, project=project, **sizes)
+    found = cloud_change(
+        first, second, stable=stable, first_adjustment=adjustments[0], second_adjustment=adjustments[1],
+        project=project, **sizes,
+    )  # fmt: skip
     found.save(target, plots)
     if as_json:
         print(json_text(found.summary))
@@ -54,12 +57,18 @@ def run_cloud_change(
         console.lines([*_cloud_summary(found.summary), f"Written to {target}"])
 
 
+SIGMA_FROM = {
+    "adjustments": "both adjustments and the noise of the points", "points": "the σ of the points",
+    "scatter": "the scatter of the points",
+}  # fmt: skip
+
+
 def _cloud_summary(c: dict[str, Any]) -> list[str]:
     lines = [
         f"{c['with_distance']} of {c['core_points']} places every {c['spacing_m']:.3g} m have a distance; cylinders of "
         f"{c['cylinder_m']:.3g} m, normals from {c['normal_m']:.3g} m, at most {c['reach_m']:.3g} m away",
-        f"σ of a distance (from the {'σ of the points' if c['sigma_from'] == 'points' else 'scatter of the points'}): "
-        f"median {c['sigma_m']:.3f} m; registration {c['registration_m']:.3f} m",
+        f"σ of a distance (from {SIGMA_FROM[c['sigma_from']]}): median {c['sigma_m']:.3f} m; registration "
+        f"{c['registration_m']:.3f} m",
         f"level of detection (95 %) {c['level_of_detection_m']:.3f} m in the median, {c['beyond_level_percent']:.1f} % "
         "of the places beyond it",
     ]

@@ -26,8 +26,8 @@ def run_ortho(
     from aerotri.public.adjustment import Adjustment
     from aerotri.public.folders import refuse_foreign_folder
     from aerotri.public.ortho import RECORD, make_ortho
-    from aerotri.public.surfaces import as_surface
     from aerotri.public.tile_folder import remove_tiles, tiles_beside
+    from aerotri.public.volume_sigma import MeasuredSurface
 
     console = Console(quiet=as_json)
     settings.check()
@@ -38,7 +38,7 @@ def run_ortho(
         raise InputError(f"there is no layer '{layer}'", f"choose one of {', '.join(LAYERS)}")
     tiles = tiles_beside(target)
     with held(target):
-        ground = as_surface(surface, layer)
+        ground = MeasuredSurface(surface, layer=layer)
         result = Adjustment(reopened(source, console))
         found = make_ortho(result, photographs, ground, target, settings, plots, tiles, console.stage, executor)
         remove_tiles(tiles)
@@ -68,9 +68,11 @@ def outcome_lines(found: Orthophoto) -> list[str]:
         lines.append(f"tiles made before: {s['tiles_resumed']}")
     if area["bridged"] > 0.0:
         lines.append(f"{area['bridged']:.0f} m² of it over bridged holes of the surface: σ is not known there")
-    parts = [f"orientation {sigma['orientation']['median']:.3f}", f"image {sigma['image']['median']:.3f}"]
+    same = s["of_one_adjustment"]
+    adjustment = "adjustment" if same else "orientation"
+    parts = [f"{adjustment} {sigma['orientation']['median']:.3f}", f"image {sigma['image']['median']:.3f}"]
     if sigma["surface"] is not None:
-        parts.insert(0, f"heights {sigma['surface']['median']:.3f}")
+        parts.insert(0, f"{'matching' if same else 'heights'} {sigma['surface']['median']:.3f}")
     lines.append(
         f"σ of X and Y: median {sigma['total']['median']:.3f} m ({', '.join(parts)}), 95 % of the area below "
         f"{sigma['total']['q95']:.3f} m"

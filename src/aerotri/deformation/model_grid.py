@@ -148,10 +148,16 @@ class Places:
         return np.diagonal(self.covariances(xyz, covariance), axis1=1, axis2=2)
 
     def covariances(self, xyz: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-        """(n, 3, 3) m² in the CRS, at (n, 3) m in the frame, of covariances (n, 3, 3) m² there."""
+        """(n, 3k, 3k) m² in the CRS, at (n, 3) m in the frame, of covariances (n, 3k, 3k) m² there.
+
+        Of k vectors of three coordinates at a place, one behind the other.
+        """
         if self.frame is None:
             return covariance
-        jacobian = self.frame.crs_per_local(xyz)
+        one = self.frame.crs_per_local(xyz)
+        count = covariance.shape[1] // 3
+        # the same for every vector: zeros between them
+        jacobian = np.einsum("kl,nij->nkilj", np.eye(count), one).reshape(covariance.shape)
         return jacobian @ covariance @ np.swapaxes(jacobian, 1, 2)
 
 

@@ -44,8 +44,12 @@ class PhotoErrors:
         return np.all(np.abs(xy) <= np.array(self.camera.half_format_mm), axis=1)
 
     def measured(self, ideal: np.ndarray) -> np.ndarray:
-        """(n, 2) mm, m = ideal + d(m), d that of the tile in which the ideal position lies."""
+        """(n, 2) mm, m = ideal + d(m), d that of the tile in which the ideal position lies.
+
+        Beyond the format d is that of its edge: nothing was measured there, and polynomials may turn back.
+        """
         out = np.empty_like(ideal)
+        half = np.array(self.camera.half_format_mm)
         x_seams, y_seams = seams_mm(self.camera)
         column = np.searchsorted(x_seams, ideal[:, 0], side="right")
         row = len(y_seams) - np.searchsorted(y_seams, ideal[:, 1], side="right")
@@ -53,7 +57,9 @@ class PhotoErrors:
             for j, tile in enumerate(tiles):
                 own = np.flatnonzero((row == i) & (column == j))
                 if len(own):
-                    out[own] = self.function.measured(ideal[own], tile.bounds_mm(self.camera))
+                    low, high = tile.bounds_mm(self.camera)
+                    within = np.maximum(low, -half), np.minimum(high, half)
+                    out[own] = self.function.measured(ideal[own], within)
         return out
 
     def partials(self, measured: np.ndarray) -> np.ndarray:

@@ -12,9 +12,10 @@ from aerotri.public.dense import COUNT, MATCHING, SURFACE, DenseSurface
 from aerotri.rasters.grids import Grid, RasterReader
 from aerotri.rasters.held import HeldRaster
 from aerotri.volume.cell_noise import NO_NOISE, CellNoise
+from aerotri.volume.lasting import Lasting
 
-NOISE_LENGTH = "NOISE_LENGTH_M"
-"""Name in the metadata of dsm.tif."""
+NOISE_LENGTH, LASTING_SIGMA, LASTING_LENGTH = "NOISE_LENGTH_M", "SHARED_SIGMA_M", "SHARED_LENGTH_M"
+"""Names in the metadata of dsm.tif."""
 BESIDE = "give dsm.tif in the folder that `aerotri dsm` wrote"
 
 
@@ -28,7 +29,9 @@ def noise_of_dense(dense: DenseSurface) -> CellNoise:
         ]
         sigma[place], count[place] = tile.sigma, tile.count
     noise, photographs = HeldRaster(sigma, o.grid, None, MATCHING), HeldRaster(count, o.grid, None, COUNT)
-    return CellNoise(noise, 0.0 if length is None else length, photographs)
+    shared = dense.summary["matching_shared"]
+    lasting = Lasting(shared["sigma_Z_m"], shared["length_m"])
+    return CellNoise(noise, 0.0 if length is None else length, photographs, lasting)
 
 
 def noise_of_file(path: Path | None, stack: ExitStack) -> CellNoise:
@@ -46,10 +49,12 @@ def noise_of_file(path: Path | None, stack: ExitStack) -> CellNoise:
     if path is None or not path.is_file():
         return NO_NOISE
     with RasterReader(path) as reader:
-        length, grid = _length(reader.tag(NOISE_LENGTH), path), reader.grid
+        length, *lasting = (_length(reader.tag(name), path) for name in (NOISE_LENGTH, LASTING_SIGMA, LASTING_LENGTH))
+        grid = reader.grid
     if path.name != SURFACE:
-        return CellNoise(None, length)
-    return CellNoise(_beside(path, MATCHING, grid, stack), length, _beside(path, COUNT, grid, stack))
+        return CellNoise(None, length, None, Lasting(*lasting))
+    matching, count = (_beside(path, name, grid, stack) for name in (MATCHING, COUNT))
+    return CellNoise(matching, length, count, Lasting(*lasting))
 
 
 def _beside(path: Path, name: str, grid: Grid, stack: ExitStack) -> RasterReader | None:

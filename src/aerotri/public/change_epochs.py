@@ -247,7 +247,8 @@ def epoch_of(
     elif not same:
         adjustment = np.sqrt(np.maximum(total**2 - own**2, 0.0))
     used = used if length is None else length
-    return Epoch(_on(heights, heights.z, grid), own, adjustment, cells_sharing(used, grid.cell_x * grid.cell_y)), said
+    sharing = cells_sharing(used, grid.cell_x * grid.cell_y)
+    return Epoch(_on(heights, heights.z, grid), own, adjustment, sharing, given.noise(stack).lasting), said
 
 
 def _refuse_no_sigma(given: MeasuredSurface, heights: Heights) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +12,15 @@ import numpy as np
 from aerotri.conventions import FilePath, InputError
 from aerotri.public.argument_types import with_checked_types
 from aerotri.public.change_epochs import plan_code, system_of_both
+from aerotri.public.cloud_epochs import (
+    by_adjustments,
+    check_sizes,
+    default_width,
+    known_alike,
+    labels_of,
+    opened,
+    within,
+)
 from aerotri.public.folders import refuse_foreign_folder
 from aerotri.public.projects import project_of
 from aerotri.public.table import Table
@@ -24,17 +31,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from shapely.geometry.base import BaseGeometry
 
+    from aerotri.public.adjustment import Adjustment
     from aerotri.volume.change.clouds import CloudDistances
 
-RECORD, TABLE = "cloud_change.json", "distances.parquet"
-OWN_NAMES = (RECORD, TABLE, "plots")
-CLOUDS = (".las", ".laz")
-POINTS_IN_CYLINDER = 30.0
-"""Points that a cylinder of the default diameter holds [L: Lague et al. 2013 ask for 20 and more]."""
+RECORD, TABLE, PAGE = "cloud_change.json", "distances.parquet", "change.html"
+OWN_NAMES = (RECORD, TABLE, "plots", PAGE)
 NORMAL_TIMES, REACH_TIMES = 2.0, 5.0
 """Default diameter of the ball of a normal, and default reach, in cylinders [C]."""
-BYTES_OF_POINT = 250
-"""Coordinates, covariance and the tree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +53,15 @@ class CloudChangePlots:
 
         return plot_distances(self.record, self.summary)
 
+    def histogram(self) -> Figure:
+        """Histogram of the distances, those beyond the level of detection apart."""
+        from aerotri.report.plots.cloud_change import plot_histogram
+
+        return plot_histogram(self.record, self.summary)
+
     def all(self) -> dict[str, Figure]:
         """Every plot by the name of its file."""
-        return {"distances": self.distances()}
+        return {"distances": self.distances(), "histogram": self.histogram()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -61,11 +70,12 @@ class MeasuredCloudChange:
 
     Parameters
     ----------
-    record : the numbers, as arrays. summary : content of cloud_change.json.
+    record : the numbers, as arrays. summary : content of cloud_change.json. head : of page and file.
     """
 
     record: CloudDistances
     summary: dict[str, Any]
+    head: Head = field(default_factory=Head)
 
     @cached_property
     def distances(self) -> Table:
@@ -94,11 +104,11 @@ class MeasuredCloudChange:
         return CloudChangePlots(self.record, self.summary)
 
     def save(self, out: FilePath, plots: bool = True) -> Path:
-        """Write cloud_change.json, distances.parquet and the plots into a folder.
+        """Write cloud_change.json, distances.parquet, the plots and the page into a folder.
 
         Parameters
         ----------
-        out : folder; an older result there is replaced in one step. plots : draw the map.
+        out : folder; an older result there is replaced in one step. plots : draw the plots and the page.
 
         Returns
         -------
@@ -119,9 +129,11 @@ class MeasuredCloudChange:
         with atomic_folder(target, own=OWN_NAMES) as folder:
             pq.write_table(self.distances.to_arrow(), folder / TABLE, compression="zstd")
             if plots:
+                from aerotri.report.pages.cloud_change import write_cloud_change_page
                 from aerotri.report.plots.rendering import save_plots
 
-                save_plots(self.plot.all(), folder / "plots")
+                drawn = save_plots(self.plot.all(), folder / "plots")
+                write_cloud_change_page(self.summary, drawn, folder / PAGE, self.head)
             write_json(folder / RECORD, self.summary)
         return target
 
@@ -148,6 +160,8 @@ def cloud_change(
     spacing: float | None = None,
     stable: BaseGeometry | FilePath | None = None,
     registration: float | None = None,
+    first_adjustment: Adjustment | FilePath | None = None,
+    second_adjustment: Adjustment | FilePath | None = None,
     project: FilePath | None = None,
 ) -> MeasuredCloudChange:
     """Distances from a point cloud to a later one along its normals (M3C2), each with σ and level of detection.
@@ -163,8 +177,12 @@ def cloud_change(
     spacing : m, of the places where distances are wanted; the diameter of the cylinder where None.
     stable : ground that did not change, as in `aerotri.change`. It tells the registration.
     registration : m, error of the position of one cloud to the other, 1 σ; from stable ground, else 0, where None.
-    project : block, or result of an adjustment, whose [project] stands at the head of the file; that of the folders of
-        the clouds where None.
+    first_adjustment : what the first cloud was measured with, a result or its folder. With both adjustments σ has
+        what their errors leave in a distance, and what both have in common (control points, values of the camera, or
+        all of it where they are one adjustment) cancels.
+    second_adjustment : of the second; the same one for two clouds of one adjustment.
+    project : block, or result of an adjustment, whose [project] stands at the head of page and file; that of the
+        adjustments or of the folders of the clouds where None.
 
     Returns
     -------
@@ -190,101 +208,45 @@ def cloud_change(
     >>> f"{np.nanmedian(found.distances['distance']):.2f} m"
     '0.30 m'
     """
-    from aerotri.volume.change.clouds import Cloud, Scales, cloud_distances, core_points, registration_of
+    from aerotri.formats.results.cloud_change import CloudSettings, cloud_change_json
+    from aerotri.volume.change.clouds import Scales, cloud_distances, core_points, registration_of
 
     asked = {
         "cylinder": cylinder, "normal": normal, "reach": reach, "spacing": spacing, "stable": stable,
         "registration": registration,
     }  # fmt: skip
-    (before, of_before), (after, of_after) = (_opened(one) for one in (first, second))
-    crs, of_heights = system_of_both((of_before, of_after), (_label(first), _label(second)))
-    width = _default_width(before.xyz) if cylinder is None else cylinder
+    epochs = opened(first), opened(second)
+    names = labels_of(*epochs, (first, second))
+    crs, of_heights = system_of_both([one.crs for one in epochs], names)
+    before, after, unlike = known_alike(epochs[0].cloud, epochs[1].cloud)
+    width = default_width(before.xyz) if cylinder is None else cylinder
     scales = Scales(
         width, NORMAL_TIMES * width if normal is None else normal, REACH_TIMES * width if reach is None else reach
     )
     between = width if spacing is None else spacing
-    _check((("cylinder", width), ("normal", scales.normal), ("reach", scales.reach), ("spacing", between)))
+    check_sizes((("cylinder", width), ("normal", scales.normal), ("reach", scales.reach), ("spacing", between)))
     if registration is not None and not 0.0 <= registration < 1e6:
         raise InputError(f"a registration of {registration:g} m is not possible", "give metres")
-    notes = [of_heights] if of_heights else []
-    if (before.covariance is None) != (after.covariance is None):
-        notes.append("one of the clouds has no σ of its points: the scatter of the points is taken for both")
-        before, after = Cloud(before.xyz, None), Cloud(after.xyz, None)
     core = before.xyz[core_points(before.xyz, between)]
     found = cloud_distances(before, after, core, scales)
     if not np.isfinite(found.distance).any():
         raise InputError("the two clouds do not meet", "check the CRS of both, or give a larger --cylinder and --reach")
-    held = None if stable is None else _within(stable, plan_code(crs), core)
-    shift, excess = (np.nan, np.nan) if held is None else registration_of(found, held)
-    if held is not None and not np.isfinite(excess):
+    stated = (first_adjustment, second_adjustment)
+    found, adjusted, said = by_adjustments(found, epochs, (before, after), stated, plan_code(crs))
+    notes = [text for text in (of_heights, unlike, *said) if text]
+    held = None if stable is None else within(stable, plan_code(crs), core)
+    on_stable = None if held is None else registration_of(found, held)
+    if on_stable is not None and not np.isfinite(on_stable[1]):
         raise InputError("no place with a distance lies on the stable ground", "give other ground, or check its CRS")
-    used = registration if registration is not None else excess if held is not None else 0.0
-    if registration is None and held is None:
+    used = registration if registration is not None else on_stable[1] if on_stable is not None else 0.0
+    if registration is None and held is None and adjusted is None and "cancel" not in " ".join(said):
         notes.append("nothing is known of how the clouds lie to one another: give --stable or --registration")
-    beyond = np.abs(found.distance) > found.level(used)
-    known = np.isfinite(found.distance)
-    head = Head(project_of(project, *(one for one in (second, first) if not isinstance(one, np.ndarray))), crs)
-    summary = head.as_dict() | {
-        "first": _label(first), "second": _label(second), "cylinder_m": scales.cylinder, "normal_m": scales.normal,
-        "reach_m": scales.reach, "spacing_m": between, "points_first": len(before.xyz),
-        "points_second": len(after.xyz), "core_points": len(core), "with_distance": int(known.sum()),
-        "sigma_from": "points" if before.covariance is not None else "scatter", "registration_m": float(used),
-        "stable": None if held is None else {"core_points": int((held & known).sum()), "mean_m": shift},
-        "sigma_m": float(np.nanmedian(found.sigma)), "level_of_detection_m": float(np.nanmedian(found.level(used))),
-        "beyond_level_percent": 100.0 * float(beyond[known].mean()), "warnings": notes,
-        "settings": used_arguments(cloud_change, asked, dict.fromkeys(asked.keys() - {"stable"}, "m")),
-    }  # fmt: skip
-    return MeasuredCloudChange(found, summary)
-
-
-def is_cloud(path: Any) -> bool:
-    """Whether a path is that of a point cloud."""
-    return isinstance(path, str | os.PathLike) and Path(path).suffix.lower() in CLOUDS
-
-
-def _opened(given: FilePath | np.ndarray) -> tuple[Any, str]:
-    from aerotri.formats.results.point_cloud import read_precise_cloud
-    from aerotri.memory import refuse_beyond_memory
-    from aerotri.volume.change.clouds import FEWEST, Cloud
-
-    if isinstance(given, np.ndarray):
-        xyz, covariance, crs = np.asarray(given, dtype=float), None, ""
-        if xyz.ndim != 2 or xyz.shape[1] != 3 or not np.isfinite(xyz).all():
-            raise InputError("a cloud is no array (n, 3) of numbers", "give X, Y, Z of every point")
-    else:
-        if not is_cloud(given):
-            raise InputError("is no point cloud", "give a LAS or LAZ file", Path(given))
-        xyz, covariance, crs = read_precise_cloud(Path(given))
-    if len(xyz) < FEWEST:
-        raise InputError(f"{_label(given)} has {len(xyz)} points", "give a cloud of more points")
-    refuse_beyond_memory(float(BYTES_OF_POINT) * len(xyz), f"{len(xyz)} points", "cut out the part that is needed")
-    return Cloud(xyz, covariance), crs
-
-
-def _default_width(xyz: np.ndarray) -> float:
-    """m, diameter of a cylinder that holds some 30 points on level ground of median density."""
-    size = float(np.ptp(xyz[:, :2], axis=0).max()) / max(np.sqrt(len(xyz)) / 10.0, 1.0)
-    if not size > 0.0:
-        raise InputError("all points of a cloud have one place", "give a cloud of an area")
-    _, count = np.unique(np.floor(xyz[:, :2] / size), axis=0, return_counts=True)
-    density = float(np.median(count)) / size**2
-    return float(f"{2.0 * np.sqrt(POINTS_IN_CYLINDER / (np.pi * density)):.2g}")
-
-
-def _check(sizes: Sequence[tuple[str, float]]) -> None:
-    for name, value in sizes:
-        if not 0.0 < value < 1e6:
-            raise InputError(f"{name} {value:g} m is not possible", "give metres above 0")
-
-
-def _within(stable: BaseGeometry | FilePath, epsg: int | None, core: np.ndarray) -> np.ndarray:
-    import shapely
-
-    from aerotri.volume.boundary import read_boundary
-
-    polygon = read_boundary(os.fspath(stable), epsg).polygon if isinstance(stable, str | os.PathLike) else stable
-    return shapely.contains_xy(polygon, core[:, 0], core[:, 1])
-
-
-def _label(given: FilePath | np.ndarray) -> str:
-    return "array" if isinstance(given, np.ndarray) else Path(given).name
+    sources = (one for one in (second_adjustment, second, first_adjustment, first) if not isinstance(one, np.ndarray))
+    head = Head(project_of(project, *sources), crs)
+    settings = CloudSettings(scales, between, used, held, np.nan if on_stable is None else on_stable[0])
+    origin = "adjustments" if adjusted is not None else "points" if before.covariance is not None else "scatter"
+    summary = head.as_dict() | {"first": names[0], "second": names[1]}
+    summary |= cloud_change_json(found, (before, after), adjusted, settings, origin)
+    of_arguments = used_arguments(cloud_change, asked, dict.fromkeys(asked.keys() - {"stable"}, "m"))
+    summary |= {"warnings": notes, "settings": of_arguments}
+    return MeasuredCloudChange(found, summary, head)

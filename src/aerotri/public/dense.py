@@ -15,6 +15,7 @@ from aerotri.conventions import FilePath, InputError
 from aerotri.execution.choice import THREADS, chosen
 from aerotri.public.adjustment import Adjustment
 from aerotri.public.argument_types import with_checked_types
+from aerotri.public.dense_plots import DensePlots
 from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
@@ -26,8 +27,6 @@ from aerotri.results.head import Head
 from aerotri.terrain.settings import DENSE_DEFAULTS, DenseSettings
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from aerotri.formats.files.spool import Spool
     from aerotri.terrain.dense.bare_ground import BareGround
     from aerotri.terrain.dense.measure import DenseOutcome
@@ -35,46 +34,6 @@ if TYPE_CHECKING:
 RECORD, SURFACE, MATCHING, COUNT, CLOUD = "dsm.json", "dsm.tif", "matching.tif", "photographs.tif", "dsm.laz"
 GROUND, SOURCE = "dtm.tif", "ground.tif"
 OWN_NAMES = (RECORD, SURFACE, MATCHING, COUNT, CLOUD, GROUND, SOURCE, "plots")
-DRAWN = 1200
-"""Cells drawn along a side, the others skipped."""
-
-
-@dataclass(frozen=True, eq=False)
-class DensePlots:
-    """Plots of a dense surface, each a matplotlib Figure.
-
-    Parameters
-    ----------
-    record : what was measured. block : name of the block.
-    """
-
-    record: DenseOutcome
-    block: str
-
-    def surface(self) -> Figure:
-        """The surface, lit from the north-west as far as it was measured, and the σ of its matching."""
-        from aerotri.rasters.grids import Grid
-        from aerotri.report.plots.terrain import plot_dense
-
-        o = self.record
-        step = max(-(-max(o.grid.rows, o.grid.columns) // DRAWN), 1)
-        rows, columns = -(-o.grid.rows // step), -(-o.grid.columns // step)
-        z, matching, total = (np.full((rows, columns), np.nan) for _ in range(3))
-        for window, tile in o.files.read_all(list(o.windows)):
-            row, column = window.row, window.column
-            sigma = np.hypot(tile.sigma, o.shared.over(o.grid.window(row, column, window.rows, window.columns)))
-            first = -row % step, -column % step
-            i, j = (row + first[0]) // step, (column + first[1]) // step
-            for whole, part in ((z, tile.z), (matching, tile.sigma), (total, sigma)):
-                taken = part[first[0] :: step, first[1] :: step]
-                whole[i : i + taken.shape[0], j : j + taken.shape[1]] = taken
-        drawn = Grid(rows, columns, o.grid.left, o.grid.top, o.grid.cell_x * step, o.grid.cell_y * step)
-        is_local = o.photographs.places.frame is None
-        return plot_dense(drawn, z, matching, float(np.nanmedian(total)), self.block, is_local)
-
-    def all(self) -> dict[str, Figure]:
-        """Every plot by the name of its file."""
-        return {"surface": self.surface()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -319,6 +278,8 @@ def _write(target: Path, dense: DenseSurface, plots: bool) -> None:
     o, crs = dense.record, horizontal_crs(dense.crs)
     of_heights, noise = crs_of_heights(dense.crs), dense.summary["noise_length_m"]
     tags = {} if noise is None else {"NOISE_LENGTH_M": f"{noise:.4g}"}
+    lasting = dense.summary["matching_shared"]
+    tags |= {"SHARED_SIGMA_M": f"{lasting['sigma_Z_m']:.4g}", "SHARED_LENGTH_M": f"{lasting['length_m']:.4g}"}
     windows = list(o.windows)
     with atomic_folder(target, own=OWN_NAMES) as folder:
         write_surface_parts(folder / SURFACE, _surface_parts(o), o.grid, of_heights, "DSM Z, m", tags)

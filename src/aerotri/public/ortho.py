@@ -20,10 +20,10 @@ from aerotri.public.folders import paths_of, refuse_foreign_folder
 from aerotri.public.ground_of_block import off_the_ground
 from aerotri.public.progress import ProgressLike, stage_report
 from aerotri.public.results import open_result
-from aerotri.public.surfaces import as_surface
 from aerotri.public.terrain import ENDINGS
 from aerotri.public.tile_folder import fingerprints, held_tiles, open_tiles
 from aerotri.public.used_arguments import used_settings
+from aerotri.public.volume_sigma import MeasuredSurface
 from aerotri.results.head import Head
 from aerotri.terrain.ortho.settings import DEFAULTS, OrthoSettings, Sampling
 from aerotri.volume.settings import LAYERS, Layer
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from aerotri.public.surfaces import SurfaceLike
     from aerotri.results.adjustment import Adjustment as Record
+    from aerotri.terrain.ortho.accuracy import HeightSigma
     from aerotri.terrain.ortho.make import OrthoOutcome
 
 RECORD, SEAMS = "ortho.json", "seams.gpkg"
@@ -58,10 +59,10 @@ class OrthoPlots:
     block: str
 
     def orthophoto(self) -> Figure:
-        """The orthophoto with its seams, and σ of its positions."""
+        """The orthophoto with its seams and points, and σ of its positions."""
         from aerotri.report.plots.ortho import plot_orthophoto
 
-        return plot_orthophoto(self.record, self.folder, self.block)
+        return plot_orthophoto(self.record, self.folder, self.block, self.points)
 
     def points_in_it(self) -> Figure:
         """The ground around control and check points, with a cross where their coordinates are.
@@ -192,12 +193,12 @@ def orthophoto(
     if layer not in LAYERS:
         raise InputError(f"there is no layer '{layer}'", f"choose one of {', '.join(LAYERS)}")
     kept = None if tiles is None else Path(tiles)
-    ground = as_surface(surface, layer)
+    ground = MeasuredSurface(surface, layer=layer)
     return make_ortho(result, paths_of(photographs), ground, Path(out), settings, plots, kept, progress, executor)
 
 
 def make_ortho(
-    result: Adjustment | FilePath, photographs: Sequence[Path], surface: SurfaceLike, out: Path,
+    result: Adjustment | FilePath, photographs: Sequence[Path], surface: MeasuredSurface, out: Path,
     settings: OrthoSettings, plots: bool = True, tiles: Path | None = None, progress: ProgressLike = None,
     executor: str = THREADS,
 ) -> Orthophoto:  # fmt: skip
@@ -215,27 +216,28 @@ def make_ortho(
 
 
 def _made(
-    result: Adjustment | FilePath, photographs: Sequence[Path], surface: SurfaceLike, out: Path,
+    result: Adjustment | FilePath, photographs: Sequence[Path], surface: MeasuredSurface, out: Path,
     settings: OrthoSettings, plots: bool, tiles: Path | None, progress: ProgressLike, executor: str,
 ) -> Orthophoto:  # fmt: skip
     from aerotri.formats.files.atomic import atomic_folder, room_beside
-    from aerotri.rasters.grids import horizontal_crs
-    from aerotri.terrain.ortho.make import make_orthophoto
+    from aerotri.rasters.grids import cache_limited
+    from aerotri.terrain.ortho.make import CACHE_BYTES, make_orthophoto
 
     in_threads = chosen(executor).kind == "threads"
     record = (result if isinstance(result, Adjustment) else open_result(result)).record
     taken = _photographs(record, photographs)
-    ground = as_surface(surface, LAYER)
+    ground = surface.surface
     if tiles is not None:
         open_tiles(tiles, _stated(record, taken[1], ground, settings))
     with ExitStack() as stack, stage_report(progress) as report:
-        heights, sigma, notes = _opened(ground, horizontal_crs(record.result.block.crs), stack)
-        far = off_the_ground(heights, record)
+        heights, sigma, notes = _opened(surface, record, stack)
+        with cache_limited(CACHE_BYTES):
+            far = off_the_ground(heights, record)
         notes += (far,) if far else ()
         folder = stack.enter_context(atomic_folder(out, own=OWN_NAMES))
         workers = None if in_threads else stack.enter_context(opened(executor, report.said))
         room = tiles if in_threads or tiles is not None else stack.enter_context(room_beside(out))
-        made = make_orthophoto(record, taken, (heights, sigma), settings, folder, report.stage, room, workers)
+        made = make_orthophoto(record, taken, heights, sigma, settings, folder, report.stage, room, workers)
         notes += _blurred(made.blur, taken[1])
         outcome, summary, points = _described(record, made, ground.label, settings, folder)
         if plots:
@@ -319,18 +321,21 @@ def _blurred(blur: np.ndarray, paths: Sequence[Path]) -> tuple[str, ...]:
     )
 
 
-def _opened(surface: Any, crs: str | None, stack: ExitStack) -> tuple[Any, Any, tuple[str, ...]]:
-    """Heights, their σ where there are any, and what is to be said about them.
+def _opened(given: MeasuredSurface, record: Record, stack: ExitStack) -> tuple[Any, HeightSigma, tuple[str, ...]]:
+    """Heights, what is known of their errors, and what is to be said about them.
 
     Raises
     ------
     InputError
         When they are not in metres in the CRS of the block.
     """
-    from aerotri.rasters.grids import RasterReader
+    from aerotri.rasters.grids import RasterReader, horizontal_crs
     from aerotri.rasters.held import HeldRaster
     from aerotri.rasters.metric import refuse_other_units
+    from aerotri.terrain.ortho.accuracy import HeightSigma
+    from aerotri.volume.shared import adjustment_key
 
+    surface, crs = given.surface, horizontal_crs(record.result.block.crs)
     if surface.path is None:
         heights = surface.heights
         sigma = HeldRaster(heights.sigma, heights.grid, surface.crs, surface.label)
@@ -350,4 +355,6 @@ def _opened(surface: Any, crs: str | None, stack: ExitStack) -> tuple[Any, Any, 
         notes.append(f"{surface.label} does not say its coordinate system; taken for {crs}")
     if not known:
         notes.append(f"{surface.label} has no σ: the accuracy of the orthophoto is stated without that of the heights")
-    return found, sigma if known else None, tuple(notes)
+    same = given.key == adjustment_key(record)
+    noise: Any = given.noise(stack).sigma if same and given.layer == LAYER else None
+    return found, HeightSigma(sigma if known else None, noise, same), tuple(notes)

@@ -339,11 +339,11 @@ def crs_of_heights(crs: str) -> str | None:
     return None if crs == "local" else crs
 
 
-def cache_limited() -> Any:
-    """A context in which GDAL keeps `CACHE_BYTES` of blocks and no more."""
+def cache_limited(most: int = CACHE_BYTES) -> Any:
+    """A context in which GDAL keeps so many bytes of blocks and no more."""
     import rasterio
 
-    return rasterio.Env(GDAL_CACHEMAX=CACHE_BYTES)
+    return rasterio.Env(GDAL_CACHEMAX=most)
 
 
 def rasterise(

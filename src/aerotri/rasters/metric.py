@@ -217,6 +217,12 @@ def refuse_other_units(reader: RasterReader) -> None:
     units = units_of(reader)
     if units.is_metric:
         return
+    if reader.crs is None:
+        raise InputError(
+            f"its heights do not count in metres but in '{reader.stated_unit}'",
+            f'bring them to metres first: gdal_calc.py -A IN --allBands=A --calc="A*{units.height:.10g}" --outfile OUT',
+            reader.path,
+        )
     if units.plan == "metre":
         raise InputError(f"is in {units.crs}, with heights that do not count in metres",
                          "bring them to metres first: gdal_calc.py, or gdalwarp -t_srs with a height system in metres",

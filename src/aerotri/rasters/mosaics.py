@@ -38,14 +38,14 @@ class MosaicWriter:
 
 @contextmanager
 def write_mosaic(
-    path: Path, grid: Grid, bands: tuple[str, ...], dtype: str, crs: Any, average: bool
+    path: Path, grid: Grid, bands: tuple[str, ...], dtype: str, crs: Any, average: bool, cache: int = CACHE_BYTES
 ) -> Generator[MosaicWriter]:
     """A cloud-optimised GeoTIFF to be filled in any order; it stands there once the block has ended.
 
     Parameters
     ----------
     bands : descriptions; the last is the mask of colours. average : whether cells are colours with a mask, whose
-        overviews are means, or numbers, whose overviews are single cells.
+        overviews are means, or numbers, whose overviews are single cells. cache : bytes of blocks that GDAL keeps.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def write_mosaic(
     cloud = {"compress": "DEFLATE", "level": LEVEL, "predictor": "YES", "bigtiff": "IF_SAFER",
              "num_threads": "ALL_CPUS", "overview_resampling": "AVERAGE" if average else "NEAREST"}  # fmt: skip
     try:
-        with warnings.catch_warnings(), rasterio.Env(GDAL_CACHEMAX=CACHE_BYTES):
+        with warnings.catch_warnings(), rasterio.Env(GDAL_CACHEMAX=cache):
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
             with rasterio.open(
                 plain, "w", driver="GTiff", height=grid.rows, width=grid.columns, count=len(bands), dtype=dtype,

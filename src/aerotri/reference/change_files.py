@@ -25,6 +25,8 @@ PART_WORDS = {
     "adjustment": "What the adjustments add: by their equations where both are given; else to all cells alike, 0 with "
     "an alignment or one adjustment.",
     "model": "Its model part, where groups of photographs share errors; 0 where the adjustments are not given.",
+    "matching_shared": "Matching errors that neighbouring cells of dense surfaces share and that do not average out; 0 "
+    "of other surfaces.",
 }
 
 
@@ -94,8 +96,13 @@ CLOUD_JSON = (
         "sigma_from",
         "text",
         "What σ is from.",
-        values={"points": "σ and covariances of the points", "scatter": "scatter of the points along the normal"},
+        values={
+            "adjustments": "both adjustments, and what the points have for themselves",
+            "points": "σ and covariances of the points; of one adjustment their noise alone",
+            "scatter": "scatter of the points along the normal",
+        },
     ),
+    Item("adjustments_m", "number?", "What both adjustments bring to it, median; null where not given.", "m"),
     Item("registration_m", "number", "Error of the position of one cloud to the other, 1 σ.", "m"),
     Item("stable", "object?", "Stable ground; null without --stable."),
     Item("stable.core_points", "whole", "Places with a distance on it."),
@@ -103,6 +110,12 @@ CLOUD_JSON = (
     Item("sigma_m", "number", "Standard deviation of a distance, median of the places.", "m"),
     Item("level_of_detection_m", "number", "Level of detection (95 %), median of the places.", "m"),
     Item("beyond_level_percent", "number", "Share of the places beyond it.", "%"),
+    Item("gained_percent", "number", "Share beyond it that gained: the second cloud lies above the first.", "%"),
+    Item("lost_percent", "number", "Share beyond it that lost.", "%"),
+    Item("distance_m", "object", "The distances.", "m"),
+    Item("distance_m.median", "number", "Median.", "m"),
+    Item("distance_m.smallest", "number", "The smallest, negative where ground was lost.", "m"),
+    Item("distance_m.largest", "number", "The largest.", "m"),
     Item("warnings[]", "text", "Sentences to read."),
     *ARGUMENTS,
 )
@@ -144,6 +157,6 @@ def change_files() -> tuple[DescribedFile, ...]:
             CLOUD_TABLE,
             when="of point clouds",
         ),
-        DescribedFile("plots", CHANGE, "folder", "Map of the change and of σ, PNG and SVG.", when=plots),
-        DescribedFile("change.html", CHANGE, "page", "The change on one page.", when="of surfaces, unless --no-plots"),
+        DescribedFile("plots", CHANGE, "folder", "Map of the change and σ; histogram of distances.", when=plots),
+        DescribedFile("change.html", CHANGE, "page", "The change on one page.", when=plots),
     )

@@ -6,7 +6,7 @@ from aerotri.reference.head import ARGUMENTS, BLOCK, HEAD
 from aerotri.reference.image_error_files import MODELS
 from aerotri.reference.records import DescribedFile, Item, of_axes
 from aerotri.terrain.picket_status import TEXTS, PicketStatus
-from aerotri.volume.accuracy import MODEL, PARTS
+from aerotri.volume.accuracy import LASTING, MODEL, PARTS
 from aerotri.volume.settings import METHODS
 
 DTM, DSM, COMPARE, VOLUME = (f"folder of {name}" for name in ("dtm", "dsm", "compare", "volume"))
@@ -89,6 +89,17 @@ DSM_JSON = (
         "Side of the square whose cells have one noise, as neighbours share it; null where no two pairs overlap.",
         "m",
     ),
+    Item(
+        "matching_shared", "object", "Errors of the matching that neighbouring cells share and that do not average out."
+    ),
+    Item(
+        "matching_shared.sigma_Z_m",
+        "number",
+        "Standard deviation of a height by them; it is part of that of matching.",
+        "m",
+    ),
+    Item("matching_shared.length_m", "number", "Distance over which their correlation falls to 1/e.", "m"),
+    Item("matching_shared.parallax_px", "number", "Their RMS as a parallax.", "px"),
     Item("y_parallax_px", "object", "Shift across the base of a pair, its median over a tile, without sign.", "px"),
     Item("y_parallax_px.median", "number", "Median of the pairs.", "px"),
     Item("y_parallax_px.largest", "number", "Largest of the pairs.", "px"),
@@ -198,6 +209,14 @@ def _parts(of: str) -> list[Item]:
             "number",
             "Part of errors that strips or other groups of photographs share. Only where the adjustment has a model "
             "part.",
+            "m³",
+            optional=True,
+        ),
+        Item(
+            f"{of}.{LASTING}",
+            "number",
+            "Part of matching errors that neighbouring cells of a dense surface share, so that they do not average "
+            "out. Only of dense surfaces.",
             "m³",
             optional=True,
         ),
@@ -381,7 +400,9 @@ def terrain_files() -> tuple[DescribedFile, ...]:
             "sigma_y, sigma_z, m, "
             "cov_xy, cov_xz, cov_yz, m², sigma_z_matching and photographs. Class 2 is ground.",
         ),
-        DescribedFile("plots", DSM, "folder", "The surface and its standard deviation, PNG and SVG.", when=plots),
+        DescribedFile(
+            "plots", DSM, "folder", "The surface, its standard deviation and its colours, PNG and SVG.", when=plots
+        ),
         DescribedFile("compare.json", COMPARE, "json", "Statistics of the differences of two surfaces.", COMPARE_JSON),
         DescribedFile("difference.tif", COMPARE, "raster", "Differences test − control, m."),
         DescribedFile("plots", COMPARE, "folder", "Map and histogram, PNG and SVG.", when=plots),

@@ -8,7 +8,7 @@ for all.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
@@ -67,41 +67,81 @@ def covariances_at(
 ) -> np.ndarray:
     """(n, 3, 3) m² in the CRS; as `variances_at`."""
     local = places_of(calibration).to_local(xyz)
-    return _covariances(calibration, restitution, rows, local, photographs, plan=False)
+
+    def partials(part: slice) -> np.ndarray:
+        return _by_unknowns(calibration, restitution, rows, local[part], photographs[part], plan=False)
+
+    return _covariances(calibration, local, partials, 3)
 
 
-def plan_variances(
+def plan_covariances(
     calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photograph: np.ndarray
 ) -> np.ndarray:
-    """(n, 2) m², of X and Y in the CRS, of places whose height is known and which one photograph each shows.
+    """(n, 2, 2) m², of X and Y in the CRS, of places whose height is known and which one photograph each shows.
 
     Parameters
     ----------
     rows : photographs of the block. xyz : (n, 3) m in the CRS. photograph : (n,) place in `rows`.
     """
     local = places_of(calibration).to_local(xyz)
-    found = _covariances(calibration, restitution, rows, local, photograph[:, None], plan=True)
-    return np.diagonal(found, axis1=1, axis2=2)[:, :2].copy()
+
+    def partials(part: slice) -> np.ndarray:
+        return _by_unknowns(calibration, restitution, rows, local[part], photograph[part, None], plan=True)
+
+    return _covariances(calibration, local, partials, 3)[:, :2, :2].copy()
+
+
+def shown_covariances(
+    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, xyz: np.ndarray, photograph: np.ndarray,
+    measured_by: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """(n, 6, 6) m² in the CRS, what the adjustment does to details in an orthophoto and to the surface below it.
+
+    [D] A surface that was measured with the same orientation moves by e = J_e·dx, as points that are intersected do. A
+    detail that is shown at a known height moves by J_p·dx, and by t·e_Z more as the height is e_Z too high, t the
+    change of X and Y along the ray by Z. Both follow from one dx: the first three rows are J_p + t·J_e,Z (the third
+    0), the others J_e.
+
+    Parameters
+    ----------
+    photograph : (n,) place in `rows` that shows the place. measured_by : (n, m) those that the surface was measured
+        in, two at least, −1 where there are fewer.
+    """
+    local = places_of(calibration).to_local(xyz)
+    away = local - restitution.true.centre[rows[photograph]]
+    along = np.zeros_like(away)
+    along[:, :2] = away[:, :2] / away[:, 2:]
+
+    def partials(part: slice) -> np.ndarray:
+        shown = _by_unknowns(calibration, restitution, rows, local[part], photograph[part, None], plan=True)
+        surface = _by_unknowns(calibration, restitution, rows, local[part], measured_by[part], plan=False)
+        return np.concatenate([shown + along[part, :, None] * surface[:, 2:], surface], axis=1)
+
+    return _covariances(calibration, local, partials, 6)
 
 
 def _covariances(
-    calibration: Adjustment, restitution: Restitution, rows: np.ndarray, local: np.ndarray, photographs: np.ndarray,
-    plan: bool,
-) -> np.ndarray:  # fmt: skip
-    """(n, 3, 3) m² in the CRS. plan : whether heights are known, and one ray gives X and Y."""
+    calibration: Adjustment, local: np.ndarray, partials: Callable[[slice], np.ndarray], size: int
+) -> np.ndarray:
+    """(n, size, size) m² in the CRS of vectors of three coordinates, one behind the other.
+
+    Parameters
+    ----------
+    local : (n, 3) m in the frame. partials : (k, size, u) by the unknowns of the reduced system, of some places.
+    """
     frame = places_of(calibration)
     factor = calibration.system.factorise(calibration.solution.equations)
-    covariances = np.empty((len(local), 3, 3))
+    covariances = np.empty((len(local), size, size))
     for first in range(0, len(local), AT_A_TIME):
         part = slice(first, first + AT_A_TIME)
-        j = _by_unknowns(calibration, restitution, rows, local[part], photographs[part], plan)
-        q = factor.solve(j.reshape(-1, j.shape[2]).T)
-        both = np.einsum("nau,unb->nab", j, q.reshape(j.shape[2], len(j), 3))
+        j = partials(part)
+        by_columns = np.ascontiguousarray(j.reshape(-1, j.shape[2]).T)
+        q = factor.solve(by_columns)
+        both = np.einsum("nau,unb->nab", j, q.reshape(j.shape[2], len(j), size))
         covariance = calibration.local.outcome.sigma0**2 * both
         if calibration.model is not None:
-            by_columns = np.ascontiguousarray(j.reshape(-1, j.shape[2]).T)
             covariance = covariance + model_of_functions(
-                calibration.system, calibration.solution, calibration.model, by_columns, q, 3
+                calibration.system, calibration.solution, calibration.model, by_columns, q, size
             )
         covariances[part] = frame.covariances(local[part], covariance)
     return covariances

@@ -25,9 +25,9 @@ from aerotri.rasters.images import open_photograph
 from aerotri.results.adjustment import Adjustment
 from aerotri.terrain._view_kernels import View
 
-CACHE_BYTES = 900_000_000
-"""Bytes of pyramids kept in memory; chosen [C]: thirty photographs of 12 Mpx or five of 86 Mpx, and well below the 2 GB
-that the whole command may take."""
+CACHE_BYTES = 500_000_000
+"""Bytes of pyramids kept in memory; chosen [C]: seventeen photographs of 12 Mpx or three of 86 Mpx, and well below the
+2 GB that the whole command may take."""
 ROWS_AT_A_TIME = 1024
 """Rows that are read and averaged at a time."""
 EIGHT = 256

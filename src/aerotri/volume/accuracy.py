@@ -42,6 +42,8 @@ PARTS = ("adjustment", "matching", "interpolation", "base", "boundary")
 MOVES = "the boundary is taken as drawn on the surface: a shift or turn of the whole block moves both"
 MODEL = "model"
 """The part beside these where groups of photographs share errors: the model part of the adjustment."""
+LASTING = "matching_shared"
+"""The part beside these of dense surfaces: errors of the matching that do not average out."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class VolumeSigma:
 
     Parameters
     ----------
-    parts : by the names of `PARTS` and perhaps `MODEL`, each alone; interpolation holds the curvature too.
+    parts : by the names of `PARTS`, perhaps `MODEL` and `LASTING` too, each alone; interpolation holds the curvature.
     curvature : ground that straight lines between the heights are expected to leave out, m³ and its σ; not in the
         volume, None where not known.
     systematic : what uncorrected image errors add or would add.
@@ -205,9 +207,10 @@ class _Beside:
 def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: SigmaOptions) -> VolumeSigma:
     """All parts together."""
     both, shared, said = [part] if base_part is None else [part, base_part], 0.0, []
+    lasting = sum(one.lasting_variance for one in both)
     if base_part is not None and same_adjustment(part, base_part):
         joint, once = difference_part(part, base_part, options.corrected)
-        both, said = [joint], [_one_adjustment(once)]
+        both, said, lasting = [joint], [_one_adjustment(once)], lasting * (1.0 - once)
     elif base_part is not None:
         shared = shared_control_covariance(part, base_part) + shared_camera_covariance(part, base_part)
         said = [shared_in_words(part, base_part)]
@@ -223,6 +226,8 @@ def _assembled(part: Part, base_part: Part | None, beside: _Beside, options: Sig
     if any(one.calibration.model is not None for one in both):
         parts = {"adjustment": parts["adjustment"], MODEL: np.sqrt(sum(one.response.model for one in both))} | parts
         said += [_model_in_words(one, parts) for one in both if one.response.model > 0.0]
+    if any(one.lasting.sigma_m > 0.0 for one in (part, base_part) if one is not None):
+        parts[LASTING] = np.sqrt(lasting)
     if beside.line is not None:
         parts[LINE] = np.sqrt(beside.line.mean_square)
     first = both[0]

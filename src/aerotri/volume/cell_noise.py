@@ -11,6 +11,7 @@ from aerotri.functional_model.collinearity import INTERIOR_COLUMNS, linearise
 from aerotri.results.adjustment import Adjustment
 from aerotri.volume.bases import Surface
 from aerotri.volume.functionals import Functional
+from aerotri.volume.lasting import NO_LASTING, Lasting
 from aerotri.volume.pickets import Pickets
 from aerotri.volume.response import in_frame
 
@@ -24,11 +25,13 @@ class CellNoise:
 
     length_m : side of the square whose cells have one noise; 0 where neighbours share none.
     photographs : number that measured a cell, on the cells of the surface; None where not known.
+    lasting : errors that do not average out.
     """
 
     sigma: Surface | None = None
     length_m: float = 0.0
     photographs: Surface | None = None
+    lasting: Lasting = NO_LASTING
 
 
 NO_NOISE = CellNoise()

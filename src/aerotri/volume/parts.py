@@ -17,6 +17,7 @@ from aerotri.volume.boundary import Boundary
 from aerotri.volume.cell_noise import NO_NOISE, CellNoise, cells_sharing, photographs_at, shares_of_noise
 from aerotri.volume.counted import Counted, counted_pieces
 from aerotri.volume.functionals import Functional, cell_volume, tin_volume, triangulated
+from aerotri.volume.lasting import NO_LASTING, Lasting, lasting_variance
 from aerotri.volume.pickets import (
     MeasuredPickets,
     Pickets,
@@ -65,6 +66,7 @@ class Part:
     calibration, response : of its adjustment. between : the ground between its heights, None where not known.
     unseen : m², area no photographs were found for.
     measured : what the surface was measured from; None where nobody asks for it.
+    lasting : errors of its heights that do not average out.
     region : what of the boundary counts; None where all does.
     side : gives the share of what of it counts: of a cut or a fill alone.
     """
@@ -76,8 +78,15 @@ class Part:
     rays: int
     unseen: float
     measured: Measured | None = None
+    lasting: Lasting = NO_LASTING
     region: Region | None = None
     side: Callable[[Counted], Part] | None = None
+
+    @property
+    def lasting_variance(self) -> float:
+        """m⁶, of the volume by errors that do not average out."""
+        m = self.measured
+        return 0.0 if m is None else lasting_variance(m.pickets.xyz[:, :2], m.gradient[:, 2], self.lasting)
 
 
 def part_of_cells(
@@ -115,8 +124,9 @@ def part_of_cells(
     unseen = float(np.abs(functional.gradient[~seen, 2]).sum())
     between = _between_cells(ground, boundary.area, region)
     measured = Measured(pickets, functional.gradient[seen])
-    side = partial(part_of_cells, calibration, surface, boundary, base, options, noise)
-    return Part(calibration, response, between, len(pickets), len(pickets.image), unseen, measured, region, side)
+    lasting = noise.lasting if options.matching_sigma_um is None else NO_LASTING
+    side, rays = partial(part_of_cells, calibration, surface, boundary, base, options, noise), len(pickets.image)
+    return Part(calibration, response, between, len(pickets), rays, unseen, measured, lasting, region, side)
 
 
 def part_of_pickets(
@@ -140,7 +150,7 @@ def part_of_pickets(
     unseen = unseen if unseen > ROUNDING * boundary.area else 0.0
     measured, side = Measured(pickets, functional.gradient), partial(_side_of_pickets, tin, ground)
     rays = len(pickets.image)
-    return Part(calibration, response, between, len(pickets), rays, unseen, measured, region, side)
+    return Part(calibration, response, between, len(pickets), rays, unseen, measured, NO_LASTING, region, side)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +184,7 @@ def _side_of_pickets(tin: _Tin, ground: Ground | None, counted: Counted) -> Part
     between = None if ground is None or not counted.sign else between_on_side(ground, counted)
     pickets, measured = tin.pickets, Measured(tin.pickets, functional.gradient)
     rays = len(pickets.image)
-    return Part(tin.calibration, response, between, len(pickets), rays, 0.0, measured, region)
+    return Part(tin.calibration, response, between, len(pickets), rays, 0.0, measured, NO_LASTING, region)
 
 
 def part_of_measured(

@@ -83,7 +83,7 @@ def summed_part(parts: Sequence[Part], corrected: bool) -> Part:
     response = respond(first.calibration, joint.pickets, gradient, corrected)
     unseen = sum(part.unseen for part in parts)
     return Part(
-        first.calibration, response, between, len(joint.pickets), len(joint.pickets.image), unseen, joint
+        first.calibration, response, between, len(joint.pickets), len(joint.pickets.image), unseen, joint, first.lasting
     )  # fmt: skip
 
 

@@ -59,13 +59,19 @@ def by_place(xyz, *more):
 
 
 def test_every_point_once_with_all_it_has(cloud):
-    xyz, covariance, system = read_precise_cloud(cloud)
+    read = read_precise_cloud(cloud)
     given = np.concatenate([one.xyz for one in PARTS])
-    found, c = by_place(xyz, covariance)
+    found, c = by_place(read.xyz, read.covariance)
     wanted, own = by_place(given, np.concatenate([one.covariance for one in PARTS]))
     np.testing.assert_allclose(found, wanted, atol=0.00051)
     np.testing.assert_allclose(c, own[:, [0, 3, 5, 1, 2, 4]], rtol=1e-5)
-    assert system == "EPSG:25832+7837"
+    for values, own in ((read.matching, "matching"), (read.photographs, "photographs")):
+        assert values is not None
+        stated = np.concatenate([getattr(one, own) for one in PARTS])
+        np.testing.assert_allclose(
+            by_place(read.xyz, values[:, None])[1], by_place(given, stated[:, None])[1], rtol=1e-6
+        )  # fmt: skip
+    assert read.crs == "EPSG:25832+7837"
     whole = laspy.read(cloud)
     crs = whole.header.parse_crs()
     assert crs is not None

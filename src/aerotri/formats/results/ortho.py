@@ -58,7 +58,7 @@ def ortho_json(outcome: OrthoOutcome, block: Block, surface: str, resampling: st
     return {
         "aerotri": __version__, "block": str(block.name), "crs": block.crs, "surface": surface, "cell_m": g.cell_x,
         "columns": g.columns, "rows": g.rows, "bands": o.bands, "pixel_type": o.dtype, "gsd_m": o.gsd,
-        "resampling": resampling, "tiles_resumed": o.resumed,
+        "resampling": resampling, "tiles_resumed": o.resumed, "of_one_adjustment": a.same,
         "area_m2": {
             "surface": o.heights * area, "orthophoto": covered * area,
             "without_photograph": (o.heights - covered) * area, "other_photograph": o.hidden * area,

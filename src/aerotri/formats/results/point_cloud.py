@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,13 +27,13 @@ SCALE_M = 0.001
 """Step of the coordinates, m, which LAS keeps as whole numbers; chosen [C]: 1 mm is below σ of every picket, and 32
 bits then reach over 4000 km."""
 
-
+OF_MATCHING, OF_PHOTOGRAPHS = "sigma_z_matching", "photographs"
 SURFACE_FIELDS = (
     ("NormalX", "f4", "of length 1, upwards"), ("NormalY", "f4", ""), ("NormalZ", "f4", ""),
     ("sigma_x", "f4", "sigma of X [m]"), ("sigma_y", "f4", "sigma of Y [m]"), ("sigma_z", "f4", "sigma of Z [m]"),
     ("cov_xy", "f4", "covariance of X, Y [m2]"), ("cov_xz", "f4", "covariance of X, Z [m2]"),
-    ("cov_yz", "f4", "covariance of Y, Z [m2]"), ("sigma_z_matching", "f4", "of matching alone [m]"),
-    ("photographs", "u1", "that measured it"),
+    ("cov_yz", "f4", "covariance of Y, Z [m2]"), (OF_MATCHING, "f4", "of matching alone [m]"),
+    (OF_PHOTOGRAPHS, "u1", "that measured it"),
 )  # fmt: skip
 """Name, type and meaning of the extra bytes of a surface; normals are named as PDAL and CloudCompare know them."""
 
@@ -127,12 +128,28 @@ def read_point_cloud(path: Path, parallel: bool = True) -> tuple[np.ndarray, np.
     return xyz, classes
 
 
-def read_precise_cloud(path: Path) -> tuple[np.ndarray, np.ndarray | None, str]:
-    """Points (n, 3) m of a LAS or LAZ file, their covariances (n, 6) m², None where unknown, and their CRS.
+@dataclass(frozen=True, eq=False)
+class PreciseCloud:
+    """Points of a LAS or LAZ file with what it says of their σ.
 
-    The CRS is 'EPSG:n', 'EPSG:n+m' where a height system is stated, '' without a code.
+    Parameters
+    ----------
+    xyz : (n, 3) m. covariance : (n, 6) m², XX, YY, ZZ, XY, XZ, YZ; None where the points have no σ.
+    matching : (n,) m, σ of Z by matching alone; photographs : (n,) that measured a point; None where not stated.
+    crs : 'EPSG:n', 'EPSG:n+m' where a height system is stated, '' without a code.
+    """
 
-    Covariances XX, YY, ZZ, XY, XZ, YZ are those of `SURFACE_FIELDS`; with `sigma_x` to `sigma_z` alone the rest is 0.
+    xyz: np.ndarray
+    covariance: np.ndarray | None
+    matching: np.ndarray | None
+    photographs: np.ndarray | None
+    crs: str
+
+
+def read_precise_cloud(path: Path) -> PreciseCloud:
+    """The points of a LAS or LAZ file with their covariances and CRS.
+
+    What is stated of σ are `SURFACE_FIELDS`; with `sigma_x` to `sigma_z` alone the covariances are 0.
 
     Raises
     ------
@@ -147,16 +164,18 @@ def read_precise_cloud(path: Path) -> tuple[np.ndarray, np.ndarray | None, str]:
         there = set(cloud.point_format.dimension_names)
         names = ("sigma_x", "sigma_y", "sigma_z", "cov_xy", "cov_xz", "cov_yz")
         columns = [np.asarray(cloud[name], dtype=float) if name in there else np.zeros(len(xyz)) for name in names]
-        crs = cloud.header.parse_crs()
+        matching, photographs = (
+            np.asarray(cloud[name], dtype=float) if name in there else None for name in (OF_MATCHING, OF_PHOTOGRAPHS)
+        )
+        system = _code_of(cloud.header.parse_crs())
     except Exception as error:  # as above
         raise InputError(f"cannot be read: {error}", "give a whole LAS or LAZ file", path) from error
-    system = _code_of(crs)
     if not {"sigma_x", "sigma_y", "sigma_z"} <= there:
-        return xyz, None, system
+        return PreciseCloud(xyz, None, None, None, system)
     covariance = np.column_stack([*(column**2 for column in columns[:3]), *columns[3:]])
-    if not np.isfinite(covariance).all():
+    if not np.isfinite(covariance).all() or (matching is not None and not np.isfinite(matching).all()):
         raise InputError("has points whose σ is no number", "write the cloud anew", path)
-    return xyz, covariance, system
+    return PreciseCloud(xyz, covariance, matching, photographs, system)
 
 
 def _code_of(crs: CRS | None) -> str:

@@ -17,7 +17,10 @@ CAPTION = (
     "lost, grey cannot be told from noise. Right: σ of the difference."
 )
 NOTHING = "no cell is beyond the level of detection"
-PARTS = {"adjustment": "adjustments", "model": "model part of the adjustments"}
+PARTS = {
+    "adjustment": "adjustments", "model": "model part of the adjustments",
+    "matching_shared": "matching errors that neighbouring cells share",
+}  # fmt: skip
 UNKNOWNS = {
     "dZ": ("height", 1e3, "mm"), "dX": ("X", 1e3, "mm"), "dY": ("Y", 1e3, "mm"),
     "tilt_X": ("tilt along X", 1e6, "mm/km"), "tilt_Y": ("tilt along Y", 1e6, "mm/km"),

@@ -28,6 +28,7 @@ WORDS = {"sigma": "σ", "q90": "90 % below", "q95": "95 % below", "gsd": "GSD", 
 PICTURES = (
     ("ortho", "orthophoto.png", "Orthophoto"),
     ("dsm", "surface.png", "Dense surface: heights and the σ of matching"),
+    ("dsm", "colours.png", "Dense surface in the colours of the photographs"),
     ("volume", "thickness.png", "Volume: height over the base"),
 )
 """What the page begins with: step, plot and caption."""

@@ -12,7 +12,7 @@ from aerotri.report.pages.head import page_environment, page_head, settings_rows
 from aerotri.report.plots.rendering import RenderedPlot
 from aerotri.report.quality import printable, two_digits, with_sigma
 from aerotri.results.head import Head
-from aerotri.volume.accuracy import MODEL
+from aerotri.volume.accuracy import LASTING, MODEL
 
 CAPTIONS = {
     "budget": (
@@ -82,7 +82,11 @@ def _budget(c: Mapping[str, Any]) -> str:
     if s is None:
         return ""
     largest = max(s["parts_m3"], key=s["parts_m3"].get)
-    largest = "errors that groups of photographs share" if largest == MODEL else largest
+    shared = {
+        MODEL: "errors that groups of photographs share",
+        LASTING: "matching errors that neighbouring cells share",
+    }
+    largest = shared.get(largest, largest)
     known, wide = two_digits(s["sigma_m3"]), two_digits(1.96 * s["sigma_m3"])
     text = (
         f"The volume is known to {known} m³ (1 σ; 95 %: ± {wide} m³), as if the mean height were known to "

@@ -57,7 +57,7 @@ def plot_change(change: Change, content: Mapping[str, Any], areas: Sequence[Boun
             axes.imshow(quiet, extent=extent, interpolation="nearest", aspect="auto")
         image = axes.imshow(values, extent=extent, interpolation="nearest", aspect="auto", **style)
         if k == 0:
-            _hatch(axes, found & (d < 0.0), extent)
+            hatch_lost(axes, found & (d < 0.0), extent)
         for one in areas:
             axes.add_collection(LineCollection(one.rings, colors=INK, linewidths=0.9))
         for one in areas if k == 0 and len(areas) > 1 else ():
@@ -77,7 +77,7 @@ def plot_change(change: Change, content: Mapping[str, Any], areas: Sequence[Boun
     return figure
 
 
-def _hatch(axes: Axes, lost: np.ndarray, extent: tuple[float, float, float, float]) -> None:
+def hatch_lost(axes: Axes, lost: np.ndarray, extent: tuple[float, float, float, float]) -> None:
     """Hatch what was lost: in black and white it is as dark as what was gained. Single cells are left out."""
     whole = binary_opening(lost, np.ones((3, 3), bool))
     if not whole.any() or whole.all():

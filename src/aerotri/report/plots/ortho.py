@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
@@ -41,8 +42,8 @@ def _names(outcome: OrthoOutcome) -> tuple[str, str]:
 
 
 @styled
-def plot_orthophoto(outcome: OrthoOutcome, folder: Path, block_name: str) -> Figure:
-    """The orthophoto with its seams, and σ of the positions of its coarse cells."""
+def plot_orthophoto(outcome: OrthoOutcome, folder: Path, block_name: str, points: Sequence[MarkedPoint] = ()) -> Figure:
+    """The orthophoto with its seams, control and check points, and σ of the positions of its coarse cells."""
     o, g = outcome, outcome.grid
     ratio = g.rows / g.columns
     width = min((WIDTH - 3.8) / 2.0, HIGHEST / ratio)
@@ -50,7 +51,8 @@ def plot_orthophoto(outcome: OrthoOutcome, folder: Path, block_name: str) -> Fig
     covered = 100.0 * float(o.cells.sum()) / max(o.heights, 1)
     subtitle = (
         f"{int((o.cells > 0).sum())} of {len(o.cells)} photographs, cells of {length_text(float(f'{g.cell_x:.3g}'))}; "
-        f"{covered:.1f} % of the surface is seen; line: seams\n"
+        f"{covered:.1f} % of the surface is seen; line: seams"
+        f"{', triangle: control point, circle: check point' if len(points) else ''}\n"
         f"σ of X and Y (each): median {two_digits(float(np.nanmedian(o.accuracy.total)))} m"
     )
     figure = new_figure(height + 1.75, f"Orthophoto – {plain(block_name)}", subtitle)
@@ -60,6 +62,7 @@ def plot_orthophoto(outcome: OrthoOutcome, folder: Path, block_name: str) -> Fig
     axes.imshow(_shown(read_mosaic(folder / IMAGE, longest=MOST_CELLS)), extent=extent, interpolation="nearest")
     lines = [np.array(part.coords) for line in seam_lines(o)[1] for part in line.geoms]
     axes.add_collection(LineCollection(lines, colors=ACCENT, linewidths=0.6))
+    _mark(axes, points)
     coordinate_axes(axes, width, height, _names(o))
     second = axes_at(figure, 0.95 + width + 0.95, 0.75, width, height)
     sigma, coarse = o.accuracy.total, o.candidates.grid.bounds
@@ -75,6 +78,13 @@ def plot_orthophoto(outcome: OrthoOutcome, folder: Path, block_name: str) -> Fig
     scale = axes_at(figure, 0.95 + 2.0 * width + 1.1, 0.75, 0.14, height)
     figure.colorbar(image, cax=scale).set_label("σ of X and Y [m]")
     return figure
+
+
+def _mark(axes: Axes, points: Sequence[MarkedPoint]) -> None:
+    """Control and check points where their given coordinates are, dark with a white rim."""
+    for role, marker in (("control", "^"), ("check", "o")):
+        xy = np.array([p.xy for p in points if p.role == role]).reshape(-1, 2)
+        axes.scatter(*xy.T, s=26, marker=marker, c=INK, edgecolors="white", linewidths=0.9, zorder=3)
 
 
 @styled

@@ -85,7 +85,7 @@ def plot_dense(grid: Grid, z: np.ndarray, matching: np.ndarray, total: float, na
     total : m, median σ of the heights with the part of the adjustment.
     """
     known = np.isfinite(z)
-    rows, columns = (_between(known.sum(axis=axis)) for axis in (1, 0))
+    rows, columns = (between(known.sum(axis=axis)) for axis in (1, 0))
     part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     z, matching = z[part], matching[part]
     subtitle = (
@@ -97,7 +97,7 @@ def plot_dense(grid: Grid, z: np.ndarray, matching: np.ndarray, total: float, na
     return _plot_heights(shown, z, matching, name, subtitle, is_local, "σ of matching [m]")
 
 
-def _between(counts: np.ndarray) -> tuple[int, int]:
+def between(counts: np.ndarray) -> tuple[int, int]:
     """First and last row, or column, between which nearly all measured cells lie."""
     share = np.cumsum(counts) / max(int(counts.sum()), 1)
     first, last = np.searchsorted(share, [OUTLYING, 1.0 - OUTLYING])

@@ -29,7 +29,7 @@ from aerotri.report.plots.canvas import (
     write_name,
 )
 from aerotri.report.quality import two_digits, with_sigma
-from aerotri.volume.accuracy import MODEL
+from aerotri.volume.accuracy import LASTING, MODEL
 from aerotri.volume.boundary import Boundary
 from aerotri.volume.compute import Volumes
 from aerotri.volume.sections import Profile, Sections, direction_of
@@ -50,6 +50,7 @@ WORDS = {
     "adjustment": "adjustment (orientation, self-calibration; all heights correlated)",
     MODEL: "errors that groups of photographs share",
     "matching": "matching of the pickets",
+    LASTING: "matching, errors that neighbouring cells share",
     "interpolation": "ground between the pickets",
     "base": "base",
     "boundary": "position of the boundary",

@@ -35,7 +35,7 @@ MOST_LEVEL = 3
 FEWEST_PIXELS = 250
 """On the shorter side of a photograph in its coarsest level."""
 COARSE_PAIRS = 3
-BYTES_OF_CELL = 60
+BYTES_OF_CELL = 48
 """Of a coarse level, held as a whole with what bounds its heights."""
 BYTES_OF_TILE = 750_000_000
 """Memory of a process that measures a tile of the finest level, measured, without the photographs that it keeps."""
@@ -75,7 +75,7 @@ class DenseOutcome:
     photographs : what was matched; paths : their files. level : of resolution they were matched at.
     cells : that have a height. shared_cells : cells a side of the square that has one noise.
     across_px : median shift across the base of a pair. factors : of the tiles. pairs : matched in all tiles.
-    resumed : tiles that an earlier run had made.
+    resumed : tiles that an earlier run had made. pixel : m of height that a pixel of parallax is, of the median tile.
     """
 
     grid: Grid
@@ -91,6 +91,7 @@ class DenseOutcome:
     factors: np.ndarray
     pairs: np.ndarray
     resumed: int
+    pixel: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +187,7 @@ def _coarse(
     windows = tile_windows(grid, tile_side(grid, gsd, level))
     options = TileOptions(level, COARSE_PAIRS, plan.edge)
     do_windows(TileWork(photographs, store, grid, heights, options, files), windows, executor, report)
-    z = np.full((grid.rows, grid.columns), np.nan)
+    z = np.full((grid.rows, grid.columns), np.nan, np.float32)
     for window, tile in files.read_all(windows):
         z[window.row : window.row + window.rows, window.column : window.column + window.columns] = tile.z
     if not np.isfinite(z).any():
@@ -236,7 +237,7 @@ def _outcome(
     files: TileFiles, level: int, resumed: int,
 ) -> DenseOutcome:  # fmt: skip
     cells, shared_cells, across, factors, pairs = 0, [], [], [], []
-    places, shown = [], []
+    places, measured, pixels = [], [], []
     for window, tile in files.read_all(windows):
         known = int(np.isfinite(tile.z).sum())
         cells += known
@@ -246,24 +247,25 @@ def _outcome(
         across.append(tile.across)
         factors.append(tile.factor)
         pairs.append(tile.pairs)
-        for place in _some_places(grid, window, tile.z, max(int(MOST_PLACES / len(windows)), 4)):
-            places.append(place)
-            shown.append(np.unique(tile.pairs))
+        pixels.append(tile.pixel)
+        for row, column in _some_cells(tile.z, max(int(MOST_PLACES / len(windows)), 4)):
+            x, y = grid.x(window.column + column), grid.y(window.row + row)
+            places.append(np.array([x, y, tile.z[row, column]]))
+            measured.append(tile.measured_by(row, column))
     if not cells:
         raise InputError(
             "no two photographs could be matched", "check that they overlap, are sharp and belong to this orientation"
         )
     told = np.array(shared_cells)[np.isfinite(shared_cells)]
     return DenseOutcome(
-        grid, tuple(windows), files, shared_part(calibration, photographs, plan.rows, np.array(places), shown),
+        grid, tuple(windows), files, shared_part(calibration, photographs, plan.rows, np.array(places), measured),
         photographs, plan.paths, level, cells, float(np.median(told)) if len(told) else np.nan, np.concatenate(across),
-        np.array(factors), np.concatenate(pairs), resumed,
+        np.array(factors), np.concatenate(pairs), resumed, float(np.median(pixels)),
     )  # fmt: skip
 
 
-def _some_places(grid: Grid, window: TileWindow, z: np.ndarray, most: int) -> Iterator[np.ndarray]:
-    """(3,) m, cells of a tile that have a height, spread over it."""
+def _some_cells(z: np.ndarray, most: int) -> Iterator[tuple[int, int]]:
+    """Row and column of cells of a tile that have a height, spread over it."""
     rows, columns = np.nonzero(np.isfinite(z))
     for n in np.unique(np.linspace(0, len(rows) - 1, most).astype(int)):
-        row, column = int(rows[n]), int(columns[n])
-        yield np.array([grid.x(window.column + column), grid.y(window.row + row), z[row, column]])
+        yield int(rows[n]), int(columns[n])

@@ -12,8 +12,6 @@ from aerotri.results.adjustment import Adjustment
 from aerotri.terrain.adjustment_part import covariances_at
 from aerotri.terrain.photographs import Photographs
 
-MOST_RAYS = 8
-"""Photographs a place is taken to be measured in; more change its σ little."""
 NODES = 60
 """Along a side of the grid that is interpolated once."""
 
@@ -42,19 +40,21 @@ class SharedPart:
 
 
 def shared_part(
-    calibration: Adjustment, photographs: Photographs, rows: np.ndarray, places: np.ndarray, shown: list[np.ndarray]
+    calibration: Adjustment,
+    photographs: Photographs,
+    rows: np.ndarray,
+    places: np.ndarray,
+    measured: list[np.ndarray],
 ) -> SharedPart:
     """Of the surface through places (n, 3) m in the CRS.
 
     Parameters
     ----------
-    rows : photographs of the block. shown : into them, of every place, those that may have measured it.
+    rows : photographs of the block. measured : into them, of every place, those that measured it.
     """
-    chosen = np.full((len(places), MOST_RAYS), -1)
-    for n, (place, candidates) in enumerate(zip(places, shown, strict=True)):
-        away = np.hypot(*(photographs.centres[candidates, :2] - place[:2]).T)
-        nearest = candidates[np.argsort(away, kind="stable")][:MOST_RAYS]
-        chosen[n, : len(nearest)] = nearest
+    chosen = np.full((len(places), max(map(len, measured))), -1)
+    for n, own in enumerate(measured):
+        chosen[n, : len(own)] = own
     covariance = covariances_at(calibration, photographs.restitution, rows, places, chosen)
     six = covariance[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
     low, high = places[:, :2].min(axis=0), places[:, :2].max(axis=0)

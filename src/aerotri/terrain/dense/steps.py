@@ -13,11 +13,11 @@ import numpy as np
 
 from aerotri.terrain.dense.cell_scale import CellScale, middle_height, square, sum_about
 
-STEP_SHARE, STRAIGHT_SHARE, ALONE_SHARE = 0.49, 0.18, 0.36
+STEP_SHARE, STRAIGHT_SHARE, ALONE_SHARE = 0.49, 0.17, 0.36
 """Of a step that is σ of the cells next to it, where steps about them run in all directions, as crowns of trees have
 them, where they run straight, as at houses and walls, and where one pair alone saw the cell, either way; chosen [C]
 with the rest of this module on rendered houses, walls, trees and few photographs (tools/prove/dense_surface.py)."""
-FAR_SHARE = 0.29
+FAR_SHARE = 0.31
 """The same of a step further away, where few pairs saw the cell, and of one that a hole may hide; chosen [C]: most such
 cells are right, some have the height of the other side."""
 CROOKED, STRAIGHT = 0.4, 0.8

@@ -18,6 +18,7 @@ from aerotri.terrain.dense.height_range import HeightRange
 from aerotri.terrain.dense.pairs import Candidate, Pair, chosen_pairs, noise_correlation, pair_for_holes, possible_pairs
 from aerotri.terrain.dense.parallaxes import Parallaxes, parallaxes_of
 from aerotri.terrain.dense.place import Place, place_at
+from aerotri.terrain.dense.tile_surface import TileSurface, empty_tile
 from aerotri.terrain.photographs import Photographs
 
 LARGEST_JUMP_PX = 1.5
@@ -49,28 +50,6 @@ MOST_MISFITS = 50_000
 LARGEST_FACTOR = 3.0
 STEP_UNITS, NO_HEIGHT = 8, -32000
 """Of the whole numbers in which heights are looked through for patches."""
-
-
-@dataclass(frozen=True, eq=False)
-class TileSurface:
-    """Heights of a tile, (rows, columns) m, NaN where there is none.
-
-    Parameters
-    ----------
-    z : of the CRS. sigma : of matching. count : photographs. shown_by : int, the most upright of those that measured a
-        cell, −1 none. factor : by which agreement of pairs changed the σ.
-    pairs : photographs, (n, 2). across : (n,) px, median shift across the base of each.
-    shared_cells : cells along a side of the square whose noise is one, as neighbours share it; NaN where not known.
-    """
-
-    z: np.ndarray
-    sigma: np.ndarray
-    count: np.ndarray
-    shown_by: np.ndarray
-    factor: float
-    pairs: np.ndarray
-    across: np.ndarray
-    shared_cells: float
 
 
 @dataclass(frozen=True)
@@ -108,24 +87,17 @@ def measure_tile(
     if matched:
         matched += _fill_holes(work, candidates, matched, nodes, inside)
     if not matched:
-        empty = np.full(shape, np.nan)
-        return TileSurface(
-            empty,
-            empty.copy(),
-            np.zeros(shape, np.int16),
-            np.full(shape, -1, np.int32),
-            1.0,
-            np.zeros((0, 2), int),
-            np.zeros(0),
-            np.nan,
-        )
+        return empty_tile(shape)
     used, layers = [m.pair for m in matched], [m.layer for m in matched]
     numbers = np.array([[p.left, p.right] for p in used])
     scale = CellScale.of(cell_px, metres_per_pixel(place, used, options.level))
-    *maps, factor, shared_cells = _fused(place, used, layers, middle[2], scale)
-    z, sigma, count, shown_by = (a[spare:-spare, spare:-spare].copy() for a in maps)
+    shown = sorted({k for p in used for k in (p.left, p.right)}, key=lambda k: _off_nadir(place, k))
+    *maps, factor, shared_cells = _fused(place, used, shown, layers, scale)
+    z, sigma, members = (a[spare:-spare, spare:-spare].copy() for a in maps)
     across = np.array([m.across for m in matched])
-    return TileSurface(z, sigma, count, shown_by, factor, numbers, across, shared_cells)
+    return TileSurface(
+        z + middle[2], sigma, members, np.array(shown), factor, numbers, across, shared_cells, scale.pixel
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,12 +210,12 @@ def metres_per_pixel(place: Place, pairs: list[Pair], level: int) -> float:
 
 
 def _fused(
-    place: Place, pairs: list[Pair], layers: list[tuple[np.ndarray, np.ndarray]], height: float, scale: CellScale
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, float]:
-    """Heights of the CRS and their σ, m, number of photographs and the first, factor of σ, cells of one noise."""
+    place: Place, pairs: list[Pair], photographs: list[int], layers: list[tuple[np.ndarray, np.ndarray]],
+    scale: CellScale,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, float]:  # fmt: skip
+    """Heights above the place and their σ, m, bits of their photographs, factor of σ, cells of one noise."""
     heights, sigmas = (np.stack(part) for part in zip(*layers, strict=True))
     correlation = noise_correlation(place, pairs)
-    photographs = sorted({k for p in pairs for k in (p.left, p.right)}, key=lambda k: _off_nadir(place, k))
     bit = {k: 1 << n for n, k in enumerate(photographs)}
     used = np.array([bit[p.left] | bit[p.right] for p in pairs], np.int64)
     shape = heights.shape[1:]
@@ -260,24 +232,13 @@ def _fused(
     patched = _without_patches(z, PATCH_STEP_PX * tolerance)
     z[~patched], sigma[~patched], members[~patched] = np.nan, np.nan, 0
     sigma = cell_sigma(z, sigma * factor, heights, sigmas, scale)
-    count, first = _seen_by(members, np.array(photographs))
-    return z + height, sigma, count, first, factor, _shared_cells(level, sigmas)
+    return z, sigma, members.astype(np.uint64), factor, _shared_cells(level, sigmas)
 
 
 def _off_nadir(place: Place, k: int) -> float:
     """Tangent of the angle from the vertical at which a photograph sees the place."""
     x, y, z = place.photographs.centres[k] - place.origin
     return float(np.hypot(x, y) / abs(z)) if z else np.inf
-
-
-def _seen_by(members: np.ndarray, photographs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Number of photographs of every cell, and the first of them, −1 none; bits of `members` are places in the list."""
-    count, first = np.zeros(members.shape, np.int16), np.full(members.shape, -1, np.int32)
-    for n in reversed(range(len(photographs))):
-        has = (members >> n) & 1 > 0
-        count += has
-        first[has] = photographs[n]
-    return count, first
 
 
 def _without_patches(z: np.ndarray, step: float) -> np.ndarray:

@@ -12,9 +12,9 @@ import numpy as np
 
 from aerotri.kept_arrays import kept_arrays
 from aerotri.rasters.grids import Grid
-from aerotri.terrain.dense.tile import TileSurface
+from aerotri.terrain.dense.tile_surface import TileSurface
 
-FIELDS = ("z", "sigma", "count", "shown_by", "factor", "pairs", "across", "shared_cells")
+FIELDS = ("z", "sigma", "members", "photographs", "factor", "pairs", "across", "shared_cells", "pixel")
 
 
 @dataclass(frozen=True)
@@ -55,10 +55,11 @@ class TileFiles:
         part = path.with_suffix(f".{uuid.uuid4().hex}.part")
         with part.open("wb") as file:
             np.savez(
-                file, z=tile.z, sigma=tile.sigma.astype(np.float32), count=tile.count.astype(np.uint8),
-                shown_by=tile.shown_by, factor=np.array(tile.factor),
+                file, z=tile.z, sigma=tile.sigma.astype(np.float32),
+                members=tile.members.astype(np.min_scalar_type(int(tile.members.max(initial=0)))),
+                photographs=tile.photographs.astype(np.int64), factor=np.array(tile.factor),
                 pairs=tile.pairs.astype(np.int64), across=tile.across.astype(np.float64),
-                shared_cells=np.array(tile.shared_cells),
+                shared_cells=np.array(tile.shared_cells), pixel=np.array(tile.pixel),
             )  # fmt: skip
         os.replace(part, path)
 
@@ -68,8 +69,8 @@ class TileFiles:
         if parts is None or parts.keys() != set(FIELDS) or parts["z"].shape != (window.rows, window.columns):
             return None
         return TileSurface(
-            parts["z"], parts["sigma"], parts["count"], parts["shown_by"], float(parts["factor"]), parts["pairs"],
-            parts["across"], float(parts["shared_cells"]),
+            parts["z"], parts["sigma"], parts["members"], parts["photographs"], float(parts["factor"]), parts["pairs"],
+            parts["across"], float(parts["shared_cells"]), float(parts["pixel"]),
         )  # fmt: skip
 
     def remove_unfinished(self) -> None:

@@ -16,7 +16,7 @@ from aerotri.rasters.grids import Grid, RasterReader, RasterWriter, cache_limite
 from aerotri.rasters.mosaics import write_mosaic
 from aerotri.results.adjustment import Adjustment
 from aerotri.terrain.dtm import rounded
-from aerotri.terrain.ortho.accuracy import PlanAccuracy, plan_accuracy
+from aerotri.terrain.ortho.accuracy import HeightSigma, PlanAccuracy, plan_accuracy
 from aerotri.terrain.ortho.balance import Balance, balance_of, balanced, no_balance
 from aerotri.terrain.ortho.candidates import (
     Candidates,
@@ -40,8 +40,13 @@ from aerotri.terrain.pickets import footprint
 IMAGE, NUMBERS, SIGMAS = "ortho.tif", "photographs.tif", "sigma.tif"
 """Names of the rasters."""
 COMPRESSED = {"compress": "deflate", "predictor": 3}
+CACHE_BYTES = 64 << 20
+"""Of blocks of rasters that GDAL keeps [C]: the surface around a few tiles, and tiles that are being written. With the
+photographs, what tiles take and the coarse cells the command stays below 2 GB, however many photographs there are."""
 BYTES_OF_COARSE_CELL = 900
 """All that a coarse cell has, at the stage that takes most; 3 bands."""
+KEPT_BESIDE_SEAMS = 256 << 20
+"""Bytes of photographs that stay in memory while seams are laid [C], which takes most of what coarse cells need."""
 PHOTOGRAPH_BAND, BRIDGED_BAND = "number of the photograph", "1: the height was not measured but bridged"
 Report = Callable[[str, float], None]
 
@@ -80,7 +85,8 @@ class OrthoOutcome:
 def make_orthophoto(
     calibration: Adjustment,
     chosen: tuple[np.ndarray, tuple[Path, ...]],
-    surface: tuple[RasterReader, RasterReader | None],
+    surface: RasterReader,
+    sigma: HeightSigma,
     settings: OrthoSettings,
     folder: Path,
     report: Report,
@@ -91,8 +97,8 @@ def make_orthophoto(
 
     Parameters
     ----------
-    chosen : photographs of the block, and their files. surface : its heights, and their σ where it has them; in
-        metres and in the CRS of the block. folder : to write to. tiles : where tiles are kept, those that are there are
+    chosen : photographs of the block, and their files. surface : heights in metres and in the CRS of the
+        block. sigma : of them. folder : to write to. tiles : where tiles are kept, those that are there are
         taken up; None: not. executor : other processes that make the tiles, kept in `tiles`; None: threads.
 
     Raises
@@ -105,21 +111,22 @@ def make_orthophoto(
     cameras = calibration.local.block.cameras
     sizes = [cameras[c].size_px for c in calibration.local.block.images.camera[chosen[0]]]
     pixels = PixelStore(chosen[1], sizes)
-    with cache_limited():
-        ground = ground_surface(BridgedReader(surface[0], settings.fill) if settings.fill > 0.0 else surface[0])
+    with cache_limited(CACHE_BYTES):
+        ground = ground_surface(BridgedReader(surface, settings.fill) if settings.fill > 0.0 else surface)
         if not np.isfinite(ground.low).any():
-            raise InputError("has no heights", "give another surface", surface[0].path)
+            raise InputError("has no heights", "give another surface", surface.path)
         gsd = float(np.median(photographs.gsd))
         grid = _grid(photographs, ground, settings, rounded(gsd))
         candidates, grid = _candidates(photographs, ground, grid, settings, report)
         candidates = coloured(candidates, photographs, pixels, lambda share: report("colours", share))
         blur = blur_of(photographs, candidates)
         candidates = sharper_first(candidates, photographs, gsd, blur)
+        pixels.forget(KEPT_BESIDE_SEAMS)
         report("seams", 0.0)
         balance = (balance_of if settings.balance else no_balance)(len(photographs), candidates)
         choice = choose(candidates, balanced(candidates, balance), settings.seams)
         report("accuracy", 0.0)
-        accuracy = plan_accuracy(calibration, photographs, candidates, choice, surface[1])
+        accuracy = plan_accuracy(calibration, photographs, candidates, choice, sigma)
         sources = Sources(
             photographs, pixels, ground, candidates, choice, balance, settings.edge, settings.resampling
         )  # fmt: skip
@@ -215,8 +222,8 @@ def _written(
         before = do_tiles(OrthoWork(sources, kept), places, executor, lambda done: report("cells", begin * done))
     layers = (PHOTOGRAPH_BAND, *([BRIDGED_BAND] if isinstance(sources.surface.reader, BridgedReader) else []))
     with (
-        write_mosaic(folder / IMAGE, grid, bands, sources.pixels.dtype.name, crs, True) as image,
-        write_mosaic(folder / NUMBERS, grid, layers, "int32", crs, False) as numbers,
+        write_mosaic(folder / IMAGE, grid, bands, sources.pixels.dtype.name, crs, True, CACHE_BYTES) as image,
+        write_mosaic(folder / NUMBERS, grid, layers, "int32", crs, False, CACHE_BYTES) as numbers,
     ):
         for was_there, tile in results_in_threads(
             one, places, lambda done: report("cells", begin + (0.95 - begin) * done)

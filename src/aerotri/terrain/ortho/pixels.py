@@ -13,8 +13,8 @@ import numpy as np
 from aerotri.conventions import InputError
 from aerotri.rasters.images import Photograph, open_photograph
 
-CACHE_BYTES = 512 << 20
-"""Of photographs kept in memory [C]: a dozen of 12 megapixels."""
+CACHE_BYTES = 400 << 20
+"""Of photographs kept in memory [C]: a dozen of 11 megapixels."""
 LARGEST_HELD = 192 << 20
 """Bytes of a photograph that is kept whole [C]; of a larger one only windows are read, again and again."""
 TYPES = ("uint8", "uint16")
@@ -113,6 +113,12 @@ class PixelStore:
             return np.concatenate([part.reshape(rows, columns, -1) for part in parts], axis=2)
         with open_photograph(self._paths[k]) as photograph:
             return by_pixel(photograph.reduced(rows, columns))
+
+    def forget(self, most: int) -> None:
+        """Keep no more than so many bytes of photographs, those used last; the others are read again when needed."""
+        with self._lock:
+            while self._bytes > most and self._kept:
+                self._bytes -= self._kept.popitem(last=False)[1].nbytes
 
     def detail(self, k: int, times: float) -> np.ndarray | None:
         """(rows, columns) float32 mean change between pixels, of twice their size, of the whole photograph k, about so

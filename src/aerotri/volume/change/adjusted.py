@@ -98,9 +98,7 @@ class AdjustedPair:
     def in_words(self) -> str:
         """What both have in common."""
         one, two = (epoch.part(np.zeros((len(epoch.seen), 3))) for epoch in (self.first, self.second))
-        if same_adjustment(one, two):
-            return "both surfaces come from one adjustment: errors that both share cancel"
-        return shared_in_words(one, two, NAMES)
+        return in_common(one, two, NAMES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,12 +145,30 @@ class AlignedPair:
         """Of gradients (b, 3) of a functional by both surfaces, and by the alignment (u,)."""
         one = self.pair.first.part(first - self.gains[0] @ along)
         two = self.pair.second.part(second - self.gains[1] @ along)
-        if same_adjustment(one, two):
-            joint = difference_part(two, one, True)[0].response
-            return max(joint.variance, 0.0), joint.model
-        own = one.response.variance + two.response.variance
-        both = shared_control_covariance(one, two) + shared_camera_covariance(one, two)
-        return max(own - 2.0 * both, 0.0), one.response.model + two.response.model
+        return variances_of_difference(one, two)
+
+
+def variances_of_difference(one: Part, two: Part) -> tuple[float, float]:
+    """Variance of the second functional less the first by noise of the adjustments, and its model part."""
+    if same_adjustment(one, two):
+        joint = difference_part(two, one, True)[0].response
+        return max(joint.variance, 0.0), joint.model
+    own = one.response.variance + two.response.variance
+    both = shared_control_covariance(one, two) + shared_camera_covariance(one, two)
+    return max(own - 2.0 * both, 0.0), one.response.model + two.response.model
+
+
+def in_common(one: Part, two: Part, names: tuple[str, str]) -> str:
+    """What both have in common, as a sentence.
+
+    Parameters
+    ----------
+    names : of the two, as 'the first surface'.
+    """
+    if same_adjustment(one, two):
+        kind = names[0].rpartition(" ")[2]
+        return f"both {kind}s come from one adjustment: errors that both share cancel"
+    return shared_in_words(one, two, names)
 
 
 def adjusted_pair(

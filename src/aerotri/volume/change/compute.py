@@ -18,10 +18,11 @@ from aerotri.rasters.grids import Grid
 from aerotri.volume.change.adjusted import AdjustedPair, AlignedPair
 from aerotri.volume.change.alignment import NO_ALIGNMENT, Align, Alignment, align
 from aerotri.volume.change.noise import variance_of_sum
+from aerotri.volume.lasting import NO_LASTING, Lasting, lasting_variance_of_cells
 
 LEVEL = 1.959963985
 """Of 95 %: changes beyond so many σ are told from noise."""
-PARTS = ("noise", "alignment", "adjustment", "model")
+PARTS = ("noise", "alignment", "adjustment", "model", "matching_shared")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +33,14 @@ class Epoch:
     ----------
     z : (rows, columns) m. noise : σ of each cell's own noise, m, NaN where not stated.
     adjustment : σ of what the adjustment adds, m, 0 where not known. sharing : cells of one noise.
+    lasting : errors of the heights that do not average out.
     """
 
     z: np.ndarray
     noise: np.ndarray
     adjustment: np.ndarray
     sharing: float = 1.0
+    lasting: Lasting = NO_LASTING
 
 
 @dataclass(frozen=True)
@@ -132,7 +135,8 @@ def compute_change(
         adjustment = np.zeros_like(raw) if moved else np.hypot(first.adjustment, second.adjustment)
     sigma = np.sqrt(noise**2 + by_alignment + adjustment**2)
     difference = np.where(np.isfinite(sigma), difference, np.nan)
-    cells = _Cells(grid, difference, noise, adjustment, design, found, sharing, pair)
+    lasting = first.lasting, second.lasting
+    cells = _Cells(grid, difference, noise, adjustment, design, found, sharing, pair, lasting)
     significant = np.abs(difference) > LEVEL * sigma
     volumes = tuple(cells.volume(name, part, significant) for name, part in areas)
     own = np.diag(found.covariance)
@@ -162,6 +166,7 @@ class _Cells:
     alignment: Alignment
     sharing: float
     pair: AlignedPair | None
+    lasting: tuple[Lasting, Lasting]
 
     def volume(self, name: str, part: np.ndarray, significant: np.ndarray) -> ChangedVolume:
         """Of the cells of an area."""
@@ -183,10 +188,12 @@ class _Cells:
         noise, model = (np.sum(weight * np.where(used, self.adjustment, 0.0)) ** 2, 0.0)
         if self.pair is not None:
             noise, model = self.pair.variances(weight)
+        cell = self.grid.cell_x, self.grid.cell_y
         values = (
             np.sqrt(variance_of_sum(own, self.sharing)),
             np.sqrt(max(float(moved @ self.alignment.covariance @ moved), 0.0)),
             np.sqrt(noise),
             np.sqrt(model),
+            np.sqrt(sum(lasting_variance_of_cells(weight, cell, one) for one in self.lasting)),
         )
         return {name: float(value) for name, value in zip(PARTS, values, strict=True)}

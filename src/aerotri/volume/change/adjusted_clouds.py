@@ -1,0 +1,142 @@
+"""What the adjustments of two epochs bring into distances of their point clouds, with what they have in common.
+
+[D] A distance along n is n·(P₂ − P₁). Its response to either adjustment is that of a point measured there, with the
+gradient n; one adjustment counts by the difference of the responses, control and camera that two have in common by
+their covariance, as in `adjusted`. Such errors change slowly over the ground, normals do not: the (3, 3) covariance of
+P₂ − P₁ is found at some places and its elements are linear between them, nᵀCn then tells every distance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+from scipy.spatial import KDTree
+
+from aerotri.conventions import InputError
+from aerotri.results.adjustment import Adjustment
+from aerotri.volume.change.adjusted import in_common, variances_of_difference
+from aerotri.volume.change.clouds import Cloud, CloudDistances, quadratic
+from aerotri.volume.parts import Measured, Part
+from aerotri.volume.pickets import Pickets, pickets_where_seen
+from aerotri.volume.response import respond
+from aerotri.volume.settings import PER_POINT
+
+PLACES = 6
+"""Places along a side at which covariances are found [C]: deformations of a block change over tenths of a model."""
+NAMES = ("the first cloud", "the second cloud")
+PAIRS = ((0, 1), (0, 2), (1, 2))
+DIRECTIONS = np.array([*np.eye(3), *(np.eye(3)[i] + np.eye(3)[j] for i, j in PAIRS)])
+"""Along which variances tell all elements: var(a + b) = var a + var b + 2·cov(a, b)."""
+
+
+@dataclass(frozen=True, eq=False)
+class AdjustedDistances:
+    """What the adjustments bring to distances.
+
+    Parameters
+    ----------
+    difference : (k,) m², to a distance. alone : (k, 2) m², to the place of either cloud along the normal.
+    words : what both have in common.
+    """
+
+    difference: np.ndarray
+    alone: np.ndarray
+    words: str
+
+
+def adjusted_distances(
+    found: CloudDistances, clouds: tuple[Cloud, Cloud], calibrations: tuple[Adjustment, Adjustment]
+) -> AdjustedDistances:
+    """The adjustments' parts of the variances of distances.
+
+    Raises
+    ------
+    InputError
+        When no photograph of an adjustment sees its cloud.
+    """
+    rows = _places(found)
+    first, second = found.core[rows], found.core[rows] + found.distance[rows, None] * found.normal[rows]
+    epochs = [_measured(*one) for one in zip((first, second), clouds, calibrations, NAMES, strict=True)]
+    seen = epochs[0][1] & epochs[1][1]
+    if not seen.any():
+        raise InputError("no place of the clouds is seen in both adjustments", "check which result belongs to which")
+    # the points of a cloud that its adjustment sees are counted without those that it does not
+    at = [(np.cumsum(own) - 1)[seen] for _, own in epochs]
+    values = np.empty((int(seen.sum()), 3, len(DIRECTIONS)))
+    words = ""
+    for k in range(len(values)):
+        for d, direction in enumerate(DIRECTIONS):
+            one, two = (
+                _part(calibration, pickets.take(np.array([own[k]])), direction)
+                for calibration, (pickets, _), own in zip(calibrations, epochs, at, strict=True)
+            )
+            alone = [part.response.variance + part.response.model for part in (one, two)]
+            values[k, :, d] = sum(variances_of_difference(one, two)), *alone
+            words = words or in_common(one, two, NAMES)
+    covariance = _between(found.core[rows][seen], _elements(values).reshape(len(values), -1), found.core)
+    difference, *own = (quadratic(part, found.normal) for part in np.split(covariance, 3, axis=1))
+    return AdjustedDistances(np.maximum(difference, 0.0), np.maximum(np.stack(own, axis=1), 0.0), words)
+
+
+def with_adjustments(found: CloudDistances, clouds: tuple[Cloud, Cloud], adjusted: AdjustedDistances) -> CloudDistances:
+    """Distances whose σ knows both adjustments.
+
+    What each cloud has for itself is its noise of matching; where that is not known apart, what its covariances have
+    beyond the adjustment; of a cloud without σ what follows from its scatter.
+    """
+    own = np.zeros(len(found.core))
+    for k, cloud in enumerate(clouds):
+        left = found.variance[:, k]
+        if cloud.matching is not None:
+            left = found.noise[:, k]
+        elif cloud.covariance is not None:
+            left = np.maximum(found.variance[:, k] - adjusted.alone[:, k], 0.0)
+        own += left
+    return found.with_variances(own + adjusted.difference)
+
+
+def _places(found: CloudDistances) -> np.ndarray:
+    """Rows of places with a distance, spread over all of them in plan."""
+    rows = np.flatnonzero(np.isfinite(found.distance))
+    plan = found.core[rows, :2]
+    nodes = [np.linspace(low, high, PLACES) for low, high in zip(plan.min(axis=0), plan.max(axis=0), strict=True)]
+    wanted = np.stack(np.meshgrid(*nodes), axis=-1).reshape(-1, 2)
+    return rows[np.unique(KDTree(plan).query(wanted)[1])]
+
+
+def _measured(xyz: np.ndarray, cloud: Cloud, calibration: Adjustment, name: str) -> tuple[Pickets, np.ndarray]:
+    """Points (p, 3) as measured in photographs of an adjustment, and which of them are seen (p,)."""
+    per_point: int | np.ndarray = PER_POINT
+    if cloud.photographs is not None:
+        per_point = cloud.photographs[KDTree(cloud.xyz).query(xyz)[1]].astype(np.int64)
+    pickets, seen = pickets_where_seen(calibration, xyz, 1e-3 * calibration.local.outcome.sigma0_um, per_point)
+    if not seen.any():
+        raise InputError(f"no photograph of its adjustment sees {name}", "check which result belongs to it")
+    return pickets, seen
+
+
+def _part(calibration: Adjustment, picket: Pickets, direction: np.ndarray) -> Part:
+    """The share of one point along a direction (3,)."""
+    gradient = direction[None]
+    response = respond(calibration, picket, gradient)
+    return Part(calibration, response, None, 1, len(picket.image), 0.0, Measured(picket, gradient))
+
+
+def _elements(values: np.ndarray) -> np.ndarray:
+    """(…, 6) XX, YY, ZZ, XY, XZ, YZ of variances (…, 6) along `DIRECTIONS`."""
+    own = values[..., :3]
+    mixed = [0.5 * (values[..., 3 + k] - own[..., i] - own[..., j]) for k, (i, j) in enumerate(PAIRS)]
+    return np.concatenate([own, np.stack(mixed, axis=-1)], axis=-1)
+
+
+def _between(places: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Values (p, m) at places (p, 3), linear between them in plan, at (k, 3); beyond them those of the nearest."""
+    plan = places[:, :2] - places[:, :2].mean(axis=0)
+    wanted = at[:, :2] - places[:, :2].mean(axis=0)
+    out = np.asarray(NearestNDInterpolator(plan, values)(wanted))
+    if len(plan) > 3 and np.linalg.matrix_rank(plan) == 2:
+        linear = np.asarray(LinearNDInterpolator(plan, values)(wanted))
+        out = np.where(np.isfinite(linear), linear, out)
+    return out

@@ -1,0 +1,117 @@
+"""σ of an orthophoto over a surface of the same adjustment, against simulated truth."""
+
+import numpy as np
+import pytest
+from rendered_blocks import CAMERA
+
+from aerotri.deformation.restitution import FREE, restitution_of
+from aerotri.functional_model.rotation import rotation_from_angles
+from aerotri.pipeline import adjust_keeping_system
+from aerotri.rasters.grids import Grid
+from aerotri.simulation import parse_spec, simulate
+from aerotri.terrain.adjustment_part import covariances_at, plan_covariances, shown_covariances
+from aerotri.terrain.ortho.accuracy import ShownCells, shown_variances, slopes
+from small_blocks import small_spec
+
+SLOPE = np.array([0.3, -0.2])
+CORNERS = np.array([[1.0, 1.0], [-1.0, 0.5]])
+"""Where in a photograph a place is looked at, in tangents of 15°."""
+
+
+def adjusted(seed, **control):
+    tables = small_spec(camera={"cam": CAMERA})
+    tables["flight"] = tables["flight"] | {"gsd_m": 1.0, "strips": 2, "images_per_strip": 4, "cross_strips": []}
+    tables["tie_points"] = {"per_image": 60, "probability": 0.9, "sigma_um": 90.0}
+    tables["control"] = {"distance_bases": 2.0, "sigma_m": [0.1] * 3} | control
+    block, made = simulate(parse_spec(tables), seed)
+    calibration = adjust_keeping_system(block)
+    return block, made, calibration, restitution_of(calibration, FREE)
+
+
+def rays_of(truth, used, place, images):
+    """Of true rays to a place (3,): (k, 3) centres and directions as the adjusted orientation has them."""
+    centre, angles, block = truth
+    found = []
+    for k in images:
+        seen = rotation_from_angles(angles[k][None], block.rotation)[0].T @ (place - centre[k])
+        found.append((used.centre[k], used.rotation[k] @ (seen / -seen[2])))
+    return np.array(found).transpose(1, 0, 2)
+
+
+def intersected(centre, direction, start):
+    """The place (3,) whose rays fit best in the image: distances off them, by their lengths."""
+    normal, right = np.zeros((3, 3)), np.zeros(3)
+    for c, d in zip(centre, direction / np.linalg.norm(direction, axis=1)[:, None], strict=True):
+        off = (np.eye(3) - np.outer(d, d)) / np.sum((start - c) ** 2)
+        normal, right = normal + off, right + off @ c
+    return np.linalg.solve(normal, right)
+
+
+def seen_by(made, place):
+    """The four nearest photographs of those whose format holds a place, about."""
+    away = np.hypot(*(made.centre[:, :2] - place[:2]).T)
+    return np.argsort(away, kind="stable")[:4]
+
+
+@pytest.mark.parametrize("slope", [np.zeros(2), SLOPE])
+def test_details_lie_as_the_joint_covariance_says(slope):
+    """Places on a plane that moves as the surface does, met by the ray of one photograph, in 20 adjustments."""
+    normalised, apart = [], []
+    for seed in range(20):
+        block, made, calibration, restitution = adjusted(seed)
+        rows, truth = np.arange(len(block.images)), (made.centre, made.angles, block)
+        for image in (1, 6):
+            for tangent in CORNERS:
+                height = made.centre[image, 2] - 20.0
+                place = made.centre[image] + np.append(np.tan(np.radians(15.0)) * tangent * height, -height)
+                images = seen_by(made, place)
+                centre, direction = rays_of(truth, restitution.true, place, images)
+                surface = intersected(centre, direction, place) - place
+                own = rays_of(truth, restitution.true, place, [image])
+                shown = met(own[0][0], own[1][0], place + surface, slope)
+                along = (place - made.centre[image])[None]
+                cells = ShownCells(
+                    place[None], np.array([image]), along[:, :2] / along[:, 2:], slope[None], images[None]
+                )
+                given = calibration, restitution, rows, place[None], np.array([image])
+                variance = shown_variances(cells, shown_covariances(*given, images[None]))[0]
+                normalised.append((shown - place)[:2] / np.sqrt(variance))
+                of_height = covariances_at(*given[:4], images[None])[0, 2, 2] * cells.along[0] ** 2
+                apart.append(np.sqrt((np.diagonal(plan_covariances(*given)[0]) + of_height) / variance))
+    assert 0.85 < np.sqrt(np.mean(np.square(normalised))) < 1.15
+    # σ that takes height and plan for independent is another one
+    assert np.abs(np.log(np.array(apart))).max() > 0.2
+
+
+def met(centre, direction, place, slope):
+    """(3,) where a ray meets the plane through a place with a slope (2,)."""
+    normal = np.append(-slope, 1.0)
+    return centre + direction * (normal @ (place - centre)) / (normal @ direction)
+
+
+def test_a_shift_of_the_block_moves_details_as_it_does_the_surface():
+    """With points nearly free of error and poor control, a detail is as uncertain as the surface in X and Y."""
+    block, made, calibration, restitution = adjusted(
+        3, distance_bases=100.0, sigma_m=[5.0, 5.0, 5.0]
+    )  # fmt: skip
+    place = made.centre[1] + np.array([150.0, 100.0, 100.0 - made.centre[1, 2]])
+    images, rows = seen_by(made, place)[None], np.arange(len(block.images))
+    along = (place - made.centre[1])[None]
+    cells = ShownCells(place[None], np.array([1]), along[:, :2] / along[:, 2:], SLOPE[None], images)
+    both = shown_covariances(calibration, restitution, rows, place[None], np.array([1]), images)
+    np.testing.assert_allclose(shown_variances(cells, both)[0], np.diagonal(both[0, 3:5, 3:5]), rtol=0.1)
+    # and not as the height of the surface and the ray apart would make it
+    alone = plan_covariances(calibration, restitution, rows, place[None], np.array([1]))[0]
+    apart = np.diagonal(alone) + cells.along[0] ** 2 * both[0, 5, 5]
+    assert (apart > 1.1 * shown_variances(cells, both)[0]).all()
+
+
+def test_slopes_are_those_of_a_plane_and_none_at_steps():
+    grid = Grid(6, 8, 10.0, 30.0, 2.0, 2.0)
+    x, y = np.meshgrid(grid.x(np.arange(8)), grid.y(np.arange(6)))
+    z = 0.3 * x - 0.2 * y
+    np.testing.assert_allclose(slopes(z, grid)[1:-1, 1:-1], np.broadcast_to([0.3, -0.2], (4, 6, 2)))
+    step = np.where(np.arange(8) < 4, 0.0, 10.0) + np.zeros((6, 1))
+    np.testing.assert_array_equal(slopes(step, grid), 0.0)
+    z[2, 3] = np.nan
+    assert np.isfinite(slopes(z, grid)).all()
