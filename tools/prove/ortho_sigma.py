@@ -8,7 +8,7 @@ the part of the image measurement (first) and with it (total). All places of a d
 adjustment: z is the root mean square over all draws. As if independent: σ as it would be with the heights' σ and the
 orientation's as if they had nothing in common.
 
-Looks inside the package on purpose.
+Measures σ of an orthophoto by its parts: imports inside on purpose.
 
 Last result, eight draws:
 

@@ -115,8 +115,8 @@ def outcome_lines(content: dict[str, Any], target: Path) -> list[str]:
         beyond = [beyond_of_side(c, name) for name in ("cut", "fill")]
         if beyond[0] is not None and beyond[1] is not None:
             lines.append(
-                f"where the base cuts the ground: cut is expected to hold {in_digits(beyond[0], 4)} m³ more than the "
-                f"surface shows, fill {in_digits(beyond[1], 4)} m³; not in them, counted in their σ"
+                f"ground expected beyond straight lines between heights: cut {in_digits(beyond[0], 4)} m³, fill "
+                f"{in_digits(beyond[1], 4)} m³, not in the volume, counted in σ"
             )
         if s["curvature"] is not None:
             beyond = with_sigma(s["curvature"]["value_m3"], s["curvature"]["sigma_m3"], signed=True)

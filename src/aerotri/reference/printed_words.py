@@ -68,10 +68,6 @@ PRINTED_WORDS = (
         "What the standard deviation of the volume comes from, each cause alone; their squares add up to its square.",
     ),
     Word(
-        "where the base cuts the ground", VOLUME,
-        "What straight lines between the heights leave out of cut and fill, less what noise adds to them. It is beyond.",
-    ),
-    Word(
         "systematic", VOLUME,
         "What systematic image errors add to the volume where the photographs are used uncorrected.",
         "Correct the photographs (aerotri imgeo) or the DEM (aerotri demcor).",
