@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import shapely
 
@@ -21,7 +22,7 @@ AREAS = {"mound": ((576709.0, 5188164.0), 8.0), "steep heap": ((576711.0, 518813
 HEAD = "| area | m² | without heights m² | boundary | net m³ | σ m³ | adjustment | model | matching | base |"
 
 
-def row(name: str, found: aerotri.MeasuredVolume, origin: str) -> str:
+def row(name: str, found: Any, origin: str) -> str:
     """A line of the table."""
     parts = dict(zip(found.parts["part"], found.parts["sigma_m3"], strict=True))
     numbers = [f"{parts.get(part, 0.0):.1f}" for part in ("adjustment", "model", "matching", "base")]
