@@ -167,7 +167,7 @@ def test_files_are_the_same_wherever_tiles_are_measured(made, tmp_path, monkeypa
         printed = run(*given, "--out", out, "--executor", text)
         assert ("Dask dashboard: " in printed) == text.startswith("dask")
         found[text] = {path.relative_to(out): path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    assert len(found["threads"]) == 8
+    assert len(found["threads"]) == 10
     assert found["processes:2"] == found["threads"]
     assert found["dask:local:2"] == found["threads"]
 

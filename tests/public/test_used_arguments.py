@@ -26,7 +26,8 @@ def test_of_surfaces_and_clouds():
     rng = np.random.default_rng(1)
     cloud = np.column_stack([rng.uniform(0, 10, (4000, 2)), rng.normal(0, 0.02, 4000)])
     moved = aerotri.cloud_change(cloud, cloud + [0.0, 0.0, 0.3], cylinder=1.0)
-    assert stated(aerotri.cloud_change, moved.summary["settings"], "first", "second") == {"cylinder"}
+    inputs = ("first", "second", "first_adjustment", "second_adjustment")
+    assert stated(aerotri.cloud_change, moved.summary["settings"], *inputs) == {"cylinder"}
 
 
 def test_of_what_begins_with_a_result(result, tmp_path):

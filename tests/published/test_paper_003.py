@@ -15,6 +15,11 @@ from simulation.test_blocks import scaled_down
 MODULES = ("cases", "runs", "table", "figures", "reports")
 
 
+def in_turn(function, shared, seeds, _bytes_of_one):
+    """Runs one after the other."""
+    return [function(shared, seed) for seed in seeds]
+
+
 @pytest.fixture(scope="module")
 def tool():
     """The modules of the tool by name."""
@@ -34,7 +39,7 @@ def answers(tool):
     found = []
     for case in tool["cases"].FREDERIKSSTAD[:2]:
         plan = smaller(case)
-        found.append((case, plan, tool["runs"].rows_of(case, plan, [1], lambda text: None)))
+        found.append((case, plan, tool["runs"].rows_of(case, plan, [1], in_turn)))
     return found
 
 
@@ -120,7 +125,7 @@ def test_days_and_navigation(tool, answers):
     """[P] 5.1: two days give the same errors; GNSS and INS hold a block without parameters."""
     case, plan, rows = answers[0]
     runs, table = tool["runs"], tool["table"]
-    tests = runs.days_over_seeds(case, plan, [1])
+    tests = runs.days_over_seeds(case, plan, [1], in_turn)
     assert tests[0].freedom == 44
     assert tests[0].p > 1e-4
     navigation = runs.with_navigation(case, plan)
