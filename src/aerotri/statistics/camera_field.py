@@ -1,0 +1,139 @@
+"""What additional parameters leave of a camera's errors: a random field over the format, the same in all photographs.
+
+The adjustment takes image errors for noise. What all photographs of a camera share bends a surface that is measured in
+them, however many cells there are. [D] As in `cluster_fields` camera k has the errors s_k = B·p_k at its rays, p_k its
+nodes over the format with the covariance σ_s²·R, and the scores h = BᵀPv the covariance σ0²·K + σ_s²·K·R·K. Here the
+noise is not known beforehand: σ̂0 of the adjustment holds the field. With γ = σ_s²/σ0², the eigenvalues λ of K^½·R·K^½,
+z = h in their directions, whitened, and the redundancy r the restricted likelihood is that of
+
+    r·ln Ω(γ) + Σ ln(1 + γλ),   Ω(γ) = vᵀPv − Σ z²·γλ/(1 + γλ),   σ0² = Ω/r.
+
+A place that is intersected from rays with gains G moves by G·B·p, and with the unknowns by J·F·p, F = Q·AᵀPB: where the
+parameters describe a part of the field both cancel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerotri.results.adjustment import Adjustment
+from aerotri.statistics.cluster_fields import (
+    KEPT,
+    LENGTHS,
+    SIZES,
+    FieldEquations,
+    correlations,
+    field_equations,
+    half_format,
+    node_counts,
+    nodes_at,
+)
+from aerotri.statistics.cluster_test import LEVEL, SAME
+from aerotri.statistics.clusters import CAMERA, LARGE, Clusters
+
+MOST_CAMERAS = 12
+"""Cameras with a field each at most; chosen [C]: each has seventy columns in the equations."""
+
+
+@dataclass(frozen=True, eq=False)
+class CameraField:
+    """The fields of all cameras of a block.
+
+    Parameters
+    ----------
+    sigma : mm, of an image coordinate. length : mm. smooth : whether R is exp(−ρ²/2ℓ²), else exp(−ρ/ℓ).
+    gain : twice the logarithm of the likelihood with the field over that without.
+    root : (nodes, k) of σ_s²·R. half : (c, 2) mm, half formats of all cameras. counts : nodes along x and y.
+    part : (c,) place of a camera among those with photographs, −1 for others.
+    by_unknowns : (6n + s, 2·m·k) F·R^½ of the unknowns of the reduced system; columns by part, component and pattern.
+    """
+
+    sigma: float
+    length: float
+    smooth: bool
+    gain: float
+    root: np.ndarray
+    half: np.ndarray
+    counts: tuple[int, int]
+    part: np.ndarray
+    by_unknowns: np.ndarray
+
+    def at(self, xy: np.ndarray, camera: np.ndarray) -> np.ndarray:
+        """(r, k) mm, the patterns at image places (r, 2) mm from the middle of the format, of cameras (r,)."""
+        node, weight = nodes_at(xy, self.half[camera], self.counts)
+        return np.einsum("rc,rck->rk", weight, self.root[node])
+
+    def moved(self, gain: np.ndarray, xy: np.ndarray, camera: np.ndarray) -> np.ndarray:
+        """(r, d, 2·m·k) what image errors do through the gains (r, d, 2) of rays, m a mm."""
+        k = self.root.shape[1]
+        out = np.zeros((len(gain), gain.shape[1], self.by_unknowns.shape[1] // (2 * k), 2, k))
+        ray = np.arange(len(gain))
+        out[ray, :, self.part[camera]] = gain[:, :, :, None] * self.at(xy, camera)[:, None, None, :]
+        return out.reshape(len(gain), gain.shape[1], -1)
+
+
+def is_of_camera(found: Adjustment) -> bool:
+    """Whether the model part of σ is of errors that all photographs share: a field of theirs takes its place."""
+    part = found.local.model_part
+    return part is not None and part.counts and part.clusters == 1
+
+
+def camera_field(found: Adjustment) -> CameraField | None:
+    """The fields; None where the residuals are explained by noise, or the block is too large to look."""
+    system, solution, outcome = found.system, found.solution, found.local.outcome
+    u = system.unknowns
+    rows = u.block.images.camera[u.images]
+    cameras = np.unique(rows)
+    squares = outcome.sigma0**2 * outcome.redundancy
+    if len(cameras) > MOST_CAMERAS or len(u.images) > LARGE or not squares > 0.0:
+        return None
+    factor = system.factorise(solution.equations)
+    one = Clusters(CAMERA, np.zeros(len(u.images), np.int64), ("",), 1)
+    equations = field_equations(system, solution, factor, one)
+    gain, variance, length, smooth = _most_likely(found, equations, squares)
+    if np.exp(-0.5 * gain) >= LEVEL:
+        return None
+    power, patterns = np.linalg.eigh(variance * correlations(system, length, smooth))
+    kept = power > KEPT * power[-1]
+    root = patterns[:, kept] * np.sqrt(power[kept])
+    sides = equations.sides.reshape(len(equations.sides), -1, len(root)) @ root
+    part = np.full(len(u.block.cameras), -1)
+    part[equations.camera] = np.arange(len(equations.camera))
+    by_unknowns = factor.solve(np.ascontiguousarray(sides.reshape(len(sides), -1)))
+    by_unknowns[: 6 * len(u.images)] *= u.eo_free.reshape(-1, 1)
+    half = np.array([camera.half_format_mm for camera in u.block.cameras])
+    return CameraField(
+        float(np.sqrt(variance)), length, smooth, gain, root, half, node_counts(system), part, by_unknowns
+    )
+
+
+def _most_likely(found: Adjustment, equations: FieldEquations, squares: float) -> tuple[float, float, float, bool]:
+    """Twice the gain of the logarithm of the likelihood, σ_s² mm², length mm, and the form.
+
+    Parameters
+    ----------
+    squares : vᵀPv.
+    """
+    system, redundancy = found.system, found.local.outcome.redundancy
+    values, vectors = np.linalg.eigh(equations.normals)
+    there = values > SAME * values[-1]
+    root = vectors[:, there] * np.sqrt(values[there])
+    z = (vectors[:, there].T @ equations.scores) / np.sqrt(values[there])
+    spread = root.reshape(2 * len(equations.camera), equations.nodes.count, -1)
+    unit, half = float(np.median(1.0 / system.unknowns.rays.inv_sigma)), float(np.hypot(*half_format(system)))
+    sizes = (unit * SIZES) ** 2
+    best = (0.0, 0.0, half, False)
+    for smooth in (False, True):
+        for length in LENGTHS:
+            r = correlations(system, half * length, smooth)
+            power, patterns = np.linalg.eigh(np.einsum("cip,ij,cjq->pq", spread, r, spread, optimize=True))
+            grown = sizes[:, None] * np.maximum(power, 0.0)
+            explained = np.sum((patterns.T @ z) ** 2 * grown / (1.0 + grown), axis=1)
+            left = np.maximum(squares - explained, 1e-12 * squares)
+            gains = redundancy * np.log(squares / left) - np.sum(np.log1p(grown), axis=1)
+            n = int(np.argmax(gains))
+            if gains[n] > best[0]:
+                best = (float(gains[n]), float(sizes[n] * left[n] / redundancy), half * length, smooth)
+    return best
